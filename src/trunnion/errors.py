@@ -1,0 +1,84 @@
+"""What can go wrong, said so that a person can act on it.
+
+A `Finding` is one sentence about a model or a result: what, where, the figure, the remedy. Findings about a
+model are collected and raised together as one `MechanismError`; failures of a computation are data: NaN in the
+result and a `Status` for each position.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from enum import IntEnum, StrEnum
+
+__all__ = ["Finding", "MechanismError", "Severity", "Status"]
+
+
+class Severity(StrEnum):
+    """How much a finding weighs: an error forbids the analysis, a warning doubts it, a note informs."""
+
+    ERROR = "error"
+    WARNING = "warning"
+    NOTE = "note"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing to know about a model or a result.
+
+    what: the fact with its figure and the limit it breaks, a sentence without a full stop.
+    where: path inside the model such as `links.crank.mass`; empty if it concerns the whole.
+    remedy: what to do about it; line, file: where it stands in the model file, if it was read from one.
+    """
+
+    what: str
+    where: str = ""
+    remedy: str = ""
+    severity: Severity = Severity.ERROR
+    line: int | None = None
+    file: str = ""
+
+    def at(self, file: str, line: int | None) -> Finding:
+        """The same finding with its place in a file."""
+        return replace(self, file=file, line=line)
+
+    def __str__(self) -> str:
+        place = ":".join(str(part) for part in (self.file, self.line) if part)
+        head = " ".join(part for part in (f"{place}:" if place else "", f"{self.severity}:") if part)
+        subject = f"{self.where}: " if self.where else ""
+        remedy = f" — {self.remedy}" if self.remedy else ""
+        return f"{head} {subject}{self.what}{remedy}"
+
+
+class MechanismError(ValueError):
+    """The model cannot be analysed; `findings` says why, all in one go."""
+
+    def __init__(self, findings: Finding | Iterable[Finding]) -> None:
+        self.findings: tuple[Finding, ...] = (findings,) if isinstance(findings, Finding) else tuple(findings)
+        super().__init__("\n".join(str(finding) for finding in self.findings))
+
+
+class Status(IntEnum):
+    """What a position came to, in rising order of severity; from `NOT_CONVERGED` on the forces are NaN."""
+
+    text: str
+
+    def __new__(cls, value: int, text: str) -> Status:
+        """An integer code that carries its sentence."""
+        status = int.__new__(cls, value)
+        status._value_ = value
+        status.text = text
+        return status
+
+    SOLVED = 0, "solved"
+    ZERO_SLIP = 1, "a relative speed is zero: the friction of that joint is an interval"
+    NEAR_SINGULAR = 2, "close to a singular position: forces and speeds are very sensitive to the dimensions"
+    NOT_CONVERGED = 3, "the friction iteration did not converge"
+    LOCKED = 4, "locked by friction: no drive effort moves the mechanism"
+    SINGULAR = 5, "singular position (dead centre): speeds and forces have no finite value"
+    NOT_ASSEMBLED = 6, "cannot be assembled"
+
+    @property
+    def solved(self) -> bool:
+        """Whether the position has numbers for everything."""
+        return self < Status.NOT_CONVERGED

@@ -1,0 +1,1 @@
+"""Joints as built: pairs and friction laws."""

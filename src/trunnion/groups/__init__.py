@@ -1,1 +1,17 @@
-""""""
+"""Modules of a mechanism: drivers and Assur groups, on numbers.
+
+`GROUPS` lists the closed forms by the letters of their joints; everything else is a `general.General`.
+"""
+
+from __future__ import annotations
+
+from trunnion.groups import driver, rrr
+from trunnion.groups.protocol import Group
+
+__all__ = ["GROUPS", "Group"]
+
+GROUPS: dict[str, Group] = {
+    "R": driver.REVOLUTE,
+    "P": driver.PRISMATIC,
+    "RRR": rrr,
+}

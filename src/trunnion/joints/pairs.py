@@ -5,11 +5,15 @@ The table `PAIRS` is the vocabulary of `type:` in a model file. A new pair is on
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
 
 from trunnion.algebra.namespace import Number, namespace
 
-__all__ = ["PAIRS", "Pair", "guide_load", "pin_load"]
+__all__ = ["PAIRS", "Load", "Pair", "Reaction"]
 
 
 @dataclass(frozen=True)
@@ -26,20 +30,56 @@ class Pair:
     needs_axis: bool = False
 
 
-def pin_load(force: tuple[Number, Number]) -> Number:
-    """Normal load |F| of a planar pin, N.  [D 8]"""
-    xp = namespace(*force)
-    return xp.hypot(*force)
+Reaction = tuple[Number, Number, Number]  # force x, y (N) and moment (N m) about the joint's point
 
 
-def guide_load(normal: Number, moment: Number, length: Number) -> Number:
-    """Sum of the normal loads |N₁| + |N₂| at the two ends of a guide, N.
+class Load(NamedTuple):
+    """How a planar joint's reaction presses on its contact: the normal load N, its gradient, and a bound.
 
-    normal: force across the guide, N; moment: about the middle of the guide, N m; length: of the guide, m.
-    The ends carry N/2 ∓ M/L: the planar twin of a bearing that carries its load at its two ends.
+    A pin (across is None) presses with N = |F|.  [D 8]
+    A guide of the given length (m), loaded off its middle, carries on its two ends:
+    N = |F_n/2 + M/length| + |F_n/2 − M/length|, F_n along the unit vector `across`: the planar twin of a bearing
+    that carries its load at its two ends.
     """
-    xp = namespace(normal, moment, length)
-    return xp.abs(normal / 2 + moment / length) + xp.abs(normal / 2 - moment / length)
+
+    across: tuple[Number, Number] | None = None
+    length: Number = 0.0
+
+    def normal(self, reaction: Reaction) -> Number:
+        """Normal load N ≥ 0, N."""
+        x, y, m = reaction
+        if self.across is None:
+            return namespace(x, y).hypot(x, y)
+        one, other = self._ends(reaction)
+        xp = namespace(one, other)
+        return xp.abs(one) + xp.abs(other)
+
+    def gradient(self, reaction: Reaction, normal: Number) -> Reaction:
+        """∂N/∂(F_x, F_y, M); zero where the load is. normal: N of this reaction, to save computing it again."""
+        x, y, _ = reaction
+        xp = namespace(x, y)
+        if self.across is None:
+            share = 1 / xp.where(normal > 0, normal, np.inf)
+            return x * share, y * share, 0.0
+        one, other = (xp.sign(end) for end in self._ends(reaction))
+        half, turn = (one + other) / 2, (one - other) / self.length
+        return half * self.across[0], half * self.across[1], turn
+
+    def bound(self, reaction: Reaction) -> Number:
+        """Most by which this reaction, added to any other, can change N."""
+        return self.normal(reaction)
+
+    def mapped(self, change: Callable[[Number], Number]) -> Load:
+        """The same with `change` applied to every number."""
+        across = None if self.across is None else (change(self.across[0]), change(self.across[1]))
+        return Load(across, change(self.length))
+
+    def _ends(self, reaction: Reaction) -> tuple[Number, Number]:
+        x, y, m = reaction
+        if self.across is None:
+            raise ValueError("a pin has no ends")
+        half, turn = (x * self.across[0] + y * self.across[1]) / 2, m / self.length
+        return half + turn, half - turn
 
 
 PAIRS: dict[str, Pair] = {

@@ -1,1 +1,1 @@
-""""""
+"""How a mechanism is built: its mobility and its modules."""

@@ -1,0 +1,286 @@
+"""Trunnion against its peers, one table: `make bench`, or `python -m benchmarks.run`.
+
+Two measurements. Time: all contenders for a job take turns in one process, the best of several rounds counts.
+Growth and memory: each contender alone in a fresh process per number of configurations, where the peak of the
+resident memory is read. One thread throughout.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import resource
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.console import Console
+from rich.table import Table
+
+from benchmarks import peers
+from benchmarks.ours import trunnion_side
+from benchmarks.reference_kernels import (
+    COLUMN,
+    HAS_NUMBA,
+    MOTION_COLUMNS,
+    OUTPUTS,
+    numba_loop,
+    numba_motion,
+    stacked_newton_euler,
+)
+from benchmarks.side import Job, Side, crank_angles, version
+
+SIZES = (10**2, 10**3, 10**4, 10**5, 10**6)
+JOBS: dict[Job, str] = {
+    "motion": "position, velocity, acceleration",
+    "friction": "kinetostatics with friction",
+    "frictionless": "kinetostatics without friction",
+}
+BUDGET = 6.0  # s: a size expected to take longer is left out of the growth columns
+Maker = Callable[[], Side | None]
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What was found for one contender: µs per configuration in turn, and alone µs and peak bytes by size."""
+
+    best: float
+    alone: dict[int, dict[str, float]]
+
+
+def _numba(job: Job) -> Side | None:
+    """The compiled loop, for any of the three jobs."""
+    if not HAS_NUMBA:
+        return None
+    name, note = "Numba loop", f"by hand, numba {version('numba')}"
+    if job == "motion":
+        return Side(name, job, lambda n: numba_motion(crank_angles(n)), np.asarray, MOTION_COLUMNS, note=note)
+    friction = {} if job == "friction" else {"friction_radius": 0.0}
+    return Side(name, job, lambda n: numba_loop(crank_angles(n), **friction), np.asarray, OUTPUTS, note=note)
+
+
+def _stacked(solve_once: bool) -> Side:
+    """The stacked 9×9 equations with friction."""
+    note = "one solve, 5 right sides" if solve_once else "solved in each iteration"
+    name = "stacked 9×9, superposed" if solve_once else "stacked 9×9"
+
+    def run(n: int) -> NDArray[np.floating[Any]]:
+        return stacked_newton_euler(crank_angles(n), solve_once=solve_once)
+
+    return Side(name, "friction", run, np.asarray, OUTPUTS, note=note)
+
+
+# name → maker, in the order of the table; Trunnion leads each job and is what the others are divided by
+CONTENDERS: dict[Job, dict[str, Maker]] = {
+    "motion": {
+        "Trunnion": lambda: trunnion_side("motion"),
+        "Numba loop": lambda: _numba("motion"),
+        "pylinkage": peers.pylinkage_side,
+    },
+    "friction": {
+        "Trunnion": lambda: trunnion_side("friction"),
+        "Numba loop": lambda: _numba("friction"),
+        "stacked 9×9": lambda: _stacked(False),
+        "stacked 9×9, superposed": lambda: _stacked(True),
+    },
+    "frictionless": {
+        "Trunnion": lambda: trunnion_side("frictionless"),
+        "Numba loop": lambda: _numba("frictionless"),
+        "Pinocchio": peers.pinocchio_side,
+        "fourbarhinge": peers.fourbarhinge_side,
+    },
+}
+
+
+def timed(call: Callable[[], Any]) -> float:
+    """Seconds one call takes."""
+    start = time.perf_counter()
+    call()
+    return time.perf_counter() - start
+
+
+def take_turns(sides: Iterable[Side], rounds: int) -> dict[str, float]:
+    """Best µs per configuration of each side; they run in turn so that a busy spell hits all of them."""
+    sides = list(sides)
+    best = dict.fromkeys((side.name for side in sides), math.inf)
+    for round_ in range(rounds + 1):
+        for side in sides:
+            seconds = timed(partial(side.run, side.configurations))
+            if round_ > 0:  # the first warms caches and compilers
+                best[side.name] = min(best[side.name], seconds / side.configurations * 1e6)
+    return best
+
+
+def deviation(side: Side, n: int = 360) -> float:
+    """Largest difference from the reference (the Numba loop's equations), relative to each column's peak."""
+    theta = crank_angles(n)
+    if side.job == "motion":
+        reference, names = numba_motion(theta), {name: k for k, name in enumerate(MOTION_COLUMNS)}
+    else:
+        friction = {} if side.job == "friction" else {"friction_radius": 0.0}
+        reference, names = numba_loop(theta, **friction), COLUMN
+    found = side.table(side.run(n))
+    worst = 0.0
+    for k, column in enumerate(side.columns):
+        expected = reference[:, names[column]]
+        difference = np.abs(found[:, k] - expected)
+        if column.startswith("link_angle"):
+            difference = np.abs(np.angle(np.exp(1j * difference)))  # modulo a turn
+        peak = np.abs(expected).max()
+        if column != "iterations" and peak > 0.0:
+            worst = max(worst, float(difference.max() / peak))
+    return worst
+
+
+def peak_memory() -> int:
+    """Peak resident memory of this process, bytes.
+
+    On Linux the high-water mark of the address space: ru_maxrss of a child also counts its parent before exec.
+    """
+    status = Path("/proc/self/status")
+    if status.exists():
+        for line in status.read_text().splitlines():
+            if line.startswith("VmHWM"):
+                return int(line.split()[1]) * 1024
+    scale = 1 if sys.platform == "darwin" else 1024
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * scale
+
+
+def measure_alone(job: Job, name: str, n: int) -> None:
+    """In a fresh process: best time and peak memory of one contender, printed as JSON."""
+    side = CONTENDERS[job][name]()
+    if side is None:
+        raise SystemExit(f"{name} is not installed")
+    side.run(100)
+    rounds = 200 if n <= 1000 else 10 if n <= 10**5 else 2
+    seconds = math.inf
+    spent = 0.0
+    for _ in range(rounds):
+        once = timed(partial(side.run, n))
+        seconds, spent = min(seconds, once), spent + once
+        if spent > BUDGET / 4:
+            break
+    print(json.dumps({"us": seconds / n * 1e6, "bytes": peak_memory()}))
+
+
+def growth(job: Job, side: Side, best: float, sizes: Iterable[int]) -> dict[int, dict[str, float]]:
+    """µs per configuration and peak bytes of a side at each size, each in a process of its own."""
+    found = {}
+    for n in sizes:
+        if best * n * 1e-6 > BUDGET:
+            continue
+        command = [sys.executable, "-m", "benchmarks.run", "--alone", job, side.name, str(n)]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        if done.returncode == 0:
+            found[n] = json.loads(done.stdout.splitlines()[-1])
+    return found
+
+
+def _figures(value: float) -> str:
+    """Three significant digits without an exponent."""
+    if not math.isfinite(value):
+        return "–"
+    return f"{value:.{max(0, 2 - math.floor(math.log10(value)))}f}" if value > 0 else "0"
+
+
+def empty_table() -> Table:
+    """The table's columns."""
+    table = Table(title="Four-bar of Durango et al. (2010), one thread", title_justify="left", pad_edge=False)
+    table.add_column("job, contender")
+    table.add_column("µs per\nconfiguration", justify="right")
+    table.add_column("time against\nTrunnion", justify="right")
+    for n in SIZES:
+        table.add_column(f"µs at\n10^{round(math.log10(n))}", justify="right")
+    table.add_column("peak MB at\n10^5", justify="right")
+    table.add_column("peak MB at\n10^6", justify="right")
+    table.add_column("deviation", justify="right")
+    return table
+
+
+def fill_job(table: Table, job: Job, rounds: int, sizes: tuple[int, ...]) -> dict[str, Measured]:
+    """Measure one job and add its rows; returns the figures by contender."""
+    sides = {name: side for name, make in CONTENDERS[job].items() if (side := make()) is not None}
+    best = take_turns(sides.values(), rounds)
+    found: dict[str, Measured] = {}
+    table.add_row(f"[bold]{JOBS[job]}[/bold]")
+    for name in CONTENDERS[job]:
+        if name not in sides:
+            table.add_row(f"  {name}", "not installed")
+            continue
+        side = sides[name]
+        found[name] = Measured(best[name], growth(job, side, best[name], sizes))
+        alone = found[name].alone
+        table.add_row(
+            f"  {name}" + (f" ({side.note})" if side.note else ""),
+            _figures(best[name]),
+            _figures(best[name] / best.get("Trunnion", math.nan)),
+            *(_figures(alone[n]["us"]) if n in alone else "–" for n in SIZES),
+            *(f"{alone[n]['bytes'] / 1e6:.0f}" if n in alone else "–" for n in (10**5, 10**6)),
+            f"{deviation(side):.0e}",
+        )
+    table.add_section()
+    return found
+
+
+def verdicts(found: dict[Job, dict[str, Measured]]) -> list[tuple[str, bool]]:
+    """The project's limits, each with whether it is kept; a limit whose contender is missing is left out."""
+    limits = []
+    friction, motion = found["friction"], found["motion"]
+    if "Trunnion" in friction:
+        ours = friction["Trunnion"]
+        ratio = friction["stacked 9×9"].best / ours.best
+        limits.append((f"with friction {ratio:.1f} × faster than the stacked 9×9, at least 5", ratio >= 5.0))
+        if "Numba loop" in friction:
+            limit = max(0.6, 2.5 * friction["Numba loop"].best)
+            text = f"with friction {ours.best:.3f} µs, at most max(0.6, 2.5 × Numba loop) = {limit:.3f} µs"
+            limits.append((text, ours.best <= limit))
+        if 10**6 in ours.alone:
+            peak = ours.alone[10**6]["bytes"] / 1e6
+            limits.append((f"10^6 configurations within {peak:.0f} MB, at most 1000", peak <= 1000.0))
+    if "Trunnion" in motion and "pylinkage" in motion:
+        ratio = motion["pylinkage"].best / motion["Trunnion"].best
+        limits.append((f"motion at {ratio:.2f} × the speed of pylinkage, at least 1", ratio >= 1.0))
+    return limits
+
+
+def main() -> int:
+    """Command line."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--rounds", type=int, default=15, help="rounds of the interleaved timing")
+    parser.add_argument("--no-growth", action="store_true", help="leave out growth and memory")
+    parser.add_argument("--check", action="store_true", help="exit status 1 if a limit is broken")
+    parser.add_argument("--alone", nargs=3, metavar=("JOB", "CONTENDER", "N"), help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.alone:
+        job, name, n = options.alone
+        measure_alone(job, name, int(n))
+        return 0
+    console = Console(width=None if sys.stdout.isatty() else 170)
+    sizes = () if options.no_growth else SIZES
+    table = empty_table()
+    found: dict[Job, dict[str, Measured]] = {}
+    for job, title in JOBS.items():
+        with console.status(title):
+            found[job] = fill_job(table, job, options.rounds, sizes)
+    console.print(table)
+    console.print(
+        "µs per configuration: best of the rounds, contenders in turn, 10^5 configurations (Pinocchio 5000, "
+        "fourbarhinge 500); µs and peak MB at a size: alone in a fresh process, interpreter and imports "
+        "included; deviation: from the Numba loop, relative to each output's peak."
+    )
+    limits = verdicts(found)
+    for sentence, kept in limits:
+        console.print(f"{'kept' if kept else 'BROKEN'}: {sentence}")
+    return int(options.check and not all(kept for _, kept in limits))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,112 @@
+"""Small dense systems, unrolled: the matrix is a list of rows whose entries broadcast over the whole batch.
+
+An entry is any number of `algebra.namespace`, so dual numbers flow through a solve as through everything else.
+`numpy.linalg.solve` on stacks is the oracle in the tests.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from trunnion.algebra.dual import primal
+from trunnion.algebra.namespace import Number, namespace
+
+__all__ = ["condition", "cross", "determinant", "dot", "inverse", "solve"]
+
+Vector = tuple[Number, Number]
+
+
+def dot(a: Vector, b: Vector) -> Number:
+    """a · b of planar vectors."""
+    return a[0] * b[0] + a[1] * b[1]
+
+
+def cross(a: Vector, b: Vector) -> Number:
+    """z component of a × b of planar vectors."""
+    return a[0] * b[1] - a[1] * b[0]
+
+
+def solve(matrix: Sequence[Sequence[Number]], *sides: Sequence[Number]) -> list[list[Number]]:
+    """Solutions x of A x = b for each right-hand side b in `sides`, by elimination with row pivoting per lane.
+
+    matrix: n rows of n entries; sides: n entries each. Returns one list of n entries for each side.
+    A singular lane comes out non-finite (a zero pivot divides).
+    """
+    n = len(matrix)
+    columns = n + len(sides)
+    rows = [[*row, *(side[i] for side in sides)] for i, row in enumerate(matrix)]
+    xp = namespace(*(entry for row in rows for entry in row))
+    if xp is np:  # array scalars divide by zero quietly under errstate, plain floats raise
+        rows = [[np.asarray(entry, float) for entry in row] for row in rows]
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        for k in range(n - 1):
+            _pivot(rows, k, columns, xp)
+            for i in range(k + 1, n):
+                factor = rows[i][k] / rows[k][k]
+                for j in range(k + 1, columns):
+                    rows[i][j] = rows[i][j] - factor * rows[k][j]
+        solutions: list[list[Number]] = []
+        for column in range(n, columns):
+            x: list[Number] = [0.0] * n
+            for i in reversed(range(n)):
+                total = rows[i][column]
+                for j in range(i + 1, n):
+                    total = total - rows[i][j] * x[j]
+                x[i] = total / rows[i][i]
+            solutions.append(x)
+    return solutions
+
+
+def _pivot(rows: list[list[Number]], k: int, columns: int, xp: Number) -> Number:
+    """Bring the largest entry of column k, rows k and below, into row k, lane by lane; −1 for an odd number of swaps."""
+    sign: Number = 1.0
+    for i in range(k + 1, len(rows)):
+        swap = np.abs(primal(rows[i][k])) > np.abs(primal(rows[k][k]))
+        if not np.any(swap):
+            continue
+        sign = np.where(swap, -sign, sign)
+        everywhere = bool(np.all(swap))
+        for j in range(k, columns):
+            upper, lower = rows[k][j], rows[i][j]
+            if everywhere:
+                rows[k][j], rows[i][j] = lower, upper
+            else:
+                rows[k][j], rows[i][j] = xp.where(swap, lower, upper), xp.where(swap, upper, lower)
+    return sign
+
+
+def inverse(matrix: Sequence[Sequence[Number]]) -> list[list[Number]]:
+    """A⁻¹ as rows, by elimination with row pivoting per lane; non-finite where a lane is singular."""
+    n = len(matrix)
+    columns = solve(matrix, *([1.0 if i == j else 0.0 for i in range(n)] for j in range(n)))
+    return [[columns[j][i] for j in range(n)] for i in range(n)]
+
+
+def determinant(matrix: Sequence[Sequence[Number]]) -> Number:
+    """Determinant by elimination with row pivoting per lane; NaN or 0 where a lane is singular."""
+    n = len(matrix)
+    rows = [list(row) for row in matrix]
+    xp = namespace(*(entry for row in rows for entry in row))
+    product: Number = 1.0
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        for k in range(n):
+            product = product * _pivot(rows, k, n, xp) * rows[k][k]
+            for i in range(k + 1, n):
+                factor = rows[i][k] / rows[k][k]
+                for j in range(k + 1, n):
+                    rows[i][j] = rows[i][j] - factor * rows[k][j]
+    return product
+
+
+def condition(matrix: Sequence[Sequence[Number]]) -> np.ndarray:
+    """2-norm condition number of each lane (∞ if singular, NaN where an entry is); real parts only."""
+    entries = np.broadcast_arrays(*(np.asarray(primal(entry), float) for row in matrix for entry in row))
+    n = len(matrix)
+    stack = np.stack(entries, axis=-1).reshape(*entries[0].shape, n, n)
+    bad = ~np.isfinite(stack).all(axis=(-2, -1))
+    values = np.linalg.svd(np.where(bad[..., None, None], 1.0, stack), compute_uv=False)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = values[..., 0] / values[..., -1]
+    return np.where(bad, np.nan, ratio)

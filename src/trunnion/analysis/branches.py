@@ -1,0 +1,371 @@
+"""Which way a mechanism is put together: a choice stated once, at the start of the cycle, and then carried.
+
+A closed-form group has the branches +1 and −1. A general group is solved at the start from many guesses, the
+assembly nearest the hint is taken, and that one is followed along the nominal cycle: the `Track`. Any batch then
+starts Newton from the track, all lanes in parallel, and a lane that ends on another branch is not assembled.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.algebra.dual import primal
+from trunnion.algebra.namespace import Number
+from trunnion.analysis.kinematics import Forward, pairs_of, pose_of, start, take
+from trunnion.analysis.system import System, Values, driven_coordinates
+from trunnion.errors import Finding, Severity
+from trunnion.groups.general import General, Pose
+from trunnion.groups.planar import Frame, point
+from trunnion.structure.decompose import Module
+
+__all__ = ["Chosen", "Track", "choose"]
+
+Array = NDArray[np.float64]
+
+GRID = 720  # intervals of the nominal cycle along which general groups are followed
+GUESSES = 512
+SEED = 20060704  # of the guesses: the same assemblies every time
+TURN_JUMP = 0.35  # rad between neighbours of the grid: more is another branch
+SLIDE_JUMP = 0.25  # of the group's size, likewise
+
+
+@dataclass(frozen=True)
+class Track:
+    """Free tree coordinates of a general group along the nominal cycle, and the sign of det J on its branch.
+
+    times: (grid,) s; coordinates: (free, grid), NaN where the group cannot be assembled.
+    """
+
+    times: Array
+    coordinates: Array
+    orientation: float
+    periodic: bool
+
+    def pose(
+        self, group: General, elements: Sequence[tuple[Frame, Frame]], drive: Sequence[Number], time: Number
+    ) -> Pose:
+        """Pose by Newton from the track; NaN in the lanes that left its branch."""
+        moment = np.mod(primal(time), self.times[-1]) if self.periodic else primal(time)
+        near = np.clip(np.searchsorted(self.times, moment), 1, len(self.times) - 1) if len(self.times) > 1 else 0
+        guess = [_interpolated(self.times, row, moment, near) for row in self.coordinates]
+        pose = group.position(elements, guess, drive)
+        stays = pose.orientation == self.orientation
+        for i, value, from_ in zip(group.free, (pose.q[i] for i in group.free), guess, strict=True):
+            revolute = group.joints[group.steps[i].joint].kind == "revolute"
+            reach = 4 * TURN_JUMP if revolute else np.inf
+            stays = stays & (np.abs(primal(value) - from_) < reach)
+        return pose._replace(frames=tuple(_kept(frame, stays) for frame in pose.frames))
+
+
+def _interpolated(times: Array, row: Array, moment: Array, near: NDArray[np.intp] | int) -> Array:
+    """Linear between the grid's neighbours; from the one that exists where the other does not."""
+    if len(times) == 1:
+        return np.broadcast_to(row[0], np.shape(moment))
+    before, after = row[near - 1], row[near]
+    share = (moment - times[near - 1]) / (times[near] - times[near - 1])
+    mixed: Array = before + share * (after - before)
+    return np.where(np.isfinite(mixed), mixed, np.where(np.isfinite(before), before, after))
+
+
+def _kept(frame: Frame, lanes: Number) -> Frame:
+    if np.all(lanes):
+        return frame
+    hole = np.where(lanes, 0.0, np.nan)
+    return Frame(*(n + hole for n in frame))
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """Assembly of every module (±1, Track, None for a driver), how many there were, and what there is to say."""
+
+    assembly: tuple[Any, ...]
+    found: tuple[int, ...]
+    findings: tuple[Finding, ...]
+
+
+def choose(system: System, values: Values) -> Chosen:
+    """The assembly of every module that lies nearest the hints, at the nominal values and the start of the cycle."""
+    cycle = system.cycle(values)
+    times = np.linspace(0.0, cycle.duration, GRID + 1 if cycle.duration > 0 else 1)
+    walk = start(system, values)
+    chosen: list[Any] = []
+    counts: list[int] = []
+    findings: list[Finding] = []
+    with np.errstate(all="ignore"):
+        for number, module in enumerate(system.plan.modules):
+            group = system.groups[number]
+            if module.rank == 1:
+                assembly, count = None, 1
+            elif isinstance(group, General):
+                drive, _, _ = driven_coordinates(system, module, system.places[number], values, times)
+                assembly, count = _track(walk, number, group, drive, times, cycle.periodic)
+            else:
+                assembly, count = _branch(walk, number, times), 2
+            if module.rank > 1 and count > 1 and not _hints(walk, module):
+                findings.append(_unstated(module, count))
+            chosen.append(assembly)
+            counts.append(count)
+            if isinstance(assembly, Track) and not np.any(np.isfinite(assembly.coordinates)):
+                findings.append(_never(module))
+            take(walk, number, pose_of(walk, number, assembly, times), times)
+    return Chosen(tuple(chosen), tuple(counts), tuple(findings))
+
+
+def _unstated(module: Module, count: int) -> Finding:
+    links = ", ".join(module.links)
+    what = f"links {links} can be assembled in {count} ways and no hint says which; one was taken"
+    remedy = f"say roughly where a point is at the start, e.g. assembly: {{{module.joints[len(module.joints) // 2]}: [x, y]}}"
+    return Finding(what, "assembly", remedy, Severity.WARNING)
+
+
+def _never(module: Module) -> Finding:
+    what = f"links {', '.join(module.links)} cannot be assembled anywhere along the cycle"
+    return Finding(what, "links", "check the lengths, or give a better assembly hint", Severity.WARNING)
+
+
+# ---- hints ----------------------------------------------------------------------------------------------------
+
+
+def _hints(walk: Forward, module: Module) -> list[tuple[str, str, tuple[Number, ...]]]:
+    """(link, point, (x, y)) or ("", joint, (angle,)) of the hints that tell assemblies of this module apart."""
+    found: list[tuple[str, str, tuple[Number, ...]]] = []
+    values = walk.values
+    for key in walk.system.mechanism.assembly:
+        path = f"assembly.{key}"
+        if f"{path}.x" in values:
+            link, name = _point_of(walk.system, module, key)
+            if link:
+                found.append((link, name, (values[f"{path}.x"], values[f"{path}.y"])))
+        elif key in module.joints:
+            found.append(("", key, (values[path],)))
+    return found
+
+
+def _point_of(system: System, module: Module, key: str) -> tuple[str, str]:
+    """The link of the module that carries the hinted point, if the place of the point is not known without it."""
+    if key in system.joints:
+        links = system.joints[key][1]
+        inside = [link for link in links if link in module.links]
+        known = system.joints[key][0] == "revolute" and len(inside) == 1
+        return ("", "") if not inside or known else (inside[-1], key)
+    link, _, name = key.partition(".")
+    return (link, name) if link in module.links else ("", "")
+
+
+def _distance(walk: Forward, module: Module, frames: Sequence[Frame], lane: Any) -> Array:
+    """Sum of the squared distances of an assembly from the hints, m² and rad²; `lane` picks the start."""
+    total: Any = 0.0
+    for link, name, place in _hints(walk, module):
+        if link:
+            frame = frames[module.links.index(link)]
+            path = f"links.{link}.points.{name}"
+            x, y = point(frame, walk.values[f"{path}.x"], walk.values[f"{path}.y"])
+            total = total + (lane(x) - place[0]) ** 2 + (lane(y) - place[1]) ** 2
+        else:
+            first, second = (_direction(walk, module, frames, side) for side in walk.system.joints[name][1])
+            turn = lane(second) - lane(first) - place[0]
+            total = total + np.angle(np.exp(1j * turn)) ** 2
+    return np.asarray(total, float)
+
+
+def _direction(walk: Forward, module: Module, frames: Sequence[Frame], link: str) -> Number:
+    frame = frames[module.links.index(link)] if link in module.links else walk.motions[link].frame
+    return np.arctan2(frame.s, frame.c)
+
+
+def _first(number: Number) -> Any:
+    """The value at the start of the cycle."""
+    return np.ravel(number)[0]
+
+
+# ---- closed forms ---------------------------------------------------------------------------------------------
+
+
+def _branch(walk: Forward, number: int, times: Array) -> int:
+    """+1 or −1: the nearer to the hints at the start; where it does not close there, the side the hint lies on."""
+    module = walk.system.plan.modules[number]
+    if not _hints(walk, module):
+        return 1
+    distances = [
+        _first(_distance(walk, module, pose_of(walk, number, branch, times).frames, _first)) for branch in (1, -1)
+    ]
+    if np.all(np.isfinite(distances)):
+        return 1 if distances[0] <= distances[1] else -1
+    return _side(walk, number)
+
+
+def _side(walk: Forward, number: int) -> int:
+    """Side of the line between the outer pins on which the hinted inner pin lies."""
+    module, places = walk.system.plan.modules[number], walk.system.places[number]
+    (b, _), _, (d, _) = pairs_of(walk, places)
+    for _, name, place in _hints(walk, module):
+        if name == module.joints[1] and len(place) == 2:
+            x, y = _first(b.x), _first(b.y)
+            side = (_first(d.x) - x) * (place[1] - y) - (_first(d.y) - y) * (place[0] - x)
+            return 1 if side >= 0 else -1
+    return 1
+
+
+# ---- general groups -------------------------------------------------------------------------------------------
+
+
+def _track(
+    walk: Forward, number: int, group: General, drive: Sequence[Number], times: Array, periodic: bool
+) -> tuple[Track, int]:
+    """The assembly nearest the hints, followed both ways from the first position where there is one."""
+    module, places = walk.system.plan.modules[number], walk.system.places[number]
+    elements = pairs_of(walk, places)
+    grid = len(times)
+    rows = np.full((len(group.free), grid), np.nan)
+    for first in _starts(grid):
+        found = _assemblies(group, _at(elements, first), [_lane(q, first) for q in drive])
+        if found.q[0].size:
+            break
+    else:
+        return Track(times, rows, 0.0, periodic), 0
+    distance = np.broadcast_to(_distance(walk, module, found.frames, lambda n: n), found.orientation.shape)
+    best = int(np.argmin(distance))
+    orientation = float(found.orientation[best])
+    here = np.array([found.q[i][best] for i in group.free])
+    rows[:, first] = here
+    follower = _Follower(group, elements, drive, orientation)
+    follower.run(rows, list(range(first, grid)))
+    follower.run(rows, list(range(first, -1, -1)))
+    if periodic:
+        _wrap(rows, group)
+        follower.run(rows, _gap_backward(rows))
+    return Track(times, rows, orientation, periodic), len(distance)
+
+
+def _starts(grid: int) -> Iterator[int]:
+    """The start of the cycle, then positions spread over it."""
+    yield from sorted({int(i) for i in np.linspace(0, grid - 1, 25)}) if grid > 1 else (0,)
+
+
+def _wrap(rows: Array, group: General) -> None:
+    """Carry the start over to the end of a periodic cycle: the same position, turned by whole turns."""
+    if np.isfinite(rows[0, 0]) and not np.isfinite(rows[0, -1]):
+        rows[:, -1] = rows[:, 0]
+    elif np.isfinite(rows[0, -1]) and not np.isfinite(rows[0, 0]):
+        rows[:, 0] = rows[:, -1]
+
+
+def _gap_backward(rows: Array) -> list[int]:
+    """Indices from the end of the cycle down to the first gap, if the end was reached only by wrapping."""
+    if np.all(np.isfinite(rows[0])) or not np.isfinite(rows[0, -1]):
+        return []
+    return list(range(rows.shape[1] - 1, -1, -1))
+
+
+def _assemblies(group: General, elements: Sequence[tuple[Frame, Frame]], drive: Sequence[Number]) -> Pose:
+    """All assemblies found at one position from many guesses, each once, along the last axis."""
+    rng = np.random.default_rng(SEED)
+    spread = max(_extent(elements), 1e-300)
+    guesses = [
+        rng.uniform(-np.pi, np.pi, GUESSES)
+        if group.joints[group.steps[i].joint].kind == "revolute"
+        else rng.uniform(-2 * spread, 2 * spread, GUESSES)
+        for i in group.free
+    ]
+    pose = group.position(elements, guesses, drive)
+    shape = (GUESSES,)
+    key = np.array(
+        [
+            np.broadcast_to(n, shape)
+            for frame in pose.frames
+            for n in (frame.x / spread, frame.y / spread, frame.c, frame.s)
+        ]
+    )
+    good = np.flatnonzero(np.isfinite(key).all(axis=0) & (np.broadcast_to(pose.condition, shape) < 1e8))
+    kept: list[int] = []
+    for lane in good:
+        if all(np.max(np.abs(key[:, lane] - key[:, other])) > 1e-6 for other in kept):
+            kept.append(int(lane))
+    frames = tuple(Frame(*(np.broadcast_to(n, shape)[kept] for n in frame)) for frame in pose.frames)
+    return pose._replace(
+        frames=frames,
+        q=tuple(np.broadcast_to(q, shape)[kept] for q in pose.q),
+        orientation=np.broadcast_to(pose.orientation, shape)[kept],
+    )
+
+
+def _extent(elements: Sequence[tuple[Frame, Frame]]) -> float:
+    """Largest distance between any two coordinates that occur: how far a slide may reach."""
+    xs = [float(np.nanmax(np.abs(n), initial=0.0)) for pair in elements for frame in pair for n in frame[:2]]
+    return max(xs, default=0.0)
+
+
+def _lane(number: Number, index: int) -> Number:
+    return number[index] if np.ndim(number) else number
+
+
+def _at(elements: Sequence[tuple[Frame, Frame]], index: int) -> list[tuple[Frame, Frame]]:
+    return [(_frame_at(a, index), _frame_at(b, index)) for a, b in elements]
+
+
+def _frame_at(frame: Frame, index: int) -> Frame:
+    return Frame(*(_lane(n, index) for n in frame))
+
+
+@dataclass(frozen=True)
+class _Follower:
+    """Follows one assembly of a general group from grid point to grid point."""
+
+    group: General
+    elements: Sequence[tuple[Frame, Frame]]
+    drive: Sequence[Number]
+    orientation: float
+
+    def run(self, rows: Array, order: Sequence[int]) -> None:
+        """Fill `rows` (free, grid) along `order`, whose first column is known, up to where the branch ends."""
+        slope = np.zeros(len(rows))
+        for here, there in zip(order, order[1:], strict=False):
+            if np.isfinite(rows[0, there]):
+                slope = rows[:, there] - rows[:, here]
+                continue
+            found = self._advance(rows[:, here], slope, here, there, 0.0, 1.0)
+            if found is None:
+                return
+            slope = found - rows[:, here]
+            rows[:, there] = found
+
+    def _advance(self, q: Array, slope: Array, here: int, there: int, low: float, high: float) -> Array | None:
+        """From share `low` to `high` of the way between two grid points, halving the step where Newton strays."""
+        found = self._solve(q + slope * (high - low), q, here, there, high)
+        if found is not None:
+            return found
+        if high - low < 1 / 16:
+            return None
+        middle = (low + high) / 2
+        half = self._advance(q, slope, here, there, low, middle)
+        return None if half is None else self._advance(half, slope, here, there, middle, high)
+
+    def _solve(self, guess: Array, before: Array, here: int, there: int, share: float) -> Array | None:
+        elements = [(_mixed(a, here, there, share), _mixed(b, here, there, share)) for a, b in self.elements]
+        drive = [_between(q, here, there, share) for q in self.drive]
+        pose = self.group.position(elements, list(guess), drive)
+        found = np.array([float(pose.q[i]) for i in self.group.free])
+        if not np.all(np.isfinite(found)) or pose.orientation != self.orientation:
+            return None
+        size = max(_extent(elements), 1e-300)
+        for i, value, old in zip(self.group.free, found, before, strict=True):
+            revolute = self.group.joints[self.group.steps[i].joint].kind == "revolute"
+            if abs(value - old) > (TURN_JUMP if revolute else SLIDE_JUMP * size):
+                return None
+        return found
+
+
+def _between(number: Number, here: int, there: int, share: float) -> Number:
+    return number[here] + share * (number[there] - number[here]) if np.ndim(number) else number
+
+
+def _mixed(frame: Frame, here: int, there: int, share: float) -> Frame:
+    """A frame part of the way between two grid points; directions stay unit vectors."""
+    x, y, c, s = (_between(n, here, there, share) for n in frame)
+    length = np.hypot(c, s)
+    return Frame(x, y, c / length, s / length)

@@ -1,0 +1,67 @@
+"""Following a solution from no friction to full friction, many positions at once.
+
+The solution that starts frictionless is the one nature takes; it is followed over the share s ∈ [0, 1] of the
+friction. Where it folds back or runs to infinity (det J reaches 0), no solution continues: the module is locked
+at that share, and a solution found beyond it by luck would be a wrong number.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.algebra import linalg
+from trunnion.algebra.namespace import Number
+
+__all__ = ["System", "follow"]
+
+Array = NDArray[np.float64]
+System = Callable[[Sequence[Array], Array], tuple[list[Number], list[list[Number]]]]
+
+FIRST_STEP = 0.05
+LAST_STEP = 1e-9  # to which the share at which a lane locks is found
+NEWTON_LIMIT = 12
+CONVERGED = 1e-12  # of the largest unknown
+
+
+def follow(system: System, unknowns: int, lanes: int) -> tuple[list[Array], Array]:
+    """(solution, share) of each lane: the share is 1, or that at which the lane's solution ceases to exist.
+
+    system(x, s) gives residual and Jacobian, lane by lane, and x = 0 solves it at s = 0. The solution of a lane
+    that stops before 1 is NaN.
+    """
+    x = [np.zeros(lanes) for _ in range(unknowns)]
+    share = np.zeros(lanes)
+    step = np.full(lanes, FIRST_STEP)
+    active = np.ones(lanes, bool)
+    while np.any(active):
+        trial = np.minimum(share + step, 1.0)
+        found, good = _correct(system, x, trial)
+        advance = active & good
+        x = [np.where(advance, new, old) for new, old in zip(found, x, strict=True)]
+        share = np.where(advance, trial, share)
+        step = np.where(advance, np.minimum(2 * step, 0.2), np.where(active, step / 2, step))
+        active = active & (share < 1.0) & (step > LAST_STEP)
+    solved = share >= 1.0
+    return [np.where(solved, value, np.nan) for value in x], share
+
+
+def _correct(system: System, start: Sequence[Array], share: Array) -> tuple[list[Array], NDArray[np.bool_]]:
+    """Newton from `start` at the given share, and whether it stayed on the branch: converged, det J > 0, no jump."""
+    x = list(start)
+    good = np.zeros(share.shape, bool)
+    with np.errstate(all="ignore"):
+        for _ in range(NEWTON_LIMIT):
+            residual, jacobian = system(x, share)
+            (move,) = linalg.solve(jacobian, residual)
+            x = [value - delta for value, delta in zip(x, move, strict=True)]
+            size = np.maximum.reduce([np.abs(value) for value in x])
+            error = np.maximum.reduce([np.abs(delta) for delta in move])
+            good = error <= CONVERGED * size + 1e-300
+            if np.all(good):
+                break
+        _, jacobian = system(x, share)
+        good = good & (linalg.determinant(jacobian) > 0)
+    return x, good & np.isfinite(size)

@@ -1,0 +1,145 @@
+"""Motion, forward through the row of modules: poses, velocities, accelerations of all links."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from trunnion.algebra.namespace import Number
+from trunnion.analysis.system import Place, System, Values, driven_coordinates
+from trunnion.groups.general import General
+from trunnion.groups.planar import Acceleration, Frame, Twist, accelerated, compose, moved, point
+
+__all__ = ["Assembly", "Forward", "Motion", "PointMotion", "forward", "pose_of"]
+
+Assembly = Sequence[Any]  # per module: ±1 for a closed form, a `branches.Track` for a general group, None for a driver
+
+
+class Motion(NamedTuple):
+    """Frame of a link with the velocity and acceleration of its origin."""
+
+    frame: Frame
+    twist: Twist
+    acceleration: Acceleration
+
+
+class PointMotion(NamedTuple):
+    """Place, velocity, acceleration of a point of a link, each (x, y)."""
+
+    place: tuple[Number, Number]
+    velocity: tuple[Number, Number]
+    acceleration: tuple[Number, Number]
+
+
+GROUND = Motion(Frame(0.0, 0.0, 1.0, 0.0), Twist(0.0, 0.0, 0.0), Acceleration(0.0, 0.0, 0.0))
+
+
+@dataclass
+class Forward:
+    """What one walk forward found; element frames are worked out once and kept."""
+
+    system: System
+    values: Values
+    local: dict[tuple[str, str], Frame]
+    motions: dict[str, Motion]
+    poses: list[Any] = field(default_factory=list)
+    drives: list[tuple[list[Number], list[Number], list[Number]]] = field(default_factory=list)
+    _elements: dict[tuple[str, str], Frame] = field(default_factory=dict)
+
+    def element(self, link: str, joint: str) -> Frame:
+        """Global frame of a joint's element on a link."""
+        key = (link, joint)
+        if key not in self._elements:
+            frame, local = self.motions[link].frame, self.local[key]
+            if self.system.joints[joint][0] == "revolute":  # its direction is the link's own
+                self._elements[key] = Frame(*point(frame, local.x, local.y), frame.c, frame.s)
+            else:
+                self._elements[key] = compose(frame, local)
+        return self._elements[key]
+
+    def arm(self, link: str, joint: str) -> tuple[Number, Number]:
+        """From the link's origin to its element of a joint, global axes."""
+        frame, element = self.motions[link].frame, self.element(link, joint)
+        return element.x - frame.x, element.y - frame.y
+
+    def twist(self, link: str, joint: str) -> Twist:
+        """Velocity of the element."""
+        return moved(self.motions[link].twist, *self.arm(link, joint))
+
+    def acceleration(self, link: str, joint: str) -> Acceleration:
+        """Acceleration of the element."""
+        motion = self.motions[link]
+        return accelerated(motion.acceleration, motion.twist.w, *self.arm(link, joint))
+
+    def point(self, link: str, name: str) -> PointMotion:
+        """Motion of a named point of a link."""
+        path = f"links.{link}.points.{name}"
+        return self.local_point(link, self.values[f"{path}.x"], self.values[f"{path}.y"])
+
+    def local_point(self, link: str, x: Number, y: Number) -> PointMotion:
+        """Motion of the point of a link with the local coordinates x, y (m)."""
+        frame, twist, acceleration = self.motions[link]
+        place = point(frame, x, y)
+        arm = place[0] - frame.x, place[1] - frame.y
+        velocity = moved(twist, *arm)
+        second = accelerated(acceleration, twist.w, *arm)
+        return PointMotion(place, (velocity.x, velocity.y), (second.x, second.y))
+
+
+def start(system: System, values: Values) -> Forward:
+    """A walk before its first module: only the ground is known."""
+    return Forward(system, values, system.elements(values), {system.mechanism.fixed_link: GROUND})
+
+
+def pairs_of(walk: Forward, places: Sequence[Place]) -> list[tuple[Frame, Frame]]:
+    """Elements of a module's joints: global on known links, local on its own."""
+
+    def side(place: Place, i: int) -> Frame:
+        link = place.links[i]
+        return walk.element(link, place.joint) if place.outer[i] else walk.local[link, place.joint]
+
+    return [(side(place, 0), side(place, 1)) for place in places]
+
+
+def pose_of(walk: Forward, number: int, assembly: Any, time: Number) -> Any:
+    """Pose of one module on the links known so far."""
+    system = walk.system
+    module, group, places = system.plan.modules[number], system.groups[number], system.places[number]
+    drive, _, _ = driven_coordinates(system, module, places, walk.values, time)
+    if isinstance(group, General) and hasattr(assembly, "pose"):
+        return assembly.pose(group, pairs_of(walk, places), drive, time)
+    return group.position(pairs_of(walk, places), assembly, drive)
+
+
+def forward(system: System, values: Values, assembly: Assembly, time: Number) -> Forward:
+    """Walk the plan forward at the given times (s).
+
+    NaN from the first module that cannot be assembled onward, lane by lane.
+    """
+    walk = start(system, values)
+    with np.errstate(all="ignore"):
+        for number in range(len(system.plan.modules)):
+            take(walk, number, pose_of(walk, number, assembly[number], time), time)
+    return walk
+
+
+def take(walk: Forward, number: int, pose: Any, time: Number) -> None:
+    """Add the motion of one module, whose pose is known, to the walk."""
+    system = walk.system
+    module, group, places = system.plan.modules[number], system.groups[number], system.places[number]
+    drives = driven_coordinates(system, module, places, walk.values, time)
+    twists_out: list[Twist | None] = []
+    accelerations_out: list[Acceleration | None] = []
+    for place in places:
+        outside = next((link for link, outer in zip(place.links, place.outer, strict=True) if outer), None)
+        twists_out.append(walk.twist(outside, place.joint) if outside else None)
+        accelerations_out.append(walk.acceleration(outside, place.joint) if outside else None)
+    twists = group.velocity(pose, twists_out, drives[1])
+    seconds = group.acceleration(pose, twists, twists_out, accelerations_out, drives[2], drives[1])
+    for link, frame, twist, second in zip(module.links, pose.frames, twists, seconds, strict=True):
+        walk.motions[link] = Motion(frame, twist, second)
+    walk.poses.append(pose)
+    walk.drives.append(drives)

@@ -1,0 +1,257 @@
+"""Forces, backward through the row of modules: reactions, friction, drive efforts, and the power balance."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from trunnion.algebra.dual import primal
+from trunnion.algebra.namespace import Number, namespace
+from trunnion.analysis.friction import Contact, FrictionMethod, Settled, settle
+from trunnion.analysis.kinematics import Assembly, Forward, forward
+from trunnion.analysis.system import Place, System, Values
+from trunnion.groups.planar import ZERO_LOAD, Wrench, about
+from trunnion.joints.friction import FRICTION_LAWS
+from trunnion.joints.pairs import Load
+
+__all__ = ["Backward", "Slip", "backward", "solve"]
+
+ZERO_SLIP = 1e-10  # of the speeds about the joint: below it the sign of a relative speed is rounding noise
+
+
+class Slip(NamedTuple):
+    """Relative speed of a joint, second link against first (rad/s, m/s), and where it is zero to rounding."""
+
+    speed: Number
+    zero: Number
+
+
+@dataclass
+class Backward:
+    """What one walk backward found, by joint and driver as the file names them.
+
+    reactions: on the second link by the first, about the joint's point on the second, friction and drive effort
+    not included; friction: torque (N m) or force along the slide (N) on the second link; settled: per module.
+    """
+
+    walk: Forward
+    loads: dict[str, Wrench]
+    slips: dict[str, Slip] = field(default_factory=dict)
+    reactions: dict[str, Wrench] = field(default_factory=dict)
+    friction: dict[str, Number] = field(default_factory=dict)
+    efforts: dict[str, Number] = field(default_factory=dict)
+    settled: list[Settled] = field(default_factory=list)
+    load_powers: dict[str, Number] = field(default_factory=dict)
+    body_power: Number = 0.0
+
+
+def solve(
+    system: System,
+    values: Values,
+    assembly: Assembly,
+    time: Number,
+    method: FrictionMethod | None = None,
+    zero_slip: Mapping[str, float] | None = None,
+) -> Backward:
+    """Motion and forces at the given times (s): one walk forward, one back.
+
+    values: every number by path; floats, arrays (sample, 1) or dual numbers. time: (position,).
+    zero_slip: sign of the slip to take for a joint where its relative speed is zero; 0 if not given.
+    """
+    walk = forward(system, values, assembly, time)
+    with np.errstate(all="ignore"):
+        return backward(walk, method or FrictionMethod(), zero_slip or {})
+
+
+def backward(walk: Forward, method: FrictionMethod, zero_slip: Mapping[str, float]) -> Backward:
+    """Reactions and friction of every module, last module first."""
+    system = walk.system
+    back = Backward(walk, {link: ZERO_LOAD for link in system.mechanism.links})
+    for name in system.joints:
+        back.slips[name] = _slip(walk, name)
+    _add_body_loads(back)
+    _add_stated_loads(back)
+    for number in reversed(range(len(system.plan.modules))):
+        _settle_module(back, number, method, zero_slip)
+    return back
+
+
+# ---- loads ----------------------------------------------------------------------------------------------------
+
+
+def _add_body_loads(back: Backward) -> None:
+    """Gravity and inertia of every link: d'Alembert, −m a at the mass centre and −J α.  [D 2-5]"""
+    walk, values = back.walk, back.walk.values
+    gx, gy = values["gravity.x"], values["gravity.y"]
+    for link, body in walk.system.mechanism.links.items():
+        if link == walk.system.mechanism.fixed_link:
+            continue
+        mass, inertia = values[f"links.{link}.mass"], values[f"links.{link}.inertia"]
+        if _absent(mass) and _absent(inertia):
+            continue
+        local = walk.system.centre(values, link)
+        if body.inertia_about == "origin":
+            inertia = inertia - mass * (local[0] * local[0] + local[1] * local[1])
+        centre = walk.local_point(link, *local)
+        motion = walk.motions[link]
+        force = (mass * (gx - centre.acceleration[0]), mass * (gy - centre.acceleration[1]))
+        moment = -inertia * motion.acceleration.w
+        back.body_power = back.body_power + (
+            force[0] * centre.velocity[0] + force[1] * centre.velocity[1] + moment * motion.twist.w
+        )
+        _add(back, link, Wrench(*force, moment), centre.place)
+
+
+def _add_stated_loads(back: Backward) -> None:
+    """The loads of the model, with the power each gives the mechanism."""
+    walk, values = back.walk, back.walk.values
+    for name, load in walk.system.mechanism.loads.items():
+        path = f"loads.{name}"
+        if load.joint is not None:
+            back.load_powers[name] = _resist(back, load.joint, path)
+            continue
+        link = load.link or ""
+        power: Number = 0.0
+        if f"{path}.force.x" in values:
+            force = values[f"{path}.force.x"], values[f"{path}.force.y"]
+            at = walk.point(link, load.at) if load.at else walk.local_point(link, 0.0, 0.0)
+            _add(back, link, Wrench(*force, 0.0), at.place)
+            power = power + force[0] * at.velocity[0] + force[1] * at.velocity[1]
+        if f"{path}.moment" in values:
+            moment = values[f"{path}.moment"]
+            _add(back, link, Wrench(0.0, 0.0, moment), None)
+            power = power + moment * walk.motions[link].twist.w
+        back.load_powers[name] = power
+
+
+def _resist(back: Backward, joint: str, path: str) -> Number:
+    """A torque or force that opposes the motion of a joint, whichever way it goes; its power (never positive)."""
+    walk, values = back.walk, back.walk.values
+    _, (first, second) = walk.system.joints[joint]
+    slip = back.slips[joint]
+    sign = np.sign(np.where(slip.zero, 0.0, primal(slip.speed)))
+    if f"{path}.resisting_torque" in values:
+        size = -sign * values[f"{path}.resisting_torque"]
+        _add(back, second, Wrench(0.0, 0.0, size), None)
+        _add(back, first, Wrench(0.0, 0.0, -size), None)
+    else:
+        size = -sign * values[f"{path}.resisting_force"]
+        axis, at = walk.element(first, joint), walk.element(second, joint)
+        _add(back, second, Wrench(size * axis.c, size * axis.s, 0.0), (at.x, at.y))
+        _add(back, first, Wrench(-size * axis.c, -size * axis.s, 0.0), (at.x, at.y))
+    return size * slip.speed
+
+
+def _add(back: Backward, link: str, load: Wrench, at: tuple[Number, Number] | None) -> None:
+    """Add a load, about the place `at` (global, m), to a link's total about its origin."""
+    frame, total = back.walk.motions[link].frame, back.loads[link]
+    x, y, m = load if at is None else about(load, frame.x - at[0], frame.y - at[1])
+    back.loads[link] = Wrench(total.x + x, total.y + y, total.m + m)
+
+
+def _absent(number: Number) -> bool:
+    return isinstance(number, (int, float)) and number == 0
+
+
+# ---- one module -----------------------------------------------------------------------------------------------
+
+
+def _slip(walk: Forward, joint: str) -> Slip:
+    """Relative speed along the freedom of a joint, and whether it is zero but for rounding."""
+    kind, (first, second) = walk.system.joints[joint]
+    w1, w2 = walk.motions[first].twist.w, walk.motions[second].twist.w
+    pace = walk.system.pace(walk.values)
+    if kind == "revolute":
+        speed = w2 - w1
+        return Slip(speed, np.abs(primal(speed)) <= ZERO_SLIP * (np.abs(primal(w1)) + np.abs(primal(w2)) + pace))
+    one, two = walk.element(first, joint), walk.element(second, joint)
+    v1, v2 = walk.twist(first, joint), walk.twist(second, joint)
+    dx, dy = two.x - one.x, two.y - one.y
+    speed = one.c * (v2.x - v1.x + w1 * dy) + one.s * (v2.y - v1.y - w1 * dx)
+    scale = pace * walk.system.size(walk.values) + np.hypot(primal(v2.x), primal(v2.y))
+    return Slip(speed, np.abs(primal(speed)) <= ZERO_SLIP * scale)
+
+
+def _settle_module(back: Backward, number: int, method: FrictionMethod, zero_slip: Mapping[str, float]) -> None:
+    walk, system = back.walk, back.walk.system
+    module, group, places = system.plan.modules[number], system.groups[number], system.places[number]
+    loads = [back.loads[link] for link in module.links]
+    contacts, levers = [], {}
+    for k, place in enumerate(places):
+        if system.mechanism.effective_joints[place.joint].friction is not None:
+            contact, levers[k] = _contact(back, module.links, k, place, zero_slip)
+            contacts.append(contact)
+    settled = settle(group, walk.poses[number], loads, contacts, method)
+    back.settled.append(settled)
+    forces = {contact.joint: force for contact, force in zip(contacts, settled.forces, strict=True)}
+    for k, place in enumerate(places):
+        friction = forces[k] * levers[k] if k in forces else 0.0
+        _record(back, place, settled.reactions[k], friction, driven=place.joint in module.driven)
+
+
+def _contact(
+    back: Backward, links: tuple[str, ...], k: int, place: Place, zero_slip: Mapping[str, float]
+) -> tuple[Contact, Number]:
+    """A joint with friction as its module sees it, and its lever arm (radius of a pin, 1 of a slide)."""
+    walk, values = back.walk, back.walk.values
+    friction = walk.system.mechanism.effective_joints[place.joint].friction
+    law = FRICTION_LAWS[friction.law if friction and friction.law else "coulomb"]
+    parameters = {name: values[f"joints.{place.joint}.friction.{name}"] for name in law.parameters}
+    slip = back.slips[place.joint]
+    sign = -1.0 if place.reversed_ else 1.0
+    if place.kind == "revolute":
+        lever = values[f"joints.{place.joint}.pin.radius"]
+        load = Load()
+        units = [_signed(link, place.links, Wrench(0.0, 0.0, lever)) for link in links]
+    else:
+        lever = 1.0
+        axis = walk.element(place.links[0], place.joint)
+        load = Load((-axis.s, axis.c), values[f"joints.{place.joint}.guide.length"])
+        at = walk.element(place.links[1], place.joint)
+        units = []
+        for link in links:
+            frame = walk.motions[link].frame
+            push = about(Wrench(axis.c, axis.s, 0.0), frame.x - at.x, frame.y - at.y)
+            units.append(_signed(link, place.links, push))
+    xp = namespace(slip.speed, lever)
+    forced = zero_slip.get(place.joint, 0.0) * np.maximum(np.abs(primal(slip.speed)), 1e-300)
+    speed = sign * lever * xp.where(slip.zero, forced, slip.speed)
+    return Contact(k, units, load, law, parameters, speed), sign * lever
+
+
+def _signed(link: str, sides: tuple[str, str], load: Wrench) -> Wrench:
+    """The load on the second side, its opposite on the first, nothing on other links."""
+    if link == sides[1]:
+        return load
+    return Wrench(*(-n for n in load)) if link == sides[0] else ZERO_LOAD
+
+
+def _record(back: Backward, place: Place, reaction: Wrench, friction: Number, driven: bool) -> None:
+    """Keep a joint's reaction, friction and drive effort in the file's sense; load its outer link with all three."""
+    walk = back.walk
+    first, second = (place.links[1], place.links[0]) if place.reversed_ else place.links
+    if place.reversed_:
+        reaction = Wrench(*(-n for n in reaction))
+        if place.kind != "revolute":  # the module's second point is the file's first: carry the moment over
+            here, there = walk.element(first, place.joint), walk.element(second, place.joint)
+            reaction = about(reaction, there.x - here.x, there.y - here.y)
+    at = walk.element(second, place.joint)
+    if place.kind == "revolute":
+        whole = Wrench(reaction.x, reaction.y, reaction.m + friction)
+        effort, bare = reaction.m, Wrench(reaction.x, reaction.y, 0.0)
+    else:
+        axis = walk.element(first, place.joint)
+        whole = Wrench(reaction.x + friction * axis.c, reaction.y + friction * axis.s, reaction.m)
+        effort = reaction.x * axis.c + reaction.y * axis.s
+        bare = Wrench(reaction.x - effort * axis.c, reaction.y - effort * axis.s, reaction.m)
+    back.reactions[place.joint] = bare
+    back.friction[place.joint] = friction
+    if driven:
+        back.efforts[place.joint] = effort
+    for link, outer in zip(place.links, place.outer, strict=True):
+        if outer and link != walk.system.mechanism.fixed_link:
+            sign = 1.0 if link == second else -1.0
+            _add(back, link, Wrench(*(sign * n for n in whole)), (at.x, at.y))

@@ -1,0 +1,199 @@
+"""A mechanism made ready to run: its plan, its modules, what hangs where, and how it is driven."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from trunnion.algebra.dual import primal
+from trunnion.algebra.namespace import Number, namespace
+from trunnion.errors import Finding, MechanismError
+from trunnion.groups import GROUPS, Group
+from trunnion.groups.general import OUTER, General, GroupJoint
+from trunnion.groups.planar import Frame
+from trunnion.joints.pairs import PAIRS
+from trunnion.model.mechanism import Mechanism
+from trunnion.structure.decompose import Module, Plan, decompose
+
+__all__ = ["Cycle", "Place", "System", "Values", "build"]
+
+Values = Mapping[str, Number]  # every number of a mechanism by its path, SI
+
+
+@dataclass(frozen=True)
+class Place:
+    """A joint as its module sees it: kind, links and whether each is outside, in the module's order of sides."""
+
+    joint: str
+    kind: str
+    links: tuple[str, str]
+    outer: tuple[bool, bool]
+    reversed_: bool
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """One turn or range of the drivers: how long it takes, s, and whether its end is its start again."""
+
+    duration: float
+    periodic: bool
+
+    def times(self, steps: int) -> np.ndarray:
+        """`steps` equally spaced times, s; the end is left out where it repeats the start."""
+        return np.linspace(0.0, self.duration, steps, endpoint=not self.periodic)
+
+
+@dataclass(frozen=True)
+class System:
+    """A mechanism, its plan and its modules. Numbers stay outside: every walk is given its `Values`."""
+
+    mechanism: Mechanism
+    plan: Plan
+
+    @cached_property
+    def groups(self) -> tuple[Group, ...]:
+        """The module that computes each entry of the plan."""
+        return tuple(self._group(module) for module in self.plan.modules)
+
+    @cached_property
+    def places(self) -> tuple[tuple[Place, ...], ...]:
+        """The joints of each module."""
+        return tuple(tuple(self._place(module, k) for k in range(len(module.joints))) for module in self.plan.modules)
+
+    @cached_property
+    def joints(self) -> dict[str, tuple[str, tuple[str, str]]]:
+        """Kind and links of every joint, as the file has them."""
+        return {name: (joint.type, tuple(joint.links)) for name, joint in self.mechanism.joints.items()}
+
+    @cached_property
+    def points(self) -> tuple[tuple[str, str], ...]:
+        """(link, point) of every named point."""
+        return tuple((name, point) for name, link in self.mechanism.links.items() for point in link.points)
+
+    def _place(self, module: Module, k: int) -> Place:
+        name = module.joints[k]
+        kind, (first, second) = self.joints[name]
+        links = (second, first) if module.reversed_[k] else (first, second)
+        return Place(name, kind, links, tuple(link not in module.links for link in links), module.reversed_[k])
+
+    def _group(self, module: Module) -> Group:
+        if module.kind in GROUPS:
+            return GROUPS[module.kind]
+        number = {link: i for i, link in enumerate(module.links)}
+        joints = tuple(
+            GroupJoint(self.joints[name][0], tuple(number.get(link, OUTER) for link in self.joints[name][1]))
+            for name in module.joints
+        )
+        return General(len(module.links), joints, tuple(module.joints.index(name) for name in module.driven))
+
+    def elements(self, values: Values) -> dict[tuple[str, str], Frame]:
+        """Local frame of every joint's element, by (link, joint); c, s is the direction of a slide."""
+        found: dict[tuple[str, str], Frame] = {}
+        for name, (kind, links) in self.joints.items():
+            for link in links:
+                path = f"links.{link}.points.{name}"
+                x, y = values[f"{path}.x"], values[f"{path}.y"]
+                if PAIRS[kind].needs_axis:
+                    ax, ay = values[f"{path}.axis.x"], values[f"{path}.axis.y"]
+                    length = namespace(ax, ay).hypot(ax, ay)
+                    found[link, name] = Frame(x, y, ax / length, ay / length)
+                else:
+                    found[link, name] = Frame(x, y)
+        return found
+
+    def centre(self, values: Values, link: str) -> tuple[Number, Number]:
+        """Local place of a link's mass centre, m."""
+        path = f"links.{link}.centre"
+        if f"{path}.distance" in values:
+            distance, angle = values[f"{path}.distance"], values[f"{path}.angle"]
+            xp = namespace(distance, angle)
+            return distance * xp.cos(angle), distance * xp.sin(angle)
+        return values[f"{path}.x"], values[f"{path}.y"]
+
+    def drive(self, values: Values, name: str, time: Number) -> tuple[Number, Number, Number]:
+        """Coordinate, rate and second derivative of a driver at `time` (s) from the start: constant speed."""
+        speed = values[f"drivers.{name}.speed"]
+        start = values.get(f"drivers.{name}.range.from", values.get(f"drivers.{name}.start", 0.0))
+        return start + speed * time, speed, 0.0
+
+    def pace(self, values: Values) -> Number:
+        """Angular speed typical of the mechanism, rad/s: that of its fastest driver, a slide's per size."""
+        rates: list[Number] = [0.0]
+        for name in self.mechanism.drivers:
+            speed = np.abs(primal(values[f"drivers.{name}.speed"]))
+            rates.append(speed if self.joints[name][0] == "revolute" else speed / self.size(values))
+        return functools.reduce(np.maximum, rates)
+
+    def size(self, values: Values) -> Number:
+        """Length typical of the mechanism, m: the widest spread of two points on one link."""
+        widest: Number = 0.0
+        for name, link in self.mechanism.links.items():
+            places = [
+                tuple(primal(values[f"links.{name}.points.{point}.{axis}"]) for axis in "xy") for point in link.points
+            ]
+            for x, y in places[1:]:
+                widest = np.maximum(widest, np.hypot(x - places[0][0], y - places[0][1]))
+        return np.where(widest > 0, widest, 1.0)
+
+    def cycle(self, values: Values) -> Cycle:
+        """How long the drivers take: the slowest full turn, or the ranges.
+
+        Raises MechanismError where a range runs against its speed or two drivers do not fit one cycle.
+        """
+        drivers = self.mechanism.drivers
+        if not drivers:
+            return Cycle(0.0, periodic=False)
+        nominal = {path: float(np.ravel(primal(value))[0]) for path, value in values.items() if "drivers." in path}
+        durations: dict[str, float] = {}
+        findings: list[Finding] = []
+        for name in drivers:
+            speed = nominal[f"drivers.{name}.speed"]
+            ranged = f"drivers.{name}.range.from" in nominal
+            extent = (
+                nominal[f"drivers.{name}.range.to"] - nominal[f"drivers.{name}.range.from"]
+                if ranged
+                else float(np.copysign(2 * np.pi, speed))
+            )
+            durations[name] = extent / speed
+            if durations[name] < 0:
+                what = f"the range runs {'up' if extent > 0 else 'down'}, the speed is {speed:g} (SI)"
+                findings.append(Finding(what, f"drivers.{name}.range", "swap the ends of the range, or the sign"))
+        longest = max(durations.values())
+        ranged = [name for name in drivers if f"drivers.{name}.range.from" in nominal]
+        for name in ranged:
+            if not findings and abs(durations[name] - longest) > 1e-9 * longest:
+                what = f"its range takes {durations[name]:g} s, the whole cycle takes {longest:g} s"
+                findings.append(Finding(what, f"drivers.{name}", "let all drivers with a range take the same time"))
+        if findings:
+            raise MechanismError(findings)
+        turns = [longest / duration for duration in durations.values()]
+        closed = all(abs(n - round(n)) < 1e-9 for n in turns)
+        return Cycle(longest, periodic=not ranged and closed)
+
+
+def build(mechanism: Mechanism) -> System:
+    """Decompose a mechanism and prepare its modules. Raises MechanismError if its structure does not determine it."""
+    if mechanism.space != "planar":
+        raise MechanismError(
+            Finding("spatial mechanisms can be read and checked, not yet analysed", "space", "use a planar mechanism")
+        )
+    return System(mechanism, decompose(mechanism))
+
+
+def driven_coordinates(
+    system: System, module: Module, places: Sequence[Place], values: Values, time: Number
+) -> tuple[list[Number], list[Number], list[Number]]:
+    """Coordinates, rates and second derivatives of a module's driven joints, in the module's sense."""
+    q: list[Number] = []
+    rate: list[Number] = []
+    second: list[Number] = []
+    for name in module.driven:
+        place = next(place for place in places if place.joint == name)
+        sign = -1.0 if place.reversed_ else 1.0
+        for target, value in zip((q, rate, second), system.drive(values, name, time), strict=True):
+            target.append(sign * value)
+    return q, rate, second

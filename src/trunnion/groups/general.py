@@ -1,0 +1,558 @@
+"""Any planar module: links between known links, joined by revolute and prismatic pairs, some perhaps driven.
+
+Cut one joint of every loop: what is left is a tree that hangs on the known links, and its joint coordinates q
+are the unknowns. A cut revolute pair asks two points to meet, a cut prismatic pair asks a point to stay on the
+axis and two directions to agree, a driven pair also prescribes its coordinate. J holds the joint screws, seen
+at the cuts.  [THEORY, "One Jacobian, four uses"]
+
+    position      J δq = −gap             (Newton)
+    velocity      J q̇ = −gap rate with q̇ = 0
+    acceleration  J q̈ = −gap acceleration with q̈ = 0
+    reactions     Jᵀ λ = −(power of the outboard loads on each screw); the rest link by link
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from trunnion.algebra import linalg
+from trunnion.algebra.dual import Dual, primal
+from trunnion.algebra.namespace import Number, namespace
+from trunnion.groups import tree as spanning
+from trunnion.groups.planar import (
+    ZERO_LOAD,
+    Acceleration,
+    Frame,
+    Twist,
+    Wrench,
+    about,
+    accelerated,
+    compose,
+    moved,
+    relative,
+    turned,
+)
+from trunnion.groups.protocol import Elements
+from trunnion.groups.tree import OUTER, GroupJoint, Step
+
+__all__ = ["OUTER", "General", "GroupJoint", "Pose"]
+
+NEWTON_LIMIT = 60
+TURN_LIMIT = 0.4  # rad a step: keeps Newton on the branch it starts on
+
+
+class Pose(NamedTuple):
+    """Frames of the links; both elements of each joint (global); tree coordinates q; J⁻¹; gap; condition.
+
+    orientation: sign of det J, which is the same all along one branch of assembly.
+    """
+
+    frames: tuple[Frame, ...]
+    elements: tuple[tuple[Frame, Frame], ...]
+    q: tuple[Number, ...]
+    inverse: list[list[Number]]
+    gap: Number
+    condition: Number
+    orientation: Number
+
+
+@dataclass(frozen=True)
+class General:
+    """The module with the given joints; `driven` lists the indices of joints whose coordinate is prescribed."""
+
+    links: int
+    joints: tuple[GroupJoint, ...]
+    driven: tuple[int, ...] = ()
+
+    @cached_property
+    def steps(self) -> tuple[Step, ...]:
+        """The tree, outermost link last; driven joints are kept in it where they can be."""
+        return spanning.grow(self.links, self.joints, self.driven)
+
+    @cached_property
+    def cuts(self) -> tuple[int, ...]:
+        """Joints not in the tree, one for each loop."""
+        in_tree = {step.joint for step in self.steps}
+        return tuple(k for k in range(len(self.joints)) if k not in in_tree)
+
+    @cached_property
+    def free(self) -> tuple[int, ...]:
+        """Positions in `steps` of the unknown coordinates."""
+        return tuple(i for i, step in enumerate(self.steps) if step.joint not in self.driven)
+
+    @cached_property
+    def _paths(self) -> dict[int, frozenset[int]]:
+        """For each link the steps between it and the known links."""
+        paths: dict[int, frozenset[int]] = {OUTER: frozenset()}
+        for i, step in enumerate(self.steps):
+            paths[step.child] = paths[step.parent] | {i}
+        return paths
+
+    def coordinates(self, elements: Elements, assembly: Sequence[Number], drive: Sequence[Number]) -> list[Number]:
+        """All tree coordinates from the free ones and the prescribed ones."""
+        q: list[Number] = [0.0] * len(self.steps)
+        for i, value in zip(self.free, assembly, strict=True):
+            q[i] = value
+        prescribed = dict(zip(self.driven, drive, strict=True))
+        for i, step in enumerate(self.steps):
+            if step.joint in prescribed:
+                q[i] = prescribed[step.joint]
+        return q
+
+    # ---- position -------------------------------------------------------------------------------------------
+
+    def position(self, elements: Elements, assembly: Sequence[Number], drive: Sequence[Number] = ()) -> Pose:
+        """Pose by Newton from the free tree coordinates `assembly` (rad, m; order of `free`).
+
+        NaN in the lanes that do not close. Dual inputs: one more step at the solution for each level of ε.
+        """
+        with np.errstate(all="ignore"):
+            q = self._newton(
+                [(_real(a), _real(b)) for a, b in elements],
+                [primal(value) for value in assembly],
+                [primal(value) for value in drive],
+            )
+            depth = max((_depth(n) for pair in elements for frame in pair for n in frame), default=0)
+            depth = max([depth, *(_depth(value) for value in drive)])
+            for _ in range(depth):
+                q = self._step(elements, q, drive)
+            q = self.coordinates(elements, [q[i] for i in self.free], drive)
+            frames, placed = self._place(elements, q)
+            jacobian = self._jacobian(placed)
+            inverse = linalg.inverse(jacobian) if jacobian else []
+            gap = self._gap(placed, drive)
+            lengths = [n for n, row in zip(gap, self._rows, strict=True) if row.is_length]
+            size = _size(self, elements)
+        xp = namespace(*lengths) if lengths else np
+        opening: Number = 0.0
+        for value in lengths:
+            opening = xp.maximum(opening, xp.abs(value))
+            orientation = np.sign(primal(linalg.determinant(jacobian)))
+        return Pose(frames, placed, tuple(q), inverse, opening, self._condition(jacobian, inverse, size), orientation)
+
+    def _newton(self, elements: Elements, start: Sequence[Number], drive: Sequence[Number]) -> list[Number]:
+        """Newton on real numbers from `start`; lanes that do not converge are NaN."""
+        q = [np.asarray(v, float) for v in self.coordinates(elements, start, drive)]
+        if not self.free:
+            return list(q)
+        size = _size(self, elements)
+        scale = [TURN_LIMIT if self.joints[self.steps[i].joint].kind == "revolute" else 0.3 * size for i in self.free]
+        last = np.inf
+        for _ in range(NEWTON_LIMIT):
+            before = [q[i] for i in self.free]
+            q = self._step(elements, q, drive, scale)
+            moves = [np.abs(q[i] - b) / s for i, b, s in zip(self.free, before, scale, strict=True)]
+            last = np.maximum.reduce(np.broadcast_arrays(*moves))
+            open_lanes = last > 1e-7
+            if not np.any(open_lanes):
+                break
+        q = self._step(elements, q, drive, scale)  # quadratic: from 1e-7 to rounding
+        closed = last <= 1e-7
+        return [np.where(closed, value, np.nan) for value in q]
+
+    def _step(
+        self, elements: Elements, q: Sequence[Number], drive: Sequence[Number], limits: Sequence[float] | None = None
+    ) -> list[Number]:
+        """One Newton step, shortened as a whole where an entry would exceed its limit."""
+        _, placed = self._place(elements, q)
+        (step,) = linalg.solve(self._jacobian(placed), self._gap(placed, drive))
+        if limits is not None:
+            worst = np.maximum.reduce(
+                np.broadcast_arrays(*(np.abs(s) / limit for s, limit in zip(step, limits, strict=True)))
+            )
+            shrink = 1 / np.maximum(worst, 1.0)
+            step = [s * shrink for s in step]
+        q = list(q)
+        for i, s in zip(self.free, step, strict=True):
+            q[i] = q[i] - s
+        return q
+
+    def _place(
+        self, elements: Elements, q: Sequence[Number]
+    ) -> tuple[tuple[Frame, ...], tuple[tuple[Frame, Frame], ...]]:
+        """Frames of all links and of both elements of all joints for the tree coordinates q."""
+        frames: dict[int, Frame] = {}
+
+        def placed(k: int, side: int) -> Frame:
+            link = self.joints[k].sides[side]
+            return elements[k][side] if link == OUTER else compose(frames[link], elements[k][side])
+
+        for value, step in zip(q, self.steps, strict=True):
+            near = placed(step.joint, step.near)
+            turn = value if step.near == 0 else -value
+            far = _across(self.joints[step.joint].kind, near, turn)
+            frames[step.child] = relative(far, elements[step.joint][1 - step.near])
+        pairs = tuple((placed(k, 0), placed(k, 1)) for k in range(len(self.joints)))
+        return tuple(frames[link] for link in range(self.links)), pairs
+
+    # ---- the cuts -------------------------------------------------------------------------------------------
+
+    @cached_property
+    def _rows(self) -> tuple[_Row, ...]:
+        """Constraints of the cuts, in the order of the rows of J."""
+        rows: list[_Row] = []
+        for k in self.cuts:
+            kinds = ["x", "y"] if self.joints[k].kind == "revolute" else ["across", "turn"]
+            if k in self.driven:
+                kinds.append("turn" if self.joints[k].kind == "revolute" else "along")
+            rows += [_Row(k, kind, self.driven.index(k) if k in self.driven else -1) for kind in kinds]
+        return tuple(rows)
+
+    def _gap(self, placed: Sequence[tuple[Frame, Frame]], drive: Sequence[Number]) -> list[Number]:
+        """By how much each constraint of the cuts is open, m or rad."""
+        gaps: list[Number] = []
+        for row in self._rows:
+            first, second = placed[row.joint]
+            dx, dy = second.x - first.x, second.y - first.y
+            driven = drive[row.drive] if row.drive >= 0 else 0.0
+            if row.kind == "turn":
+                turn = -driven if self.joints[row.joint].kind == "revolute" else 0.0
+                xp = namespace(first.c, second.c, driven)
+                gaps.append(_angle(first, second, xp.cos(turn), xp.sin(turn)))
+            else:
+                gaps.append(_component(row.kind, first, dx, dy) - (driven if row.kind == "along" else 0.0))
+        return gaps
+
+    def _screws(self, placed: Sequence[tuple[Frame, Frame]], at: Frame) -> list[Twist]:
+        """Motion of the point `at` of the outboard side for a unit rate of each tree coordinate."""
+        screws = []
+        for step in self.steps:
+            pivot = placed[step.joint][0]
+            sign = 1.0 if step.near == 0 else -1.0
+            if self.joints[step.joint].kind == "revolute":
+                screws.append(Twist(-sign * (at.y - pivot.y), sign * (at.x - pivot.x), sign))
+            else:
+                screws.append(Twist(sign * pivot.c, sign * pivot.s, 0.0))
+        return screws
+
+    def _jacobian(self, placed: Sequence[tuple[Frame, Frame]]) -> list[list[Number]]:
+        """Rate of every gap for a unit rate of every free coordinate; square for an Assur group."""
+        matrix: list[list[Number]] = []
+        for row in self._rows:
+            first, second = placed[row.joint]
+            screws = self._screws(placed, second)
+            to_first, to_second = (self._paths[link] for link in self.joints[row.joint].sides)
+            entries: list[Number] = []
+            for i in self.free:
+                weight = (i in to_second) - (i in to_first)
+                screw = screws[i]
+                value = screw.w if row.kind == "turn" else _component(row.kind, first, screw.x, screw.y)
+                entries.append(weight * value if weight else 0.0)
+            matrix.append(entries)
+        return matrix
+
+    def _condition(
+        self, jacobian: Sequence[Sequence[Number]], inverse: Sequence[Sequence[Number]], size: float
+    ) -> Number:
+        """‖S J‖·‖(S J)⁻¹‖ (Frobenius) with lengths measured in `size`."""
+        if not jacobian:
+            return 1.0
+        rows = [1.0 / size if row.is_length else 1.0 for row in self._rows]
+        columns = [1.0 if self.joints[self.steps[i].joint].kind == "revolute" else size for i in self.free]
+        direct = sum(
+            (primal(v) * r * c) ** 2
+            for line, r in zip(jacobian, rows, strict=True)
+            for v, c in zip(line, columns, strict=True)
+        )
+        reverse = sum(
+            (primal(v) / (r * c)) ** 2
+            for line, c in zip(inverse, columns, strict=True)
+            for v, r in zip(line, rows, strict=True)
+        )
+        with np.errstate(all="ignore"):
+            return np.sqrt(direct * reverse)
+
+    # ---- velocity and acceleration --------------------------------------------------------------------------
+
+    def velocity(self, pose: Pose, outer: Sequence[Twist | None], drive: Sequence[Number] = ()) -> list[Twist]:
+        """Velocities of the frame origins: outer motion and driven rates give the gaps' rates, J⁻¹ closes them."""
+        rates = self.rates(pose, outer, drive)
+        return self._twists(pose, outer, rates)
+
+    def rates(self, pose: Pose, outer: Sequence[Twist | None], drive: Sequence[Number] = ()) -> list[Number]:
+        """Rates of all tree coordinates, rad/s and m/s."""
+        rates = self.coordinates((), [0.0] * len(self.free), drive)
+        open_rates = self._gap_rates(pose, outer, self._twists(pose, outer, rates), drive)
+        for i, line in zip(self.free, pose.inverse, strict=True):
+            rates[i] = -_weighted(line, open_rates)
+        return rates
+
+    def _twists(self, pose: Pose, outer: Sequence[Twist | None], rates: Sequence[Number]) -> list[Twist]:
+        twists: dict[int, Twist] = {}
+        for rate, step in zip(rates, self.steps, strict=True):
+            near, far = pose.elements[step.joint][step.near], pose.elements[step.joint][1 - step.near]
+            base = self._at(pose, twists, outer, step.joint, step.near)
+            signed = rate if step.near == 0 else -rate
+            if self.joints[step.joint].kind == "revolute":
+                at = Twist(base.x, base.y, base.w + signed)
+            else:
+                at = moved(base, far.x - near.x, far.y - near.y)
+                at = Twist(at.x + near.c * signed, at.y + near.s * signed, at.w)
+            frame = pose.frames[step.child]
+            twists[step.child] = moved(at, frame.x - far.x, frame.y - far.y)
+        return [twists[link] for link in range(self.links)]
+
+    def _at(
+        self,
+        pose: Pose,
+        twists: dict[int, Twist] | list[Twist],
+        outer: Sequence[Twist | None],
+        k: int,
+        side: int,
+    ) -> Twist:
+        """Velocity of the element of joint k on one side."""
+        link = self.joints[k].sides[side]
+        known = outer[k] if link == OUTER else None
+        if known is not None:
+            return known
+        frame, element = pose.frames[link], pose.elements[k][side]
+        return moved(twists[link], element.x - frame.x, element.y - frame.y)
+
+    def _gap_rates(
+        self, pose: Pose, outer: Sequence[Twist | None], twists: list[Twist], drive: Sequence[Number]
+    ) -> list[Number]:
+        gaps: list[Number] = []
+        for row in self._rows:
+            first, second = pose.elements[row.joint]
+            one, two = (self._at(pose, twists, outer, row.joint, side) for side in (0, 1))
+            driven = drive[row.drive] if row.is_driven(self.joints[row.joint].kind) else 0.0
+            if row.kind == "turn":
+                gaps.append(two.w - one.w - driven)
+            else:
+                carried = moved(one, second.x - first.x, second.y - first.y)
+                gaps.append(_component(row.kind, first, two.x - carried.x, two.y - carried.y) - driven)
+        return gaps
+
+    def acceleration(
+        self,
+        pose: Pose,
+        twists: Sequence[Twist],
+        outer_twists: Sequence[Twist | None],
+        outer: Sequence[Acceleration | None],
+        drive: Sequence[Number] = (),
+        rates: Sequence[Number] = (),
+    ) -> list[Acceleration]:
+        """Accelerations of the frame origins. drive: second derivatives of the driven coordinates, rates: first."""
+        known = _Motion(pose, list(twists), outer_twists, outer)
+        speeds = self.rates(pose, outer_twists, rates)
+        second = self.coordinates((), [0.0] * len(self.free), drive)
+        gaps = self._gap_accelerations(known, self._accelerations(known, speeds, second), drive)
+        for i, line in zip(self.free, pose.inverse, strict=True):
+            second[i] = -_weighted(line, gaps)
+        return self._accelerations(known, speeds, second)
+
+    def _accelerations(self, known: _Motion, speeds: Sequence[Number], second: Sequence[Number]) -> list[Acceleration]:
+        pose, found = known.pose, dict[int, Acceleration]()
+        for speed, value, step in zip(speeds, second, self.steps, strict=True):
+            near, far = pose.elements[step.joint][step.near], pose.elements[step.joint][1 - step.near]
+            base = self._acceleration_at(known, found, step.joint, step.near)
+            sign = 1.0 if step.near == 0 else -1.0
+            w = known.twists[step.child].w
+            if self.joints[step.joint].kind == "revolute":
+                at = Acceleration(base.x, base.y, base.w + sign * value)
+            else:
+                at = accelerated(base, w, far.x - near.x, far.y - near.y)
+                along, coriolis = sign * value, 2 * sign * w * speed
+                at = Acceleration(
+                    at.x + near.c * along - near.s * coriolis, at.y + near.s * along + near.c * coriolis, at.w
+                )
+            frame = pose.frames[step.child]
+            found[step.child] = accelerated(at, w, frame.x - far.x, frame.y - far.y)
+        return [found[link] for link in range(self.links)]
+
+    def _acceleration_at(
+        self, known: _Motion, found: dict[int, Acceleration] | list[Acceleration], k: int, side: int
+    ) -> Acceleration:
+        """Acceleration of the element of joint k on one side."""
+        link = self.joints[k].sides[side]
+        given = known.outer[k] if link == OUTER else None
+        if given is not None:
+            return given
+        frame, element = known.pose.frames[link], known.pose.elements[k][side]
+        return accelerated(found[link], known.twists[link].w, element.x - frame.x, element.y - frame.y)
+
+    def _gap_accelerations(self, known: _Motion, found: list[Acceleration], drive: Sequence[Number]) -> list[Number]:
+        gaps: list[Number] = []
+        for row in self._rows:
+            first, second = known.pose.elements[row.joint]
+            dx, dy = second.x - first.x, second.y - first.y
+            one, two = (self._acceleration_at(known, found, row.joint, side) for side in (0, 1))
+            driven = drive[row.drive] if row.is_driven(self.joints[row.joint].kind) else 0.0
+            if row.kind == "turn":
+                gaps.append(two.w - one.w - driven)
+                continue
+            v1, v2 = (self._at(known.pose, known.twists, known.outer_twists, row.joint, s) for s in (0, 1))
+            v1 = moved(v1, dx, dy)
+            slide = first.c * (v2.x - v1.x) + first.s * (v2.y - v1.y)
+            carried = accelerated(one, v1.w, dx, dy)
+            gap = _component(row.kind, first, two.x - carried.x, two.y - carried.y) - driven
+            gaps.append(gap - 2 * v1.w * slide if row.kind == "across" else gap)
+        return gaps
+
+    # ---- reactions ------------------------------------------------------------------------------------------
+
+    def reactions(self, pose: Pose, loads: Sequence[Wrench]) -> list[Wrench]:
+        """Cut wrenches from Jᵀ λ = −(outboard power on each screw), the others link by link from outside in."""
+        carried = {link: self._from_origin(pose, loads[link], link) for link in range(self.links)}
+        found = self._cut_wrenches(pose, carried)
+        for k, wrench in found.items():
+            first, second = self.joints[k].sides
+            at = pose.elements[k][1]
+            for link, sign in ((second, 1.0), (first, -1.0)):
+                if link != OUTER:
+                    carried[link] = _plus(carried[link], _moved_to(pose, wrench, at), sign)
+        for step in reversed(self.steps):
+            at = pose.elements[step.joint][1]
+            total = carried[step.child]
+            sign = -1.0 if step.near == 0 else 1.0
+            found[step.joint] = _scaled(_moved_from(pose, total, at), sign)
+            if step.parent != OUTER:
+                carried[step.parent] = _plus(carried[step.parent], total, 1.0)
+        return [found[k] for k in range(len(self.joints))]
+
+    def _cut_wrenches(self, pose: Pose, carried: dict[int, Wrench]) -> dict[int, Wrench]:
+        """Wrench on the second link of every cut joint, about its point there."""
+        powers: list[Number] = []
+        for i in self.free:
+            outboard = ZERO_LOAD
+            for link, path in self._paths.items():
+                if i in path:
+                    outboard = _plus(outboard, carried[link], 1.0)
+            screw = self._screws(pose.elements, _reference(pose))[i]
+            powers.append(screw.x * outboard.x + screw.y * outboard.y + screw.w * outboard.m)
+        found = {k: ZERO_LOAD for k in self.cuts}
+        for j, row in enumerate(self._rows):
+            size = -_weighted([line[j] for line in pose.inverse], powers)
+            first = pose.elements[row.joint][0]
+            if row.kind == "turn":
+                found[row.joint] = _plus(found[row.joint], Wrench(0.0, 0.0, size), 1.0)
+            else:
+                x, y = _direction(row.kind, first)
+                found[row.joint] = _plus(found[row.joint], Wrench(size * x, size * y, 0.0), 1.0)
+        return found
+
+    @staticmethod
+    def _from_origin(pose: Pose, load: Wrench, link: int) -> Wrench:
+        """A load about a link's origin, about the common reference point."""
+        return _moved_to(pose, load, pose.frames[link])
+
+    def closure(self, pose: Pose) -> Number:
+        """Largest distance by which a cut joint is open, m."""
+        return pose.gap
+
+    def condition(self, pose: Pose) -> Number:
+        """Frobenius condition of J with lengths measured in the size of the group."""
+        return pose.condition
+
+
+class _Motion(NamedTuple):
+    pose: Pose
+    twists: list[Twist]
+    outer_twists: Sequence[Twist | None]
+    outer: Sequence[Acceleration | None]
+
+
+class _Row(NamedTuple):
+    """One constraint of a cut joint; drive: index of its prescribed coordinate, −1 if it is free."""
+
+    joint: int
+    kind: str
+    drive: int
+
+    @property
+    def is_length(self) -> bool:
+        return self.kind != "turn"
+
+    def is_driven(self, joint_kind: str) -> bool:
+        return self.drive >= 0 and self.kind == ("turn" if joint_kind == "revolute" else "along")
+
+
+def _direction(kind: str, first: Frame) -> tuple[Number, Number]:
+    """Unit vector along which a constraint measures."""
+    return {"x": (1.0, 0.0), "y": (0.0, 1.0), "across": (-first.s, first.c), "along": (first.c, first.s)}[kind]
+
+
+def _component(kind: str, first: Frame, x: Number, y: Number) -> Number:
+    """Component of (x, y) that a constraint sees."""
+    if kind == "x":
+        return x
+    if kind == "y":
+        return y
+    ux, uy = _direction(kind, first)
+    return ux * x + uy * y
+
+
+def _angle(first: Frame, second: Frame, c: Number, s: Number) -> Number:
+    """Turn of the second element against the first, less the angle with cosine c and sine −s."""
+    c2, s2 = turned(c, s, second.c, second.s)
+    sine = first.c * s2 - first.s * c2
+    cosine = first.c * c2 + first.s * s2
+    return namespace(sine, cosine).arctan2(sine, cosine)
+
+
+def _across(kind: str, near: Frame, value: Number) -> Frame:
+    """The far element of a joint from its near one and the coordinate, seen from the near side."""
+    if kind == "revolute":
+        xp = namespace(value)
+        c, s = turned(xp.cos(value), xp.sin(value), near.c, near.s)
+        return Frame(near.x, near.y, c, s)
+    return Frame(near.x + near.c * value, near.y + near.s * value, near.c, near.s)
+
+
+def _weighted(weights: Sequence[Number], values: Sequence[Number]) -> Number:
+    total: Number = 0.0
+    for weight, value in zip(weights, values, strict=True):
+        total = total + weight * value
+    return total
+
+
+def _plus(a: Wrench, b: Wrench, sign: float) -> Wrench:
+    return Wrench(a.x + sign * b.x, a.y + sign * b.y, a.m + sign * b.m)
+
+
+def _scaled(a: Wrench, sign: float) -> Wrench:
+    return Wrench(sign * a.x, sign * a.y, sign * a.m)
+
+
+def _reference(pose: Pose) -> Frame:
+    """A point of the group about which wrenches are added up: near, so that no digits are lost."""
+    return pose.elements[0][0]
+
+
+def _moved_to(pose: Pose, wrench: Wrench, at: Frame) -> Wrench:
+    """A wrench about `at`, about the common reference point."""
+    reference = _reference(pose)
+    return about(wrench, reference.x - at.x, reference.y - at.y)
+
+
+def _moved_from(pose: Pose, wrench: Wrench, at: Frame) -> Wrench:
+    """A wrench about the common reference point, about `at`."""
+    reference = _reference(pose)
+    return about(wrench, at.x - reference.x, at.y - reference.y)
+
+
+def _depth(number: Number) -> int:
+    return number.depth if isinstance(number, Dual) else 0
+
+
+def _real(frame: Frame) -> Frame:
+    return Frame(*(primal(n) for n in frame))
+
+
+def _size(group: General, elements: Elements) -> float:
+    """A length typical of the group, m: the widest spread of joint elements on one link (or on all known links)."""
+    places: dict[int, list[tuple[np.ndarray, np.ndarray]]] = {}
+    for joint, pair in zip(group.joints, elements, strict=True):
+        for link, frame in zip(joint.sides, pair, strict=True):
+            places.setdefault(link, []).append((np.asarray(primal(frame.x)), np.asarray(primal(frame.y))))
+    spans = [
+        float(np.nanmax(np.hypot(x - x0, y - y0), initial=0.0))
+        for (x0, y0), *others in places.values()
+        for x, y in others
+    ]
+    return max(spans, default=0.0) or 1.0

@@ -1,0 +1,120 @@
+"""The few planar quantities that pass between modules, and rigid-body motion of a point.
+
+All entries are numbers of `algebra.namespace` that broadcast over (sample, position). SI units, global axes.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from trunnion.algebra.namespace import Number
+
+__all__ = [
+    "ZERO_LOAD",
+    "Acceleration",
+    "Frame",
+    "Twist",
+    "Wrench",
+    "about",
+    "accelerated",
+    "compose",
+    "moved",
+    "point",
+    "relative",
+    "turned",
+]
+
+
+class Frame(NamedTuple):
+    """A pose: origin (x, y), m, and direction of the x axis (c, s) = (cos φ, sin φ).
+
+    As an element of a joint: its point, and for a prismatic pair the direction of the slide.
+    """
+
+    x: Number
+    y: Number
+    c: Number = 1.0
+    s: Number = 0.0
+
+
+class Twist(NamedTuple):
+    """Velocity of a point of a body (m/s) and the body's angular velocity w (rad/s)."""
+
+    x: Number
+    y: Number
+    w: Number
+
+
+class Acceleration(NamedTuple):
+    """Acceleration of a point of a body (m/s²) and the body's angular acceleration w (rad/s²)."""
+
+    x: Number
+    y: Number
+    w: Number
+
+
+class Wrench(NamedTuple):
+    """Force (N) and moment (N m) about a stated point."""
+
+    x: Number
+    y: Number
+    m: Number
+
+
+ZERO_LOAD = Wrench(0.0, 0.0, 0.0)
+
+
+def _is_zero(number: Number) -> bool:
+    """A literal zero, as most local coordinates are: skipping it saves whole passes over an array."""
+    return isinstance(number, float) and number == 0.0
+
+
+def turned(c: Number, s: Number, x: Number, y: Number) -> tuple[Number, Number]:
+    """(x, y) turned by the angle whose cosine and sine are c, s."""
+    if _is_zero(y):
+        return (0.0, 0.0) if _is_zero(x) else (c * x, s * x)
+    if _is_zero(x):
+        return -(s * y), c * y
+    return c * x - s * y, s * x + c * y
+
+
+def point(frame: Frame, x: Number, y: Number) -> tuple[Number, Number]:
+    """Global place of the point with local coordinates (x, y)."""
+    dx, dy = turned(frame.c, frame.s, x, y)
+    return frame.x + dx, frame.y + dy
+
+
+def compose(frame: Frame, local: Frame) -> Frame:
+    """Global frame of an element given in local coordinates of a link."""
+    x, y = point(frame, local.x, local.y)
+    c, s = turned(frame.c, frame.s, local.c, local.s)
+    return Frame(x, y, c, s)
+
+
+def relative(element: Frame, local: Frame) -> Frame:
+    """Frame of the link whose element with the local frame `local` lies at the global frame `element`."""
+    c, s = turned(element.c, element.s, local.c, -local.s)
+    dx, dy = turned(c, s, local.x, local.y)
+    return Frame(element.x - dx, element.y - dy, c, s)
+
+
+def moved(velocity: Twist, dx: Number, dy: Number) -> Twist:
+    """Velocity of the point that lies (dx, dy) from the one given, on the same body."""
+    return Twist(velocity.x - velocity.w * dy, velocity.y + velocity.w * dx, velocity.w)
+
+
+def accelerated(acceleration: Acceleration, w: Number, dx: Number, dy: Number) -> Acceleration:
+    """Acceleration of the point that lies (dx, dy) from the one given, on a body that turns at w."""
+    ww = w * w
+    return Acceleration(
+        acceleration.x - acceleration.w * dy - ww * dx,
+        acceleration.y + acceleration.w * dx - ww * dy,
+        acceleration.w,
+    )
+
+
+def about(wrench: Wrench, dx: Number, dy: Number) -> Wrench:
+    """The wrench about the point that lies (dx, dy) from its present one."""
+    if _is_zero(wrench.x) and _is_zero(wrench.y):  # a pure moment is the same about every point
+        return wrench
+    return Wrench(wrench.x, wrench.y, wrench.m - (dx * wrench.y - dy * wrench.x))

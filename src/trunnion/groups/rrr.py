@@ -1,0 +1,147 @@
+"""The class II group with three revolute pairs (dyad RRR), in closed form.  [D 2-13]
+
+    h --B-- i --C-- j --D-- k        h, k: known links; i, j: the group
+
+Joint order B, C, D: `elements` is ((B on h, B on i), (C on i, C on j), (D on k, D on j)), so the sides are
+(h, i), (i, j), (k, j). [D] S. Durango, G. Calle, O. Ruiz, J. Braz. Soc. Mech. Sci. & Eng. (2010).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple, TypeVar
+
+from trunnion.algebra.linalg import Vector, cross, dot
+from trunnion.algebra.namespace import Number, namespace
+from trunnion.groups.planar import Acceleration, Frame, Twist, Wrench, about, accelerated, moved, turned
+from trunnion.groups.protocol import Elements
+
+__all__ = ["Pose", "acceleration", "closure", "condition", "meet", "position", "reactions", "velocity"]
+
+_Motion = TypeVar("_Motion", Twist, Acceleration)
+
+
+class Pose(NamedTuple):
+    """Frames of the links i, j; B→C, D→C, and from the frame origins to B and D, global axes, m; |BC|, |CD|."""
+
+    frames: tuple[Frame, Frame]
+    bc: Vector
+    dc: Vector
+    b: Vector
+    d: Vector
+    lengths: tuple[Number, Number]
+    closure: Number
+
+
+def meet(b: Vector, d: Vector, bc: Number, cd: Number, branch: int) -> Vector:
+    """B→C for the pin C of an RRR group between known pins B and D.
+
+    |C − B| = bc, |C − D| = cd; branch +1 puts C left of B→D, −1 right of it.  [D fig. 5]
+    b, d: (x, y) m; bc, cd: m; all broadcast over (sample, position). NaN where the circles do not meet.
+    """
+    xp = namespace(*b, *d, bc, cd)
+    x, y = d[0] - b[0], d[1] - b[1]
+    square = x * x + y * y
+    along = (square + (bc - cd) * (bc + cd)) / (2 * square)
+    across = branch * xp.sqrt(bc * bc / square - along * along)
+    return along * x - across * y, along * y + across * x
+
+
+def position(elements: Elements, assembly: int, drive: Sequence[Number] = ()) -> Pose:
+    """Pose of both links. assembly: ±1, C left or right of B→D.
+
+    elements: (B on h, B on i), (C on i, C on j), (D on k, D on j); those on h and k global, else local; m.
+    """
+    (b, b_i), (c_i, c_j), (d, d_j) = elements
+    side_i = (c_i.x - b_i.x, c_i.y - b_i.y)
+    side_j = (c_j.x - d_j.x, c_j.y - d_j.y)
+    xp = namespace(*side_i, *side_j)
+    lengths = xp.hypot(*side_i), xp.hypot(*side_j)
+    bc = meet((b.x, b.y), (d.x, d.y), *lengths, assembly)
+    dc = (bc[0] - (d.x - b.x), bc[1] - (d.y - b.y))
+    frame_i, arm_b = _frame(b, b_i, bc, side_i, lengths[0])
+    frame_j, arm_d = _frame(d, d_j, dc, side_j, lengths[1])
+    gap = xp.abs(namespace(*bc).hypot(*bc) - lengths[0]) + xp.abs(namespace(*dc).hypot(*dc) - lengths[1])
+    return Pose((frame_i, frame_j), bc, dc, arm_b, arm_d, lengths, gap)
+
+
+def _frame(pin: Frame, local: Frame, reach: Vector, side: Vector, length: Number) -> tuple[Frame, Vector]:
+    """Frame of a link with its pin at a known place and its side along `reach`; and its origin → pin."""
+    square = length * length
+    x, y = side[0] / square, side[1] / square
+    c, s = turned(x, -y, *reach)
+    arm = turned(c, s, local.x, local.y)
+    return Frame(pin.x - arm[0], pin.y - arm[1], c, s), arm
+
+
+def velocity(pose: Pose, outer: Sequence[Twist | None], drive: Sequence[Number] = ()) -> list[Twist]:
+    """Velocities from v_B + ω_i × BC = v_D + ω_j × DC; outer: (of B, None, of D)."""
+    b, d = _known(outer)
+    w_i, w_j = _rates(pose, (d.x - b.x, d.y - b.y))
+    return [
+        moved(Twist(b.x, b.y, w_i), -pose.b[0], -pose.b[1]),
+        moved(Twist(d.x, d.y, w_j), -pose.d[0], -pose.d[1]),
+    ]
+
+
+def acceleration(
+    pose: Pose,
+    twists: Sequence[Twist],
+    outer_twists: Sequence[Twist | None],
+    outer: Sequence[Acceleration | None],
+    drive: Sequence[Number] = (),
+    rates: Sequence[Number] = (),
+) -> list[Acceleration]:
+    """Accelerations from a_B + α_i × BC − ω_i² BC = a_D + α_j × DC − ω_j² DC."""
+    b, d = _known(outer)
+    w_i, w_j = twists[0].w, twists[1].w
+    wi2, wj2 = w_i * w_i, w_j * w_j
+    jump = (
+        d.x - b.x + wi2 * pose.bc[0] - wj2 * pose.dc[0],
+        d.y - b.y + wi2 * pose.bc[1] - wj2 * pose.dc[1],
+    )
+    a_i, a_j = _rates(pose, jump)
+    return [
+        accelerated(Acceleration(b.x, b.y, a_i), w_i, -pose.b[0], -pose.b[1]),
+        accelerated(Acceleration(d.x, d.y, a_j), w_j, -pose.d[0], -pose.d[1]),
+    ]
+
+
+def _known(outer: Sequence[_Motion | None]) -> tuple[_Motion, _Motion]:
+    b, _, d = outer
+    if b is None or d is None:
+        raise ValueError("the RRR group needs the motion of both outer pins, B and D")
+    return b, d
+
+
+def _rates(pose: Pose, jump: Vector) -> tuple[Number, Number]:
+    """(p, q) with p × BC − q × DC = jump; × means z × vector. No solution where B, C, D are in line."""
+    area = cross(pose.bc, pose.dc)
+    return dot(jump, pose.dc) / area, dot(jump, pose.bc) / area
+
+
+def reactions(pose: Pose, loads: Sequence[Wrench]) -> list[Wrench]:
+    """Reactions F_hi at B, F_ij at C, F_kj at D.  [D 2-7, with friction among the loads 12-13]
+
+    Moments about B on link i and about D on link j hold only F_ij:
+        BC × F_ij = M_i,  DC × F_ij = −M_j
+    which is [D 12-13] with [D 6-7] inserted; then F_hi and F_kj follow from [D 6-7].
+    """
+    on_i = about(loads[0], *pose.b)
+    on_j = about(loads[1], *pose.d)
+    area = cross(pose.bc, pose.dc)
+    p, q = on_j.m / area, on_i.m / area
+    x = p * pose.bc[0] + q * pose.dc[0]
+    y = p * pose.bc[1] + q * pose.dc[1]
+    return [Wrench(x - on_i.x, y - on_i.y, 0.0), Wrench(x, y, 0.0), Wrench(-x - on_j.x, -y - on_j.y, 0.0)]
+
+
+def closure(pose: Pose) -> Number:
+    """By how much the pin C found misses the two circles, m."""
+    return pose.closure
+
+
+def condition(pose: Pose) -> Number:
+    """2/|sin μ|, μ the transmission angle between BC and DC: Frobenius condition of their unit vectors."""
+    xp = namespace(*pose.bc)
+    return 2 * pose.lengths[0] * pose.lengths[1] / xp.abs(cross(pose.bc, pose.dc))

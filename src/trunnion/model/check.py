@@ -1,0 +1,333 @@
+"""Checks of a model that need nothing but the model: names, dimensions, and data that no linkage can have.
+
+Each check yields findings; `check_model` runs them all. What needs the structure (whether the drivers suffice,
+whether it can be assembled) is checked where the structure is known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from typing import TYPE_CHECKING
+
+from trunnion.errors import Finding, Severity
+from trunnion.joints.friction import FRICTION_LAWS
+from trunnion.joints.pairs import PAIRS
+from trunnion.model.check_values import check_values
+from trunnion.model.expression import RESERVED
+from trunnion.model.names import nearest
+from trunnion.model.parameters import ParameterSet, entries, evaluation_order
+from trunnion.model.parts import Friction, Joint, Load, Measure, freedoms
+from trunnion.model.quantity import UNREADABLE
+from trunnion.model.units import ANY, Dimension, UnitError
+
+if TYPE_CHECKING:
+    from trunnion.model.mechanism import Mechanism
+
+__all__ = ["check_model"]
+
+
+def check_model(mechanism: Mechanism, lost: Collection[str] = ()) -> list[Finding]:
+    """Everything wrong or doubtful with a model, in the order of its sections.
+
+    lost: names of entries that could not be read; what follows from their absence is not reported.
+    """
+    unreadable: set[str] = set()
+    findings = [*_quantities(mechanism, unreadable), *_links(mechanism), *_joints(mechanism)]
+    findings += [*_loop(mechanism), *_drivers(mechanism), *_loads(mechanism), *_others(mechanism)]
+    numbers = ParameterSet(mechanism, unreadable) if unreadable else mechanism.parameter_set
+    findings += check_values(mechanism, numbers)
+    return [finding for finding in findings if not any(_speaks_of(finding, name) for name in lost)]
+
+
+def _speaks_of(finding: Finding, name: str) -> bool:
+    return f"'{name}'" in finding.what or name in finding.where.split(".")
+
+
+def _quantities(mechanism: Mechanism, unreadable: set[str]) -> Iterator[Finding]:
+    """Names and dimensions in every expression; `unreadable` receives the paths that have no value."""
+    known: dict[str, Dimension | None] = {}
+    yield from _dimensions(mechanism, known, unreadable)
+    used: set[str] = set()
+    for entry in entries(mechanism):
+        names = entry.quantity.names
+        used.update(names)
+        if entry.quantity is UNREADABLE:
+            unreadable.add(entry.path)
+        if entry.alias or entry.path in unreadable:
+            continue
+        if missing := [name for name in names if name not in known]:
+            unreadable.add(entry.path)
+            for name in missing:
+                what = f"'{entry.quantity.source}' speaks of '{name}', which is not one of the dimensions"
+                yield Finding(what, entry.path, nearest(name, known))
+            continue
+        try:
+            entry.quantity.check(known, entry.kind)
+        except UnitError as error:
+            yield Finding(error.what, entry.path, error.remedy)
+    for name in mechanism.dimensions:
+        if name not in used:
+            yield Finding("is not used", f"dimensions.{name}", "remove it", Severity.NOTE)
+
+
+def _dimensions(mechanism: Mechanism, known: dict[str, Dimension | None], unreadable: set[str]) -> Iterator[Finding]:
+    """Names of the dimensions and what each measures: `known` receives it, `unreadable` the paths without a value."""
+    dimensions = mechanism.dimensions
+    known.update(dict.fromkeys(dimensions))
+    order, circles = evaluation_order(dimensions)
+    for circle in circles:
+        unreadable.update(f"dimensions.{name}" for name in circle)
+        ring = " → ".join([*circle, circle[0]])
+        yield Finding(f"is defined by itself: {ring}", f"dimensions.{circle[0]}", "give one of them a value")
+    for name in order:
+        yield from _dimension_name(name)
+        quantity, path = dimensions[name], f"dimensions.{name}"
+        if set(quantity.names) <= known.keys() and path not in unreadable:
+            try:
+                known[name] = quantity.check(known, ANY)
+            except UnitError as error:
+                unreadable.add(path)
+                yield Finding(error.what, path, error.remedy)
+
+
+def _dimension_name(name: str) -> Iterator[Finding]:
+    where = f"dimensions.{name}"
+    if name in RESERVED:
+        yield Finding(f"'{name}' is a name of the expressions themselves", where, "call the dimension otherwise")
+    elif not name.isidentifier() or name.startswith("_"):
+        yield Finding(
+            f"'{name}' cannot be used in an expression", where, "name it with letters, digits and _, a letter first"
+        )
+
+
+def _links(mechanism: Mechanism) -> Iterator[Finding]:
+    joints = mechanism.effective_joints
+    jointed = {name for joint in joints.values() for name in joint.links}
+    size = mechanism.coordinates
+    if not mechanism.links and not mechanism.loop:
+        yield Finding("there are no links", "links", "state at least a ground and a moving link")
+    for name, link in mechanism.links.items():
+        where = f"links.{name}"
+        if name not in jointed:
+            yield Finding(f"no joint holds the link '{name}'", where, "join it to another link or remove it")
+        if link.inertia_about == "origin" and not link.model_fields_set & {"inertia"}:
+            yield Finding("inertia_about is given without an inertia", where, "give the inertia", Severity.WARNING)
+        for point, place in link.points.items():
+            for key in ("at", "axis", "x"):
+                vector = getattr(place, key)
+                if vector is not None:
+                    yield from _length(len(vector), size, f"{where}.points.{point}" + f".{key}" * (key != "at"))
+        if isinstance(link.centre, tuple):
+            yield from _length(len(link.centre), size, f"{where}.centre")
+    if mechanism.gravity is not None:
+        yield from _length(len(mechanism.gravity), size, "gravity")
+    fixed = mechanism.fixed_link
+    if not fixed and (mechanism.links or mechanism.loop):
+        yield Finding(
+            "no link is fixed", "ground", "name the fixed link 'ground' or 'frame', or state ground: <its name>"
+        )
+    elif fixed and fixed not in mechanism.links and fixed not in {row.link for row in mechanism.loop}:
+        yield Finding(f"there is no link '{fixed}'", "ground", nearest(fixed, mechanism.links))
+
+
+def _length(found: int, size: int, where: str) -> Iterator[Finding]:
+    if found != size:
+        space = "planar" if size == 2 else "spatial"
+        yield Finding(f"has {found} coordinates, a {space} model needs {size}", where, f"give {size}")
+
+
+def _joints(mechanism: Mechanism) -> Iterator[Finding]:
+    if mechanism.links and not mechanism.effective_joints:
+        yield Finding("there are no joints", "joints", "join the links")
+    for name, joint in mechanism.effective_joints.items():
+        where = f"joints.{name}"
+        if mechanism.space == "planar" and joint.type not in PAIRS:
+            yield Finding(f"a {joint.type} joint does not exist in the plane", where, f"use one of {', '.join(PAIRS)}")
+        if name in mechanism.joints:
+            yield from _ends(mechanism, name, joint)
+        yield from _contact(joint, where)
+    if mechanism.joint_defaults.friction:
+        yield from _parameters_of_law(mechanism.joint_defaults.friction, "joint_defaults.friction", complete=False)
+
+
+def _ends(mechanism: Mechanism, name: str, joint: Joint) -> Iterator[Finding]:
+    """The links of a joint and its point on each."""
+    where = f"joints.{name}"
+    if joint.links[0] == joint.links[1]:
+        yield Finding(f"joins the link '{joint.links[0]}' to itself", where, "name two different links")
+    for link in dict.fromkeys(joint.links):
+        if link not in mechanism.links:
+            yield Finding(f"there is no link '{link}'", f"{where}.links", nearest(link, mechanism.links))
+            continue
+        points = mechanism.links[link].points
+        if name not in points:
+            remedy = f"add {name}: [x, y] to the points of '{link}'"
+            yield Finding(f"the link '{link}' has no point '{name}'", where, f"{remedy} ({nearest(name, points)})")
+        elif joint.type in PAIRS and PAIRS[joint.type].needs_axis and points[name].axis is None:
+            yield Finding(
+                f"the point '{name}' of the link '{link}' has no axis, a {joint.type} joint needs one",
+                f"links.{link}.points.{name}",
+                f"write {name}: {{at: [x, y], axis: [1, 0]}}",
+            )
+
+
+def _contact(joint: Joint, where: str) -> Iterator[Finding]:
+    """Whether pin, guide and friction suit the type of joint and are complete."""
+    turns = "rotation" in freedoms(joint.type)
+    if turns and joint.guide:
+        yield Finding(f"a {joint.type} joint has a pin, not a guide", f"{where}.guide", "state pin instead")
+    if not turns and joint.pin:
+        yield Finding(f"a {joint.type} joint has a guide, not a pin", f"{where}.pin", "state guide instead")
+    friction = joint.friction
+    if friction is None:
+        return
+    yield from _parameters_of_law(friction, f"{where}.friction", complete=True)
+    if turns and not (joint.pin and joint.pin.radius):
+        yield Finding(
+            "friction without the radius of the pin", where, "state pin: {radius: …} or a fit, or friction: 0"
+        )
+    if not turns and not (joint.guide and joint.guide.length):
+        yield Finding("friction without the length of the guide", where, "state guide: {length: …}, or friction: 0")
+
+
+def _parameters_of_law(friction: Friction, where: str, complete: bool) -> Iterator[Finding]:
+    law = friction.law or "coulomb"
+    declared = FRICTION_LAWS[law].parameters
+    for parameter in friction.parameters:
+        if parameter not in declared:
+            what = f"the key '{parameter}' is unknown to the friction law {law}"
+            yield Finding(what, f"{where}.{parameter}", nearest(parameter, ["law", "model", *declared]))
+    if not complete:
+        return
+    for parameter, one in declared.items():
+        if one.default is None and parameter not in friction.parameters:
+            remedy = f"add {parameter}" + f" ({one.meaning})" * bool(one.meaning)
+            yield Finding(f"the friction law {law} needs '{parameter}'", where, remedy)
+
+
+def _loop(mechanism: Mechanism) -> Iterator[Finding]:
+    rows = mechanism.loop
+    for name, link in mechanism.links.items():
+        ends = [joint for joint, one in mechanism.effective_joints.items() if name in one.links]
+        if link.frame is not None and not rows:
+            yield Finding("frame is for the links of a loop", f"links.{name}.frame", "remove it")
+        elif link.frame is not None and ends and link.frame not in ends:
+            what = f"'{link.frame}' is not a joint of the link '{name}'"
+            yield Finding(what, f"links.{name}.frame", nearest(link.frame, ends))
+    if rows and mechanism.space == "planar":
+        yield Finding("a loop is spatial", "loop", "state space: spatial")
+    if rows and mechanism.joints:
+        yield Finding("joints and loop are both given", "joints", "keep the loop or the joints")
+    for kind, names in (("joint", [row.joint for row in rows]), ("link", [row.link for row in rows])):
+        for name in sorted({name for name in names if names.count(name) > 1}):
+            yield Finding(f"the {kind} '{name}' stands in several rows", "loop", "give each row its own")
+    for row in rows:
+        for freedom in {"slide", "rotation"} & set(freedoms(row.type)) & row.model_fields_set:
+            what = f"the {freedom} of a {row.type} joint is free, not constant"
+            yield Finding(what, f"loop.{row.joint}.{freedom}", "remove it")
+
+
+def _drivers(mechanism: Mechanism) -> Iterator[Finding]:
+    joints = mechanism.effective_joints
+    if joints and not mechanism.drivers:
+        yield Finding("there is no driver", "drivers", "state which joint is driven, as A: {speed: 10 rad/s}")
+    for name, driver in mechanism.drivers.items():
+        where = f"drivers.{name}"
+        if name not in joints:
+            yield Finding(f"there is no joint '{name}' to drive", where, nearest(name, joints))
+        elif "rotation" not in freedoms(joints[name].type) and driver.range is None:
+            yield Finding(f"a driven {joints[name].type} joint needs a range", where, "add range: [0 mm, 50 mm]")
+
+
+def _loads(mechanism: Mechanism) -> Iterator[Finding]:
+    for name, load in mechanism.loads.items():
+        where = f"loads.{name}"
+        if (load.link is None) == (load.joint is None):
+            yield Finding("acts on neither or both of a link and a joint", where, "state link: … or joint: …")
+        elif load.link is not None:
+            yield from _link_load(mechanism, load, load.link, where)
+        else:
+            yield from _joint_load(mechanism, load, where)
+
+
+def _link_load(mechanism: Mechanism, load: Load, link: str, where: str) -> Iterator[Finding]:
+    if load.resisting_torque is not None or load.resisting_force is not None:
+        yield Finding("a resisting load acts on a joint, not a link", where, "state joint: … instead of link: …")
+    elif load.force is None and load.moment is None:
+        yield Finding("there is nothing in this load", where, "state a force or a moment")
+    if load.force is not None:
+        yield from _length(len(load.force), mechanism.coordinates, f"{where}.force")
+        if load.at is None:
+            yield Finding("the force has no point to act at", where, "add at: <a point of the link>")
+    if load.moment is not None and isinstance(load.moment, tuple) != (mechanism.space == "spatial"):
+        form = "one number" if mechanism.space == "planar" else "[x, y, z]"
+        yield Finding(f"the moment of a {mechanism.space} model is {form}", f"{where}.moment", f"write {form}")
+    if link not in mechanism.links:
+        yield Finding(f"there is no link '{link}'", f"{where}.link", nearest(link, mechanism.links))
+    elif load.at is not None and load.at not in mechanism.links[link].points:
+        points = mechanism.links[link].points
+        yield Finding(f"the link '{link}' has no point '{load.at}'", f"{where}.at", nearest(load.at, points))
+    if link == mechanism.fixed_link:
+        yield Finding("acts on the fixed link and does nothing", where, "name a moving link", Severity.WARNING)
+
+
+def _joint_load(mechanism: Mechanism, load: Load, where: str) -> Iterator[Finding]:
+    joints = mechanism.effective_joints
+    if load.force is not None or load.moment is not None or load.at is not None:
+        yield Finding(
+            "at, force and moment are for a load on a link", where, "state resisting_torque or resisting_force"
+        )
+    elif load.resisting_torque is None and load.resisting_force is None:
+        yield Finding("there is nothing in this load", where, "state resisting_torque or resisting_force")
+    if load.joint is None or load.joint not in joints:
+        yield Finding(f"there is no joint '{load.joint}'", f"{where}.joint", nearest(str(load.joint), joints))
+        return
+    free = freedoms(joints[load.joint].type)
+    for key, freedom in (("resisting_torque", "rotation"), ("resisting_force", "slide")):
+        if getattr(load, key) is not None and freedom not in free:
+            yield Finding(
+                f"a {joints[load.joint].type} joint has no {freedom} to resist", f"{where}.{key}", "remove it"
+            )
+
+
+def _others(mechanism: Mechanism) -> Iterator[Finding]:
+    """Assembly hints and measures."""
+    joints, links = mechanism.effective_joints, mechanism.links
+    for name, hint in mechanism.assembly.items():
+        where = f"assembly.{name}"
+        link, _, point = name.partition(".")
+        if point and (link not in links or point not in links[link].points):
+            yield from _point(mechanism, name, where)
+        elif not point and name not in joints:
+            yield Finding(f"there is no joint '{name}'", where, nearest(name, joints))
+        if isinstance(hint, tuple):
+            yield from _length(len(hint), mechanism.coordinates, where)
+        elif point:
+            yield Finding("a point has a position, not an angle", where, "write [x, y]")
+    for name, measure in mechanism.measures.items():
+        yield from _measure(mechanism, measure, f"measures.{name}")
+
+
+def _measure(mechanism: Mechanism, measure: Measure, where: str) -> Iterator[Finding]:
+    subjects = [key for key in ("point", "effort", "angle") if getattr(measure, key) is not None]
+    if len(subjects) != 1:
+        found = " and ".join(subjects) or "nothing"
+        yield Finding(f"measures {found}", where, "state one of point, effort or angle")
+    if (measure.point is None) != (measure.axis is None):
+        yield Finding("a point is measured along an axis", where, "write {point: link.point, axis: x}")
+    if measure.axis == "z" and mechanism.space == "planar":
+        yield Finding("there is no z in the plane", f"{where}.axis", "write x or y")
+    if measure.point is not None:
+        yield from _point(mechanism, measure.point, f"{where}.point")
+    if measure.effort is not None and measure.effort not in mechanism.drivers:
+        what = f"there is no driver '{measure.effort}'"
+        yield Finding(what, f"{where}.effort", nearest(measure.effort, mechanism.drivers))
+    if measure.angle is not None and measure.angle not in mechanism.links:
+        yield Finding(f"there is no link '{measure.angle}'", f"{where}.angle", nearest(measure.angle, mechanism.links))
+
+
+def _point(mechanism: Mechanism, name: str, where: str) -> Iterator[Finding]:
+    """Whether `link.point` exists."""
+    known = [f"{link}.{point}" for link, part in mechanism.links.items() for point in part.points]
+    if name not in known:
+        yield Finding(f"there is no point '{name}'", where, nearest(name, known) + " (write link.point)")

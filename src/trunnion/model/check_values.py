@@ -1,0 +1,171 @@
+"""Checks of the numbers of a model: signs, ranges and bodies that cannot exist."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from itertools import combinations
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from trunnion.algebra.namespace import Number
+from trunnion.errors import Finding, Severity
+from trunnion.joints.friction import FRICTION_LAWS
+from trunnion.model.parameters import ParameterSet
+from trunnion.model.parts import InertiaTensor, Link, freedoms
+
+if TYPE_CHECKING:
+    from trunnion.model.mechanism import Mechanism
+
+__all__ = ["check_values"]
+
+Values = Mapping[str, Number]
+# Rounding in a file of four to six digits may violate the triangle inequality of a flat body by this much.
+INERTIA_SLACK = 1e-3
+
+
+def check_values(mechanism: Mechanism, numbers: ParameterSet) -> Iterator[Finding]:
+    """Findings about the nominal values; a nan in them stands for what is reported already and passes every check."""
+    values = numbers.nominal
+    for path, entry in numbers.entries.items():
+        broken = any(np.isnan(values[one]) for one in entry.depends if one in values)
+        if entry.quantity.names and not broken and not np.isfinite(values[path]) and not numbers.is_unreadable(path):
+            yield Finding(
+                f"'{entry.quantity.source}' has no finite value ({values[path]})", path, "check divisions and roots"
+            )
+        if entry.path.rpartition(".")[2] in _NOT_NEGATIVE and not entry.alias and values[path] < 0:
+            yield Finding(f"is {values[path]:g}, which is negative", path, "give a value of at least 0")
+    for name, link in mechanism.links.items():
+        yield from _inertia(mechanism, link, values, f"links.{name}")
+    for name in mechanism.effective_joints:
+        yield from _joint(mechanism, name, values)
+    for name in mechanism.drivers:
+        yield from _driver(values, f"drivers.{name}")
+    yield from _directions(mechanism, values)
+    yield from _sides(mechanism, values)
+
+
+_NOT_NEGATIVE = frozenset({"mass", "radius", "length", "bearing", "clearance"})
+
+
+def _joint(mechanism: Mechanism, name: str, values: Values) -> Iterator[Finding]:
+    joint, where = mechanism.effective_joints[name], f"joints.{name}"
+
+    def value(path: str) -> Number:
+        return values.get(f"{where}.{path}", np.nan)
+
+    friction = joint.friction
+    if friction and friction.law:
+        for parameter, declared in FRICTION_LAWS[friction.law].parameters.items():
+            number, path = value(f"friction.{parameter}"), f"{where}.friction.{parameter}"
+            if number < declared.minimum or number > declared.maximum:
+                limits = f"{declared.minimum:g} to {declared.maximum:g}"
+                yield Finding(f"is {number:g}, outside {limits}", path, "give a value within the range of the law")
+            elif parameter == "pair_factor" and number == 0:
+                yield Finding("is 0, which removes the friction", path, "give a factor above 0, or friction: 0")
+        if value("friction.coefficient") > 1:
+            yield Finding(
+                f"is {value('friction.coefficient'):g}, above 1",
+                f"{where}.friction.coefficient",
+                "check it: dry metals have 0.1 to 0.6",
+                Severity.WARNING,
+            )
+    for size, needed in (("pin.radius", friction), ("guide.length", friction)):
+        if needed and value(size) == 0:
+            yield Finding("is 0, where friction needs it", f"{where}.{size}", "give a value above 0")
+    for part, size in (("pin", "radius"), ("guide", "length")):
+        clearance, body = value(f"{part}.clearance"), value(f"{part}.{size}")
+        if clearance >= body > 0:
+            yield Finding(
+                f"is {clearance:g} m, not less than the {size} {body:g} m of the {part}",
+                f"{where}.{part}.clearance",
+                "check its unit",
+            )
+    pin = joint.pin
+    if pin and pin.fit and {"radius", "clearance"} & pin.model_fields_set and _states_both(mechanism, name):
+        yield Finding("a fit states radius and clearance already", f"{where}.pin", "keep the fit or the numbers")
+
+
+def _states_both(mechanism: Mechanism, name: str) -> bool:
+    """Whether the file itself gives a pin a fit and a radius or clearance."""
+    own = mechanism.joints[name].pin if name in mechanism.joints else None
+    stated = own or mechanism.joint_defaults.pin
+    return bool(stated and stated.fit and (stated.radius or stated.clearance))
+
+
+def _driver(values: Values, where: str) -> Iterator[Finding]:
+    if values[f"{where}.speed"] == 0:
+        yield Finding("the speed is 0", f"{where}.speed", "give a speed, however small, with its sign")
+    start, end = (values.get(f"{where}.range.{end}", np.nan) for end in ("from", "to"))
+    if start == end:
+        yield Finding(f"the range begins and ends at {start:g}", f"{where}.range", "give it an extent")
+
+
+def _directions(mechanism: Mechanism, values: Values) -> Iterator[Finding]:
+    for name, link in mechanism.links.items():
+        for point, place in link.points.items():
+            for key in ("axis", "x"):
+                path = f"links.{name}.points.{point}.{key}"
+                if getattr(place, key) is not None and all(
+                    values[f"{path}.{one}"] == 0 for one in _letters(values, path)
+                ):
+                    yield Finding("has no direction: all its components are 0", path, "write [1, 0] for along x")
+
+
+def _letters(values: Values, path: str) -> list[str]:
+    return [letter for letter in "xyz" if f"{path}.{letter}" in values]
+
+
+def _sides(mechanism: Mechanism, values: Values) -> Iterator[Finding]:
+    """A link of two turning joints at one point has no length to transmit motion with."""
+    if mechanism.space == "spatial":
+        return
+    for name, link in mechanism.links.items():
+        joints = [
+            key for key, joint in mechanism.effective_joints.items() if name in joint.links and key in link.points
+        ]
+        if len(joints) != 2 or any("rotation" not in freedoms(mechanism.effective_joints[key].type) for key in joints):
+            continue
+        for first, second in combinations(joints, 2):
+            a, b = ([values[f"links.{name}.points.{key}.{one}"] for one in "xy"] for key in (first, second))
+            if a == b:
+                severity = Severity.WARNING if name == mechanism.fixed_link else Severity.ERROR
+                what = f"the joints '{first}' and '{second}' of the link '{name}' are at one point"
+                yield Finding(what, f"links.{name}.points", "move one of them", severity)
+
+
+def _inertia(mechanism: Mechanism, link: Link, values: Values, where: str) -> Iterator[Finding]:
+    """Whether a body can be so: principal moments about its centre, each at most the sum of the others."""
+    mass = values[f"{where}.mass"]
+    centre = np.array([values[f"{where}.centre.{one}"] for one in _letters(values, f"{where}.centre")], dtype=float)
+    if not len(centre):
+        distance, angle = values[f"{where}.centre.distance"], values[f"{where}.centre.angle"]
+        centre = distance * np.array([np.cos(angle), np.sin(angle)])
+    path = f"{where}.inertia"
+    spatial = isinstance(link.inertia, InertiaTensor)
+    if spatial != (mechanism.space == "spatial") and "inertia" in link.model_fields_set:
+        form = "{xx: …, yy: …, zz: …}" if mechanism.space == "spatial" else "one number"
+        yield Finding(f"the inertia of a {mechanism.space} link is {form}", path, f"write {form}")
+        return
+    about_origin = link.inertia_about == "origin"
+    if not spatial:
+        least = mass * float(centre @ centre) if about_origin else 0.0
+        if values[path] < least * (1 - INERTIA_SLACK):
+            what = f"is {values[path]:g} kg m², less than m r² = {least:g}" if least else "is negative"
+            yield Finding(what, path, "check unit and inertia_about")
+        return
+    xx, yy, zz, xy, xz, yz = (float(values[f"{path}.{one}"]) for one in ("xx", "yy", "zz", "xy", "xz", "yz"))
+    tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    if about_origin and len(centre) == 3:
+        tensor = tensor - mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
+    if not np.isfinite(tensor).all():
+        return
+    principal = np.linalg.eigvalsh(tensor)
+    slack = INERTIA_SLACK * float(np.abs(tensor).max())
+    if principal[0] < -slack or principal[2] > principal[0] + principal[1] + slack:
+        shown = ", ".join(f"{one:.4g}" for one in principal)
+        yield Finding(
+            f"no body has the principal moments {shown} kg m² about its centre: one exceeds the sum of the others",
+            path,
+            "check inertia_about and the signs of xy, xz, yz (xy = −∫ x y dm)",
+        )

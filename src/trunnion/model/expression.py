@@ -1,0 +1,340 @@
+"""Expressions over named dimensions: `BE * cos(gamma)`, `90 deg - 0.1 deg`, `2*AB + 3 mm`.
+
+A number directly followed by a unit is one literal. A unit is words with optional integer powers, joined by a
+single space or by / * · without spaces (`N m`, `rad/s`, `kg m^2`); an operator with spaces around it calculates.
+The text is cut into tokens here, each operand replaced by a placeholder, and what is left is parsed by the
+standard library's `ast` over a whitelist of nodes: nothing of the text is ever executed.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import reduce
+from typing import Final
+
+import numpy as np
+
+from trunnion.algebra.namespace import Number, namespace
+from trunnion.model.units import ANGLE, NUMBER, Dimension, UnitError, dimension_text, fits, unit
+
+__all__ = ["RESERVED", "Expression", "literal", "parse"]
+
+MAX_LENGTH = 500
+MAX_DEPTH = 40
+
+_NUMBER = r"(?:[0-9]++(?:\.[0-9]*+)?+|\.[0-9]++)(?:[eE][-+]?[0-9]++)?+"
+_WORD = r"(?:[^\W\d_]++|%|°[A-Za-z]?+)(?!\w|\s*\()(?:(?:\^|\*\*)[-+]?[0-9](?![\w.]))?"
+_UNIT = rf"(?:{_WORD})(?:[ /*·⋅](?:{_WORD}))*"
+LITERAL = re.compile(rf"(?P<number>{_NUMBER})(?:\s*(?P<unit>{_UNIT})|\s+(?P<per>1/{_UNIT}))?")
+_TOKEN = re.compile(rf"\s*(?:(?P<literal>{LITERAL.pattern})|(?P<name>[^\W\d]\w*)|(?P<operator>\*\*|[-+*/^(),]))")
+# Signs an engineer's keyboard or word processor makes of - * ^2; the minus of a superscript included.
+_SIGNS = str.maketrans({"−": "-", "–": "-", "×": "*", "⋅": "·"})
+_SUPERSCRIPT = re.compile("⁻?[⁰¹²³⁴⁵⁶⁷⁸⁹]")
+_DIGITS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
+
+Evaluator = Callable[[Mapping[str, Number]], Number]
+Dimensions = Mapping[str, "Dimension | None"]
+
+
+@dataclass(frozen=True)
+class _Function:
+    """A function of expressions: its name in the namespace, how many arguments, what it does to dimensions."""
+
+    name: str
+    arguments: tuple[int, int]
+    takes: str  # "angle", "number" or "same": arguments of one dimension
+    gives: str  # "angle", "number", "same" or "root"
+
+
+_MANY = 20
+FUNCTIONS: Final[Mapping[str, _Function]] = {
+    "sin": _Function("sin", (1, 1), "angle", "number"),
+    "cos": _Function("cos", (1, 1), "angle", "number"),
+    "tan": _Function("tan", (1, 1), "angle", "number"),
+    "asin": _Function("arcsin", (1, 1), "number", "angle"),
+    "acos": _Function("arccos", (1, 1), "number", "angle"),
+    "atan": _Function("arctan", (1, 1), "number", "angle"),
+    "atan2": _Function("arctan2", (2, 2), "same", "angle"),
+    "sqrt": _Function("sqrt", (1, 1), "same", "root"),
+    "hypot": _Function("hypot", (2, 2), "same", "same"),
+    "abs": _Function("abs", (1, 1), "same", "same"),
+    "min": _Function("minimum", (2, _MANY), "same", "same"),
+    "max": _Function("maximum", (2, _MANY), "same", "same"),
+}
+RESERVED = frozenset({"pi", *FUNCTIONS})  # names a dimension cannot have
+
+
+@dataclass(frozen=True)
+class Literal:
+    """A number with its unit: value in SI, dimension; `unit` is empty for a bare number."""
+
+    value: float
+    dimension: Dimension
+    unit: str
+
+
+@dataclass(frozen=True)
+class Expression:
+    """A parsed expression.
+
+    names: the dimensions it speaks of; evaluate: values of those (SI floats, arrays, duals) to a value;
+    literal: set if it is nothing but one number with its unit (and perhaps a minus).
+    """
+
+    names: tuple[str, ...]
+    evaluate: Evaluator
+    literal: Literal | None
+    bare: bool  # neither a unit nor a name in it: only numbers
+    _tree: ast.expr = field(repr=False)
+    _operands: Mapping[str, Literal | str] = field(repr=False)
+
+    def dimension(self, names: Dimensions) -> Dimension | None:
+        """Dimension of the value, from those of the names (None: unknown); UnitError if terms do not fit."""
+        return _dimension(self._tree, self._operands, names)
+
+
+def literal(number: str, unit_text: str) -> Literal:
+    """The value of `number` times `unit_text` in SI, rounded once; UnitError if it has none."""
+    value = float(number)
+    factor, dimension = unit(unit_text) if unit_text else (Fraction(1), NUMBER)
+    if value and np.isfinite(value):
+        try:
+            value = float(Fraction(number) * factor)
+        except OverflowError:
+            value = float("inf")
+    if not np.isfinite(value):
+        raise UnitError(f"the number {number} is too large", "give a finite number")
+    return Literal(value, dimension, unit_text)
+
+
+def normalise(text: str) -> str:
+    """The text with typographic signs as plain ones: − – × as - *, m² as m^2."""
+    return _SUPERSCRIPT.sub(lambda found: "^" + found[0].translate(_DIGITS), text.translate(_SIGNS))
+
+
+def parse(text: str) -> Expression:
+    """Read an expression; UnitError says what is wrong with it. Never runs code."""
+    if len(text) > MAX_LENGTH:
+        raise UnitError(f"an expression of {len(text)} characters, {MAX_LENGTH} at most", "split it in dimensions")
+    source, operands = _tokens(normalise(text))
+    try:
+        tree = ast.parse(source, mode="eval").body
+        depth = _depth(tree)
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        raise UnitError(f"'{text}' cannot be read", "check operators and parentheses") from None
+    if depth > MAX_DEPTH:
+        raise UnitError(f"'{text[:40]}…' is nested too deeply", "split it in dimensions")
+    evaluate = _compile(tree, operands)
+    names = tuple(dict.fromkeys(one for one in operands.values() if isinstance(one, str) and one not in RESERVED))
+    found = [one for one in operands.values() if isinstance(one, Literal)]
+    core = tree.operand if isinstance(tree, ast.UnaryOp) else tree
+    alone = found[0] if isinstance(core, ast.Name) and found else None
+    bare = len(found) == len(operands) and not any(one.unit for one in found)
+    return Expression(names, evaluate, alone, bare, tree, operands)
+
+
+def _tokens(text: str) -> tuple[str, dict[str, Literal | str]]:
+    """The text as Python source with placeholders `_0`, `_1`, … for operands, and what they stand for."""
+    source: list[str] = []
+    operands: dict[str, Literal | str] = {}
+    place, after_operand = 0, False
+    text = text.strip()
+    while place < len(text):
+        found = _TOKEN.match(text, place)
+        if not found:
+            raise UnitError(f"'{text[place:].strip()[:20]}' is not understood in '{text}'", _hint(text))
+        operator = found["operator"]
+        if operator is None and after_operand:
+            raise UnitError(
+                f"an operator is missing before '{found[0].strip()}' in '{text}'",
+                "write a product as 2 * AB, a quantity as 60 mm",
+            )
+        if operator is None:
+            key = f"_{len(operands)}"
+            number = found["number"]
+            operands[key] = literal(number, found["unit"] or found["per"] or "") if number else found["name"]
+            source.append(key)
+        else:
+            if operator == "," and "(" not in source:
+                raise UnitError(f"',' is not understood in '{text}'", _hint(text))
+            source.append("**" if operator == "^" else operator)
+        after_operand = operator is None or operator == ")"
+        place = found.end()
+    return " ".join(source), operands
+
+
+def _hint(text: str) -> str:
+    """The remedy that the commonest slips need."""
+    if re.search(r"[0-9],[0-9]", text):
+        return "write a decimal point, not a comma"
+    return "use numbers with units, names of dimensions, + - * / ^ ( ) and " + ", ".join(sorted(RESERVED))
+
+
+def _depth(tree: ast.expr) -> int:
+    """How deep the tree is nested; RecursionError beyond Python's own limit."""
+    return 1 + max((_depth(child) for child in ast.iter_child_nodes(tree) if isinstance(child, ast.expr)), default=0)
+
+
+def _divide(a: Number, b: Number) -> Number:
+    return a / b
+
+
+_OPERATORS: Mapping[type[ast.operator], Callable[[Number, Number], Number]] = {
+    ast.Add: lambda a, b: a + b,
+    ast.Sub: lambda a, b: a - b,
+    ast.Mult: lambda a, b: a * b,
+    ast.Div: _divide,
+    ast.Pow: lambda a, b: a**b,
+}
+
+
+def _compile(tree: ast.expr, operands: Mapping[str, Literal | str]) -> Evaluator:
+    """The tree as nested closures. Constants are NumPy floats, so that 1/0 and (-1)^0.5 give inf and nan, data."""
+    match tree:
+        case ast.Name(id=key):
+            return _operand(operands[key])
+        case ast.UnaryOp(op=ast.USub(), operand=inner):
+            value = _compile(inner, operands)
+            return lambda names: -value(names)
+        case ast.UnaryOp(op=ast.UAdd(), operand=inner):
+            return _compile(inner, operands)
+        case ast.BinOp(op=ast.Pow(), left=base, right=exponent) if (power := _integer(exponent, operands)) is not None:
+            value, whole = _compile(base, operands), power  # an int, so that duals of negative numbers have powers
+            return lambda names: value(names) ** whole
+        case ast.BinOp(op=operator, left=left, right=right) if type(operator) in _OPERATORS:
+            combine, first, second = _OPERATORS[type(operator)], _compile(left, operands), _compile(right, operands)
+            return lambda names: combine(first(names), second(names))
+        case ast.Call(func=ast.Name(id=key), args=arguments, keywords=[]):
+            return _call(operands[key], [_compile(one, operands) for one in arguments])
+    raise UnitError("an expression has a part that is no number, name, operator or function", _hint(""))
+
+
+def _operand(operand: Literal | str) -> Evaluator:
+    if isinstance(operand, Literal):
+        constant = np.float64(operand.value)
+        return lambda names: constant
+    if operand == "pi":
+        return lambda names: np.float64(np.pi)
+    if operand in FUNCTIONS:
+        raise UnitError(f"the function '{operand}' has no argument", f"write {operand}(…)")
+    name = operand
+
+    def look_up(names: Mapping[str, Number]) -> Number:
+        value = names[name]
+        return np.float64(value) if isinstance(value, (float, int)) else value
+
+    return look_up
+
+
+def _integer(tree: ast.expr, operands: Mapping[str, Literal | str]) -> int | None:
+    """The exponent as an int if it is a whole literal number."""
+    negative = isinstance(tree, ast.UnaryOp) and isinstance(tree.op, ast.USub)
+    core = tree.operand if isinstance(tree, ast.UnaryOp) else tree
+    operand = operands[core.id] if isinstance(core, ast.Name) else None
+    if not isinstance(operand, Literal) or operand.value != int(operand.value) or abs(operand.value) > 99:
+        return None
+    return -int(operand.value) if negative else int(operand.value)
+
+
+def _call(name: Literal | str, arguments: list[Evaluator]) -> Evaluator:
+    if isinstance(name, Literal):
+        raise UnitError("an operator is missing before a parenthesis", "write a product as 2 * (a + b)")
+    if name not in FUNCTIONS:
+        raise UnitError(f"'{name}' is not a function", "the functions are " + ", ".join(sorted(FUNCTIONS)))
+    function = FUNCTIONS[name]
+    least, most = function.arguments
+    if not least <= len(arguments) <= most:
+        raise UnitError(f"{name} takes {least} argument{'s' * (least > 1)}, not {len(arguments)}", "separate them by ,")
+
+    def call(names: Mapping[str, Number]) -> Number:
+        values = [argument(names) for argument in arguments]
+        apply = getattr(namespace(*values), function.name)
+        return reduce(apply, values) if len(values) > 1 else apply(values[0])
+
+    return call
+
+
+def _dimension(tree: ast.expr, operands: Mapping[str, Literal | str], names: Dimensions) -> Dimension | None:
+    """Dimension of a tree that `_compile` accepted; None where a plain number leaves it unknown."""
+
+    def of(part: ast.expr) -> Dimension | None:
+        return _dimension(part, operands, names)
+
+    match tree:
+        case ast.Name(id=key):
+            operand = operands[key]
+            if isinstance(operand, Literal):
+                return operand.dimension if operand.value or operand.unit else None  # a bare 0 fits anywhere
+            return NUMBER if operand == "pi" else names[operand]
+        case ast.UnaryOp(operand=inner):
+            return of(inner)
+        case ast.BinOp(op=ast.Pow(), left=base, right=exponent):
+            return _power(of(base), of(exponent), exponent, operands)
+        case ast.BinOp(op=ast.Mult() | ast.Div() as operator, left=left, right=right):
+            first, second = of(left), of(right)
+            if first is None or second is None:
+                return None
+            sign = 1 if isinstance(operator, ast.Mult) else -1
+            return _combine(first, second, sign)
+        case ast.BinOp(left=left, right=right):
+            return _same([of(left), of(right)], "added")
+        case ast.Call(func=ast.Name(id=key), args=arguments):
+            return _function_dimension(str(operands[key]), [of(one) for one in arguments])
+    raise AssertionError("every node was checked when compiled")
+
+
+def _combine(first: Dimension, second: Dimension, sign: int) -> Dimension:
+    length, mass, time, angle = (a + sign * b for a, b in zip(first, second, strict=True))
+    return length, mass, time, angle
+
+
+def _scale(dimension: Dimension, factor: Fraction) -> Dimension:
+    length, mass, time, angle = (exponent * factor for exponent in dimension)
+    return length, mass, time, angle
+
+
+def _power(
+    base: Dimension | None, exponent: Dimension | None, tree: ast.expr, operands: Mapping[str, Literal | str]
+) -> Dimension | None:
+    if exponent is not None and exponent != NUMBER:
+        raise UnitError(f"an exponent is {dimension_text(exponent)}", "an exponent must be a number without unit")
+    if base is None or base == NUMBER:
+        return base
+    whole = _integer(tree, operands)
+    if whole is None:
+        raise UnitError(f"{dimension_text(base)} is raised to a power that is not a whole number", "use sqrt or ^2")
+    return _scale(base, Fraction(whole))
+
+
+def _same(dimensions: list[Dimension | None], verb: str) -> Dimension | None:
+    """The common dimension of terms; an angle beside pure numbers makes an angle."""
+    known = [dimension for dimension in dimensions if dimension is not None]
+    if not known:
+        return None
+    result = next((dimension for dimension in known if dimension != NUMBER), NUMBER)
+    for dimension in known:
+        if not fits(dimension, result):
+            raise UnitError(
+                f"{dimension_text(result)} and {dimension_text(dimension)} are {verb}",
+                "give every number its unit, such as 3 mm",
+            )
+    return result
+
+
+def _function_dimension(name: str, arguments: list[Dimension | None]) -> Dimension | None:
+    function = FUNCTIONS[name]
+    common = _same(arguments, f"put together in {name}")
+    wanted = {"angle": ANGLE, "number": NUMBER}.get(function.takes)
+    if wanted is not None and common is not None and not fits(common, wanted):
+        raise UnitError(f"{name} is given {dimension_text(common)}", f"{name} takes {dimension_text(wanted)}")
+    results: Mapping[str, Dimension | None] = {
+        "angle": ANGLE,
+        "number": NUMBER,
+        "same": common,
+        "root": None if common is None else _scale(common, Fraction(1, 2)),
+    }
+    return results[function.gives]

@@ -1,0 +1,283 @@
+"""Reading and writing model files: YAML 1.2, JSON (which is YAML) and TOML.
+
+A file is data from a stranger: its size, nesting, tags and aliases are bounded before anything is built from it.
+Every finding gets the file and the line of the entry it concerns.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import tomllib
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from ruamel.yaml import YAML
+from ruamel.yaml.error import MarkedYAMLError, YAMLError
+from ruamel.yaml.events import AliasEvent
+from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
+
+from trunnion.errors import Finding, MechanismError
+from trunnion.model.mechanism import Mechanism
+
+__all__ = ["read_mechanism", "write_mechanism"]
+
+MAX_BYTES = 1_000_000  # some ten thousand links; parsing takes seconds
+MAX_DEPTH = 30
+_TYPES = {".yaml": "YAML", ".yml": "YAML", ".json": "JSON", ".toml": "TOML"}
+_TAG = "tag:yaml.org,2002:"
+_PLAIN_TAGS = frozenset(_TAG + name for name in ("str", "int", "float", "bool", "null", "map", "seq"))
+
+Lines = dict[str, int]
+
+
+def read_mechanism(path: str | os.PathLike[str]) -> Mechanism:
+    """The mechanism of a file, by its extension .yaml, .yml, .json or .toml.
+
+    MechanismError with every finding of severity error, each with file, line, what and remedy.
+    """
+    path = Path(path)
+    try:
+        data, lines = _parse(_text(path), _file_type(path))
+        findings = [] if "trunnion" in data else [_unversioned()]
+    except MechanismError as error:
+        raise MechanismError(finding.at(str(path), finding.line) for finding in error.findings) from None
+    try:
+        mechanism = Mechanism(**data)
+    except MechanismError as error:
+        findings += error.findings
+    if findings:
+        raise MechanismError(_placed(findings, str(path), lines, data)) from None
+    return mechanism
+
+
+def write_mechanism(mechanism: Mechanism, path: str | os.PathLike[str]) -> None:
+    """Write a mechanism as YAML or JSON, whole or not at all; MechanismError if it cannot be written."""
+    path = Path(path)
+    kind = _file_type(path)
+    if kind == "TOML":
+        raise MechanismError(Finding("TOML is read but not written", file=str(path), remedy="write .yaml or .json"))
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        with temporary.open("w", encoding="utf-8", newline="\n") as stream:
+            if kind == "JSON":
+                json.dump(mechanism.data(), stream, indent=2, ensure_ascii=False)
+                stream.write("\n")
+            else:
+                _yaml().dump(mechanism.data(), stream)
+        temporary.replace(path)
+    except OSError as error:
+        raise MechanismError(
+            Finding(f"cannot be written: {error.strerror}", file=str(path), remedy="check folder and permissions")
+        ) from error
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _yaml() -> YAML:
+    yaml = YAML(typ="safe", pure=True)
+    yaml.default_flow_style = None  # the innermost groups on one line
+    yaml.allow_unicode = True
+    yaml.width = 110
+    yaml.sort_base_mapping_type_on_output = False
+    return yaml
+
+
+def _unversioned() -> Finding:
+    return Finding("the version of the file is missing", "trunnion", "begin the file with trunnion: 1", line=1)
+
+
+def _file_type(path: Path) -> str:
+    suffix = path.suffix.lower()
+    if suffix not in _TYPES:
+        raise MechanismError(
+            Finding(
+                f"the extension '{suffix}' is none of a model file", file=str(path), remedy=f"use {', '.join(_TYPES)}"
+            )
+        )
+    return _TYPES[suffix]
+
+
+def _text(path: Path) -> str:
+    """The content of a file of bounded size, as text."""
+    try:
+        if path.exists() and not path.is_file():
+            raise MechanismError(Finding("is not a file", remedy="name a model file"))
+        size = path.stat().st_size
+        if size > MAX_BYTES:
+            raise MechanismError(
+                Finding(
+                    f"has {size / 1e6:.1f} MB, a model file at most {MAX_BYTES / 1e6:.1f} MB",
+                    remedy="check that it is a model file",
+                )
+            )
+        raw = path.read_bytes()
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else str(error)
+        raise MechanismError(Finding(f"cannot be read: {reason}", remedy="check the path")) from error
+    try:
+        text = raw.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = raw.count(b"\n", 0, error.start) + 1
+        raise MechanismError(
+            Finding(f"is not UTF-8 text (byte {error.start})", remedy="save it as UTF-8", line=line)
+        ) from error
+    if not text.strip():
+        raise MechanismError(Finding("is empty", remedy="start from one of the examples", line=1))
+    return text
+
+
+def _parse(text: str, kind: str) -> tuple[dict[str, Any], Lines]:
+    """Plain data of the text, and the line of every path in it."""
+    try:
+        return _parse_toml(text) if kind == "TOML" else _parse_yaml(text, kind)
+    except RecursionError:
+        raise MechanismError(Finding("is nested too deeply", remedy="check brackets")) from None
+
+
+def _parse_toml(text: str) -> tuple[dict[str, Any], Lines]:
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        found = re.search(r"at line (\d+), column \d+", str(error))
+        raise MechanismError(
+            Finding(f"is not TOML: {error}", remedy="correct it there", line=int(found[1]) if found else None)
+        ) from error
+    # tomllib keeps no lines: a key that stands once in the file is found by searching for it.
+    places: dict[str, list[int]] = {}
+    for number, line in enumerate(text.splitlines(), start=1):
+        for key in set(re.findall(r"[\w-]+(?=\"?\s*[=.\]])", line)):
+            places.setdefault(key, []).append(number)
+    unique = {key: numbers[0] for key, numbers in places.items() if len(numbers) == 1}
+    return data, {path: unique[key] for path, key in _paths(data) if key in unique}
+
+
+def _paths(data: Any, prefix: str = "") -> Iterable[tuple[str, str]]:
+    for key, value in data.items() if isinstance(data, dict) else ():
+        path = f"{prefix}.{key}" if prefix else key
+        yield path, key
+        yield from _paths(value, path)
+
+
+def _parse_yaml(text: str, kind: str) -> tuple[dict[str, Any], Lines]:
+    if kind == "JSON":
+        text = text.replace("\t", " ")  # allowed between the tokens of JSON, not of YAML
+    try:
+        for event in YAML(typ="safe", pure=True).parse(text):
+            _refuse(event)
+        root = YAML(typ="safe", pure=True).compose(text)
+    except MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        what = f"is not {kind}: {error.problem or error.context}" + (f" (column {mark.column + 1})" if mark else "")
+        raise MechanismError(
+            Finding(what, remedy="check indentation, brackets and quotes", line=mark.line + 1 if mark else None)
+        ) from error
+    except YAMLError as error:
+        what = f"is not {kind}: {str(error).splitlines()[0]}"
+        raise MechanismError(Finding(what, remedy="check that it is a text file")) from error
+    except (ValueError, TypeError, LookupError, AttributeError, AssertionError, ArithmeticError) as error:
+        # ruamel lets some of Python's own errors pass on text that is no YAML
+        raise MechanismError(Finding(f"is not {kind}: {error}", remedy="check that it is a text file")) from error
+    if not isinstance(root, MappingNode):
+        what = "is not a group of entries (key: value) at its top"
+        raise MechanismError(Finding(what, remedy="start from one of the examples", line=1))
+    builder = _Builder()
+    data = builder.build(root, "", 0)
+    if builder.findings:
+        raise MechanismError(builder.findings)
+    return data, builder.lines
+
+
+def _refuse(event: Any) -> None:
+    """Aliases (a few bytes of which can mean gigabytes) and tags (which can name code) are no part of a model file."""
+    line = event.start_mark.line + 1
+    if isinstance(event, AliasEvent):
+        raise MechanismError(
+            Finding(f"the alias *{event.anchor} is not allowed", remedy="write it out, or name a dimension", line=line)
+        )
+    tag = str(getattr(event, "tag", None) or "")
+    if tag and tag not in _PLAIN_TAGS and tag != "!":
+        raise MechanismError(Finding(f"the tag {tag} is not allowed", remedy="remove the tag", line=line))
+
+
+class _Builder:
+    """Plain data from YAML nodes, with the line of every path, and what is wrong on the way."""
+
+    def __init__(self) -> None:
+        self.lines: Lines = {}
+        self.findings: list[Finding] = []
+
+    def build(self, node: Node, path: str, depth: int) -> Any:
+        """The value of a node at a path."""
+        self.lines.setdefault(path, node.start_mark.line + 1)
+        if depth > MAX_DEPTH:
+            raise RecursionError
+        if isinstance(node, MappingNode):
+            return self._mapping(node, path, depth)
+        if isinstance(node, SequenceNode):
+            return [self.build(item, f"{path}.{index}", depth + 1) for index, item in enumerate(node.value)]
+        assert isinstance(node, ScalarNode)  # there are no other nodes
+        return self._scalar(node, path)
+
+    def _mapping(self, node: MappingNode, path: str, depth: int) -> dict[str, Any]:
+        values: dict[str, Any] = {}
+        for key_node, value_node in node.value:
+            line = key_node.start_mark.line + 1
+            if not isinstance(key_node, ScalarNode):
+                self.findings.append(Finding("a key is not a text", path, "write key: value", line=line))
+                continue
+            key = str(key_node.value)
+            below = f"{path}.{key}" if path else key
+            if key in values:
+                what = f"the key '{key}' is given twice, first in line {self.lines[below]}"
+                self.findings.append(Finding(what, below, "remove one of them", line=line))
+                continue
+            self.lines[below] = line
+            values[key] = self.build(value_node, below, depth + 1)
+        return values
+
+    def _scalar(self, node: ScalarNode, path: str) -> Any:
+        text = str(node.value)
+        try:
+            match str(node.tag).removeprefix(_TAG):
+                case "int":
+                    return int(text.replace("_", ""), 0 if re.match(r"[-+]?0[xob]", text) else 10)
+                case "float":
+                    return float(re.sub(r"(?i)\.(?=inf|nan)", "", text.replace("_", "")))
+                case "bool":
+                    return text.lower() == "true"
+                case "null":
+                    return None
+        except ValueError:
+            remedy = "write a number as 12.5 or 1.25e1"
+            line = node.start_mark.line + 1
+            self.findings.append(Finding(f"'{text[:40]}' is not a number", path, remedy, line=line))
+        return text
+
+
+def _placed(findings: Iterable[Finding], file: str, lines: Lines, data: Mapping[str, Any]) -> list[Finding]:
+    """Findings with their file and line, in the order of the file."""
+    loop = data.get("loop")
+    rows = {f"loop.{row.get('joint')}": f"loop.{index}" for index, row in _groups(loop)}
+    rows |= {f"joints.{name.partition('.')[2]}": row for name, row in rows.items()}
+    placed = [finding.at(file, finding.line or _line(finding.where, lines, rows)) for finding in findings]
+    return sorted(placed, key=lambda finding: finding.line or 0)
+
+
+def _groups(items: Any) -> list[tuple[int, dict[str, Any]]]:
+    """The groups of entries in a list, with their index."""
+    return [(index, one) for index, one in enumerate(items if isinstance(items, list) else ()) if isinstance(one, dict)]
+
+
+def _line(where: str, lines: Lines, rows: Mapping[str, str]) -> int | None:
+    """The line of a path, or of the nearest part that contains it; a row of the loop is spoken of by its joint."""
+    rest = ""
+    while where:
+        for path in (where + rest, rows.get(where, where) + rest, where, rows.get(where, where)):
+            if path in lines:
+                return lines[path]
+        where, _, last = where.rpartition(".")
+        rest = f".{last}{rest}"
+    return lines.get("")

@@ -1,0 +1,170 @@
+"""What pydantic found wrong with the sections of a model, as findings in the words of a model file."""
+
+from __future__ import annotations
+
+import types
+import typing
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+
+from trunnion.errors import Finding
+from trunnion.model.names import nearest
+from trunnion.model.quantity import UNREADABLE
+
+__all__ = ["repair", "schema_findings"]
+
+# What the other types of pydantic errors mean here; {…} are filled from the error's context.
+_MEANINGS: Mapping[str, tuple[str, str]] = {
+    "missing": ("'{key}' is missing", "add it"),
+    "string_type": ("is not a text", "write a text, in quotes if it looks like a number"),
+    "bool_type": ("is not true or false", "write true or false"),
+    "bool_parsing": ("is not true or false", "write true or false"),
+    "tuple_type": ("is not a list", "write a list [..., ...]"),
+    "mapping_type": ("is not a group of entries", "write a group {{key: value}} or indented lines key: value"),
+    "dict_type": ("is not a group of entries", "write a group {{key: value}} or indented lines key: value"),
+    "model_type": ("is not a group of entries", "write a group {{key: value}} or indented lines key: value"),
+    "too_short": ("has {actual_length} entries, at least {min_length} are needed", "give them all"),
+    "too_long": ("has more than the {max_length} entries it can have", "remove what is too much"),
+    "literal_error": ("is none of {expected}", "write one of {expected}"),
+}
+
+
+def schema_findings(error: ValidationError, model: type[BaseModel], data: Mapping[str, Any]) -> list[Finding]:
+    """One finding for each thing that pydantic found, with its path."""
+    return [_finding(one, model, data) for one in error.errors(include_url=False)]
+
+
+def _finding(error: ErrorDetails, model: type[BaseModel], data: Mapping[str, Any]) -> Finding:
+    location = _plain(error["loc"])
+    key = str(location[-1]) if location else ""
+    context = error.get("ctx", {})
+    kind = error["type"]
+    if error["input"] is None and kind != "missing":
+        what, remedy = "is empty", "give it a value or remove it"
+    elif kind in ("quantity", "stated"):
+        what, remedy = context["what"], context["remedy"]
+    elif kind == "extra_forbidden":
+        what, remedy = f"the key '{key[:80]}' is unknown", nearest(key, _fields(model, location[:-1]))
+    elif kind == "literal_error" and key == "trunnion":
+        what, remedy = f"the file is of version {error['input']!r}, this program reads 1", "write trunnion: 1"
+    elif kind in _MEANINGS:
+        what, remedy = (text.format(**{"key": key, **context}) for text in _MEANINGS[kind])
+    else:
+        what, remedy = error["msg"][:1].lower() + error["msg"][1:], "see the examples of model files"
+    if kind == "missing":
+        location = location[:-1]
+    return Finding(what, _path(location, data), remedy)
+
+
+def _plain(location: tuple[int | str, ...]) -> tuple[int | str, ...]:
+    """A location without the marks of pydantic: tags of forms and of keys."""
+    return tuple(part for part in location if part != "[key]" and not str(part).startswith(":"))
+
+
+def _path(location: tuple[int | str, ...], data: Mapping[str, Any]) -> str:
+    """Location as a path: coordinates by their letters, rows of the loop by their joints."""
+    parts: list[str] = []
+    for place, part in enumerate(location):
+        if part == "at" and place > 2 and location[place - 2] == "points":
+            continue
+        if not isinstance(part, int):
+            parts.append(part)
+        elif location[0] == "loop" and place == 1:
+            row = data["loop"][part]
+            parts.append(str(row["joint"]) if isinstance(row, Mapping) and "joint" in row else str(part))
+        else:
+            names = ("from", "to") if location[place - 1] == "range" else ("x", "y", "z")
+            parts.append(names[part] if part < len(names) else str(part))
+    return ".".join(parts)
+
+
+def _fields(model: type[BaseModel], location: tuple[int | str, ...]) -> list[str]:
+    """The keys that the part of the model at a location can have."""
+    reached: list[Any] = [model]
+    for part in location:
+        reached = [below for annotation in reached for below in _below(annotation, part)]
+    return [field for one in reached for field in one.model_fields]
+
+
+def _below(annotation: Any, part: int | str) -> Iterator[type[BaseModel]]:
+    """The model classes, or containers of them, that an annotation has under a key."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        field = annotation.model_fields.get(str(part))
+        yield from _classes(field.annotation) if field else ()
+    else:
+        yield from _classes(typing.get_args(annotation)[1 if _origin(annotation) is Mapping else 0])
+
+
+def _origin(annotation: Any) -> Any:
+    found = typing.get_origin(annotation)
+    return Mapping if isinstance(found, type) and issubclass(found, Mapping) else found
+
+
+def _classes(annotation: Any) -> Iterator[Any]:
+    """Model classes and containers in an annotation, unions and Annotated unwrapped."""
+    origin = typing.get_origin(annotation)
+    if origin in (typing.Union, types.UnionType):
+        for one in typing.get_args(annotation):
+            yield from _classes(one)
+    elif origin is typing.Annotated:
+        yield from _classes(typing.get_args(annotation)[0])
+    elif _origin(annotation) in (Mapping, tuple) or (
+        isinstance(annotation, type) and issubclass(annotation, BaseModel)
+    ):
+        yield annotation
+
+
+def repair(error: ValidationError, data: Mapping[str, Any]) -> tuple[dict[str, Any], frozenset[str]]:
+    """The data without what could not be read, to check the rest; and the names of the entries lost with it."""
+    mended = {key: _mutable(value) for key, value in data.items()}
+    lost: set[str] = set()
+    for one in error.errors(include_url=False, include_input=False):
+        location = _plain(one["loc"])
+        if one["type"] == "extra_forbidden":
+            _at(mended, location, lambda holder, key: holder.pop(key, None))
+        elif one["type"] == "quantity":
+            _at(mended, location, _unreadable)
+        else:
+            entry = location[: 2 if len(location) > 1 and location[0] not in ("gravity", "loop") else 1]
+            _at(mended, entry, lambda holder, key: holder.pop(key, None))
+            lost.add(str(entry[-1]))
+    return mended, frozenset(lost)
+
+
+def _mutable(value: Any) -> Any:
+    """A copy whose groups and lists can be changed."""
+    if isinstance(value, Mapping):
+        return {key: _mutable(item) for key, item in value.items()}
+    return [_mutable(item) for item in value] if isinstance(value, (list, tuple)) else value
+
+
+def _unreadable(holder: Any, key: int | str) -> None:
+    if isinstance(holder[key], (dict, list)):
+        holder.pop(key)
+    else:
+        holder[key] = UNREADABLE
+
+
+def _at(data: Any, location: tuple[int | str, ...], change: Callable[[Any, Any], Any]) -> None:
+    """Apply a change at a location; a short form has no such place, and its entry is changed as a whole."""
+    holder = data
+    *path, key = location
+    for part in path:
+        below = holder[part] if _has(holder, part) else None
+        if part == "at" and isinstance(holder, list):
+            continue
+        if not isinstance(below, (dict, list)):
+            key = part
+            break
+        holder = below
+    if _has(holder, key):
+        change(holder, key)
+
+
+def _has(holder: Any, key: Any) -> bool:
+    if isinstance(holder, list):
+        return isinstance(key, int) and key < len(holder)
+    return isinstance(holder, dict) and key in holder

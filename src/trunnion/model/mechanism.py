@@ -1,0 +1,212 @@
+"""The mechanism as its engineer states it: one immutable object, one-to-one with the model file."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Mapping
+from functools import cached_property
+from itertools import pairwise
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, ValidationError
+
+from trunnion.algebra.namespace import Number
+from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.joints.friction import FRICTION_LAWS
+from trunnion.model.check import check_model
+from trunnion.model.findings import repair, schema_findings
+from trunnion.model.names import nearest
+from trunnion.model.parameters import Location, ParameterSet, merge_joint
+from trunnion.model.parts import (
+    Driver,
+    Hint,
+    Joint,
+    JointDefaults,
+    Link,
+    Load,
+    LoopJoint,
+    Measure,
+    Name,
+    Part,
+)
+from trunnion.model.quantity import Acceleration, AnyQuantity, Quantity
+from trunnion.model.units import Kind
+
+__all__ = ["Mechanism"]
+
+FIXED_NAMES = ("ground", "frame")
+
+
+class Mechanism(Part):
+    """A linkage: dimensions, links, joints, drivers, loads. See the sections' classes in `model.parts`.
+
+    Built from plain mappings, numbers (SI) and texts with units, or from the classes. A mechanism that exists is
+    sound: whatever is wrong with it is raised as one MechanismError when it is built.
+    """
+
+    trunnion: Literal[1] = 1
+    name: str = ""
+    space: Literal["planar", "spatial"] = "planar"
+    gravity: Annotated[tuple[Acceleration, ...], Field(min_length=2, max_length=3)] | None = None
+    ground: str | None = None
+    dimensions: Mapping[Name, AnyQuantity] = {}
+    links: Mapping[Name, Link] = {}
+    joints: Mapping[Name, Joint] = {}
+    joint_defaults: JointDefaults = JointDefaults()
+    loop: tuple[LoopJoint, ...] = ()
+    drivers: Mapping[Name, Driver] = {}
+    loads: Mapping[Name, Load] = {}
+    assembly: Mapping[str, Hint] = {}
+    measures: Mapping[Name, Measure] = {}
+    references: tuple[str, ...] = ()
+    notes: str = ""
+
+    def __init__(self, **data: Any) -> None:
+        """Validate and check; MechanismError with every finding of severity error."""
+        findings: list[Finding] = []
+        lost: frozenset[str] = frozenset()
+        try:
+            super().__init__(**data)
+        except ValidationError as error:
+            findings = schema_findings(error, Mechanism, data)
+            try:  # what can still be checked without the unreadable entries is, so that all is said in one go
+                mended, lost = repair(error, data)
+                super().__init__(**mended)
+            except ValidationError:
+                raise MechanismError(findings) from None
+        found = check_model(self, lost)
+        findings += [finding for finding in found if finding.severity is Severity.ERROR]
+        if findings:
+            raise MechanismError(findings)
+
+    @classmethod
+    def model_validate(cls, obj: Any, **options: Any) -> Self:
+        """The mechanism of a mapping; MechanismError, as when built from keywords."""
+        return obj if isinstance(obj, cls) else cls(**obj)
+
+    @classmethod
+    def read(cls, path: str | os.PathLike[str]) -> Mechanism:
+        """The mechanism of a YAML, JSON or TOML file; MechanismError with file, line and remedy of every finding."""
+        from trunnion.model.file import read_mechanism
+
+        return read_mechanism(path)
+
+    def write(self, path: str | os.PathLike[str]) -> None:
+        """Write the model as YAML or JSON, by extension; reading it again gives an equal mechanism."""
+        from trunnion.model.file import write_mechanism
+
+        write_mechanism(self, path)
+
+    @property
+    def coordinates(self) -> int:
+        """How many coordinates a point has: 2 or 3."""
+        return 2 if self.space == "planar" else 3
+
+    @property
+    def fixed_link(self) -> str:
+        """The link that does not move: `ground`, else the link of that name or named frame; empty if there is none."""
+        names = [*self.links, *(row.link for row in self.loop)]
+        return self.ground or next((name for name in FIXED_NAMES if name in names), "")
+
+    @cached_property
+    def effective_joints(self) -> Mapping[str, Joint]:
+        """Every joint with the defaults merged in and its friction complete; of a loop, with the links of its rows."""
+        stated = dict(self.joints)
+        for before, row in zip((*self.loop[-1:], *self.loop[:-1]), self.loop, strict=True):
+            stated[row.joint] = Joint(
+                type=row.type, links=(before.link, row.link), pin=row.pin, guide=row.guide, friction=row.friction
+            )
+        return {name: merge_joint(joint, self.joint_defaults) for name, joint in stated.items()}
+
+    @cached_property
+    def parameter_set(self) -> ParameterSet:
+        """The numbers of the mechanism, compiled once."""
+        return ParameterSet(self)
+
+    def parameters(self, overrides: Mapping[str, Number] | None = None) -> dict[str, Number]:
+        """Every number in SI by path, such as `links.crank.mass`.
+
+        overrides: values by path or by an ending that is unique (`AB`, `crank.mass`): floats, arrays (sample, 1)
+        or dual numbers; what depends on them follows. MechanismError names the nearest if a name is unknown.
+        """
+        return self.parameter_set.evaluate(overrides)
+
+    def parameter_kinds(self) -> dict[str, Kind]:
+        """What each parameter measures, with its SI unit, by path."""
+        return {path: entry.kind for path, entry in self.parameter_set.entries.items()}
+
+    def tolerances(self) -> dict[str, tuple[float, float]]:
+        """(lower, upper) signed deviations in SI of every parameter that states them, by path.
+
+        A tolerance in `joint_defaults` is one of each joint that has it: the joints vary independently.
+        """
+        found = self.parameter_set.entries.values()
+        own = [entry for entry in found if not entry.path.startswith("joint_defaults.")]
+        return {
+            entry.path: entry.quantity.tolerance
+            for entry in own
+            if entry.quantity.tolerance and (not entry.alias or entry.alias.startswith("joint_defaults."))
+        }
+
+    def with_values(self, values: Mapping[str, float | str]) -> Mechanism:
+        """The mechanism with some entries replaced, by names as in `parameters`; texts are read as in a file."""
+        data = self.data()
+        for name, value in values.items():
+            _assign(
+                data, self.parameter_set.entries[self.parameter_set.resolve(name)].location, value, self.coordinates
+            )
+        return Mechanism(**data)
+
+    def with_friction(self, law: str) -> Mechanism:
+        """The mechanism without friction ("off"), or with another law wherever there is friction.
+
+        Parameters that the laws share are kept; MechanismError names those that the new law lacks.
+        """
+        if law != "off" and law not in FRICTION_LAWS:
+            raise MechanismError(
+                Finding(f"'{law}' is not a friction law", remedy=nearest(law, [*FRICTION_LAWS, "off"]))
+            )
+        data = self.data()
+        holders = [data.get("joint_defaults", {}), *data.get("joints", {}).values(), *data.get("loop", [])]
+        for holder in (one for one in holders if "friction" in one):
+            stated = holder.pop("friction")
+            if law != "off":
+                stated = stated if isinstance(stated, dict) else {"coefficient": stated}
+                keep = {"model", *FRICTION_LAWS[law].parameters}
+                holder["friction"] = {"law": law, **{key: value for key, value in stated.items() if key in keep}}
+        return Mechanism(**data)
+
+    def data(self) -> dict[str, Any]:
+        """The model as plain mappings, lists, numbers and texts: what was stated, as it was written."""
+        return {"trunnion": self.trunnion, **self.model_dump(mode="json", exclude_unset=True)}
+
+    @property
+    def digest(self) -> str:
+        """Hash of the content, 16 hexadecimal digits: equal mechanisms have equal digests."""
+        text = json.dumps(_canonical(self.model_dump(mode="json")), sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def _canonical(value: Any) -> Any:
+    """Plain data with 1 and 1.0 alike."""
+    if isinstance(value, dict):
+        return {key: _canonical(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_canonical(item) for item in value]
+    return float(value) if isinstance(value, int) and not isinstance(value, bool) else value
+
+
+def _assign(data: dict[str, Any], location: Location, value: float | str | Quantity, coordinates: int) -> None:
+    """Put a value at its place in plain data, making the groups on the way and writing short forms out."""
+    holder: Any = data
+    for key, following in pairwise(location):
+        if isinstance(holder, dict) and holder.get(key) is None:
+            holder[key] = [0] * coordinates if isinstance(following, int) else {}
+        if following == "at" and isinstance(holder[key], list):
+            holder[key] = {"at": holder[key]}
+        elif isinstance(following, str) and not isinstance(holder[key], dict):
+            holder[key] = {"coefficient": holder[key]}  # the short form of friction
+        holder = holder[key]
+    holder[location[-1]] = value

@@ -1,0 +1,360 @@
+"""The sections of a model file as frozen pydantic models: one class for each kind of entry, one field for each key.
+
+A class reads the plain mappings, numbers and texts of a file; Python code may give those or the classes. Fields
+left out stay unset, so that a model is written back with what was stated and nothing more.
+"""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
+
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Discriminator,
+    Field,
+    PlainSerializer,
+    PlainValidator,
+    SerializerFunctionWrapHandler,
+    Tag,
+    WithJsonSchema,
+    model_serializer,
+    model_validator,
+)
+from pydantic_core import PydanticCustomError
+
+from trunnion.joints.friction import FRICTION_LAWS
+from trunnion.joints.pairs import PAIRS
+from trunnion.model.names import nearest
+from trunnion.model.quantity import (
+    Angle,
+    AngleOrLength,
+    AnyQuantity,
+    Dimensionless,
+    Force,
+    Inertia,
+    Length,
+    Mass,
+    Moment,
+    Quantity,
+    Rate,
+)
+from trunnion.model.units import KINDS, UnitError
+
+__all__ = [
+    "FRICTION_MODELS",
+    "JOINT_TYPES",
+    "Driver",
+    "Fit",
+    "Friction",
+    "Guide",
+    "InertiaTensor",
+    "Joint",
+    "JointDefaults",
+    "Link",
+    "Load",
+    "LoopJoint",
+    "Measure",
+    "Part",
+    "Pin",
+    "Point",
+    "PolarPoint",
+    "freedoms",
+]
+
+# Spatial pairs that a file may name already; each moves to `PAIRS` with the analysis that knows it.
+SPATIAL_FREEDOMS: Mapping[str, tuple[str, ...]] = {
+    "cylindrical": ("rotation", "slide"),
+    "spherical": ("rotation",),
+    "universal": ("rotation",),
+    "helical": ("rotation",),
+    "planar": ("slide",),
+}
+JOINT_TYPES = (*PAIRS, *(name for name in SPATIAL_FREEDOMS if name not in PAIRS))
+FRICTION_MODELS = ("two-contact", "pezzuti")
+
+
+def freedoms(joint_type: str) -> tuple[str, ...]:
+    """The motions a joint of this type frees, of ("rotation", "slide"): a rotation has a pin, a slide alone a guide."""
+    return PAIRS[joint_type].freedoms if joint_type in PAIRS else SPATIAL_FREEDOMS[joint_type]
+
+
+def _name(name: str) -> str:
+    """A name that can stand in a path and in a message."""
+    if not name.strip() or name != name.strip():
+        raise _problem(f"the name {name[:80]!r} is empty or begins or ends with a space", "remove the space")
+    if "." in name:
+        raise _problem(f"the name '{name[:80]}' has a dot, which separates the parts of a path", "use - or _")
+    if len(name) > 80 or any(unicodedata.category(sign) in ("Cc", "Cf", "Cs", "Zl", "Zp") for sign in name):
+        raise _problem(f"the name {name[:80]!r} has control characters or over 80", "use a short printable name")
+    return name
+
+
+def _problem(what: str, remedy: str) -> PydanticCustomError:
+    return PydanticCustomError("stated", "{what}", {"what": what, "remedy": remedy})
+
+
+def _known(table: tuple[str, ...], noun: str) -> Any:
+    """Annotations of a text that must be an entry of a table, for validation and JSON Schema."""
+
+    def check(value: str) -> str:
+        if value not in table:
+            raise _problem(f"'{value[:80]}' is not a {noun}", nearest(value, table))
+        return value
+
+    return AfterValidator(check), WithJsonSchema({"type": "string", "enum": list(table)})
+
+
+def _shape(value: object) -> str:
+    """Which of the forms of an entry was written: a list, a group of entries or a single value."""
+    if isinstance(value, (Mapping, BaseModel)):
+        return ":group"
+    return ":list" if isinstance(value, (list, tuple)) else ":value"
+
+
+def _forms(text: str) -> Discriminator:
+    return Discriminator(_shape, custom_error_type="forms", custom_error_message=f"takes {text}")
+
+
+_check_type, _schema_type = _known(JOINT_TYPES, "joint type")
+_check_law, _schema_law = _known(tuple(FRICTION_LAWS), "friction law")
+_check_model, _schema_model = _known(FRICTION_MODELS, "friction model")
+
+Name = Annotated[str, AfterValidator(_name)]
+JointType = Annotated[str, _check_type, _schema_type]
+Position = Annotated[tuple[Length, ...], Field(min_length=2, max_length=3)]
+Direction = Annotated[tuple[Dimensionless, ...], Field(min_length=2, max_length=3)]
+
+
+class Part(BaseModel):
+    """An entry of a model file: immutable, an unknown key is an error."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, hide_input_in_errors=True)
+
+
+class Point(Part):
+    """A point of a link in the link's frame: `[x, y]`, or with the axis of a sliding or spatial joint there."""
+
+    at: Position
+    axis: Direction | None = None
+    x: Direction | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read_list(cls, value: object) -> object:
+        return {"at": value} if isinstance(value, (list, tuple)) else value
+
+    @model_serializer(mode="wrap")
+    def _write_list(self, write: SerializerFunctionWrapHandler) -> Any:
+        long = write(self)
+        return long["at"] if self.axis is None and self.x is None else long
+
+
+class PolarPoint(Part):
+    """A point by its distance from the link's origin and its angle from the link's x."""
+
+    distance: Length
+    angle: Angle
+
+
+class InertiaTensor(Part):
+    """Inertia of a spatial link, kg m²: entries of the symmetric tensor (so xy = −∫ x y dm)."""
+
+    xx: Inertia
+    yy: Inertia
+    zz: Inertia
+    xy: Inertia = Quantity(0, KINDS["moment of inertia"])
+    xz: Inertia = Quantity(0, KINDS["moment of inertia"])
+    yz: Inertia = Quantity(0, KINDS["moment of inertia"])
+
+
+class Link(Part):
+    """A rigid body: its points by name, its mass properties in its own frame (massless if not stated).
+
+    centre: mass centre, the origin if not stated; inertia refers to it unless `inertia_about` is origin.
+    frame: in a spatial loop, the joint whose frame the mass properties are given in.
+    """
+
+    points: Mapping[Name, Point] = {}
+    mass: Mass = Quantity(0, KINDS["mass"])
+    centre: (
+        Annotated[
+            Annotated[Position, Tag(":list")] | Annotated[PolarPoint, Tag(":group")],
+            _forms("[x, y] or {distance: …, angle: …}"),
+        ]
+        | None
+    ) = None
+    inertia: Annotated[
+        Annotated[Inertia, Tag(":value")] | Annotated[InertiaTensor, Tag(":group")],
+        _forms("a number or a group {xx: …, yy: …, zz: …}"),
+    ] = Quantity(0, KINDS["moment of inertia"])
+    inertia_about: Literal["centre", "origin"] = "centre"
+    frame: str | None = None
+
+
+_FIT = re.compile(r"^(?P<size>.*\S)\s+(?P<hole>[A-Z]{1,2}[0-9]{1,2})\s*/\s*(?P<shaft>[a-z]{1,2}[0-9]{1,2})$")
+
+
+@dataclass(frozen=True)
+class Fit:
+    """An ISO 286 fit such as `20 mm H7/g6`: diameter, hole class and shaft class, as written."""
+
+    source: str
+    size: Quantity
+    hole: str
+    shaft: str
+
+    @classmethod
+    def read(cls, source: object) -> Fit:
+        """A fit from its text; a pydantic error if it is none."""
+        if isinstance(source, Fit):
+            return source
+        found = _FIT.match(source.strip()) if isinstance(source, str) else None
+        if not isinstance(source, str) or not found:
+            raise _problem(f"{str(source)[:60]!r} is not a fit", "write diameter, hole and shaft as 20 mm H7/g6")
+        try:
+            size = Quantity.read(found["size"], KINDS["length"])
+        except UnitError as error:
+            raise _problem(error.what, error.remedy) from error
+        return cls(source, size, found["hole"], found["shaft"])
+
+
+FitText = Annotated[
+    Fit,
+    PlainValidator(Fit.read),
+    PlainSerializer(lambda fit: fit.source),
+    WithJsonSchema({"type": "string", "description": "an ISO 286 fit", "examples": ["20 mm H7/g6"]}),
+]
+
+
+class Pin(Part):
+    """Pin and hole of a joint that turns.
+
+    length: of the pin in its hole (for play); bearing: effective length for friction, `length` if not stated;
+    clearance: hole radius less pin radius; fit: diameter and clearance by ISO 286 instead; offset: of the
+    middle of the bearing from the joint's point, along the axis.
+    """
+
+    radius: Length | None = None
+    length: Length | None = None
+    bearing: Length | None = None
+    clearance: Length | None = None
+    fit: FitText | None = None
+    offset: Length | None = None
+
+
+class Guide(Part):
+    """Slider and guide of a joint that slides: length in contact, play across."""
+
+    length: Length | None = None
+    clearance: Length | None = None
+
+
+class Friction(BaseModel):
+    """Friction of a joint: a law of `FRICTION_LAWS` with its parameters, or one number, the coefficient.
+
+    Attributes beside `law` and `model` are the parameters of the law; `parameters` has them by name.
+    """
+
+    model_config = ConfigDict(extra="allow", frozen=True, hide_input_in_errors=True)
+    __pydantic_extra__: dict[str, AnyQuantity]
+
+    law: Annotated[str, _check_law, _schema_law] | None = None
+    model: Annotated[str, _check_model, _schema_model] | None = None
+
+    @property
+    def parameters(self) -> Mapping[str, Quantity]:
+        """Parameters of the law by name."""
+        return self.__pydantic_extra__
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read_number(cls, value: object) -> object:
+        return {"coefficient": value} if isinstance(value, (int, float, str, Quantity)) else value
+
+    @model_serializer(mode="wrap")
+    def _write_number(self, write: SerializerFunctionWrapHandler) -> Any:
+        long = write(self)
+        return long["coefficient"] if list(long) == ["coefficient"] else long
+
+
+class JointDefaults(Part):
+    """What every joint has unless it says otherwise: pins where it turns, guides where it slides."""
+
+    pin: Pin | None = None
+    guide: Guide | None = None
+    friction: Friction | None = None
+
+
+class Joint(Part):
+    """A kinematic pair between two links, at the point of its own name on both."""
+
+    type: JointType
+    links: tuple[str, str]
+    pin: Pin | None = None
+    guide: Guide | None = None
+    friction: Friction | None = None
+
+
+class LoopJoint(Part):
+    """A row of a dual Denavit–Hartenberg table: the joint, then the link after it up to the next joint."""
+
+    joint: Name
+    type: JointType
+    link: Name
+    twist: Angle = Quantity(0, KINDS["angle"])
+    distance: Length = Quantity(0, KINDS["length"])
+    slide: Length | None = None
+    rotation: Angle | None = None
+    pin: Pin | None = None
+    guide: Guide | None = None
+    friction: Friction | None = None
+
+
+class Driver(Part):
+    """Prescribed motion of the joint it is named after; one turn from `start` unless a range is given."""
+
+    speed: Rate
+    start: AngleOrLength = Quantity(0, KINDS["angle"] | KINDS["length"])
+    range: tuple[AngleOrLength, AngleOrLength] | None = None
+
+
+class Load(Part):
+    """A load on a link (force at a point, moment) in global axes, or one that resists the motion of a joint."""
+
+    link: str | None = None
+    at: str | None = None
+    force: Annotated[tuple[Force, ...], Field(min_length=2, max_length=3)] | None = None
+    moment: (
+        Annotated[
+            Annotated[Moment, Tag(":value")]
+            | Annotated[tuple[Moment, ...], Field(min_length=3, max_length=3), Tag(":list")],
+            _forms("one moment (planar) or [x, y, z]"),
+        ]
+        | None
+    ) = None
+    joint: str | None = None
+    resisting_torque: Moment | None = None
+    resisting_force: Force | None = None
+    useful: bool = False
+
+
+class Measure(Part):
+    """A number to watch over the cycle: a coordinate of a point, the effort of a driver, or the angle of a link."""
+
+    point: str | None = None
+    axis: Literal["x", "y", "z"] | None = None
+    effort: str | None = None
+    angle: str | None = None
+    limit: AnyQuantity | None = None
+
+
+Hint = Annotated[
+    Annotated[Position, Tag(":list")] | Annotated[AngleOrLength, Tag(":value")],
+    _forms("[x, y] of a point, or the rotation of a joint"),
+]

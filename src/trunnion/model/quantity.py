@@ -1,0 +1,233 @@
+"""Quantities of a model file: a number in SI, a text with unit and tolerance, or an expression.
+
+`Quantity` keeps what was written, so that a model is written back as it was read. The annotated types `Length`,
+`Mass`, … say what a field of the model measures: pydantic reads a number or a text into a `Quantity` of that kind.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import PydanticCustomError, core_schema
+
+from trunnion.algebra.namespace import Number
+from trunnion.model.expression import LITERAL, Expression, literal, normalise, parse
+from trunnion.model.units import ANY, KINDS, NUMBER, Dimension, Kind, UnitError, dimension_text, fits
+
+__all__ = [
+    "Acceleration",
+    "Angle",
+    "AngleOrLength",
+    "AnyQuantity",
+    "Dimensionless",
+    "Force",
+    "Inertia",
+    "Length",
+    "Mass",
+    "Moment",
+    "Quantity",
+    "Rate",
+]
+
+_SYMMETRIC = re.compile(r"^(.*?)\s*(?:±|\+/-|\+-)\s*(.*)$", re.DOTALL)
+_LIMITS = re.compile(r"^(.*\S)\s+([-+][0-9.][^/]*|0)/\s*([-+][0-9.].*|0)$", re.DOTALL)
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A number of the model, as written.
+
+    source: the number (SI) or text; kind: what it measures; tolerance: (lower, upper) signed deviations in SI.
+    Two quantities are equal if they are written alike.
+    """
+
+    source: float | str
+    kind: Kind = ANY
+    tolerance: tuple[float, float] | None = field(default=None, compare=False)
+    expression: Expression | None = field(default=None, compare=False, repr=False)
+
+    @classmethod
+    def read(cls, source: object, kind: Kind = ANY) -> Quantity:
+        """A quantity from a number (SI) or a text; UnitError if it is none or of the wrong kind."""
+        if isinstance(source, Quantity):
+            if source is UNREADABLE or source.kind == kind:
+                return source
+            source = source.source
+        if isinstance(source, (bool, np.bool_)) or not isinstance(source, (int, float, str, np.number)):
+            what = "is empty" if source is None else f"is {_shape(source)}, not a number or text"
+            raise UnitError(what, f"give a {kind.name} such as {kind.example}")
+        if not isinstance(source, str):
+            source = _plain(source)
+            return cls(source, kind)
+        try:
+            main, tolerance = _split(normalise(source), kind)
+            expression = parse(main)
+        except UnitError as error:
+            raise UnitError(error.what, error.remedy or f"write a {kind.name} such as {kind.example}") from None
+        quantity = cls(source, kind, tolerance, expression)
+        if not expression.names:
+            quantity.check({})
+            _finite(quantity.evaluate(), source)
+        return quantity
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The dimensions its expression speaks of."""
+        return self.expression.names if self.expression else ()
+
+    def evaluate(self, values: Mapping[str, Number] | None = None) -> Number:
+        """The value in SI, from those of `names`: floats, arrays (sample, 1) or duals; nan or inf where undefined."""
+        if self.expression is None:
+            return float(self.source)
+        with np.errstate(all="ignore"):
+            return self.expression.evaluate(values or {})
+
+    def check(self, names: Mapping[str, Dimension | None], kind: Kind | None = None) -> Dimension | None:
+        """The dimension of the value, given those of `names` (None: unknown); UnitError if `kind` forbids it."""
+        if self.expression is None:
+            return None
+        kind = kind or self.kind
+        dimension = self.expression.dimension(names)
+        if self.expression.bare and dimension is not None and kind.dimensions and NUMBER not in kind.dimensions:
+            if self.evaluate() == 0:
+                return None
+            raise UnitError(
+                f"'{self.source}' has no unit where {_needed(kind)} is needed",
+                f"write a unit, such as {kind.example}, or a plain number in {kind.unit}",
+            )
+        if not kind.accepts(dimension):
+            assert dimension is not None  # None fits every kind
+            raise UnitError(
+                f"'{self.source}' is {dimension_text(dimension)} where {_needed(kind)} is needed",
+                f"write {_needed(kind)} such as {kind.example}",
+            )
+        return dimension
+
+
+# Stands for a quantity that could not be read while the rest of the model is checked; every check passes over it.
+UNREADABLE = Quantity(math.nan)
+
+
+def _needed(kind: Kind) -> str:
+    return f"{'an' if kind.name[0] in 'aeiou' else 'a'} {kind.name}"
+
+
+def _shape(value: object) -> str:
+    """What a value of the wrong shape is, in the words of a model file."""
+    names = {bool: "a yes/no value", list: "a list", tuple: "a list", dict: "a group of entries"}
+    return names.get(type(value), f"a {type(value).__name__}")
+
+
+def _plain(number: Any) -> float:
+    """A finite int or float; UnitError if it is not finite."""
+    value = number.item() if isinstance(number, np.generic) else number
+    try:
+        finite = math.isfinite(value)
+    except OverflowError:  # an int beyond the floats
+        finite = False
+    if not finite:
+        raise UnitError(f"{str(value)[:20]} is not a finite number", "give a finite number")
+    return value  # type: ignore[no-any-return]
+
+
+def _finite(value: Number, source: str) -> None:
+    if not np.isfinite(value):
+        raise UnitError(f"'{source}' has no finite value ({value})", "check divisions and roots")
+
+
+def _split(text: str, kind: Kind) -> tuple[str, tuple[float, float] | None]:
+    """Value text and tolerance in SI; a unit stated once serves the value and the tolerance."""
+    if found := _SYMMETRIC.match(text):
+        main, parts = found[1], [found[2]]
+    elif found := _LIMITS.match(text):
+        main, parts = found[1], [found[2], found[3]]
+    else:
+        return text, None
+    terms = [_term(part) for part in parts]
+    value = LITERAL.fullmatch(main.strip().lstrip("-+ "))
+    unit_of_value = value["unit"] or "" if value else ""
+    unit = next((one for _, one in reversed(terms) if one), unit_of_value)
+    if value and not unit_of_value and unit:
+        main = f"{main.strip()} {unit}"
+    if not unit and not value and kind.dimensions != KINDS["number"].dimensions:
+        raise UnitError(f"the tolerance in '{text}' has no unit", "write the unit of the tolerance, such as ± 0.05 mm")
+    found_dimension = parse(main).dimension({}) if value else None
+    deviations = []
+    for number, own in terms:
+        deviation = literal(number.lstrip("-+"), own or unit)
+        if found_dimension is not None and not (
+            fits(deviation.dimension, found_dimension) and fits(found_dimension, deviation.dimension)
+        ):
+            raise UnitError(
+                f"the tolerance in '{text}' is {dimension_text(deviation.dimension)}, "
+                f"the value {dimension_text(found_dimension)}",
+                "give both the same unit",
+            )
+        if not kind.accepts(deviation.dimension):
+            raise UnitError(f"the tolerance in '{text}' is {dimension_text(deviation.dimension)}")
+        deviations.append(-deviation.value if number.startswith("-") else deviation.value)
+    if len(deviations) == 1:
+        if terms[0][0][0] in "-+":
+            raise UnitError(f"the tolerance in '{text}' has a sign after ±", "write ± 0.05 mm")
+        deviations.append(-deviations[0])
+    return main, (min(deviations), max(deviations))
+
+
+def _term(text: str) -> tuple[str, str]:
+    """Number (with its sign) and unit of one side of a tolerance."""
+    stripped = text.strip()
+    sign = stripped[:1] if stripped[:1] in ("-", "+") else ""
+    found = LITERAL.fullmatch(stripped[len(sign) :].strip())
+    if not found:
+        raise UnitError(f"the tolerance '{stripped}' is not a number with a unit", "write ± 0.05 mm or +0.02/-0.01 mm")
+    return sign + found["number"], found["unit"] or ""
+
+
+@dataclass(frozen=True)
+class _Read:
+    """Annotation that makes pydantic read a number or text into a Quantity of this kind."""
+
+    kind: Kind
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
+        """Validation by `Quantity.read`; written back as it was written."""
+
+        def read(value: object) -> Quantity:
+            try:
+                return Quantity.read(value, self.kind)
+            except UnitError as error:
+                raise PydanticCustomError("quantity", "{what}", {"what": error.what, "remedy": error.remedy}) from error
+
+        return core_schema.no_info_plain_validator_function(
+            read, serialization=core_schema.plain_serializer_function_ser_schema(lambda quantity: quantity.source)
+        )
+
+    def __get_pydantic_json_schema__(
+        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        """A number or a text, with its SI unit and an example."""
+        return {
+            "type": ["number", "string"],
+            "description": f"{self.kind.name}: a number in {self.kind.unit}, or a text with unit, ± or an expression",
+            "examples": [self.kind.example],
+        }
+
+
+AnyQuantity = Annotated[Quantity, _Read(ANY)]
+Dimensionless = Annotated[Quantity, _Read(KINDS["number"])]
+Length = Annotated[Quantity, _Read(KINDS["length"])]
+Angle = Annotated[Quantity, _Read(KINDS["angle"])]
+Mass = Annotated[Quantity, _Read(KINDS["mass"])]
+Inertia = Annotated[Quantity, _Read(KINDS["moment of inertia"])]
+Force = Annotated[Quantity, _Read(KINDS["force"])]
+Moment = Annotated[Quantity, _Read(KINDS["moment"])]
+Acceleration = Annotated[Quantity, _Read(KINDS["acceleration"])]
+Rate = Annotated[Quantity, _Read(KINDS["angular speed"] | KINDS["speed"])]
+AngleOrLength = Annotated[Quantity, _Read(KINDS["angle"] | KINDS["length"])]

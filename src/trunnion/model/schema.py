@@ -1,0 +1,37 @@
+"""JSON Schema of the model file, generated from the sections' classes and the tables of joints and friction laws.
+
+`mechanism.schema.json` beside this file is what editors complete model files with; a test keeps it up to date.
+Write it anew with `python -m trunnion.model.schema`.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from trunnion.model.mechanism import Mechanism
+
+__all__ = ["SCHEMA_FILE", "json_schema", "schema_text"]
+
+SCHEMA_FILE = Path(__file__).with_name("mechanism.schema.json")
+
+
+def json_schema() -> dict[str, Any]:
+    """The JSON Schema (2020-12) of a model file."""
+    schema = Mechanism.model_json_schema()
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        **schema,
+        "title": "Trunnion model file",
+        "required": ["trunnion"],
+    }
+
+
+def schema_text() -> str:
+    """The schema as the file holds it."""
+    return json.dumps(json_schema(), indent=1, ensure_ascii=False) + "\n"
+
+
+if __name__ == "__main__":
+    SCHEMA_FILE.write_text(schema_text(), encoding="utf-8")

@@ -1,0 +1,132 @@
+"""Kinds of quantity (length, moment, …) and the units a model file may write them in.
+
+A dimension is the exponents of (length, mass, time, angle). Angle counts as one, although SI calls it a pure
+number, so that 30 deg is not taken for a length nor 30 mm for an angle; beside other dimensions it drops out
+(N m/rad is N m). pint knows the units; it is imported when the first unit is read.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cache
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import pint
+
+__all__ = ["ANGLE", "ANY", "KINDS", "NUMBER", "Dimension", "Kind", "UnitError", "dimension_text", "fits", "unit"]
+
+Dimension = tuple[Fraction, Fraction, Fraction, Fraction]
+
+
+class UnitError(ValueError):
+    """A unit that cannot be used; `what` and `remedy` as in a finding."""
+
+    def __init__(self, what: str, remedy: str = "") -> None:
+        super().__init__(what)
+        self.what = what
+        self.remedy = remedy
+
+
+def _dimension(length: int = 0, mass: int = 0, time: int = 0, angle: int = 0) -> Dimension:
+    return Fraction(length), Fraction(mass), Fraction(time), Fraction(angle)
+
+
+NUMBER = _dimension()
+ANGLE = _dimension(angle=1)
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What a quantity measures.
+
+    unit: the SI unit its plain numbers are in; example: how one is written; dimensions: those it may have
+    (a driver's speed is a speed or an angular speed, by its joint), any if empty.
+    """
+
+    name: str
+    unit: str
+    example: str
+    dimensions: tuple[Dimension, ...]
+
+    def __or__(self, other: Kind) -> Kind:
+        """A quantity that may be either, until its place says which."""
+        return Kind(
+            f"{self.name} or {other.name}",
+            f"{self.unit} or {other.unit}",
+            self.example,
+            self.dimensions + other.dimensions,
+        )
+
+    def accepts(self, dimension: Dimension | None) -> bool:
+        """Whether a value of this dimension (None: a plain number, unknown) can stand here."""
+        return dimension is None or not self.dimensions or any(fits(dimension, one) for one in self.dimensions)
+
+
+KINDS: dict[str, Kind] = {
+    kind.name: kind
+    for kind in (
+        Kind("number", "1", "0.1", (NUMBER,)),
+        Kind("length", "m", "60 mm", (_dimension(length=1),)),
+        Kind("angle", "rad", "30 deg", (ANGLE,)),
+        Kind("mass", "kg", "1.2 kg", (_dimension(mass=1),)),
+        Kind("moment of inertia", "kg m^2", "4e-4 kg m^2", (_dimension(length=2, mass=1),)),
+        Kind("force", "N", "1 kN", (_dimension(length=1, mass=1, time=-2),)),
+        Kind("moment", "N m", "10 N m", (_dimension(length=2, mass=1, time=-2),)),
+        Kind("angular speed", "rad/s", "1500 rpm", (_dimension(time=-1, angle=1),)),
+        Kind("speed", "m/s", "50 mm/s", (_dimension(length=1, time=-1),)),
+        Kind("acceleration", "m/s^2", "9.81 m/s^2", (_dimension(length=1, time=-2),)),
+    )
+}
+ANY = Kind("quantity", "SI", "60 mm", ())
+
+
+def fits(dimension: Dimension, other: Dimension) -> bool:
+    """Whether a value of `dimension` can stand for `other`: equal, angles and pure numbers being one beside others.
+
+    A pure number can be an angle (an arc over a radius), an angle cannot be a pure number.
+    """
+    return dimension[:3] == other[:3] and (any(other[:3]) or other[3] != 0 or dimension[3] == 0)
+
+
+def dimension_text(dimension: Dimension) -> str:
+    """A dimension in words: `a length`, `an angle`, else its SI unit."""
+    for kind in KINDS.values():
+        if dimension in kind.dimensions:
+            return f"{'an' if kind.name[0] in 'aeiou' else 'a'} {kind.name}"
+    symbols = zip(("m", "kg", "s", "rad"), dimension, strict=True)
+    parts = [name if power == 1 else f"{name}^{power}" for name, power in symbols if power]
+    return f"in {' '.join(parts)}"
+
+
+@cache
+def _registry() -> pint.UnitRegistry[Fraction]:
+    """pint with exact rational factors: 93.782 mm is the float nearest 0.093782."""
+    import pint
+
+    return pint.UnitRegistry(non_int_type=Fraction)
+
+
+@cache
+def unit(text: str) -> tuple[Fraction, Dimension]:
+    """Factor to SI and dimension of a unit such as `N m`, `kg m^2`, `rpm`; UnitError if it is none of mechanics."""
+    registry = _registry()
+    try:
+        parsed = registry.parse_units(text.replace("·", "*").replace("⋅", "*"))
+        factor, root = registry.get_root_units(parsed)
+    except Exception as error:  # pint raises its own, tokenizer and arithmetic errors on text that is no unit
+        raise UnitError(
+            f"the unit '{text}' is not known", "write a product of a number and a dimension as 2 * AB"
+        ) from error
+    order = ("meter", "gram", "second", "radian")
+    exponents = {str(name): Fraction(str(power)) for name, power in root._units.items()}
+    names = [str(name) for name in parsed._units]
+    if set(exponents) - set(order) or any(name.endswith("bel") for name in names):
+        raise UnitError(f"the unit '{text}' is not one of mechanics", "use units of length, mass, time and angle")
+    length, mass, time, angle = (exponents.get(name, Fraction(0)) for name in order)
+    dimension = (length, mass, time, angle)
+    per_time = dimension == _dimension(time=-1) and factor != 1
+    if per_time or any(name.endswith("hertz") for name in names):
+        raise UnitError(f"the unit '{text}' may count turns or radians", "write an angular speed in rpm or rad/s")
+    return Fraction(str(factor)) / Fraction(1000) ** int(mass), dimension

@@ -1,0 +1,233 @@
+"""A mechanism as a row of modules: drivers and Assur groups, in the order in which motion flows.
+
+Every joint takes freedoms from the two links it joins, every driver one more. Matching each of these constraints
+to a freedom of one link says which link it determines; a link then depends on the other links of the
+constraints that determine it. Links that depend on each other are one module (a strongly connected component),
+and the modules follow each other as their dependence demands. So any class of group is found by the same graph
+work.  [THEORY of the docs, "Structure"; D 17 for the formula]
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import networkx as nx
+
+from trunnion.errors import Finding, MechanismError
+from trunnion.joints.pairs import PAIRS
+from trunnion.model.mechanism import Mechanism
+
+__all__ = ["Module", "Plan", "decompose", "mobility_by_formula"]
+
+PLANAR_FREEDOMS = 3
+ROMAN = {1: "I", 2: "II", 3: "III", 4: "IV", 5: "V", 6: "VI", 7: "VII", 8: "VIII", 9: "IX", 10: "X"}
+
+
+@dataclass(frozen=True)
+class Module:
+    """A driver or an Assur group.
+
+    kind: key of `groups.GROUPS`, or "general". links: in file order, for a closed form in its own order.
+    joints: in the order of the group; `reversed_` tells which of them name their links in the file the other way
+    round than the group does. driven: joints whose coordinate is prescribed. rank: the class (1 for a driver).
+    """
+
+    kind: str
+    links: tuple[str, ...]
+    joints: tuple[str, ...]
+    reversed_: tuple[bool, ...]
+    driven: tuple[str, ...]
+    rank: int
+    label: str
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Ordered modules of a mechanism, with its mobility by formula."""
+
+    modules: tuple[Module, ...]
+    mobility: int
+
+    @property
+    def formula(self) -> str:
+        """Structural formula such as I(0,1)R → II(2,3)RRR.  [D 17]"""
+        return " → ".join(module.label for module in self.modules)
+
+
+def mobility_by_formula(mechanism: Mechanism) -> int:
+    """Grübler's count 3 (n − 1) − Σ (3 − f_j) of a planar mechanism with n links, ground included."""
+    taken = sum(PLANAR_FREEDOMS - len(PAIRS[joint.type].freedoms) for joint in mechanism.joints.values())
+    return PLANAR_FREEDOMS * (len(mechanism.links) - 1) - taken
+
+
+def decompose(mechanism: Mechanism) -> Plan:
+    """The modules in order.
+
+    Raises MechanismError with a finding for every part that is not determined or determined twice.
+    """
+    ground = mechanism.fixed_link
+    mobility = mobility_by_formula(mechanism)
+    bodies = [link for link in mechanism.links if link != ground]
+    determines = _match(mechanism, bodies, ground)
+    findings = _undetermined(mechanism, mobility, bodies, determines)
+    if findings:
+        raise MechanismError(findings)
+    dependence = nx.DiGraph()
+    dependence.add_nodes_from(bodies)
+    for constraint, body in determines.items():
+        for other in mechanism.joints[constraint[0]].links:
+            if other not in (body, ground):
+                dependence.add_edge(other, body)
+    parts = nx.condensation(dependence)
+    place = {body: i for i, body in enumerate(bodies)}
+    order = nx.lexicographical_topological_sort(
+        parts, key=lambda part: min(place[b] for b in parts.nodes[part]["members"])
+    )
+    known = {ground}
+    modules: list[Module] = []
+    for part in order:
+        members = sorted(parts.nodes[part]["members"], key=place.__getitem__)
+        modules.append(_module(mechanism, members, known))
+        known |= set(members)
+    return Plan(tuple(modules), mobility)
+
+
+Constraint = tuple[str, int]
+
+
+def _constraints(mechanism: Mechanism) -> list[Constraint]:
+    """(joint, number) for every freedom a joint takes, drivers last."""
+    found: list[Constraint] = []
+    for name, joint in mechanism.joints.items():
+        found += [(name, i) for i in range(PLANAR_FREEDOMS - len(PAIRS[joint.type].freedoms))]
+    return found + [(name, PLANAR_FREEDOMS) for name in mechanism.drivers]
+
+
+def _match(mechanism: Mechanism, bodies: list[str], ground: str) -> dict[Constraint, str]:
+    """Each constraint with the link it determines: a maximum matching onto the links' freedoms."""
+    graph = nx.Graph()
+    constraints = _constraints(mechanism)
+    graph.add_nodes_from(constraints)
+    for constraint in constraints:
+        for link in mechanism.joints[constraint[0]].links:
+            if link != ground:
+                graph.add_edges_from((constraint, ("freedom", link, i)) for i in range(PLANAR_FREEDOMS))
+    matching = nx.bipartite.maximum_matching(graph, top_nodes=constraints)
+    return {c: matching[c][1] for c in constraints if c in matching}
+
+
+def _undetermined(
+    mechanism: Mechanism, mobility: int, bodies: list[str], determines: dict[Constraint, str]
+) -> list[Finding]:
+    """What keeps the drivers from determining the motion exactly."""
+    drivers = len(mechanism.drivers)
+    findings: list[Finding] = []
+    loose = sorted(
+        {body for body in bodies if sum(b == body for b in determines.values()) < PLANAR_FREEDOMS}, key=bodies.index
+    )
+    surplus = [c for c in _constraints(mechanism) if c not in determines]
+    if mobility != drivers:
+        has = "no driver" if drivers == 0 else "one driver" if drivers == 1 else f"{drivers} drivers"
+        remedy = (
+            "add a driver for each freedom left, or a link or joint that removes it"
+            if mobility > drivers
+            else "remove a driver, or a joint or link that constrains twice"
+        )
+        findings.append(
+            Finding(f"the mobility is {mobility} by Grübler's formula, but there is {has}", "drivers", remedy)
+        )
+    for name, number in surplus:
+        if number == PLANAR_FREEDOMS:
+            what = "cannot be driven: the relative motion of its links is already determined"
+            findings.append(Finding(what, f"drivers.{name}", "drive a joint of the part that is still free"))
+    if not findings and (surplus or loose):
+        joints = ", ".join(sorted({name for name, _ in surplus}))
+        links = ", ".join(loose)
+        what = f"one part is constrained twice (joints {joints}) while links {links} stay undetermined"
+        findings.append(Finding(what, "joints", "move a joint or driver from the rigid part to the free one"))
+    return findings
+
+
+def _module(mechanism: Mechanism, links: list[str], known: set[str]) -> Module:
+    """The module that the given links form on the links known so far."""
+    joints = [name for name, joint in mechanism.joints.items() if _belongs(joint.links, links, known)]
+    driven = [name for name in joints if name in mechanism.drivers]
+    numbers = _numbers(mechanism)
+    letters = "".join(
+        f"[{PAIRS[mechanism.joints[name].type].symbol}]"
+        if name in driven
+        else PAIRS[mechanism.joints[name].type].symbol
+        for name in joints
+    )
+    if len(links) == 1 and driven == joints:
+        base = next(link for link in mechanism.joints[joints[0]].links if link not in links)
+        letter = PAIRS[mechanism.joints[joints[0]].type].symbol
+        label = f"I({numbers[base]},{numbers[links[0]]}){letter}"
+        return _assembled(mechanism, letter, links, joints, driven, 1, label)
+    rank = _class(mechanism, links, joints)
+    dyad = _dyad(mechanism, links, joints) if not driven else None
+    if dyad:
+        kind, links, joints = dyad
+        letters = kind
+    else:
+        kind = "general"
+    listed = ",".join(str(numbers[link]) for link in links)
+    return _assembled(mechanism, kind, links, joints, driven, rank, f"{ROMAN.get(rank, rank)}({listed}){letters}")
+
+
+def _belongs(pair: tuple[str, str], links: list[str], known: set[str]) -> bool:
+    """Whether a joint is inside the module or between it and the known links."""
+    return any(link in links for link in pair) and all(link in links or link in known for link in pair)
+
+
+def _numbers(mechanism: Mechanism) -> dict[str, int]:
+    """Link numbers of the formula: 0 for the ground, the others in file order."""
+    others = [link for link in mechanism.links if link != mechanism.fixed_link]
+    return {mechanism.fixed_link: 0, **{link: i for i, link in enumerate(others, 1)}}
+
+
+def _dyad(mechanism: Mechanism, links: list[str], joints: list[str]) -> tuple[str, list[str], list[str]] | None:
+    """(kind, links, joints) of a class II group with a closed form: outer joint, inner joint, outer joint."""
+    if len(links) != 2 or len(joints) != 3:
+        return None
+    pairs = {name: mechanism.joints[name].links for name in joints}
+    inner = [name for name in joints if all(link in links for link in pairs[name])]
+    if len(inner) != 1:
+        return None
+    first, last = (name for name in joints if name != inner[0])
+    if pairs[first][0] in links and pairs[first][0] in pairs[last]:
+        return None
+    if links[0] not in pairs[first]:
+        first, last = last, first
+    order = [first, inner[0], last]
+    kind = "".join(PAIRS[mechanism.joints[name].type].symbol for name in order)
+    return ("RRR", links, order) if kind == "RRR" else None
+
+
+def _class(mechanism: Mechanism, links: list[str], joints: list[str]) -> int:
+    """Class after Assur and Artobolevski: joints of the richest link, or of the longest loop of links, at least 2."""
+    inner = nx.Graph()
+    inner.add_nodes_from(links)
+    most = 2
+    for link in links:
+        most = max(most, sum(link in mechanism.joints[name].links for name in joints))
+    for name in joints:
+        a, b = mechanism.joints[name].links
+        if a in links and b in links:
+            inner.add_edge(a, b)
+    loops = nx.minimum_cycle_basis(inner)
+    return max([most, *(len(loop) for loop in loops if len(loop) > 3)])
+
+
+def _assembled(
+    mechanism: Mechanism, kind: str, links: list[str], joints: list[str], driven: list[str], rank: int, label: str
+) -> Module:
+    def reversed_(name: str) -> bool:
+        """A closed form takes the outer link first, and inside the group the link it lists first."""
+        first, second = mechanism.joints[name].links
+        if kind == "general":
+            return False  # its joints are as the file has them
+        return first in links and (second not in links or links.index(first) > links.index(second))
+
+    flags = tuple(reversed_(name) for name in joints)
+    return Module(kind, tuple(links), tuple(joints), flags, tuple(driven), rank, label)

@@ -1,0 +1,144 @@
+"""One look for all matplotlib figures: sizes, palette, axes, legends, and the shading of positions without an answer.
+
+Only the object-oriented interface is used, so figures can be made in any thread and leave no global state.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.ticker import AutoMinorLocator, MaxNLocator, MultipleLocator
+
+from trunnion.views.cycle import Abscissa, Array, intervals, thin
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+
+INK, MUTED, RULE, SHADE = "#1b1f24", "#5d6670", "#d9dde2", "#eceef1"
+# Okabe and Ito's colours, which people with any colour vision tell apart; yellow is left out, it fades on white.
+PALETTE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
+DASHES = ("-", (0, (6, 2)), (0, (2, 1.5)), (0, (6, 2, 1.5, 2)))
+WIDTH = 7.4
+
+
+def style_of(index: int) -> dict[str, Any]:
+    """Colour and dash of the n-th series; colours repeat with another dash."""
+    return {"color": PALETTE[index % len(PALETTE)], "linestyle": DASHES[index // len(PALETTE) % len(DASHES)]}
+
+
+def plain(name: str) -> str:
+    """A name that matplotlib shows as it is: `$` starts no formula, a leading `_` hides no legend entry."""
+    text = name.replace("$", r"\$")
+    return f"\u2009{text}" if text.startswith("_") else text
+
+
+def new(title: str, result: xr.Dataset, height: float = 4.3, width: float = WIDTH) -> Figure:
+    """An empty figure with its title and, smaller, the name of the mechanism."""
+    figure = Figure(figsize=(width, height), dpi=150, facecolor="white", layout="constrained")
+    FigureCanvasAgg(figure)
+    figure.get_layout_engine().set(w_pad=0.08, h_pad=0.06, hspace=0.03, wspace=0.04)  # type: ignore[union-attr]
+    name = str(result.attrs.get("name", ""))
+    figure.suptitle(plain(title), x=0.012, ha="left", fontsize=12, fontweight="bold", color=INK)
+    if name:
+        figure.supxlabel(plain(name), x=0.99, ha="right", fontsize=7.5, color=MUTED)
+    return figure
+
+
+def dress(axes: Axes, x: str = "", y: str = "") -> None:
+    """Quiet axes: a light grid below the curves, a frame left and below only, labels with units."""
+    axes.set_axisbelow(True)
+    axes.grid(True, color=RULE, linewidth=0.6)
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+    for side in ("left", "bottom"):
+        axes.spines[side].set_color(MUTED)
+        axes.spines[side].set_linewidth(0.8)
+    axes.tick_params(colors=MUTED, labelcolor=INK, labelsize=8.5, width=0.8, length=3.5)
+    axes.tick_params(which="minor", length=2, width=0.6, color=MUTED)
+    axes.set_xlabel(x, fontsize=9, color=INK)
+    axes.set_ylabel(y, fontsize=9, color=INK)
+
+
+def along(axes: Axes, over: Abscissa, y: str) -> None:
+    """Axes over the drive: whole degrees at round angles, limits at the ends of the run."""
+    dress(axes, plain(over.title), y)
+    span = _span(over)
+    if over.unit == "°" and span >= 90:
+        axes.xaxis.set_major_locator(MultipleLocator(_round_angle(span)))
+    elif over.unit == "":
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.xaxis.set_minor_locator(AutoMinorLocator(2))
+    if span > 0:
+        low = float(over.values.min() if over.period >= 0 else over.values.max() + over.period)
+        axes.set_xlim(low, low + span)
+    axes.axhline(0, color=MUTED, linewidth=0.8, zorder=1.5)
+
+
+def _span(over: Abscissa) -> float:
+    return abs(over.period) if over.closed else float(np.ptp(over.values)) if over.values.size else 0.0
+
+
+def _round_angle(span: float) -> float:
+    return next((step for step in (15, 30, 45, 60, 90, 180, 360) if span / step <= 9), 720)
+
+
+def curve(axes: Axes, over: Abscissa, values: Array, label: str | None, *, close: bool = True, **style: Any) -> None:
+    """One curve over the drive: thinned without losing a peak, a dot where a position stands alone.
+
+    close: over a whole turn lead the curve on to its first value; not for angles, which gain a turn.
+    """
+    x, y = over.values, np.asarray(values, dtype=float)
+    if over.closed and close:
+        x, y = np.append(x, x[0] + over.period), np.append(y, y[0])
+    picked = thin(y)
+    x, y = x[picked], y[picked]
+    axes.plot(
+        x, y, label=None if label is None else plain(label), **{"linewidth": 1.6, "solid_joinstyle": "round"} | style
+    )
+    known = np.isfinite(y)
+    alone = known & ~np.append(False, known[:-1]) & ~np.append(known[1:], False)
+    if alone.any():  # a single position makes no line
+        axes.plot(x[alone], y[alone], "o", markersize=4, color=style.get("color", INK))
+
+
+def shade(axes: Axes, result: xr.Dataset, over: Abscissa) -> None:
+    """Grey where positions have no answer, with the cause written once for each cause."""
+    runs = intervals(result)
+    if not runs:
+        return
+    x = over.values
+    half = abs(float(x[1] - x[0])) / 2 if x.size > 1 else 0.5
+    said: set[str] = set()
+    for run in runs:
+        low, high = sorted((float(x[run.start]), float(x[run.stop - 1])))
+        axes.axvspan(low - half, high + half, color=SHADE, linewidth=0, zorder=0.5)
+        for edge in (low - half, high + half):
+            axes.axvline(edge, color=MUTED, linewidth=0.6, linestyle=(0, (2, 2)), zorder=0.6)
+        if run.text not in said:
+            said.add(run.text)
+            _write_cause(axes, (low + high) / 2, run.text)
+
+
+def _write_cause(axes: Axes, x: float, text: str) -> None:
+    short = text.split(":")[0]
+    axes.text(
+        x, 0.5, short, transform=axes.get_xaxis_transform(), rotation=90, ha="center", va="center",
+        fontsize=8, color=MUTED, zorder=3, clip_on=True,
+    )  # fmt: skip
+
+
+def legend(axes: Axes, most: int = 6) -> None:
+    """A legend in rows above the axes, where it hides no curve."""
+    handles, labels = axes.get_legend_handles_labels()
+    if len(handles) < 2:
+        return
+    fits = sum(map(len, labels)) + 7 * len(labels) <= 100  # characters a row holds beside the line samples
+    columns = len(labels) if fits else max(1, min(most, 100 // (max(map(len, labels)) + 7)))
+    axes.legend(
+        handles, labels, loc="lower left", bbox_to_anchor=(-0.02, 1.0), ncols=columns, frameon=False, fontsize=8.5,
+        labelcolor=INK, handlelength=2.2, columnspacing=1.6, borderaxespad=0.3,
+    )  # fmt: skip

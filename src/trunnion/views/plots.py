@@ -1,0 +1,318 @@
+"""The figures an engineer expects of a linkage: each a function of the result, and if wanted of the ideal one.
+
+`PLOTS` is the list; `save` writes a figure as PNG, SVG or PDF. `ideal` is the same run without friction.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.lines import Line2D
+
+from trunnion.views.cycle import Abscissa, Array, abscissa, attribute, column, layout, names, thin
+from trunnion.views.drawing import draw, picture
+from trunnion.views.figures import (
+    INK, MUTED, PALETTE, SHADE, along, curve, dress, legend, new, plain, shade, style_of,
+)  # fmt: skip
+from trunnion.views.quantities import prefixed
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["PLOTS", "friction_power", "mechanism", "motion", "polar", "power", "reactions", "save", "torque"]
+
+FORMATS = ("png", "svg", "pdf")
+FREE: dict[str, Any] = {"color": INK, "linewidth": 0.9, "linestyle": (0, (3, 2))}  # without friction, among many curves
+
+
+def peak(*columns: Array | None) -> float:
+    """The greatest magnitude in all columns; 0 if none is finite."""
+    known = [np.abs(values[np.isfinite(values)]).max(initial=0.0) for values in columns if values is not None]
+    return float(max(known, default=0.0))
+
+
+def torque(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
+    """Drive effort over the drive, one panel a driver; without friction dashed, its interval at zero slip as a band."""
+    over, drivers = abscissa(result), names(result, "driver")
+    units = attribute(result, "driver_units", ["N m"] * len(drivers))
+    title = (
+        "Drive force" if units and set(units) == {"N"} else "Drive torque" if set(units) == {"N m"} else "Drive effort"
+    )
+    figure = new(title, result, 2.0 + 2.3 * max(len(drivers), 1))
+    panels = figure.subplots(max(len(drivers), 1), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, driver, unit in zip(panels, drivers, units, strict=False):
+        effort = column(result, "drive_effort", driver=driver)
+        free = None if ideal is None else column(ideal, "drive_effort", driver=driver)
+        if effort is None:
+            continue
+        factor, shown = prefixed(peak(effort, free), unit)
+        noun = "force" if unit == "N" else "torque"
+        along(axes, over, f"{noun} {plain(driver)} [{shown}]")
+        shade(axes, result, over)
+        _band(axes, result, over, driver, factor)
+        curve(axes, over, effort * factor, "with friction" if free is not None else noun, color=PALETTE[0])
+        if free is not None:
+            curve(axes, over, free * factor, "without friction", color=PALETTE[1], linestyle=(0, (5, 2)), linewidth=1.3)
+    _only_last_titled(list(panels))
+    legend(panels[0])
+    return figure
+
+
+def _band(axes: Axes, result: xr.Dataset, over: Abscissa, driver: str, factor: float) -> None:
+    """Where the friction of a joint at rest is an interval, so is the effort: fill it."""
+    low = column(result, "drive_effort_lower", driver=driver)
+    high = column(result, "drive_effort_upper", driver=driver)
+    if low is None or high is None or not (np.abs(high - low) > 1e-9 * (peak(low, high) or 1.0)).any():
+        return
+    picked = thin(high - low)
+    axes.fill_between(over.values[picked], low[picked] * factor, high[picked] * factor, color=PALETTE[0], alpha=0.25,
+                      linewidth=0.8, label="range, friction at rest")  # fmt: skip
+
+
+def _only_last_titled(panels: list[Axes]) -> None:
+    for axes in panels[:-1]:
+        axes.set_xlabel("")
+
+
+def friction_power(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
+    """Power lost to friction in each joint and in all, with the mean of each over the run."""
+    over, joints = abscissa(result), names(result, "joint")
+    losses = {joint: column(result, "friction_power", joint=joint) for joint in joints}
+    known = {joint: values for joint, values in losses.items() if values is not None and peak(values) > 0}
+    total = np.sum(list(known.values()), axis=0) if known else np.zeros(over.values.size)
+    factor, unit = prefixed(peak(total), "W")
+    figure = new("Friction power by joint", result)
+    axes = figure.subplots()
+    along(axes, over, f"friction power [{unit}]")
+    shade(axes, result, over)
+    picked = thin(total)
+    axes.fill_between(over.values[picked], 0, total[picked] * factor, color=SHADE, alpha=0.6, linewidth=0, zorder=1)
+    curve(axes, over, total * factor, f"all joints, {_mean(total, factor, unit)}", color=INK, linewidth=1.8)
+    for joint, values in known.items():
+        label = f"{joint}, {_mean(values, factor, unit)}"
+        curve(axes, over, values * factor, label, **style_of(joints.index(joint)), linewidth=1.4)
+    legend(axes, most=3)
+    return figure
+
+
+def _mean(values: Array, factor: float, unit: str) -> str:
+    known = values[np.isfinite(values)]
+    return f"mean {known.mean() * factor:.4g} {unit}".replace("-", "−") if known.size else "no answer"
+
+
+def _reaction(result: xr.Dataset, joint: str) -> Array:
+    """(axis, position) N."""
+    picked = result["reaction_force"].sel(joint=joint).transpose("axis", "position")
+    return np.asarray(picked.values, dtype=float)
+
+
+def reactions(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
+    """Magnitude of the reaction in each joint; without friction thin and dotted."""
+    over, joints = abscissa(result), names(result, "joint")
+    forces = [np.hypot(*_reaction(result, joint)) for joint in joints]
+    factor, unit = prefixed(peak(*forces), "N")
+    figure = new("Joint reactions", result)
+    axes = figure.subplots()
+    along(axes, over, f"magnitude of the reaction [{unit}]")
+    shade(axes, result, over)
+    for index, (joint, force) in enumerate(zip(joints, forces, strict=True)):
+        curve(axes, over, force * factor, joint, **style_of(index))
+    if ideal is not None:
+        for index, joint in enumerate(joints):
+            free = np.hypot(*_reaction(ideal, joint))
+            curve(axes, over, free * factor, "without friction" if index == 0 else None, **FREE)
+    legend(axes)
+    return figure
+
+
+def polar(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
+    """Polar reaction diagrams: the tip of each joint's force vector over the run, in the global frame."""
+    over, joints = abscissa(result), names(result, "joint")
+    columns = min(len(joints), 2 if len(joints) in (2, 4) else 3) or 1
+    rows = -(-len(joints) // columns) or 1
+    figure = new("Polar diagrams of the joint reactions", result, 0.9 + rows * 7.4 / columns * 0.92)
+    grid = figure.subplots(rows, columns, squeeze=False).ravel()
+    for axes in grid[len(joints) :]:
+        axes.set_visible(False)
+    for index, (axes, joint) in enumerate(zip(grid, joints, strict=False)):
+        free = None if ideal is None else _reaction(ideal, joint)
+        _hodograph(axes, over, joint, _reaction(result, joint), free, PALETTE[index % len(PALETTE)])
+    if ideal is not None:
+        lines = [Line2D([], [], color=PALETTE[0], linewidth=1.6), Line2D([], [], **FREE)]
+        figure.legend(lines, ["with friction", "without friction"], loc="upper right", ncols=2, frameon=False,
+                      fontsize=8.5, labelcolor=INK)  # fmt: skip
+    return figure
+
+
+def _hodograph(axes: Axes, over: Abscissa, joint: str, force: Array, free: Array | None, colour: str) -> None:
+    factor, unit = prefixed(peak(force, free), "N")
+    dress(axes, f"Fx [{unit}]", f"Fy [{unit}]")
+    axes.set_title(plain(joint), fontsize=10, fontweight="bold", color=INK, loc="left")
+    axes.axhline(0, color=MUTED, linewidth=0.8, zorder=1.5)
+    axes.axvline(0, color=MUTED, linewidth=0.8, zorder=1.5)
+    if free is not None:
+        axes.plot(*_loop(free, over) * factor, **FREE)
+    axes.plot(*_loop(force, over) * factor, color=colour, linewidth=1.6)
+    _marks(axes, over, force * factor, colour)
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.margins(0.1)
+
+
+def _loop(force: Array, over: Abscissa) -> Array:
+    """The track of a vector, closed over a whole turn, at most some 5000 points of it."""
+    stride = -(-force.shape[1] // 5000)
+    kept = force[:, ::stride]
+    return np.hstack([kept, force[:, :1]]) if over.closed else kept
+
+
+def _marks(axes: Axes, over: Abscissa, force: Array, colour: str) -> None:
+    """Dots every 30°, with the angle at every 90°; without a turn only the start."""
+    wanted = np.arange(0, 360, 30) if over.closed else over.values[:1]
+    for angle in wanted:
+        index = int(np.argmin(np.abs((over.values - angle + 180) % 360 - 180))) if over.closed else 0
+        place = force[:, index]
+        if not np.isfinite(place).all():
+            continue
+        axes.plot(*place, "o", markersize=3.2, color=colour, markeredgecolor="white", markeredgewidth=0.5, zorder=4)
+        if not over.closed or angle % 90 == 0:
+            axes.annotate(over.say(index), place, xytext=(5, 4), textcoords="offset points", fontsize=7.5, color=INK)
+
+
+def mechanism(result: xr.Dataset, ideal: xr.Dataset | None = None, index: int | None = None) -> Figure:
+    """The mechanism at a position (the first that can be drawn, if not told), ghosts, coupler curves, joints named."""
+    shown = picture(result)
+    if index is None:
+        index = _first_drawable(list(shown.tracks.values()))
+    low_x, low_y, high_x, high_y = shown.box
+    margin = 0.09 * shown.size
+    width, height = high_x - low_x + 2 * margin, high_y - low_y + 2 * margin
+    figure = new("Mechanism", result, min(max(7.0 * height / width, 2.6), 8.0) + 0.5)
+    axes = figure.subplots()
+    axes.set_aspect("equal")
+    axes.set_xlim(low_x - margin, high_x + margin)
+    axes.set_ylim(low_y - margin, high_y + margin)
+    axes.axis("off")
+    draw(axes, shown, index)
+    over = abscissa(result)
+    formula = str(result.attrs.get("formula", ""))
+    axes.set_title(f"{over.label} = {over.say(index)}    {formula}", fontsize=8.5, color=MUTED, loc="left")
+    return figure
+
+
+def _first_drawable(tracks: list[Array]) -> int:
+    """A telling position: an eighth into the longest of what can be drawn, so that links do not lie in one line."""
+    known = np.flatnonzero(np.all([np.isfinite(track).all(axis=0) for track in tracks], axis=0))
+    return int(known[known.size // 8]) if known.size else 0
+
+
+def power(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
+    """Where the power goes: drive, useful, friction, and the remainder that masses and other loads take or give."""
+    over = abscissa(result)
+    drive = np.sum([column(result, "drive_power", driver=name) for name in names(result, "driver")], axis=0)
+    useful = column(result, "useful_power")
+    lost = np.asarray(result["friction_power"].sum("joint", skipna=False).values, dtype=float)
+    useful = np.zeros_like(lost) if useful is None else useful
+    rest = drive - useful - lost
+    factor, unit = prefixed(peak(drive, useful, lost), "W")
+    figure = new("Power over the run", result)
+    axes = figure.subplots()
+    along(axes, over, f"power [{unit}]")
+    shade(axes, result, over)
+    curve(axes, over, drive * factor, "drive", color=PALETTE[0])
+    curve(axes, over, useful * factor, "useful", color=PALETTE[2])
+    curve(axes, over, lost * factor, "friction", color=PALETTE[1])
+    if peak(rest) > 1e-9 * peak(drive, useful, lost):
+        label = "masses and other loads"
+        curve(axes, over, rest * factor, label, color=MUTED, linestyle=(0, (2, 1.5)), linewidth=1.2)
+    legend(axes)
+    return figure
+
+
+def motion(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
+    """Angles of the turning links, slides of the sliding joints, and their rates."""
+    over, stated = abscissa(result), layout(result)
+    turning = [name for name in names(result, "link")
+               if name != stated["ground"] and _turns(column(result, "link_angle", link=name))]  # fmt: skip
+    sliding = [name for name in names(result, "joint") if stated["joints"].get(name, {}).get("type") == "prismatic"]
+    kinds = [("link", "link_angle", turning, "angle", "rad")] if turning or not sliding else []
+    if sliding:
+        kinds.append(("joint", "joint_slide", sliding, "slide", "m"))
+    figure = new("Motion", result, 6.4, 7.4 if len(kinds) == 1 else 9.6)
+    grid = figure.subplots(3, len(kinds), sharex=True, squeeze=False)
+    for panels, (dim, variable, members, noun, unit) in zip(grid.T, kinds, strict=True):
+        _rates(list(panels), result, over, dim, variable, members, noun, unit)
+        legend(panels[0], most=6 if len(kinds) == 1 else 3)
+        if len(members) == 1:
+            panels[0].set_title(plain(members[0]), fontsize=8.5, color=INK, loc="left")
+    return figure
+
+
+def _turns(angle: Array | None) -> bool:
+    known = np.array([]) if angle is None else angle[np.isfinite(angle)]
+    return known.size == 1 or (known.size > 1 and bool(np.ptp(known) > 1e-9))
+
+
+def _rates(
+    panels: list[Axes], result: xr.Dataset, over: Abscissa, dim: str, variable: str, members: list[str],
+    noun: str, unit: str,
+) -> None:  # fmt: skip
+    """Three panels: the quantity and its first and second rate."""
+    for order, axes in enumerate(panels):
+        name = variable + ("", "_velocity", "_acceleration")[order]
+        columns = {member: column(result, name, **{dim: member}) for member in members}
+        scale, shown = prefixed(peak(*columns.values()), unit) if order == 0 or unit == "m" else (1.0, unit)
+        title = noun if order == 0 else ("velocity", "acceleration")[order - 1]
+        rate = ("", "/s", "/s²")[order]
+        along(axes, over, f"{title} [{shown}{rate}]")
+        shade(axes, result, over)
+        for index, (member, values) in enumerate(columns.items()):
+            if values is not None:
+                curve(axes, over, values * scale, member, close=order > 0 or unit == "m", **style_of(index))
+    _only_last_titled(panels)
+
+
+PLOTS: dict[str, Callable[[xr.Dataset, xr.Dataset | None], Figure]] = {
+    "torque": torque,
+    "friction-power": friction_power,
+    "reactions": reactions,
+    "polar": polar,
+    "power": power,
+    "mechanism": mechanism,
+    "motion": motion,
+}
+
+
+def save(figure: Figure, path: str | os.PathLike[str]) -> Path:
+    """Write a figure by its extension, whole or not at all: to a file beside the target, then renamed over it."""
+    target = Path(path)
+    kind = target.suffix.lower().lstrip(".")
+    if kind not in FORMATS:
+        raise ValueError(f"cannot write a figure as “{target.name}”: end the name in .png, .svg or .pdf")
+    handle, draft = tempfile.mkstemp(dir=target.parent, prefix=f".{target.stem}-", suffix=f".{kind}")
+    os.close(handle)
+    try:
+        with warnings.catch_warnings():
+            # A name in a script that the font lacks is drawn as boxes; that is no reason to fail.
+            warnings.filterwarnings("ignore", message="Glyph .* missing from font")
+            figure.savefig(draft, format=kind, dpi=200, metadata={"Date": None} if kind == "svg" else None)
+        os.chmod(draft, 0o666 & ~_umask())
+        os.replace(draft, target)
+    except BaseException:
+        Path(draft).unlink(missing_ok=True)
+        raise
+    return target
+
+
+def _umask() -> int:
+    """The process's mask for new files; mkstemp ignores it."""
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

@@ -1,0 +1,56 @@
+"""Numbers as an engineer reads them: an SI prefix that fits, four digits, true minus signs.
+
+`web/format.js` says the same in the browser; both are held to one table of cases in `tests/views`.
+"""
+
+from __future__ import annotations
+
+import math
+
+__all__ = ["number", "prefixed", "quantity"]
+
+PREFIXES = {-4: "p", -3: "n", -2: "µ", -1: "m", 0: "", 1: "k", 2: "M", 3: "G"}
+SCALABLE = ("N m", "N", "W", "m", "s", "J", "Pa")
+WORDS = {"rad/s^2": "rad/s²", "m/s^2": "m/s²", "kg m^2": "kg m²"}
+
+
+def prefixed(peak: float, unit: str) -> tuple[float, str]:
+    """The factor and the unit that bring `peak` between 1 and 1000: (0.001, "kN m") for 18 750 N m.
+
+    Units without a use for prefixes (rad, 1, kg m²) come back as they are; so does a peak of zero or NaN.
+    """
+    if unit == "rad":
+        return 180.0 / math.pi, "°"
+    if unit not in SCALABLE or not math.isfinite(peak) or peak == 0:
+        return 1.0, "" if unit == "1" else WORDS.get(unit, unit)
+    step = math.floor(math.log10(abs(float(f"{peak:.4g}"))) / 3 + 1e-12)  # 999.99 N reads as 1.000 kN
+    step = min(max(step, min(PREFIXES)), max(PREFIXES))
+    return 10.0 ** (-3 * step), PREFIXES[step] + unit
+
+
+def number(value: float, digits: int = 4) -> str:
+    """`value` with so many significant digits, thin spaces between thousands and a true minus: "3.1×10⁻¹²"."""
+    if not math.isfinite(value):
+        return "—" if math.isnan(value) else ("∞" if value > 0 else "−∞")
+    if value == 0:
+        return "0"
+    size = math.floor(math.log10(abs(float(f"{value:.{digits}g}"))))
+    if not -4 <= size < 7:
+        mantissa, power = f"{value:.{min(digits, 3) - 1}e}".split("e")
+        return f"{mantissa}×10{str(int(power)).translate(SUPERSCRIPT)}".replace("-", "−")
+    return f"{value:,.{max(digits - 1 - size, 0)}f}".replace(",", "\u202f").replace("-", "−")
+
+
+def quantity(value: object, unit: str = "") -> str:
+    """A value with its unit for a table; what is no number is shown as its text."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        text = "" if value is None else str(value)
+        return f"{text}\u00a0{unit}" if text and unit not in ("", "1") else text
+    if unit in ("1", "") and float(value).is_integer() and abs(value) < 1e7:
+        return number(value, 1)
+    factor, shown = prefixed(value, unit)
+    separator = "" if shown in ("°", "") else "\u00a0"
+    return f"{number(value * factor)}{separator}{shown}"
+
+
+SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")

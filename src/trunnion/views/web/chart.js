@@ -1,0 +1,183 @@
+// A line chart over the drive: axes, curves with gaps, shaded positions without an answer, a cursor that follows.
+
+import { domain, extent, gaps, nearest, peak } from "./data.js";
+import { html, onWidth, set, svg } from "./dom.js";
+import { fixed, prefixed, tickLabel, ticks } from "./format.js";
+
+const MARGIN = { top: 8, right: 14, bottom: 40, left: 58 };
+
+/**
+ * A chart of `series` [{label, values, kind, quiet}] in one unit; `kind` is a class that colours the curve.
+ * `band` {low, high, kind, label} is filled. `limits` caps the vertical axis. `pick(index)` is called when the reader points.
+ */
+export function lineChart(scene, { title, unit, series, band = null, limits = null, note = "", pick }) {
+  const scale = prefixed(peak(...series.map((one) => one.values)), unit);
+  const most = peak(...series.map((one) => one.values)) * scale.factor;
+  const plot = html("div", { class: "plot" });
+  const values = series.map(() => html("span", { class: "value" }, "—"));
+  const element = html(
+    "figure",
+    { class: "chart" },
+    html("figcaption", {}, html("span", { class: "title" }, title), html("span", { class: "unit" }, scale.unit && `[${scale.unit}]`)),
+    legend(series, values, band),
+    plot,
+    note ? html("p", { class: "remark" }, note) : null,
+  );
+  const chart = { scene, scale, series, band, limits, title, frame: null, index: 0, plot };
+  onWidth(plot, (width) => draw(chart, width), 335);
+  listen(chart, pick);
+  return {
+    element,
+    show(index) {
+      chart.index = index;
+      moveCursor(chart);
+      series.forEach((one, order) => {
+        const value = one.values[index];
+        values[order].textContent = value === null ? "—" : fixed(value * scale.factor, most);
+      });
+    },
+  };
+}
+
+function legend(series, values, band) {
+  const items = series.map((one, order) =>
+    html("li", {}, swatch(one.kind), html("span", { class: "label" }, one.label), values[order]),
+  );
+  if (band) items.push(html("li", {}, html("span", { class: `swatch area ${band.kind}` }), html("span", {}, band.label)));
+  return html("ul", { class: "legend" }, ...items);
+}
+
+function swatch(kind) {
+  return svg("svg", { class: "swatch", viewBox: "0 0 22 8", "aria-hidden": "true" }, svg("line", { x1: 1, x2: 21, y1: 4, y2: 4, class: `curve ${kind}` }));
+}
+
+function draw(chart, width) {
+  const { scene, scale, series, band } = chart;
+  const height = Math.round(Math.min(Math.max(width * 0.46, 190), 270));
+  const [x0, x1] = domain(scene.abscissa);
+  const [y0, y1] = vertical(chart);
+  const right = width - MARGIN.right;
+  const bottom = height - MARGIN.bottom;
+  const frame = {
+    width, height, bottom, right,
+    x: (value) => MARGIN.left + ((value - x0) / (x1 - x0)) * (right - MARGIN.left),
+    y: (value) => bottom - ((value - y0) / (y1 - y0)) * (bottom - MARGIN.top),
+    back: (px) => x0 + ((px - MARGIN.left) / (right - MARGIN.left)) * (x1 - x0),
+  };
+  chart.frame = frame;
+  const clip = `clip-${(clips += 1)}`;
+  chart.cursor = svg("line", { class: "cursor", y1: MARGIN.top, y2: bottom });
+  chart.dots = series.map((one) => svg("circle", { class: `dot ${one.kind}`, r: one.quiet ? 0 : 3.2 }));
+  const area = svg("g", { "clip-path": `url(#${clip})` });
+  if (band) area.append(svg("path", { class: `band ${band.kind}`, d: bandPath(chart, band) }));
+  for (const one of series) area.append(svg("path", { class: `curve ${one.kind}`, d: curvePath(scene, frame, one.values, scale.factor) }));
+  chart.plot.replaceChildren(
+    svg(
+      "svg",
+      { viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": describe(chart) },
+      svg("clipPath", { id: clip }, svg("rect", { x: MARGIN.left - 2, y: MARGIN.top - 2, width: right - MARGIN.left + 4, height: bottom - MARGIN.top + 4 })),
+      ...shading(chart, frame),
+      ...axes(scene.abscissa, frame, [x0, x1], [y0, y1]),
+      area,
+      chart.cursor,
+      ...chart.dots,
+    ),
+  );
+  moveCursor(chart);
+}
+
+let clips = 0; // clip paths need names that are unique in the page
+
+/** Ends of the vertical axis in display units: around the data and zero, within the limits if there are any. */
+function vertical(chart) {
+  const { scale, series, band, limits } = chart;
+  const shown = [...series.map((one) => one.values), ...(band ? [band.low, band.high] : [])];
+  let [low, high] = extent(shown) ?? [0, 1];
+  if (limits) [low, high] = [Math.max(low, limits[0]), Math.min(high, limits[1])];
+  [low, high] = [Math.min(low, 0) * scale.factor, Math.max(high, 0) * scale.factor];
+  if (!(high - low > 0)) return [low - 1, high + 1];
+  const room = 0.05 * (high - low);
+  return [low < 0 ? low - room : 0, high > 0 ? high + room : 0];
+}
+
+function describe(chart) {
+  const found = extent(chart.series.map((one) => one.values));
+  const span = found ? `from ${fixed(found[0] * chart.scale.factor, found[1] * chart.scale.factor)} to ${fixed(found[1] * chart.scale.factor, found[1] * chart.scale.factor)} ${chart.scale.unit}` : "without values";
+  return `${chart.title} over ${chart.scene.abscissa.label}, ${span}`;
+}
+
+function axes(abscissa, frame, [x0, x1], [y0, y1]) {
+  const across = ticks(x0, x1, frame.width < 420 ? 5 : 9, abscissa.unit === "°");
+  const up = ticks(y0, y1, 6);
+  const step = (list) => (list.length > 1 ? list[1] - list[0] : 1);
+  const parts = up.map((value) => svg("line", { class: value === 0 ? "zero" : "grid", x1: MARGIN.left, x2: frame.right, y1: frame.y(value), y2: frame.y(value) }));
+  parts.push(...across.map((value) => svg("line", { class: "grid", x1: frame.x(value), x2: frame.x(value), y1: MARGIN.top, y2: frame.bottom })));
+  parts.push(...up.map((value) => svg("text", { class: "tick end", x: MARGIN.left - 8, y: frame.y(value), dy: "0.32em" }, tickLabel(value, step(up)))));
+  parts.push(...across.map((value) => svg("text", { class: "tick middle", x: frame.x(value), y: frame.bottom + 16 }, tickLabel(value, step(across)))));
+  const label = abscissa.unit ? `${abscissa.label} [${abscissa.unit}]` : abscissa.label;
+  parts.push(svg("text", { class: "axis middle", x: (MARGIN.left + frame.right) / 2, y: frame.bottom + 34 }, label));
+  return parts;
+}
+
+function shading(chart, frame) {
+  const { values } = chart.scene.abscissa;
+  const half = values.length > 1 ? Math.abs(values[1] - values[0]) / 2 : 0.5;
+  return gaps(chart.scene).map(([first, last]) => {
+    const low = Math.max(frame.x(Math.min(values[first], values[last]) - half), MARGIN.left);
+    const high = Math.min(frame.x(Math.max(values[first], values[last]) + half), frame.right);
+    return svg("rect", { class: "unsolved", x: low, y: MARGIN.top, width: Math.max(high - low, 1), height: frame.bottom - MARGIN.top });
+  });
+}
+
+/** The path of a curve, broken where there is no value, led on to the first value over a closed turn. */
+export function curvePath(scene, frame, values, factor) {
+  const { abscissa } = scene;
+  const count = abscissa.values.length;
+  let path = "";
+  let pen = "M";
+  for (let index = 0; index < count + (abscissa.closed ? 1 : 0); index += 1) {
+    const value = values[index % count];
+    if (value === null) {
+      pen = "M";
+      continue;
+    }
+    const x = abscissa.values[index % count] + (index === count ? abscissa.period : 0);
+    path += `${pen}${frame.x(x).toFixed(1)},${frame.y(value * factor).toFixed(1)}`;
+    if (pen === "M") path += "h0"; // a value that stands alone still leaves a dot
+    pen = "L";
+  }
+  return path;
+}
+
+function bandPath({ scene, frame, scale }, band) {
+  const corner = (values) => (_, index) =>
+    values[index] === null ? null : `${frame.x(scene.abscissa.values[index]).toFixed(1)},${frame.y(values[index] * scale.factor).toFixed(1)}`;
+  const low = band.low.map(corner(band.low)).filter(Boolean);
+  const high = band.high.map(corner(band.high)).filter(Boolean).reverse();
+  return low.length ? `M${[...low, ...high].join("L")}Z` : "";
+}
+
+function moveCursor(chart) {
+  const { frame, scene, series, scale, index } = chart;
+  if (!frame) return;
+  const x = frame.x(scene.abscissa.values[index]);
+  set(chart.cursor, { x1: x, x2: x });
+  series.forEach((one, order) => {
+    const value = one.values[index];
+    const y = value === null ? null : frame.y(value * scale.factor);
+    const inside = y !== null && y >= 0 && y <= frame.bottom + 2;
+    set(chart.dots[order], { cx: x, cy: inside ? y : 0, visibility: inside ? null : "hidden" });
+  });
+}
+
+/** Pointing moves the crank: a mouse by hovering, a finger or a pressed button by dragging. */
+function listen(chart, pick) {
+  const point = (event, firm) => {
+    if (!chart.frame) return;
+    const box = chart.plot.getBoundingClientRect();
+    const x = ((event.clientX - box.left) / box.width) * chart.frame.width;
+    pick(nearest(chart.scene.abscissa, chart.frame.back(x)), firm);
+  };
+  chart.plot.addEventListener("pointerdown", (event) => point(event, true));
+  chart.plot.addEventListener("pointermove", (event) => point(event, event.buttons > 0));
+}

@@ -1,0 +1,137 @@
+// Reading a scene (trunnion/views/scene.py): series, vectors, extents, state. No drawing here.
+
+const FIRST_UNSOLVED = 3; // errors.Status.NOT_CONVERGED: from here on the forces have no value
+
+/** The value of a series at a position; a series of one number holds everywhere. */
+export function at(series, index) {
+  if (!series || series.length === 0) return null;
+  return series.length === 1 ? series[0] : series[index];
+}
+
+/** A series written out for every position. */
+export function full(series, count) {
+  return Array.from({ length: count }, (_, index) => at(series, index));
+}
+
+/** Magnitude of a vector {x, y} of series, for every position; null where either part is. */
+export function magnitude(vector, count) {
+  return Array.from({ length: count }, (_, index) => {
+    const x = at(vector.x, index);
+    const y = at(vector.y, index);
+    return x === null || y === null ? null : Math.hypot(x, y);
+  });
+}
+
+/** Sum of several series, for every position; null where any of them is. */
+export function total(list, count) {
+  return Array.from({ length: count }, (_, index) =>
+    list.reduce((sum, series) => (sum === null || at(series, index) === null ? null : sum + at(series, index)), 0),
+  );
+}
+
+/** Greatest magnitude in any of the series, 0 if there is none. */
+export function peak(...list) {
+  return list.flat().reduce((most, value) => (Number.isFinite(value) ? Math.max(most, Math.abs(value)) : most), 0);
+}
+
+/** Least and greatest number in the series, or null. */
+export function extent(list) {
+  let low = Infinity;
+  let high = -Infinity;
+  for (const series of list) {
+    for (const value of series) {
+      if (value === null || !Number.isFinite(value)) continue;
+      low = Math.min(low, value);
+      high = Math.max(high, value);
+    }
+  }
+  return low <= high ? [low, high] : null;
+}
+
+/** The share of the values (0…1) that lies below the answer. */
+export function quantile(values, share) {
+  const sorted = values.filter((value) => Number.isFinite(value)).sort((a, b) => a - b);
+  return sorted.length ? sorted[Math.min(Math.floor(share * sorted.length), sorted.length - 1)] : 0;
+}
+
+/** Index of the value nearest to x; over a closed turn the end is as near as the start. */
+export function nearest(abscissa, x) {
+  let best = 0;
+  let least = Infinity;
+  abscissa.values.forEach((value, index) => {
+    let gap = Math.abs(value - x);
+    if (abscissa.closed) gap = Math.min(gap, Math.abs(gap - Math.abs(abscissa.period)));
+    if (gap < least) [best, least] = [index, gap];
+  });
+  return best;
+}
+
+/** Ends of the horizontal axis: over a closed turn it runs on to where the turn began. */
+export function domain(abscissa) {
+  const [low, high] = extent([abscissa.values]) ?? [0, 1];
+  if (!abscissa.closed) return low === high ? [low - 0.5, high + 0.5] : [low, high];
+  return abscissa.period > 0 ? [low, low + abscissa.period] : [high + abscissa.period, high];
+}
+
+/** Where a point is, [x, y] in metres, or null. */
+export function place(scene, key, index) {
+  const track = scene.points[key];
+  if (!track) return null;
+  const x = at(track.x, index);
+  const y = at(track.y, index);
+  return x === null || y === null ? null : [x, y];
+}
+
+/** The smallest box around all tracks, {x, y, width, height} in metres; null if nothing was ever assembled. */
+export function bounds(scene) {
+  const tracks = Object.values(scene.points);
+  const across = extent(tracks.map((track) => track.x));
+  const up = extent(tracks.map((track) => track.y));
+  if (!across || !up) return null;
+  return { x: across[0], y: up[0], width: across[1] - across[0], height: up[1] - up[0] };
+}
+
+/** Convex hull of a few points, counter-clockwise (Andrew's monotone chain). */
+export function hull(points) {
+  const ordered = [...points].sort((a, b) => a[0] - b[0] || a[1] - b[1]);
+  if (ordered.length < 3) return ordered;
+  const turn = (a, b, c) => (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+  const half = (list) => {
+    const kept = [];
+    for (const point of list) {
+      while (kept.length > 1 && turn(kept[kept.length - 2], kept[kept.length - 1], point) <= 0) kept.pop();
+      kept.push(point);
+    }
+    return kept.slice(0, -1);
+  };
+  return [...half(ordered), ...half(ordered.reverse())];
+}
+
+/** Whether the position has numbers for everything. */
+export function solved(scene, index) {
+  return scene.status[index] < FIRST_UNSOLVED;
+}
+
+/** The state of a position in a sentence. */
+export function state(scene, index) {
+  return scene.states[String(scene.status[index])] ?? "no answer";
+}
+
+/** Runs [first, last] of positions without an answer. */
+export function gaps(scene) {
+  const runs = [];
+  for (let index = 0; index < scene.count; index += 1) {
+    if (solved(scene, index)) continue;
+    const last = runs[runs.length - 1];
+    if (last && last[1] === index - 1) last[1] = index;
+    else runs.push([index, index]);
+  }
+  return runs;
+}
+
+/** Direction of a prismatic joint's guide in the global frame, rad. */
+export function guide(scene, joint, index) {
+  const [x, y] = joint.axis ?? [1, 0];
+  const link = scene.links.find((one) => one.name === joint.links[0]);
+  return Math.atan2(y, x) + (link ? at(link.angle, index) ?? 0 : 0);
+}

@@ -1,0 +1,261 @@
+// The mechanism as SVG: ground, links as bodies, joints, coupler curves, loads, reaction vectors.
+
+import { at, bounds, guide, hull, magnitude, place, quantile, solved, state } from "./data.js";
+import { html, onWidth, set, svg } from "./dom.js";
+import { roundBelow, stated } from "./format.js";
+
+const MARGIN = 62; // room for labels and arrows, px
+
+/** The drawing; `show(index)` moves it, `reactions(names, factor)` chooses the vectors and their size. */
+export function mechanismView(scene, kinds) {
+  const stage = html("div", { class: "stage" });
+  const message = html("p", { class: "message", hidden: true });
+  const element = html("div", { class: "mechanism" }, stage, message);
+  const box = bounds(scene);
+  if (!box) {
+    message.textContent = "The mechanism could not be assembled at any position.";
+    message.hidden = false;
+    return { element, show() {}, reactions() {} };
+  }
+  const view = { scene, kinds, box, stage, message, index: 0, posed: 0, factor: 1, shown: new Set(scene.joints.map((joint) => joint.name)) };
+  view.usual = quantile(scene.joints.flatMap((joint) => magnitude(joint.reaction, scene.count)), 0.9);
+  onWidth(stage, (width) => build(view, width), 490);
+  return {
+    element,
+    show(index) {
+      view.index = index;
+      pose(view);
+    },
+    reactions(names, factor) {
+      view.shown = new Set(names);
+      view.factor = factor;
+      if (view.frame) scales(view);
+      pose(view);
+    },
+  };
+}
+
+function build(view, width) {
+  const { scene, box } = view;
+  const margin = Math.min(MARGIN, width * 0.12);
+  const tall = Math.min(Math.max(((width - 2 * margin) * box.height) / (box.width || 1) + 2 * margin, width * 0.5), width * 0.95, 620);
+  const scale = Math.min((width - 2 * margin) / (box.width || 1e-9), (tall - 2 * margin) / (box.height || 1e-9));
+  const left = (width - scale * box.width) / 2 - scale * box.x;
+  const foot = (tall + scale * box.height) / 2 + scale * box.y;
+  view.frame = { width, height: tall, scale, to: ([x, y]) => [left + scale * x, foot - scale * y] };
+  view.parts = {
+    bodies: scene.links.filter((link) => !link.ground).map((link) => body(link, scene)),
+    joints: scene.joints.map((one) => joint(one, scene)),
+    points: scene.links.filter((link) => !link.ground).flatMap((link) => link.free.map((key) => freePoint(key, link.name))),
+    loads: scene.loads.filter((load) => load.at && Math.hypot(...load.force) > 0).map(load),
+    vectors: scene.joints.map((one) => svg("path", { class: `reaction ${view.kinds.get(one.name)}` })),
+    drives: scene.drivers.map(() => svg("path", { class: "drive" })),
+  };
+  view.key = svg("g", { class: "key" });
+  view.moving = svg("g", {}, ...view.parts.bodies.map((one) => one.node), ...view.parts.points.map((one) => one.node), ...view.parts.joints.map((one) => one.node), ...view.parts.drives, ...view.parts.loads.map((one) => one.node), ...view.parts.vectors, ...view.parts.joints.map((one) => one.label));
+  view.stage.replaceChildren(
+    svg("svg", { viewBox: `0 0 ${width} ${Math.round(tall)}`, role: "img", "aria-label": `Mechanism: ${scene.name}` }, ...ground(view), ...tracks(view), view.moving, view.key),
+  );
+  scales(view);
+  pose(view);
+}
+
+/** Bearings and guides that stand on the ground; they do not move. */
+function ground(view) {
+  const { scene, frame } = view;
+  const fixed = scene.links.find((link) => link.ground)?.name;
+  const still = scene.joints.filter((one) => one.links.includes(fixed));
+  return still.map((one) => {
+    const track = scene.points[one.at];
+    const spots = track ? Array.from({ length: scene.count }, (_, index) => place(scene, one.at, index)).filter(Boolean) : [];
+    if (!spots.length) return null;
+    return one.type === "prismatic" ? rail(frame, spots, guide(scene, one, 0)) : support(frame, spots[0]);
+  }).filter(Boolean);
+}
+
+function support(frame, spot) {
+  const [x, y] = frame.to(spot);
+  return svg("g", { class: "ground" }, svg("path", { class: "bearing", d: `M${x},${y}l-11,19h22Z` }), hatching(x, y + 19, 0, 20));
+}
+
+function rail(frame, spots, angle) {
+  const [ux, uy] = [Math.cos(angle), Math.sin(angle)];
+  const along = spots.map(([x, y]) => x * ux + y * uy);
+  const [low, high] = [Math.min(...along), Math.max(...along)];
+  const shift = (low + high) / 2 - along[0];
+  const [x, y] = frame.to([spots[0][0] + shift * ux, spots[0][1] + shift * uy]);
+  const half = ((high - low) / 2) * frame.scale + 26;
+  return svg("g", { class: "ground" }, hatching(x + 11 * uy, y + 11 * ux, -angle, half));
+}
+
+/** A line with hatching on its far side, around (x, y), turned by `angle` (screen sense, rad). */
+function hatching(x, y, angle, half) {
+  let path = `M${-half},0H${half}`;
+  for (let along = -half + 5; along <= half; along += 6.5) path += `M${along.toFixed(1)},0l-6,7`;
+  return svg("path", { class: "hatch", d: path, transform: `translate(${x},${y}) rotate(${(angle * 180) / Math.PI})` });
+}
+
+/** Coupler curves of named points, thin ones for moving joints. */
+function tracks({ scene, frame }) {
+  const parts = [];
+  for (const link of scene.links.filter((one) => !one.ground)) {
+    for (const key of link.points) {
+      const track = scene.points[key];
+      if (track.x.length === 1 && track.y.length === 1) continue;
+      parts.push(svg("path", { class: link.free.includes(key) ? "track free" : "track", d: trackPath(scene, frame, key) }));
+    }
+  }
+  return parts;
+}
+
+function trackPath(scene, frame, key) {
+  let path = "";
+  let pen = "M";
+  for (let index = 0; index < scene.count + (scene.abscissa.closed ? 1 : 0); index += 1) {
+    const spot = place(scene, key, index % scene.count);
+    if (spot) {
+      const [x, y] = frame.to(spot);
+      path += `${pen}${x.toFixed(1)},${y.toFixed(1)}`;
+    }
+    pen = spot ? "L" : "M";
+  }
+  return path;
+}
+
+/** A link as a rounded plate: its outline drawn wide, then less wide in its tint. */
+function body(link, scene) {
+  const kind = `k${scene.links.filter((one) => !one.ground).indexOf(link) % 6}`;
+  const parts = [svg("path", { class: `edge ${kind}` }), svg("path", { class: "underlay" }), svg("path", { class: `plate ${kind}` })];
+  return { link, parts, node: svg("g", { class: "body" }, svg("title", {}, link.name), ...parts) };
+}
+
+function joint(one, scene) {
+  const grounded = scene.links.some((link) => link.ground && one.links.includes(link.name));
+  const beside = one.type === "prismatic" ? [26, -13] : grounded ? [-19, 15] : [-11, -10]; // clear of bearing and block
+  const node = svg("g", { class: "joint" }, svg("title", {}, one.name), one.type === "prismatic" ? svg("rect", { x: -17, y: -10, width: 34, height: 20, rx: 1.5 }) : svg("circle", { r: 5 }));
+  return { joint: one, node, beside, label: svg("text", { class: "name" }, one.name) };
+}
+
+function freePoint(key, link) {
+  const name = key.slice(link.length + 1);
+  return { key, node: svg("g", { class: "point" }, svg("circle", { r: 3.5 }), svg("text", { x: 9, y: -8 }, name)) };
+}
+
+function load(one) {
+  const size = stated(Math.hypot(...one.force), "N");
+  return { load: one, node: svg("g", { class: "load" }, svg("title", {}, `${one.name}: ${size}`), svg("path", {}), svg("text", {}, size)) };
+}
+
+/** Length bar and reference arrow, with round numbers. */
+function scales(view) {
+  const { frame, usual, factor } = view;
+  const y = frame.height - 14;
+  const length = roundBelow((frame.width * 0.2) / frame.scale);
+  const bar = length * frame.scale;
+  const parts = [svg("path", { class: "bar", d: `M14,${y - 4}v8m0,-4h${bar}m0,-4v8` }), svg("text", { x: 14 + bar + 7, y, dy: "0.32em" }, stated(length, "m"))];
+  view.perNewton = usual > 0 ? (Math.min(frame.width, frame.height) * 0.24 * factor) / usual : 0;
+  if (view.perNewton > 0 && view.shown.size) {
+    const force = roundBelow((frame.width * 0.17) / view.perNewton);
+    const x = frame.width * 0.55;
+    parts.push(svg("path", { class: "reaction reference", d: arrow(x, y, force * view.perNewton, 0) }));
+    parts.push(svg("text", { x: x + force * view.perNewton + 8, y, dy: "0.32em" }, stated(force, "N")));
+  }
+  view.key.replaceChildren(...parts);
+}
+
+/** A vector as a path: shaft and filled head, from (x, y) by (dx, dy) px. */
+export function arrow(x, y, dx, dy) {
+  const length = Math.hypot(dx, dy);
+  if (!(length > 0.5)) return "";
+  const [ux, uy] = [dx / length, dy / length];
+  const head = Math.min(10, length);
+  const [bx, by] = [x + dx - head * ux, y + dy - head * uy];
+  const wing = 0.36 * head;
+  const at_ = (a, b) => `${a.toFixed(1)},${b.toFixed(1)}`;
+  return `M${at_(x, y)}L${at_(bx, by)}M${at_(x + dx, y + dy)}L${at_(bx - wing * uy, by + wing * ux)}L${at_(bx + wing * uy, by - wing * ux)}Z`;
+}
+
+/** Everything that moves, at the present position; where it cannot be assembled, the last pose in grey. */
+function pose(view) {
+  const { scene, frame, index, parts } = view;
+  if (!frame) return;
+  if (drawable(scene, index)) view.posed = index;
+  else if (!drawable(scene, view.posed)) view.posed = Math.max(scene.status.findIndex((_, one) => drawable(scene, one)), 0);
+  const answered = solved(scene, index);
+  view.moving.setAttribute("class", answered ? "moving" : "moving without-answer");
+  view.message.hidden = answered;
+  view.message.textContent = answered ? "" : sentence(state(scene, index));
+  parts.bodies.forEach((one) => poseBody(view, one));
+  parts.points.forEach((one) => moveTo(one.node, spotOf(view, one.key)));
+  parts.joints.forEach((one) => poseJoint(view, one));
+  parts.loads.forEach((one) => poseLoad(view, one));
+  scene.drivers.forEach((driver, order) => poseDrive(view, driver, parts.drives[order]));
+  scene.joints.forEach((one, order) => poseVector(view, one, parts.vectors[order]));
+}
+
+function drawable(scene, index) {
+  return Object.keys(scene.points).every((key) => place(scene, key, index));
+}
+
+function sentence(text) {
+  return `${text.charAt(0).toUpperCase()}${text.slice(1)}.`;
+}
+
+function spotOf(view, key) {
+  const spot = place(view.scene, key, view.posed);
+  return spot ? view.frame.to(spot) : null;
+}
+
+function moveTo(node, spot, angle = 0) {
+  const turn = angle ? ` rotate(${((-angle * 180) / Math.PI).toFixed(2)})` : "";
+  set(node, { transform: spot ? `translate(${spot[0].toFixed(1)},${spot[1].toFixed(1)})${turn}` : null, visibility: spot ? null : "hidden" });
+}
+
+function poseBody(view, { link, parts }) {
+  const spots = link.points.map((key) => spotOf(view, key)).filter(Boolean);
+  const corners = hull(spots).map(([x, y]) => `${x.toFixed(1)},${y.toFixed(1)}`);
+  const path = corners.length ? `M${corners.join("L")}${corners.length > 2 ? "Z" : ""}` : "";
+  parts.forEach((part) => part.setAttribute("d", path));
+}
+
+function poseJoint(view, one) {
+  const spot = spotOf(view, one.joint.at);
+  moveTo(one.node, spot, one.joint.type === "prismatic" ? guide(view.scene, one.joint, view.posed) : 0);
+  moveTo(one.label, spot && [spot[0] + one.beside[0], spot[1] + one.beside[1]]);
+}
+
+function poseLoad(view, { load: one, node }) {
+  const spot = spotOf(view, one.at);
+  const size = Math.hypot(...one.force);
+  const [dx, dy] = [(44 * one.force[0]) / size, (-44 * one.force[1]) / size];
+  const [path, text] = node.querySelectorAll("path, text");
+  moveTo(node, spot);
+  path.setAttribute("d", arrow(0, 0, dx, dy));
+  set(text, { x: dx + 8, y: dy, dy: "0.32em" });
+}
+
+/** An arc around a turning drive in the sense it turns; along its way, for a sliding one an arrow. */
+function poseDrive(view, driver, node) {
+  const one = view.scene.joints.find((candidate) => candidate.name === driver.name);
+  const spot = one ? spotOf(view, one.at) : null;
+  const { values, period } = view.scene.abscissa;
+  const forward = view.scene.drivers.indexOf(driver) > 0 ? 0 : Math.sign(period || values[values.length - 1] - values[0]);
+  if (!spot || !forward) return set(node, { d: "" });
+  const [x, y] = spot;
+  if (driver.type === "prismatic") {
+    const angle = guide(view.scene, one, view.posed);
+    return set(node, { d: arrow(x - 30 * Math.sin(angle), y - 30 * Math.cos(angle), 34 * forward * Math.cos(angle), -34 * forward * Math.sin(angle)) });
+  }
+  const end = forward > 0 ? -1 : 1; // counter-clockwise ends on the left
+  const tip = [x + end * 19, y - 15];
+  const head = `m${-end * 1.2},-8.2L${tip}l${-end * 8.2},-1.2`;
+  return set(node, { d: `M${x - end * 19},${y - 15}A24.2,24.2 0 0 ${forward > 0 ? 0 : 1} ${tip}${head}` });
+}
+
+function poseVector(view, one, node) {
+  const spot = spotOf(view, one.at);
+  const x = at(one.reaction.x, view.index);
+  const y = at(one.reaction.y, view.index);
+  const show = spot && view.shown.has(one.name) && x !== null && y !== null;
+  node.setAttribute("d", show ? arrow(spot[0], spot[1], x * view.perNewton, -y * view.perNewton) : "");
+}

@@ -1,0 +1,141 @@
+// Polar reaction diagram of one joint: the tip of the force vector over the run, in the global frame.
+
+import { at, extent, magnitude, peak } from "./data.js";
+import { html, onWidth, set, svg } from "./dom.js";
+import { fixed, prefixed, tickLabel, ticks } from "./format.js";
+
+const MARGIN = { top: 8, right: 10, bottom: 36, left: 50 };
+
+/** The diagram of `joint`; `kind` colours it, `pick(index, firm)` is called when the reader points at the curve. */
+export function polarChart(scene, joint, kind, pick) {
+  const sizes = magnitude(joint.reaction, scene.count);
+  const most = peak(sizes, joint.ideal ? magnitude(joint.ideal, scene.count) : []);
+  const scale = prefixed(most, "N");
+  const plot = html("div", { class: "plot" });
+  const value = html("span", { class: "value" }, "—");
+  const element = html(
+    "figure",
+    { class: "chart polar" },
+    html("figcaption", {}, html("span", { class: "title" }, joint.name), html("span", { class: "unit" }, `[${scale.unit}]`), value),
+    plot,
+  );
+  const chart = { scene, joint, kind, scale, plot, frame: null, index: 0 };
+  onWidth(plot, (width) => draw(chart, width), 220);
+  const point = (event, firm) => chart.frame && pick(closest(chart, event), firm);
+  plot.addEventListener("pointerdown", (event) => point(event, true));
+  plot.addEventListener("pointermove", (event) => event.buttons > 0 && point(event, true));
+  return {
+    element,
+    show(index) {
+      chart.index = index;
+      value.textContent = sizes[index] === null ? "—" : `${fixed(sizes[index] * scale.factor, most * scale.factor)} ${scale.unit}`;
+      moveVector(chart);
+    },
+  };
+}
+
+function draw(chart, width) {
+  const { scene, joint, kind, scale } = chart;
+  const side = width - MARGIN.left - MARGIN.right;
+  const height = side + MARGIN.top + MARGIN.bottom;
+  const { middle, half } = window_(joint, scale.factor);
+  const frame = {
+    width,
+    x: (value) => MARGIN.left + ((value - middle[0]) / half + 1) * (side / 2),
+    y: (value) => MARGIN.top + (1 - (value - middle[1]) / half) * (side / 2),
+  };
+  chart.frame = frame;
+  chart.vector = svg("line", { class: `vector ${kind}` });
+  chart.tip = svg("circle", { class: `dot ${kind}`, r: 4 });
+  const across = ticks(middle[0] - half, middle[0] + half, 4);
+  const up = ticks(middle[1] - half, middle[1] + half, 4);
+  chart.plot.replaceChildren(
+    svg(
+      "svg",
+      { viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": `Polar diagram of the reaction in joint ${joint.name}` },
+      ...grid(frame, across, up, side),
+      svg("text", { class: "axis middle", x: MARGIN.left + side / 2, y: height - 4 }, "Fx"),
+      svg("text", { class: "axis middle", x: 11, y: MARGIN.top + side / 2, dy: "0.32em" }, "Fy"),
+      joint.ideal ? svg("path", { class: "curve free", d: loop(chart, joint.ideal) }) : null,
+      svg("path", { class: `curve ${kind}`, d: loop(chart, joint.reaction) }),
+      ...marks(chart),
+      chart.vector,
+      chart.tip,
+    ),
+  );
+  moveVector(chart);
+}
+
+/** A square window around the curves and the origin. */
+function window_(joint, factor) {
+  const both = [joint.reaction, ...(joint.ideal ? [joint.ideal] : [])];
+  const [x0, x1] = extent([[0], ...both.map((one) => one.x)]);
+  const [y0, y1] = extent([[0], ...both.map((one) => one.y)]);
+  const half = (Math.max(x1 - x0, y1 - y0) / 2) * factor * 1.1 || 1;
+  return { middle: [((x0 + x1) / 2) * factor, ((y0 + y1) / 2) * factor], half };
+}
+
+function grid(frame, across, up, side) {
+  const step = (list) => (list.length > 1 ? list[1] - list[0] : 1);
+  const bottom = MARGIN.top + side;
+  return [
+    ...across.map((value) => svg("line", { class: value === 0 ? "zero" : "grid", x1: frame.x(value), x2: frame.x(value), y1: MARGIN.top, y2: bottom })),
+    ...up.map((value) => svg("line", { class: value === 0 ? "zero" : "grid", x1: MARGIN.left, x2: MARGIN.left + side, y1: frame.y(value), y2: frame.y(value) })),
+    ...across.map((value) => svg("text", { class: "tick middle", x: frame.x(value), y: bottom + 15 }, tickLabel(value, step(across)))),
+    ...up.map((value) => svg("text", { class: "tick end", x: MARGIN.left - 6, y: frame.y(value), dy: "0.32em" }, tickLabel(value, step(up)))),
+  ];
+}
+
+function spot({ frame, scale }, vector, index) {
+  const x = at(vector.x, index);
+  const y = at(vector.y, index);
+  return x === null || y === null ? null : [frame.x(x * scale.factor), frame.y(y * scale.factor)];
+}
+
+function loop(chart, vector) {
+  const { scene } = chart;
+  let path = "";
+  let pen = "M";
+  for (let index = 0; index < scene.count + (scene.abscissa.closed ? 1 : 0); index += 1) {
+    const place = spot(chart, vector, index % scene.count);
+    if (place) path += `${pen}${place[0].toFixed(1)},${place[1].toFixed(1)}${pen === "M" ? "h0" : ""}`;
+    pen = place ? "L" : "M";
+  }
+  return path;
+}
+
+/** Dots at every twelfth of a closed turn, with the angle at every quarter. */
+function marks(chart) {
+  const { scene, joint, kind } = chart;
+  if (!scene.abscissa.closed || scene.count < 12) return [];
+  return Array.from({ length: 12 }, (_, order) => {
+    const index = Math.round((order * scene.count) / 12);
+    const place = spot(chart, joint.reaction, index);
+    if (!place) return null;
+    const label = order % 3 ? null : svg("text", { class: "mark", x: place[0] + 6, y: place[1] - 5 }, `${Math.round(scene.abscissa.values[index])}°`);
+    return svg("g", {}, svg("circle", { class: `milestone ${kind}`, cx: place[0], cy: place[1], r: 2.2 }), label);
+  }).filter(Boolean);
+}
+
+function moveVector(chart) {
+  if (!chart.frame) return;
+  const tip = spot(chart, chart.joint.reaction, chart.index);
+  const hidden = tip ? null : "hidden";
+  const [x, y] = tip ?? [0, 0];
+  set(chart.vector, { x1: chart.frame.x(0), y1: chart.frame.y(0), x2: x, y2: y, visibility: hidden });
+  set(chart.tip, { cx: x, cy: y, visibility: hidden });
+}
+
+function closest(chart, event) {
+  const box = chart.plot.getBoundingClientRect();
+  const grow = chart.frame.width / box.width;
+  const [px, py] = [(event.clientX - box.left) * grow, (event.clientY - box.top) * grow];
+  let best = chart.index;
+  let least = Infinity;
+  for (let index = 0; index < chart.scene.count; index += 1) {
+    const place = spot(chart, chart.joint.reaction, index);
+    const gap = place ? Math.hypot(place[0] - px, place[1] - py) : Infinity;
+    if (gap < least) [best, least] = [index, gap];
+  }
+  return best;
+}

@@ -1,0 +1,129 @@
+// The report page: reads the scene out of the document, builds the views, and lets the crank move them all.
+
+import { lineChart } from "./chart.js";
+import { at, full, magnitude, peak, solved, state, total } from "./data.js";
+import { html, svg } from "./dom.js";
+import { fixed, quantity } from "./format.js";
+import { mechanismView } from "./mechanism.js";
+import { listenToKeys, player } from "./player.js";
+import { polarChart } from "./polar.js";
+
+/** Class that colours the n-th joint's curves and vectors; after six the dash changes. */
+function kindOf(order) {
+  return `k${order % 6} d${Math.floor(order / 6) % 4}`;
+}
+
+/** Every chart of the scene that has something to show, as [{show, element}]. */
+function charts(scene, kinds, pick) {
+  const { count, sums, drivers, joints } = scene;
+  const list = drivers.map((driver) => effortChart(scene, driver, pick));
+  const losses = joints.map((joint) => ({ label: joint.name, values: full(joint.friction_power, count), kind: kinds.get(joint.name) })).filter((one) => peak(one.values) > 0);
+  const lost = total(joints.map((joint) => joint.friction_power), count);
+  if (losses.length) list.push(lineChart(scene, { title: "Friction power by joint", unit: "W", pick, series: [{ label: "all", values: lost, kind: "ink" }, ...losses] }));
+  list.push(reactionChart(scene, kinds, pick));
+  list.push(powerChart(scene, lost, pick));
+  if (sums.efficiency_instant) {
+    const values = full(sums.efficiency_instant, count).map((value) => (value === null ? null : 100 * value));
+    const note = scene.efficiency === null ? "" : `Over the whole run: ${quantity(100 * scene.efficiency, "%")}.`;
+    list.push(lineChart(scene, { title: "Efficiency at each position", unit: "%", pick, limits: [-100, 100], note, series: [{ label: "efficiency", values, kind: "k2" }] }));
+  }
+  return list;
+}
+
+function effortChart(scene, driver, pick) {
+  const { count } = scene;
+  const noun = driver.unit === "N" ? "force" : "torque";
+  const series = [{ label: driver.ideal ? "with friction" : noun, values: full(driver.effort, count), kind: "k0" }];
+  if (driver.ideal) series.push({ label: "without friction", values: full(driver.ideal, count), kind: "k1 dashed" });
+  const low = full(driver.effort_lower, count);
+  const high = full(driver.effort_upper, count);
+  const open = low.some((value, index) => value !== null && high[index] - value > 1e-9 * peak(low, high));
+  const band = open ? { low, high, kind: "k0", label: "range, friction at rest" } : null;
+  return lineChart(scene, { title: `Drive ${noun} ${driver.name}`, unit: driver.unit, series, band, pick });
+}
+
+function reactionChart(scene, kinds, pick) {
+  const series = scene.joints.map((joint) => ({ label: joint.name, values: magnitude(joint.reaction, scene.count), kind: kinds.get(joint.name) }));
+  return lineChart(scene, { title: "Joint reactions, magnitude", unit: "N", series, pick });
+}
+
+function powerChart(scene, lost, pick) {
+  const { count } = scene;
+  const drive = total(scene.drivers.map((driver) => driver.power), count);
+  const useful = full(scene.sums.useful_power, count);
+  const rest = drive.map((value, index) => (value === null || useful[index] === null || lost[index] === null ? null : value - useful[index] - lost[index]));
+  const series = [
+    { label: "drive", values: drive, kind: "k0" },
+    { label: "useful", values: useful, kind: "k2" },
+    { label: "friction", values: lost, kind: "k1" },
+  ];
+  if (peak(rest) > 1e-6 * peak(drive, useful, lost)) series.push({ label: "masses, other loads", values: rest, kind: "quiet dashed" });
+  return lineChart(scene, { title: "Power", unit: "W", series, pick });
+}
+
+/** The figures of the present position. */
+function readout(scene) {
+  const unitOf = (driver) => driver.unit;
+  const rows = [
+    [scene.abscissa.label, (index) => `${fixed(scene.abscissa.values[index], peak(scene.abscissa.values))}${scene.abscissa.unit === "°" ? "" : "\u00a0"}${scene.abscissa.unit}`],
+    ["time", (index) => quantity(at(scene.time, index), "s", peak(scene.time))],
+    ...scene.drivers.map((driver) => [`${unitOf(driver) === "N" ? "force" : "torque"} ${driver.name}`, (index) => quantity(at(driver.effort, index), unitOf(driver), peak(driver.effort))]),
+    ["friction power", (index) => quantity(at(total(scene.joints.map((joint) => joint.friction_power), scene.count), index), "W", peak(...scene.joints.map((joint) => joint.friction_power)))],
+    ["status", (index) => state(scene, index)],
+  ];
+  const cells = rows.map(() => html("dd", {}, "—"));
+  const element = html("dl", { class: "readout" }, ...rows.map(([label], order) => html("div", { class: label }, html("dt", {}, label), cells[order])));
+  const show = (index) => {
+    rows.forEach(([, text], order) => (cells[order].textContent = text(index)));
+    element.classList.toggle("unsolved", !solved(scene, index));
+  };
+  return { element, show, words: (index) => `${scene.abscissa.label} ${rows[0][1](index)}, ${state(scene, index)}` };
+}
+
+/** Which reaction vectors are drawn, and how long. */
+function vectorControls(scene, kinds, mechanism) {
+  const boxes = scene.joints.map((joint) => html("input", { type: "checkbox", checked: true, value: joint.name }));
+  const size = html("select", { "aria-label": "Length of the vectors" }, ...[0.25, 0.5, 1, 2, 4, 10].map((factor) => html("option", { value: factor, selected: factor === 1 }, `× ${factor}`)));
+  const all = html("button", { type: "button", class: "plain" }, "none");
+  const apply = () => {
+    mechanism.reactions(boxes.filter((box) => box.checked).map((box) => box.value), Number(size.value));
+    all.textContent = boxes.some((box) => box.checked) ? "none" : "all";
+  };
+  all.addEventListener("click", () => {
+    const wanted = all.textContent === "all";
+    boxes.forEach((box) => (box.checked = wanted));
+    apply();
+  });
+  [...boxes, size].forEach((control) => control.addEventListener("change", apply));
+  const labels = scene.joints.map((joint, order) => html("label", { class: `chip ${kinds.get(joint.name)}` }, boxes[order], html("span", { class: "swatch bar" }), joint.name));
+  return html("fieldset", { class: "vectors" }, html("legend", {}, "Reactions"), ...labels, all, size);
+}
+
+/** Build the page into its places. */
+export function start(scene, places) {
+  const kinds = new Map(scene.joints.map((joint, order) => [joint.name, kindOf(order)]));
+  const mechanism = mechanismView(scene, kinds);
+  const figures = readout(scene);
+  const views = [mechanism, figures];
+  const crank = player(scene.count, figures.words, (index) => views.forEach((view) => view.show(index)), { svg });
+  const pick = (index, firm) => {
+    if (firm) crank.go(index);
+    else if (!crank.playing()) crank.go(index);
+  };
+  const curves = charts(scene, kinds, pick);
+  const polars = scene.joints.map((joint) => polarChart(scene, joint, kinds.get(joint.name), pick));
+  views.push(...curves, ...polars);
+  const hint = html("p", { class: "hint" }, "Space plays, ← and → step (Shift: ten), Home and End jump; point at a curve to move the crank.");
+  places.stage.append(mechanism.element, crank.element, figures.element, vectorControls(scene, kinds, mechanism), hint);
+  places.charts.append(...curves.map((chart) => chart.element));
+  places.polars.append(...polars.map((chart) => chart.element));
+  listenToKeys(document, crank);
+  crank.go(0);
+  return crank;
+}
+
+if (globalThis.document) {
+  const find = (id) => document.getElementById(id);
+  const data = find("scene");
+  if (data) start(JSON.parse(data.textContent), { stage: find("stage"), charts: find("charts"), polars: find("polars") });
+}

@@ -26,7 +26,7 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks import peers
-from benchmarks.ours import trunnion_side
+from benchmarks.ours import dataset_side, trunnion_side
 from benchmarks.reference_kernels import (
     COLUMN,
     HAS_NUMBA,
@@ -87,6 +87,7 @@ CONTENDERS: dict[Job, dict[str, Maker]] = {
     },
     "friction": {
         "Trunnion": lambda: trunnion_side("friction"),
+        "Trunnion analyse()": dataset_side,
         "Numba loop": lambda: _numba("friction"),
         "stacked 9×9": lambda: _stacked(False),
         "stacked 9×9, superposed": lambda: _stacked(True),

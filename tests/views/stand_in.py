@@ -45,19 +45,28 @@ def assemble(joints, links, points, drivers, columns, attrs):
         second = np.gradient(rate, columns["time"], axis=-1) if count > 1 else np.zeros_like(values)
         unit = UNITS[name]
         variables[f"{stem}_velocity"] = (shape, rate, {"units": f"{unit}/s", "long_name": f"{stem} velocity"})
-        variables[f"{stem}_acceleration"] = (
-            shape, second, {"units": f"{unit}/s^2", "long_name": f"{stem} acceleration"})  # fmt: skip
+        about = {"units": f"{unit}/s^2", "long_name": f"{stem} acceleration"}
+        variables[f"{stem}_acceleration"] = (shape, second, about)
     return xr.Dataset(
         variables,
         coords={
             "time": ("position", columns["time"], {"units": "s", "long_name": "time"}),
-            "joint": joints, "link": links, "point": points, "driver": drivers, "axis": ["x", "y"],
-        },  # fmt: skip
+            "joint": joints,
+            "link": links,
+            "point": points,
+            "driver": drivers,
+            "axis": ["x", "y"],
+        },
         attrs={
-            "model_hash": "9f2c41d07ab35e68", "trunnion_version": "0.1.0", "method": "newton",
-            "references": "Durango, Calle, Ruiz (2010), J. Braz. Soc. Mech. Sci. Eng., doi:10.1590/S1678-58782010000300010",
-            "findings": "[]", "inputs": "[]", "summary": "[]", **attrs,
-        },  # fmt: skip
+            "model_hash": "9f2c41d07ab35e68",
+            "trunnion_version": "0.1.0",
+            "method": "newton",
+            "references": "Durango, Calle, Ruiz (2010), J. Braz. Soc. Mech. Sci., doi:10.1590/S1678-58782010000300010",
+            "findings": "[]",
+            "inputs": "[]",
+            "summary": "[]",
+            **attrs,
+        },
     )
 
 
@@ -76,13 +85,19 @@ def _solve(theta, friction=1.0):
     phi = np.arctan2(*(C - B)[::-1])
     psi = np.unwrap(np.arctan2(*(C - D)[::-1]))
     E = B + 2.5 * np.stack([np.cos(phi + np.pi / 6), np.sin(phi + np.pi / 6)])
-    dC = np.gradient(np.gradient(C, 0.1 * np.diff(theta).mean() if theta.size > 1 else 1.0, axis=1), axis=1) if theta.size > 2 else C
+    dC = (
+        np.gradient(np.gradient(C, 0.1 * np.diff(theta).mean() if theta.size > 1 else 1.0, axis=1), axis=1)
+        if theta.size > 2
+        else C
+    )
     FC = np.stack([300 + 40 * np.abs(dC).max() * np.cos(theta), 900 * np.sin(theta) ** 2 - 120])
     FB = FC * 6 + np.stack([900 * np.cos(2 * theta), 700 * np.sin(theta - 0.4)])
     FA = FB + np.stack([240 * np.cos(theta), 240 * np.sin(theta)])
     forces = np.stack([FA, FB, FC, -FC * 1.2])
     loss = 0.4 * 0.0075 * np.hypot(forces[:, 0], forces[:, 1])
-    slip = 10 * np.stack([np.ones_like(theta), 1 + 0.4 * np.sin(theta), 0.7 + 0.5 * np.cos(theta), np.sin(theta - 0.25)])
+    slip = 10 * np.stack(
+        [np.ones_like(theta), 1 + 0.4 * np.sin(theta), 0.7 + 0.5 * np.cos(theta), np.sin(theta - 0.25)]
+    )
     power = friction * loss * np.abs(slip)
     ideal = B[0] * FB[1] - B[1] * FB[0]
     return A, B, C, D, E, phi, psi, forces, power, -np.sign(slip) * loss * friction, ideal + power.sum(0) / 10
@@ -182,7 +197,7 @@ def slider(count=90):
             "time": s / 0.05, "joint_rotation": [flat, -lean, lean, flat],
             "joint_slide": [s, flat, flat, R[0] - R[0][0]],
             "link_angle": [flat, flat + tilt, -lean, flat],
-            "point_position": [zero, zero + [[0.2], [-0.02]], S, Q, Q, R, R, R],
+            "point_position": [zero, zero + np.array([[0.2], [-0.02]]), S, Q, Q, R, R, R],
             "reaction_force": [force, force * 0.8, force * 0.7, force * 0.3],
             "reaction_moment": [flat + 0.4, flat, flat, flat + 0.1],
             "friction_torque": np.zeros((4, count)), "friction_force": [flat + 4, flat, flat, flat + 2],

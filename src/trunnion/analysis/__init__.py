@@ -1,1 +1,1 @@
-""""""
+"""One question each about a mechanism."""

@@ -197,3 +197,8 @@ def driven_coordinates(
         for target, value in zip((q, rate, second), system.drive(values, name, time), strict=True):
             target.append(sign * value)
     return q, rate, second
+
+
+def rubbing(system: System) -> list[str]:
+    """Joints that have friction."""
+    return [name for name, joint in system.mechanism.effective_joints.items() if joint.friction is not None]

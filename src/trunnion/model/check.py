@@ -33,9 +33,11 @@ def check_model(mechanism: Mechanism, lost: Collection[str] = ()) -> list[Findin
     """
     unreadable: set[str] = set()
     findings = [*_quantities(mechanism, unreadable), *_links(mechanism), *_joints(mechanism)]
+    findings += [] if lost else _absent(mechanism)
     findings += [*_loop(mechanism), *_drivers(mechanism), *_loads(mechanism), *_others(mechanism)]
     numbers = ParameterSet(mechanism, unreadable) if unreadable else mechanism.parameter_set
     findings += check_values(mechanism, numbers)
+    findings = list(dict.fromkeys(findings))  # a default that several joints share is found once
     return [finding for finding in findings if not any(_speaks_of(finding, name) for name in lost)]
 
 
@@ -100,16 +102,33 @@ def _dimension_name(name: str) -> Iterator[Finding]:
         )
 
 
-def _links(mechanism: Mechanism) -> Iterator[Finding]:
-    joints = mechanism.effective_joints
-    jointed = {name for joint in joints.values() for name in joint.links}
-    size = mechanism.coordinates
-    if not mechanism.links and not mechanism.loop:
+def _absent(mechanism: Mechanism) -> Iterator[Finding]:
+    """What every mechanism needs and this one lacks."""
+    links, joints = mechanism.links, mechanism.effective_joints
+    if not links and not mechanism.loop:
         yield Finding("there are no links", "links", "state at least a ground and a moving link")
+        return
+    if not joints:
+        yield Finding("there are no joints", "joints", "join the links")
+        return
+    jointed = {name for joint in joints.values() for name in joint.links}
+    for name in links:
+        if name not in jointed:
+            yield Finding(f"no joint holds the link '{name}'", f"links.{name}", "join it to another link or remove it")
+    if not mechanism.fixed_link:
+        yield Finding(
+            "no link is fixed", "ground", "name the fixed link 'ground' or 'frame', or state ground: <its name>"
+        )
+    if not mechanism.drivers:
+        yield Finding("there is no driver", "drivers", "state which joint is driven, as A: {speed: 10 rad/s}")
+
+
+def _links(mechanism: Mechanism) -> Iterator[Finding]:
+    size, fixed = mechanism.coordinates, mechanism.ground
+    if fixed is not None and fixed not in {*mechanism.links, *(row.link for row in mechanism.loop)}:
+        yield Finding(f"there is no link '{fixed}'", "ground", nearest(fixed, mechanism.links))
     for name, link in mechanism.links.items():
         where = f"links.{name}"
-        if name not in jointed:
-            yield Finding(f"no joint holds the link '{name}'", where, "join it to another link or remove it")
         if link.inertia_about == "origin" and not link.model_fields_set & {"inertia"}:
             yield Finding("inertia_about is given without an inertia", where, "give the inertia", Severity.WARNING)
         for point, place in link.points.items():
@@ -121,13 +140,6 @@ def _links(mechanism: Mechanism) -> Iterator[Finding]:
             yield from _length(len(link.centre), size, f"{where}.centre")
     if mechanism.gravity is not None:
         yield from _length(len(mechanism.gravity), size, "gravity")
-    fixed = mechanism.fixed_link
-    if not fixed and (mechanism.links or mechanism.loop):
-        yield Finding(
-            "no link is fixed", "ground", "name the fixed link 'ground' or 'frame', or state ground: <its name>"
-        )
-    elif fixed and fixed not in mechanism.links and fixed not in {row.link for row in mechanism.loop}:
-        yield Finding(f"there is no link '{fixed}'", "ground", nearest(fixed, mechanism.links))
 
 
 def _length(found: int, size: int, where: str) -> Iterator[Finding]:
@@ -137,17 +149,14 @@ def _length(found: int, size: int, where: str) -> Iterator[Finding]:
 
 
 def _joints(mechanism: Mechanism) -> Iterator[Finding]:
-    if mechanism.links and not mechanism.effective_joints:
-        yield Finding("there are no joints", "joints", "join the links")
     for name, joint in mechanism.effective_joints.items():
         where = f"joints.{name}"
         if mechanism.space == "planar" and joint.type not in PAIRS:
             yield Finding(f"a {joint.type} joint does not exist in the plane", where, f"use one of {', '.join(PAIRS)}")
         if name in mechanism.joints:
             yield from _ends(mechanism, name, joint)
-        yield from _contact(joint, where)
-    if mechanism.joint_defaults.friction:
-        yield from _parameters_of_law(mechanism.joint_defaults.friction, "joint_defaults.friction", complete=False)
+        own = mechanism.stated_joints[name].friction
+        yield from _contact(joint, where, "joint_defaults.friction" if own is None else f"{where}.friction")
 
 
 def _ends(mechanism: Mechanism, name: str, joint: Joint) -> Iterator[Finding]:
@@ -171,8 +180,8 @@ def _ends(mechanism: Mechanism, name: str, joint: Joint) -> Iterator[Finding]:
             )
 
 
-def _contact(joint: Joint, where: str) -> Iterator[Finding]:
-    """Whether pin, guide and friction suit the type of joint and are complete."""
+def _contact(joint: Joint, where: str, friction_at: str) -> Iterator[Finding]:
+    """Whether pin, guide and friction suit the type of joint and are complete; friction_at: where it is stated."""
     turns = "rotation" in freedoms(joint.type)
     if turns and joint.guide:
         yield Finding(f"a {joint.type} joint has a pin, not a guide", f"{where}.guide", "state pin instead")
@@ -181,7 +190,7 @@ def _contact(joint: Joint, where: str) -> Iterator[Finding]:
     friction = joint.friction
     if friction is None:
         return
-    yield from _parameters_of_law(friction, f"{where}.friction", complete=True)
+    yield from _parameters_of_law(friction, friction_at)
     if turns and not (joint.pin and joint.pin.radius):
         yield Finding(
             "friction without the radius of the pin", where, "state pin: {radius: …} or a fit, or friction: 0"
@@ -190,15 +199,13 @@ def _contact(joint: Joint, where: str) -> Iterator[Finding]:
         yield Finding("friction without the length of the guide", where, "state guide: {length: …}, or friction: 0")
 
 
-def _parameters_of_law(friction: Friction, where: str, complete: bool) -> Iterator[Finding]:
-    law = friction.law or "coulomb"
+def _parameters_of_law(friction: Friction, where: str) -> Iterator[Finding]:
+    law = str(friction.law)  # stated or filled in
     declared = FRICTION_LAWS[law].parameters
     for parameter in friction.parameters:
         if parameter not in declared:
             what = f"the key '{parameter}' is unknown to the friction law {law}"
             yield Finding(what, f"{where}.{parameter}", nearest(parameter, ["law", "model", *declared]))
-    if not complete:
-        return
     for parameter, one in declared.items():
         if one.default is None and parameter not in friction.parameters:
             remedy = f"add {parameter}" + f" ({one.meaning})" * bool(one.meaning)
@@ -229,8 +236,6 @@ def _loop(mechanism: Mechanism) -> Iterator[Finding]:
 
 def _drivers(mechanism: Mechanism) -> Iterator[Finding]:
     joints = mechanism.effective_joints
-    if joints and not mechanism.drivers:
-        yield Finding("there is no driver", "drivers", "state which joint is driven, as A: {speed: 10 rad/s}")
     for name, driver in mechanism.drivers.items():
         where = f"drivers.{name}"
         if name not in joints:

@@ -10,7 +10,7 @@ import numpy as np
 
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, Severity
-from trunnion.joints.friction import FRICTION_LAWS
+from trunnion.joints.friction import FRICTION_LAWS, LawParameter
 from trunnion.model.parameters import ParameterSet
 from trunnion.model.parts import InertiaTensor, Link, freedoms
 
@@ -38,7 +38,7 @@ def check_values(mechanism: Mechanism, numbers: ParameterSet) -> Iterator[Findin
     for name, link in mechanism.links.items():
         yield from _inertia(mechanism, link, values, f"links.{name}")
     for name in mechanism.effective_joints:
-        yield from _joint(mechanism, name, values)
+        yield from _joint(mechanism, name, numbers)
     for name in mechanism.drivers:
         yield from _driver(values, f"drivers.{name}")
     yield from _directions(mechanism, values)
@@ -48,49 +48,46 @@ def check_values(mechanism: Mechanism, numbers: ParameterSet) -> Iterator[Findin
 _NOT_NEGATIVE = frozenset({"mass", "radius", "length", "bearing", "clearance"})
 
 
-def _joint(mechanism: Mechanism, name: str, values: Values) -> Iterator[Finding]:
+def _joint(mechanism: Mechanism, name: str, numbers: ParameterSet) -> Iterator[Finding]:
     joint, where = mechanism.effective_joints[name], f"joints.{name}"
 
     def value(path: str) -> Number:
-        return values.get(f"{where}.{path}", np.nan)
+        return numbers.nominal.get(f"{where}.{path}", np.nan)
 
-    friction = joint.friction
-    if friction and friction.law:
-        for parameter, declared in FRICTION_LAWS[friction.law].parameters.items():
-            number, path = value(f"friction.{parameter}"), f"{where}.friction.{parameter}"
-            if number < declared.minimum or number > declared.maximum:
-                limits = f"{declared.minimum:g} to {declared.maximum:g}"
-                yield Finding(f"is {number:g}, outside {limits}", path, "give a value within the range of the law")
-            elif parameter == "pair_factor" and number == 0:
-                yield Finding("is 0, which removes the friction", path, "give a factor above 0, or friction: 0")
-        if value("friction.coefficient") > 1:
-            yield Finding(
-                f"is {value('friction.coefficient'):g}, above 1",
-                f"{where}.friction.coefficient",
-                "check it: dry metals have 0.1 to 0.6",
-                Severity.WARNING,
-            )
-    for size, needed in (("pin.radius", friction), ("guide.length", friction)):
-        if needed and value(size) == 0:
-            yield Finding("is 0, where friction needs it", f"{where}.{size}", "give a value above 0")
+    def stated(path: str) -> str:
+        """Where a value stands: with the joint or with the defaults."""
+        entry = numbers.entries[f"{where}.{path}"]
+        return entry.alias or entry.path
+
+    if joint.friction and joint.friction.law:
+        for parameter, declared in FRICTION_LAWS[joint.friction.law].parameters.items():
+            if parameter in joint.friction.parameters:
+                key = f"friction.{parameter}"
+                yield from _law_value(declared, parameter, value(key), stated(key))
+        for size in ("pin.radius", "guide.length"):
+            if value(size) == 0:
+                yield Finding("is 0, where friction needs it", stated(size), "give a value above 0")
     for part, size in (("pin", "radius"), ("guide", "length")):
         clearance, body = value(f"{part}.clearance"), value(f"{part}.{size}")
         if clearance >= body > 0:
-            yield Finding(
-                f"is {clearance:g} m, not less than the {size} {body:g} m of the {part}",
-                f"{where}.{part}.clearance",
-                "check its unit",
-            )
-    pin = joint.pin
-    if pin and pin.fit and {"radius", "clearance"} & pin.model_fields_set and _states_both(mechanism, name):
+            what = f"is {clearance:g} m, not less than the {size} {body:g} m of the {part}"
+            yield Finding(what, stated(f"{part}.clearance"), "check its unit")
+    pin = mechanism.stated_joints[name].pin or mechanism.joint_defaults.pin
+    if pin and pin.fit and (pin.radius or pin.clearance):
         yield Finding("a fit states radius and clearance already", f"{where}.pin", "keep the fit or the numbers")
 
 
-def _states_both(mechanism: Mechanism, name: str) -> bool:
-    """Whether the file itself gives a pin a fit and a radius or clearance."""
-    own = mechanism.joints[name].pin if name in mechanism.joints else None
-    stated = own or mechanism.joint_defaults.pin
-    return bool(stated and stated.fit and (stated.radius or stated.clearance))
+def _law_value(declared: LawParameter, parameter: str, number: Number, where: str) -> Iterator[Finding]:
+    if number < declared.minimum:
+        yield Finding(
+            f"is {number:g}, the least is {declared.minimum:g}", where, "give a value in the range of the law"
+        )
+    elif number > declared.maximum:
+        yield Finding(f"is {number:g}, the most is {declared.maximum:g}", where, "give a value in the range of the law")
+    elif parameter == "pair_factor" and number == 0:
+        yield Finding("is 0, which removes the friction", where, "give a factor above 0, or friction: 0")
+    elif parameter == "coefficient" and number > 1:
+        yield Finding(f"is {number:g}, above 1", where, "check it: dry metals have 0.1 to 0.6", Severity.WARNING)
 
 
 def _driver(values: Values, where: str) -> Iterator[Finding]:

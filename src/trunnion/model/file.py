@@ -81,7 +81,7 @@ def _yaml() -> YAML:
     yaml.default_flow_style = None  # the innermost groups on one line
     yaml.allow_unicode = True
     yaml.width = 110
-    yaml.sort_base_mapping_type_on_output = False
+    yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]  # keys as stated
     return yaml
 
 
@@ -115,7 +115,7 @@ def _text(path: Path) -> str:
             )
         raw = path.read_bytes()
     except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) else str(error)
+        reason = str(getattr(error, "strerror", None) or error)
         raise MechanismError(Finding(f"cannot be read: {reason}", remedy="check the path")) from error
     try:
         text = raw.decode("utf-8-sig")

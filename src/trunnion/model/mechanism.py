@@ -76,6 +76,8 @@ class Mechanism(Part):
                 super().__init__(**mended)
             except ValidationError:
                 raise MechanismError(findings) from None
+            if lost & type(self).model_fields.keys():  # a whole section: the rest would speak of nothing else
+                raise MechanismError(findings) from None
         found = check_model(self, lost)
         findings += [finding for finding in found if finding.severity is Severity.ERROR]
         if findings:
@@ -111,14 +113,19 @@ class Mechanism(Part):
         return self.ground or next((name for name in FIXED_NAMES if name in names), "")
 
     @cached_property
-    def effective_joints(self) -> Mapping[str, Joint]:
-        """Every joint with the defaults merged in and its friction complete; of a loop, with the links of its rows."""
+    def stated_joints(self) -> Mapping[str, Joint]:
+        """Every joint as it was stated; a row of the loop joins the link before it to its own."""
         stated = dict(self.joints)
         for before, row in zip((*self.loop[-1:], *self.loop[:-1]), self.loop, strict=True):
             stated[row.joint] = Joint(
                 type=row.type, links=(before.link, row.link), pin=row.pin, guide=row.guide, friction=row.friction
             )
-        return {name: merge_joint(joint, self.joint_defaults) for name, joint in stated.items()}
+        return stated
+
+    @cached_property
+    def effective_joints(self) -> Mapping[str, Joint]:
+        """Every joint with the defaults merged in and its friction complete: law, model and all parameters."""
+        return {name: merge_joint(joint, self.joint_defaults) for name, joint in self.stated_joints.items()}
 
     @cached_property
     def parameter_set(self) -> ParameterSet:

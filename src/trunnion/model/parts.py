@@ -18,6 +18,7 @@ from pydantic import (
     ConfigDict,
     Discriminator,
     Field,
+    GetJsonSchemaHandler,
     PlainSerializer,
     PlainValidator,
     SerializerFunctionWrapHandler,
@@ -26,7 +27,8 @@ from pydantic import (
     model_serializer,
     model_validator,
 )
-from pydantic_core import PydanticCustomError
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema, PydanticCustomError
 
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.joints.pairs import PAIRS
@@ -144,6 +146,12 @@ class Point(Part):
     axis: Direction | None = None
     x: Direction | None = None
 
+    @classmethod
+    def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        """The list or the group."""
+        group = handler.resolve_ref_schema(handler(schema))
+        return {"anyOf": [group["properties"]["at"], group], "description": group.pop("description")}
+
     @model_validator(mode="before")
     @classmethod
     def _read_list(cls, value: object) -> object:
@@ -256,10 +264,7 @@ class Guide(Part):
 
 
 class Friction(BaseModel):
-    """Friction of a joint: a law of `FRICTION_LAWS` with its parameters, or one number, the coefficient.
-
-    Attributes beside `law` and `model` are the parameters of the law; `parameters` has them by name.
-    """
+    """Friction of a joint: a law with its parameters, or one number, the coefficient (law: coulomb)."""
 
     model_config = ConfigDict(extra="allow", frozen=True, hide_input_in_errors=True)
     __pydantic_extra__: dict[str, AnyQuantity]
@@ -269,8 +274,20 @@ class Friction(BaseModel):
 
     @property
     def parameters(self) -> Mapping[str, Quantity]:
-        """Parameters of the law by name."""
+        """Parameters of the law by name: every key beside `law` and `model`."""
         return self.__pydantic_extra__
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        """The number, or the group with the parameters of every law in the table."""
+        group = handler.resolve_ref_schema(handler(schema))
+        declared = {key: one for law in FRICTION_LAWS.values() for key, one in law.parameters.items()}
+        number = group["additionalProperties"]["type"]
+        for key, one in declared.items():
+            unit = f", {one.unit}" if one.unit else ""
+            group["properties"][key] = {"type": number, "description": f"{one.meaning}{unit}"}
+        group["additionalProperties"] = False
+        return {"anyOf": [{"type": number}, group], "description": group.pop("description")}
 
     @model_validator(mode="before")
     @classmethod

@@ -77,6 +77,9 @@ class Quantity:
             _finite(quantity.evaluate(), source)
         return quantity
 
+    def __repr__(self) -> str:
+        return f"Quantity({self.source!r}, {self.kind.name})"
+
     @property
     def names(self) -> tuple[str, ...]:
         """The dimensions its expression speaks of."""
@@ -170,7 +173,7 @@ def _split(text: str, kind: Kind) -> tuple[str, tuple[float, float] | None]:
                 f"the value {dimension_text(found_dimension)}",
                 "give both the same unit",
             )
-        if not kind.accepts(deviation.dimension):
+        if (own or unit) and not kind.accepts(deviation.dimension):
             raise UnitError(f"the tolerance in '{text}' is {dimension_text(deviation.dimension)}")
         deviations.append(-deviation.value if number.startswith("-") else deviation.value)
     if len(deviations) == 1:

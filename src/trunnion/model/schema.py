@@ -10,16 +10,29 @@ import json
 from pathlib import Path
 from typing import Any
 
+from pydantic.json_schema import GenerateJsonSchema
+
 from trunnion.model.mechanism import Mechanism
+from trunnion.model.quantity import Quantity
 
 __all__ = ["SCHEMA_FILE", "json_schema", "schema_text"]
 
 SCHEMA_FILE = Path(__file__).with_name("mechanism.schema.json")
 
 
+class _Generator(GenerateJsonSchema):
+    """Defaults as they would be written in a file; no titles that repeat the keys."""
+
+    def encode_default(self, dft: Any) -> Any:
+        return dft.source if isinstance(dft, Quantity) else super().encode_default(dft)
+
+    def field_title_should_be_set(self, schema: Any) -> bool:
+        return False
+
+
 def json_schema() -> dict[str, Any]:
     """The JSON Schema (2020-12) of a model file."""
-    schema = Mechanism.model_json_schema()
+    schema = Mechanism.model_json_schema(schema_generator=_Generator)
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         **schema,

@@ -7,7 +7,7 @@ number, so that 30 deg is not taken for a length nor 30 mm for an angle; beside 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cache
 from typing import TYPE_CHECKING
@@ -48,7 +48,7 @@ class Kind:
     name: str
     unit: str
     example: str
-    dimensions: tuple[Dimension, ...]
+    dimensions: tuple[Dimension, ...] = field(repr=False)
 
     def __or__(self, other: Kind) -> Kind:
         """A quantity that may be either, until its place says which."""

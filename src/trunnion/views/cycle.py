@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 __all__ = ["Abscissa", "Interval", "abscissa", "attribute", "intervals", "layout", "status_text", "thin"]
 
 Array = NDArray[np.float64]
+TEXTS = {int(status): status.text for status in Status}
 
 
 @dataclass(frozen=True)
@@ -90,7 +91,8 @@ def abscissa(result: xr.Dataset) -> Abscissa:
     if drivers:
         first = drivers[0]
         sliding = layout(result)["joints"].get(first, {}).get("type") == "prismatic"
-        values = _filled(result, column(result, "joint_slide" if sliding else "joint_rotation", joint=first))
+        name, turn = ("joint_slide", 0.0) if sliding else ("joint_rotation", 2 * np.pi)
+        values = _filled(result, column(result, name, joint=first), turn)
         if values is not None:
             return _over_slide(first, values) if sliding else _over_angle(first, values)
     time = column(result, "time")
@@ -113,29 +115,41 @@ def _over_slide(name: str, values: Array) -> Abscissa:
     return Abscissa(f"drive slide {name}", unit, values * factor)
 
 
-def _filled(result: xr.Dataset, values: Array | None) -> Array | None:
-    """The drive, carried on at its constant speed where it is not known; None unless it runs one way."""
-    time = column(result, "time")
+def _filled(result: xr.Dataset, values: Array | None, turn: float) -> Array | None:
+    """The drive, carried on at its constant speed where it is not known; None unless it runs one way.
+
+    turn: 2π for angles, whose count of whole turns may be lost over a gap; 0 for slides.
+    """
     if values is None or not values.size:
         return None
     known = np.isfinite(values)
     if not known.all():
-        if time is None or known.sum() < 2 or not np.isfinite(time).all():
+        line = _constant_speed(column(result, "time"), values, known)
+        if line is None:
             return None
-        line = np.polyfit(time[known], values[known], 1)
-        if np.abs(np.polyval(line, time[known]) - values[known]).max() > 1e-6 * np.ptp(values[known]):
+        turns = np.round((line - values)[known] / turn) * turn if turn else 0.0
+        if np.abs(values[known] + turns - line[known]).max() > 1e-6 * np.ptp(line):
             return None
-        values = np.where(known, values, np.polyval(line, time))
+        values = line
     steps = np.diff(values)
     return values if not steps.size or (steps > 0).all() or (steps < 0).all() else None
 
 
+def _constant_speed(time: Array | None, values: Array, known: NDArray[np.bool_]) -> Array | None:
+    """The line over time that the first two known neighbours span, as a row of values; None without such two."""
+    pairs = np.flatnonzero(known[:-1] & known[1:])
+    if time is None or not pairs.size or not np.isfinite(time).all():
+        return None
+    first, last = pairs[0], pairs[0] + 1
+    while last + 1 < known.size and known[last + 1]:  # the longer the base, the better the slope
+        last += 1
+    slope = (values[last] - values[first]) / (time[last] - time[first])
+    return np.asarray(values[first] + slope * (time - time[first]), dtype=float)
+
+
 def status_text(code: int) -> str:
     """The sentence of a status code."""
-    try:
-        return Status(code).text
-    except ValueError:
-        return f"no answer (status {code})"
+    return TEXTS.get(code, f"no answer (status {code})")
 
 
 def intervals(result: xr.Dataset, lowest: int = Status.NOT_CONVERGED) -> list[Interval]:

@@ -99,10 +99,10 @@ def _curves(axes: Axes, shown: Picture) -> None:
             continue
         free = point not in shown.stated["joints"]
         x, y = np.hstack([track, track[:, :1]]) if _closes(track) else track
-        look = (
-            {"color": INK, "linewidth": 1.3} if free else {"color": MUTED, "linewidth": 0.7, "linestyle": (0, (1, 2))}
-        )
-        axes.plot(x, y, zorder=2.5, **look)
+        if free:
+            axes.plot(x, y, color=INK, linewidth=1.3, zorder=2.5)
+        else:
+            axes.plot(x, y, color=MUTED, linewidth=0.7, linestyle=(0, (1, 2)), zorder=2.5)
 
 
 def _closes(track: Array) -> bool:
@@ -174,7 +174,10 @@ def _joint(axes: Axes, shown: Picture, name: str, joint: dict[str, Any], index: 
         return
     if grounded:
         _support(axes, place, 0.022 * shown.size)
-    axes.add_patch(Circle(place, 0.0095 * shown.size, facecolor="white", edgecolor=INK, linewidth=1.3, zorder=6))
+    r = 0.0095 * shown.size
+    axes.add_patch(
+        Circle((place[0], place[1]), r, facecolor="white", edgecolor=INK, linewidth=1.3, zorder=6)
+    )
 
 
 def _support(axes: Axes, place: Array, r: float) -> None:
@@ -235,7 +238,7 @@ def _labels(axes: Axes, shown: Picture, index: int) -> None:
         elif any(shown.ground in joint.get("links", ()) for joint in joints):
             away = np.array([-1.05 if away[0] < 0 else 1.05, -0.5])  # beside the bearing, not on the link
         axes.annotate(
-            plain(text), place, xytext=away * 17, textcoords="offset points", ha="center", va="center",
+            plain(text), (place[0], place[1]), xytext=away * 17, textcoords="offset points", ha="center", va="center",
             fontsize=10, fontweight="bold", color=INK, zorder=7,
             bbox={"boxstyle": "round,pad=0.12", "facecolor": "white", "edgecolor": "none", "alpha": 0.75},
         )  # fmt: skip

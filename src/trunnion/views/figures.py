@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.ticker import AutoMinorLocator, MaxNLocator, MultipleLocator
 
 from trunnion.views.cycle import Abscissa, Array, intervals, thin
@@ -38,9 +39,9 @@ def plain(name: str) -> str:
 
 def new(title: str, result: xr.Dataset, height: float = 4.3, width: float = WIDTH) -> Figure:
     """An empty figure with its title and, smaller, the name of the mechanism."""
-    figure = Figure(figsize=(width, height), dpi=150, facecolor="white", layout="constrained")
+    layout = ConstrainedLayoutEngine(w_pad=0.08, h_pad=0.06, hspace=0.03, wspace=0.04)
+    figure = Figure(figsize=(width, height), dpi=150, facecolor="white", layout=layout)
     FigureCanvasAgg(figure)
-    figure.get_layout_engine().set(w_pad=0.08, h_pad=0.06, hspace=0.03, wspace=0.04)  # type: ignore[union-attr]
     name = str(result.attrs.get("name", ""))
     figure.suptitle(plain(title), x=0.012, ha="left", fontsize=12, fontweight="bold", color=INK)
     if name:
@@ -96,9 +97,8 @@ def curve(axes: Axes, over: Abscissa, values: Array, label: str | None, *, close
         x, y = np.append(x, x[0] + over.period), np.append(y, y[0])
     picked = thin(y)
     x, y = x[picked], y[picked]
-    axes.plot(
-        x, y, label=None if label is None else plain(label), **{"linewidth": 1.6, "solid_joinstyle": "round"} | style
-    )
+    look: dict[str, Any] = {"linewidth": 1.6, "solid_joinstyle": "round"} | style
+    axes.plot(x, y, label=None if label is None else plain(label), **look)
     known = np.isfinite(y)
     alone = known & ~np.append(False, known[:-1]) & ~np.append(known[1:], False)
     if alone.any():  # a single position makes no line

@@ -18,7 +18,18 @@ from matplotlib.lines import Line2D
 from trunnion.views.cycle import Abscissa, Array, abscissa, attribute, column, layout, names, thin
 from trunnion.views.drawing import draw, picture
 from trunnion.views.figures import (
-    INK, MUTED, PALETTE, SHADE, along, curve, dress, legend, new, plain, shade, style_of,
+    INK,
+    MUTED,
+    PALETTE,
+    SHADE,
+    along,
+    curve,
+    dress,
+    legend,
+    new,
+    plain,
+    shade,
+    style_of,
 )  # fmt: skip
 from trunnion.views.quantities import prefixed
 
@@ -30,6 +41,7 @@ if TYPE_CHECKING:
 __all__ = ["PLOTS", "friction_power", "mechanism", "motion", "polar", "power", "reactions", "save", "torque"]
 
 FORMATS = ("png", "svg", "pdf")
+NOTE: dict[str, Any] = {"textcoords": "offset points", "fontsize": 7.5, "color": INK}
 FREE: dict[str, Any] = {"color": INK, "linewidth": 0.9, "linestyle": (0, (3, 2))}  # without friction, among many curves
 
 
@@ -183,7 +195,7 @@ def _marks(axes: Axes, over: Abscissa, force: Array, colour: str) -> None:
             continue
         axes.plot(*place, "o", markersize=3.2, color=colour, markeredgecolor="white", markeredgewidth=0.5, zorder=4)
         if not over.closed or angle % 90 == 0:
-            axes.annotate(over.say(index), place, xytext=(5, 4), textcoords="offset points", fontsize=7.5, color=INK)
+            axes.annotate(over.say(index), (place[0], place[1]), xytext=(5, 4), **NOTE)
 
 
 def mechanism(result: xr.Dataset, ideal: xr.Dataset | None = None, index: int | None = None) -> Figure:
@@ -216,7 +228,7 @@ def _first_drawable(tracks: list[Array]) -> int:
 def power(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
     """Where the power goes: drive, useful, friction, and the remainder that masses and other loads take or give."""
     over = abscissa(result)
-    drive = np.sum([column(result, "drive_power", driver=name) for name in names(result, "driver")], axis=0)
+    drive = np.asarray(result["drive_power"].sum("driver", skipna=False).values, dtype=float)
     useful = column(result, "useful_power")
     lost = np.asarray(result["friction_power"].sum("joint", skipna=False).values, dtype=float)
     useful = np.zeros_like(lost) if useful is None else useful

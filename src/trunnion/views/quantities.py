@@ -48,6 +48,8 @@ def quantity(value: object, unit: str = "") -> str:
         return f"{text}\u00a0{unit}" if text and unit not in ("", "1") else text
     if unit in ("1", "") and float(value).is_integer() and abs(value) < 1e7:
         return number(value, 1)
+    if math.isnan(value):
+        return number(value)
     factor, shown = prefixed(value, unit)
     separator = "" if shown in ("°", "") else "\u00a0"
     return f"{number(value * factor)}{separator}{shown}"

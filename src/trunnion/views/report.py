@@ -48,7 +48,7 @@ def report(result: xr.Dataset, ideal: xr.Dataset | None = None) -> str:
         "name": shown["name"] or "Mechanism", "formula": shown["formula"], "compared": ideal is not None,
         "positions": result.sizes["position"], "thinned": _ordinal(shown), "method": result.attrs.get("method", ""),
         "unanswered": sum(run.stop - run.start for run in runs),
-        "summary": [(row["label"], quantity(row["value"], row.get("unit", ""))) for row in attribute(result, "summary", [])],
+        "summary": _summary(result),
         "findings": _findings(result), "balance": _balance(result), "inputs": _inputs(result),
         "references": [line for line in str(result.attrs.get("references", "")).splitlines() if line.strip()],
         "version": result.attrs.get("trunnion_version", ""), "model_hash": result.attrs.get("model_hash", ""),
@@ -88,16 +88,22 @@ def _ordinal(shown: dict[str, Any]) -> str:
     return f"{stride}{suffix}"
 
 
+def _summary(result: xr.Dataset) -> list[tuple[str, str]]:
+    """Label and value with unit of each summary row."""
+    rows = attribute(result, "summary", [])
+    return [(str(row["label"]), quantity(row["value"], str(row.get("unit") or ""))) for row in rows]
+
+
 def _findings(result: xr.Dataset) -> list[dict[str, str]]:
-    """The findings of the result; intervals without an answer, if no finding speaks of them."""
+    """The findings of the result; intervals without an answer, if no error among them speaks of such."""
     rows = [{key: str(row.get(key) or "") for key in ("severity", "where", "what", "remedy")}
             for row in attribute(result, "findings", [])]  # fmt: skip
     over = abscissa(result)
-    said = " ".join(row["what"] for row in rows)
+    if any(row["severity"] == "error" for row in rows):
+        return rows
     for run in intervals(result):
-        if run.text.split(":")[0] not in said:
-            what = f"{run.text}, from {over.say(run.start)} to {over.say(run.stop - 1)} ({over.label})"
-            rows.append({"severity": "warning", "where": "", "what": what, "remedy": ""})
+        what = f"{run.text}, from {over.say(run.start)} to {over.say(run.stop - 1)} ({over.label})"
+        rows.append({"severity": "error", "where": "", "what": what, "remedy": ""})
     return rows
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from trunnion.views.cycle import Array, abscissa, attribute, column, intervals, layout, names
 
@@ -59,7 +60,7 @@ def scene(result: xr.Dataset, ideal: xr.Dataset | None = None, max_positions: in
     }  # fmt: skip
 
 
-def _picked(count: int, most: int) -> Array:
+def _picked(count: int, most: int) -> NDArray[np.intp]:
     """Indices of evenly spaced positions, at most `most` of them, from the first on."""
     stride = -(-count // max(most, 1)) if count else 1
     return np.arange(0, count, stride)

@@ -18,7 +18,12 @@ export function lineChart(scene, { title, unit, series, band = null, limits = nu
   const element = html(
     "figure",
     { class: "chart" },
-    html("figcaption", {}, html("span", { class: "title" }, title), html("span", { class: "unit" }, scale.unit && `[${scale.unit}]`)),
+    html(
+      "figcaption",
+      {},
+      html("span", { class: "title" }, title),
+      html("span", { class: "unit" }, scale.unit && `[${scale.unit}]`),
+    ),
     legend(series, values, band),
     plot,
     note ? html("p", { class: "remark" }, note) : null,
@@ -43,12 +48,17 @@ function legend(series, values, band) {
   const items = series.map((one, order) =>
     html("li", {}, swatch(one.kind), html("span", { class: "label" }, one.label), values[order]),
   );
-  if (band) items.push(html("li", {}, html("span", { class: `swatch area ${band.kind}` }), html("span", {}, band.label)));
+  if (band)
+    items.push(html("li", {}, html("span", { class: `swatch area ${band.kind}` }), html("span", {}, band.label)));
   return html("ul", { class: "legend" }, ...items);
 }
 
 function swatch(kind) {
-  return svg("svg", { class: "swatch", viewBox: "0 0 22 8", "aria-hidden": "true" }, svg("line", { x1: 1, x2: 21, y1: 4, y2: 4, class: `curve ${kind}` }));
+  return svg(
+    "svg",
+    { class: "swatch", viewBox: "0 0 22 8", "aria-hidden": "true" },
+    svg("line", { x1: 1, x2: 21, y1: 4, y2: 4, class: `curve ${kind}` }),
+  );
 }
 
 function draw(chart, width) {
@@ -59,7 +69,10 @@ function draw(chart, width) {
   const right = width - MARGIN.right;
   const bottom = height - MARGIN.bottom;
   const frame = {
-    width, height, bottom, right,
+    width,
+    height,
+    bottom,
+    right,
     x: (value) => MARGIN.left + ((value - x0) / (x1 - x0)) * (right - MARGIN.left),
     y: (value) => bottom - ((value - y0) / (y1 - y0)) * (bottom - MARGIN.top),
     back: (px) => x0 + ((px - MARGIN.left) / (right - MARGIN.left)) * (x1 - x0),
@@ -70,12 +83,22 @@ function draw(chart, width) {
   chart.dots = series.map((one) => svg("circle", { class: `dot ${one.kind}`, r: one.quiet ? 0 : 3.2 }));
   const area = svg("g", { "clip-path": `url(#${clip})` });
   if (band) area.append(svg("path", { class: `band ${band.kind}`, d: bandPath(chart, band) }));
-  for (const one of series) area.append(svg("path", { class: `curve ${one.kind}`, d: curvePath(scene, frame, one.values, scale.factor) }));
+  for (const one of series)
+    area.append(svg("path", { class: `curve ${one.kind}`, d: curvePath(scene, frame, one.values, scale.factor) }));
   chart.plot.replaceChildren(
     svg(
       "svg",
       { viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": describe(chart) },
-      svg("clipPath", { id: clip }, svg("rect", { x: MARGIN.left - 2, y: MARGIN.top - 2, width: right - MARGIN.left + 4, height: bottom - MARGIN.top + 4 })),
+      svg(
+        "clipPath",
+        { id: clip },
+        svg("rect", {
+          x: MARGIN.left - 2,
+          y: MARGIN.top - 2,
+          width: right - MARGIN.left + 4,
+          height: bottom - MARGIN.top + 4,
+        }),
+      ),
       ...shading(chart, frame),
       ...axes(scene.abscissa, frame, [x0, x1], [y0, y1]),
       area,
@@ -102,7 +125,9 @@ function vertical(chart) {
 
 function describe(chart) {
   const found = extent(chart.series.map((one) => one.values));
-  const span = found ? `from ${fixed(found[0] * chart.scale.factor, found[1] * chart.scale.factor)} to ${fixed(found[1] * chart.scale.factor, found[1] * chart.scale.factor)} ${chart.scale.unit}` : "without values";
+  const span = found
+    ? `from ${fixed(found[0] * chart.scale.factor, found[1] * chart.scale.factor)} to ${fixed(found[1] * chart.scale.factor, found[1] * chart.scale.factor)} ${chart.scale.unit}`
+    : "without values";
   return `${chart.title} over ${chart.scene.abscissa.label}, ${span}`;
 }
 
@@ -110,10 +135,34 @@ function axes(abscissa, frame, [x0, x1], [y0, y1]) {
   const across = ticks(x0, x1, frame.width < 420 ? 5 : 9, abscissa.unit === "°");
   const up = ticks(y0, y1, 6);
   const step = (list) => (list.length > 1 ? list[1] - list[0] : 1);
-  const parts = up.map((value) => svg("line", { class: value === 0 ? "zero" : "grid", x1: MARGIN.left, x2: frame.right, y1: frame.y(value), y2: frame.y(value) }));
-  parts.push(...across.map((value) => svg("line", { class: "grid", x1: frame.x(value), x2: frame.x(value), y1: MARGIN.top, y2: frame.bottom })));
-  parts.push(...up.map((value) => svg("text", { class: "tick end", x: MARGIN.left - 8, y: frame.y(value), dy: "0.32em" }, tickLabel(value, step(up)))));
-  parts.push(...across.map((value) => svg("text", { class: "tick middle", x: frame.x(value), y: frame.bottom + 16 }, tickLabel(value, step(across)))));
+  const parts = up.map((value) =>
+    svg("line", {
+      class: value === 0 ? "zero" : "grid",
+      x1: MARGIN.left,
+      x2: frame.right,
+      y1: frame.y(value),
+      y2: frame.y(value),
+    }),
+  );
+  parts.push(
+    ...across.map((value) =>
+      svg("line", { class: "grid", x1: frame.x(value), x2: frame.x(value), y1: MARGIN.top, y2: frame.bottom }),
+    ),
+  );
+  parts.push(
+    ...up.map((value) =>
+      svg(
+        "text",
+        { class: "tick end", x: MARGIN.left - 8, y: frame.y(value), dy: "0.32em" },
+        tickLabel(value, step(up)),
+      ),
+    ),
+  );
+  parts.push(
+    ...across.map((value) =>
+      svg("text", { class: "tick middle", x: frame.x(value), y: frame.bottom + 16 }, tickLabel(value, step(across))),
+    ),
+  );
   const label = abscissa.unit ? `${abscissa.label} [${abscissa.unit}]` : abscissa.label;
   parts.push(svg("text", { class: "axis middle", x: (MARGIN.left + frame.right) / 2, y: frame.bottom + 34 }, label));
   return parts;
@@ -125,7 +174,13 @@ function shading(chart, frame) {
   return gaps(chart.scene).map(([first, last]) => {
     const low = Math.max(frame.x(Math.min(values[first], values[last]) - half), MARGIN.left);
     const high = Math.min(frame.x(Math.max(values[first], values[last]) + half), frame.right);
-    return svg("rect", { class: "unsolved", x: low, y: MARGIN.top, width: Math.max(high - low, 1), height: frame.bottom - MARGIN.top });
+    return svg("rect", {
+      class: "unsolved",
+      x: low,
+      y: MARGIN.top,
+      width: Math.max(high - low, 1),
+      height: frame.bottom - MARGIN.top,
+    });
   });
 }
 
@@ -151,7 +206,9 @@ export function curvePath(scene, frame, values, factor) {
 
 function bandPath({ scene, frame, scale }, band) {
   const corner = (values) => (_, index) =>
-    values[index] === null ? null : `${frame.x(scene.abscissa.values[index]).toFixed(1)},${frame.y(values[index] * scale.factor).toFixed(1)}`;
+    values[index] === null
+      ? null
+      : `${frame.x(scene.abscissa.values[index]).toFixed(1)},${frame.y(values[index] * scale.factor).toFixed(1)}`;
   const low = band.low.map(corner(band.low)).filter(Boolean);
   const high = band.high.map(corner(band.high)).filter(Boolean).reverse();
   return low.length ? `M${[...low, ...high].join("L")}Z` : "";

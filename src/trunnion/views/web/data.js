@@ -133,5 +133,5 @@ export function gaps(scene) {
 export function guide(scene, joint, index) {
   const [x, y] = joint.axis ?? [1, 0];
   const link = scene.links.find((one) => one.name === joint.links[0]);
-  return Math.atan2(y, x) + (link ? at(link.angle, index) ?? 0 : 0);
+  return Math.atan2(y, x) + (link ? (at(link.angle, index) ?? 0) : 0);
 }

@@ -2,7 +2,7 @@
 
 import { at, bounds, guide, hull, magnitude, place, quantile, solved, state } from "./data.js";
 import { html, onWidth, set, svg } from "./dom.js";
-import { roundBelow, stated } from "./format.js";
+import { number, roundBelow, stated } from "./format.js";
 
 const MARGIN = 62; // room for labels and arrows, px
 
@@ -17,8 +17,21 @@ export function mechanismView(scene, kinds) {
     message.hidden = false;
     return { element, show() {}, reactions() {} };
   }
-  const view = { scene, kinds, box, stage, message, index: 0, posed: 0, factor: 1, shown: new Set(scene.joints.map((joint) => joint.name)) };
-  view.usual = quantile(scene.joints.flatMap((joint) => magnitude(joint.reaction, scene.count)), 0.9);
+  const view = {
+    scene,
+    kinds,
+    box,
+    stage,
+    message,
+    index: 0,
+    posed: 0,
+    factor: 1,
+    shown: new Set(scene.joints.map((joint) => joint.name)),
+  };
+  view.usual = quantile(
+    scene.joints.flatMap((joint) => magnitude(joint.reaction, scene.count)),
+    0.9,
+  );
   onWidth(stage, (width) => build(view, width), 490);
   return {
     element,
@@ -38,7 +51,11 @@ export function mechanismView(scene, kinds) {
 function build(view, width) {
   const { scene, box } = view;
   const margin = Math.min(MARGIN, width * 0.12);
-  const tall = Math.min(Math.max(((width - 2 * margin) * box.height) / (box.width || 1) + 2 * margin, width * 0.5), width * 0.95, 620);
+  const tall = Math.min(
+    Math.max(((width - 2 * margin) * box.height) / (box.width || 1) + 2 * margin, width * 0.5),
+    width * 0.95,
+    620,
+  );
   const scale = Math.min((width - 2 * margin) / (box.width || 1e-9), (tall - 2 * margin) / (box.height || 1e-9));
   const left = (width - scale * box.width) / 2 - scale * box.x;
   const foot = (tall + scale * box.height) / 2 + scale * box.y;
@@ -46,15 +63,34 @@ function build(view, width) {
   view.parts = {
     bodies: scene.links.filter((link) => !link.ground).map((link) => body(link, scene)),
     joints: scene.joints.map((one) => joint(one, scene)),
-    points: scene.links.filter((link) => !link.ground).flatMap((link) => link.free.map((key) => freePoint(key, link.name))),
+    points: scene.links
+      .filter((link) => !link.ground)
+      .flatMap((link) => link.free.map((key) => freePoint(key, link.name))),
     loads: scene.loads.filter((load) => load.at && Math.hypot(...load.force) > 0).map(load),
     vectors: scene.joints.map((one) => svg("path", { class: `reaction ${view.kinds.get(one.name)}` })),
     drives: scene.drivers.map(() => svg("path", { class: "drive" })),
   };
   view.key = svg("g", { class: "key" });
-  view.moving = svg("g", {}, ...view.parts.bodies.map((one) => one.node), ...view.parts.points.map((one) => one.node), ...view.parts.joints.map((one) => one.node), ...view.parts.drives, ...view.parts.loads.map((one) => one.node), ...view.parts.vectors, ...view.parts.joints.map((one) => one.label));
+  view.moving = svg(
+    "g",
+    {},
+    ...view.parts.bodies.map((one) => one.node),
+    ...view.parts.points.map((one) => one.node),
+    ...view.parts.joints.map((one) => one.node),
+    ...view.parts.drives,
+    ...view.parts.loads.map((one) => one.node),
+    ...view.parts.vectors,
+    ...view.parts.joints.map((one) => one.label),
+  );
   view.stage.replaceChildren(
-    svg("svg", { viewBox: `0 0 ${width} ${Math.round(tall)}`, role: "img", "aria-label": `Mechanism: ${scene.name}` }, ...ground(view), ...tracks(view), view.moving, view.key),
+    svg(
+      "svg",
+      { viewBox: `0 0 ${width} ${Math.round(tall)}`, role: "img", "aria-label": `Mechanism: ${scene.name}` },
+      ...ground(view),
+      ...tracks(view),
+      view.moving,
+      view.key,
+    ),
   );
   scales(view);
   pose(view);
@@ -65,17 +101,26 @@ function ground(view) {
   const { scene, frame } = view;
   const fixed = scene.links.find((link) => link.ground)?.name;
   const still = scene.joints.filter((one) => one.links.includes(fixed));
-  return still.map((one) => {
-    const track = scene.points[one.at];
-    const spots = track ? Array.from({ length: scene.count }, (_, index) => place(scene, one.at, index)).filter(Boolean) : [];
-    if (!spots.length) return null;
-    return one.type === "prismatic" ? rail(frame, spots, guide(scene, one, 0)) : support(frame, spots[0]);
-  }).filter(Boolean);
+  return still
+    .map((one) => {
+      const track = scene.points[one.at];
+      const spots = track
+        ? Array.from({ length: scene.count }, (_, index) => place(scene, one.at, index)).filter(Boolean)
+        : [];
+      if (!spots.length) return null;
+      return one.type === "prismatic" ? rail(frame, spots, guide(scene, one, 0)) : support(frame, spots[0]);
+    })
+    .filter(Boolean);
 }
 
 function support(frame, spot) {
   const [x, y] = frame.to(spot);
-  return svg("g", { class: "ground" }, svg("path", { class: "bearing", d: `M${x},${y}l-11,19h22Z` }), hatching(x, y + 19, 0, 20));
+  return svg(
+    "g",
+    { class: "ground" },
+    svg("path", { class: "bearing", d: `M${x},${y}l-11,19h22Z` }),
+    hatching(x, y + 19, 0, 20),
+  );
 }
 
 function rail(frame, spots, angle) {
@@ -102,7 +147,9 @@ function tracks({ scene, frame }) {
     for (const key of link.points) {
       const track = scene.points[key];
       if (track.x.length === 1 && track.y.length === 1) continue;
-      parts.push(svg("path", { class: link.free.includes(key) ? "track free" : "track", d: trackPath(scene, frame, key) }));
+      parts.push(
+        svg("path", { class: link.free.includes(key) ? "track free" : "track", d: trackPath(scene, frame, key) }),
+      );
     }
   }
   return parts;
@@ -125,14 +172,25 @@ function trackPath(scene, frame, key) {
 /** A link as a rounded plate: its outline drawn wide, then less wide in its tint. */
 function body(link, scene) {
   const kind = `k${scene.links.filter((one) => !one.ground).indexOf(link) % 6}`;
-  const parts = [svg("path", { class: `edge ${kind}` }), svg("path", { class: "underlay" }), svg("path", { class: `plate ${kind}` })];
+  const parts = [
+    svg("path", { class: `edge ${kind}` }),
+    svg("path", { class: "underlay" }),
+    svg("path", { class: `plate ${kind}` }),
+  ];
   return { link, parts, node: svg("g", { class: "body" }, svg("title", {}, link.name), ...parts) };
 }
 
 function joint(one, scene) {
   const grounded = scene.links.some((link) => link.ground && one.links.includes(link.name));
   const beside = one.type === "prismatic" ? [26, -13] : grounded ? [-19, 15] : [-11, -10]; // clear of bearing and block
-  const node = svg("g", { class: "joint" }, svg("title", {}, one.name), one.type === "prismatic" ? svg("rect", { x: -17, y: -10, width: 34, height: 20, rx: 1.5 }) : svg("circle", { r: 5 }));
+  const node = svg(
+    "g",
+    { class: "joint" },
+    svg("title", {}, one.name),
+    one.type === "prismatic"
+      ? svg("rect", { x: -17, y: -10, width: 34, height: 20, rx: 1.5 })
+      : svg("circle", { r: 5 }),
+  );
   return { joint: one, node, beside, label: svg("text", { class: "name" }, one.name) };
 }
 
@@ -143,7 +201,10 @@ function freePoint(key, link) {
 
 function load(one) {
   const size = stated(Math.hypot(...one.force), "N");
-  return { load: one, node: svg("g", { class: "load" }, svg("title", {}, `${one.name}: ${size}`), svg("path", {}), svg("text", {}, size)) };
+  return {
+    load: one,
+    node: svg("g", { class: "load" }, svg("title", {}, `${one.name}: ${size}`), svg("path", {}), svg("text", {}, size)),
+  };
 }
 
 /** Length bar and reference arrow, with round numbers. */
@@ -152,7 +213,10 @@ function scales(view) {
   const y = frame.height - 14;
   const length = roundBelow((frame.width * 0.2) / frame.scale);
   const bar = length * frame.scale;
-  const parts = [svg("path", { class: "bar", d: `M14,${y - 4}v8m0,-4h${bar}m0,-4v8` }), svg("text", { x: 14 + bar + 7, y, dy: "0.32em" }, stated(length, "m"))];
+  const parts = [
+    svg("path", { class: "bar", d: `M14,${y - 4}v8m0,-4h${bar}m0,-4v8` }),
+    svg("text", { x: 14 + bar + 7, y, dy: "0.32em" }, stated(length, "m")),
+  ];
   view.perNewton = usual > 0 ? (Math.min(frame.width, frame.height) * 0.24 * factor) / usual : 0;
   if (view.perNewton > 0 && view.shown.size) {
     const force = roundBelow((frame.width * 0.17) / view.perNewton);
@@ -180,11 +244,15 @@ function pose(view) {
   const { scene, frame, index, parts } = view;
   if (!frame) return;
   if (drawable(scene, index)) view.posed = index;
-  else if (!drawable(scene, view.posed)) view.posed = Math.max(scene.status.findIndex((_, one) => drawable(scene, one)), 0);
+  else if (!drawable(scene, view.posed))
+    view.posed = Math.max(
+      scene.status.findIndex((_, one) => drawable(scene, one)),
+      0,
+    );
   const answered = solved(scene, index);
   view.moving.setAttribute("class", answered ? "moving" : "moving without-answer");
   view.message.hidden = answered;
-  view.message.textContent = answered ? "" : sentence(state(scene, index));
+  view.message.textContent = answered ? "" : cause(scene, index);
   parts.bodies.forEach((one) => poseBody(view, one));
   parts.points.forEach((one) => moveTo(one.node, spotOf(view, one.key)));
   parts.joints.forEach((one) => poseJoint(view, one));
@@ -197,8 +265,17 @@ function drawable(scene, index) {
   return Object.keys(scene.points).every((key) => place(scene, key, index));
 }
 
-function sentence(text) {
-  return `${text.charAt(0).toUpperCase()}${text.slice(1)}.`;
+/** Why there is no answer, and over which stretch of the drive. */
+function cause(scene, index) {
+  const same = (one) => scene.status[one] === scene.status[index];
+  let [first, last] = [index, index];
+  while (first > 0 && same(first - 1)) first -= 1;
+  while (last < scene.count - 1 && same(last + 1)) last += 1;
+  const { values, unit } = scene.abscissa;
+  const say = (one) => `${number(values[one])}${unit === "°" || !unit ? "" : "\u00a0"}${unit}`;
+  const text = state(scene, index);
+  const stretch = first < last ? ` (${say(first)} to ${say(last)})` : "";
+  return `${text.charAt(0).toUpperCase()}${text.slice(1)}${stretch}.`;
 }
 
 function spotOf(view, key) {
@@ -208,7 +285,10 @@ function spotOf(view, key) {
 
 function moveTo(node, spot, angle = 0) {
   const turn = angle ? ` rotate(${((-angle * 180) / Math.PI).toFixed(2)})` : "";
-  set(node, { transform: spot ? `translate(${spot[0].toFixed(1)},${spot[1].toFixed(1)})${turn}` : null, visibility: spot ? null : "hidden" });
+  set(node, {
+    transform: spot ? `translate(${spot[0].toFixed(1)},${spot[1].toFixed(1)})${turn}` : null,
+    visibility: spot ? null : "hidden",
+  });
 }
 
 function poseBody(view, { link, parts }) {
@@ -239,12 +319,20 @@ function poseDrive(view, driver, node) {
   const one = view.scene.joints.find((candidate) => candidate.name === driver.name);
   const spot = one ? spotOf(view, one.at) : null;
   const { values, period } = view.scene.abscissa;
-  const forward = view.scene.drivers.indexOf(driver) > 0 ? 0 : Math.sign(period || values[values.length - 1] - values[0]);
+  const forward =
+    view.scene.drivers.indexOf(driver) > 0 ? 0 : Math.sign(period || values[values.length - 1] - values[0]);
   if (!spot || !forward) return set(node, { d: "" });
   const [x, y] = spot;
   if (driver.type === "prismatic") {
     const angle = guide(view.scene, one, view.posed);
-    return set(node, { d: arrow(x - 30 * Math.sin(angle), y - 30 * Math.cos(angle), 34 * forward * Math.cos(angle), -34 * forward * Math.sin(angle)) });
+    return set(node, {
+      d: arrow(
+        x - 30 * Math.sin(angle),
+        y - 30 * Math.cos(angle),
+        34 * forward * Math.cos(angle),
+        -34 * forward * Math.sin(angle),
+      ),
+    });
   }
   const end = forward > 0 ? -1 : 1; // counter-clockwise ends on the left
   const tip = [x + end * 19, y - 15];

@@ -12,13 +12,36 @@ const PAUSE = "M4,3h3v10H4zM9,3h3v10H9z";
  */
 export function player(count, describe, onShow, { svg }) {
   const icon = svg("path", { d: PLAY });
-  const button = html("button", { type: "button", class: "play", "aria-label": "Play" }, svg("svg", { viewBox: "0 0 16 16", "aria-hidden": "true" }, icon));
+  const button = html(
+    "button",
+    { type: "button", class: "play", "aria-label": "Play" },
+    svg("svg", { viewBox: "0 0 16 16", "aria-hidden": "true" }, icon),
+  );
   const back = html("button", { type: "button", class: "step", "aria-label": "One position back" }, "‹");
   const on = html("button", { type: "button", class: "step", "aria-label": "One position on" }, "›");
-  const slider = html("input", { type: "range", min: 0, max: count - 1, step: 1, value: 0, "aria-label": "Position of the drive" });
-  const pace = html("select", { "aria-label": "Time in which the run is played" }, ...CYCLES.map((time) => html("option", { value: time }, `${time} s`)));
+  const slider = html("input", {
+    type: "range",
+    min: 0,
+    max: count - 1,
+    step: 1,
+    value: 0,
+    "aria-label": "Position of the drive",
+  });
+  const pace = html(
+    "select",
+    { "aria-label": "Time in which the run is played" },
+    ...CYCLES.map((time) => html("option", { value: time }, `${time} s`)),
+  );
   pace.value = "8";
-  const element = html("div", { class: "player", role: "group", "aria-label": "Motion" }, button, back, slider, on, html("label", { class: "pace" }, html("span", {}, "run in"), pace));
+  const element = html(
+    "div",
+    { class: "player", role: "group", "aria-label": "Motion" },
+    button,
+    back,
+    slider,
+    on,
+    html("label", { class: "pace" }, html("span", {}, "run in"), pace),
+  );
   const state = { index: 0, exact: 0, timer: 0, last: 0 };
 
   const show = (index) => {

@@ -16,7 +16,13 @@ export function polarChart(scene, joint, kind, pick) {
   const element = html(
     "figure",
     { class: "chart polar" },
-    html("figcaption", {}, html("span", { class: "title" }, joint.name), html("span", { class: "unit" }, `[${scale.unit}]`), value),
+    html(
+      "figcaption",
+      {},
+      html("span", { class: "title" }, joint.name),
+      html("span", { class: "unit" }, `[${scale.unit}]`),
+      value,
+    ),
     plot,
   );
   const chart = { scene, joint, kind, scale, plot, frame: null, index: 0 };
@@ -28,7 +34,8 @@ export function polarChart(scene, joint, kind, pick) {
     element,
     show(index) {
       chart.index = index;
-      value.textContent = sizes[index] === null ? "—" : `${fixed(sizes[index] * scale.factor, most * scale.factor)} ${scale.unit}`;
+      value.textContent =
+        sizes[index] === null ? "—" : `${fixed(sizes[index] * scale.factor, most * scale.factor)} ${scale.unit}`;
       moveVector(chart);
     },
   };
@@ -52,7 +59,11 @@ function draw(chart, width) {
   chart.plot.replaceChildren(
     svg(
       "svg",
-      { viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": `Polar diagram of the reaction in joint ${joint.name}` },
+      {
+        viewBox: `0 0 ${width} ${height}`,
+        role: "img",
+        "aria-label": `Polar diagram of the reaction in joint ${joint.name}`,
+      },
       ...grid(frame, across, up, side),
       svg("text", { class: "axis middle", x: MARGIN.left + side / 2, y: height - 4 }, "Fx"),
       svg("text", { class: "axis middle", x: 11, y: MARGIN.top + side / 2, dy: "0.32em" }, "Fy"),
@@ -79,10 +90,34 @@ function grid(frame, across, up, side) {
   const step = (list) => (list.length > 1 ? list[1] - list[0] : 1);
   const bottom = MARGIN.top + side;
   return [
-    ...across.map((value) => svg("line", { class: value === 0 ? "zero" : "grid", x1: frame.x(value), x2: frame.x(value), y1: MARGIN.top, y2: bottom })),
-    ...up.map((value) => svg("line", { class: value === 0 ? "zero" : "grid", x1: MARGIN.left, x2: MARGIN.left + side, y1: frame.y(value), y2: frame.y(value) })),
-    ...across.map((value) => svg("text", { class: "tick middle", x: frame.x(value), y: bottom + 15 }, tickLabel(value, step(across)))),
-    ...up.map((value) => svg("text", { class: "tick end", x: MARGIN.left - 6, y: frame.y(value), dy: "0.32em" }, tickLabel(value, step(up)))),
+    ...across.map((value) =>
+      svg("line", {
+        class: value === 0 ? "zero" : "grid",
+        x1: frame.x(value),
+        x2: frame.x(value),
+        y1: MARGIN.top,
+        y2: bottom,
+      }),
+    ),
+    ...up.map((value) =>
+      svg("line", {
+        class: value === 0 ? "zero" : "grid",
+        x1: MARGIN.left,
+        x2: MARGIN.left + side,
+        y1: frame.y(value),
+        y2: frame.y(value),
+      }),
+    ),
+    ...across.map((value) =>
+      svg("text", { class: "tick middle", x: frame.x(value), y: bottom + 15 }, tickLabel(value, step(across))),
+    ),
+    ...up.map((value) =>
+      svg(
+        "text",
+        { class: "tick end", x: MARGIN.left - 6, y: frame.y(value), dy: "0.32em" },
+        tickLabel(value, step(up)),
+      ),
+    ),
   ];
 }
 
@@ -112,7 +147,14 @@ function marks(chart) {
     const index = Math.round((order * scene.count) / 12);
     const place = spot(chart, joint.reaction, index);
     if (!place) return null;
-    const label = order % 3 ? null : svg("text", { class: "mark", x: place[0] + 6, y: place[1] - 5 }, `${Math.round(scene.abscissa.values[index])}°`);
+    const label =
+      order % 3
+        ? null
+        : svg(
+            "text",
+            { class: "mark", x: place[0] + 6, y: place[1] - 5 },
+            `${Math.round(scene.abscissa.values[index])}°`,
+          );
     return svg("g", {}, svg("circle", { class: `milestone ${kind}`, cx: place[0], cy: place[1], r: 2.2 }), label);
   }).filter(Boolean);
 }

@@ -17,15 +17,37 @@ function kindOf(order) {
 function charts(scene, kinds, pick) {
   const { count, sums, drivers, joints } = scene;
   const list = drivers.map((driver) => effortChart(scene, driver, pick));
-  const losses = joints.map((joint) => ({ label: joint.name, values: full(joint.friction_power, count), kind: kinds.get(joint.name) })).filter((one) => peak(one.values) > 0);
-  const lost = total(joints.map((joint) => joint.friction_power), count);
-  if (losses.length) list.push(lineChart(scene, { title: "Friction power by joint", unit: "W", pick, series: [{ label: "all", values: lost, kind: "ink" }, ...losses] }));
+  const losses = joints
+    .map((joint) => ({ label: joint.name, values: full(joint.friction_power, count), kind: kinds.get(joint.name) }))
+    .filter((one) => peak(one.values) > 0);
+  const lost = total(
+    joints.map((joint) => joint.friction_power),
+    count,
+  );
+  if (losses.length)
+    list.push(
+      lineChart(scene, {
+        title: "Friction power by joint",
+        unit: "W",
+        pick,
+        series: [{ label: "all", values: lost, kind: "ink" }, ...losses],
+      }),
+    );
   list.push(reactionChart(scene, kinds, pick));
   list.push(powerChart(scene, lost, pick));
   if (sums.efficiency_instant) {
     const values = full(sums.efficiency_instant, count).map((value) => (value === null ? null : 100 * value));
     const note = scene.efficiency === null ? "" : `Over the whole run: ${quantity(100 * scene.efficiency, "%")}.`;
-    list.push(lineChart(scene, { title: "Efficiency at each position", unit: "%", pick, limits: [-100, 100], note, series: [{ label: "efficiency", values, kind: "k2" }] }));
+    list.push(
+      lineChart(scene, {
+        title: "Efficiency at each position",
+        unit: "%",
+        pick,
+        limits: [-100, 100],
+        note,
+        series: [{ label: "efficiency", values, kind: "k2" }],
+      }),
+    );
   }
   return list;
 }
@@ -43,21 +65,31 @@ function effortChart(scene, driver, pick) {
 }
 
 function reactionChart(scene, kinds, pick) {
-  const series = scene.joints.map((joint) => ({ label: joint.name, values: magnitude(joint.reaction, scene.count), kind: kinds.get(joint.name) }));
+  const series = scene.joints.map((joint) => ({
+    label: joint.name,
+    values: magnitude(joint.reaction, scene.count),
+    kind: kinds.get(joint.name),
+  }));
   return lineChart(scene, { title: "Joint reactions, magnitude", unit: "N", series, pick });
 }
 
 function powerChart(scene, lost, pick) {
   const { count } = scene;
-  const drive = total(scene.drivers.map((driver) => driver.power), count);
+  const drive = total(
+    scene.drivers.map((driver) => driver.power),
+    count,
+  );
   const useful = full(scene.sums.useful_power, count);
-  const rest = drive.map((value, index) => (value === null || useful[index] === null || lost[index] === null ? null : value - useful[index] - lost[index]));
+  const rest = drive.map((value, index) =>
+    value === null || useful[index] === null || lost[index] === null ? null : value - useful[index] - lost[index],
+  );
   const series = [
     { label: "drive", values: drive, kind: "k0" },
     { label: "useful", values: useful, kind: "k2" },
     { label: "friction", values: lost, kind: "k1" },
   ];
-  if (peak(rest) > 1e-6 * peak(drive, useful, lost)) series.push({ label: "masses, other loads", values: rest, kind: "quiet dashed" });
+  if (peak(rest) > 1e-6 * peak(drive, useful, lost))
+    series.push({ label: "masses, other loads", values: rest, kind: "quiet dashed" });
   return lineChart(scene, { title: "Power", unit: "W", series, pick });
 }
 
@@ -65,14 +97,39 @@ function powerChart(scene, lost, pick) {
 function readout(scene) {
   const unitOf = (driver) => driver.unit;
   const rows = [
-    [scene.abscissa.label, (index) => `${fixed(scene.abscissa.values[index], peak(scene.abscissa.values))}${scene.abscissa.unit === "°" ? "" : "\u00a0"}${scene.abscissa.unit}`],
+    [
+      scene.abscissa.label,
+      (index) =>
+        `${fixed(scene.abscissa.values[index], peak(scene.abscissa.values))}${scene.abscissa.unit === "°" ? "" : "\u00a0"}${scene.abscissa.unit}`,
+    ],
     ["time", (index) => quantity(at(scene.time, index), "s", peak(scene.time))],
-    ...scene.drivers.map((driver) => [`${unitOf(driver) === "N" ? "force" : "torque"} ${driver.name}`, (index) => quantity(at(driver.effort, index), unitOf(driver), peak(driver.effort))]),
-    ["friction power", (index) => quantity(at(total(scene.joints.map((joint) => joint.friction_power), scene.count), index), "W", peak(...scene.joints.map((joint) => joint.friction_power)))],
+    ...scene.drivers.map((driver) => [
+      `${unitOf(driver) === "N" ? "force" : "torque"} ${driver.name}`,
+      (index) => quantity(at(driver.effort, index), unitOf(driver), peak(driver.effort)),
+    ]),
+    [
+      "friction power",
+      (index) =>
+        quantity(
+          at(
+            total(
+              scene.joints.map((joint) => joint.friction_power),
+              scene.count,
+            ),
+            index,
+          ),
+          "W",
+          peak(...scene.joints.map((joint) => joint.friction_power)),
+        ),
+    ],
     ["status", (index) => state(scene, index)],
   ];
   const cells = rows.map(() => html("dd", {}, "—"));
-  const element = html("dl", { class: "readout" }, ...rows.map(([label], order) => html("div", { class: label }, html("dt", {}, label), cells[order])));
+  const element = html(
+    "dl",
+    { class: "readout" },
+    ...rows.map(([label], order) => html("div", { class: label }, html("dt", {}, label), cells[order])),
+  );
   const show = (index) => {
     rows.forEach(([, text], order) => (cells[order].textContent = text(index)));
     element.classList.toggle("unsolved", !solved(scene, index));
@@ -83,10 +140,19 @@ function readout(scene) {
 /** Which reaction vectors are drawn, and how long. */
 function vectorControls(scene, kinds, mechanism) {
   const boxes = scene.joints.map((joint) => html("input", { type: "checkbox", checked: true, value: joint.name }));
-  const size = html("select", { "aria-label": "Length of the vectors" }, ...[0.25, 0.5, 1, 2, 4, 10].map((factor) => html("option", { value: factor, selected: factor === 1 }, `× ${factor}`)));
+  const size = html(
+    "select",
+    { "aria-label": "Length of the vectors" },
+    ...[0.25, 0.5, 1, 2, 4, 10].map((factor) =>
+      html("option", { value: factor, selected: factor === 1 }, `× ${factor}`),
+    ),
+  );
   const all = html("button", { type: "button", class: "plain" }, "none");
   const apply = () => {
-    mechanism.reactions(boxes.filter((box) => box.checked).map((box) => box.value), Number(size.value));
+    mechanism.reactions(
+      boxes.filter((box) => box.checked).map((box) => box.value),
+      Number(size.value),
+    );
     all.textContent = boxes.some((box) => box.checked) ? "none" : "all";
   };
   all.addEventListener("click", () => {
@@ -95,7 +161,15 @@ function vectorControls(scene, kinds, mechanism) {
     apply();
   });
   [...boxes, size].forEach((control) => control.addEventListener("change", apply));
-  const labels = scene.joints.map((joint, order) => html("label", { class: `chip ${kinds.get(joint.name)}` }, boxes[order], html("span", { class: "swatch bar" }), joint.name));
+  const labels = scene.joints.map((joint, order) =>
+    html(
+      "label",
+      { class: `chip ${kinds.get(joint.name)}` },
+      boxes[order],
+      html("span", { class: "swatch bar" }),
+      joint.name,
+    ),
+  );
   return html("fieldset", { class: "vectors" }, html("legend", {}, "Reactions"), ...labels, all, size);
 }
 
@@ -113,7 +187,11 @@ export function start(scene, places) {
   const curves = charts(scene, kinds, pick);
   const polars = scene.joints.map((joint) => polarChart(scene, joint, kinds.get(joint.name), pick));
   views.push(...curves, ...polars);
-  const hint = html("p", { class: "hint" }, "Space plays, ← and → step (Shift: ten), Home and End jump; point at a curve to move the crank.");
+  const hint = html(
+    "p",
+    { class: "hint" },
+    "Space plays, ← and → step (Shift: ten), Home and End jump; point at a curve to move the crank.",
+  );
   places.stage.append(mechanism.element, crank.element, figures.element, vectorControls(scene, kinds, mechanism), hint);
   places.charts.append(...curves.map((chart) => chart.element));
   places.polars.append(...polars.map((chart) => chart.element));
@@ -125,5 +203,6 @@ export function start(scene, places) {
 if (globalThis.document) {
   const find = (id) => document.getElementById(id);
   const data = find("scene");
-  if (data) start(JSON.parse(data.textContent), { stage: find("stage"), charts: find("charts"), polars: find("polars") });
+  if (data)
+    start(JSON.parse(data.textContent), { stage: find("stage"), charts: find("charts"), polars: find("polars") });
 }

@@ -1,0 +1,40 @@
+"""Trunnion: the analysis of linkages as built. See `read`, `analyse`, `Mechanism`.
+
+Names are loaded when first used, so that importing the package costs nothing.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+__version__ = "0.1.0"
+
+if TYPE_CHECKING:
+    from trunnion.analysis.analyse import analyse, prepare
+    from trunnion.analysis.friction import FrictionMethod
+    from trunnion.errors import Finding, MechanismError, Status
+    from trunnion.model.mechanism import Mechanism
+
+_PLACES = {
+    "FrictionMethod": "trunnion.analysis.friction",
+    "Finding": "trunnion.errors",
+    "Mechanism": "trunnion.model.mechanism",
+    "MechanismError": "trunnion.errors",
+    "Status": "trunnion.errors",
+    "analyse": "trunnion.analysis.analyse",
+    "prepare": "trunnion.analysis.analyse",
+}
+
+__all__ = ["Finding", "FrictionMethod", "Mechanism", "MechanismError", "Status", "analyse", "prepare"]
+
+
+def __getattr__(name: str) -> Any:
+    """Load a public name from where it lives."""
+    if name not in _PLACES:
+        raise AttributeError(f"module 'trunnion' has no attribute '{name}'")
+    return getattr(import_module(_PLACES[name]), name)
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *_PLACES])

@@ -1,0 +1,259 @@
+"""The books of a cycle: power, efficiency, summary, findings and provenance, gathered into the result."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion import __version__, results
+from trunnion.algebra.namespace import Number
+from trunnion.analysis import diagnosis
+from trunnion.analysis.friction import FrictionMethod
+from trunnion.analysis.kinetostatics import Backward
+from trunnion.analysis.system import Cycle, System, rubbing
+from trunnion.errors import Finding, Severity, Status
+from trunnion.joints.friction import FRICTION_LAWS
+from trunnion.model.check import check_model
+from trunnion.model.mechanism import Mechanism
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from trunnion.analysis.analyse import Run
+
+__all__ = ["fill_power", "finish"]
+
+Arrays = Mapping[str, NDArray[np.float64]]
+
+DURANGO = (
+    "S. Durango, G. Calle, O. Ruiz, Analytical method for the kinetostatic analysis of the second-class RRR Assur "
+    "group allowing for friction in the kinematic pairs, J. Braz. Soc. Mech. Sci. & Eng., 2010"
+)
+
+
+def useful_loads(mechanism: Mechanism) -> list[str]:
+    """Loads whose power is the purpose: those marked useful, or all if none is."""
+    marked = [name for name, load in mechanism.loads.items() if load.useful]
+    return marked or list(mechanism.loads)
+
+
+def fill_power(arrays: dict[str, NDArray[np.float64]], back: Backward, window: slice) -> None:
+    """Power of drivers, loads and friction, and what is left over: drive + loads + inertia and gravity − friction."""
+    walk = back.walk
+    total: Number = back.body_power
+    for power in back.load_powers.values():
+        total = total + power
+    for i, name in enumerate(walk.system.joints):
+        lost = -(back.friction[name] * back.slips[name].speed)
+        arrays["friction_power"][i, window] = lost
+        total = total - lost
+    driven: Number = 0.0
+    for i, name in enumerate(walk.system.mechanism.drivers):
+        power = back.efforts[name] * walk.values[f"drivers.{name}.speed"]
+        arrays["drive_power"][i, window] = power
+        driven = driven + power
+    useful: Number = 0.0
+    for name in useful_loads(walk.system.mechanism):
+        useful = useful - back.load_powers[name]
+    arrays["useful_power"][window] = useful
+    arrays["efficiency_instant"][window] = useful / np.where(np.asarray(driven) > 0, driven, np.nan)
+    arrays["power_residual"][window] = total + driven
+    arrays["closure_residual"][window] = _worst(walk.system, walk.poses, "closure")
+    arrays["condition"][window] = _worst(walk.system, walk.poses, "condition")
+
+
+def _worst(system: System, poses: Sequence[Any], figure: str) -> Number:
+    worst: Number = 0.0
+    for group, pose in zip(system.groups, poses, strict=True):
+        worst = np.maximum(worst, getattr(group, figure)(pose))
+    return worst
+
+
+def mean(values: NDArray[np.float64], cycle: Cycle) -> float:
+    """Mean over the cycle: of equally spaced values over a period, by trapezoids over a range; NaN with a gap."""
+    if len(values) == 1 or cycle.periodic:
+        return float(np.mean(values))
+    return float(np.trapezoid(values) / (len(values) - 1))
+
+
+def efficiency(arrays: Arrays, cycle: Cycle) -> float:
+    """Useful work over drive work of the cycle [D 1]; NaN where the loads drive or a position has no answer."""
+    drive = np.sum(arrays["drive_power"], axis=0)
+    work, size = mean(drive, cycle), mean(np.abs(drive), cycle)
+    if not work > 1e-9 * size:
+        return float("nan")
+    useful = mean(arrays["useful_power"], cycle)
+    # what a load gives and takes back over a turn cancels but for rounding
+    return useful / work if abs(useful) > 1e-12 * size else 0.0
+
+
+def finish(
+    run: Run,
+    arrays: dict[str, NDArray[np.float64]],
+    labels: Mapping[str, Sequence[str]],
+    time: NDArray[np.float64],
+    method: FrictionMethod,
+    causes: diagnosis.Causes,
+) -> xr.Dataset:
+    """The Dataset with its attributes: formula, findings, summary, input data, drawing data, provenance."""
+    mechanism = run.system.mechanism
+    value = efficiency(arrays, run.cycle)
+    found = [*_model_notes(mechanism), *run.chosen.findings, *_over_the_cycle(run, arrays, causes, time)]
+    attributes: dict[str, str | float] = {
+        "name": mechanism.name,
+        "formula": run.system.plan.formula,
+        "mobility": run.system.plan.mobility,
+        "model_hash": mechanism.digest,
+        "trunnion_version": __version__,
+        "method": method.name,
+        "references": "\n".join(_references(mechanism)),
+        "flag_values": " ".join(str(int(code)) for code in Status),
+        "flag_meanings": " ".join(code.name.lower() for code in Status),
+        "driver_units": json.dumps(effort_units(run.system)),
+        "findings": json.dumps([_row(finding) for finding in found], ensure_ascii=False),
+        "summary": json.dumps(_summary(run, arrays, value, time), ensure_ascii=False),
+        "inputs": json.dumps(_inputs(mechanism), ensure_ascii=False),
+        "scene": json.dumps(_scene(run.system), ensure_ascii=False),
+        "periodic": int(run.cycle.periodic),
+    }
+    return results.dataset(arrays, labels, time, value, attributes)
+
+
+def effort_units(system: System) -> list[str]:
+    """Unit of every driver's effort."""
+    return ["N m" if system.joints[name][0] == "revolute" else "N" for name in system.mechanism.drivers]
+
+
+def _row(finding: Finding) -> dict[str, str]:
+    return {
+        "severity": str(finding.severity),
+        "where": finding.where,
+        "what": finding.what,
+        "remedy": finding.remedy,
+    }
+
+
+def _model_notes(mechanism: Mechanism) -> list[Finding]:
+    """What the model says that this analysis leaves out, and warnings about the data."""
+    notes = [finding for finding in check_model(mechanism) if finding.severity is not Severity.ERROR]
+    playing = [
+        name
+        for name, joint in mechanism.effective_joints.items()
+        if (joint.pin and (joint.pin.clearance or joint.pin.fit)) or (joint.guide and joint.guide.clearance)
+    ]
+    if playing:
+        what = f"clearance and fit of {', '.join(playing)} are not in this analysis: the joints have no play"
+        notes.append(Finding(what, "joints", severity=Severity.NOTE))
+    return notes
+
+
+def _over_the_cycle(run: Run, arrays: Arrays, causes: diagnosis.Causes, time: NDArray[np.float64]) -> list[Finding]:
+    units = effort_units(run.system)
+    efforts = {
+        name: (arrays["drive_effort_lower"][i], arrays["drive_effort_upper"][i], units[i])
+        for i, name in enumerate(run.system.mechanism.drivers)
+    }
+    return diagnosis.findings(causes, _dial(run, time), arrays["status"], arrays["condition"], efforts)
+
+
+def _dial(run: Run, time: NDArray[np.float64]) -> diagnosis.Dial:
+    """The coordinate of the only driver, else time."""
+    drivers = list(run.system.mechanism.drivers)
+    if len(drivers) != 1:
+        return diagnosis.Dial(time, " s", "")
+    q = np.broadcast_to(run.system.drive(run.values, drivers[0], time)[0], time.shape)
+    revolute = run.system.joints[drivers[0]][0] == "revolute"
+    return diagnosis.Dial(np.degrees(q) if revolute else q * 1e3, "°" if revolute else " mm", drivers[0])
+
+
+def _references(mechanism: Mechanism) -> list[str]:
+    laws = {
+        joint.friction.law or "coulomb" for joint in mechanism.effective_joints.values() if joint.friction is not None
+    }
+    return [DURANGO, *(f"{law}: {FRICTION_LAWS[law].source}" for law in sorted(laws)), *mechanism.references]
+
+
+def _summary(run: Run, arrays: Arrays, value: float, time: NDArray[np.float64]) -> list[dict[str, Any]]:
+    """The figures one looks at first."""
+    rows: list[dict[str, Any]] = []
+    dial = _dial(run, time)
+    with np.errstate(all="ignore"):
+        for i, (name, unit) in enumerate(zip(run.system.mechanism.drivers, effort_units(run.system), strict=True)):
+            effort = arrays["drive_effort"][i]
+            kind = "torque" if unit == "N m" else "force"
+            if np.any(np.isfinite(effort)):
+                low, high = int(np.nanargmin(effort)), int(np.nanargmax(effort))
+                rows += [
+                    {"label": f"drive {kind} of {name}, least, at {dial.at(low)}", "value": effort[low], "unit": unit},
+                    {
+                        "label": f"drive {kind} of {name}, largest, at {dial.at(high)}",
+                        "value": effort[high],
+                        "unit": unit,
+                    },
+                    {"label": f"drive {kind} of {name}, RMS", "value": np.sqrt(np.nanmean(effort**2)), "unit": unit},
+                ]
+        lost = np.sum(arrays["friction_power"], axis=0)
+        if rubbing(run.system):
+            rows.append({"label": "friction power, mean", "value": mean(lost, run.cycle), "unit": "W"})
+            if np.any(np.isfinite(lost)):
+                top = int(np.nanargmax(lost))
+                rows.append({"label": f"friction power, largest, at {dial.at(top)}", "value": lost[top], "unit": "W"})
+        label = "efficiency of the cycle" + (" (the useful loads do no net work)" if value == 0 else "")
+        rows.append({"label": label, "value": value, "unit": "1"})
+        rows.append({"label": "power residual, largest, of peak drive power", "value": balance(arrays), "unit": "1"})
+    solved = int(np.count_nonzero(arrays["status"] < Status.NOT_CONVERGED))
+    rows.append(
+        {"label": "friction iterations, most", "value": int(np.max(arrays["friction_iterations"])), "unit": "1"}
+    )
+    rows.append({"label": f"positions solved, of {len(time)}", "value": solved, "unit": "1"})
+    return [{**row, "value": None if not np.isfinite(row["value"]) else float(row["value"])} for row in rows]
+
+
+def balance(arrays: Arrays) -> float:
+    """Largest power residual over the largest power that any driver, or else any load, has."""
+    residual = np.nanmax(np.abs(arrays["power_residual"]), initial=0.0)
+    powers = [
+        np.nanmax(np.abs(arrays[name]), initial=0.0) for name in ("drive_power", "useful_power", "friction_power")
+    ]
+    return float(residual / max(powers)) if max(powers) > 0 else float(residual)
+
+
+def _inputs(mechanism: Mechanism) -> list[dict[str, Any]]:
+    """Every number that was stated: path, SI value, unit, and the text of the model."""
+    values = mechanism.parameters()
+    rows = []
+    for path, entry in mechanism.parameter_set.entries.items():
+        text = str(entry.quantity.source)
+        if not entry.alias and text != "0":
+            rows.append({"path": path, "value": float(values[path]), "unit": entry.kind.unit, "text": text})
+    return rows
+
+
+def _scene(system: System) -> dict[str, Any]:
+    """What a drawing needs to know beside the positions of the points."""
+    mechanism, values = system.mechanism, system.mechanism.parameters()
+    joints: dict[str, Any] = {}
+    for name, (kind, links) in system.joints.items():
+        joints[name] = {"type": kind, "links": list(links), "friction": name in rubbing(system)}
+        if kind == "prismatic":
+            axis = system.elements(values)[links[0], name]
+            joints[name]["axis"] = [float(axis.c), float(axis.s)]
+    loads: dict[str, Any] = {}
+    useful = useful_loads(mechanism)
+    for name, load in mechanism.loads.items():
+        path = f"loads.{name}"
+        force = [float(values[f"{path}.force.{axis}"]) for axis in "xy"] if load.force else None
+        moment = float(values[f"{path}.moment"]) if f"{path}.moment" in values else None
+        loads[name] = {"link": load.link, "joint": load.joint, "at": load.at, "force": force, "moment": moment}
+        loads[name]["useful"] = name in useful
+    return {
+        "ground": mechanism.fixed_link,
+        "links": {name: {"points": list(link.points)} for name, link in mechanism.links.items()},
+        "joints": joints,
+        "drivers": list(mechanism.drivers),
+        "loads": loads,
+    }

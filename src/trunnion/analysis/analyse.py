@@ -1,0 +1,285 @@
+"""The main question: how does it move, what force is in each joint, what drives it, where does the power go."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion import results
+from trunnion.algebra.namespace import Number
+from trunnion.analysis import account, diagnosis
+from trunnion.analysis.branches import Chosen, choose
+from trunnion.analysis.friction import FrictionMethod
+from trunnion.analysis.kinetostatics import Backward, solve
+from trunnion.analysis.system import Cycle, System, Values, build, rubbing
+from trunnion.errors import Finding, MechanismError, Status
+from trunnion.groups.planar import accelerated
+from trunnion.model.mechanism import Mechanism
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["Run", "analyse", "prepare"]
+
+CHUNK = 4096  # positions at a time: the arrays of a walk stay in cache
+MOST_STEPS = 100_000_000
+SINGULAR = 1e6  # condition from which less than about four digits would be left
+NEAR_SINGULAR = 1e4
+
+
+@dataclass(frozen=True)
+class Run:
+    """A mechanism prepared once: its system, nominal values, cycle and assembly. Evaluate it as often as needed."""
+
+    system: System
+    values: Values
+    cycle: Cycle
+    chosen: Chosen
+
+    def solve(
+        self,
+        time: Number,
+        values: Values | None = None,
+        method: FrictionMethod | None = None,
+        zero_slip: Mapping[str, float] | None = None,
+    ) -> Backward:
+        """Motion and forces at the given times (s), for the nominal or other values; see `kinetostatics.solve`."""
+        return solve(
+            self.system, self.values if values is None else values, self.chosen.assembly, time, method, zero_slip
+        )
+
+
+def prepare(mechanism: Mechanism) -> Run:
+    """Decompose a mechanism and choose its assembly. Raises MechanismError if its structure is not determined."""
+    system = build(mechanism)
+    values = mechanism.parameters()
+    return Run(system, values, system.cycle(values), choose(system, values))
+
+
+def analyse(mechanism: Mechanism, steps: int = 360, method: FrictionMethod | None = None) -> xr.Dataset:
+    """Motion, reactions with friction, drive effort and power of a mechanism over its cycle.
+
+    steps: equally spaced positions; over a full turn the end is not repeated. Returns a Dataset with the names,
+    units and dims of `results.VARIABLES`; positions without an answer are NaN and have a status.
+    Method: the modules' closed forms or the general group, friction settled per module (`friction.settle`).
+    Raises MechanismError if the structure does not determine the motion or `steps` is out of range.
+    """
+    if not 1 <= steps <= MOST_STEPS:
+        remedy = f"give a number from 1 to {MOST_STEPS:,}"
+        raise MechanismError(Finding(f"cannot analyse {steps} positions", "steps", remedy))
+    method = method or FrictionMethod()
+    run = prepare(mechanism)
+    steps = steps if run.cycle.duration > 0 else 1
+    time = run.cycle.times(steps)
+    labels = _labels(run.system)
+    arrays = results.allocate(labels, steps, _absent(run.system))
+    causes = diagnosis.Causes(run.system)
+    for low in range(0, steps, CHUNK):
+        window = slice(low, min(low + CHUNK, steps))
+        back = run.solve(time[window], method=method)
+        _fill(arrays, back, time[window], window, causes)
+    _bracket(arrays, run, time, method, causes)
+    _unwrap(arrays, run.system)
+    return account.finish(run, arrays, labels, time, method, causes)
+
+
+def _labels(system: System) -> dict[str, list[str]]:
+    mechanism = system.mechanism
+    return {
+        "joint": list(system.joints),
+        "link": list(mechanism.links),
+        "point": [f"{link}.{point}" for link, point in system.points],
+        "axis": ["x", "y"],
+        "driver": list(mechanism.drivers),
+    }
+
+
+def _absent(system: System) -> list[str]:
+    """Variables that this mechanism cannot have: zero without taking memory."""
+    if any(kind == "prismatic" for kind, _ in system.joints.values()):
+        return []
+    slides = ["joint_slide", "joint_slide_velocity", "joint_slide_acceleration", "friction_force"]
+    return [*slides, "reaction_moment"]
+
+
+Arrays = dict[str, NDArray[np.float64]]
+
+
+def _fill(arrays: Arrays, back: Backward, time: NDArray[np.float64], window: slice, causes: diagnosis.Causes) -> None:
+    """Write one chunk into the result; what a status rules out becomes NaN."""
+    status = _status(back, arrays["status"][window].shape)
+    arrays["status"][window] = status
+    causes.note(back, status, window.start)
+    with np.errstate(all="ignore"):
+        _fill_motion(arrays, back, time, window)
+        _fill_forces(arrays, back, window)
+        account.fill_power(arrays, back, window)
+    _blank(arrays, status, window)
+
+
+def _status(back: Backward, shape: tuple[int, ...]) -> NDArray[np.int8]:
+    """The gravest status of every position."""
+    walk = back.walk
+    status = np.zeros(shape, np.int8)
+
+    def raise_to(code: Status, where: Number) -> None:
+        np.maximum(status, np.where(where, np.int8(code), np.int8(0)), out=status)
+
+    placed: Number = True
+    condition: Number = 1.0
+    for group, pose in zip(walk.system.groups, walk.poses, strict=True):
+        for frame in pose.frames:
+            placed = placed & np.isfinite(frame.x + frame.y + frame.c + frame.s)
+        condition = np.maximum(condition, group.condition(pose))
+    for name in rubbing(walk.system):
+        raise_to(Status.ZERO_SLIP, back.slips[name].zero)
+    raise_to(Status.NEAR_SINGULAR, condition > NEAR_SINGULAR)
+    for settled in back.settled:
+        raise_to(Status.NOT_CONVERGED, ~np.asarray(settled.converged, bool))
+        raise_to(Status.LOCKED, np.asarray(settled.share) < 1.0)
+    raise_to(Status.SINGULAR, ~(condition <= SINGULAR))
+    raise_to(Status.NOT_ASSEMBLED, ~np.asarray(placed))
+    return status
+
+
+def _fill_motion(arrays: Arrays, back: Backward, time: NDArray[np.float64], window: slice) -> None:
+    walk = back.walk
+    for i, motion in enumerate(walk.motions[link] for link in walk.system.mechanism.links):
+        arrays["link_angle"][i, window] = np.arctan2(motion.frame.s, motion.frame.c)
+        arrays["link_angle_velocity"][i, window] = motion.twist.w
+        arrays["link_angle_acceleration"][i, window] = motion.acceleration.w
+    for i, (link, name) in enumerate(walk.system.points):
+        moved = walk.point(link, name)
+        for axis in (0, 1):
+            arrays["point_position"][i, axis, window] = moved.place[axis]
+            arrays["point_velocity"][i, axis, window] = moved.velocity[axis]
+            arrays["point_acceleration"][i, axis, window] = moved.acceleration[axis]
+    for i, (kind, links) in enumerate(walk.system.joints.values()):
+        first, second = (walk.motions[link] for link in links)
+        arrays["joint_rotation_velocity"][i, window] = second.twist.w - first.twist.w
+        arrays["joint_rotation_acceleration"][i, window] = second.acceleration.w - first.acceleration.w
+        if kind == "prismatic":
+            _fill_slide(arrays, back, i, window)
+        elif arrays["joint_slide"].flags.writeable:
+            for name in ("joint_slide", "joint_slide_velocity", "joint_slide_acceleration"):
+                arrays[name][i, window] = 0.0
+
+
+def _fill_slide(arrays: Arrays, back: Backward, i: int, window: slice) -> None:
+    """Slide of one joint with its derivatives, along the axis on its first link."""
+    walk = back.walk
+    name = list(walk.system.joints)[i]
+    first, second = walk.system.joints[name][1]
+    one, two = walk.element(first, name), walk.element(second, name)
+    dx, dy = two.x - one.x, two.y - one.y
+    w, base, end = walk.motions[first].twist.w, walk.acceleration(first, name), walk.acceleration(second, name)
+    carried = accelerated(base, w, dx, dy)
+    arrays["joint_slide"][i, window] = one.c * dx + one.s * dy
+    arrays["joint_slide_velocity"][i, window] = back.slips[name].speed
+    # the Coriolis part 2 ω × ṡ lies across the slide
+    arrays["joint_slide_acceleration"][i, window] = one.c * (end.x - carried.x) + one.s * (end.y - carried.y)
+
+
+def _fill_forces(arrays: Arrays, back: Backward, window: slice) -> None:
+    system = back.walk.system
+    for i, (name, (kind, _)) in enumerate(system.joints.items()):
+        reaction, friction = back.reactions[name], back.friction[name]
+        arrays["reaction_force"][i, 0, window] = reaction.x
+        arrays["reaction_force"][i, 1, window] = reaction.y
+        if arrays["reaction_moment"].flags.writeable:
+            arrays["reaction_moment"][i, window] = reaction.m
+        rotates = kind == "revolute"
+        arrays["friction_torque"][i, window] = friction if rotates else 0.0
+        if arrays["friction_force"].flags.writeable:
+            arrays["friction_force"][i, window] = 0.0 if rotates else friction
+    for i, name in enumerate(system.mechanism.drivers):
+        arrays["drive_effort"][i, window] = back.efforts[name]
+    settled = back.settled
+    arrays["friction_iterations"][window] = max((one.iterations for one in settled), default=0)
+    for key, field in (("friction_change", "change"), ("friction_contraction", "contraction")):
+        worst = functools.reduce(np.maximum, (getattr(one, field) for one in settled), 0.0)
+        arrays[key][window] = worst
+
+
+FORCES = [
+    *("reaction_force", "reaction_moment", "friction_torque", "friction_force", "friction_power"),
+    *("drive_effort", "drive_power", "power_residual", "friction_change", "friction_contraction"),
+]
+RATES = [name for name in results.VARIABLES if name.endswith(("_velocity", "_acceleration"))]
+
+
+def _blank(arrays: Arrays, status: NDArray[np.int8], window: slice) -> None:
+    """NaN for every number that a status rules out."""
+    if not np.any(status >= Status.NOT_CONVERGED):
+        return
+    for names, where in (
+        (FORCES, status >= Status.NOT_CONVERGED),
+        (RATES, status >= Status.SINGULAR),
+        (["useful_power", "efficiency_instant"], status >= Status.NOT_CONVERGED),
+    ):
+        for name in names:
+            if arrays[name].flags.writeable:
+                arrays[name][..., window][..., where] = np.nan
+    # a driver's own link is known where the rest is not; a whole position is either assembled or not
+    for name in ("point_position", "link_angle", "joint_slide", "closure_residual", "condition"):
+        if arrays[name].flags.writeable:
+            arrays[name][..., window][..., status == Status.NOT_ASSEMBLED] = np.nan
+
+
+def _bracket(
+    arrays: Arrays, run: Run, time: NDArray[np.float64], method: FrictionMethod, causes: diagnosis.Causes
+) -> None:
+    """Least and largest drive effort: where a relative speed is zero, friction may act either way.
+
+    Exact for one such joint at a position; with several, their separate effects are added (first order).
+    """
+    lower, upper = arrays["drive_effort_lower"], arrays["drive_effort_upper"]
+    lower[...] = arrays["drive_effort"]
+    upper[...] = arrays["drive_effort"]
+    for joint, positions in causes.zero_slip().items():
+        for low in range(0, len(positions), CHUNK):
+            part = positions[low : low + CHUNK]
+            _widen(lower, upper, arrays["drive_effort"], run, time[part], part, joint, method)
+
+
+def _widen(
+    lower: NDArray[np.float64],
+    upper: NDArray[np.float64],
+    effort: NDArray[np.float64],
+    run: Run,
+    time: NDArray[np.float64],
+    positions: NDArray[np.intp],
+    joint: str,
+    method: FrictionMethod,
+) -> None:
+    """Widen the interval by what the friction of one joint can do with either sign."""
+    ends = [run.solve(time, method=method, zero_slip={joint: sign}).efforts for sign in (-1.0, 1.0)]
+    for i, name in enumerate(run.system.mechanism.drivers):
+        changes = [np.broadcast_to(end[name], time.shape) - effort[i, positions] for end in ends]
+        lower[i, positions] += np.minimum(0.0, np.minimum(*changes))
+        upper[i, positions] += np.maximum(0.0, np.maximum(*changes))
+
+
+def _unwrap(arrays: Arrays, system: System) -> None:
+    """Angles without jumps of a whole turn along each run of solved positions, and the joints' rotations."""
+    angles = arrays["link_angle"]
+    order = list(system.mechanism.links)
+    for angle in angles:
+        _unwrap_row(angle)
+    for i, (_, (first, second)) in enumerate(system.joints.values()):
+        rotation = arrays["joint_rotation"][i]
+        np.subtract(angles[order.index(second)], angles[order.index(first)], out=rotation)
+
+
+def _unwrap_row(angle: NDArray[np.float64]) -> None:
+    """In place; a gap of NaN is bridged to the nearest turn."""
+    solved = np.flatnonzero(np.isfinite(angle))
+    if len(solved) == len(angle):
+        angle[:] = np.unwrap(angle)
+    elif len(solved):
+        angle[solved] = np.unwrap(angle[solved])

@@ -1,0 +1,207 @@
+"""Why a position has no answer, told over the cycle: cause, interval, figure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.analysis.kinematics import Forward, pairs_of
+from trunnion.analysis.kinetostatics import Backward
+from trunnion.analysis.system import System, rubbing
+from trunnion.errors import Finding, Severity, Status
+from trunnion.groups.rrr import Pose as RrrPose
+
+__all__ = ["Causes", "findings"]
+
+MOST_INTERVALS = 6  # named in one finding; the rest are counted
+
+Positions = NDArray[np.intp]
+
+
+class _Open(NamedTuple):
+    """Positions at which one module does not close, with the figure of it (m; NaN if there is none)."""
+
+    module: int
+    positions: Positions
+    too_far: NDArray[np.float64]
+    too_near: NDArray[np.float64]
+
+
+@dataclass
+class Causes:
+    """Collects, chunk by chunk, what the findings need to say."""
+
+    system: System
+    _open: list[_Open] = field(default_factory=list)
+    _zero: dict[str, list[Positions]] = field(default_factory=dict)
+    _locked: dict[int, list[tuple[Positions, NDArray[np.float64]]]] = field(default_factory=dict)
+
+    def note(self, back: Backward, status: NDArray[np.int8], offset: int) -> None:
+        """Look at one chunk, whose first position has the number `offset`."""
+        if np.any(status == Status.NOT_ASSEMBLED):
+            self._note_open(back.walk, status, offset)
+        for name in rubbing(self.system):
+            zero = np.broadcast_to(back.slips[name].zero, status.shape) & (status < Status.NOT_CONVERGED)
+            if np.any(zero):
+                self._zero.setdefault(name, []).append(np.flatnonzero(zero) + offset)
+        if np.any(status == Status.LOCKED):
+            modules = reversed(range(len(back.settled)))  # settled from the last module to the first
+            for number, settled in zip(modules, back.settled, strict=True):
+                share = np.broadcast_to(settled.share, status.shape)
+                locked = np.flatnonzero(share < 1.0)
+                if len(locked):
+                    self._locked.setdefault(number, []).append((locked + offset, share[locked]))
+
+    def _note_open(self, walk: Forward, status: NDArray[np.int8], offset: int) -> None:
+        """The first module of each unassembled position that does not close, and by how much."""
+        left = status == Status.NOT_ASSEMBLED
+        for number, pose in enumerate(walk.poses):
+            bad = np.zeros(status.shape, bool)
+            for frame in pose.frames:
+                bad |= ~np.isfinite(np.broadcast_to(frame.x + frame.c, status.shape))
+            here = np.flatnonzero(bad & left)
+            left = left & ~bad
+            if not len(here):
+                continue
+            far = near = np.full(len(here), np.nan)
+            if isinstance(pose, RrrPose):
+                (b, _), _, (d, _) = pairs_of(walk, self.system.places[number])
+                gap = np.broadcast_to(np.hypot(d.x - b.x, d.y - b.y), status.shape)[here]
+                bc, cd = (np.broadcast_to(n, status.shape)[here] for n in pose.lengths)
+                far, near = gap - (bc + cd), np.abs(bc - cd) - gap
+            self._open.append(_Open(number, here + offset, far, near))
+
+    def zero_slip(self) -> dict[str, Positions]:
+        """Positions at which the relative speed of a joint with friction is zero."""
+        return {name: np.concatenate(parts) for name, parts in self._zero.items()}
+
+    def open_modules(self) -> dict[int, _Open]:
+        """What each module that does not close everywhere said, over the whole cycle."""
+        merged: dict[int, _Open] = {}
+        for number in sorted({part.module for part in self._open}):
+            parts = [part for part in self._open if part.module == number]
+            merged[number] = _Open(number, *(np.concatenate([part[i] for part in parts]) for i in (1, 2, 3)))
+        return merged
+
+    def locked(self) -> dict[int, tuple[Positions, NDArray[np.float64]]]:
+        """Positions at which a module locks and the share of the friction at which it does."""
+        return {
+            number: (np.concatenate([p for p, _ in parts]), np.concatenate([s for _, s in parts]))
+            for number, parts in self._locked.items()
+        }
+
+
+class Dial(NamedTuple):
+    """How positions are named to a person: the drive coordinate in degrees or mm, or time."""
+
+    values: NDArray[np.float64]
+    unit: str
+    of: str
+
+    def at(self, position: int) -> str:
+        """One position."""
+        number = f"{self.values[position]:.4g}"
+        return f"{number}{self.unit}"
+
+    def intervals(self, positions: Positions) -> str:
+        """Positions as intervals: 'at 12° and between 132° and 228° of A'."""
+        runs = np.split(positions, np.flatnonzero(np.diff(positions) > 1) + 1)
+        if len(positions) == len(self.values):
+            return "at every position" if len(self.values) > 1 else "in its one position"
+        texts = [
+            f"at {self.at(run[0])}" if len(run) == 1 else f"between {self.at(run[0])} and {self.at(run[-1])}"
+            for run in runs[:MOST_INTERVALS]
+        ]
+        more = f" and in {len(runs) - MOST_INTERVALS} more places" if len(runs) > MOST_INTERVALS else ""
+        return ", ".join(texts) + more + (f" of {self.of}" if self.of else "")
+
+
+def findings(
+    causes: Causes,
+    dial: Dial,
+    status: NDArray[np.int8],
+    condition: NDArray[np.float64],
+    efforts: dict[str, tuple[NDArray[np.float64], NDArray[np.float64], str]],
+) -> list[Finding]:
+    """One finding for each cause. efforts: least and largest effort and unit of every driver."""
+    found = [_not_assembled(causes, dial, part) for part in causes.open_modules().values()]
+    singular = np.flatnonzero(status == Status.SINGULAR)
+    if len(singular):
+        what = f"dead centre (singular position) {dial.intervals(singular)}: condition {_most(condition[singular])}"
+        found.append(Finding(what, "links", "speeds and forces have no finite value there; keep out of it"))
+    for number, (positions, share) in causes.locked().items():
+        found.append(_locked(causes.system, dial, number, positions, share))
+    late = np.flatnonzero(status == Status.NOT_CONVERGED)
+    if len(late):
+        what = f"the friction iteration did not converge {dial.intervals(late)}"
+        found.append(Finding(what, "joints", "use the Newton method, a larger criterion or more iterations"))
+    near = np.flatnonzero(status == Status.NEAR_SINGULAR)
+    if len(near):
+        what = f"close to a dead centre {dial.intervals(near)}: condition up to {_most(condition[near])}"
+        found.append(Finding(what, "links", "forces there are very sensitive to the dimensions", Severity.WARNING))
+    for joint, positions in causes.zero_slip().items():
+        found.append(_zero_slip(dial, joint, positions, efforts))
+    return found
+
+
+def _not_assembled(causes: Causes, dial: Dial, part: _Open) -> Finding:
+    module = causes.system.plan.modules[part.module]
+    head = f"cannot be assembled {dial.intervals(part.positions)}"
+    where = f"links {', '.join(module.links)}"
+    remedy = "change the lengths or the range of the driver"
+    if module.kind != "RRR":
+        return Finding(f"{head}: no position of these links closes its loops", where, remedy)
+    b, c, d = module.joints
+    reasons = []
+    if np.any(part.too_far > 0):
+        reasons.append(f"|{b}{d}| exceeds {b}{c} + {c}{d} by up to {_length(np.nanmax(part.too_far))}")
+    if np.any(part.too_near > 0):
+        reasons.append(f"|{b}{d}| falls short of |{b}{c} − {c}{d}| by up to {_length(np.nanmax(part.too_near))}")
+    return Finding(f"{head}: {'; '.join(reasons) or 'an earlier module has no position'}", where, remedy)
+
+
+def _locked(system: System, dial: Dial, number: int, positions: Positions, share: NDArray[np.float64]) -> Finding:
+    module = system.plan.modules[number]
+    joints = ", ".join(name for name in module.joints if name in rubbing(system))
+    worst = float(np.min(share))
+    what = (
+        f"locked by friction {dial.intervals(positions)}: no solution beyond {worst:.4g} of the friction "
+        f"in joints {joints}"
+    )
+    remedy = f"lower these coefficients below {worst:.3g} of their values, shorten the arms or lengthen the guides"
+    return Finding(what, f"links {', '.join(module.links)}", remedy)
+
+
+def _zero_slip(
+    dial: Dial,
+    joint: str,
+    positions: Positions,
+    efforts: dict[str, tuple[NDArray[np.float64], NDArray[np.float64], str]],
+) -> Finding:
+    parts = []
+    for driver, (lower, upper, unit) in efforts.items():
+        widths = upper[positions] - lower[positions]
+        if np.any(np.isfinite(widths)):
+            worst = int(np.nanargmax(widths))
+            place = positions[worst]
+            parts.append(f"effort of {driver} {lower[place]:.6g} … {upper[place]:.6g} {unit} at {dial.at(place)}")
+    what = f"relative speed zero {dial.intervals(positions)}: its friction is an interval; {', '.join(parts)}"
+    return Finding(
+        what, f"joints.{joint}", "the bounds are in drive_effort_lower and drive_effort_upper", Severity.NOTE
+    )
+
+
+def _length(metres: float) -> str:
+    """A length in the unit a drawing would use."""
+    size = abs(metres)
+    if size >= 1:
+        return f"{metres:.4g} m"
+    return f"{metres * 1e3:.4g} mm" if size >= 1e-4 else f"{metres * 1e6:.4g} µm"
+
+
+def _most(values: NDArray[np.float64]) -> str:
+    finite = values[np.isfinite(values)]
+    return f"{np.max(finite):.3g}" if len(finite) == len(values) and len(finite) else "∞"

@@ -1,0 +1,173 @@
+"""A result as a file: CSV, JSON, NetCDF, Zarr or Parquet, by extension.
+
+CSV (and Parquet) have one row a position and flat columns: `time`, `<joint>.rotation`, `<joint>.slide`,
+`<joint>.reaction_x|y`, `<joint>.friction_torque`, `<driver>.effort`, `<link>.<point>.x|y`, `power_in`,
+`power_useful`, `status` and so on, in SI; the other formats hold the whole Dataset.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import math
+import os
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.errors import Finding, MechanismError, Status
+from trunnion.output import whole
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+
+__all__ = ["FORMATS", "check_format", "columns", "save"]
+
+ROWS = 20_000  # written at a time, so that memory does not grow with the number of positions
+
+Column = tuple[str, str, Callable[[slice], NDArray[Any]]]
+
+
+def columns(result: xr.Dataset) -> list[Column]:
+    """(name, unit, values of a window of positions) of every flat column."""
+    found: list[Column] = [("time", "s", lambda window: result["time"].values[window])]
+    prismatic = {
+        name for name, joint in json.loads(result.attrs["scene"])["joints"].items() if joint["type"] != "revolute"
+    }
+    for i, joint in enumerate(result["joint"].values):
+        flat = [("joint_rotation", "rotation"), ("joint_rotation_velocity", "rotation_velocity")]
+        flat += [("joint_slide", "slide"), ("joint_slide_velocity", "slide_velocity")] if joint in prismatic else []
+        found += [_column(result, variable, f"{joint}.{name}", (i,)) for variable, name in flat]
+        found += [_column(result, "reaction_force", f"{joint}.reaction_{axis}", (i, k)) for k, axis in enumerate("xy")]
+        if joint in prismatic:
+            found.append(_column(result, "reaction_moment", f"{joint}.reaction_moment", (i,)))
+            found.append(_column(result, "friction_force", f"{joint}.friction_force", (i,)))
+        else:
+            found.append(_column(result, "friction_torque", f"{joint}.friction_torque", (i,)))
+        found.append(_column(result, "friction_power", f"{joint}.friction_power", (i,)))
+    for i, (driver, unit) in enumerate(
+        zip(result["driver"].values, json.loads(result.attrs["driver_units"]), strict=True)
+    ):
+        name, _, values = _column(result, "drive_effort", f"{driver}.effort", (i,))
+        found.append((name, unit, values))
+    for i, point in enumerate(result["point"].values):
+        found += [_column(result, "point_position", f"{point}.{axis}", (i, k)) for k, axis in enumerate("xy")]
+    drive = result["drive_power"].values
+    found.append(("power_in", "W", lambda window: drive[:, window].sum(axis=0)))
+    found.append(_column(result, "useful_power", "power_useful", ()))
+    names = np.array([status.name.lower() for status in Status])
+    found.append(("status", "", lambda window: names[result["status"].values[window]]))
+    return found
+
+
+def _column(result: xr.Dataset, variable: str, name: str, index: tuple[int, ...]) -> Column:
+    array = result[variable]
+    values = array.values[index]
+    return name, str(array.attrs["units"]), lambda window: values[window]
+
+
+def frames(result: xr.Dataset) -> Iterator[pd.DataFrame]:
+    """The flat columns, some rows at a time."""
+    import pandas as pd
+
+    flat = columns(result)
+    for low in range(0, result.sizes["position"], ROWS):
+        window = slice(low, low + ROWS)
+        yield pd.DataFrame({name: values(window) for name, _, values in flat})
+
+
+def _csv(result: xr.Dataset, path: Path, units_row: bool) -> None:
+    with path.open("w", encoding="utf-8", newline="") as file:
+        for number, frame in enumerate(frames(result)):
+            if number == 0:
+                frame.head(0).to_csv(file, index=False)
+                if units_row:
+                    import csv
+
+                    csv.writer(file, lineterminator="\n").writerow([unit for _, unit, _ in columns(result)])
+            frame.to_csv(file, index=False, header=False)
+
+
+def _parquet(result: xr.Dataset, path: Path, units_row: bool) -> None:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    writer = None
+    for frame in frames(result):
+        table = pa.Table.from_pandas(frame, preserve_index=False)
+        writer = writer or pq.ParquetWriter(path, table.schema)
+        writer.write_table(table)
+    if writer:
+        writer.close()
+
+
+def _netcdf(result: xr.Dataset, path: Path, units_row: bool) -> None:
+    engine = "h5netcdf" if importlib.util.find_spec("h5netcdf") else "scipy"
+    result.to_netcdf(path, engine=engine)  # type: ignore[arg-type]
+
+
+def _zarr(result: xr.Dataset, path: Path, units_row: bool) -> None:
+    path.unlink()  # a Zarr store is a folder
+    try:
+        result.to_zarr(path)
+    except BaseException:
+        shutil.rmtree(path, ignore_errors=True)
+        raise
+
+
+def _json(result: xr.Dataset, path: Path, units_row: bool) -> None:
+    data = result.to_dict()
+    for section in ("coords", "data_vars"):
+        for entry in data[section].values():
+            entry["data"] = _plain(entry["data"])
+    with path.open("w", encoding="utf-8") as file:
+        json.dump(data, file, ensure_ascii=False, allow_nan=False)
+
+
+def _plain(value: Any) -> Any:
+    """Nested lists with null in place of a number that is none: JSON has no NaN."""
+    if isinstance(value, list):
+        return [_plain(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+Writer = Callable[["xr.Dataset", Path, bool], None]
+
+# extension: writer, the package it needs and the extra that brings it
+FORMATS: dict[str, tuple[Writer, str, str]] = {
+    ".csv": (_csv, "", ""),
+    ".json": (_json, "", ""),
+    ".nc": (_netcdf, "", ""),
+    ".zarr": (_zarr, "zarr", "zarr"),
+    ".parquet": (_parquet, "pyarrow", "parquet"),
+}
+
+
+def check_format(path: str | os.PathLike[str]) -> None:
+    """MechanismError if the file's extension is not one of FORMATS or its package is not installed."""
+    suffix = Path(path).suffix.lower()
+    if suffix not in FORMATS:
+        known = ", ".join(FORMATS)
+        raise MechanismError(Finding(f"cannot write a result as '{suffix}'", str(path), f"use one of {known}"))
+    _, package, extra = FORMATS[suffix]
+    if package and importlib.util.find_spec(package) is None:
+        raise MechanismError(Finding(f"{suffix} needs {package}", str(path), f"pip install 'trunnion[{extra}]'"))
+
+
+def save(result: xr.Dataset, path: str | os.PathLike[str], units_row: bool = False) -> None:
+    """Write a result by the file's extension, whole or not at all.
+
+    units_row: a second header row with the units (CSV). Raises MechanismError for an unknown extension, a missing
+    package, or a place that cannot be written.
+    """
+    check_format(path)
+    writer, _, _ = FORMATS[Path(path).suffix.lower()]
+    if Path(path).suffix.lower() == ".zarr" and Path(path).is_dir():
+        raise MechanismError(Finding("exists already", str(path), "remove it or choose another name"))
+    with whole(path) as temporary:
+        writer(result, temporary, units_row)

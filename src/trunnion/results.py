@@ -1,0 +1,107 @@
+"""Results with names, units, long names and provenance, put on once.
+
+`VARIABLES` is the whole vocabulary. Dims: position last; joint, link, point ("link.point"), axis (x, y), driver.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["LONG_NAMES", "VARIABLES", "Variable", "allocate", "dataset"]
+
+
+@dataclass(frozen=True)
+class Variable:
+    """Dimensions before `position`, unit and long name of a result."""
+
+    dims: tuple[str, ...]
+    units: str
+    long_name: str
+
+
+def _rates(name: str, dims: tuple[str, ...], unit: str, long_name: str) -> dict[str, Variable]:
+    """A quantity with its first and second derivative by time."""
+    return {
+        name: Variable(dims, unit, long_name),
+        f"{name}_velocity": Variable(dims, f"{unit}/s", f"rate of the {long_name}"),
+        f"{name}_acceleration": Variable(dims, f"{unit}/s^2", f"second derivative of the {long_name}"),
+    }
+
+
+VARIABLES: dict[str, Variable] = {
+    **_rates("joint_rotation", ("joint",), "rad", "rotation of the joint, second link against first"),
+    **_rates("joint_slide", ("joint",), "m", "slide of the joint, second link against first"),
+    **_rates("link_angle", ("link",), "rad", "angle of the link's x axis"),
+    "point_position": Variable(("point", "axis"), "m", "place of the point"),
+    "point_velocity": Variable(("point", "axis"), "m/s", "velocity of the point"),
+    "point_acceleration": Variable(("point", "axis"), "m/s^2", "acceleration of the point"),
+    "reaction_force": Variable(("joint", "axis"), "N", "reaction on the second link by the first"),
+    "reaction_moment": Variable(("joint",), "N m", "reaction moment on the second link, about the joint's point"),
+    "friction_torque": Variable(("joint",), "N m", "friction torque on the second link by the first"),
+    "friction_force": Variable(("joint",), "N", "friction force along the slide on the second link by the first"),
+    "friction_power": Variable(("joint",), "W", "power lost to friction"),
+    "drive_effort": Variable(("driver",), "N m", "drive effort on the second link by the first"),
+    "drive_effort_lower": Variable(("driver",), "N m", "least drive effort where a friction is an interval"),
+    "drive_effort_upper": Variable(("driver",), "N m", "largest drive effort where a friction is an interval"),
+    "drive_power": Variable(("driver",), "W", "power of the driver"),
+    "useful_power": Variable((), "W", "power taken by the useful loads"),
+    "efficiency_instant": Variable((), "1", "useful power over drive power"),
+    "closure_residual": Variable((), "m", "largest opening of a closed loop"),
+    "condition": Variable((), "1", "largest condition number of a module's Jacobian"),
+    "power_residual": Variable((), "W", "drive + loads + inertia − friction power; 0 but for rounding"),
+    "friction_iterations": Variable((), "1", "rounds to settle friction and reactions"),
+    "friction_change": Variable((), "N", "largest change of a reaction in the last round"),
+    "friction_contraction": Variable((), "1", "contraction of the friction iteration; from 1 on it may diverge"),
+    "status": Variable((), "1", "code of the position's status; see the attribute flag_meanings"),
+}
+INTEGERS = {"status": np.int8, "friction_iterations": np.int16}
+LONG_NAMES = {name: variable.long_name for name, variable in VARIABLES.items()}
+
+Labels = Mapping[str, Sequence[str]]
+
+
+def allocate(labels: Labels, positions: int, absent: Sequence[str] = ()) -> dict[str, NDArray[np.float64]]:
+    """Empty arrays for every variable, position last; those in `absent` are zero everywhere and take no memory."""
+    arrays: dict[str, NDArray[np.float64]] = {}
+    for name, variable in VARIABLES.items():
+        shape = (*(len(labels[dim]) for dim in variable.dims), positions)
+        if name in absent:
+            arrays[name] = np.broadcast_to(np.zeros(()), shape)
+        else:
+            arrays[name] = np.full(shape, 0 if name in INTEGERS else np.nan, INTEGERS.get(name, np.float64))
+    return arrays
+
+
+def dataset(
+    arrays: Mapping[str, NDArray[np.float64]],
+    labels: Labels,
+    time: NDArray[np.float64],
+    efficiency: float,
+    attributes: Mapping[str, str | float],
+) -> xr.Dataset:
+    """The arrays as an xarray Dataset with coordinates, units and long names."""
+    import xarray as xr
+
+    variables = {
+        name: xr.Variable(
+            (*VARIABLES[name].dims, "position"),
+            array,
+            {"units": VARIABLES[name].units, "long_name": VARIABLES[name].long_name},
+        )
+        for name, array in arrays.items()
+    }
+    variables["efficiency"] = xr.Variable(
+        (), efficiency, {"units": "1", "long_name": "useful work over drive work of the cycle"}
+    )
+    coordinates = {dim: (dim, np.asarray(names, dtype=str)) for dim, names in labels.items()}
+    coordinates["position"] = ("position", np.arange(len(time)))
+    times = xr.Variable("position", time, {"units": "s", "long_name": "time from the start of the cycle"})
+    return xr.Dataset(variables, {**coordinates, "time": times}, dict(attributes))

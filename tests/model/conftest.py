@@ -1,0 +1,63 @@
+"""The example files, and a small model whose lines are known."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from trunnion.errors import Finding, MechanismError
+from trunnion.model.file import read_mechanism
+
+EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.yaml"))
+
+FOURBAR = """\
+trunnion: 1
+space: planar
+dimensions:
+  AB: 2 m
+  AD: 5.5 m
+links:
+  ground:
+    points: {A: [0, 0], D: [AD, 0]}
+  crank:
+    points: {A: [0, 0], B: [AB, 0]}
+    mass: 4.8 kg
+  coupler:
+    points: {B: [0, 0], C: [6 m, 0]}
+    inertia: 2 kg m^2
+  rocker:
+    points: {D: [0, 0], C: [3 m, 0]}
+joints:
+  A: {type: revolute, links: [ground, crank]}
+  B: {type: revolute, links: [crank, coupler]}
+  C: {type: revolute, links: [coupler, rocker]}
+  D: {type: revolute, links: [ground, rocker]}
+joint_defaults:
+  pin: {radius: 7.5 mm}
+  friction: 0.1
+drivers:
+  A: {speed: 10 rad/s}
+loads:
+  work: {link: coupler, at: C, force: [0, -1 kN]}
+assembly:
+  C: [3.9, 2.5]
+measures:
+  tip: {point: coupler.C, axis: x}
+"""
+
+
+@pytest.fixture
+def findings_of(tmp_path: Path) -> Callable[..., tuple[Finding, ...]]:
+    """The findings that reading a text as a file raises."""
+
+    def read(content: str | bytes, name: str = "model.yaml") -> tuple[Finding, ...]:
+        path = tmp_path / name
+        path.write_bytes(content.encode() if isinstance(content, str) else content)
+        with pytest.raises(MechanismError) as error:
+            read_mechanism(path)
+        assert all(finding.file == str(path) for finding in error.value.findings)
+        return error.value.findings
+
+    return read

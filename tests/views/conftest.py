@@ -1,0 +1,52 @@
+"""Results that the tests of the views share."""
+
+from __future__ import annotations
+
+import pytest
+from stand_in import four_bar, slider
+
+from trunnion.errors import Status
+
+NASTY = {
+    "A": "Ω—Welle",
+    "B": "</script><script>alert(1)</script>",
+    "C": '<img src=x onerror="alert(2)">',
+    "D": "_$x$ & <!-- 曲柄",
+}
+
+
+@pytest.fixture
+def plain():
+    return four_bar()
+
+
+@pytest.fixture
+def ideal():
+    return four_bar(friction=0.0)
+
+
+def _two_drivers():
+    """As a result of two drivers would look: the second drive is another column."""
+    one = four_bar(90)
+    two = one.isel(driver=[0, 0]).assign_coords(driver=["A", "D"])
+    two.attrs["driver_units"] = '["N m", "N m"]'
+    return two
+
+
+CASES = {
+    "plain": four_bar,
+    "gap": lambda: four_bar(gap=(132, 229, Status.NOT_ASSEMBLED)),
+    "gap at the start": lambda: four_bar(gap=(0, 40, Status.LOCKED)),
+    "nowhere": lambda: four_bar(72, gap=(0, 72, Status.NOT_ASSEMBLED)),
+    "one position": lambda: four_bar(1),
+    "two positions": lambda: four_bar(2),
+    "sliding drive": slider,
+    "odd names": lambda: four_bar(90, rename=NASTY),
+    "two drivers": _two_drivers,
+}
+
+
+@pytest.fixture(params=CASES)
+def case(request):
+    """(name, result) of every kind of result a view must bear."""
+    return request.param, CASES[request.param]()

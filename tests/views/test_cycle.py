@@ -1,0 +1,85 @@
+"""What the curves are drawn over, where they are silent, and that thinning keeps the peaks."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from stand_in import blank, four_bar, slider
+
+from trunnion.errors import Status
+from trunnion.views.cycle import abscissa, intervals, status_text, thin
+
+
+def test_a_turning_drive_is_drawn_over_its_angle_and_the_turn_closes(plain):
+    over = abscissa(plain)
+    assert (over.title, over.closed, over.period) == ("drive angle A [°]", True, pytest.approx(360.0))
+    assert over.values[90] == pytest.approx(90.0)
+
+
+def test_part_of_a_turn_does_not_close(plain):
+    assert not abscissa(plain.isel(position=slice(0, 200))).closed
+
+
+def test_a_drive_turning_backwards_closes_too(plain):
+    back = plain.assign(joint_rotation=-plain.joint_rotation)
+    assert abscissa(back).period == pytest.approx(-360.0)
+
+
+def test_a_sliding_drive_is_drawn_over_its_slide_in_millimetres():
+    over = abscissa(slider())
+    assert over.title == "drive slide S [mm]"
+    assert over.values[-1] == pytest.approx(80.0)
+
+
+def test_a_gap_in_the_drive_is_filled_at_its_constant_speed(plain):
+    over = abscissa(blank(plain, 100, 150, Status.NOT_ASSEMBLED))
+    assert over.values[120] == pytest.approx(120.0)
+
+
+def test_turns_lost_over_a_gap_are_found_again(plain):
+    holed = blank(plain, 100, 300, Status.NOT_ASSEMBLED)
+    holed["joint_rotation"][0, 300:] -= 2 * np.pi  # what unwrapping to the nearest turn makes of it
+    assert abscissa(holed).values == pytest.approx(np.arange(360.0))
+
+
+def test_without_a_drive_angle_time_serves(plain):
+    over = abscissa(blank(plain, 0, 360, Status.NOT_ASSEMBLED))
+    assert over.title == "time [ms]"
+
+
+def test_a_drive_that_turns_back_is_drawn_over_time(plain):
+    swing = plain.assign(joint_rotation=np.sin(plain.joint_rotation))
+    assert abscissa(swing).label == "time"
+
+
+def test_intervals_name_each_run_without_an_answer(plain):
+    twice = blank(blank(plain, 10, 20, Status.LOCKED), 300, 360, Status.NOT_ASSEMBLED)
+    twice["status"][5] = Status.ZERO_SLIP  # solved, only flagged
+    runs = intervals(twice)
+    assert [(run.start, run.stop, run.text) for run in runs] == [
+        (10, 20, Status.LOCKED.text),
+        (300, 360, Status.NOT_ASSEMBLED.text),
+    ]
+
+
+def test_an_unknown_status_is_still_said():
+    assert status_text(99) == "no answer (status 99)"
+
+
+def test_intervals_of_nothing():
+    assert intervals(four_bar(12)) == []
+
+
+@given(st.lists(st.floats(-1e6, 1e6) | st.just(np.nan), min_size=1, max_size=400), st.integers(4, 60))
+def test_thinning_keeps_both_peaks_and_every_long_gap(values, most):
+    column = np.array(values)
+    picked = thin(column, most)
+    kept = column[picked]
+    assert (np.diff(picked) > 0).all()
+    assert picked.size <= 2 * most + 2 or picked.size == column.size
+    if np.isfinite(column).any():
+        assert np.nanmax(kept) == np.nanmax(column)
+        assert np.nanmin(kept) == np.nanmin(column)
+    assert np.isnan(kept).any() == np.isnan(column).any()

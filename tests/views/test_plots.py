@@ -1,0 +1,127 @@
+"""Every figure bears every kind of result, says what it shows, and is written whole or not at all."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from stand_in import four_bar, slider
+
+from trunnion.errors import Status
+from trunnion.views import plots
+from trunnion.views.drawing import hull
+from trunnion.views.plots import PLOTS, mechanism, save
+
+SIGNATURES = {".png": b"\x89PNG", ".pdf": b"%PDF", ".svg": b"<?xml"}
+
+
+@pytest.mark.parametrize("name", PLOTS)
+def test_every_figure_of_every_result(name, case, tmp_path):
+    kind, result = case
+    if (name, kind) == ("mechanism", "nowhere"):
+        with pytest.raises(ValueError, match="nothing to draw"):
+            PLOTS[name](result, None)
+        return
+    path = save(PLOTS[name](result, None), tmp_path / "figure.png")
+    assert path.stat().st_size > 5_000
+
+
+@pytest.mark.parametrize("name", PLOTS)
+def test_overlaid_comparison_changes_no_limits_of_the_drive(name, plain, ideal):
+    alone, both = PLOTS[name](plain, None), PLOTS[name](plain, ideal)
+    assert isinstance(both, Figure)
+    assert alone.axes[0].get_xlim() == pytest.approx(both.axes[0].get_xlim(), rel=0.05, abs=0.1)
+
+
+def _texts(figure):
+    return [text.get_text() for axes in figure.axes for text in [*axes.texts, axes.xaxis.label, axes.yaxis.label]]
+
+
+def _curve(figure, label, panel=0):
+    return next(line for line in figure.axes[panel].lines if line.get_label() == label).get_xydata()
+
+
+def test_torque_is_that_of_the_result_in_kilonewton_metres_and_closes_the_turn(plain, ideal):
+    figure = PLOTS["torque"](plain, ideal)
+    drawn = _curve(figure, "with friction")
+    assert drawn[:-1, 1] == pytest.approx(plain.drive_effort.values[0] / 1000)
+    assert (drawn[-1] == (pytest.approx(360.0), pytest.approx(drawn[0, 1]))).all()
+    assert {"torque A [kN m]", "drive angle A [°]"} <= set(_texts(figure))
+    assert _curve(figure, "without friction")[:-1, 1] == pytest.approx(ideal.drive_effort.values[0] / 1000)
+
+
+def test_a_sliding_drive_has_a_force_over_millimetres():
+    figure = PLOTS["torque"](slider(), None)
+    assert {"force S [N]", "drive slide S [mm]"} <= set(_texts(figure))
+
+
+def test_a_gap_breaks_the_curve_and_names_its_cause():
+    figure = PLOTS["torque"](four_bar(gap=(132, 229, Status.NOT_ASSEMBLED)), None)
+    drawn = _curve(figure, "torque")
+    assert np.isnan(drawn[132:229, 1]).all()
+    assert np.isfinite(drawn[131, 1])
+    assert "cannot be assembled" in _texts(figure)
+
+
+def test_friction_power_adds_up(plain):
+    figure = PLOTS["friction-power"](plain, None)
+    lines = {line.get_label().split(",")[0]: line.get_ydata() for line in figure.axes[0].lines}
+    assert sum(lines[joint] for joint in "ABCD") == pytest.approx(lines["all joints"])
+
+
+def test_names_are_shown_as_they_are():
+    result = four_bar(24, rename={"A": "_α", "B": "$B$", "C": "C$", "D": "D_{1}"})
+    labels = [text.get_text() for text in PLOTS["reactions"](result, None).axes[0].get_legend().get_texts()]
+    assert [label.strip("\u2009") for label in labels] == ["_α", r"\$B\$", r"C\$", "D_{1}"]
+
+
+def test_a_hundred_thousand_positions(tmp_path):
+    short = four_bar(400)
+    long = short.isel(position=np.arange(100_000) * 400 // 100_000)
+    ramp = np.arange(100_000) * 2 * np.pi / 100_000
+    long["joint_rotation"] = long["joint_rotation"].copy(data=np.tile(ramp, (4, 1)))
+    for name in PLOTS:
+        path = save(PLOTS[name](long, long), tmp_path / f"{name}.svg")
+        assert path.stat().st_size < 3_000_000, name
+
+
+def test_mechanism_at_a_chosen_position(plain):
+    figure = mechanism(plain, index=60)
+    assert "drive angle A = 60°" in figure.axes[0].get_title(loc="left")
+
+
+@pytest.mark.parametrize("suffix", SIGNATURES)
+def test_formats(suffix, plain, tmp_path):
+    path = save(PLOTS["polar"](plain, None), tmp_path / f"polar{suffix}")
+    assert path.read_bytes().startswith(SIGNATURES[suffix])
+    assert [file.name for file in tmp_path.iterdir()] == [path.name]
+
+
+def test_an_unknown_format_is_refused_before_anything_is_written(plain, tmp_path):
+    with pytest.raises(ValueError, match=r"\.png, \.svg or \.pdf"):
+        save(PLOTS["torque"](plain, None), tmp_path / "torque.bmp")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_failed_write_leaves_the_old_file_and_no_draft(plain, tmp_path, monkeypatch):
+    target = tmp_path / "torque.png"
+    target.write_text("old")
+    figure = PLOTS["torque"](plain, None)
+    monkeypatch.setattr(figure, "savefig", lambda *_, **__: (_ for _ in ()).throw(OSError("disk full")))
+    with pytest.raises(OSError, match="disk full"):
+        save(figure, target)
+    assert [file.name for file in tmp_path.iterdir()] == ["torque.png"]
+    assert target.read_text() == "old"
+
+
+def test_no_pyplot_state_is_touched(plain):
+    import sys
+
+    PLOTS["torque"](plain, None)
+    assert "matplotlib.pyplot" not in vars(plots)
+    assert not getattr(sys.modules.get("matplotlib.pyplot"), "get_fignums", list)()
+
+
+def test_hull_leaves_inner_points_out():
+    corners = hull(np.array([[0, 0], [4, 0], [0, 4], [1, 1], [2, 0]], dtype=float))
+    assert {tuple(corner) for corner in corners} == {(0, 0), (4, 0), (0, 4)}

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.reference_kernels import MOTION_COLUMNS, OUTPUTS
-from benchmarks.side import Job, Side, version
+from benchmarks.side import MOTION_COLUMNS, OUTPUTS, Job, Side, version
 
 if version("trunnion"):
     from trunnion import Mechanism, analyse, prepare
@@ -18,7 +17,7 @@ if version("trunnion"):
 
 Array = NDArray[np.floating[Any]]
 MODEL = Path(__file__).parents[1] / "examples" / "durango-fourbar.yaml"
-CHUNK = 8192
+CHUNK = 8192  # positions at a time
 LINKS = ("crank", "coupler", "rocker")
 FORCE_OUTPUTS = OUTPUTS[:-1]  # without the number of iterations
 
@@ -46,7 +45,7 @@ def trunnion_side(job: Job) -> Side | None:
     return Side("Trunnion", job, run, np.transpose, columns, note=version("trunnion"))
 
 
-def dataset_side() -> Side | None:
+def dataset_side(job: Job) -> Side | None:
     """The public `analyse`: also points, balance, diagnosis and efficiency, as a labelled Dataset."""
     if not version("trunnion"):
         return None
@@ -60,9 +59,7 @@ def dataset_side() -> Side | None:
         blocks += [found[name] for name in ("friction_torque", "friction_power", "drive_effort")]
         return np.concatenate([np.asarray(block) for block in blocks]).T
 
-    return Side(
-        "Trunnion analyse()", "friction", lambda n: analyse(mechanism, steps=n), table, FORCE_OUTPUTS, note="Dataset"
-    )
+    return Side("Trunnion analyse()", job, lambda n: analyse(mechanism, steps=n), table, FORCE_OUTPUTS, note="Dataset")
 
 
 def _motion_rows(prepared: Any, times: Array) -> Iterator[Any]:

@@ -12,15 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks import durango as d
-from benchmarks.reference_kernels import COLUMN, MOTION_COLUMNS, numba_loop
-from benchmarks.side import Side, crank_angles, version
+from benchmarks.reference_kernels import COLUMN, numba_loop
+from benchmarks.side import MOTION_COLUMNS, Job, Side, crank_angles, version
 
 Array = NDArray[np.float64]
 
 __all__ = ["fourbarhinge_side", "pinocchio_side", "pylinkage_side"]
 
 
-def pylinkage_side() -> Side | None:
+def pylinkage_side(job: Job) -> Side | None:
     """Position, velocity and acceleration of B and C by pylinkage's compiled loop (`step_fast_with_kinematics`).
 
     It turns the crank before each step, so its first configuration is ours at one step: started one step back.
@@ -47,7 +47,7 @@ def pylinkage_side() -> Side | None:
 
     return Side(
         "pylinkage",
-        "motion",
+        job,
         lambda n: build(n).step_fast_with_kinematics(iterations=n),
         table,
         MOTION_COLUMNS[9:],
@@ -55,7 +55,7 @@ def pylinkage_side() -> Side | None:
     )
 
 
-def fourbarhinge_side() -> Side | None:
+def fourbarhinge_side(job: Job) -> Side | None:
     """Drive torque and the four reactions, without friction, by fourbarhinge (one 9×9 solve a configuration)."""
     if not version("fourbarhinge"):
         return None
@@ -95,10 +95,10 @@ def fourbarhinge_side() -> Side | None:
         return out
 
     columns = (*(f"reaction.{joint}.{axis}" for joint in "ABCD" for axis in "xy"), "drive_torque")
-    return Side("fourbarhinge", "frictionless", run, np.asarray, columns, 500, note=version("fourbarhinge"))
+    return Side("fourbarhinge", job, run, np.asarray, columns, 500, note=version("fourbarhinge"))
 
 
-def pinocchio_side() -> Side | None:
+def pinocchio_side(job: Job) -> Side | None:
     """Drive torque and force in the cut joint C, without friction, by Pinocchio's RNEA on the opened loop.
 
     Chain A–B and chain D, cut at C; the force there makes the torques of the passive joints B and D vanish (a
@@ -139,7 +139,7 @@ def pinocchio_side() -> Side | None:
     forces[3] = pin.Force(np.zeros(3), np.array([0.0, 0.0, d.M3_APPLIED]))
     columns = ("reaction.C.x", "reaction.C.y", "drive_torque")
     note = f"{version('pin')}, motion given"
-    return Side("Pinocchio", "frictionless", run, np.asarray, columns, 5_000, note=note)
+    return Side("Pinocchio", job, run, np.asarray, columns, 5_000, note=note)
 
 
 def _pinocchio_model() -> tuple[Any, tuple[int, int]]:

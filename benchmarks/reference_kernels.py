@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks import durango as d
+from benchmarks.side import MOTION_COLUMNS, OUTPUTS, Job, Side, crank_angles, version
 
 try:
     from numba import njit
@@ -37,26 +38,14 @@ Array = NDArray[np.floating[Any]]
 
 __all__ = [
     "COLUMN",
-    "HAS_NUMBA",
-    "MOTION_COLUMNS",
-    "OUTPUTS",
     "numba_loop",
     "numba_motion",
+    "numba_side",
     "stacked_newton_euler",
+    "stacked_side",
+    "superposed_side",
 ]
 
-JOINTS = "ABCD"
-OUTPUTS = (
-    *(f"link_{quantity}.{link}" for quantity in ("angle", "velocity", "acceleration") for link in (1, 2, 3)),
-    *(f"reaction.{joint}.{axis}" for joint in JOINTS for axis in "xy"),
-    *(f"friction_torque.{joint}" for joint in JOINTS),
-    *(f"friction_power.{joint}" for joint in JOINTS),
-    "drive_torque",
-    "iterations",
-)
-MOTION_COLUMNS = OUTPUTS[:9] + tuple(
-    f"{pin}.{quantity}.{axis}" for quantity in ("position", "velocity", "acceleration") for pin in "BC" for axis in "xy"
-)
 COLUMN = {name: k for k, name in enumerate(OUTPUTS)}
 N_OUTPUTS = len(OUTPUTS)
 TOLERANCE = 1e-9
@@ -384,3 +373,34 @@ def _store(out: Array, motion: dict[str, Array], omega: float, x: Array, torques
     out[:, 9:17], out[:, 17:21] = x[:, :8], torques
     out[:, 21:25] = -torques * _slips(motion["w"], omega)
     out[:, 25], out[:, 26] = x[:, 8], iterations
+
+
+def numba_side(job: Job) -> Side | None:
+    """The compiled loop, for any of the three jobs; None if Numba is not installed."""
+    if not HAS_NUMBA:
+        return None
+    name, note = "Numba loop", f"by hand, numba {version('numba')}"
+    if job == "motion":
+        return Side(name, job, lambda n: numba_motion(crank_angles(n)), np.asarray, MOTION_COLUMNS, note=note)
+    radius = d.FRICTION_RADIUS if job == "friction" else 0.0
+    return Side(
+        name, job, lambda n: numba_loop(crank_angles(n), friction_radius=radius), np.asarray, OUTPUTS, note=note
+    )
+
+
+def stacked_side(job: Job) -> Side:
+    """The stacked equations, solved anew in each friction iteration."""
+    note = "solved in each iteration"
+    return Side("stacked 9×9", job, lambda n: stacked_newton_euler(crank_angles(n)), np.asarray, OUTPUTS, note=note)
+
+
+def superposed_side(job: Job) -> Side:
+    """The stacked equations, solved once for five right sides."""
+    return Side(
+        "stacked 9×9, superposed",
+        job,
+        lambda n: stacked_newton_euler(crank_angles(n), solve_once=True),
+        np.asarray,
+        OUTPUTS,
+        note="one solve, 5 right sides",
+    )

@@ -12,7 +12,26 @@ from numpy.typing import NDArray
 
 Job = Literal["motion", "friction", "frictionless"]
 
-__all__ = ["Job", "Side", "crank_angles", "version"]
+__all__ = ["JOBS", "MOTION_COLUMNS", "OUTPUTS", "Job", "Side", "crank_angles", "version"]
+
+JOBS: dict[Job, str] = {
+    "motion": "position, velocity, acceleration",
+    "friction": "kinetostatics with friction",
+    "frictionless": "kinetostatics without friction",
+}
+# What a full answer holds for each configuration; links 1 crank, 2 coupler, 3 rocker
+JOINTS = "ABCD"
+OUTPUTS = (
+    *(f"link_{quantity}.{link}" for quantity in ("angle", "velocity", "acceleration") for link in (1, 2, 3)),
+    *(f"reaction.{joint}.{axis}" for joint in JOINTS for axis in "xy"),
+    *(f"friction_torque.{joint}" for joint in JOINTS),
+    *(f"friction_power.{joint}" for joint in JOINTS),
+    "drive_torque",
+    "iterations",
+)
+MOTION_COLUMNS = OUTPUTS[:9] + tuple(
+    f"{pin}.{quantity}.{axis}" for quantity in ("position", "velocity", "acceleration") for pin in "BC" for axis in "xy"
+)
 
 
 @dataclass(frozen=True)

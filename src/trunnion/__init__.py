@@ -13,8 +13,12 @@ __version__ = "0.1.0"
 if TYPE_CHECKING:
     from trunnion.analysis.analyse import analyse, prepare
     from trunnion.analysis.friction import FrictionMethod
+    from trunnion.analysis.inspect import Check, check
     from trunnion.errors import Finding, MechanismError, Status
+    from trunnion.export import save
+    from trunnion.model.file import read_mechanism as read
     from trunnion.model.mechanism import Mechanism
+    from trunnion.views.report import report
 
 _PLACES = {
     "FrictionMethod": "trunnion.analysis.friction",
@@ -22,18 +26,37 @@ _PLACES = {
     "Mechanism": "trunnion.model.mechanism",
     "MechanismError": "trunnion.errors",
     "Status": "trunnion.errors",
+    "Check": "trunnion.analysis.inspect",
     "analyse": "trunnion.analysis.analyse",
+    "check": "trunnion.analysis.inspect",
     "prepare": "trunnion.analysis.analyse",
+    "read": "trunnion.model.file",
+    "report": "trunnion.views.report",
+    "save": "trunnion.export",
 }
+_ELSEWHERE = {"read": "read_mechanism"}
 
-__all__ = ["Finding", "FrictionMethod", "Mechanism", "MechanismError", "Status", "analyse", "prepare"]
+__all__ = [
+    "Check",
+    "Finding",
+    "FrictionMethod",
+    "Mechanism",
+    "MechanismError",
+    "Status",
+    "analyse",
+    "check",
+    "prepare",
+    "read",
+    "report",
+    "save",
+]
 
 
 def __getattr__(name: str) -> Any:
     """Load a public name from where it lives."""
     if name not in _PLACES:
         raise AttributeError(f"module 'trunnion' has no attribute '{name}'")
-    return getattr(import_module(_PLACES[name]), name)
+    return getattr(import_module(_PLACES[name]), _ELSEWHERE.get(name, name))
 
 
 def __dir__() -> list[str]:

@@ -14,7 +14,7 @@ import os
 import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -107,8 +107,8 @@ def _parquet(result: xr.Dataset, path: Path, units_row: bool) -> None:
 
 
 def _netcdf(result: xr.Dataset, path: Path, units_row: bool) -> None:
-    engine = "h5netcdf" if importlib.util.find_spec("h5netcdf") else "scipy"
-    result.to_netcdf(path, engine=engine)  # type: ignore[arg-type]
+    engine: Literal["h5netcdf", "scipy"] = "h5netcdf" if importlib.util.find_spec("h5netcdf") else "scipy"
+    result.to_netcdf(path, engine=engine)
 
 
 def _zarr(result: xr.Dataset, path: Path, units_row: bool) -> None:

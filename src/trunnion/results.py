@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["LONG_NAMES", "VARIABLES", "Variable", "allocate", "dataset"]
+__all__ = ["VARIABLES", "Variable", "allocate", "dataset"]
 
 
 @dataclass(frozen=True)
@@ -63,20 +63,25 @@ VARIABLES: dict[str, Variable] = {
     "status": Variable((), "1", "code of the position's status; see the attribute flag_meanings"),
 }
 INTEGERS = {"status": np.int8, "friction_iterations": np.int16}
-LONG_NAMES = {name: variable.long_name for name, variable in VARIABLES.items()}
+# the same array until something sets them apart
+SAME_AS = {"drive_effort_lower": "drive_effort", "drive_effort_upper": "drive_effort"}
 
 Labels = Mapping[str, Sequence[str]]
 
 
 def allocate(labels: Labels, positions: int, absent: Sequence[str] = ()) -> dict[str, NDArray[np.float64]]:
-    """Empty arrays for every variable, position last; those in `absent` are zero everywhere and take no memory."""
+    """Arrays for every variable, to be filled, position last; those in `absent` are zero and take no memory."""
     arrays: dict[str, NDArray[np.float64]] = {}
     for name, variable in VARIABLES.items():
+        if name in SAME_AS:
+            continue
         shape = (*(len(labels[dim]) for dim in variable.dims), positions)
         if name in absent:
             arrays[name] = np.broadcast_to(np.zeros(()), shape)
         else:
-            arrays[name] = np.full(shape, 0 if name in INTEGERS else np.nan, INTEGERS.get(name, np.float64))
+            arrays[name] = np.empty(shape, INTEGERS.get(name, np.float64))
+    for name, other in SAME_AS.items():
+        arrays[name] = arrays[other]
     return arrays
 
 
@@ -102,6 +107,5 @@ def dataset(
         (), efficiency, {"units": "1", "long_name": "useful work over drive work of the cycle"}
     )
     coordinates = {dim: (dim, np.asarray(names, dtype=str)) for dim, names in labels.items()}
-    coordinates["position"] = ("position", np.arange(len(time)))
     times = xr.Variable("position", time, {"units": "s", "long_name": "time from the start of the cycle"})
     return xr.Dataset(variables, {**coordinates, "time": times}, dict(attributes))

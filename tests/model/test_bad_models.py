@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import pytest
-from conftest import FOURBAR
+from model_samples import FOURBAR
+from ruamel.yaml import YAML
 
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.model.check import check_model
@@ -104,9 +105,9 @@ CASES = [
     ("link: coupler, at: C, force: [0, -1 kN]", "joint: A, at: C, force: [0, 1]", 28, "loads.work",
      "are for a load on a link", "resisting"),
     ("{radius: 7.5 mm}", "{length: 7.5 mm}", 18, "joints.A", "friction without the radius of the pin", "radius: "),
-    ("{radius: 7.5 mm}", "{radius: 0}", 18, "joints.A.pin.radius", "is 0, where friction needs it", "above 0"),
+    ("{radius: 7.5 mm}", "{radius: 0}", 23, "joint_defaults.pin.radius", "is 0, where friction needs it", "above 0"),
     ("{radius: 7.5 mm}", "{radius: -7.5 mm}", 23, "joint_defaults.pin.radius", "negative", "at least 0"),
-    ("7.5 mm}", "7.5 mm, clearance: 8 mm}", 18, "joints.A.pin.clearance", "not less than the radius", "unit"),
+    ("7.5 mm}", "7.5 mm, clearance: 8 mm}", 23, "joint_defaults.pin.clearance", "not less than the radius", "unit"),
     ("friction: 0.1", "friction: -0.1", 24, "friction.coefficient", "is -0.1, the least is 0", "range"),
     ("friction: 0.1", "friction: {coefficient: 0.1, pair_factor: 0}", 24, "pair_factor", "removes", "above 0"),
     ("friction: 0.1", "friction: {coeficient: 0.1}", 24, "joint_defaults.friction.coeficient", "unknown to the",
@@ -162,6 +163,20 @@ def test_every_finding_in_one_go_in_the_order_of_the_file(findings_of: FindingsO
 def test_a_lost_entry_is_not_reported_twice(findings_of: FindingsOf) -> None:
     found = findings_of(FOURBAR.replace("links: [crank, coupler]", "link: [crank, coupler]"))
     assert {one.where for one in found} == {"joints.B", "joints.B.link"}, "\n".join(map(str, found))
+
+
+def test_a_wrong_coordinate_hides_nothing_else(findings_of: FindingsOf) -> None:
+    found = findings_of(FOURBAR.replace("mass: 4.8 kg", "mass: -1\n    centre: [1 kg, 0]"))
+    assert [one.where for one in found] == ["links.crank.mass", "links.crank.centre.x"], "\n".join(map(str, found))
+
+
+def test_no_friction_needs_no_radius() -> None:
+    mechanism = Mechanism.model_validate(
+        YAML(typ="safe", pure=True).load(
+            FOURBAR.replace("{radius: 7.5 mm}", "{}").replace("friction: 0.1", "friction: 0")
+        )
+    )
+    assert all(joint.friction is None for joint in mechanism.effective_joints.values())
 
 
 def test_python_raises_the_same_findings_without_lines(findings_of: FindingsOf) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 
 import numpy as np
 import pytest
@@ -261,9 +262,5 @@ def test_the_evaluator_agrees_with_python(tree: object, first: float, second: fl
 
 @given(st.text(max_size=60) | st.text("0123456789.eE+-*/^() mkgNrads°µ±%AB,", max_size=60))
 def test_no_text_does_anything_but_fail_cleanly(text: str) -> None:
-    try:
-        quantity = Quantity.read(text, LENGTH)
-    except UnitError as error:
-        assert error.what
-    else:
-        assert quantity.source == text
+    with suppress(UnitError):
+        assert Quantity.read(text, LENGTH).source == text

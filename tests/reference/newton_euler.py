@@ -82,9 +82,7 @@ class Solution:
     condition: float
 
 
-def solve(
-    bodies: Mapping[str, Body], joints: Mapping[str, Joint], gravity: ArrayLike = (0.0, 0.0)
-) -> Solution:
+def solve(bodies: Mapping[str, Body], joints: Mapping[str, Joint], gravity: ArrayLike = (0.0, 0.0)) -> Solution:
     """All joint reactions and drive efforts at one position.
 
     For each body  Σ F = m a  and, about its centre,  Σ (M + r × F) = J α, with the unknowns on the left.

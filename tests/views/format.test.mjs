@@ -3,7 +3,17 @@ import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import test from "node:test";
 
-import { at, bounds, domain, gaps, hull, magnitude, nearest, total } from "../../src/trunnion/views/web/data.js";
+import {
+  at,
+  bounds,
+  domain,
+  gaps,
+  hull,
+  magnitude,
+  nearest,
+  total,
+  usualPeak,
+} from "../../src/trunnion/views/web/data.js";
 import {
   fixed,
   number,
@@ -100,4 +110,10 @@ test("keys", () => {
   assert.equal(command("End", false, 5, 359), 359);
   assert.equal(command(" ", false, 5, 359), "toggle");
   assert.equal(command("a", false, 5, 359), null);
+});
+
+test("a peak that towers over all else does not set the scale", () => {
+  assert.equal(usualPeak([1, -2, 3, null]), 3);
+  assert.equal(usualPeak([...Array(99).fill(1), 1000]), 4);
+  assert.equal(usualPeak([]), 0);
 });

@@ -56,9 +56,12 @@ class Dual:
         return self
 
     def __abs__(self) -> Dual:
-        return _abs(self)
+        found: Dual = _abs(self)
+        return found
 
     def __add__(self, other: Any) -> Dual:
+        if _depth(other) < self.depth:
+            return Dual(self.real + other, self.dual)
         x, y = _pair(self, other)
         return Dual(x.real + y.real, x.dual + y.dual)
 
@@ -69,9 +72,11 @@ class Dual:
         return Dual(x.real - y.real, x.dual - y.dual)
 
     def __rsub__(self, other: Any) -> Dual:
-        return -self + other
+        return Dual.__add__(-self, other)
 
     def __mul__(self, other: Any) -> Dual:
+        if _depth(other) < self.depth:  # a constant for this ε: two products instead of three
+            return Dual(self.real * other, self.dual * other)
         x, y = _pair(self, other)
         return Dual(x.real * y.real, x.real * y.dual + x.dual * y.real)
 
@@ -87,13 +92,14 @@ class Dual:
 
     def __pow__(self, exponent: Any) -> Dual:
         if isinstance(exponent, Dual):
-            return _exp(exponent * _log(self))
+            return Dual.__rpow__(exponent, self)
         if exponent == 0:
             return Dual(self.real**0, self.dual * 0.0)
         return Dual(self.real**exponent, exponent * self.real ** (exponent - 1) * self.dual)
 
     def __rpow__(self, base: Any) -> Dual:
-        return _exp(self * _of(base).log(base))
+        power: Dual = _exp(self * _of(base).log(base))
+        return power
 
     def __lt__(self, other: Any) -> Any:
         return primal(self) < primal(other)
@@ -261,7 +267,7 @@ def _on_real(name: str) -> Callable[..., Any]:
     return apply
 
 
-functions = SimpleNamespace(
+functions: SimpleNamespace = SimpleNamespace(
     sin=_chain("sin", lambda xp, a: xp.cos(a)),
     cos=_chain("cos", lambda xp, a: -xp.sin(a)),
     tan=_chain("tan", lambda xp, a: 1 + xp.tan(a) ** 2),

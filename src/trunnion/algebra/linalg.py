@@ -60,7 +60,7 @@ def solve(matrix: Sequence[Sequence[Number]], *sides: Sequence[Number]) -> list[
 
 
 def _pivot(rows: list[list[Number]], k: int, columns: int, xp: Number) -> Number:
-    """Bring the largest entry of column k, rows k and below, into row k, lane by lane; −1 for an odd number of swaps."""
+    """Bring the largest entry of column k from row k on into row k, lane by lane; −1 for an odd number of swaps."""
     sign: Number = 1.0
     for i in range(k + 1, len(rows)):
         swap = np.abs(primal(rows[i][k])) > np.abs(primal(rows[k][k]))

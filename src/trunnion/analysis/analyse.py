@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Run", "analyse", "prepare"]
 
-CHUNK = 4096  # positions at a time: the arrays of a walk stay in cache
+CHUNK = 8192  # positions at a time: the arrays of a walk stay in cache
 MOST_STEPS = 100_000_000
 SINGULAR = 1e6  # condition from which less than about four digits would be left
 NEAR_SINGULAR = 1e4
@@ -48,10 +48,9 @@ class Run:
         method: FrictionMethod | None = None,
         zero_slip: Mapping[str, float] | None = None,
     ) -> Backward:
-        """Motion and forces at the given times (s), for the nominal or other values; see `kinetostatics.solve`."""
-        return solve(
-            self.system, self.values if values is None else values, self.chosen.assembly, time, method, zero_slip
-        )
+        """Motion and forces at the given times (s), nominal or with other values; see `kinetostatics.solve`."""
+        values = self.values if values is None else values
+        return solve(self.system, values, self.chosen.assembly, time, method, zero_slip)
 
 
 def prepare(mechanism: Mechanism) -> Run:
@@ -61,12 +60,17 @@ def prepare(mechanism: Mechanism) -> Run:
     return Run(system, values, system.cycle(values), choose(system, values))
 
 
-def analyse(mechanism: Mechanism, steps: int = 360, method: FrictionMethod | None = None) -> xr.Dataset:
+def analyse(
+    mechanism: Mechanism,
+    steps: int = 360,
+    method: FrictionMethod | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> xr.Dataset:
     """Motion, reactions with friction, drive effort and power of a mechanism over its cycle.
 
     steps: equally spaced positions; over a full turn the end is not repeated. Returns a Dataset with the names,
     units and dims of `results.VARIABLES`; positions without an answer are NaN and have a status.
-    Method: the modules' closed forms or the general group, friction settled per module (`friction.settle`).
+    progress: called with the number of positions done. Method: the modules' closed forms or the general group, friction settled per module (`friction.settle`).
     Raises MechanismError if the structure does not determine the motion or `steps` is out of range.
     """
     if not 1 <= steps <= MOST_STEPS:
@@ -83,6 +87,8 @@ def analyse(mechanism: Mechanism, steps: int = 360, method: FrictionMethod | Non
         window = slice(low, min(low + CHUNK, steps))
         back = run.solve(time[window], method=method)
         _fill(arrays, back, time[window], window, causes)
+        if progress:
+            progress(window.stop)
     _bracket(arrays, run, time, method, causes)
     _unwrap(arrays, run.system)
     return account.finish(run, arrays, labels, time, method, causes)
@@ -238,9 +244,10 @@ def _bracket(
 
     Exact for one such joint at a position; with several, their separate effects are added (first order).
     """
-    lower, upper = arrays["drive_effort_lower"], arrays["drive_effort_upper"]
-    lower[...] = arrays["drive_effort"]
-    upper[...] = arrays["drive_effort"]
+    if not causes.zero_slip():
+        return  # both are the effort itself
+    lower = arrays["drive_effort_lower"] = arrays["drive_effort"].copy()
+    upper = arrays["drive_effort_upper"] = arrays["drive_effort"].copy()
     for joint, positions in causes.zero_slip().items():
         for low in range(0, len(positions), CHUNK):
             part = positions[low : low + CHUNK]
@@ -277,9 +284,12 @@ def _unwrap(arrays: Arrays, system: System) -> None:
 
 
 def _unwrap_row(angle: NDArray[np.float64]) -> None:
-    """In place; a gap of NaN is bridged to the nearest turn."""
-    solved = np.flatnonzero(np.isfinite(angle))
-    if len(solved) == len(angle):
-        angle[:] = np.unwrap(angle)
-    elif len(solved):
-        angle[solved] = np.unwrap(angle[solved])
+    """In place, some positions at a time to save memory; a gap of NaN is bridged to the nearest turn."""
+    last = np.nan
+    for low in range(0, len(angle), CHUNK):
+        part = angle[low : low + CHUNK]
+        solved = np.flatnonzero(np.isfinite(part))
+        if len(solved):
+            start = last if np.isfinite(last) else part[solved[0]]
+            part[solved] = np.unwrap(np.concatenate([[start], part[solved]]))[1:]
+            last = part[solved[-1]]

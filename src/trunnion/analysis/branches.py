@@ -7,6 +7,7 @@ starts Newton from the track, all lanes in parallel, and a lane that ends on ano
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -99,6 +100,7 @@ def choose(system: System, values: Values) -> Chosen:
     with np.errstate(all="ignore"):
         for number, module in enumerate(system.plan.modules):
             group = system.groups[number]
+            assembly: Any
             if module.rank == 1:
                 assembly, count = None, 1
             elif isinstance(group, General):
@@ -119,7 +121,8 @@ def choose(system: System, values: Values) -> Chosen:
 def _unstated(module: Module, count: int) -> Finding:
     links = ", ".join(module.links)
     what = f"links {links} can be assembled in {count} ways and no hint says which; one was taken"
-    remedy = f"say roughly where a point is at the start, e.g. assembly: {{{module.joints[len(module.joints) // 2]}: [x, y]}}"
+    joint = module.joints[len(module.joints) // 2]
+    remedy = f"say roughly where a point is at the start, e.g. assembly: {{{joint}: [x, y]}}"
     return Finding(what, "assembly", remedy, Severity.WARNING)
 
 
@@ -324,7 +327,7 @@ class _Follower:
     def run(self, rows: Array, order: Sequence[int]) -> None:
         """Fill `rows` (free, grid) along `order`, whose first column is known, up to where the branch ends."""
         slope = np.zeros(len(rows))
-        for here, there in zip(order, order[1:], strict=False):
+        for here, there in itertools.pairwise(order):
             if np.isfinite(rows[0, there]):
                 slope = rows[:, there] - rows[:, here]
                 continue

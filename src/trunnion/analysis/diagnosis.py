@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -122,7 +122,7 @@ class Dial(NamedTuple):
 def findings(
     causes: Causes,
     dial: Dial,
-    status: NDArray[np.int8],
+    status: NDArray[Any],
     condition: NDArray[np.float64],
     efforts: dict[str, tuple[NDArray[np.float64], NDArray[np.float64], str]],
 ) -> list[Finding]:

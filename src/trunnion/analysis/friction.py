@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,12 +23,13 @@ from trunnion.algebra import linalg
 from trunnion.algebra.dual import Dual, derivative, primal
 from trunnion.algebra.namespace import Number
 from trunnion.analysis import continuation
+from trunnion.errors import Finding, MechanismError
 from trunnion.groups.planar import Wrench
 from trunnion.groups.protocol import Group
 from trunnion.joints.friction import FrictionLaw
 from trunnion.joints.pairs import Load, Reaction
 
-__all__ = ["Contact", "FrictionMethod", "Settled", "settle"]
+__all__ = ["Contact", "FrictionMethod", "Settled", "method_named", "settle"]
 
 Method = Literal["newton", "successive-approximation"]
 
@@ -54,6 +55,19 @@ class FrictionMethod:
         if self.name == "successive-approximation":
             return 1e-3
         return 1e-8 * _largest(normals)
+
+
+def method_named(name: str, criterion: float | None, limit: int) -> FrictionMethod:
+    """A method from its name and figures; MechanismError if they make no sense."""
+    for known in get_args(Method):
+        if name == known:
+            if criterion is not None and not criterion > 0:
+                raise MechanismError(Finding(f"a criterion of {criterion:g} N is never met", "criterion", "above 0"))
+            if limit < 1:
+                raise MechanismError(Finding(f"{limit} rounds settle nothing", "iterations", "give 1 or more"))
+            return FrictionMethod(known, criterion, limit)
+    known_names = " or ".join(get_args(Method))
+    raise MechanismError(Finding(f"there is no method '{name}'", "method", f"use {known_names}"))
 
 
 class Contact(NamedTuple):
@@ -106,6 +120,13 @@ def settle(
     return state._replace(reactions=problem.reactions(state.forces))
 
 
+class _State(NamedTuple):
+    """Reaction and normal load at every contact."""
+
+    reactions: list[Wrench]
+    normals: list[Number]
+
+
 @dataclass(frozen=True)
 class _Problem:
     """φ = law(N(R₀ + G φ))."""
@@ -147,8 +168,10 @@ class _Problem:
     def reactions(self, forces: Sequence[Number]) -> list[Wrench]:
         return [self.at(joint, forces) for joint in range(len(self.start))]
 
-    def normals(self, forces: Sequence[Number]) -> list[Number]:
-        return [contact.load.normal(self.at(contact.joint, forces)) for contact in self.contacts]
+    def state(self, forces: Sequence[Number]) -> _State:
+        """Reactions and normal loads at the contacts under friction forces."""
+        at = [self.at(contact.joint, forces) for contact in self.contacts]
+        return _State(at, [c.load.normal(reaction) for c, reaction in zip(self.contacts, at, strict=True)])
 
     def target(self, normals: Sequence[Number]) -> list[Number]:
         """What the laws say for these normal loads."""
@@ -161,81 +184,94 @@ class _Problem:
             for c, n in zip(self.contacts, normals, strict=True)
         ]
 
-    def map_derivative(self, normals: Sequence[Number], forces: Sequence[Number]) -> list[list[Number]]:
+    def map_derivative(self, state: _State, slopes: Sequence[Number]) -> list[list[Number]]:
         """A with A_kl = ∂ law_k / ∂ φ_l."""
         rows = []
-        for contact, normal, slope in zip(self.contacts, normals, self.slopes(normals), strict=True):
-            gradient = contact.load.gradient(self.at(contact.joint, forces), normal)
+        for contact, reaction, normal, slope in zip(self.contacts, *state, slopes, strict=True):
+            gradient = contact.load.gradient(reaction, normal)
             rows.append([slope * _along(gradient, column[contact.joint]) for column in self.influence])
         return rows
 
     def bound(self, slopes: Sequence[Number]) -> Number:
         """Largest row sum of |A| over all reactions: below 1 the solution exists, alone, for any share of friction."""
         rows = [
-            sum(np.abs(primal(slope)) * primal(contact.load.bound(column[contact.joint])) for column in self.influence)
+            np.abs(slope) * sum(contact.load.bound(column[contact.joint]) for column in self.influence)
             for contact, slope in zip(self.contacts, slopes, strict=True)
         ]
         return _largest(rows)
 
 
 def _newton(problem: _Problem, method: FrictionMethod) -> Settled:
-    """Newton from no friction; lanes without the certificate of `bound` are followed by continuation."""
+    """Newton from no friction; lanes without the certificate of `bound` are followed by continuation.
+
+    The matrix is kept while a round reduces the change a hundredfold, which in all but the worst cases is always.
+    """
     real = _primal(problem)
-    n = len(real.contacts)
-    forces: list[Number] = [0.0] * n
-    normals = real.normals(forces)
-    bound = real.bound(real.slopes(normals))
+    forces: list[Number] = [0.0] * len(real.contacts)
+    state = real.state(forces)
+    slopes = real.slopes(state.normals)
+    certain = ~(real.bound(slopes) >= 1.0)
     rows: list[list[Number]] = []
+    inverse: list[list[Number]] = []
     change: Number = np.inf
     iterations = 0
     done: Number = False
+    renew = True
     while iterations < method.limit and not np.all(done):
         iterations += 1
-        rows, forces = _newton_step(real, normals, forces)
-        before, normals = normals, real.normals(forces)
-        change = _largest([after - n for after, n in zip(normals, before, strict=True)])
-        done = ~(change > method.tolerance(normals))  # a lane of NaN has nothing to wait for
+        if renew:
+            rows = real.map_derivative(state, slopes if iterations == 1 else real.slopes(state.normals))
+            inverse = linalg.inverse(_identity_minus(rows))
+        forces = _corrected(real, state, forces, inverse)
+        before, state = state, real.state(forces)
+        previous, change = change, _changed(state, before)
+        done = ~(change > method.tolerance(state.normals)) | ~certain  # nor has a lane of NaN anything to wait for
+        renew = bool(np.any((change > 0.01 * previous) & ~done))
     shares: Number = 1.0
-    certain = ~(bound >= 1.0)
     if not np.all(certain):
         forces, shares = _follow(real, forces, ~certain)
-        normals = real.normals(forces)
-        rows = real.map_derivative(normals, forces)
+        state = real.state(forces)
         done = np.where(certain, done, shares >= 1.0)
+        rows = real.map_derivative(state, real.slopes(state.normals))
+        inverse = linalg.inverse(_identity_minus(rows))
     for _ in range(_depth(problem)):
-        residual = [a - b for a, b in zip(problem.target(problem.normals(forces)), forces, strict=True)]
-        (step,) = linalg.solve(_identity_minus(rows), residual)
-        forces = [f + s for f, s in zip(forces, step, strict=True)]
+        forces = _corrected(problem, problem.state(forces), forces, inverse)
     contraction = _largest([sum(np.abs(entry) for entry in row) for row in rows])
     return Settled([], forces, iterations, change, contraction, done, shares)
 
 
-def _newton_step(
-    problem: _Problem, normals: Sequence[Number], forces: Sequence[Number]
-) -> tuple[list[list[Number]], list[Number]]:
-    """A at the present forces, and the forces after one step of (1 − A) δφ = law − φ."""
-    rows = problem.map_derivative(normals, forces)
-    residual = [a - b for a, b in zip(problem.target(normals), forces, strict=True)]
-    (step,) = linalg.solve(_identity_minus(rows), residual)
-    return rows, [f + s for f, s in zip(forces, step, strict=True)]
+def _corrected(
+    problem: _Problem, state: _State, forces: Sequence[Number], inverse: Sequence[Sequence[Number]]
+) -> list[Number]:
+    """φ + (1 − A)⁻¹ (law − φ)."""
+    residual = [a - b for a, b in zip(problem.target(state.normals), forces, strict=True)]
+    return [
+        force + sum(entry * part for entry, part in zip(row, residual, strict=True))
+        for force, row in zip(forces, inverse, strict=True)
+    ]
+
+
+def _changed(state: _State, before: _State) -> Number:
+    """Largest change of a normal load, N."""
+    return _largest([a - b for a, b in zip(state.normals, before.normals, strict=True)])
 
 
 def _successive(problem: _Problem, method: FrictionMethod) -> Settled:
     """[D] steps 1-5: friction from the last reactions, reactions from the last friction, until they rest."""
     forces: list[Number] = [0.0] * len(problem.contacts)
-    normals = problem.normals(forces)
+    state = problem.state(forces)
     change: Number = np.inf
     previous: Number = np.inf
     done: Number = False
     iterations = 0
     while iterations < method.limit and not np.all(done):
         iterations += 1
-        forces = problem.target(normals)
-        before, normals = normals, problem.normals(forces)
-        previous, change = change, primal(_largest([a - b for a, b in zip(normals, before, strict=True)]))
-        done = ~(change > method.tolerance(normals))
-    with np.errstate(all="ignore"):
-        ratio = np.where(np.isfinite(previous) & (previous > 0), change / np.where(previous > 0, previous, 1.0), 0.0)
+        forces = problem.target(state.normals)
+        before, state = state, problem.state(forces)
+        previous, change = change, _changed(state, before)
+        done = ~(change > method.tolerance(state.normals))
+    measurable = np.isfinite(previous) & (previous > 0)
+    ratio = np.where(measurable, change / np.where(measurable, previous, 1.0), 0.0)
     return Settled([], forces, iterations, change, ratio, done, 1.0)
 
 
@@ -261,9 +297,10 @@ def _scaled_system(problem: _Problem) -> continuation.System:
     def system(
         forces: Sequence[NDArray[np.float64]], share: NDArray[np.float64]
     ) -> tuple[list[Number], list[list[Number]]]:
-        normals = problem.normals(forces)
-        residual = [f - share * t for f, t in zip(forces, problem.target(normals), strict=True)]
-        rows = [[share * entry for entry in row] for row in problem.map_derivative(normals, forces)]
+        state = problem.state(forces)
+        residual = [f - share * t for f, t in zip(forces, problem.target(state.normals), strict=True)]
+        slopes = problem.slopes(state.normals)
+        rows = [[share * entry for entry in row] for row in problem.map_derivative(state, slopes)]
         return residual, _identity_minus(rows)
 
     return system

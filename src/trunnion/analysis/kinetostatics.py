@@ -69,7 +69,7 @@ def solve(
 def backward(walk: Forward, method: FrictionMethod, zero_slip: Mapping[str, float]) -> Backward:
     """Reactions and friction of every module, last module first."""
     system = walk.system
-    back = Backward(walk, {link: ZERO_LOAD for link in system.mechanism.links})
+    back = Backward(walk, dict.fromkeys(system.mechanism.links, ZERO_LOAD))
     for name in system.joints:
         back.slips[name] = _slip(walk, name)
     _add_body_loads(back)

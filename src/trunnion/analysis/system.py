@@ -67,7 +67,7 @@ class System:
     @cached_property
     def joints(self) -> dict[str, tuple[str, tuple[str, str]]]:
         """Kind and links of every joint, as the file has them."""
-        return {name: (joint.type, tuple(joint.links)) for name, joint in self.mechanism.joints.items()}
+        return {name: (joint.type, joint.links) for name, joint in self.mechanism.joints.items()}
 
     @cached_property
     def points(self) -> tuple[tuple[str, str], ...]:
@@ -78,15 +78,16 @@ class System:
         name = module.joints[k]
         kind, (first, second) = self.joints[name]
         links = (second, first) if module.reversed_[k] else (first, second)
-        return Place(name, kind, links, tuple(link not in module.links for link in links), module.reversed_[k])
+        outer = (links[0] not in module.links, links[1] not in module.links)
+        return Place(name, kind, links, outer, module.reversed_[k])
 
     def _group(self, module: Module) -> Group:
         if module.kind in GROUPS:
             return GROUPS[module.kind]
         number = {link: i for i, link in enumerate(module.links)}
         joints = tuple(
-            GroupJoint(self.joints[name][0], tuple(number.get(link, OUTER) for link in self.joints[name][1]))
-            for name in module.joints
+            GroupJoint(kind, (number.get(first, OUTER), number.get(second, OUTER)))
+            for kind, (first, second) in (self.joints[name] for name in module.joints)
         )
         return General(len(module.links), joints, tuple(module.joints.index(name) for name in module.driven))
 
@@ -148,22 +149,19 @@ class System:
         if not drivers:
             return Cycle(0.0, periodic=False)
         nominal = {path: float(np.ravel(primal(value))[0]) for path, value in values.items() if "drivers." in path}
+        ranged = [name for name in drivers if f"drivers.{name}.range.from" in nominal]
         durations: dict[str, float] = {}
         findings: list[Finding] = []
         for name in drivers:
             speed = nominal[f"drivers.{name}.speed"]
-            ranged = f"drivers.{name}.range.from" in nominal
-            extent = (
-                nominal[f"drivers.{name}.range.to"] - nominal[f"drivers.{name}.range.from"]
-                if ranged
-                else float(np.copysign(2 * np.pi, speed))
-            )
+            extent = float(np.copysign(2 * np.pi, speed))
+            if name in ranged:
+                extent = nominal[f"drivers.{name}.range.to"] - nominal[f"drivers.{name}.range.from"]
             durations[name] = extent / speed
             if durations[name] < 0:
                 what = f"the range runs {'up' if extent > 0 else 'down'}, the speed is {speed:g} (SI)"
                 findings.append(Finding(what, f"drivers.{name}.range", "swap the ends of the range, or the sign"))
         longest = max(durations.values())
-        ranged = [name for name in drivers if f"drivers.{name}.range.from" in nominal]
         for name in ranged:
             if not findings and abs(durations[name] - longest) > 1e-9 * longest:
                 what = f"its range takes {durations[name]:g} s, the whole cycle takes {longest:g} s"

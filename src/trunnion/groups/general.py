@@ -425,7 +425,7 @@ class General:
                     outboard = _plus(outboard, carried[link], 1.0)
             screw = self._screws(pose.elements, _reference(pose))[i]
             powers.append(screw.x * outboard.x + screw.y * outboard.y + screw.w * outboard.m)
-        found = {k: ZERO_LOAD for k in self.cuts}
+        found = dict.fromkeys(self.cuts, ZERO_LOAD)
         for j, row in enumerate(self._rows):
             size = -_weighted([line[j] for line in pose.inverse], powers)
             first = pose.elements[row.joint][0]

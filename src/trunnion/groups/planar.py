@@ -18,6 +18,7 @@ __all__ = [
     "about",
     "accelerated",
     "compose",
+    "is_zero",
     "moved",
     "point",
     "relative",
@@ -64,16 +65,16 @@ class Wrench(NamedTuple):
 ZERO_LOAD = Wrench(0.0, 0.0, 0.0)
 
 
-def _is_zero(number: Number) -> bool:
+def is_zero(number: Number) -> bool:
     """A literal zero, as most local coordinates are: skipping it saves whole passes over an array."""
     return isinstance(number, float) and number == 0.0
 
 
 def turned(c: Number, s: Number, x: Number, y: Number) -> tuple[Number, Number]:
     """(x, y) turned by the angle whose cosine and sine are c, s."""
-    if _is_zero(y):
-        return (0.0, 0.0) if _is_zero(x) else (c * x, s * x)
-    if _is_zero(x):
+    if is_zero(y):
+        return (0.0, 0.0) if is_zero(x) else (c * x, s * x)
+    if is_zero(x):
         return -(s * y), c * y
     return c * x - s * y, s * x + c * y
 
@@ -115,6 +116,6 @@ def accelerated(acceleration: Acceleration, w: Number, dx: Number, dy: Number) -
 
 def about(wrench: Wrench, dx: Number, dy: Number) -> Wrench:
     """The wrench about the point that lies (dx, dy) from its present one."""
-    if _is_zero(wrench.x) and _is_zero(wrench.y):  # a pure moment is the same about every point
+    if is_zero(wrench.x) and is_zero(wrench.y):  # a pure moment is the same about every point
         return wrench
     return Wrench(wrench.x, wrench.y, wrench.m - (dx * wrench.y - dy * wrench.x))

@@ -13,7 +13,7 @@ from typing import NamedTuple, TypeVar
 
 from trunnion.algebra.linalg import Vector, cross, dot
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.groups.planar import Acceleration, Frame, Twist, Wrench, about, accelerated, moved, turned
+from trunnion.groups.planar import Acceleration, Frame, Twist, Wrench, about, accelerated, is_zero, moved, turned
 from trunnion.groups.protocol import Elements
 
 __all__ = ["Pose", "acceleration", "closure", "condition", "meet", "position", "reactions", "velocity"]
@@ -22,7 +22,10 @@ _Motion = TypeVar("_Motion", Twist, Acceleration)
 
 
 class Pose(NamedTuple):
-    """Frames of the links i, j; B→C, D→C, and from the frame origins to B and D, global axes, m; |BC|, |CD|."""
+    """Frames of the links i, j; B→C, D→C, and from the frame origins to B and D, global axes, m; |BC|, |CD|.
+
+    area: 1/(BC × DC), 1/m²; infinite in a dead centre. closure: opening of the pin C, m.
+    """
 
     frames: tuple[Frame, Frame]
     bc: Vector
@@ -30,6 +33,7 @@ class Pose(NamedTuple):
     b: Vector
     d: Vector
     lengths: tuple[Number, Number]
+    area: Number
     closure: Number
 
 
@@ -61,8 +65,9 @@ def position(elements: Elements, assembly: int, drive: Sequence[Number] = ()) ->
     dc = (bc[0] - (d.x - b.x), bc[1] - (d.y - b.y))
     frame_i, arm_b = _frame(b, b_i, bc, side_i, lengths[0])
     frame_j, arm_d = _frame(d, d_j, dc, side_j, lengths[1])
-    gap = xp.abs(namespace(*bc).hypot(*bc) - lengths[0]) + xp.abs(namespace(*dc).hypot(*dc) - lengths[1])
-    return Pose((frame_i, frame_j), bc, dc, arm_b, arm_d, lengths, gap)
+    xp = namespace(*bc)
+    gap = xp.abs(xp.sqrt(dot(bc, bc)) - lengths[0]) + xp.abs(xp.sqrt(dot(dc, dc)) - lengths[1])
+    return Pose((frame_i, frame_j), bc, dc, arm_b, arm_d, lengths, 1 / cross(bc, dc), gap)
 
 
 def _frame(pin: Frame, local: Frame, reach: Vector, side: Vector, length: Number) -> tuple[Frame, Vector]:
@@ -116,8 +121,7 @@ def _known(outer: Sequence[_Motion | None]) -> tuple[_Motion, _Motion]:
 
 def _rates(pose: Pose, jump: Vector) -> tuple[Number, Number]:
     """(p, q) with p × BC − q × DC = jump; × means z × vector. No solution where B, C, D are in line."""
-    area = cross(pose.bc, pose.dc)
-    return dot(jump, pose.dc) / area, dot(jump, pose.bc) / area
+    return dot(jump, pose.dc) * pose.area, dot(jump, pose.bc) * pose.area
 
 
 def reactions(pose: Pose, loads: Sequence[Wrench]) -> list[Wrench]:
@@ -129,11 +133,20 @@ def reactions(pose: Pose, loads: Sequence[Wrench]) -> list[Wrench]:
     """
     on_i = about(loads[0], *pose.b)
     on_j = about(loads[1], *pose.d)
-    area = cross(pose.bc, pose.dc)
-    p, q = on_j.m / area, on_i.m / area
-    x = p * pose.bc[0] + q * pose.dc[0]
-    y = p * pose.bc[1] + q * pose.dc[1]
+    x, y = _shared(on_i.m, on_j.m, pose)
     return [Wrench(x - on_i.x, y - on_i.y, 0.0), Wrench(x, y, 0.0), Wrench(-x - on_j.x, -y - on_j.y, 0.0)]
+
+
+def _shared(m_i: Number, m_j: Number, pose: Pose) -> Vector:
+    """F_ij from the moments on both links; a literal zero among them, as in a unit friction load, costs nothing."""
+    if is_zero(m_j):
+        q = m_i * pose.area
+        return q * pose.dc[0], q * pose.dc[1]
+    p = m_j * pose.area
+    if is_zero(m_i):
+        return p * pose.bc[0], p * pose.bc[1]
+    q = m_i * pose.area
+    return p * pose.bc[0] + q * pose.dc[0], p * pose.bc[1] + q * pose.dc[1]
 
 
 def closure(pose: Pose) -> Number:
@@ -144,4 +157,4 @@ def closure(pose: Pose) -> Number:
 def condition(pose: Pose) -> Number:
     """2/|sin μ|, μ the transmission angle between BC and DC: Frobenius condition of their unit vectors."""
     xp = namespace(*pose.bc)
-    return 2 * pose.lengths[0] * pose.lengths[1] / xp.abs(cross(pose.bc, pose.dc))
+    return 2 * pose.lengths[0] * pose.lengths[1] * xp.abs(pose.area)

@@ -47,9 +47,9 @@ class Load(NamedTuple):
 
     def normal(self, reaction: Reaction) -> Number:
         """Normal load N ≥ 0, N."""
-        x, y, m = reaction
+        x, y, _ = reaction
         if self.across is None:
-            return namespace(x, y).hypot(x, y)
+            return namespace(x, y).sqrt(x * x + y * y)  # hypot guards against overflow and costs four times as much
         one, other = self._ends(reaction)
         xp = namespace(one, other)
         return xp.abs(one) + xp.abs(other)
@@ -66,7 +66,9 @@ class Load(NamedTuple):
         return half * self.across[0], half * self.across[1], turn
 
     def bound(self, reaction: Reaction) -> Number:
-        """Most by which this reaction, added to any other, can change N."""
+        """At least the most by which this reaction, added to any other, can change N."""
+        if self.across is None:
+            return np.abs(reaction[0]) + np.abs(reaction[1])
         return self.normal(reaction)
 
     def mapped(self, change: Callable[[Number], Number]) -> Load:

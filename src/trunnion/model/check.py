@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from trunnion.errors import Finding, Severity
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.joints.pairs import PAIRS
@@ -36,7 +38,8 @@ def check_model(mechanism: Mechanism, lost: Collection[str] = ()) -> list[Findin
     findings += [] if lost else _absent(mechanism)
     findings += [*_loop(mechanism), *_drivers(mechanism), *_loads(mechanism), *_others(mechanism)]
     numbers = ParameterSet(mechanism, unreadable) if unreadable else mechanism.parameter_set
-    findings += check_values(mechanism, numbers)
+    with np.errstate(all="ignore"):  # absurd numbers may overflow in a check; they are still only numbers
+        findings += check_values(mechanism, numbers)
     findings = list(dict.fromkeys(findings))  # a default that several joints share is found once
     return [finding for finding in findings if not any(_speaks_of(finding, name) for name in lost)]
 
@@ -145,7 +148,8 @@ def _links(mechanism: Mechanism) -> Iterator[Finding]:
 def _length(found: int, size: int, where: str) -> Iterator[Finding]:
     if found != size:
         space = "planar" if size == 2 else "spatial"
-        yield Finding(f"has {found} coordinates, a {space} model needs {size}", where, f"give {size}")
+        remedy = f"give {size}; a decimal comma would make two numbers of one"
+        yield Finding(f"has {found} coordinates, a {space} model needs {size}", where, remedy)
 
 
 def _joints(mechanism: Mechanism) -> Iterator[Finding]:

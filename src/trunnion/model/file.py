@@ -16,7 +16,7 @@ from typing import Any
 
 from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
-from ruamel.yaml.events import AliasEvent
+from ruamel.yaml.events import AliasEvent, CollectionEndEvent, CollectionStartEvent
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
 from trunnion.errors import Finding, MechanismError
@@ -40,7 +40,8 @@ def read_mechanism(path: str | os.PathLike[str]) -> Mechanism:
     """
     path = Path(path)
     try:
-        data, lines = _parse(_text(path), _file_type(path))
+        kind = _file_type(path)
+        data, lines = _parse(_text(path), kind)
         findings = [] if "trunnion" in data else [_unversioned()]
     except MechanismError as error:
         raise MechanismError(finding.at(str(path), finding.line) for finding in error.findings) from None
@@ -165,9 +166,8 @@ def _parse_yaml(text: str, kind: str) -> tuple[dict[str, Any], Lines]:
     if kind == "JSON":
         text = text.replace("\t", " ")  # allowed between the tokens of JSON, not of YAML
     try:
-        for event in YAML(typ="safe", pure=True).parse(text):
-            _refuse(event)
-        root = YAML(typ="safe", pure=True).compose(text)
+        refused = _refused(YAML(typ="safe", pure=True).parse(text))
+        root = None if refused else YAML(typ="safe", pure=True).compose(text)
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         what = f"is not {kind}: {error.problem or error.context}" + (f" (column {mark.column + 1})" if mark else "")
@@ -180,26 +180,33 @@ def _parse_yaml(text: str, kind: str) -> tuple[dict[str, Any], Lines]:
     except (ValueError, TypeError, LookupError, AttributeError, AssertionError, ArithmeticError) as error:
         # ruamel lets some of Python's own errors pass on text that is no YAML
         raise MechanismError(Finding(f"is not {kind}: {error}", remedy="check that it is a text file")) from error
+    if refused:
+        raise MechanismError(refused)
     if not isinstance(root, MappingNode):
         what = "is not a group of entries (key: value) at its top"
         raise MechanismError(Finding(what, remedy="start from one of the examples", line=1))
     builder = _Builder()
-    data = builder.build(root, "", 0)
+    data = builder.build(root, "")
     if builder.findings:
         raise MechanismError(builder.findings)
     return data, builder.lines
 
 
-def _refuse(event: Any) -> None:
-    """Aliases (a few bytes of which can mean gigabytes) and tags (which can name code) are no part of a model file."""
-    line = event.start_mark.line + 1
-    if isinstance(event, AliasEvent):
-        raise MechanismError(
-            Finding(f"the alias *{event.anchor} is not allowed", remedy="write it out, or name a dimension", line=line)
-        )
-    tag = str(getattr(event, "tag", None) or "")
-    if tag and tag not in _PLAIN_TAGS and tag != "!":
-        raise MechanismError(Finding(f"the tag {tag} is not allowed", remedy="remove the tag", line=line))
+def _refused(events: Iterable[Any]) -> Finding | None:
+    """What no model file has: aliases (a few bytes can mean gigabytes), tags (they can name code), deep nesting."""
+    depth = 0
+    for event in events:
+        line = event.start_mark.line + 1
+        depth += isinstance(event, CollectionStartEvent) - isinstance(event, CollectionEndEvent)
+        tag = str(getattr(event, "tag", None) or "")
+        if isinstance(event, AliasEvent):
+            what = f"the alias *{event.anchor} is not allowed"
+            return Finding(what, remedy="write it out, or name a dimension", line=line)
+        if tag and tag not in _PLAIN_TAGS and tag != "!":
+            return Finding(f"the tag {tag} is not allowed", remedy="remove the tag", line=line)
+        if depth > MAX_DEPTH:
+            return Finding("is nested too deeply", remedy="check brackets and indentation", line=line)
+    return None
 
 
 class _Builder:
@@ -209,19 +216,17 @@ class _Builder:
         self.lines: Lines = {}
         self.findings: list[Finding] = []
 
-    def build(self, node: Node, path: str, depth: int) -> Any:
+    def build(self, node: Node, path: str) -> Any:
         """The value of a node at a path."""
         self.lines.setdefault(path, node.start_mark.line + 1)
-        if depth > MAX_DEPTH:
-            raise RecursionError
         if isinstance(node, MappingNode):
-            return self._mapping(node, path, depth)
+            return self._mapping(node, path)
         if isinstance(node, SequenceNode):
-            return [self.build(item, f"{path}.{index}", depth + 1) for index, item in enumerate(node.value)]
+            return [self.build(item, f"{path}.{index}") for index, item in enumerate(node.value)]
         assert isinstance(node, ScalarNode)  # there are no other nodes
         return self._scalar(node, path)
 
-    def _mapping(self, node: MappingNode, path: str, depth: int) -> dict[str, Any]:
+    def _mapping(self, node: MappingNode, path: str) -> dict[str, Any]:
         values: dict[str, Any] = {}
         for key_node, value_node in node.value:
             line = key_node.start_mark.line + 1
@@ -235,7 +240,7 @@ class _Builder:
                 self.findings.append(Finding(what, below, "remove one of them", line=line))
                 continue
             self.lines[below] = line
-            values[key] = self.build(value_node, below, depth + 1)
+            values[key] = self.build(value_node, below)
         return values
 
     def _scalar(self, node: ScalarNode, path: str) -> Any:

@@ -12,6 +12,7 @@ from pydantic_core import ErrorDetails
 
 from trunnion.errors import Finding
 from trunnion.model.names import nearest
+from trunnion.model.parts import FORMS
 from trunnion.model.quantity import UNREADABLE
 
 __all__ = ["repair", "schema_findings"]
@@ -34,7 +35,14 @@ _MEANINGS: Mapping[str, tuple[str, str]] = {
 
 def schema_findings(error: ValidationError, model: type[BaseModel], data: Mapping[str, Any]) -> list[Finding]:
     """One finding for each thing that pydantic found, with its path."""
-    return [_finding(one, model, data) for one in error.errors(include_url=False)]
+    return [_finding(one, model, data) for one in _errors(error)]
+
+
+def _errors(error: ValidationError) -> list[ErrorDetails]:
+    """pydantic's errors, but for lists that are too short only because some of their items are wrong."""
+    found = error.errors(include_url=False)
+    parents = {one["loc"][:-1] for one in found}
+    return [one for one in found if one["type"] != "too_short" or one["loc"] not in parents]
 
 
 def _finding(error: ErrorDetails, model: type[BaseModel], data: Mapping[str, Any]) -> Finding:
@@ -61,7 +69,7 @@ def _finding(error: ErrorDetails, model: type[BaseModel], data: Mapping[str, Any
 
 def _plain(location: tuple[int | str, ...]) -> tuple[int | str, ...]:
     """A location without the marks of pydantic: tags of forms and of keys."""
-    return tuple(part for part in location if part != "[key]" and not str(part).startswith(":"))
+    return tuple(part for part in location if part not in ("[key]", *FORMS))
 
 
 def _path(location: tuple[int | str, ...], data: Mapping[str, Any]) -> str:
@@ -86,16 +94,20 @@ def _fields(model: type[BaseModel], location: tuple[int | str, ...]) -> list[str
     reached: list[Any] = [model]
     for part in location:
         reached = [below for annotation in reached for below in _below(annotation, part)]
-    return [field for one in reached for field in one.model_fields]
+    return [field for one in reached if _is_part(one) for field in one.model_fields]
 
 
 def _below(annotation: Any, part: int | str) -> Iterator[type[BaseModel]]:
     """The model classes, or containers of them, that an annotation has under a key."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+    if _is_part(annotation):
         field = annotation.model_fields.get(str(part))
         yield from _classes(field.annotation) if field else ()
     else:
         yield from _classes(typing.get_args(annotation)[1 if _origin(annotation) is Mapping else 0])
+
+
+def _is_part(annotation: Any) -> bool:
+    return isinstance(annotation, type) and issubclass(annotation, BaseModel)
 
 
 def _origin(annotation: Any) -> Any:
@@ -111,9 +123,7 @@ def _classes(annotation: Any) -> Iterator[Any]:
             yield from _classes(one)
     elif origin is typing.Annotated:
         yield from _classes(typing.get_args(annotation)[0])
-    elif _origin(annotation) in (Mapping, tuple) or (
-        isinstance(annotation, type) and issubclass(annotation, BaseModel)
-    ):
+    elif _origin(annotation) in (Mapping, tuple) or _is_part(annotation):
         yield annotation
 
 
@@ -121,7 +131,7 @@ def repair(error: ValidationError, data: Mapping[str, Any]) -> tuple[dict[str, A
     """The data without what could not be read, to check the rest; and the names of the entries lost with it."""
     mended = {key: _mutable(value) for key, value in data.items()}
     lost: set[str] = set()
-    for one in error.errors(include_url=False, include_input=False):
+    for one in _errors(error):
         location = _plain(one["loc"])
         if one["type"] == "extra_forbidden":
             _at(mended, location, lambda holder, key: holder.pop(key, None))
@@ -130,7 +140,7 @@ def repair(error: ValidationError, data: Mapping[str, Any]) -> tuple[dict[str, A
         else:
             entry = location[: 2 if len(location) > 1 and location[0] not in ("gravity", "loop") else 1]
             _at(mended, entry, lambda holder, key: holder.pop(key, None))
-            lost.add(str(entry[-1]))
+            lost.update(str(part) for part in entry[-1:])
     return mended, frozenset(lost)
 
 
@@ -150,6 +160,8 @@ def _unreadable(holder: Any, key: int | str) -> None:
 
 def _at(data: Any, location: tuple[int | str, ...], change: Callable[[Any, Any], Any]) -> None:
     """Apply a change at a location; a short form has no such place, and its entry is changed as a whole."""
+    if not location:
+        return
     holder = data
     *path, key = location
     for part in path:

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 __all__ = ["Entry", "ParameterSet", "entries", "evaluation_order", "merge_joint"]
 
 DEFAULT_LAW = "coulomb"
+NO_FRICTION = Quantity(0)
 Location = tuple[str | int, ...]
 
 
@@ -159,6 +160,9 @@ def merge_joint(joint: Joint, defaults: JointDefaults) -> Joint:
     if not turns and (guide or defaults.guide):
         guide = Guide(**{**_stated(defaults.guide), **_stated(guide)})
     friction = _friction(_stated(defaults.friction), _stated(joint.friction))
+    contact = pin.radius if turns and pin else guide.length if guide and not turns else None
+    if friction and contact is None and friction.parameters.get("coefficient") == NO_FRICTION:
+        friction = None  # friction: 0 asks for no radius or length
     return joint.model_copy(update={"pin": pin, "guide": guide, "friction": friction})
 
 

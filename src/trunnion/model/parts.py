@@ -112,6 +112,9 @@ def _known(table: tuple[str, ...], noun: str) -> Any:
     return AfterValidator(check), WithJsonSchema({"type": "string", "enum": list(table)})
 
 
+FORMS = (":group", ":list", ":value")  # tags of the forms an entry may have
+
+
 def _shape(value: object) -> str:
     """Which of the forms of an entry was written: a list, a group of entries or a single value."""
     if isinstance(value, (Mapping, BaseModel)):

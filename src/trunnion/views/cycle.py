@@ -15,7 +15,7 @@ from trunnion.views.quantities import prefixed
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Abscissa", "Interval", "abscissa", "attribute", "intervals", "layout", "status_text", "thin"]
+__all__ = ["Abscissa", "Interval", "abscissa", "attribute", "intervals", "layout", "status_text", "thin", "usual_peak"]
 
 Array = NDArray[np.float64]
 TEXTS = {int(status): status.text for status in Status}
@@ -161,6 +161,19 @@ def intervals(result: xr.Dataset, lowest: int = Status.NOT_CONVERGED) -> list[In
     starts, stops = [0, *edges.tolist()], [*edges.tolist(), status.size]
     runs = (Interval(start, stop, int(status[start])) for start, stop in zip(starts, stops, strict=True))
     return [run for run in runs if run.status >= lowest]
+
+
+def usual_peak(*columns: Array | None) -> float:
+    """The magnitude a figure should show: the greatest, unless it towers over nearly all the rest.
+
+    Next to a dead centre forces grow without bound and would flatten everything else; then it is four times the
+    magnitude that 90 % of the values stay below, and the figure says what it leaves out.
+    """
+    sizes = np.concatenate([np.abs(values[np.isfinite(values)]) for values in columns if values is not None] or [[]])
+    if not sizes.size:
+        return 0.0
+    most, usual = float(sizes.max()), float(np.quantile(sizes, 0.9))
+    return 4.0 * usual if 0.0 < usual < most / 16.0 else most
 
 
 def thin(values: Array, most: int = 4000) -> NDArray[np.intp]:

@@ -175,9 +175,7 @@ def _joint(axes: Axes, shown: Picture, name: str, joint: dict[str, Any], index: 
     if grounded:
         _support(axes, place, 0.022 * shown.size)
     r = 0.0095 * shown.size
-    axes.add_patch(
-        Circle((place[0], place[1]), r, facecolor="white", edgecolor=INK, linewidth=1.3, zorder=6)
-    )
+    axes.add_patch(Circle((place[0], place[1]), r, facecolor="white", edgecolor=INK, linewidth=1.3, zorder=6))
 
 
 def _support(axes: Axes, place: Array, r: float) -> None:

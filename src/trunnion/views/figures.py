@@ -14,6 +14,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.ticker import AutoMinorLocator, MaxNLocator, MultipleLocator
 
 from trunnion.views.cycle import Abscissa, Array, intervals, thin
+from trunnion.views.quantities import quantity
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -129,6 +130,32 @@ def _write_cause(axes: Axes, x: float, text: str) -> None:
         x, 0.5, short, transform=axes.get_xaxis_transform(), rotation=90, ha="center", va="center",
         fontsize=8, color=MUTED, zorder=3, clip_on=True,
     )  # fmt: skip
+
+
+def frame_peak(axes: Axes, most: float, shown: float, factor: float, unit: str) -> None:
+    """Cut the vertical axis at `shown` where the curves rise far above it to `most`, and say so in the frame."""
+    if shown >= most:
+        return
+    low, high, room = axes.dataLim.y0, axes.dataLim.y1, 1.05
+    axes.set_ylim(max(min(low, 0.0), -shown * factor) * room, min(max(high, 0.0), shown * factor) * room)
+    _outside(axes, most, unit)
+
+
+def _outside(axes: Axes, most: float, unit: str) -> None:
+    text = f"peak {quantity(most, unit)} lies outside"
+    axes.text(0.99, 0.97, text, transform=axes.transAxes, ha="right", va="top", fontsize=8, color=MUTED)
+
+
+def square(axes: Axes, most: float, shown: float, factor: float, unit: str) -> None:
+    """Equal scales on both axes; where a vector grows far beyond `shown`, the window around the origin of that size."""
+    if shown >= most:
+        axes.set_aspect("equal", adjustable="datalim")
+        axes.margins(0.1)
+        return
+    half = shown * factor
+    axes.set_aspect("equal", adjustable="box")
+    axes.set(xlim=(-half, half), ylim=(-half, half))
+    _outside(axes, most, unit)
 
 
 def legend(axes: Axes, most: int = 6) -> None:

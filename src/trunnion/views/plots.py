@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.lines import Line2D
 
-from trunnion.views.cycle import Abscissa, Array, abscissa, attribute, column, layout, names, thin
+from trunnion.views.cycle import Abscissa, Array, abscissa, attribute, column, layout, names, thin, usual_peak
 from trunnion.views.drawing import draw, picture
 from trunnion.views.figures import (
     INK,
@@ -25,13 +25,15 @@ from trunnion.views.figures import (
     along,
     curve,
     dress,
+    frame_peak,
     legend,
     new,
     plain,
     shade,
+    square,
     style_of,
 )  # fmt: skip
-from trunnion.views.quantities import prefixed
+from trunnion.views.quantities import prefixed, quantity
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -65,28 +67,32 @@ def torque(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
         free = None if ideal is None else column(ideal, "drive_effort", driver=driver)
         if effort is None:
             continue
-        factor, shown = prefixed(peak(effort, free), unit)
+        scope = usual_peak(effort, free)
+        factor, shown = prefixed(scope, unit)
         noun = "force" if unit == "N" else "torque"
         along(axes, over, f"{noun} {plain(driver)} [{shown}]")
         shade(axes, result, over)
-        _band(axes, result, over, driver, factor)
         curve(axes, over, effort * factor, "with friction" if free is not None else noun, color=PALETTE[0])
         if free is not None:
             curve(axes, over, free * factor, "without friction", color=PALETTE[1], linestyle=(0, (5, 2)), linewidth=1.3)
+        _band(axes, result, over, driver, factor)
+        frame_peak(axes, peak(effort, free), scope, factor, unit)
     _only_last_titled(list(panels))
     legend(panels[0])
     return figure
 
 
 def _band(axes: Axes, result: xr.Dataset, over: Abscissa, driver: str, factor: float) -> None:
-    """Where the friction of a joint at rest is an interval, so is the effort: fill it."""
+    """Where the friction of a joint at rest is an interval, so is the effort: a bar at each such position."""
     low = column(result, "drive_effort_lower", driver=driver)
     high = column(result, "drive_effort_upper", driver=driver)
-    if low is None or high is None or not (np.abs(high - low) > 1e-9 * (peak(low, high) or 1.0)).any():
+    if low is None or high is None:
         return
-    picked = thin(high - low)
-    axes.fill_between(over.values[picked], low[picked] * factor, high[picked] * factor, color=PALETTE[0], alpha=0.25,
-                      linewidth=0.8, label="range, friction at rest")  # fmt: skip
+    wide = np.flatnonzero(high - low > 0.002 * usual_peak(low, high))  # narrower ones would not be seen
+    if wide.size:
+        x = over.values[wide]
+        axes.vlines(x, low[wide] * factor, high[wide] * factor, color=PALETTE[0], alpha=0.35, linewidth=4.0,
+                    label="range, friction at rest")  # fmt: skip
 
 
 def _only_last_titled(panels: list[Axes]) -> None:
@@ -100,24 +106,26 @@ def friction_power(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figur
     losses = {joint: column(result, "friction_power", joint=joint) for joint in joints}
     known = {joint: values for joint, values in losses.items() if values is not None and peak(values) > 0}
     total = np.sum(list(known.values()), axis=0) if known else np.zeros(over.values.size)
-    factor, unit = prefixed(peak(total), "W")
+    scope = usual_peak(total)
+    factor, unit = prefixed(scope, "W")
     figure = new("Friction power by joint", result)
     axes = figure.subplots()
     along(axes, over, f"friction power [{unit}]")
     shade(axes, result, over)
     picked = thin(total)
     axes.fill_between(over.values[picked], 0, total[picked] * factor, color=SHADE, alpha=0.6, linewidth=0, zorder=1)
-    curve(axes, over, total * factor, f"all joints, {_mean(total, factor, unit)}", color=INK, linewidth=1.8)
+    curve(axes, over, total * factor, f"all joints, {_mean(total)}", color=INK, linewidth=1.8)
     for joint, values in known.items():
-        label = f"{joint}, {_mean(values, factor, unit)}"
+        label = f"{joint}, {_mean(values)}"
         curve(axes, over, values * factor, label, **style_of(joints.index(joint)), linewidth=1.4)
+    frame_peak(axes, peak(total), scope, factor, "W")
     legend(axes, most=3)
     return figure
 
 
-def _mean(values: Array, factor: float, unit: str) -> str:
+def _mean(values: Array) -> str:
     known = values[np.isfinite(values)]
-    return f"mean {known.mean() * factor:.4g} {unit}".replace("-", "−") if known.size else "no answer"
+    return f"mean {quantity(float(known.mean()), 'W')}" if known.size else "no answer"
 
 
 def _reaction(result: xr.Dataset, joint: str) -> Array:
@@ -130,7 +138,8 @@ def reactions(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
     """Magnitude of the reaction in each joint; without friction thin and dotted."""
     over, joints = abscissa(result), names(result, "joint")
     forces = [np.hypot(*_reaction(result, joint)) for joint in joints]
-    factor, unit = prefixed(peak(*forces), "N")
+    scope = usual_peak(*forces)
+    factor, unit = prefixed(scope, "N")
     figure = new("Joint reactions", result)
     axes = figure.subplots()
     along(axes, over, f"magnitude of the reaction [{unit}]")
@@ -141,6 +150,7 @@ def reactions(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
         for index, joint in enumerate(joints):
             free = np.hypot(*_reaction(ideal, joint))
             curve(axes, over, free * factor, "without friction" if index == 0 else None, **FREE)
+    frame_peak(axes, peak(*forces), scope, factor, "N")
     legend(axes)
     return figure
 
@@ -165,7 +175,8 @@ def polar(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
 
 
 def _hodograph(axes: Axes, over: Abscissa, joint: str, force: Array, free: Array | None, colour: str) -> None:
-    factor, unit = prefixed(peak(force, free), "N")
+    scope = usual_peak(np.hypot(*force), None if free is None else np.hypot(*free))
+    factor, unit = prefixed(scope, "N")
     dress(axes, f"Fx [{unit}]", f"Fy [{unit}]")
     axes.set_title(plain(joint), fontsize=10, fontweight="bold", color=INK, loc="left")
     axes.axhline(0, color=MUTED, linewidth=0.8, zorder=1.5)
@@ -173,9 +184,8 @@ def _hodograph(axes: Axes, over: Abscissa, joint: str, force: Array, free: Array
     if free is not None:
         axes.plot(*_loop(free, over) * factor, **FREE)
     axes.plot(*_loop(force, over) * factor, color=colour, linewidth=1.6)
-    _marks(axes, over, force * factor, colour)
-    axes.set_aspect("equal", adjustable="datalim")
-    axes.margins(0.1)
+    _marks(axes, over, force * factor, colour, 0.12 * scope * factor)
+    square(axes, peak(np.hypot(*force)), scope, factor, "N")
 
 
 def _loop(force: Array, over: Abscissa) -> Array:
@@ -185,8 +195,9 @@ def _loop(force: Array, over: Abscissa) -> Array:
     return np.hstack([kept, force[:, :1]]) if over.closed else kept
 
 
-def _marks(axes: Axes, over: Abscissa, force: Array, colour: str) -> None:
-    """Dots every 30°, with the angle at every 90°; without a turn only the start."""
+def _marks(axes: Axes, over: Abscissa, force: Array, colour: str, apart: float) -> None:
+    """Dots every 30°, with the angle at every 90° unless it would lie on another; without a turn only the start."""
+    labelled: list[Array] = []
     wanted = np.arange(0, 360, 30) if over.closed else over.values[:1]
     for angle in wanted:
         index = int(np.argmin(np.abs((over.values - angle + 180) % 360 - 180))) if over.closed else 0
@@ -194,7 +205,9 @@ def _marks(axes: Axes, over: Abscissa, force: Array, colour: str) -> None:
         if not np.isfinite(place).all():
             continue
         axes.plot(*place, "o", markersize=3.2, color=colour, markeredgecolor="white", markeredgewidth=0.5, zorder=4)
-        if not over.closed or angle % 90 == 0:
+        crowded = any(np.hypot(*(place - other)) < apart for other in labelled)
+        if not over.closed or (angle % 90 == 0 and not crowded):
+            labelled.append(place)
             axes.annotate(over.say(index), (place[0], place[1]), xytext=(5, 4), **NOTE)
 
 
@@ -233,7 +246,8 @@ def power(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
     lost = np.asarray(result["friction_power"].sum("joint", skipna=False).values, dtype=float)
     useful = np.zeros_like(lost) if useful is None else useful
     rest = drive - useful - lost
-    factor, unit = prefixed(peak(drive, useful, lost), "W")
+    scope = usual_peak(drive, useful, lost)
+    factor, unit = prefixed(scope, "W")
     figure = new("Power over the run", result)
     axes = figure.subplots()
     along(axes, over, f"power [{unit}]")
@@ -244,6 +258,7 @@ def power(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
     if peak(rest) > 1e-9 * peak(drive, useful, lost):
         label = "masses and other loads"
         curve(axes, over, rest * factor, label, color=MUTED, linestyle=(0, (2, 1.5)), linewidth=1.2)
+    frame_peak(axes, peak(drive, useful, lost), scope, factor, "W")
     legend(axes)
     return figure
 
@@ -280,7 +295,8 @@ def _rates(
     for order, axes in enumerate(panels):
         name = variable + ("", "_velocity", "_acceleration")[order]
         columns = {member: column(result, name, **{dim: member}) for member in members}
-        scale, shown = prefixed(peak(*columns.values()), unit) if order == 0 or unit == "m" else (1.0, unit)
+        scope = usual_peak(*columns.values())
+        scale, shown = prefixed(scope, unit) if order == 0 or unit == "m" else (1.0, unit)
         title = noun if order == 0 else ("velocity", "acceleration")[order - 1]
         rate = ("", "/s", "/s²")[order]
         along(axes, over, f"{title} [{shown}{rate}]")
@@ -288,6 +304,7 @@ def _rates(
         for index, (member, values) in enumerate(columns.items()):
             if values is not None:
                 curve(axes, over, values * scale, member, close=order > 0 or unit == "m", **style_of(index))
+        frame_peak(axes, peak(*columns.values()), scope, scale, unit + rate)
     _only_last_titled(panels)
 
 

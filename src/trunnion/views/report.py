@@ -138,12 +138,30 @@ def _worst(label: str, values: Any, unit: str, meaning: str, over: Any) -> dict[
 
 
 def _inputs(result: xr.Dataset) -> list[tuple[str, list[dict[str, str]]]]:
-    """Input rows by section of the model (the first name of their path), each as it was written."""
+    """Input rows by section of the model, the first name of their path."""
     rows = attribute(result, "inputs", [])
     sections = []
     for section, members in groupby(rows, key=lambda row: str(row["path"]).split(".")[0]):
-        lines = [{"path": str(row["path"]).removeprefix(f"{section}."),
-                  "text": str(row.get("text") or quantity(row.get("value"), str(row.get("unit") or "")))}
-                 for row in members]  # fmt: skip
+        lines = [{"path": str(row["path"]).removeprefix(f"{section}."), "text": _stated(row)} for row in members]
         sections.append((section.replace("_", " ").capitalize(), lines))
     return sections
+
+
+def _stated(row: dict[str, Any]) -> str:
+    """An input as it was written: a plain number with its SI unit, an expression with what it comes to."""
+    text, value = str(row.get("text") or ""), row.get("value")
+    unit = str(row.get("unit") or "")
+    unit = "" if unit in ("1", "SI") else unit  # a dimension is a length or an angle, as its own text says
+    if not text:
+        return quantity(value, unit)
+    if not text[0].isdigit() and text[0] not in "+-.":
+        return f"{text} = {quantity(value, unit)}"
+    return f"{text}\u00a0{unit}" if unit and _is_number(text) else text
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

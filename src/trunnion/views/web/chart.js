@@ -1,8 +1,8 @@
 // A line chart over the drive: axes, curves with gaps, shaded positions without an answer, a cursor that follows.
 
-import { domain, extent, gaps, nearest, peak } from "./data.js";
-import { html, onWidth, set, svg } from "./dom.js";
-import { fixed, prefixed, tickLabel, ticks } from "./format.js";
+import { domain, extent, gaps, nearest, peak, usualPeak } from "./data.js";
+import { clipped, html, onWidth, set, svg } from "./dom.js";
+import { fixed, prefixed, quantity, tickLabel, ticks } from "./format.js";
 
 const MARGIN = { top: 8, right: 14, bottom: 40, left: 58 };
 
@@ -11,8 +11,12 @@ const MARGIN = { top: 8, right: 14, bottom: 40, left: 58 };
  * `band` {low, high, kind, label} is filled. `limits` caps the vertical axis. `pick(index)` is called when the reader points.
  */
 export function lineChart(scene, { title, unit, series, band = null, limits = null, note = "", pick }) {
-  const scale = prefixed(peak(...series.map((one) => one.values)), unit);
-  const most = peak(...series.map((one) => one.values)) * scale.factor;
+  const columns = series.map((one) => one.values);
+  const scope = limits ? peak(limits) : usualPeak(...columns);
+  const scale = prefixed(scope, unit);
+  const most = scope * scale.factor;
+  const cut = !limits && scope < peak(...columns);
+  const remark = cut ? `The peak of ${quantity(peak(...columns), unit)} lies outside.` : note;
   const plot = html("div", { class: "plot" });
   const values = series.map(() => html("span", { class: "value" }, "—"));
   const element = html(
@@ -26,9 +30,19 @@ export function lineChart(scene, { title, unit, series, band = null, limits = nu
     ),
     legend(series, values, band),
     plot,
-    note ? html("p", { class: "remark" }, note) : null,
+    remark ? html("p", { class: "remark" }, remark) : null,
   );
-  const chart = { scene, scale, series, band, limits, title, frame: null, index: 0, plot };
+  const chart = {
+    scene,
+    scale,
+    series,
+    band,
+    limits: cut ? [-scope, scope] : limits,
+    title,
+    frame: null,
+    index: 0,
+    plot,
+  };
   onWidth(plot, (width) => draw(chart, width), 335);
   listen(chart, pick);
   return {
@@ -78,38 +92,31 @@ function draw(chart, width) {
     back: (px) => x0 + ((px - MARGIN.left) / (right - MARGIN.left)) * (x1 - x0),
   };
   chart.frame = frame;
-  const clip = `clip-${(clips += 1)}`;
   chart.cursor = svg("line", { class: "cursor", y1: MARGIN.top, y2: bottom });
   chart.dots = series.map((one) => svg("circle", { class: `dot ${one.kind}`, r: one.quiet ? 0 : 3.2 }));
-  const area = svg("g", { "clip-path": `url(#${clip})` });
-  if (band) area.append(svg("path", { class: `band ${band.kind}`, d: bandPath(chart, band) }));
-  for (const one of series)
-    area.append(svg("path", { class: `curve ${one.kind}`, d: curvePath(scene, frame, one.values, scale.factor) }));
+  const box = {
+    x: MARGIN.left - 2,
+    y: MARGIN.top - 2,
+    width: right - MARGIN.left + 4,
+    height: bottom - MARGIN.top + 4,
+  };
+  const curves = series.map((one) =>
+    svg("path", { class: `curve ${one.kind}`, d: curvePath(scene, frame, one.values, scale.factor) }),
+  );
+  const bars = band ? svg("path", { class: `band ${band.kind}`, d: bandPath(chart, band) }) : null;
   chart.plot.replaceChildren(
     svg(
       "svg",
       { viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": describe(chart) },
-      svg(
-        "clipPath",
-        { id: clip },
-        svg("rect", {
-          x: MARGIN.left - 2,
-          y: MARGIN.top - 2,
-          width: right - MARGIN.left + 4,
-          height: bottom - MARGIN.top + 4,
-        }),
-      ),
       ...shading(chart, frame),
       ...axes(scene.abscissa, frame, [x0, x1], [y0, y1]),
-      area,
+      clipped(box, ...curves, bars),
       chart.cursor,
       ...chart.dots,
     ),
   );
   moveCursor(chart);
 }
-
-let clips = 0; // clip paths need names that are unique in the page
 
 /** Ends of the vertical axis in display units: around the data and zero, within the limits if there are any. */
 function vertical(chart) {
@@ -204,14 +211,16 @@ export function curvePath(scene, frame, values, factor) {
   return path;
 }
 
+/** A bar at each position where the value is an interval. */
 function bandPath({ scene, frame, scale }, band) {
-  const corner = (values) => (_, index) =>
-    values[index] === null
-      ? null
-      : `${frame.x(scene.abscissa.values[index]).toFixed(1)},${frame.y(values[index] * scale.factor).toFixed(1)}`;
-  const low = band.low.map(corner(band.low)).filter(Boolean);
-  const high = band.high.map(corner(band.high)).filter(Boolean).reverse();
-  return low.length ? `M${[...low, ...high].join("L")}Z` : "";
+  return band.low
+    .map((low, index) => {
+      const high = band.high[index];
+      if (low === null || high === null || !(high > low)) return "";
+      const x = frame.x(scene.abscissa.values[index]).toFixed(1);
+      return `M${x},${frame.y(low * scale.factor).toFixed(1)}V${frame.y(high * scale.factor).toFixed(1)}`;
+    })
+    .join("");
 }
 
 function moveCursor(chart) {

@@ -34,6 +34,17 @@ export function peak(...list) {
   return list.flat().reduce((most, value) => (Number.isFinite(value) ? Math.max(most, Math.abs(value)) : most), 0);
 }
 
+/** The magnitude a chart should show: the greatest, unless it towers over nearly all the rest, as near a dead centre. */
+export function usualPeak(...list) {
+  const sizes = list
+    .flat()
+    .filter((value) => Number.isFinite(value))
+    .map(Math.abs);
+  const most = peak(sizes);
+  const usual = quantile(sizes, 0.9);
+  return usual > 0 && usual < most / 16 ? 4 * usual : most;
+}
+
 /** Least and greatest number in the series, or null. */
 export function extent(list) {
   let low = Infinity;

@@ -27,6 +27,14 @@ function fill(element, attributes, children) {
   return element;
 }
 
+let clips = 0; // clip paths need names that are unique in the page
+
+/** Children of a drawing, cut at the box {x, y, width, height}. */
+export function clipped(box, ...children) {
+  const id = `clip-${(clips += 1)}`;
+  return svg("g", {}, svg("clipPath", { id }, svg("rect", box)), svg("g", { "clip-path": `url(#${id})` }, ...children));
+}
+
 /** Call `draw(width)` now, whenever the width of the element changes, and with `printed` px before printing. */
 export function onWidth(element, draw, printed) {
   let last = 0;

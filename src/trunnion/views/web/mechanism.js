@@ -311,7 +311,8 @@ function poseLoad(view, { load: one, node }) {
   const [path, text] = node.querySelectorAll("path, text");
   moveTo(node, spot);
   path.setAttribute("d", arrow(0, 0, dx, dy));
-  set(text, { x: dx + 8, y: dy, dy: "0.32em" });
+  const lean = dx / 44;
+  set(text, { x: dx + (lean < -0.3 ? -8 : 8), y: dy, dy: "0.32em", "text-anchor": lean < -0.3 ? "end" : "start" });
 }
 
 /** An arc around a turning drive in the sense it turns; along its way, for a sliding one an arrow. */

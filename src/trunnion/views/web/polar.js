@@ -1,7 +1,7 @@
 // Polar reaction diagram of one joint: the tip of the force vector over the run, in the global frame.
 
-import { at, extent, magnitude, peak } from "./data.js";
-import { html, onWidth, set, svg } from "./dom.js";
+import { at, extent, magnitude, peak, usualPeak } from "./data.js";
+import { clipped, html, onWidth, set, svg } from "./dom.js";
 import { fixed, prefixed, tickLabel, ticks } from "./format.js";
 
 const MARGIN = { top: 8, right: 10, bottom: 36, left: 50 };
@@ -9,7 +9,8 @@ const MARGIN = { top: 8, right: 10, bottom: 36, left: 50 };
 /** The diagram of `joint`; `kind` colours it, `pick(index, firm)` is called when the reader points at the curve. */
 export function polarChart(scene, joint, kind, pick) {
   const sizes = magnitude(joint.reaction, scene.count);
-  const most = peak(sizes, joint.ideal ? magnitude(joint.ideal, scene.count) : []);
+  const most = usualPeak(sizes, joint.ideal ? magnitude(joint.ideal, scene.count) : []);
+  const cut = most < peak(sizes) ? most : null; // then the window shows what is usual, around the origin
   const scale = prefixed(most, "N");
   const plot = html("div", { class: "plot" });
   const value = html("span", { class: "value" }, "—");
@@ -25,7 +26,7 @@ export function polarChart(scene, joint, kind, pick) {
     ),
     plot,
   );
-  const chart = { scene, joint, kind, scale, plot, frame: null, index: 0 };
+  const chart = { scene, joint, kind, scale, cut, plot, frame: null, index: 0 };
   onWidth(plot, (width) => draw(chart, width), 220);
   const point = (event, firm) => chart.frame && pick(closest(chart, event), firm);
   plot.addEventListener("pointerdown", (event) => point(event, true));
@@ -42,10 +43,10 @@ export function polarChart(scene, joint, kind, pick) {
 }
 
 function draw(chart, width) {
-  const { scene, joint, kind, scale } = chart;
+  const { joint, kind } = chart;
   const side = width - MARGIN.left - MARGIN.right;
   const height = side + MARGIN.top + MARGIN.bottom;
-  const { middle, half } = window_(joint, scale.factor);
+  const { middle, half } = around(chart);
   const frame = {
     width,
     x: (value) => MARGIN.left + ((value - middle[0]) / half + 1) * (side / 2),
@@ -67,18 +68,22 @@ function draw(chart, width) {
       ...grid(frame, across, up, side),
       svg("text", { class: "axis middle", x: MARGIN.left + side / 2, y: height - 4 }, "Fx"),
       svg("text", { class: "axis middle", x: 11, y: MARGIN.top + side / 2, dy: "0.32em" }, "Fy"),
-      joint.ideal ? svg("path", { class: "curve free", d: loop(chart, joint.ideal) }) : null,
-      svg("path", { class: `curve ${kind}`, d: loop(chart, joint.reaction) }),
-      ...marks(chart),
-      chart.vector,
-      chart.tip,
+      clipped(
+        { x: MARGIN.left, y: MARGIN.top, width: side, height: side },
+        joint.ideal ? svg("path", { class: "curve free", d: loop(chart, joint.ideal) }) : null,
+        svg("path", { class: `curve ${kind}`, d: loop(chart, joint.reaction) }),
+        ...marks(chart),
+        chart.vector,
+        chart.tip,
+      ),
     ),
   );
   moveVector(chart);
 }
 
 /** A square window around the curves and the origin. */
-function window_(joint, factor) {
+function around({ joint, cut, scale: { factor } }) {
+  if (cut !== null) return { middle: [0, 0], half: cut * factor };
   const both = [joint.reaction, ...(joint.ideal ? [joint.ideal] : [])];
   const [x0, x1] = extent([[0], ...both.map((one) => one.x)]);
   const [y0, y1] = extent([[0], ...both.map((one) => one.y)]);
@@ -139,22 +144,20 @@ function loop(chart, vector) {
   return path;
 }
 
-/** Dots at every twelfth of a closed turn, with the angle at every quarter. */
+/** Dots at every twelfth of a closed turn, with the angle at every quarter unless it would lie on another. */
 function marks(chart) {
   const { scene, joint, kind } = chart;
   if (!scene.abscissa.closed || scene.count < 12) return [];
+  const labelled = [];
   return Array.from({ length: 12 }, (_, order) => {
     const index = Math.round((order * scene.count) / 12);
     const place = spot(chart, joint.reaction, index);
     if (!place) return null;
-    const label =
-      order % 3
-        ? null
-        : svg(
-            "text",
-            { class: "mark", x: place[0] + 6, y: place[1] - 5 },
-            `${Math.round(scene.abscissa.values[index])}°`,
-          );
+    const free = labelled.every(([x, y]) => Math.hypot(place[0] - x, place[1] - y) > 24);
+    const named = order % 3 === 0 && free;
+    if (named) labelled.push(place);
+    const text = `${Math.round(scene.abscissa.values[index])}°`;
+    const label = named ? svg("text", { class: "mark", x: place[0] + 6, y: place[1] - 5 }, text) : null;
     return svg("g", {}, svg("circle", { class: `milestone ${kind}`, cx: place[0], cy: place[1], r: 2.2 }), label);
   }).filter(Boolean);
 }

@@ -1,7 +1,7 @@
 // The report page: reads the scene out of the document, builds the views, and lets the crank move them all.
 
 import { lineChart } from "./chart.js";
-import { at, full, magnitude, peak, solved, state, total } from "./data.js";
+import { at, full, magnitude, peak, solved, state, total, usualPeak } from "./data.js";
 import { html, svg } from "./dom.js";
 import { fixed, quantity } from "./format.js";
 import { mechanismView } from "./mechanism.js";
@@ -37,7 +37,7 @@ function charts(scene, kinds, pick) {
   list.push(powerChart(scene, lost, pick));
   if (sums.efficiency_instant) {
     const values = full(sums.efficiency_instant, count).map((value) => (value === null ? null : 100 * value));
-    const note = scene.efficiency === null ? "" : `Over the whole run: ${quantity(100 * scene.efficiency, "%")}.`;
+    const note = !scene.efficiency ? "" : `Over the whole run: ${quantity(100 * scene.efficiency, "%")}.`;
     list.push(
       lineChart(scene, {
         title: "Efficiency at each position",
@@ -59,7 +59,7 @@ function effortChart(scene, driver, pick) {
   if (driver.ideal) series.push({ label: "without friction", values: full(driver.ideal, count), kind: "k1 dashed" });
   const low = full(driver.effort_lower, count);
   const high = full(driver.effort_upper, count);
-  const open = low.some((value, index) => value !== null && high[index] - value > 1e-9 * peak(low, high));
+  const open = low.some((value, index) => value !== null && high[index] - value > 0.002 * usualPeak(low, high));
   const band = open ? { low, high, kind: "k0", label: "range, friction at rest" } : null;
   return lineChart(scene, { title: `Drive ${noun} ${driver.name}`, unit: driver.unit, series, band, pick });
 }
@@ -95,40 +95,29 @@ function powerChart(scene, lost, pick) {
 
 /** The figures of the present position. */
 function readout(scene) {
-  const unitOf = (driver) => driver.unit;
+  const { abscissa, drivers, joints, count } = scene;
+  const lost = total(
+    joints.map((joint) => joint.friction_power),
+    count,
+  );
+  const gap = abscissa.unit === "°" ? "" : "\u00a0";
   const rows = [
-    [
-      scene.abscissa.label,
-      (index) =>
-        `${fixed(scene.abscissa.values[index], peak(scene.abscissa.values))}${scene.abscissa.unit === "°" ? "" : "\u00a0"}${scene.abscissa.unit}`,
-    ],
+    [abscissa.label, (index) => fixed(abscissa.values[index], peak(abscissa.values)) + gap + abscissa.unit],
     ["time", (index) => quantity(at(scene.time, index), "s", peak(scene.time))],
-    ...scene.drivers.map((driver) => [
-      `${unitOf(driver) === "N" ? "force" : "torque"} ${driver.name}`,
-      (index) => quantity(at(driver.effort, index), unitOf(driver), peak(driver.effort)),
+    ...drivers.map(({ name, unit, effort }) => [
+      `${unit === "N" ? "force" : "torque"} ${name}`,
+      (index) => quantity(at(effort, index), unit, usualPeak(effort)),
     ]),
-    [
-      "friction power",
-      (index) =>
-        quantity(
-          at(
-            total(
-              scene.joints.map((joint) => joint.friction_power),
-              scene.count,
-            ),
-            index,
-          ),
-          "W",
-          peak(...scene.joints.map((joint) => joint.friction_power)),
-        ),
-    ],
+    ["friction power", (index) => quantity(lost[index], "W", usualPeak(lost))],
     ["status", (index) => state(scene, index)],
   ];
   const cells = rows.map(() => html("dd", {}, "—"));
   const element = html(
     "dl",
     { class: "readout" },
-    ...rows.map(([label], order) => html("div", { class: label }, html("dt", {}, label), cells[order])),
+    ...rows.map(([label], order) =>
+      html("div", { class: label === "status" ? label : null }, html("dt", {}, label), cells[order]),
+    ),
   );
   const show = (index) => {
     rows.forEach(([, text], order) => (cells[order].textContent = text(index)));

@@ -1,0 +1,54 @@
+# Set-up and the main jobs. Each target makes the virtual environment it needs; nothing else has to be installed
+# but Python 3.11 or later and make.
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+OUT ?= out
+EXAMPLE ?= examples/durango-fourbar.yaml
+
+.PHONY: demo test bench docs clean
+
+# The main job on a real example: a table on the screen, and report, CSV and figures in $(OUT).
+demo: $(VENV)/.base
+	@mkdir -p $(OUT)
+	$(BIN)/trunnion analyse $(EXAMPLE) --out $(OUT)/four-bar.csv --report $(OUT)/four-bar.html
+	$(BIN)/trunnion plot $(EXAMPLE) --out $(OUT)
+	@echo "open $(OUT)/four-bar.html in a browser"
+
+# Lint, types, layer rule, tests, documentation.
+test: $(VENV)/.dev
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+	$(BIN)/python -m pytest -n 2
+	$(BIN)/mkdocs build --strict --quiet --site-dir $(VENV)/site
+
+# Ratios to peers and hand-written kernels, measured in one run.
+bench: $(VENV)/.bench
+	$(BIN)/python -m benchmarks.run
+
+docs: $(VENV)/.dev
+	$(BIN)/mkdocs build --strict
+
+clean:
+	rm -rf $(VENV) $(OUT) site dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	find src tests benchmarks -name __pycache__ -prune -exec rm -rf {} +
+
+$(VENV)/.made:
+	$(PYTHON) -c 'import sys; sys.exit("Python 3.11 or later is needed" if sys.version_info < (3, 11) else 0)'
+	$(PYTHON) -m venv $(VENV)
+	@touch $@
+
+$(VENV)/.base: $(VENV)/.made pyproject.toml
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
+	@touch $@
+
+$(VENV)/.dev: $(VENV)/.made pyproject.toml
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	@touch $@
+
+$(VENV)/.bench: $(VENV)/.made pyproject.toml
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[bench]'
+	@touch $@

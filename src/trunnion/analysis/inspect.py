@@ -1,0 +1,87 @@
+"""What a mechanism is before any question is asked of it: findings, mobility, structural formula, plan."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+
+import numpy as np
+
+from trunnion.algebra.dual import primal
+from trunnion.analysis.analyse import analyse, prepare
+from trunnion.analysis.kinematics import Forward, forward
+from trunnion.errors import Finding, Severity
+from trunnion.model.mechanism import Mechanism
+from trunnion.structure.decompose import Plan
+from trunnion.structure.mobility import mobility_by_rank
+
+__all__ = ["Check", "check"]
+
+
+@dataclass(frozen=True)
+class Check:
+    """The outcome of `check`.
+
+    rank_mobility: by the rank of the joints' constraints, None where no position can be assembled.
+    assemblies: number found for each module; findings: everything to know, worst first.
+    """
+
+    plan: Plan
+    rank_mobility: int | None
+    assemblies: tuple[int, ...]
+    findings: tuple[Finding, ...]
+
+    @property
+    def formula(self) -> str:
+        """Structural formula, e.g. I(0,1)R → II(2,3)RRR."""
+        return self.plan.formula
+
+    @property
+    def mobility(self) -> int:
+        """Mobility by Grübler's formula."""
+        return self.plan.mobility
+
+
+def check(mechanism: Mechanism, steps: int = 360) -> Check:
+    """Structure and findings of a mechanism, looked at over `steps` positions of its cycle.
+
+    Raises MechanismError if the structure does not determine the motion.
+    """
+    run = prepare(mechanism)
+    result = analyse(mechanism, steps)
+    found = [
+        Finding(row["what"], row["where"], row["remedy"], Severity(row["severity"]))
+        for row in json.loads(result.attrs["findings"])
+    ]
+    walk = forward(run.system, run.values, run.chosen.assembly, run.cycle.times(steps))
+    rank = _rank(walk)
+    if rank is not None and rank != run.system.plan.mobility:
+        what = (
+            f"the mobility is {run.system.plan.mobility} by Grübler's formula and {rank} by the rank of the constraints"
+        )
+        found.append(
+            Finding(what, "joints", "a special geometry: reactions or motion are not determined", Severity.WARNING)
+        )
+    order = list(Severity)
+    found.sort(key=lambda finding: order.index(finding.severity))
+    return Check(run.system.plan, rank, run.chosen.found, tuple(found))
+
+
+def _rank(walk: Forward) -> int | None:
+    """Mobility by rank at the first assembled position."""
+    system = walk.system
+    size = float(np.max(system.size(walk.values)))
+    places = {}
+    for name, (_, (_, second)) in system.joints.items():
+        places[name] = np.broadcast_arrays(*(np.atleast_1d(primal(n)) for n in walk.element(second, name)))
+    length = max((len(place[0]) for place in places.values()), default=1)
+    table = {name: np.array([np.broadcast_to(n, length) for n in place]) for name, place in places.items()}
+    solved = np.all([np.isfinite(place).all(axis=0) for place in table.values()], axis=0)
+    if not np.any(solved):
+        return None
+    first = int(np.argmax(solved))
+    at = {
+        name: (float(p[0, first]), float(p[1, first]), float(p[2, first]), float(p[3, first]))
+        for name, p in table.items()
+    }
+    return mobility_by_rank(list(system.mechanism.links), system.mechanism.fixed_link, system.joints, at, size)

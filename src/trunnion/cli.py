@@ -1,0 +1,336 @@
+"""The command line: every verb of the library, with the same words.
+
+Exit status: 0 fine, 1 findings (cannot be assembled somewhere, locks, dead centre), 2 bad input.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from trunnion import __version__
+from trunnion.errors import Finding, MechanismError, Severity
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from trunnion.analysis.friction import FrictionMethod
+    from trunnion.model.mechanism import Mechanism
+
+app = typer.Typer(
+    name="trunnion",
+    help="The analysis of linkages as built: motion, reactions with friction, drive torque, power.",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+)
+
+File = Annotated[Path, typer.Argument(help="Model file: YAML, JSON or TOML.", show_default=False)]
+Steps = Annotated[int, typer.Option("--steps", help="Equally spaced positions over the turn or range.")]
+Set = Annotated[
+    list[str] | None,
+    typer.Option("--set", help="Replace a value: AB=2.1m, crank.mass=5kg, B.friction.coefficient=0.3. Repeatable."),
+]
+FrictionLaw = Annotated[
+    str | None, typer.Option("--friction", help="off, or a friction law for all joints with friction.")
+]
+Method = Annotated[str, typer.Option("--method", help="newton, or successive-approximation (Durango et al., 2010).")]
+Criterion = Annotated[
+    float | None,
+    typer.Option(
+        "--criterion", help="Largest change of a reaction at which the iteration ends, N.", show_default=False
+    ),
+]
+Rounds = Annotated[int, typer.Option("--iterations", help="Most rounds of the friction iteration.")]
+Report = Annotated[
+    Path | None, typer.Option("--report", help="Also write the report, one HTML file.", show_default=False)
+]
+
+
+@app.command()
+def check(file: File, set_: Set = None, friction: FrictionLaw = None) -> None:
+    """Findings, mobility, structural formula and plan of a mechanism."""
+    from trunnion.analysis.inspect import check as inspect
+
+    mechanism = _mechanism(file, set_, friction)
+    found = inspect(mechanism)
+    rank = "not known: no position can be assembled" if found.rank_mobility is None else str(found.rank_mobility)
+    out = _console()
+    out.print(mechanism.name or file.name, style="bold", markup=False)
+    out.print(f"mobility {found.mobility} by formula, {rank} by rank; drivers: {len(mechanism.drivers)}", markup=False)
+    out.print(f"formula  {found.formula or '(no moving link)'}", markup=False)
+    for module, count in zip(found.plan.modules, found.assemblies, strict=True):
+        ways = "" if module.rank == 1 else f", {count} assemblies"
+        solver = "general group" if module.kind == "general" else "closed form"
+        joints = ", ".join(module.joints)
+        out.print(
+            f"  {module.label:<24} links {', '.join(module.links)}; joints {joints}; {solver}{ways}", markup=False
+        )
+    _say(found.findings)
+    raise typer.Exit(_status(found.findings))
+
+
+@app.command()
+def analyse(
+    file: File,
+    steps: Steps = 360,
+    set_: Set = None,
+    friction: FrictionLaw = None,
+    method: Method = "newton",
+    criterion: Criterion = None,
+    iterations: Rounds = 200,
+    out: Annotated[
+        list[Path] | None, typer.Option("--out", help="Write the result: .csv .json .nc .zarr .parquet. Repeatable.")
+    ] = None,
+    report: Report = None,
+    units_row: Annotated[bool, typer.Option("--units-row", help="Second CSV header row with the units.")] = False,
+) -> None:
+    """Motion, reactions with friction, drive effort and power over the cycle."""
+    from trunnion.export import check_format, save
+
+    for path in out or []:
+        check_format(path)
+    mechanism = _mechanism(file, set_, friction)
+    result = _run(mechanism, steps, _method(method, criterion, iterations))
+    for path in out or []:
+        save(result, path, units_row)
+    if report:
+        _write_report(mechanism, result, report)
+    _summary(result)
+    for path in [*(out or []), *([report] if report else [])]:
+        _console().print(f"wrote {path}", markup=False, highlight=False, soft_wrap=True)
+    raise typer.Exit(_status(_findings(result)))
+
+
+@app.command()
+def plot(
+    file: File,
+    out: Annotated[Path, typer.Option("--out", help="Folder, or a .png, .svg or .pdf file of one plot.")],
+    kind: Annotated[
+        list[str] | None, typer.Option("--kind", help="Plot to draw; repeatable; all if not given.", show_default=False)
+    ] = None,
+    steps: Steps = 360,
+    set_: Set = None,
+    friction: FrictionLaw = None,
+    image: Annotated[str, typer.Option("--format", help="png, svg or pdf, for a folder of plots.")] = "png",
+) -> None:
+    """Figures: drive torque, friction power, reactions, polar diagram, mechanism with coupler curve."""
+    from trunnion.views.plots import PLOTS, save
+
+    kinds = kind or list(PLOTS)
+    unknown = [name for name in kinds if name not in PLOTS]
+    if unknown:
+        raise MechanismError(Finding(f"there is no plot '{unknown[0]}'", "--kind", f"use one of {', '.join(PLOTS)}"))
+    single = out.suffix.lower() in (".png", ".svg", ".pdf")
+    if single and len(kinds) > 1:
+        raise MechanismError(
+            Finding(f"{len(kinds)} plots do not fit one file", str(out), "name a folder, or one --kind")
+        )
+    mechanism = _mechanism(file, set_, friction)
+    result = _run(mechanism, steps, None)
+    ideal = _ideal(mechanism, steps, None)
+    if not single:
+        out.mkdir(parents=True, exist_ok=True)
+    for name in kinds:
+        path = out if single else out / f"{name}.{image.lstrip('.')}"
+        save(PLOTS[name](result, ideal), path)
+        _console().print(f"wrote {path}", markup=False, highlight=False, soft_wrap=True)
+    _say([finding for finding in _findings(result) if finding.severity is not Severity.NOTE])
+    raise typer.Exit(_status(_findings(result)))
+
+
+@app.command()
+def report(
+    file: File,
+    out: Annotated[Path, typer.Option("--out", help="The HTML file to write.")],
+    steps: Steps = 360,
+    set_: Set = None,
+    friction: FrictionLaw = None,
+    method: Method = "newton",
+    criterion: Criterion = None,
+    iterations: Rounds = 200,
+) -> None:
+    """One self-contained HTML file: animation, plots, findings, balance, input data."""
+    mechanism = _mechanism(file, set_, friction)
+    result = _run(mechanism, steps, _method(method, criterion, iterations))
+    _write_report(mechanism, result, out)
+    _console().print(f"wrote {out}", markup=False, highlight=False, soft_wrap=True)
+    raise typer.Exit(_status(_findings(result)))
+
+
+@app.command()
+def examples(
+    name: Annotated[str | None, typer.Argument(help="Example to copy out; all are listed if not given.")] = None,
+    to: Annotated[Path, typer.Option("--to", help="Folder to copy it into.")] = Path(),
+    force: Annotated[bool, typer.Option("--force", help="Overwrite a file of that name.")] = False,
+) -> None:
+    """List the example models, or copy one out."""
+    found = _examples()
+    if name is None:
+        for path in found.values():
+            title = next(
+                (line[5:].strip() for line in path.read_text("utf-8").splitlines() if line.startswith("name:")), ""
+            )
+            _console().print(f"{path.stem:<28} {title}", markup=False, highlight=False, soft_wrap=True)
+        return
+    source = found.get(name.removesuffix(".yaml"))
+    if source is None:
+        raise MechanismError(Finding(f"there is no example '{name}'", remedy=f"use one of {', '.join(found)}"))
+    from trunnion.output import whole
+
+    target = to / source.name
+    if target.exists() and not force:
+        raise MechanismError(Finding("exists already", str(target), "use --force to overwrite it"))
+    with whole(target) as temporary:
+        temporary.write_bytes(source.read_bytes())
+    _console().print(f"wrote {target}", markup=False, highlight=False, soft_wrap=True)
+
+
+def _version(show: bool) -> None:
+    if show:
+        print(f"trunnion {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
+    ] = False,
+) -> None:
+    """Options of the program itself."""
+
+
+def main() -> None:
+    """Run the command line; every failure is a message and an exit status, never a traceback."""
+    for stream in (sys.stdout, sys.stderr):  # names may be Greek whatever the terminal's code page is
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(encoding="utf-8", errors="replace")
+    try:
+        app()
+    except MechanismError as error:
+        _say(error.findings)
+        sys.exit(2)
+    except KeyboardInterrupt:
+        print("stopped; nothing was written", file=sys.stderr)
+        sys.exit(130)
+    except MemoryError:
+        print("error: not enough memory — use fewer --steps", file=sys.stderr)
+        sys.exit(2)
+
+
+# ---- shared by the verbs --------------------------------------------------------------------------------------
+
+
+def _console() -> Any:
+    from rich.console import Console
+
+    return Console()
+
+
+def _mechanism(file: Path, settings: list[str] | None, friction: str | None) -> Mechanism:
+    """The model with the options `--set` and `--friction` applied."""
+    from trunnion.model.file import read_mechanism
+
+    mechanism = read_mechanism(file)
+    if settings:
+        mechanism = mechanism.with_values(dict(_setting(text) for text in settings))
+    return mechanism.with_friction(friction) if friction else mechanism
+
+
+def _setting(text: str) -> tuple[str, float | str]:
+    """A name and its value from `name=value`."""
+    name, equals, value = text.partition("=")
+    if not equals or not name.strip() or not value.strip():
+        raise MechanismError(Finding(f"'{text}' sets nothing", "--set", "write name=value, e.g. AB=2.1m"))
+    try:
+        return name.strip(), float(value)
+    except ValueError:
+        return name.strip(), value.strip()
+
+
+def _method(name: str, criterion: float | None, iterations: int) -> FrictionMethod:
+    from trunnion.analysis.friction import method_named
+
+    return method_named(name, criterion, iterations)
+
+
+def _run(mechanism: Mechanism, steps: int, method: FrictionMethod | None) -> xr.Dataset:
+    """Analyse, with a progress bar when it takes long enough to need one."""
+    from trunnion.analysis.analyse import analyse as run
+
+    if steps < 200_000 or not sys.stderr.isatty():
+        return run(mechanism, steps, method)
+    from rich.console import Console
+    from rich.progress import Progress
+
+    with Progress(console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task("positions", total=steps)
+        return run(mechanism, steps, method, progress=lambda done: progress.update(task, completed=done))
+
+
+def _ideal(mechanism: Mechanism, steps: int, method: FrictionMethod | None) -> xr.Dataset | None:
+    """The same without friction, to compare with; None if there is none."""
+    if all(joint.friction is None for joint in mechanism.effective_joints.values()):
+        return None
+    return _run(mechanism.with_friction("off"), steps, method)
+
+
+def _write_report(mechanism: Mechanism, result: xr.Dataset, path: Path) -> None:
+    from trunnion.output import whole
+    from trunnion.views.report import report as page
+
+    text = page(result, _ideal(mechanism, result.sizes["position"], None))
+    with whole(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def _findings(result: xr.Dataset) -> list[Finding]:
+    import json
+
+    return [
+        Finding(row["what"], row["where"], row["remedy"], Severity(row["severity"]))
+        for row in json.loads(result.attrs["findings"])
+    ]
+
+
+def _summary(result: xr.Dataset) -> None:
+    """The short table of an analysis, and its findings."""
+    import json
+
+    from rich.table import Table
+
+    table = Table(title=f"{result.attrs['name']}\n{result.attrs['formula']}", title_justify="left", show_edge=False)
+    table.add_column("")
+    table.add_column("value", justify="right")
+    table.add_column("unit")
+    for row in json.loads(result.attrs["summary"]):
+        value = "no answer" if row["value"] is None else f"{row['value']:.6g}"
+        table.add_row(row["label"], value, "" if row["unit"] == "1" else row["unit"])
+    _console().print(table, markup=False, highlight=False)
+    _say(_findings(result))
+
+
+def _say(findings: Any) -> None:
+    """Findings on the error stream, one a paragraph, nothing in them taken for markup."""
+    for finding in findings:
+        print(str(finding), file=sys.stderr)
+
+
+def _status(findings: Any) -> int:
+    return 1 if any(finding.severity is Severity.ERROR for finding in findings) else 0
+
+
+def _examples() -> dict[str, Path]:
+    """Example models by name: beside the installed package, or in the source tree."""
+    here = Path(__file__).resolve().parent
+    folder = here / "examples" if (here / "examples").is_dir() else here.parents[1] / "examples"
+    return {path.stem: path for path in sorted(folder.glob("*.yaml"))}
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,284 @@
+"""Model files: what is read is what is written, and a file that is none says so and does no harm."""
+
+from __future__ import annotations
+
+import copy
+import json
+import os
+import random
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from model_samples import EXAMPLES, FOURBAR
+
+from trunnion.errors import Finding, MechanismError
+from trunnion.model.check import check_model
+from trunnion.model.file import read_mechanism, write_mechanism
+from trunnion.model.mechanism import Mechanism
+
+FindingsOf = Callable[..., tuple[Finding, ...]]
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
+@pytest.mark.parametrize("extension", ["yaml", "json"])
+def test_examples_are_read_and_written_without_loss(example: Path, extension: str, tmp_path: Path) -> None:
+    mechanism = read_mechanism(example)
+    assert not check_model(mechanism)
+    copy = tmp_path / f"copy.{extension}"
+    mechanism.write(copy)
+    again = Mechanism.read(copy)
+    assert again == mechanism
+    assert again.digest == mechanism.digest
+    assert again.data() == mechanism.data()
+    assert os.listdir(tmp_path) == [copy.name]  # no temporary file stays behind
+
+
+def test_there_are_examples() -> None:
+    assert len(EXAMPLES) >= 3
+
+
+def test_toml(tmp_path: Path, findings_of: FindingsOf) -> None:
+    text = """
+trunnion = 1
+[links]
+ground = { points = { A = [0, 0], D = ["5.5 m", 0] } }
+crank = { points = { A = [0, 0], B = ["2 m", 0] } }
+coupler = { points = { B = [0, 0], C = ["6 m", 0] } }
+rocker = { points = { D = [0, 0], C = ["3 m", 0] } }
+[joints]
+A = { type = "revolute", links = ["ground", "crank"] }
+B = { type = "revolute", links = ["crank", "coupler"] }
+C = { type = "revolute", links = ["coupler", "rocker"] }
+D = { type = "revolute", links = ["ground", "rocker"] }
+[drivers.A]
+speed = "10 rad/s"
+"""
+    path = tmp_path / "good.toml"
+    path.write_text(text)
+    assert read_mechanism(path).parameters()["links.crank.points.B.x"] == 2.0
+    found = findings_of(text.replace("speed =", "sped ="), "model.toml")
+    assert {(one.where, one.line) for one in found} >= {("drivers.A.sped", 14)}
+    with pytest.raises(MechanismError, match=r"TOML is read but not written — write \.yaml or \.json"):
+        write_mechanism(read_mechanism(path), tmp_path / "other.toml")
+
+
+def test_json_with_tabs_and_lines(tmp_path: Path, findings_of: FindingsOf) -> None:
+    data = read_mechanism(EXAMPLES[0]).data()
+    text = json.dumps(data, indent="\t", ensure_ascii=True)
+    path = tmp_path / "model.json"
+    path.write_text(text)
+    assert read_mechanism(path).data() == data
+    found = findings_of(text.replace('"mass"', '"mas"', 1), "model.json")
+    assert found[0].line == 1 + text[: text.index('"mass"')].count("\n")
+
+
+BOMB = "a: &a [x, x, x]\nb: &b [*a, *a, *a]\nc: &c [*b, *b, *b]\nd: [*c, *c, *c]\n"
+BAD_FILES = [
+    ("", 1, "is empty", "examples"),
+    ("\n  \n", 1, "is empty", "examples"),
+    ("# only a remark\n", 1, "not a group of entries", "examples"),
+    ("- 1\n- 2\n", 1, "not a group of entries", "examples"),
+    ("hello", 1, "not a group of entries", "examples"),
+    (b"\xff\xfe\x00\x01", 1, "is not UTF-8 text (byte 0)", "UTF-8"),
+    (b"trunnion: 1\nname: caf\xe9\n", 2, "is not UTF-8 text (byte 21)", "UTF-8"),
+    (b"\x00\x01\x02\x03" * 100, None, "is not YAML", "text file"),
+    ("trunnion: 1\nlinks: [1, 2\njoints: 3\n", 3, "is not YAML", "brackets"),
+    ("trunnion: 1\n  links: 2\n", 2, "is not YAML: mapping values are not allowed here (column 8)", "indentation"),
+    ("trunnion: 1\n\tlinks: 2\n", 2, "is not YAML", "indentation"),
+    ("trunnion: 1\nname: 'open\n", None, "is not YAML", "quotes"),
+    ("trunnion: 1\n---\ntrunnion: 1\n", 2, "is not YAML", ""),
+    ("trunnion: 1\nname: a\nname: b\n", 3, "the key 'name' is given twice, first in line 2", "remove"),
+    ("trunnion: 1\n? [a, b]\n: 3\n", 2, "a key is not a text", "key: value"),
+    (BOMB, 2, "the alias *a is not allowed", "write it out"),
+    ("trunnion: 1\nlinks: &l {a: *l}\n", 2, "the alias *l is not allowed", ""),
+    ("a: &a {b: 1}\nc:\n  <<: *a\n", 3, "the alias *a is not allowed", ""),
+    ("trunnion: 1\nname: !!python/object/apply:os.system [ls]\n", 2, "the tag", "remove the tag"),
+    ("trunnion: 1\nname: !secret x\n", 2, "the tag !secret is not allowed", "remove the tag"),
+    ("trunnion: 1\nname: !!float x\n", 2, "'x' is not a number", "12.5"),
+    ("trunnion: 1\nx: " + "[" * 5000 + "\n", None, "", ""),
+    ("trunnion: 1\nx: " + "[" * 100 + "]" * 100 + "\n", None, "nested too deeply", "brackets"),
+    ("trunnion: 1\nx: " + "{a: " * 100 + "1" + "}" * 100 + "\n", None, "nested too deeply", "brackets"),
+    ("trunnion: 1\n", 1, "there are no links", "state"),
+    ("trunnion: 1\n3: x\n", 2, "the key '3' is unknown", "known: "),
+    ("trunnion: 1\nlinks:\n", 2, "is empty", "value or remove"),
+]
+
+
+@pytest.mark.parametrize(("content", "line", "what", "remedy"), BAD_FILES)
+def test_files_that_are_no_model(
+    findings_of: FindingsOf, content: str | bytes, line: int | None, what: str, remedy: str
+) -> None:
+    started = time.perf_counter()
+    found = findings_of(content)
+    assert time.perf_counter() - started < 3
+    fitting = [one for one in found if what in one.what and remedy in one.remedy]
+    assert fitting, "\n".join(map(str, found))
+    assert line is None or fitting[0].line == line
+    assert all(one.remedy for one in found)
+
+
+@pytest.mark.parametrize(
+    ("content", "what"),
+    [
+        ("{", "is not JSON"),
+        ('{"trunnion": 1, "trunnion": 1}', "given twice"),
+        ("[1]", "not a group of entries"),
+        ('{"trunnion": 1, "name": NaN}', ""),
+    ],
+)
+def test_json_that_is_no_model(findings_of: FindingsOf, content: str, what: str) -> None:
+    found = findings_of(content, "model.json")
+    assert any(what in one.what for one in found)
+    assert all(one.line == 1 for one in found)
+
+
+@pytest.mark.parametrize(
+    ("content", "line"), [("a = [", None), ("a = 1\na = 2\n", 2), ("a" + ".a" * 5000 + "=1", None)]
+)
+def test_toml_that_is_no_model(findings_of: FindingsOf, content: str, line: int | None) -> None:
+    found = findings_of(content, "model.toml")
+    assert line is None or found[0].line == line
+
+
+def test_paths_that_are_no_file(tmp_path: Path) -> None:
+    for path, what in (
+        (tmp_path / "missing.yaml", "cannot be read: No such file or directory"),
+        (tmp_path / "model.txt", "the extension '.txt' is none of a model file"),
+        (tmp_path / "model", "the extension '' is none"),
+    ):
+        with pytest.raises(MechanismError) as error:
+            read_mechanism(path)
+        assert what in error.value.findings[0].what
+        assert error.value.findings[0].remedy
+        assert error.value.findings[0].file == str(path)
+    folder = tmp_path / "folder.yaml"
+    folder.mkdir()
+    with pytest.raises(MechanismError, match="is not a file"):
+        read_mechanism(folder)
+
+
+def test_a_huge_file_is_refused_at_once(tmp_path: Path) -> None:
+    path = tmp_path / "huge.yaml"
+    with path.open("wb") as stream:
+        stream.truncate(50_000_000)
+    started = time.perf_counter()
+    with pytest.raises(MechanismError, match=r"has 50\.0 MB, a model file at most 1\.0 MB"):
+        read_mechanism(path)
+    assert time.perf_counter() - started < 0.5
+
+
+def test_writing_fails_whole(tmp_path: Path) -> None:
+    mechanism = read_mechanism(EXAMPLES[0])
+    with pytest.raises(MechanismError, match="cannot be written: No such file or directory"):
+        mechanism.write(tmp_path / "none" / "model.yaml")
+    folder = tmp_path / "model.yaml"
+    folder.mkdir()
+    with pytest.raises(MechanismError, match="cannot be written"):
+        mechanism.write(folder)
+    assert os.listdir(tmp_path) == ["model.yaml"]
+
+
+def test_names_may_have_spaces_and_greek_letters(tmp_path: Path) -> None:
+    text = FOURBAR.replace("crank", "Kurbel α 1").replace("AB", "Länge").replace("C:", '"P 3":')
+    text = text.replace("at: C", "at: P 3").replace("coupler.C", "coupler.P 3")
+    path = tmp_path / "modèle.yaml"
+    path.write_text(text, encoding="utf-8")
+    mechanism = read_mechanism(path)
+    assert mechanism.parameters({"Länge": 3.0})["links.Kurbel α 1.points.B.x"] == 3.0
+    mechanism.write(path)
+    assert read_mechanism(path) == mechanism
+
+
+VALUES = st.one_of(
+    st.floats(-1e6, 1e6, allow_nan=False).map(lambda x: x or 0.5),
+    st.integers(-(10**6), 10**6).map(lambda x: x or 1),
+    st.tuples(st.floats(0.001, 1e6), st.sampled_from(["m", "mm", "um", "inch"])).map(lambda x: f"{x[0]!r} {x[1]}"),
+    st.sampled_from(["60 mm ± 0.05 mm", "2 * AB", "+60 mm +0.02/-0.01 mm", "AB - 1 mm", "yes * 1 mm"]),
+)
+
+
+@settings(deadline=None, max_examples=50)
+@given(VALUES, st.sampled_from(["yaml", "json"]))
+def test_any_value_is_read_back_as_written(tmp_path_factory: pytest.TempPathFactory, value: object, kind: str) -> None:
+    base = read_mechanism(EXAMPLES[0]).data()
+    base["dimensions"] = {**base["dimensions"], "yes": 2, "extra": value}
+    mechanism = Mechanism(**base)
+    path = tmp_path_factory.mktemp("written") / f"model.{kind}"
+    mechanism.write(path)
+    again = read_mechanism(path)
+    assert again == mechanism
+    assert type(again.dimensions["extra"].source) is type(value)
+
+
+JUNK = [*":{}[],-'\"#|0C \n\t\x00é±~%@", "", "&a ", "*a ", "!!x ", "1e999", ".nan", "AB", "kg", "? ", "<<: ", "links"]
+JUNK += ["null", "9" * 20]
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
+def test_no_mutation_of_an_example_gives_anything_but_findings(example: Path, tmp_path: Path) -> None:
+    draw = random.Random(20)
+    original = example.read_text(encoding="utf-8")
+    path = tmp_path / "mutant.yaml"
+    for _ in range(int(os.environ.get("TRUNNION_MUTANTS", "60"))):
+        text = original
+        for _ in range(draw.randint(1, 4)):
+            start = draw.randrange(len(text))
+            end = min(len(text), start + draw.choice([0, 0, 1, 3, 20]))
+            text = text[:start] + draw.choice(JUNK) + text[end:]
+        path.write_text(text, encoding="utf-8")
+        with suppress(MechanismError):
+            read_mechanism(path).parameters()
+
+
+ODD = [
+    None,
+    True,
+    0,
+    -1,
+    1e308,
+    10**400,
+    float("nan"),
+    "",
+    "A",
+    "AB",
+    "-5 mm",
+    "1/0",
+    [],
+    {},
+    [1],
+    [[1]],
+    {"a": 1},
+    "x" * 600,
+]
+ODD += [{"at": 3}, [0, 0, 0], {"law": "x"}, {1: 2}, ("a", "b"), b"x", object()]
+
+
+def _holders(data: object) -> list[tuple[dict[object, object] | list[object], object]]:
+    """Every place in plain data that a value can be put at."""
+    items = data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ()
+    return [place for key, value in items for place in [(data, key), *_holders(value)]]  # type: ignore[list-item]
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
+def test_no_odd_value_anywhere_gives_anything_but_findings(example: Path) -> None:
+    draw = random.Random(21)
+    whole = read_mechanism(example).data()
+    for _ in range(int(os.environ.get("TRUNNION_MUTANTS", "60")) * 5):
+        data = copy.deepcopy(whole)
+        for _ in range(draw.randint(1, 3)):
+            holder, key = draw.choice(_holders(data))
+            if draw.random() < 0.2:
+                del holder[key]  # type: ignore[arg-type]
+            else:
+                holder[key] = draw.choice(ODD)  # type: ignore[index, call-overload]
+        try:
+            Mechanism(**data).parameters()
+        except MechanismError as error:
+            remedies = [finding.remedy for finding in error.findings]
+            if not all(remedies):
+                raise

@@ -123,7 +123,6 @@ CASES = [
      "'20' has no unit", "60 mm"),
     ("links: [ground, crank]}", "links: [ground, crank], pin: {fit: 20 mm H7/g6, radius: 1}}", 18, "joints.A.pin",
      "states radius and clearance already", "keep"),
-    ("drivers:\n  A: {speed: 10 rad/s}\n", "", 1, "drivers", "there is no driver", "A: {speed"),
     ("mass: 4.8 kg", "mass: 1 kg\n    centre: [1, 0]\n    inertia: 0.5\n    inertia_about: origin", 13,
      "links.crank.inertia", "less than m r² = 1", "inertia_about"),
     ("mass: 4.8 kg", "inertia: {xx: 1, yy: 1, zz: 1}", 11, "links.crank.inertia", "planar link is one number", "one"),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from xml.etree import ElementTree
+
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
@@ -125,3 +127,15 @@ def test_no_pyplot_state_is_touched(plain):
 def test_hull_leaves_inner_points_out():
     corners = hull(np.array([[0, 0], [4, 0], [0, 4], [1, 1], [2, 0]], dtype=float))
     assert {tuple(corner) for corner in corners} == {(0, 0), (4, 0), (0, 4)}
+
+
+@pytest.mark.parametrize("name", PLOTS)
+def test_svg_is_well_formed_and_fetches_nothing(name, case, tmp_path):
+    kind, result = case
+    if (name, kind) == ("mechanism", "nowhere"):
+        return
+    path = save(PLOTS[name](result, None), tmp_path / "figure.svg")
+    root = ElementTree.parse(path).getroot()
+    assert root.tag.endswith("svg")
+    links = [value for element in root.iter() for key, value in element.attrib.items() if key.endswith("href")]
+    assert all(link.startswith("#") for link in links)

@@ -70,7 +70,8 @@ def analyse(
 
     steps: equally spaced positions; over a full turn the end is not repeated. Returns a Dataset with the names,
     units and dims of `results.VARIABLES`; positions without an answer are NaN and have a status.
-    progress: called with the number of positions done. Method: the modules' closed forms or the general group, friction settled per module (`friction.settle`).
+    progress: called with the number of positions done.
+    Method: the modules' closed forms or the general group, friction settled per module (`friction.settle`).
     Raises MechanismError if the structure does not determine the motion or `steps` is out of range.
     """
     if not 1 <= steps <= MOST_STEPS:

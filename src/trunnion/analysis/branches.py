@@ -7,7 +7,6 @@ starts Newton from the track, all lanes in parallel, and a lane that ends on ano
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -33,6 +32,7 @@ GUESSES = 512
 SEED = 20060704  # of the guesses: the same assemblies every time
 TURN_JUMP = 0.35  # rad between neighbours of the grid: more is another branch
 SLIDE_JUMP = 0.25  # of the group's size, likewise
+BLOCK = 32  # grid points tried at a time
 
 
 @dataclass(frozen=True)
@@ -303,7 +303,7 @@ def _extent(elements: Sequence[tuple[Frame, Frame]]) -> float:
     return max(xs, default=0.0)
 
 
-def _lane(number: Number, index: int) -> Number:
+def _lane(number: Number, index: int | NDArray[np.intp]) -> Number:
     return number[index] if np.ndim(number) else number
 
 
@@ -311,7 +311,7 @@ def _at(elements: Sequence[tuple[Frame, Frame]], index: int) -> list[tuple[Frame
     return [(_frame_at(a, index), _frame_at(b, index)) for a, b in elements]
 
 
-def _frame_at(frame: Frame, index: int) -> Frame:
+def _frame_at(frame: Frame, index: int | NDArray[np.intp]) -> Frame:
     return Frame(*(_lane(n, index) for n in frame))
 
 
@@ -325,17 +325,50 @@ class _Follower:
     orientation: float
 
     def run(self, rows: Array, order: Sequence[int]) -> None:
-        """Fill `rows` (free, grid) along `order`, whose first column is known, up to where the branch ends."""
+        """Fill `rows` (free, grid) along `order`, whose first column is known, up to where the branch ends.
+
+        Several grid points are tried at a time, all lanes in parallel, and kept as far as they follow smoothly.
+        """
         slope = np.zeros(len(rows))
-        for here, there in itertools.pairwise(order):
-            if np.isfinite(rows[0, there]):
-                slope = rows[:, there] - rows[:, here]
+        block, place = 1, 0
+        while place + 1 < len(order):
+            here, ahead = order[place], list(order[place + 1 : place + 1 + block])
+            if np.isfinite(rows[0, ahead[0]]):
+                slope = rows[:, ahead[0]] - rows[:, here]
+                place += 1
                 continue
-            found = self._advance(rows[:, here], slope, here, there, 0.0, 1.0)
-            if found is None:
-                return
-            slope = found - rows[:, here]
-            rows[:, there] = found
+            found = self._block(rows[:, here], slope, ahead)
+            kept = found.shape[1]
+            if kept == 0 and block == 1:
+                found_one = self._advance(rows[:, here], slope, here, ahead[0], 0.0, 1.0)
+                if found_one is None:
+                    return
+                found, kept = found_one[:, None], 1
+            if kept:
+                rows[:, ahead[:kept]] = found
+                before = rows[:, ahead[kept - 2]] if kept > 1 else rows[:, here]
+                slope = found[:, -1] - before
+            place += kept
+            block = min(2 * block, BLOCK) if kept == len(ahead) else max(1, kept)
+
+    def _block(self, q: Array, slope: Array, ahead: Sequence[int]) -> Array:
+        """Coordinates (free, k) at the first k points of `ahead`, k as far as they follow q smoothly."""
+        guess = q[:, None] + slope[:, None] * np.arange(1, len(ahead) + 1)
+        indices = np.asarray(ahead)
+        elements = [(_frame_at(a, indices), _frame_at(b, indices)) for a, b in self.elements]
+        pose = self.group.position(elements, list(guess), [_lane(n, indices) for n in self.drive])
+        found = np.array([np.broadcast_to(pose.q[i], indices.shape) for i in self.group.free])
+        change = np.diff(found, axis=1, prepend=q[:, None])
+        bend = np.abs(np.diff(change, axis=1, prepend=change[:, :1]))
+        limits = self._limits(max(_extent(elements), 1e-300))[:, None]
+        good = np.all((np.abs(change) <= limits) & (bend <= limits / 4), axis=0)
+        good = good & (np.broadcast_to(pose.orientation, indices.shape) == self.orientation)
+        return found[:, : len(ahead) if good.all() else int(np.argmin(good))]
+
+    def _limits(self, size: float) -> Array:
+        """Largest change of each free coordinate between neighbours of the grid, rad or m."""
+        kinds = [self.group.joints[self.group.steps[i].joint].kind for i in self.group.free]
+        return np.array([TURN_JUMP if kind == "revolute" else SLIDE_JUMP * size for kind in kinds])
 
     def _advance(self, q: Array, slope: Array, here: int, there: int, low: float, high: float) -> Array | None:
         """From share `low` to `high` of the way between two grid points, halving the step where Newton strays."""
@@ -355,12 +388,8 @@ class _Follower:
         found = np.array([float(pose.q[i]) for i in self.group.free])
         if not np.all(np.isfinite(found)) or pose.orientation != self.orientation:
             return None
-        size = max(_extent(elements), 1e-300)
-        for i, value, old in zip(self.group.free, found, before, strict=True):
-            revolute = self.group.joints[self.group.steps[i].joint].kind == "revolute"
-            if abs(value - old) > (TURN_JUMP if revolute else SLIDE_JUMP * size):
-                return None
-        return found
+        limits = self._limits(max(_extent(elements), 1e-300))
+        return found if np.all(np.abs(found - before) <= limits) else None
 
 
 def _between(number: Number, here: int, there: int, share: float) -> Number:

@@ -24,6 +24,7 @@ from trunnion.algebra import linalg
 from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.groups import tree as spanning
+from trunnion.groups.cuts import Row, rows
 from trunnion.groups.planar import (
     ZERO_LOAD,
     Acceleration,
@@ -32,9 +33,11 @@ from trunnion.groups.planar import (
     Wrench,
     about,
     accelerated,
+    added,
     compose,
     moved,
     relative,
+    scaled,
     turned,
 )
 from trunnion.groups.protocol import Elements
@@ -42,7 +45,9 @@ from trunnion.groups.tree import OUTER, GroupJoint, Step
 
 __all__ = ["OUTER", "General", "GroupJoint", "Pose"]
 
-NEWTON_LIMIT = 60
+QUICK = 8  # rounds for all lanes
+NEWTON_LIMIT = 60  # more for those that need them
+NEARLY = 1e-7  # of its largest allowed step: from here one more round reaches rounding
 TURN_LIMIT = 0.4  # rad a step: keeps Newton on the branch it starts on
 
 
@@ -141,19 +146,49 @@ class General:
         if not self.free:
             return list(q)
         size = _size(self, elements)
-        scale = [TURN_LIMIT if self.joints[self.steps[i].joint].kind == "revolute" else 0.3 * size for i in self.free]
-        last = np.inf
-        for _ in range(NEWTON_LIMIT):
+        kinds = [self.joints[self.steps[i].joint].kind for i in self.free]
+        scale = [TURN_LIMIT if kind == "revolute" else 0.3 * size for kind in kinds]
+        q, moved_by = self._iterate(elements, q, drive, scale, QUICK)
+        late = ~(moved_by <= NEARLY)
+        if np.any(late):
+            q, moved_by = self._finish_late(elements, q, drive, scale, late)
+        q = self._step(elements, q, drive, scale)  # quadratic: from NEARLY to rounding
+        closed = moved_by <= NEARLY
+        return [np.where(closed, value, np.nan) for value in q]
+
+    def _iterate(
+        self, elements: Elements, q: list[Number], drive: Sequence[Number], scale: Sequence[float], rounds: int
+    ) -> tuple[list[Number], Number]:
+        """Newton steps until no lane moves by more than NEARLY (of its scale), at most `rounds`."""
+        last: Number = np.inf
+        for _ in range(rounds):
             before = [q[i] for i in self.free]
             q = self._step(elements, q, drive, scale)
             moves = [np.abs(q[i] - b) / s for i, b, s in zip(self.free, before, scale, strict=True)]
             last = np.maximum.reduce(np.broadcast_arrays(*moves))
-            open_lanes = last > 1e-7
-            if not np.any(open_lanes):
+            if not np.any(last > NEARLY):
                 break
-        q = self._step(elements, q, drive, scale)  # quadratic: from 1e-7 to rounding
-        closed = last <= 1e-7
-        return [np.where(closed, value, np.nan) for value in q]
+        return q, last
+
+    def _finish_late(
+        self, elements: Elements, q: list[Number], drive: Sequence[Number], scale: Sequence[float], late: Number
+    ) -> tuple[list[Number], Number]:
+        """Go on with the lanes that are still open, and with those alone: they are few or beyond help."""
+        shape = late.shape
+
+        def part(number: Number) -> Number:
+            return np.broadcast_to(number, shape)[late]
+
+        some = [(Frame(*(part(n) for n in a)), Frame(*(part(n) for n in b))) for a, b in elements]
+        found, last = self._iterate(some, [part(v) for v in q], [part(v) for v in drive], scale, NEWTON_LIMIT)
+        moved_by = np.zeros(shape)
+        moved_by[late] = last
+        merged = []
+        for value, new in zip(q, found, strict=True):
+            whole = np.array(np.broadcast_to(value, shape), float)
+            whole[late] = new
+            merged.append(whole)
+        return merged, moved_by
 
     def _step(
         self, elements: Elements, q: Sequence[Number], drive: Sequence[Number], limits: Sequence[float] | None = None
@@ -190,33 +225,15 @@ class General:
         pairs = tuple((placed(k, 0), placed(k, 1)) for k in range(len(self.joints)))
         return tuple(frames[link] for link in range(self.links)), pairs
 
-    # ---- the cuts -------------------------------------------------------------------------------------------
+    # ---- the Jacobian ---------------------------------------------------------------------------------------
 
     @cached_property
-    def _rows(self) -> tuple[_Row, ...]:
-        """Constraints of the cuts, in the order of the rows of J."""
-        rows: list[_Row] = []
-        for k in self.cuts:
-            kinds = ["x", "y"] if self.joints[k].kind == "revolute" else ["across", "turn"]
-            if k in self.driven:
-                kinds.append("turn" if self.joints[k].kind == "revolute" else "along")
-            rows += [_Row(k, kind, self.driven.index(k) if k in self.driven else -1) for kind in kinds]
-        return tuple(rows)
+    def _rows(self) -> tuple[Row, ...]:
+        return rows(self.joints, self.cuts, self.driven)
 
     def _gap(self, placed: Sequence[tuple[Frame, Frame]], drive: Sequence[Number]) -> list[Number]:
         """By how much each constraint of the cuts is open, m or rad."""
-        gaps: list[Number] = []
-        for row in self._rows:
-            first, second = placed[row.joint]
-            dx, dy = second.x - first.x, second.y - first.y
-            driven = drive[row.drive] if row.drive >= 0 else 0.0
-            if row.kind == "turn":
-                turn = -driven if self.joints[row.joint].kind == "revolute" else 0.0
-                xp = namespace(first.c, second.c, driven)
-                gaps.append(_angle(first, second, xp.cos(turn), xp.sin(turn)))
-            else:
-                gaps.append(_component(row.kind, first, dx, dy) - (driven if row.kind == "along" else 0.0))
-        return gaps
+        return [row.gap(*placed[row.joint], drive) for row in self._rows]
 
     def _screws(self, placed: Sequence[tuple[Frame, Frame]], at: Frame) -> list[Twist]:
         """Motion of the point `at` of the outboard side for a unit rate of each tree coordinate."""
@@ -240,9 +257,7 @@ class General:
             entries: list[Number] = []
             for i in self.free:
                 weight = (i in to_second) - (i in to_first)
-                screw = screws[i]
-                value = screw.w if row.kind == "turn" else _component(row.kind, first, screw.x, screw.y)
-                entries.append(weight * value if weight else 0.0)
+                entries.append(weight * row.entry(first, screws[i]) if weight else 0.0)
             matrix.append(entries)
         return matrix
 
@@ -277,7 +292,11 @@ class General:
     def rates(self, pose: Pose, outer: Sequence[Twist | None], drive: Sequence[Number] = ()) -> list[Number]:
         """Rates of all tree coordinates, rad/s and m/s."""
         rates = self.coordinates((), [0.0] * len(self.free), drive)
-        open_rates = self._gap_rates(pose, outer, self._twists(pose, outer, rates), drive)
+        twists = self._twists(pose, outer, rates)
+        open_rates = []
+        for row in self._rows:
+            ends = self._at(pose, twists, outer, row.joint, 0), self._at(pose, twists, outer, row.joint, 1)
+            open_rates.append(row.rate(pose.elements[row.joint], ends, drive))
         for i, line in zip(self.free, pose.inverse, strict=True):
             rates[i] = -_weighted(line, open_rates)
         return rates
@@ -312,21 +331,6 @@ class General:
             return known
         frame, element = pose.frames[link], pose.elements[k][side]
         return moved(twists[link], element.x - frame.x, element.y - frame.y)
-
-    def _gap_rates(
-        self, pose: Pose, outer: Sequence[Twist | None], twists: list[Twist], drive: Sequence[Number]
-    ) -> list[Number]:
-        gaps: list[Number] = []
-        for row in self._rows:
-            first, second = pose.elements[row.joint]
-            one, two = (self._at(pose, twists, outer, row.joint, side) for side in (0, 1))
-            driven = drive[row.drive] if row.is_driven(self.joints[row.joint].kind) else 0.0
-            if row.kind == "turn":
-                gaps.append(two.w - one.w - driven)
-            else:
-                carried = moved(one, second.x - first.x, second.y - first.y)
-                gaps.append(_component(row.kind, first, two.x - carried.x, two.y - carried.y) - driven)
-        return gaps
 
     def acceleration(
         self,
@@ -379,40 +383,31 @@ class General:
     def _gap_accelerations(self, known: _Motion, found: list[Acceleration], drive: Sequence[Number]) -> list[Number]:
         gaps: list[Number] = []
         for row in self._rows:
-            first, second = known.pose.elements[row.joint]
-            dx, dy = second.x - first.x, second.y - first.y
-            one, two = (self._acceleration_at(known, found, row.joint, side) for side in (0, 1))
-            driven = drive[row.drive] if row.is_driven(self.joints[row.joint].kind) else 0.0
-            if row.kind == "turn":
-                gaps.append(two.w - one.w - driven)
-                continue
-            v1, v2 = (self._at(known.pose, known.twists, known.outer_twists, row.joint, s) for s in (0, 1))
-            v1 = moved(v1, dx, dy)
-            slide = first.c * (v2.x - v1.x) + first.s * (v2.y - v1.y)
-            carried = accelerated(one, v1.w, dx, dy)
-            gap = _component(row.kind, first, two.x - carried.x, two.y - carried.y) - driven
-            gaps.append(gap - 2 * v1.w * slide if row.kind == "across" else gap)
+            k = row.joint
+            v1, v2 = (self._at(known.pose, known.twists, known.outer_twists, k, side) for side in (0, 1))
+            one, two = (self._acceleration_at(known, found, k, side) for side in (0, 1))
+            gaps.append(row.second(known.pose.elements[k], (v1, v2), (one, two), drive))
         return gaps
 
     # ---- reactions ------------------------------------------------------------------------------------------
 
     def reactions(self, pose: Pose, loads: Sequence[Wrench]) -> list[Wrench]:
         """Cut wrenches from Jᵀ λ = −(outboard power on each screw), the others link by link from outside in."""
-        carried = {link: self._from_origin(pose, loads[link], link) for link in range(self.links)}
+        carried = {link: _moved_to(pose, loads[link], pose.frames[link]) for link in range(self.links)}
         found = self._cut_wrenches(pose, carried)
         for k, wrench in found.items():
             first, second = self.joints[k].sides
             at = pose.elements[k][1]
             for link, sign in ((second, 1.0), (first, -1.0)):
                 if link != OUTER:
-                    carried[link] = _plus(carried[link], _moved_to(pose, wrench, at), sign)
+                    carried[link] = added(carried[link], _moved_to(pose, wrench, at), sign)
         for step in reversed(self.steps):
             at = pose.elements[step.joint][1]
             total = carried[step.child]
             sign = -1.0 if step.near == 0 else 1.0
-            found[step.joint] = _scaled(_moved_from(pose, total, at), sign)
+            found[step.joint] = scaled(_moved_from(pose, total, at), sign)
             if step.parent != OUTER:
-                carried[step.parent] = _plus(carried[step.parent], total, 1.0)
+                carried[step.parent] = added(carried[step.parent], total, 1.0)
         return [found[k] for k in range(len(self.joints))]
 
     def _cut_wrenches(self, pose: Pose, carried: dict[int, Wrench]) -> dict[int, Wrench]:
@@ -422,24 +417,14 @@ class General:
             outboard = ZERO_LOAD
             for link, path in self._paths.items():
                 if i in path:
-                    outboard = _plus(outboard, carried[link], 1.0)
+                    outboard = added(outboard, carried[link], 1.0)
             screw = self._screws(pose.elements, _reference(pose))[i]
             powers.append(screw.x * outboard.x + screw.y * outboard.y + screw.w * outboard.m)
         found = dict.fromkeys(self.cuts, ZERO_LOAD)
         for j, row in enumerate(self._rows):
             size = -_weighted([line[j] for line in pose.inverse], powers)
-            first = pose.elements[row.joint][0]
-            if row.kind == "turn":
-                found[row.joint] = _plus(found[row.joint], Wrench(0.0, 0.0, size), 1.0)
-            else:
-                x, y = _direction(row.kind, first)
-                found[row.joint] = _plus(found[row.joint], Wrench(size * x, size * y, 0.0), 1.0)
+            found[row.joint] = added(found[row.joint], row.wrench(pose.elements[row.joint][0], size), 1.0)
         return found
-
-    @staticmethod
-    def _from_origin(pose: Pose, load: Wrench, link: int) -> Wrench:
-        """A load about a link's origin, about the common reference point."""
-        return _moved_to(pose, load, pose.frames[link])
 
     def closure(self, pose: Pose) -> Number:
         """Largest distance by which a cut joint is open, m."""
@@ -457,44 +442,6 @@ class _Motion(NamedTuple):
     outer: Sequence[Acceleration | None]
 
 
-class _Row(NamedTuple):
-    """One constraint of a cut joint; drive: index of its prescribed coordinate, −1 if it is free."""
-
-    joint: int
-    kind: str
-    drive: int
-
-    @property
-    def is_length(self) -> bool:
-        return self.kind != "turn"
-
-    def is_driven(self, joint_kind: str) -> bool:
-        return self.drive >= 0 and self.kind == ("turn" if joint_kind == "revolute" else "along")
-
-
-def _direction(kind: str, first: Frame) -> tuple[Number, Number]:
-    """Unit vector along which a constraint measures."""
-    return {"x": (1.0, 0.0), "y": (0.0, 1.0), "across": (-first.s, first.c), "along": (first.c, first.s)}[kind]
-
-
-def _component(kind: str, first: Frame, x: Number, y: Number) -> Number:
-    """Component of (x, y) that a constraint sees."""
-    if kind == "x":
-        return x
-    if kind == "y":
-        return y
-    ux, uy = _direction(kind, first)
-    return ux * x + uy * y
-
-
-def _angle(first: Frame, second: Frame, c: Number, s: Number) -> Number:
-    """Turn of the second element against the first, less the angle with cosine c and sine −s."""
-    c2, s2 = turned(c, s, second.c, second.s)
-    sine = first.c * s2 - first.s * c2
-    cosine = first.c * c2 + first.s * s2
-    return namespace(sine, cosine).arctan2(sine, cosine)
-
-
 def _across(kind: str, near: Frame, value: Number) -> Frame:
     """The far element of a joint from its near one and the coordinate, seen from the near side."""
     if kind == "revolute":
@@ -509,14 +456,6 @@ def _weighted(weights: Sequence[Number], values: Sequence[Number]) -> Number:
     for weight, value in zip(weights, values, strict=True):
         total = total + weight * value
     return total
-
-
-def _plus(a: Wrench, b: Wrench, sign: float) -> Wrench:
-    return Wrench(a.x + sign * b.x, a.y + sign * b.y, a.m + sign * b.m)
-
-
-def _scaled(a: Wrench, sign: float) -> Wrench:
-    return Wrench(sign * a.x, sign * a.y, sign * a.m)
 
 
 def _reference(pose: Pose) -> Frame:

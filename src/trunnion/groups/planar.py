@@ -17,11 +17,13 @@ __all__ = [
     "Wrench",
     "about",
     "accelerated",
+    "added",
     "compose",
     "is_zero",
     "moved",
     "point",
     "relative",
+    "scaled",
     "turned",
 ]
 
@@ -119,3 +121,13 @@ def about(wrench: Wrench, dx: Number, dy: Number) -> Wrench:
     if is_zero(wrench.x) and is_zero(wrench.y):  # a pure moment is the same about every point
         return wrench
     return Wrench(wrench.x, wrench.y, wrench.m - (dx * wrench.y - dy * wrench.x))
+
+
+def added(a: Wrench, b: Wrench, sign: float) -> Wrench:
+    """a + sign · b, both about the same point."""
+    return Wrench(a.x + sign * b.x, a.y + sign * b.y, a.m + sign * b.m)
+
+
+def scaled(a: Wrench, factor: float) -> Wrench:
+    """The wrench multiplied by a number."""
+    return Wrench(factor * a.x, factor * a.y, factor * a.m)

@@ -122,8 +122,6 @@ def _absent(mechanism: Mechanism) -> Iterator[Finding]:
         yield Finding(
             "no link is fixed", "ground", "name the fixed link 'ground' or 'frame', or state ground: <its name>"
         )
-    if not mechanism.drivers:
-        yield Finding("there is no driver", "drivers", "state which joint is driven, as A: {speed: 10 rad/s}")
 
 
 def _links(mechanism: Mechanism) -> Iterator[Finding]:

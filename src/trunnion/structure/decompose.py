@@ -129,7 +129,7 @@ def _undetermined(
     if mobility != drivers:
         has = "no driver" if drivers == 0 else "one driver" if drivers == 1 else f"{drivers} drivers"
         remedy = (
-            "add a driver for each freedom left, or a link or joint that removes it"
+            "drive a joint for each freedom left, as A: {speed: 10 rad/s}, or add a link or joint that removes it"
             if mobility > drivers
             else "remove a driver, or a joint or link that constrains twice"
         )

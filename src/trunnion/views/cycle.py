@@ -169,7 +169,8 @@ def usual_peak(*columns: Array | None) -> float:
     Next to a dead centre forces grow without bound and would flatten everything else; then it is four times the
     magnitude that 90 % of the values stay below, and the figure says what it leaves out.
     """
-    sizes = np.concatenate([np.abs(values[np.isfinite(values)]) for values in columns if values is not None] or [[]])
+    finite = [np.abs(values[np.isfinite(values)]).ravel() for values in columns if values is not None]
+    sizes = np.concatenate(finite) if finite else np.empty(0)
     if not sizes.size:
         return 0.0
     most, usual = float(sizes.max()), float(np.quantile(sizes, 0.9))

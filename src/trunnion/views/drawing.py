@@ -251,4 +251,9 @@ def _together(places: dict[str, Array], near: float) -> list[tuple[str, list[str
             groups.append([point])
         else:
             home.append(point)
-    return [(", ".join(group), group) for group in groups]
+    return [(", ".join(map(_short, group)), group) for group in groups]
+
+
+def _short(name: str) -> str:
+    """A name that fits into the drawing."""
+    return name if len(name) <= 18 else f"{name[:17]}…"

@@ -143,7 +143,8 @@ def frame_peak(axes: Axes, most: float, shown: float, factor: float, unit: str) 
 
 def _outside(axes: Axes, most: float, unit: str) -> None:
     text = f"peak {quantity(most, unit)} lies outside"
-    axes.text(0.99, 0.97, text, transform=axes.transAxes, ha="right", va="top", fontsize=8, color=MUTED)
+    box = {"boxstyle": "round,pad=0.2", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
+    axes.text(0.99, 0.97, text, transform=axes.transAxes, ha="right", va="top", fontsize=8, color=MUTED, bbox=box)
 
 
 def square(axes: Axes, most: float, shown: float, factor: float, unit: str) -> None:

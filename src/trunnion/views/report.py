@@ -43,13 +43,15 @@ def report(result: xr.Dataset, ideal: xr.Dataset | None = None) -> str:
 
     shown = scene(result, ideal)
     style, script = web_text("report.css"), bundle("report.js")
-    runs = intervals(result)
+    runs, found = intervals(result), _findings(result)
     context = {
         "name": shown["name"] or "Mechanism", "formula": shown["formula"], "compared": ideal is not None,
         "positions": result.sizes["position"], "thinned": _ordinal(shown), "method": result.attrs.get("method", ""),
         "unanswered": sum(run.stop - run.start for run in runs),
         "summary": _summary(result),
-        "findings": _findings(result), "balance": _balance(result), "inputs": _inputs(result),
+        "findings": [row for row in found if row["severity"] != "note"],
+        "notes": [row for row in found if row["severity"] == "note"],
+        "balance": _balance(result), "inputs": _inputs(result),
         "references": [line for line in str(result.attrs.get("references", "")).splitlines() if line.strip()],
         "version": result.attrs.get("trunnion_version", ""), "model_hash": result.attrs.get("model_hash", ""),
         "style": Markup(style), "style_hash": _hash(style), "script": Markup(script), "script_hash": _hash(script),
@@ -91,7 +93,7 @@ def _ordinal(shown: dict[str, Any]) -> str:
 def _summary(result: xr.Dataset) -> list[tuple[str, str]]:
     """Label and value with unit of each summary row."""
     rows = attribute(result, "summary", [])
-    return [(str(row["label"]), quantity(row["value"], str(row.get("unit") or ""))) for row in rows]
+    return [(str(row["label"]), quantity(row["value"], str(row.get("unit") or "")) or "—") for row in rows]
 
 
 def _findings(result: xr.Dataset) -> list[dict[str, str]]:

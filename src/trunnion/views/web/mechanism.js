@@ -1,6 +1,6 @@
 // The mechanism as SVG: ground, links as bodies, joints, coupler curves, loads, reaction vectors.
 
-import { at, bounds, guide, hull, magnitude, place, quantile, solved, state } from "./data.js";
+import { at, bounds, guide, hull, magnitude, place, quantile, solved, state, usualPeak } from "./data.js";
 import { html, onWidth, set, svg } from "./dom.js";
 import { number, roundBelow, stated } from "./format.js";
 
@@ -15,6 +15,7 @@ export function mechanismView(scene, kinds) {
   if (!box) {
     message.textContent = "The mechanism could not be assembled at any position.";
     message.hidden = false;
+    element.classList.add("empty");
     return { element, show() {}, reactions() {} };
   }
   const view = {
@@ -28,10 +29,8 @@ export function mechanismView(scene, kinds) {
     factor: 1,
     shown: new Set(scene.joints.map((joint) => joint.name)),
   };
-  view.usual = quantile(
-    scene.joints.flatMap((joint) => magnitude(joint.reaction, scene.count)),
-    0.9,
-  );
+  const forces = scene.joints.flatMap((joint) => magnitude(joint.reaction, scene.count));
+  view.usual = Math.max(quantile(forces, 0.9), usualPeak(forces) / 2); // long vectors stay in sight, common ones legible
   onWidth(stage, (width) => build(view, width), 490);
   return {
     element,
@@ -191,12 +190,15 @@ function joint(one, scene) {
       ? svg("rect", { x: -17, y: -10, width: 34, height: 20, rx: 1.5 })
       : svg("circle", { r: 5 }),
   );
-  return { joint: one, node, beside, label: svg("text", { class: "name" }, one.name) };
+  return { joint: one, node, beside, label: svg("text", { class: "name" }, short(one.name)) };
 }
 
 function freePoint(key, link) {
   const name = key.slice(link.length + 1);
-  return { key, node: svg("g", { class: "point" }, svg("circle", { r: 3.5 }), svg("text", { x: 9, y: -8 }, name)) };
+  return {
+    key,
+    node: svg("g", { class: "point" }, svg("circle", { r: 3.5 }), svg("text", { x: 9, y: -8 }, short(name))),
+  };
 }
 
 function load(one) {
@@ -205,6 +207,12 @@ function load(one) {
     load: one,
     node: svg("g", { class: "load" }, svg("title", {}, `${one.name}: ${size}`), svg("path", {}), svg("text", {}, size)),
   };
+}
+
+/** A name that fits into the drawing; the whole of it is in the tooltip. */
+function short(name) {
+  const signs = [...name];
+  return signs.length > 14 ? `${signs.slice(0, 13).join("")}…` : name;
 }
 
 /** Length bar and reference arrow, with round numbers. */

@@ -103,7 +103,7 @@ function readout(scene) {
   const gap = abscissa.unit === "°" ? "" : "\u00a0";
   const rows = [
     [abscissa.label, (index) => fixed(abscissa.values[index], peak(abscissa.values)) + gap + abscissa.unit],
-    ["time", (index) => quantity(at(scene.time, index), "s", peak(scene.time))],
+    ...(abscissa.label === "time" ? [] : [["time", (index) => quantity(at(scene.time, index), "s", peak(scene.time))]]),
     ...drivers.map(({ name, unit, effort }) => [
       `${unit === "N" ? "force" : "torque"} ${name}`,
       (index) => quantity(at(effort, index), unit, usualPeak(effort)),

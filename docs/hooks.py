@@ -1,0 +1,391 @@
+"""What the build of the pages adds to their text, so that no table or picture can drift from the code.
+
+- `<!-- generated: NAME -->` in a page becomes the table of that name, made from the code's own tables.
+- `figures/MODEL/KIND.svg` and `figures/MODEL/report.html` are drawn when a page refers to them. MODEL is a file of
+  `examples/`, a block of a page titled `MODEL.yaml`, or an entry of `VARIANTS`.
+- `$x$` and `$$x$$` become MathML, which browsers set without any script.
+"""
+
+from __future__ import annotations
+
+import inspect
+import re
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
+from xml.etree.ElementTree import Element
+
+import yaml
+from latex2mathml.converter import convert
+from markdown.extensions import Extension
+from markdown.inlinepatterns import InlineProcessor
+from mkdocs.exceptions import PluginError
+from mkdocs.structure.files import File, Files
+from pydantic import BaseModel
+from pydantic_core import PydanticUndefined
+
+ROOT = Path(__file__).resolve().parents[1]
+DOCS = ROOT / "docs"
+EXAMPLES = ROOT / "examples"
+
+# model: (the model it is made from, what is replaced in it)
+VARIANTS: dict[str, tuple[str, dict[str, float | str]]] = {
+    "long-crank": ("durango-fourbar", {"AB": "2.6 m"}),
+    "press-long-guide": ("press", {"S.guide.length": "150 mm"}),
+}
+
+
+# ---- mathematics ----------------------------------------------------------------------------------------------
+
+
+class _Formula(InlineProcessor):
+    """A formula between dollar signs, as MathML."""
+
+    def handleMatch(self, m: re.Match[str], data: str) -> tuple[str | Element | None, int | None, int | None]:  # noqa: N802
+        """MathML, kept away from the other patterns."""
+        display = "block" if m.group(1) == "$$" else "inline"
+        return self.md.htmlStash.store(convert(m.group(2).strip(), display=display)), m.start(0), m.end(0)
+
+
+class Mathematics(Extension):
+    """`$…$` in a line and `$$…$$` on its own."""
+
+    def extendMarkdown(self, md: Any) -> None:  # noqa: N802
+        """After code spans, before escapes: a backslash belongs to the formula."""
+        md.inlinePatterns.register(_Formula(r"(?<!\\)(\$\$?)(?!\s)(.+?)(?<!\s)\1", md), "mathematics", 185)
+
+
+def on_config(config: Any) -> Any:
+    """Add the formulas to the Markdown extensions."""
+    config["markdown_extensions"].append(Mathematics())
+    return config
+
+
+# ---- figures --------------------------------------------------------------------------------------------------
+
+
+def on_files(files: Files, config: Any) -> Files:
+    """Draw what the pages refer to; put the examples and the schema beside them."""
+    pages = {path: path.read_text("utf-8") for path in sorted(DOCS.rglob("*.md"))}
+    wanted = {found for text in pages.values() for found in re.findall(r"figures/([\w-]+)/([\w-]+)\.(svg|html)", text)}
+    models = models_of(pages.values())
+    for model in sorted({name for name, _, _ in wanted}):
+        kinds = [kind for name, kind, suffix in sorted(wanted) if name == model and suffix == "svg"]
+        drawn = _drawn(model, models, kinds, report=any(name == model and s == "html" for name, _, s in wanted))
+        for name, content in drawn.items():
+            files.append(File.generated(config, f"figures/{model}/{name}", content=content))
+    for path in sorted(EXAMPLES.glob("*.yaml")):
+        files.append(File.generated(config, f"examples/{path.name}", abs_src_path=str(path)))
+    schema = ROOT / "src" / "trunnion" / "model" / "mechanism.schema.json"
+    files.append(File.generated(config, f"reference/{schema.name}", abs_src_path=str(schema)))
+    return files
+
+
+def models_of(pages: Any) -> dict[str, str]:
+    """Model files by name: the examples, and the blocks of the pages titled as a file."""
+    models = {path.stem: path.read_text("utf-8") for path in EXAMPLES.glob("*.yaml")}
+    for text in pages:
+        models |= dict(re.findall(r'^```yaml title="([\w-]+)\.yaml"\n(.*?)^```', text, re.DOTALL | re.MULTILINE))
+    return models
+
+
+def _drawn(model: str, models: dict[str, str], kinds: list[str], report: bool) -> dict[str, bytes]:
+    """The figures of a model, and its report, by file name."""
+    from trunnion import analyse, read
+    from trunnion import report as page
+    from trunnion.views.plots import PLOTS, save
+
+    base, values = VARIANTS.get(model, (model, {}))
+    if base not in models:
+        raise PluginError(f"figures/{model}: there is no model '{base}'")
+    drawn = {}
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / f"{base}.yaml"
+        file.write_text(models[base], encoding="utf-8")
+        mechanism = read(file)
+        mechanism = mechanism.with_values(values) if values else mechanism
+        result, ideal = analyse(mechanism), analyse(mechanism.with_friction("off"))
+        for kind in kinds:
+            path = Path(folder) / f"{kind}.svg"
+            save(PLOTS[kind](result, ideal), path)
+            drawn[path.name] = path.read_bytes()
+        if report:
+            drawn["report.html"] = page(result, ideal).encode()
+    return drawn
+
+
+# ---- tables ---------------------------------------------------------------------------------------------------
+
+
+def on_page_markdown(markdown: str, **_: Any) -> str:
+    """Put the generated tables into a page."""
+
+    def table(found: re.Match[str]) -> str:
+        name, _, argument = found[1].partition(" ")
+        if name not in TABLES:
+            raise PluginError(f"there is no generated table '{name}'; known: {', '.join(TABLES)}")
+        return TABLES[name](argument) if argument else TABLES[name]()
+
+    return re.sub(r"<!-- generated: (.+?) -->", table, markdown)
+
+
+def _rows(head: tuple[str, ...], rows: list[tuple[object, ...]]) -> str:
+    def line(cells: tuple[object, ...]) -> str:
+        return "| " + " | ".join(str(cell).replace("|", "&#124;").replace("\n", " ") for cell in cells) + " |"
+
+    return "\n".join([line(head), line(("---",) * len(head)), *(line(row) for row in rows)]) + "\n"
+
+
+def _code(text: object) -> str:
+    return f"`{text}`" if text not in ("", None) else ""
+
+
+def _unit(text: str) -> str:
+    return re.sub(r"\^([0-9])", lambda found: "⁰¹²³⁴⁵⁶⁷⁸⁹"[int(found[1])], text).replace(" ", " ")
+
+
+def results_table() -> str:
+    """Every variable of a result."""
+    from trunnion.results import VARIABLES
+
+    rows = [
+        (_code(name), ", ".join((*one.dims, "position")), _unit(one.units), one.long_name)
+        for name, one in VARIABLES.items()
+    ]
+    rows.append((_code("efficiency"), "", "1", "useful work over drive work of the cycle"))
+    return _rows(("variable", "dimensions", "unit", "meaning"), rows)
+
+
+def status_table() -> str:
+    """Every status."""
+    from trunnion.errors import Status
+
+    shown = {True: "all", False: "motion only"}
+    rows = [
+        (
+            int(one),
+            _code(one.name.lower()),
+            "nothing"
+            if one is Status.NOT_ASSEMBLED
+            else "positions only"
+            if one is Status.SINGULAR
+            else shown[one.solved],
+            one.text,
+        )
+        for one in Status
+    ]
+    return _rows(("code", "name", "numbers given", "meaning"), rows)
+
+
+def laws_table() -> str:
+    """Every friction law with its parameters."""
+    from trunnion.joints.friction import FRICTION_LAWS
+
+    parts = []
+    for name, law in FRICTION_LAWS.items():
+        rows = [
+            (
+                _code(key),
+                _unit(one.unit) or "1",
+                "must be given" if one.default is None else f"{one.default:g}",
+                f"{one.minimum:g} … {one.maximum:g}".replace("inf", "∞"),
+                one.meaning,
+            )
+            for key, one in law.parameters.items()
+        ]
+        head = f"**`{name}`** — {law.validity}. Source: {law.source}. Function: `joints.friction.{law.function.__name__}`."
+        parts.append(head + "\n\n" + _rows(("parameter", "unit", "default", "range", "meaning"), rows))
+    return "\n".join(parts)
+
+
+def pairs_table() -> str:
+    """Every pair that the analysis knows."""
+    from trunnion.joints.pairs import PAIRS
+
+    rows = [
+        (_code(name), one.symbol, ", ".join(one.freedoms), "yes" if one.needs_axis else "no")
+        for name, one in PAIRS.items()
+    ]
+    return _rows(("`type`", "letter", "freedoms", "needs an `axis` on both links"), rows)
+
+
+def groups_table() -> str:
+    """Every module with a closed form."""
+    from trunnion.groups import GROUPS
+
+    rows = []
+    for name, group in GROUPS.items():
+        is_module = inspect.ismodule(group)
+        home = group.__name__ if is_module else type(group).__module__
+        about = inspect.getdoc(group if is_module else inspect.getmodule(type(group))) or ""
+        rows.append((_code(name), _code(home.removeprefix("trunnion.")), about.splitlines()[0]))
+    rows.append(("every other", "`groups.general`", "Any planar group, by Newton's method and one Jacobian"))
+    return _rows(("module", "where", "what"), rows)
+
+
+def plots_table() -> str:
+    """Every plot."""
+    from trunnion.views.plots import PLOTS
+
+    return _rows(
+        ("kind", "shows"), [(_code(name), (inspect.getdoc(f) or "").splitlines()[0]) for name, f in PLOTS.items()]
+    )
+
+
+def formats_table() -> str:
+    """Every format a result is written in."""
+    from trunnion.export import FORMATS
+
+    rows = [(_code(name), f"`pip install 'trunnion[{extra}]'`" if extra else "") for name, (_, _, extra) in FORMATS.items()]
+    return _rows(("extension", "needs"), rows)
+
+
+def units_table() -> str:
+    """Every kind of quantity."""
+    from trunnion.model.units import KINDS
+
+    return _rows(
+        ("kind", "a plain number is in", "for example"),
+        [(kind.name, _unit(kind.unit), _code(kind.example)) for kind in KINDS.values()],
+    )
+
+
+def command_line() -> str:
+    """Every verb with its arguments and options."""
+    from trunnion.cli import app
+
+    parts = []
+    for command in app.registered_commands:
+        call = command.callback
+        assert call is not None
+        rows = []
+        for parameter in inspect.signature(call).parameters.values():
+            hint = get_type_hints(call, include_extras=True)[parameter.name]
+            base, info = get_args(hint)[0], hint.__metadata__[0]
+            names = [name for name in info.param_decls or () if name.startswith("-")]
+            argument = type(info).__name__ == "ArgumentInfo"
+            default = parameter.default
+            if default is inspect.Parameter.empty:
+                default = "must be given"
+            elif default is None or default is False:
+                default = ""
+            elif str(default) == ".":
+                default = "here"
+            rows.append(
+                (
+                    _code(parameter.name.upper() if argument else names[0] if names else f"--{parameter.name}"),
+                    "" if base is bool else _kind_of(base),
+                    default,
+                    info.help or "",
+                )
+            )
+        name = command.name or call.__name__
+        parts.append(
+            f"## trunnion {name}\n\n{inspect.getdoc(call)}\n\n" + _rows(("", "takes", "default", "meaning"), rows)
+        )
+    return "\n".join(parts)
+
+
+def _kind_of(base: Any) -> str:
+    text = str(base)
+    words = {"int": "whole number", "float": "number", "Path": "path", "str": "text"}
+    return next((word for key, word in words.items() if key in text), text)
+
+
+def public_names() -> str:
+    """mkdocstrings' directive for every public name."""
+    import trunnion
+
+    places = [getattr(trunnion, name) for name in trunnion.__all__]
+    return "\n\n".join(f"::: {one.__module__}.{one.__qualname__}" for one in places)
+
+
+# ---- the model file -------------------------------------------------------------------------------------------
+
+SECTIONS = ("Link", "Point", "PolarPoint", "InertiaTensor", "Joint", "Pin", "Guide", "Friction", "JointDefaults",
+            "LoopJoint", "Driver", "Load", "Measure")  # fmt: skip
+
+
+def meanings() -> dict[str, dict[str, str]]:
+    """What each key means, by class and key; the tables below refuse to be built if one is missing or too many."""
+    return yaml.safe_load((DOCS / "meanings.yaml").read_text("utf-8"))
+
+
+def section(name: str) -> str:
+    """The keys of one section: what each takes, its default, its meaning."""
+    told = meanings()[name]
+    fields = _class(name).model_fields
+    stray = set(told) ^ set(fields)
+    if stray:
+        raise PluginError(f"docs/meanings.yaml, {name}: {', '.join(sorted(stray))} is told or stated, not both")
+    rows = [(_code(key), _takes(field), _default(field), told[key]) for key, field in fields.items()]
+    return _rows(("key", "takes", "default", "meaning"), rows)
+
+
+def _class(name: str) -> type[BaseModel]:
+    from trunnion.model import mechanism, parts
+
+    return mechanism.Mechanism if name == "Mechanism" else getattr(parts, name)
+
+
+def _takes(field: Any) -> str:
+    found = list(dict.fromkeys(_forms(Annotated[field.annotation, *field.metadata] if field.metadata else field.annotation)))
+    return " or ".join(found)
+
+
+def _forms(hint: Any, metadata: tuple[Any, ...] = ()) -> Iterator[str]:
+    """In words, every form that a type hint allows."""
+    origin, arguments = get_origin(hint), get_args(hint)
+    kinds = [one.kind for one in metadata if hasattr(one, "kind")]
+    enums = [one.json_schema for one in metadata if hasattr(one, "json_schema")]
+    if kinds:
+        yield f"{kinds[0].name} ({_unit(kinds[0].unit)})" if kinds[0].dimensions else "any quantity"
+    elif enums:
+        yield " or ".join(f"`{one}`" for one in enums[0].get("enum", enums[0].get("examples", [])))
+    elif origin is Annotated:
+        yield from _forms(arguments[0], hint.__metadata__)
+    elif origin is Literal:
+        yield " or ".join(f"`{one}`" for one in arguments)
+    elif origin is tuple:
+        inside = [next(_forms(one)) for one in arguments if one is not Ellipsis]
+        yield "list of " + inside[0] if len(set(inside)) == 1 else f"[{', '.join(inside)}]"
+    elif isinstance(origin, type) and "Mapping" in origin.__name__:
+        yield "by name: " + " or ".join(_forms(arguments[1]))
+    elif arguments:
+        for one in arguments:
+            yield from _forms(one, ())
+    elif isinstance(hint, type) and issubclass(hint, BaseModel):
+        yield f"[{hint.__name__}](#{hint.__name__.lower()})"
+    elif hint is bool:
+        yield "`true` or `false`"
+    elif hint is str:
+        yield "text"
+
+
+def _default(field: Any) -> str:
+    from trunnion.model.quantity import Quantity
+
+    value = field.default
+    if value is PydanticUndefined:
+        return "must be given" if field.is_required() else ""
+    if isinstance(value, Quantity):
+        return str(value.source)
+    if isinstance(value, bool):
+        return str(value).lower()
+    return _code(value) if isinstance(value, (str, int)) and value != "" else ""
+
+
+TABLES: dict[str, Callable[..., str]] = {
+    "results": results_table,
+    "statuses": status_table,
+    "laws": laws_table,
+    "pairs": pairs_table,
+    "groups": groups_table,
+    "plots": plots_table,
+    "formats": formats_table,
+    "units": units_table,
+    "command-line": command_line,
+    "public-names": public_names,
+    "section": section,
+}

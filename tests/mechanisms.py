@@ -1,0 +1,401 @@
+"""Mechanisms that many tests share, as plain data, and what is asked of their results again and again."""
+
+from __future__ import annotations
+
+import copy
+import json
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import trunnion
+from trunnion import Mechanism
+from trunnion.groups.general import OUTER, General, GroupJoint
+
+Data = dict[str, Any]
+Array = NDArray[np.float64]
+DURANGO = Path(__file__).parents[1] / "examples" / "durango-fourbar.yaml"
+
+
+def revolute(*links: str) -> Data:
+    return {"type": "revolute", "links": list(links)}
+
+
+def prismatic(*links: str) -> Data:
+    return {"type": "prismatic", "links": list(links)}
+
+
+def slide(x: float, y: float, angle: float = 0.0) -> Data:
+    """Point of a prismatic joint with the direction of its slide."""
+    return {"at": [x, y], "axis": [float(np.cos(angle)), float(np.sin(angle))]}
+
+
+def body(points: Data, number: int = 1, size: float = 1.0) -> Data:
+    """A link with mass properties off its axes, different for each number."""
+    return {
+        "points": points,
+        "mass": 1.0 + 0.7 * number,
+        "centre": [size * (0.2 + 0.07 * number), size * (0.1 - 0.05 * number)],
+        "inertia": size**2 * (0.05 + 0.02 * number),
+    }
+
+
+def model(data: Data, friction: float | None = 0.12, radius: float = 0.01, guide: float = 0.4) -> Data:
+    """The data with gravity and friction in every joint."""
+    defaults: Data = {"pin": {"radius": radius}}
+    if any(joint["type"] == "prismatic" for joint in data["joints"].values()):
+        defaults["guide"] = {"length": guide}
+    if friction is not None:
+        defaults["friction"] = friction
+    return {"gravity": [0.3, -9.81], "joint_defaults": defaults, **data}
+
+
+def four_bar(ab: float = 0.3, bc: float = 0.9, cd: float = 0.7, ad: float = 1.0, side: float = 1.0) -> Data:
+    """Crank and rocker by default; side: where C is at the start."""
+    return {
+        "links": {
+            "ground": {"points": {"A": [0, 0], "D": [ad, 0]}},
+            "crank": body({"A": [0, 0], "B": [ab, 0]}, 1, ab),
+            "coupler": body({"B": [0, 0], "C": [bc, 0], "E": [0.4 * bc, 0.3 * bc]}, 2, bc),
+            "rocker": body({"D": [0, 0], "C": [cd, 0]}, 3, cd),
+        },
+        "joints": {
+            "A": revolute("ground", "crank"),
+            "B": revolute("crank", "coupler"),
+            "C": revolute("coupler", "rocker"),
+            "D": revolute("ground", "rocker"),
+        },
+        "drivers": {"A": {"speed": 4.0}},
+        "loads": {
+            "push": {"link": "coupler", "at": "E", "force": [12.0, -30.0]},
+            "brake": {"link": "rocker", "moment": -7.0},
+        },
+        "assembly": {"C": [0.9 * ad, side * cd]},
+    }
+
+
+def slider_crank(r: float = 0.3, length: float = 1.0, offset: float = 0.1) -> Data:
+    return {
+        "links": {
+            "ground": {"points": {"A": [0, 0], "C": slide(0, offset)}},
+            "crank": body({"A": [0, 0], "B": [r, 0]}, 1, r),
+            "rod": body({"B": [0, 0], "P": [length, 0]}, 2, length),
+            "piston": body({"P": [0, 0], "C": slide(0.05, 0), "H": [0.1, 0.08]}, 3, r),
+        },
+        "joints": {
+            "A": revolute("ground", "crank"),
+            "B": revolute("crank", "rod"),
+            "P": revolute("rod", "piston"),
+            "C": prismatic("ground", "piston"),
+        },
+        "drivers": {"A": {"speed": -6.0}},
+        "loads": {"gas": {"link": "piston", "at": "H", "force": [-50.0, 4.0]}},
+        "assembly": {"P": [r + length, offset]},
+    }
+
+
+def inverted_slider_crank() -> Data:
+    """Crank and swinging arm in which a block slides (RPR group): a shaper's drive, the arm's pin off its slide."""
+    return {
+        "links": {
+            "ground": {"points": {"A": [0, 0], "D": [0.1, -0.8]}},
+            "crank": body({"A": [0, 0], "B": [0.3, 0]}, 1, 0.3),
+            "block": body({"B": [0, 0], "S": slide(0.02, 0.01, 0.1)}, 2, 0.2),
+            "arm": body({"D": [0, 0], "S": slide(0.03, 0, np.pi / 2 + 0.1), "T": [0, 1.5]}, 3, 1.0),
+        },
+        "joints": {
+            "A": revolute("ground", "crank"),
+            "B": revolute("block", "crank"),
+            "S": prismatic("arm", "block"),
+            "D": revolute("ground", "arm"),
+        },
+        "drivers": {"A": {"speed": 3.0, "start": 0.2}},
+        "loads": {"cut": {"link": "arm", "at": "T", "force": [20.0, 5.0]}},
+        "assembly": {"S": [0.3, 0.0], "arm.T": [0.5, 0.8]},
+    }
+
+
+def watt_six_bar() -> Data:
+    data = four_bar()
+    data["links"]["ground"]["points"]["G"] = [2.0, 0.1]
+    data["links"]["rocker"]["points"]["F"] = [0.5, 0.3]
+    data["links"]["rod"] = body({"F": [0, 0], "H": [1.0, 0]}, 4)
+    data["links"]["output"] = body({"G": [0, 0], "H": [0.8, 0]}, 5)
+    data["joints"] |= {
+        "F": revolute("rod", "rocker"),
+        "H": revolute("rod", "output"),
+        "G": revolute("output", "ground"),
+    }
+    data["loads"]["work"] = {"link": "output", "moment": 9.0, "useful": True}
+    data["assembly"]["H"] = [2.0, 1.0]
+    return data
+
+
+def stephenson_six_bar() -> Data:
+    """Stephenson III: a dyad on the coupler point of a four-bar."""
+    data = four_bar()
+    data["links"]["ground"]["points"]["G"] = [0.2, 1.4]
+    data["links"]["rod"] = body({"E": [0, 0], "H": [0.8, 0]}, 4)
+    data["links"]["output"] = body({"G": [0, 0], "H": [0.7, 0]}, 5)
+    data["joints"] |= {
+        "E": revolute("coupler", "rod"),
+        "H": revolute("rod", "output"),
+        "G": revolute("ground", "output"),
+    }
+    data["loads"]["work"] = {"link": "output", "moment": -9.0}
+    data["assembly"]["H"] = [0.9, 1.3]
+    return data
+
+
+def class_three() -> Data:
+    """A ternary link on three rods: to the crank and to the two ends of the ground (Assur group of class III)."""
+    return {
+        "links": {
+            "ground": {"points": {"A": [0, 0], "G": [1.6, 0.0], "H": [1.0, 1.9]}},
+            "crank": body({"A": [0, 0], "B": [0.08, 0]}, 1, 0.2),
+            "rod1": body({"B": [0, 0], "P": [0.8, 0]}, 2, 0.8),
+            "rod2": body({"G": [0, 0], "Q": [0.7, 0]}, 3, 0.7),
+            "rod3": body({"H": [0, 0], "R": [0.8, 0]}, 4, 0.8),
+            "plate": body({"P": [0, 0], "Q": [0.6, 0], "R": [0.25, 0.5]}, 5, 0.4),
+        },
+        "joints": {
+            "A": revolute("ground", "crank"),
+            "B": revolute("crank", "rod1"),
+            "P": revolute("rod1", "plate"),
+            "Q": revolute("plate", "rod2"),
+            "R": revolute("rod3", "plate"),
+            "G": revolute("ground", "rod2"),
+            "H": revolute("rod3", "ground"),
+        },
+        "drivers": {"A": {"speed": 5.0}},
+        "loads": {
+            "push": {"link": "plate", "at": "R", "force": [7.0, -20.0]},
+            "turn": {"link": "rod3", "moment": 3.0},
+        },
+        "assembly": {"P": [0.7, 0.7], "Q": [1.3, 0.65], "R": [0.9, 1.15]},
+    }
+
+
+def five_bar() -> Data:
+    return {
+        "links": {
+            "ground": {"points": {"A": [0, 0], "E": [0.8, 0]}},
+            "left": body({"A": [0, 0], "B": [0.3, 0]}, 1, 0.3),
+            "right": body({"E": [0, 0], "D": [0.25, 0]}, 2, 0.3),
+            "rod1": body({"B": [0, 0], "C": [0.9, 0]}, 3, 0.9),
+            "rod2": body({"D": [0, 0], "C": [0.8, 0], "T": [1.0, 0.1]}, 4, 0.8),
+        },
+        "joints": {
+            "A": revolute("ground", "left"),
+            "E": revolute("right", "ground"),
+            "B": revolute("left", "rod1"),
+            "C": revolute("rod2", "rod1"),
+            "D": revolute("right", "rod2"),
+        },
+        "drivers": {"A": {"speed": 2.0}, "E": {"speed": -4.0, "start": 0.4}},
+        "loads": {"tool": {"link": "rod2", "at": "T", "force": [-5.0, 11.0]}},
+        "assembly": {"C": [0.5, 0.8]},
+    }
+
+
+def excavator() -> Data:
+    """A boom raised by a cylinder, and on it a stick that is turned by a driver on the moving boom."""
+    return {
+        "links": {
+            "ground": {"points": {"A": [0, 0], "B": [0.5, -0.2]}},
+            "boom": body({"A": [0, 0], "C": [0.9, 0.15], "K": [2.0, 0]}, 1, 1.5),
+            "barrel": body({"B": [0, 0], "S": slide(0.1, 0)}, 2, 0.4),
+            "rod": body({"C": [0.05, 0], "S": slide(-0.5, 0)}, 3, 0.4),
+            "stick": body({"K": [0, 0], "T": [1.1, 0.1]}, 4, 0.8),
+        },
+        "joints": {
+            "A": revolute("ground", "boom"),
+            "B": revolute("ground", "barrel"),
+            "C": revolute("boom", "rod"),
+            "S": prismatic("barrel", "rod"),
+            "K": revolute("stick", "boom"),
+        },
+        "drivers": {"S": {"speed": 0.05, "range": [0.0, 0.2]}, "K": {"speed": -0.2, "range": [1.9, 1.1]}},
+        "loads": {"dig": {"link": "stick", "at": "T", "force": [-80.0, 120.0]}},
+        "assembly": {"C": [0.8, 0.4]},
+    }
+
+
+def serial_arm() -> Data:
+    """Revolute, prismatic, revolute: drivers on moving links, nothing closes."""
+    return {
+        "links": {
+            "ground": {"points": {"A": [0.2, 0.1]}},
+            "arm": body({"A": [0.1, 0], "P": slide(0.5, 0.1, 0.3)}, 1),
+            "ram": body({"P": slide(-0.2, 0.05, -0.4), "W": [0.6, 0.1]}, 2),
+            "hand": body({"W": [0.05, 0.02], "T": [0.4, 0]}, 3, 0.3),
+        },
+        "joints": {
+            "A": revolute("ground", "arm"),
+            "P": prismatic("arm", "ram"),
+            "W": revolute("hand", "ram"),
+        },
+        "drivers": {
+            "A": {"speed": 1.0, "range": [0.0, 2.0]},
+            "P": {"speed": -0.25, "range": [0.5, 0.0]},
+            "W": {"speed": 3.0, "range": [0.0, 6.0]},
+        },
+        "loads": {"tip": {"link": "hand", "at": "T", "force": [3.0, -8.0]}},
+    }
+
+
+def scotch_yoke() -> Data:
+    """Crank pin in a block, block in the slot of a yoke, yoke in a guide (RPP group)."""
+    return {
+        "links": {
+            "ground": {"points": {"A": [0, 0], "G": slide(0.6, 0.05, 0.1)}},
+            "crank": body({"A": [0, 0], "B": [0.25, 0]}, 1, 0.25),
+            "block": body({"B": [0, 0], "S": slide(0.01, 0, 1.4)}, 2, 0.1),
+            "yoke": body({"S": slide(0, 0.1, 1.4), "G": slide(0.5, 0, 0.0)}, 3, 0.4),
+        },
+        "joints": {
+            "A": revolute("ground", "crank"),
+            "B": revolute("crank", "block"),
+            "S": prismatic("block", "yoke"),
+            "G": prismatic("ground", "yoke"),
+        },
+        "drivers": {"A": {"speed": 2.5}},
+        "loads": {"work": {"link": "yoke", "at": "S", "force": [-15.0, 2.0]}},
+        "assembly": {"S": [0.25, 0.0]},
+    }
+
+
+def elliptic_bar() -> Data:
+    """A bar between two slides, one driven (RRP group on a sliding driver)."""
+    return {
+        "links": {
+            "ground": {"points": {"X": slide(0, 0), "Y": slide(0, 0, 1.3)}},
+            "ram": body({"X": slide(0, 0), "P": [0.1, 0.02]}, 1, 0.2),
+            "bar": body({"P": [0, 0], "Q": [0.9, 0]}, 2, 0.9),
+            "slider": body({"Q": [0, 0], "Y": slide(0.05, 0.1, 1.3)}, 3, 0.2),
+        },
+        "joints": {
+            "X": prismatic("ground", "ram"),
+            "P": revolute("ram", "bar"),
+            "Q": revolute("bar", "slider"),
+            "Y": prismatic("ground", "slider"),
+        },
+        "drivers": {"X": {"speed": 0.3, "range": [0.05, 0.5]}},
+        "loads": {"work": {"link": "slider", "at": "Q", "force": [1.0, -25.0]}},
+        "assembly": {"Q": [0.2, 0.8]},
+    }
+
+
+def tangent_drive() -> Data:
+    """A driven arm with a slot, a block in the slot, pinned to a slide on the ground (PRP group)."""
+    return {
+        "links": {
+            "ground": {"points": {"A": [0, 0], "G": slide(0.5, 0.1, 1.5)}},
+            "arm": body({"A": [0, 0], "S": slide(0.3, 0.02, 0.05)}, 1, 0.5),
+            "block": body({"S": slide(0, 0), "P": [0.02, 0.01]}, 2, 0.1),
+            "slider": body({"P": [0, 0.05], "G": slide(0.03, 0, 1.5)}, 3, 0.2),
+        },
+        "joints": {
+            "A": revolute("ground", "arm"),
+            "S": prismatic("block", "arm"),
+            "P": revolute("block", "slider"),
+            "G": prismatic("slider", "ground"),
+        },
+        "drivers": {"A": {"speed": 0.7, "range": [-0.6, 0.9]}},
+        "loads": {"work": {"link": "slider", "at": "P", "force": [2.0, -40.0]}},
+        "assembly": {"P": [0.5, -0.3]},
+    }
+
+
+MODELS: Mapping[str, Callable[[], Data]] = {
+    "four-bar": four_bar,
+    "four-bar, other branch": lambda: four_bar(side=-1.0),
+    "slider-crank": slider_crank,
+    "inverted slider-crank": inverted_slider_crank,
+    "Watt six-bar": watt_six_bar,
+    "Stephenson six-bar": stephenson_six_bar,
+    "class III": class_three,
+    "five-bar": five_bar,
+    "excavator": excavator,
+    "serial arm": serial_arm,
+    "Scotch yoke": scotch_yoke,
+    "elliptic bar": elliptic_bar,
+    "tangent drive": tangent_drive,
+}
+
+
+def build(data: Data, **options: Any) -> Mechanism:
+    """The mechanism of one of the tables above, with friction and gravity."""
+    return Mechanism(**model(copy.deepcopy(data), **options))
+
+
+def findings(result: Any) -> list[dict[str, str]]:
+    return list(json.loads(result.attrs["findings"]))
+
+
+def analyse(data: Data, steps: int = 36, method: Any = None, **options: Any) -> Any:
+    return trunnion.analyse(build(data, **options), steps, method)
+
+
+def transformed(data: Data, turn: float = 0.0, shift: Sequence[float] = (0.0, 0.0), mirror: bool = False) -> Data:
+    """The same mechanism in a turned, shifted, mirrored frame: ground, gravity, loads, hints, drivers.
+
+    Links keep their own frames, mirrored in their x axis if the whole is. Gravity must be in the data.
+    """
+    data = copy.deepcopy(data)
+    sign = -1.0 if mirror else 1.0
+    c, s = float(np.cos(turn)), float(np.sin(turn))
+
+    def vector(v: Sequence[float]) -> list[float]:
+        x, y = float(v[0]), sign * float(v[1])
+        return [c * x - s * y, s * x + c * y]
+
+    def place(v: Sequence[float]) -> list[float]:
+        x, y = vector(v)
+        return [x + shift[0], y + shift[1]]
+
+    def local(v: Sequence[float]) -> list[float]:
+        return [float(v[0]), sign * float(v[1])]
+
+    for name, link in data["links"].items():
+        at, direction = (place, vector) if name == "ground" else (local, local)
+        for key, value in link["points"].items():
+            link["points"][key] = (
+                {"at": at(value["at"]), "axis": direction(value["axis"])} if isinstance(value, dict) else at(value)
+            )
+        if "centre" in link:
+            link["centre"] = local(link["centre"])
+    data["gravity"] = vector(data["gravity"])
+    for load in data.get("loads", {}).values():
+        if "force" in load:
+            load["force"] = vector(load["force"])
+        if "moment" in load:
+            load["moment"] = sign * load["moment"]
+    data["assembly"] = {key: place(value) for key, value in data.get("assembly", {}).items()}
+    moving = set(data["links"]) - {"ground"}
+    for name, driver in data["drivers"].items():
+        joint = data["joints"][name]
+        if joint["type"] == "prismatic":
+            continue
+        offset = 0.0 if set(joint["links"]) <= moving else turn * (1.0 if joint["links"][0] == "ground" else -1.0)
+        driver["speed"] = sign * driver["speed"]
+        if "range" in driver:
+            driver["range"] = [sign * q + offset for q in driver["range"]]
+        else:
+            driver["start"] = sign * driver.get("start", 0.0) + offset
+    return data
+
+
+# ---- groups by hand -------------------------------------------------------------------------------------------
+
+KIND = {"R": "revolute", "P": "prismatic"}
+
+
+def dyad(letters: str) -> General:
+    """General group of two links on known links: outer joint, inner joint, outer joint."""
+    first, inner, last = (KIND[letter] for letter in letters)
+    joints = (GroupJoint(first, (OUTER, 0)), GroupJoint(inner, (0, 1)), GroupJoint(last, (OUTER, 1)))
+    return General(2, joints)

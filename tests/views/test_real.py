@@ -1,0 +1,84 @@
+"""The views on real analyses: the four-bar of Durango, one that cannot turn all the way, and a slider-crank."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from test_report import Page
+
+from trunnion import Mechanism, analyse
+from trunnion.views.plots import PLOTS, save
+from trunnion.views.report import report
+from trunnion.views.scene import scene
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+@pytest.fixture(scope="module")
+def four_bar():
+    mechanism = Mechanism.read(EXAMPLES / "durango-fourbar.yaml")
+    return analyse(mechanism), analyse(mechanism.with_friction("off"))
+
+
+@pytest.fixture(scope="module")
+def stuck():
+    """The crank made longer than the shortest link: it cannot turn all the way."""
+    return analyse(Mechanism.read(EXAMPLES / "durango-fourbar.yaml").with_values({"dimensions.AB": 3.2}))
+
+
+@pytest.fixture(scope="module")
+def slider_crank():
+    return analyse(Mechanism.read(EXAMPLES / "toleranced-slider-crank.yaml"), steps=72)
+
+
+def test_the_report_tells_the_published_figures(four_bar):
+    result, ideal = four_bar
+    text = report(result, ideal)
+    words = " ".join("".join(Page(text).words).split())
+    for figure in ("9.288 kN m", "−18.55 kN m", "517.5 W", "2.375 kW"):  # THEORY, section 7
+        assert figure in words
+    assert len(text) < 1_500_000
+
+
+def test_the_scene_is_the_analysis(four_bar):
+    result, ideal = four_bar
+    shown = scene(result, ideal)
+    assert shown["abscissa"]["values"][60] == pytest.approx(60.0)
+    assert shown["drivers"][0]["effort"][60] == pytest.approx(3393.503681)
+    assert shown["drivers"][0]["ideal"][60] == pytest.approx(3364.879649)
+    reactions = {joint["name"]: joint["reaction"] for joint in shown["joints"]}
+    assert reactions["A"]["x"][60] == pytest.approx(-3388.683339, rel=1e-6)
+    assert [link["free"] for link in shown["links"] if link["name"] == "coupler"] == [["coupler.E"]]
+
+
+def test_where_it_cannot_be_assembled_the_drive_is_still_told(stuck):
+    shown = scene(stuck)
+    missing = [index for index, code in enumerate(shown["status"]) if code]
+    assert missing
+    assert shown["abscissa"]["unit"] == "°"
+    assert np.diff(shown["abscissa"]["values"]) == pytest.approx(1.0)
+    assert shown["points"]["rocker.C"]["x"][missing[0]] is None
+    words = "".join(Page(report(stuck)).words)
+    assert "cannot be assembled" in words
+
+
+def test_a_slider_has_its_guide_along_the_frame(slider_crank):
+    joint = next(one for one in scene(slider_crank)["joints"] if one["name"] == "S")
+    assert (joint["type"], joint["axis"], joint["at"]) == ("prismatic", [1.0, 0.0], "piston.S")
+
+
+@pytest.mark.parametrize("name", PLOTS)
+@pytest.mark.parametrize("which", ["stuck", "slider_crank"])
+def test_figures(name, which, request, tmp_path):
+    result = request.getfixturevalue(which)
+    assert save(PLOTS[name](result, None), tmp_path / "figure.svg").stat().st_size > 5_000
+
+
+def test_input_data_are_told_as_they_were_written(slider_crank):
+    words = " ".join("".join(Page(report(slider_crank)).words).split())
+    texts = [row["text"] for row in json.loads(slider_crank.attrs["inputs"])]
+    assert "1500 rpm" in texts
+    assert "1500 rpm" in words

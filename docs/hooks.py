@@ -263,7 +263,7 @@ def command_line() -> str:
         for parameter in inspect.signature(call).parameters.values():
             hint = get_type_hints(call, include_extras=True)[parameter.name]
             base, info = get_args(hint)[0], hint.__metadata__[0]
-            names = [name for name in info.param_decls or () if name.startswith("-")]
+            names = [name for name in (info.default, *(info.param_decls or ())) if str(name).startswith("--")]
             argument = type(info).__name__ == "ArgumentInfo"
             default = parameter.default
             if default is inspect.Parameter.empty:

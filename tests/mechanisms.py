@@ -151,14 +151,14 @@ def stephenson_six_bar() -> Data:
 
 
 def class_three() -> Data:
-    """A ternary link on three rods: to the crank and to the two ends of the ground (Assur group of class III)."""
+    """A ternary link on three rods: to the crank and to two pins of the ground (Assur group of class III)."""
     return {
         "links": {
-            "ground": {"points": {"A": [0, 0], "G": [1.6, 0.0], "H": [1.0, 1.9]}},
-            "crank": body({"A": [0, 0], "B": [0.08, 0]}, 1, 0.2),
-            "rod1": body({"B": [0, 0], "P": [0.8, 0]}, 2, 0.8),
-            "rod2": body({"G": [0, 0], "Q": [0.7, 0]}, 3, 0.7),
-            "rod3": body({"H": [0, 0], "R": [0.8, 0]}, 4, 0.8),
+            "ground": {"points": {"A": [0, 0], "G": [1.4, -0.15], "H": [0.55, 1.9]}},
+            "crank": body({"A": [0, 0], "B": [0.1, 0]}, 1, 0.2),
+            "rod1": body({"B": [0, 0], "P": [0.8485, 0]}, 2, 0.8),
+            "rod2": body({"G": [0, 0], "Q": [0.7566, 0]}, 3, 0.7),
+            "rod3": body({"H": [0, 0], "R": [0.8944, 0]}, 4, 0.8),
             "plate": body({"P": [0, 0], "Q": [0.6, 0], "R": [0.25, 0.5]}, 5, 0.4),
         },
         "joints": {
@@ -175,7 +175,7 @@ def class_three() -> Data:
             "push": {"link": "plate", "at": "R", "force": [7.0, -20.0]},
             "turn": {"link": "rod3", "moment": 3.0},
         },
-        "assembly": {"P": [0.7, 0.7], "Q": [1.3, 0.65], "R": [0.9, 1.15]},
+        "assembly": {"P": [0.7, 0.6], "Q": [1.3, 0.6], "R": [0.95, 1.1]},
     }
 
 
@@ -304,7 +304,7 @@ def tangent_drive() -> Data:
             "P": revolute("block", "slider"),
             "G": prismatic("slider", "ground"),
         },
-        "drivers": {"A": {"speed": 0.7, "range": [-0.6, 0.9]}},
+        "drivers": {"A": {"speed": 0.7, "range": [-0.6, 0.6]}},
         "loads": {"work": {"link": "slider", "at": "P", "force": [2.0, -40.0]}},
         "assembly": {"P": [0.5, -0.3]},
     }

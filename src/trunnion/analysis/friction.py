@@ -24,7 +24,7 @@ from trunnion.algebra.dual import Dual, derivative, primal
 from trunnion.algebra.namespace import Number
 from trunnion.analysis import continuation
 from trunnion.errors import Finding, MechanismError
-from trunnion.groups.planar import Wrench
+from trunnion.groups.planar import Wrench, is_zero
 from trunnion.groups.protocol import Group
 from trunnion.joints.friction import FrictionLaw
 from trunnion.joints.pairs import Load, Reaction
@@ -116,8 +116,7 @@ def settle(
         return Settled(start, [], 0, 0.0, 0.0, True, 1.0)
     influence = [group.reactions(pose, contact.unit_loads) for contact in contacts]
     problem = _Problem(contacts, start, influence)
-    state = _newton(problem, method) if method.name == "newton" else _successive(problem, method)
-    return state._replace(reactions=problem.reactions(state.forces))
+    return _newton(problem, method) if method.name == "newton" else _successive(problem, method)
 
 
 class _State(NamedTuple):
@@ -156,17 +155,21 @@ class _Problem:
         return found
 
     def at(self, joint: int, forces: Sequence[Number]) -> Wrench:
-        """Reaction of one joint under friction forces."""
+        """Reaction of one joint under friction forces; without any, the frictionless one."""
         x, y, m = self.start[joint]
+        if all(is_zero(force) for force in forces):
+            return Wrench(x, y, m)
         for force, column in zip(forces, self.influence, strict=True):
             dx, dy, dm = column[joint]
             x, y = x + dx * force, y + dy * force
-            if not (isinstance(dm, float) and dm == 0.0):
+            if not is_zero(dm):
                 m = m + dm * force
         return Wrench(x, y, m)
 
-    def reactions(self, forces: Sequence[Number]) -> list[Wrench]:
-        return [self.at(joint, forces) for joint in range(len(self.start))]
+    def reactions(self, forces: Sequence[Number], known: _State) -> list[Wrench]:
+        """Reactions of all joints; those of the contacts are in the state that belongs to the forces."""
+        found = {c.joint: reaction for c, reaction in zip(self.contacts, known.reactions, strict=True)}
+        return [found[j] if j in found else self.at(j, forces) for j in range(len(self.start))]
 
     def state(self, forces: Sequence[Number]) -> _State:
         """Reactions and normal loads at the contacts under friction forces."""
@@ -236,8 +239,9 @@ def _newton(problem: _Problem, method: FrictionMethod) -> Settled:
         inverse = linalg.inverse(_identity_minus(rows))
     for _ in range(_depth(problem)):
         forces = _corrected(problem, problem.state(forces), forces, inverse)
+        state = problem.state(forces)
     contraction = _largest([sum(np.abs(entry) for entry in row) for row in rows])
-    return Settled([], forces, iterations, change, contraction, done, shares)
+    return Settled(problem.reactions(forces, state), forces, iterations, change, contraction, done, shares)
 
 
 def _corrected(
@@ -272,7 +276,7 @@ def _successive(problem: _Problem, method: FrictionMethod) -> Settled:
         done = ~(change > method.tolerance(state.normals))
     measurable = np.isfinite(previous) & (previous > 0)
     ratio = np.where(measurable, change / np.where(measurable, previous, 1.0), 0.0)
-    return Settled([], forces, iterations, change, ratio, done, 1.0)
+    return Settled(problem.reactions(forces, state), forces, iterations, change, ratio, done, 1.0)
 
 
 def _follow(problem: _Problem, forces: Sequence[Number], lanes: Number) -> tuple[list[Number], NDArray[np.float64]]:
@@ -313,7 +317,7 @@ def _identity_minus(rows: Sequence[Sequence[Number]]) -> list[list[Number]]:
 def _along(gradient: Reaction, column: Reaction) -> Number:
     """Derivative of a normal load along a change of the reaction."""
     total = gradient[0] * column[0] + gradient[1] * column[1]
-    if isinstance(gradient[2], float) and gradient[2] == 0.0:
+    if is_zero(gradient[2]):
         return total
     return total + gradient[2] * column[2]
 

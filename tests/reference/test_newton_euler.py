@@ -1,0 +1,150 @@
+"""Whole mechanisms against the Newton–Euler equations of all links at once, which share nothing with Trunnion.
+
+The oracle is given accelerations differentiated here from Trunnion's positions only, so that a consistent error of
+velocity, acceleration and force could not cancel; friction is given from the reactions found.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from mechanisms import MODELS, Array, Data, build, model
+from reference import newton_euler
+
+import trunnion
+from trunnion.analysis.analyse import Run
+
+STEPS = 24
+STEP = 2e-3  # rad-like share of the cycle for the sixth-order differences below
+
+
+def times(run: Run) -> Array:
+    """Times away from the ends of a range, where central differences have no room."""
+    return (np.arange(STEPS) + 0.37) / STEPS * run.cycle.duration
+
+
+def link_poses(run: Run, time: Array) -> dict[str, tuple[Array, Array, Array]]:
+    """Origin and angle of every moving link."""
+    walk = run.solve(time).walk
+    ground = run.system.mechanism.fixed_link
+    return {
+        link: tuple(
+            np.broadcast_to(n, np.shape(time))
+            for n in (motion.frame.x, motion.frame.y, np.arctan2(motion.frame.s, motion.frame.c))
+        )
+        for link, motion in walk.motions.items()
+        if link != ground
+    }
+
+
+def accelerations(run: Run, time: Array) -> dict[str, tuple[Array, Array, Array]]:
+    """Second derivatives of the poses of the centres of mass, eighth-order central differences of positions."""
+    h = STEP * run.cycle.duration
+    weights = np.array([-1 / 560, 8 / 315, -1 / 5, 8 / 5, -205 / 72, 8 / 5, -1 / 5, 8 / 315, -1 / 560]) / h**2
+    stencil = time + h * np.arange(-4, 5)[:, None]
+    found = {}
+    sampled = [link_poses(run, row) for row in stencil]
+    for link in sampled[0]:
+        cx, cy = run.system.centre(run.values, link)
+        angle = np.unwrap(np.array([poses[link][2] for poses in sampled]), axis=0)
+        x = np.array([poses[link][0] for poses in sampled]) + np.cos(angle) * cx - np.sin(angle) * cy
+        y = np.array([poses[link][1] for poses in sampled]) + np.sin(angle) * cx + np.cos(angle) * cy
+        found[link] = tuple(np.tensordot(weights, n, axes=1) for n in (x, y, angle))
+    return found
+
+
+def bodies_at(run: Run, data: Data, back: Any, second: dict[str, tuple[Array, Array, Array]], i: int) -> dict[str, Any]:
+    walk, mechanism, values = back.walk, run.system.mechanism, run.values
+
+    def here(number: Any) -> float:
+        return float(np.broadcast_to(number, (STEPS,))[i])
+
+    bodies = {}
+    for link in mechanism.links:
+        if link == mechanism.fixed_link:
+            continue
+        loads = []
+        for load in data.get("loads", {}).values():
+            if load.get("link") != link:
+                continue
+            at = walk.point(link, load["at"]).place if "at" in load else (0.0, 0.0)
+            force = load.get("force", (0.0, 0.0))
+            loads.append(newton_euler.Load((here(at[0]), here(at[1])), force, load.get("moment", 0.0)))
+        x, y = walk.local_point(link, *run.system.centre(values, link)).place
+        bodies[link] = newton_euler.Body(
+            values[f"links.{link}.mass"],
+            values[f"links.{link}.inertia"],
+            (here(x), here(y)),
+            (second[link][0][i], second[link][1][i]),
+            second[link][2][i],
+            loads,
+        )
+    return bodies
+
+
+def joints_at(run: Run, back: Any, i: int) -> dict[str, newton_euler.Joint]:
+    def here(number: Any) -> float:
+        return float(np.broadcast_to(number, (STEPS,))[i])
+
+    ground = run.system.mechanism.fixed_link
+    joints = {}
+    for name, (kind, (first, second)) in run.system.joints.items():
+        at, axis = back.walk.element(second, name), back.walk.element(first, name)
+        joints[name] = newton_euler.Joint(
+            kind,
+            None if first == ground else first,
+            None if second == ground else second,
+            (here(at.x), here(at.y)),
+            (here(axis.c), here(axis.s)),
+            here(back.friction[name]),
+            name in run.system.mechanism.drivers,
+        )
+    return joints
+
+
+@pytest.mark.parametrize("friction", [None, 0.15])
+@pytest.mark.parametrize("name", MODELS)
+def test_reactions_and_efforts(name: str, friction: float | None) -> None:
+    """Same reactions and efforts to 1e-8: eighth-order differences are good to about 1e-10 of the accelerations."""
+    data = model(MODELS[name](), friction=friction)
+    run = trunnion.prepare(build(MODELS[name](), friction=friction))
+    time = times(run)
+    back = run.solve(time)
+    second = accelerations(run, time)
+    scale = max(float(np.max(np.hypot(r.x, r.y))) for r in back.reactions.values())
+    arm = float(run.system.size(run.values))
+    for i in range(STEPS):
+        joints = joints_at(run, back, i)
+        oracle = newton_euler.solve(bodies_at(run, data, back, second, i), joints, data["gravity"])
+        for joint, reaction in back.reactions.items():
+            found = [float(np.broadcast_to(n, (STEPS,))[i]) for n in (reaction.x, reaction.y, reaction.m)]
+            np.testing.assert_allclose(found[:2], oracle.force[joint], rtol=0, atol=1e-8 * scale, err_msg=joint)
+            np.testing.assert_allclose(found[2], oracle.moment[joint], rtol=0, atol=1e-8 * scale * arm, err_msg=joint)
+        for driver, effort in back.efforts.items():
+            size = scale * (arm if joints[driver].kind == "revolute" else 1.0)
+            found = float(np.broadcast_to(effort, (STEPS,))[i])
+            np.testing.assert_allclose(found, oracle.effort[driver], rtol=0, atol=1e-8 * size, err_msg=driver)
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_friction_obeys_its_law(name: str) -> None:
+    """|M| = f r |F| at a pin, |F_t| = f (|F_n/2 + M/L| + |F_n/2 − M/L|) in a guide, against the slip."""
+    coefficient, radius, guide = 0.15, 0.01, 0.4
+    run = trunnion.prepare(build(MODELS[name](), friction=coefficient, radius=radius, guide=guide))
+    back = run.solve(times(run))
+    for joint, (kind, (first, _)) in run.system.joints.items():
+        reaction, slip = back.reactions[joint], back.slips[joint].speed
+        if kind == "revolute":
+            expected = -np.sign(slip) * coefficient * radius * np.hypot(reaction.x, reaction.y)
+        else:
+            axis = back.walk.element(first, joint)
+            across = axis.c * reaction.y - axis.s * reaction.x
+            ends = np.abs(across / 2 + reaction.m / guide) + np.abs(across / 2 - reaction.m / guide)
+            expected = -np.sign(slip) * coefficient * ends
+        expected = np.broadcast_to(expected, (STEPS,))
+        # the iteration rests where N changes by 1e-8 of the largest N of the module; the next error is its square
+        np.testing.assert_allclose(
+            np.broadcast_to(back.friction[joint], (STEPS,)), expected, rtol=0, atol=1e-10 * np.max(np.abs(expected))
+        )

@@ -107,7 +107,8 @@ def _parquet(result: xr.Dataset, path: Path, units_row: bool) -> None:
 
 
 def _netcdf(result: xr.Dataset, path: Path, units_row: bool) -> None:
-    engine: Literal["h5netcdf", "scipy"] = "h5netcdf" if importlib.util.find_spec("h5netcdf") else "scipy"
+    modern = all(importlib.util.find_spec(package) for package in ("h5netcdf", "h5py"))
+    engine: Literal["h5netcdf", "scipy"] = "h5netcdf" if modern else "scipy"
     result.to_netcdf(path, engine=engine)
 
 

@@ -188,7 +188,8 @@ def _zero_slip(
             worst = int(np.nanargmax(widths))
             place = positions[worst]
             parts.append(f"effort of {driver} {lower[place]:.6g} … {upper[place]:.6g} {unit} at {dial.at(place)}")
-    what = f"relative speed zero {dial.intervals(positions)}: its friction is an interval; {', '.join(parts)}"
+    bounds = ", ".join(parts) or "with one sign it locks, so the effort has no bounds"
+    what = f"relative speed zero {dial.intervals(positions)}: its friction is an interval; {bounds}"
     return Finding(
         what, f"joints.{joint}", "the bounds are in drive_effort_lower and drive_effort_upper", Severity.NOTE
     )

@@ -278,6 +278,7 @@ class ParameterSet:
             raise MechanismError(
                 Finding(f"the name '{name}' stands for {len(paths)} numbers", remedy=f"say which: {some}")
             )
-        raise MechanismError(
-            Finding(f"there is no number named '{name}'", remedy=nearest(name, [*self.entries, *self._endings]))
-        )
+        dimensions = [path.partition(".")[2] for path in self.entries if path.startswith("dimensions.")]
+        # a short name is most likely a mistyped dimension; endings such as `x` resemble everything
+        known = [*self.entries, *self._endings] if "." in name or not dimensions else dimensions
+        raise MechanismError(Finding(f"there is no number named '{name}'", remedy=nearest(name, known)))

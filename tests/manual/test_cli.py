@@ -1,0 +1,327 @@
+"""The command line as a user meets it: every verb; every fault with message and exit status, nothing half-written."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+from trunnion import cli
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+FOUR_BAR = EXAMPLES / "durango-fourbar.yaml"
+
+
+class Outcome(NamedTuple):
+    code: int
+    out: str
+    err: str
+
+
+Run = Callable[..., Outcome]
+
+
+@pytest.fixture
+def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Run:
+    """The program, in this process, in an empty folder."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "140")
+
+    def call(*arguments: object) -> Outcome:
+        monkeypatch.setattr(sys, "argv", ["trunnion", *map(str, arguments)])
+        capsys.readouterr()
+        code = 0
+        try:
+            cli.main()
+        except SystemExit as stop:
+            code = int(stop.code or 0)
+        out, err = capsys.readouterr()
+        assert "Traceback" not in err + out
+        return Outcome(code, out, err)
+
+    return call
+
+
+def model(tmp_path: Path, change: Callable[[str], str], name: str = "model.yaml") -> Path:
+    """The four-bar with its text changed."""
+    text = FOUR_BAR.read_text("utf-8")
+    changed = change(text)
+    assert changed != text
+    path = tmp_path / name
+    path.write_text(changed, "utf-8")
+    return path
+
+
+def table(path: Path) -> list[dict[str, str]]:
+    """Rows of a CSV file."""
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def files(folder: Path) -> set[str]:
+    return {path.name for path in folder.iterdir()}
+
+
+# ---- what works -----------------------------------------------------------------------------------------------
+
+
+def test_analyse_prints_the_figures_of_the_case_study_and_writes_every_format(run: Run, tmp_path: Path) -> None:
+    done = run("analyse", FOUR_BAR, "--out", "r.csv", "--out", "r.nc", "--out", "r.json", "--report", "r.html")
+    assert done.code == 0
+    for figure in ("-18552.9", "9288.3", "517.465", "2375.34", "I(0,1)R → II(2,3)RRR"):
+        assert figure in done.out
+    assert files(tmp_path) == {"r.csv", "r.nc", "r.json", "r.html"}
+    rows = table(tmp_path / "r.csv")
+    assert len(rows) == 360
+    assert float(rows[60]["A.effort"]) == pytest.approx(3393.503681, abs=1e-6)
+    assert rows[0]["status"] == "zero_slip"
+    assert rows[1]["status"] == "solved"
+    assert json.loads((tmp_path / "r.json").read_text("utf-8"))["attrs"]["formula"] == "I(0,1)R → II(2,3)RRR"
+
+
+def test_friction_off_changes_the_torque(run: Run, tmp_path: Path) -> None:
+    assert run("analyse", FOUR_BAR, "--friction", "off", "--out", "off.csv").code == 0
+    rows = table(tmp_path / "off.csv")
+    assert float(rows[60]["A.effort"]) == pytest.approx(3364.879649, abs=1e-6)
+
+
+def test_set_replaces_dimensions_and_paths(run: Run) -> None:
+    plain = run("analyse", FOUR_BAR).out
+    longer = run("analyse", FOUR_BAR, "--set", "AB=2.1m").out
+    assert longer != plain
+    assert run("analyse", FOUR_BAR, "--set", "AB=2100 mm").out == longer
+    assert run("analyse", FOUR_BAR, "--set", "B.friction.coefficient=0.1").out != plain
+
+
+def test_methods_agree(run: Run, tmp_path: Path) -> None:
+    assert run("analyse", FOUR_BAR, "--out", "newton.csv").code == 0
+    named = ("--method", "successive-approximation", "--criterion", "1e-9", "--out", "named.csv")
+    assert run("analyse", FOUR_BAR, *named).code == 0
+    newton, other = (table(tmp_path / f"{n}.csv") for n in ("newton", "named"))
+    for one, two in zip(newton, other, strict=True):
+        assert float(one["A.effort"]) == pytest.approx(float(two["A.effort"]), rel=1e-9)
+
+
+def test_check_prints_mobility_formula_and_plan(run: Run) -> None:
+    done = run("check", FOUR_BAR)
+    assert done.code == 0
+    for text in (
+        "mobility 1 by formula, 1 by rank",
+        "I(0,1)R → II(2,3)RRR",
+        "II(2,3)RRR",
+        "closed form",
+        "2 assemblies",
+    ):
+        assert text in done.out
+
+
+def test_plots_are_written_one_by_one_or_all(run: Run, tmp_path: Path) -> None:
+    assert run("plot", FOUR_BAR, "--kind", "torque", "--out", "torque.svg", "--steps", "36").code == 0
+    assert (tmp_path / "torque.svg").read_text("utf-8").lstrip().startswith("<?xml")
+    assert run("plot", FOUR_BAR, "--out", "figures", "--steps", "36").code == 0
+    assert {"torque.png", "mechanism.png", "friction-power.png", "reactions.png", "polar.png"} <= files(
+        tmp_path / "figures"
+    )
+
+
+def test_examples_are_listed_and_copied(run: Run, tmp_path: Path) -> None:
+    assert "durango-fourbar" in run("examples").out
+    assert run("examples", "durango-fourbar").code == 0
+    assert (tmp_path / "durango-fourbar.yaml").read_bytes() == FOUR_BAR.read_bytes()
+    again = run("examples", "durango-fourbar")
+    assert again.code == 2
+    assert "--force" in again.err
+    assert run("examples", "durango-fourbar", "--force").code == 0
+    assert "durango-fourbar" in run("examples", "nothing-like-it").err
+
+
+def test_units_row_comes_only_on_request(run: Run, tmp_path: Path) -> None:
+    run("analyse", FOUR_BAR, "--steps", "4", "--out", "plain.csv")
+    run("analyse", FOUR_BAR, "--steps", "4", "--out", "units.csv", "--units-row")
+    plain, units = ((tmp_path / name).read_text("utf-8").splitlines() for name in ("plain.csv", "units.csv"))
+    assert len(plain) == 5
+    assert units[0] == plain[0]
+    assert units[1].split(",")[:3] == ["s", "rad", "rad/s"]
+    assert units[2:] == plain[1:]
+
+
+# ---- faults of the mechanism ----------------------------------------------------------------------------------
+
+
+def test_a_linkage_that_does_not_close_everywhere_says_where_and_by_how_much(run: Run, tmp_path: Path) -> None:
+    done = run("analyse", FOUR_BAR, "--set", "AB=4m", "--out", "r.csv")
+    assert done.code == 1
+    assert "cannot be assembled" in done.err
+    assert "|BD| exceeds BC + CD by up to" in done.err
+    rows = table(tmp_path / "r.csv")
+    solved = [row for row in rows if row["status"] in ("solved", "zero_slip")]
+    missing = [row for row in rows if row["status"] == "not_assembled"]
+    assert solved
+    assert missing
+    assert all(row["A.effort"] for row in solved)
+    assert not any(row["A.effort"] or row["coupler.C.x"] for row in missing)
+
+
+def test_a_linkage_that_never_closes_is_said_to(run: Run) -> None:
+    done = run("analyse", FOUR_BAR, "--set", "BC=0.3m")
+    assert done.code == 1
+    assert "cannot be assembled at every position" in done.err
+    assert "no answer" in done.out or "0" in done.out
+
+
+def test_friction_that_locks_gives_a_status_and_no_number(run: Run, tmp_path: Path) -> None:
+    done = run("analyse", FOUR_BAR, "--set", "joint_defaults.pin.radius=4m", "--out", "r.csv")
+    assert done.code == 1
+    assert "locked by friction" in done.err
+    rows = table(tmp_path / "r.csv")
+    locked = [row for row in rows if row["status"] == "locked"]
+    assert locked
+    assert not any(row["A.effort"] for row in locked)
+
+
+def test_a_dead_centre_is_a_finding(run: Run, tmp_path: Path) -> None:
+    # driven at the rocker over a range that ends where crank and coupler are in line
+    def drive_rocker(text: str) -> str:
+        text = text.replace(
+            "  A: {speed: 10 rad/s}               # one turn unless a range is given", "  D: {speed: 1 rad/s}"
+        )
+        return text
+
+    done = run("analyse", model(tmp_path, drive_rocker))
+    assert done.code == 1
+    assert "cannot be assembled" in done.err
+
+
+def test_wrong_mobility_is_bad_input(run: Run, tmp_path: Path) -> None:
+    path = model(
+        tmp_path, lambda text: text.replace("  A: {speed: 10 rad/s} ", "  A: {speed: 10 rad/s}\n  D: {speed: 1 rad/s} ")
+    )
+    done = run("analyse", path, "--out", "r.csv")
+    assert done.code == 2
+    assert "mobility is 1" in done.err
+    assert "2 drivers" in done.err
+    assert files(tmp_path) == {"model.yaml"}
+
+
+def test_a_spatial_model_is_read_but_not_analysed(run: Run) -> None:
+    done = run("analyse", EXAMPLES / "pezzuti-cardan.yaml")
+    assert done.code == 2
+    assert "spatial" in done.err
+
+
+# ---- bad input ------------------------------------------------------------------------------------------------
+
+BAD_TEXTS = {
+    "empty": (lambda text: "", "empty"),
+    "no yaml": (lambda text: text.replace("links:", "links: [", 1), "not YAML"),
+    "unknown key": (lambda text: text.replace("mass: 4.8 kg", "mas: 4.8 kg"), "mass"),
+    "mass in metres": (lambda text: text.replace("4.8 kg", "4.8 m"), "kg"),
+    "negative mass": (lambda text: text.replace("4.8 kg", "-4.8 kg"), "links.crank.mass"),
+    "undefined dimension": (lambda text: text.replace("[AB, 0]", "[AX, 0]"), "AX"),
+    "circular dimensions": (
+        lambda text: text.replace("BC: 6.00 m", "BC: CD * 2\n  EF: BC").replace("CD: 3.00 m", "CD: EF"),
+        "defined by itself",
+    ),
+    "missing point": (lambda text: text.replace("D: [0, 0], C: [CD, 0]", "D: [0, 0]"), "C"),
+    "floating link": (lambda text: text.replace("joints:   ", "  spare: {points: {Z: [0, 0]}}\njoints:   "), "spare"),
+    "nan": (lambda text: text.replace("mass: 4.8 kg", "mass: .nan"), "links.crank.mass"),
+    "infinite": (lambda text: text.replace("mass: 4.8 kg", "mass: .inf"), "links.crank.mass"),
+    "python tag": (lambda text: text + "\nnotes: !!python/object/apply:os.system ['true']\n", "tag"),
+}
+
+
+@pytest.mark.parametrize("verb", ["check", "analyse"])
+@pytest.mark.parametrize("case", BAD_TEXTS)
+def test_bad_models_are_refused_with_a_message(run: Run, tmp_path: Path, verb: str, case: str) -> None:
+    change, word = BAD_TEXTS[case]
+    path = model(tmp_path, change)
+    done = run(verb, path, *(["--out", "r.csv"] if verb == "analyse" else []))
+    assert done.code == 2
+    assert word in done.err
+    assert "error:" in done.err
+    assert str(path) in done.err
+    assert files(tmp_path) == {"model.yaml"}
+
+
+def test_several_findings_come_at_once_with_their_lines(run: Run, tmp_path: Path) -> None:
+    path = model(tmp_path, lambda text: text.replace("4.8 kg", "-4.8 kg").replace("mass: 7.2 kg", "mass: 7.2 s"))
+    done = run("check", path)
+    lines = path.read_text("utf-8").splitlines()
+    for needle in ("-4.8 kg", "7.2 s"):
+        number = next(i for i, line in enumerate(lines, 1) if needle in line)
+        assert f"{path}:{number}" in done.err
+
+
+def test_missing_file_folder_and_huge_file(run: Run, tmp_path: Path) -> None:
+    assert run("check", "nowhere.yaml").code == 2
+    assert run("check", tmp_path).code == 2
+    big = tmp_path / "big.yaml"
+    big.write_bytes(b"# " + b"x" * 50_000_000)
+    done = run("check", big)
+    assert done.code == 2
+    assert "MB" in done.err
+
+
+def test_names_with_spaces_and_greek_letters_are_fine(run: Run, tmp_path: Path) -> None:
+    def rename(text: str) -> str:
+        return text.replace("crank", '"κ link 1"').replace("coupler", '"Kоppel θ"').replace("gamma", "γ")
+
+    done = run("analyse", model(tmp_path, rename), "--steps", "12", "--out", "r.csv", "--report", "r.html")
+    assert done.code == 0
+    assert "κ link 1.B.x" in (tmp_path / "r.csv").read_text("utf-8")
+
+
+@pytest.mark.parametrize(
+    ("options", "word"),
+    [
+        (["--steps", "0"], "steps"),
+        (["--steps", "-5"], "steps"),
+        (["--set", "AX=1"], "AB"),
+        (["--set", "AB"], "name=value"),
+        (["--set", "AB=2 kg"], "mass"),
+        (["--set", "AB=-1 m;import os"], "AB"),
+        (["--friction", "kulomb"], "coulomb"),
+        (["--method", "magic"], "newton"),
+        (["--criterion", "-1"], "criterion"),
+        (["--iterations", "0"], "iterations"),
+        (["--out", "r.xlsx"], ".csv"),
+        (["--out", "no/such/folder/r.csv"], "folder"),
+    ],
+)
+def test_bad_options_are_refused_with_a_message(run: Run, tmp_path: Path, options: list[str], word: str) -> None:
+    done = run("analyse", FOUR_BAR, *options)
+    assert done.code == 2
+    assert word in done.err
+    assert not files(tmp_path)
+
+
+def test_bad_plot_options(run: Run) -> None:
+    assert "torque" in run("plot", FOUR_BAR, "--kind", "nothing", "--out", "x.png").err
+    assert run("plot", FOUR_BAR, "--out", "x.png").code == 2
+
+
+def test_the_program_as_a_process(tmp_path: Path) -> None:
+    """Exit status, streams and encoding of the installed command, not only of its functions."""
+    program = Path(sys.executable).with_name("trunnion")
+    environment = {**os.environ, "PYTHONIOENCODING": "ascii"}
+    arguments = [str(program), "check", str(FOUR_BAR)]
+    done = subprocess.run(arguments, capture_output=True, env=environment, cwd=tmp_path, check=False)
+    assert done.returncode == 0
+    assert "I(0,1)R → II(2,3)RRR" in done.stdout.decode("utf-8")
+    bad = subprocess.run([str(program), "analyse", "missing.yaml"], capture_output=True, cwd=tmp_path, check=False)
+    assert bad.returncode == 2
+    assert b"Traceback" not in bad.stderr
+
+
+def test_help_needs_no_heavy_imports() -> None:
+    """What keeps `trunnion --help` quick."""
+    code = "import sys, trunnion.cli; print([m for m in ('numpy', 'xarray', 'pint', 'matplotlib') if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"

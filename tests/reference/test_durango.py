@@ -104,16 +104,16 @@ def test_zero_slip_is_an_interval(results: dict[str, Any]) -> None:
 
 @pytest.mark.parametrize("position", [0.0, np.pi])
 def test_interval_holds_the_limits_from_both_sides(results: dict[str, Any], position: float) -> None:
-    """Just before and just after, friction at C is fully on one side: the two torques are the ends of the interval."""
+    """On either side friction at C is fully on; both torques, extrapolated to the place itself, are the ends."""
     run = trunnion.prepare(trunnion.read(DURANGO))
     result, index = results["friction"], round(np.degrees(position))
-    step = 1e-7 / RATE  # the torque itself moves by about 1e-2 N m here, the interval is wider than that
-    near = run.solve((np.array([position - 1e-7, position + 1e-7]) % (2 * np.pi)) / RATE).efforts["A"]
-    slope = np.gradient(torque(results["ideal"]))[index] * 180 / np.pi * RATE * step
-    ends = sorted([near[0] + slope, near[1] - slope])
-    assert ends[0] == pytest.approx(float(result["drive_effort_lower"][0, index]), abs=0.05)
-    assert ends[1] == pytest.approx(float(result["drive_effort_upper"][0, index]), abs=0.05)
-    assert ends[1] - ends[0] > 1.0
+    step = 1e-5  # rad: what curves over it is below 1e-10 T″ ≈ 1e-4 N m
+    angles = (position + step * np.array([-2.0, -1.0, 1.0, 2.0])) % (2 * np.pi)
+    near = run.solve(angles / RATE).efforts["A"]
+    ends = sorted([2 * near[1] - near[0], 2 * near[2] - near[3]])
+    assert ends[0] == pytest.approx(float(result["drive_effort_lower"][0, index]), abs=2e-4)
+    assert ends[1] == pytest.approx(float(result["drive_effort_upper"][0, index]), abs=2e-4)
+    assert ends[1] - ends[0] > 2e-3
 
 
 @pytest.mark.parametrize("crank", [14.361511563, 212.157208609])
@@ -147,8 +147,6 @@ def test_three_iterations_suffice(limit: int, share: float) -> None:
         size = np.hypot(reaction.x, reaction.y)
         error = np.hypot(few.reactions[joint].x - reaction.x, few.reactions[joint].y - reaction.y)
         assert np.all(error < share * size), joint
-        if limit == 1:  # the statement would be empty if one iteration were as good
-            continue
     assert few.settled[0].iterations == limit
 
 

@@ -134,17 +134,22 @@ def test_friction_obeys_its_law(name: str) -> None:
     coefficient, radius, guide = 0.15, 0.01, 0.4
     run = trunnion.prepare(build(MODELS[name](), friction=coefficient, radius=radius, guide=guide))
     back = run.solve(times(run))
+    normals = {}
     for joint, (kind, (first, _)) in run.system.joints.items():
-        reaction, slip = back.reactions[joint], back.slips[joint].speed
-        if kind == "revolute":
-            expected = -np.sign(slip) * coefficient * radius * np.hypot(reaction.x, reaction.y)
-        else:
+        reaction = back.reactions[joint]
+        normals[joint] = np.hypot(reaction.x, reaction.y)
+        if kind == "prismatic":
             axis = back.walk.element(first, joint)
             across = axis.c * reaction.y - axis.s * reaction.x
-            ends = np.abs(across / 2 + reaction.m / guide) + np.abs(across / 2 - reaction.m / guide)
-            expected = -np.sign(slip) * coefficient * ends
-        expected = np.broadcast_to(expected, (STEPS,))
-        # the iteration rests where N changes by 1e-8 of the largest N in the module and shrinks a hundredfold a round
+            normals[joint] = np.abs(across / 2 + reaction.m / guide) + np.abs(across / 2 - reaction.m / guide)
+    largest = max(float(np.max(normal)) for normal in normals.values())
+    for joint, (kind, _) in run.system.joints.items():
+        lever = radius if kind == "revolute" else 1.0
+        expected = -np.sign(back.slips[joint].speed) * coefficient * lever * normals[joint]
+        # the iteration rests where no normal load changes by more than 1e-8 of the largest
         np.testing.assert_allclose(
-            np.broadcast_to(back.friction[joint], (STEPS,)), expected, rtol=0, atol=1e-9 * np.max(np.abs(expected))
+            np.broadcast_to(back.friction[joint], (STEPS,)),
+            np.broadcast_to(expected, (STEPS,)),
+            rtol=0,
+            atol=1e-8 * coefficient * lever * largest,
         )

@@ -3,16 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from stand_in import four_bar, slider
+from stand_in import NASTY, four_bar, slider
 
 from trunnion.errors import Status
-
-NASTY = {
-    "A": "Ω—Welle",
-    "B": "</script><script>alert(1)</script>",
-    "C": '<img src=x onerror="alert(2)">',
-    "D": "_$x$ & <!-- 曲柄",
-}
 
 
 @pytest.fixture

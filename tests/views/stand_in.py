@@ -11,6 +11,15 @@ import json
 import numpy as np
 import xarray as xr
 
+# names that try to break out of a page or a plot
+NASTY = {
+    "A": "Ω—Welle",
+    "B": "</script><script>alert(1)</script>",
+    "C": '<img src=x onerror="alert(2)">',
+    "D": "_$x$ & <!-- 曲柄",
+}
+
+
 UNITS = {
     "joint_rotation": "rad", "joint_slide": "m", "link_angle": "rad", "point_position": "m",
     "reaction_force": "N", "reaction_moment": "N m", "friction_torque": "N m", "friction_force": "N",

@@ -9,8 +9,7 @@ import re
 from html.parser import HTMLParser
 
 import pytest
-from conftest import NASTY
-from stand_in import four_bar
+from stand_in import NASTY, four_bar
 
 from trunnion.errors import Status
 from trunnion.views.bundle import bundle, web_text

@@ -1,0 +1,113 @@
+"""Dual numbers through a whole analysis equal central differences, for every output by every number of the model."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from mechanisms import MODELS, Array, build
+
+import trunnion
+from trunnion import FrictionMethod
+from trunnion.algebra.dual import Dual, derivative, primal
+
+POSITIONS = 7
+# Settled far below what the differences can see: the differences divide noise by a step of 2e-4 of the value.
+METHOD = FrictionMethod("newton", 1e-11)
+
+
+def outputs(back: Any) -> Iterator[tuple[str, Any]]:
+    """Every number a walk there and back finds, by name."""
+    for link, motion in back.walk.motions.items():
+        for part, group in zip(("place", "speed", "acceleration"), motion, strict=True):
+            for i, number in enumerate(group):
+                yield f"{part} {i} of {link}", number
+    for kind in ("reactions", "friction", "efforts", "load_powers"):
+        for name, value in getattr(back, kind).items():
+            for i, number in enumerate(value if isinstance(value, tuple) else (value,)):
+                yield f"{kind} {name} {i}", number
+    yield "power of weight and inertia", back.body_power
+
+
+def varied(run: Any, paths: list[str], part: Any) -> dict[str, Any]:
+    """Values in which sample i has its path i replaced by part(nominal value, row of zeros and a one)."""
+    mechanism = run.system.mechanism
+    replaced = {path: part(run.values[path], np.eye(len(paths))[:, [i]]) for i, path in enumerate(paths)}
+    return dict(mechanism.parameters(replaced))
+
+
+def steps_of(run: Any, paths: list[str]) -> Array:
+    return np.array([2e-4 * max(abs(run.values[path]), 0.1) for path in paths])
+
+
+@pytest.mark.parametrize("friction", [None, 0.15])
+@pytest.mark.parametrize("name", MODELS)
+def test_duals_equal_central_differences(name: str, friction: float | None) -> None:
+    """To 1e-7 of the largest derivative or value per step-scale: fourth-order differences, all numbers at once."""
+    run = trunnion.prepare(build(MODELS[name](), friction=friction, radius=0.03))
+    paths = [path for path in run.values if not path.startswith(("assembly.", "joint_defaults."))]
+    time = (np.arange(POSITIONS) + 0.37) / POSITIONS * run.cycle.duration
+    step = steps_of(run, paths)
+    shape = (len(paths), POSITIONS)
+
+    dual = run.solve(time, varied(run, paths, Dual), METHOD)
+    moved = {
+        k: dict(
+            outputs(run.solve(time, varied(run, paths, lambda v, one, k=k: v + k * step[:, None] * one), METHOD))
+        )
+        for k in (-2, -1, 1, 2)
+    }
+    nominal = dict(outputs(run.solve(time, method=METHOD)))
+    checked = 0
+    for output, number in outputs(dual):
+        a, b, c, d = (np.broadcast_to(moved[k][output], shape) for k in (-2, -1, 1, 2))
+        expected = (8 * (c - b) - (d - a)) / (12 * step[:, None])
+        found = np.broadcast_to(derivative(number), shape)
+        value = np.broadcast_to(nominal[output], shape)
+        np.testing.assert_allclose(
+            np.broadcast_to(primal(number), shape), value, rtol=0, atol=1e-11 * (1 + np.abs(value).max())
+        )
+        scale = np.maximum(np.abs(expected).max(axis=1), np.abs(value).max(axis=1) / (5000 * step))
+        for i, path in enumerate(paths):
+            np.testing.assert_allclose(
+                found[i], expected[i], rtol=0, atol=1e-7 * scale[i] + 1e-9, err_msg=f"∂({output})/∂({path})"
+            )
+            checked += 1
+    assert checked > 100
+
+
+@pytest.mark.parametrize("name", ["four-bar", "slider-crank", "class III"])
+def test_nested_duals_give_second_derivatives(name: str) -> None:
+    """∂²/∂p∂q by depth 2 equals the difference of first derivatives."""
+    run = trunnion.prepare(build(MODELS[name](), radius=0.03))
+    time = np.array([0.21, 0.63]) * run.cycle.duration
+    p, q = "links.crank.points.B.x", "joints.B.friction.coefficient"
+    vp, vq = run.values[p], run.values[q]
+
+    def first(shift: float) -> dict[str, Array]:
+        values = run.system.mechanism.parameters({p: Dual(vp + shift, 1.0), q: vq})
+        return {key: derivative(number) for key, number in outputs(run.solve(time, values, METHOD))}
+
+    for other, value in ((p, vp), (q, vq)):
+        inner = {p: Dual(Dual(vp, 1.0), Dual(1.0, 0.0))} if other == p else {p: Dual(vp, 0.0)}
+        if other == q:
+            inner = {p: Dual(Dual(vp, 0.0), Dual(1.0, 0.0)), q: Dual(Dual(vq, 1.0), Dual(0.0, 0.0))}
+        nested = run.solve(time, run.system.mechanism.parameters(inner), METHOD)
+        h = 1e-3 * value
+        if other == p:
+            lows = [first(k * h) for k in (-2, -1, 1, 2)]
+        else:
+            lows = []
+            for k in (-2, -1, 1, 2):
+                values = run.system.mechanism.parameters({p: Dual(vp, 1.0), q: vq + k * h})
+                lows.append({key: derivative(n) for key, n in outputs(run.solve(time, values, METHOD))})
+        for output, number in outputs(nested):
+            if not isinstance(number, Dual):
+                continue
+            a, b, c, d = (np.broadcast_to(low[output], time.shape) for low in lows)
+            expected = (8 * (c - b) - (d - a)) / (12 * h)
+            found = np.broadcast_to(derivative(derivative(number)), time.shape)
+            scale = max(float(np.abs(expected).max()), float(np.abs(b).max()) / abs(value), 1e-3)
+            np.testing.assert_allclose(found, expected, rtol=0, atol=1e-6 * scale, err_msg=f"{output} by {other}")

@@ -190,6 +190,23 @@ def examples(
     _console().print(f"wrote {target}", markup=False, highlight=False, soft_wrap=True)
 
 
+@app.command()
+def schema(
+    out: Annotated[Path | None, typer.Option("--out", help="Write it to a file.", show_default=False)] = None,
+) -> None:
+    """The JSON Schema of the model file, for editors that complete and check as you type."""
+    from trunnion.model.schema import SCHEMA_FILE
+
+    text = SCHEMA_FILE.read_text("utf-8")
+    if out is None:
+        print(text, end="")
+        return
+    from trunnion.output import whole
+
+    with whole(out) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
 def _version(show: bool) -> None:
     if show:
         print(f"trunnion {__version__}")

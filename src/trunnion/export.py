@@ -115,7 +115,7 @@ def _netcdf(result: xr.Dataset, path: Path, units_row: bool) -> None:
 def _zarr(result: xr.Dataset, path: Path, units_row: bool) -> None:
     path.unlink()  # a Zarr store is a folder
     try:
-        result.to_zarr(path)
+        result.to_zarr(path, zarr_format=2)  # version 3 has no stable text arrays yet
     except BaseException:
         shutil.rmtree(path, ignore_errors=True)
         raise

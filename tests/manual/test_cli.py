@@ -11,7 +11,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
+import pandas as pd
 import pytest
+import xarray as xr
 
 from trunnion import cli
 
@@ -140,6 +142,24 @@ def test_examples_are_listed_and_copied(run: Run, tmp_path: Path) -> None:
     assert "--force" in again.err
     assert run("examples", "durango-fourbar", "--force").code == 0
     assert "durango-fourbar" in run("examples", "nothing-like-it").err
+
+
+def test_parquet_and_zarr_hold_the_same_numbers(run: Run, tmp_path: Path) -> None:
+    assert (
+        run("analyse", FOUR_BAR, "--steps", "24", "--out", "r.parquet", "--out", "r.zarr", "--out", "r.csv").code == 0
+    )
+    flat = pd.read_parquet(tmp_path / "r.parquet")
+    text = pd.read_csv(tmp_path / "r.csv")
+    assert (flat["A.effort"].to_numpy() == text["A.effort"].to_numpy()).all()
+    with xr.open_zarr(tmp_path / "r.zarr") as stored:
+        assert (stored["drive_effort"].values[0] == flat["A.effort"].to_numpy()).all()
+
+
+def test_schema_is_shown_and_written(run: Run, tmp_path: Path) -> None:
+    shown = json.loads(run("schema").out)
+    assert "links" in shown["properties"]
+    assert run("schema", "--out", "s.json").code == 0
+    assert json.loads((tmp_path / "s.json").read_text("utf-8")) == shown
 
 
 def test_units_row_comes_only_on_request(run: Run, tmp_path: Path) -> None:

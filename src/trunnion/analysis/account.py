@@ -19,6 +19,7 @@ from trunnion.errors import Finding, Severity, Status
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.model.check import check_model
 from trunnion.model.mechanism import Mechanism
+from trunnion.model.units import Dimension, si_unit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -225,11 +226,17 @@ def balance(arrays: Arrays) -> float:
 def _inputs(mechanism: Mechanism) -> list[dict[str, Any]]:
     """Every number that was stated: path, SI value, unit, and the text of the model."""
     values = mechanism.parameters()
+    dimensions: dict[str, Dimension | None] = {}
     rows = []
-    for path, entry in mechanism.parameter_set.entries.items():
+    for path, entry in mechanism.parameter_set.entries.items():  # dimensions first, in order of evaluation
+        unit = entry.kind.unit
+        if path.startswith("dimensions."):
+            name = path.removeprefix("dimensions.")
+            dimensions[name] = entry.quantity.check(dimensions)
+            unit = si_unit(dimensions[name])
         text = str(entry.quantity.source)
         if not entry.alias and text != "0":
-            rows.append({"path": path, "value": float(values[path]), "unit": entry.kind.unit, "text": text})
+            rows.append({"path": path, "value": float(values[path]), "unit": unit, "text": text})
     return rows
 
 

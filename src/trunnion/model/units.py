@@ -15,7 +15,19 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import pint
 
-__all__ = ["ANGLE", "ANY", "KINDS", "NUMBER", "Dimension", "Kind", "UnitError", "dimension_text", "fits", "unit"]
+__all__ = [
+    "ANGLE",
+    "ANY",
+    "KINDS",
+    "NUMBER",
+    "Dimension",
+    "Kind",
+    "UnitError",
+    "dimension_text",
+    "fits",
+    "si_unit",
+    "unit",
+]
 
 Dimension = tuple[Fraction, Fraction, Fraction, Fraction]
 
@@ -88,6 +100,14 @@ def fits(dimension: Dimension, other: Dimension) -> bool:
     A pure number can be an angle (an arc over a radius), an angle cannot be a pure number.
     """
     return dimension[:3] == other[:3] and (any(other[:3]) or other[3] != 0 or dimension[3] == 0)
+
+
+def si_unit(dimension: Dimension | None) -> str:
+    """SI unit of a dimension; empty for a plain number, whose unit only its use tells."""
+    if dimension is None:
+        return ""
+    known = next((kind.unit for kind in KINDS.values() if dimension in kind.dimensions), None)
+    return known or dimension_text(dimension).removeprefix("in ")
 
 
 def dimension_text(dimension: Dimension) -> str:

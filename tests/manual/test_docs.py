@@ -1,0 +1,207 @@
+"""What README.md and docs/ show is what happens: every Python block and every `trunnion` command runs.
+
+The blocks of a page run in order, in one folder with the examples at hand; Python blocks share their names.
+CONTRIBUTING.md tells the marks. Links between pages are checked by `mkdocs build --strict`.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import io
+import math
+import re
+import shlex
+import shutil
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from trunnion.cli import main
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = sorted([ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").rglob("*.md")])
+FENCE = re.compile(r"^( *)```(\w+)?([^\n]*)\n(.*?)^\1```$", re.DOTALL | re.MULTILINE)
+MARK = re.compile(r"<!-- (exit|test): (\w+) -->\s*$")
+NUMBER = re.compile(r"(?<![\w.])[-−]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?(?![\w.]*\w)")
+LAYERS = "algebra|joints|model|structure|groups|results|export|analysis|views|cli|errors"
+
+
+@dataclass(frozen=True)
+class Block:
+    """A fenced block: its language, the title of a file, its text, where it stands, and its mark."""
+
+    language: str
+    title: str
+    text: str
+    line: int
+    exit: int
+    skip: bool
+
+
+def blocks(page: Path) -> Iterator[Block]:
+    """The fenced blocks of a page, in order."""
+    text = page.read_text("utf-8")
+    for found in FENCE.finditer(text):
+        mark = MARK.search(text[: found.start()])
+        title = re.search(r'title="([^"]+)"', found[3])
+        yield Block(
+            found[2] or "",
+            title[1] if title else "",
+            found[4],
+            text.count("\n", 0, found.start()) + 1,
+            int(mark[2]) if mark and mark[1] == "exit" else 0,
+            bool(mark and mark[1] == "test"),
+        )
+
+
+@pytest.fixture(scope="session")
+def files() -> dict[str, str]:
+    """Titled blocks of all pages: models that commands and Python code may use on any page."""
+    return {block.title: block.text for page in PAGES for block in blocks(page) if block.title}
+
+
+@pytest.fixture
+def place(tmp_path: Path, files: dict[str, str], monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The folder a page is worked through in: the examples, the titled blocks, and an example copied to models/."""
+    shutil.copytree(ROOT / "examples", tmp_path / "examples")
+    (tmp_path / "models").mkdir()
+    for name, text in files.items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "200")  # no table or line is wrapped
+    return tmp_path
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_page(page: Path, place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    names: dict[str, Any] = {"__name__": "page"}
+    shown = ""
+    for block in blocks(page):
+        where = f"{page.relative_to(ROOT)}:{block.line}"
+        if block.skip:
+            continue
+        if block.language == "python":
+            shown = _python(block.text, where, names)
+        elif block.language == "sh":
+            shown = _shell(block, where, monkeypatch)
+        elif block.language == "text":
+            _compare(block.text, shown, where)
+
+
+def _python(text: str, where: str, names: dict[str, Any]) -> str:
+    """What the code prints."""
+    output = io.StringIO()
+    with contextlib.redirect_stdout(output):
+        exec(compile(text, where, "exec"), names)
+    return output.getvalue()
+
+
+def _shell(block: Block, where: str, monkeypatch: pytest.MonkeyPatch) -> str:
+    """Output and findings of the `trunnion` commands of a block; only the last may end with the status it declares."""
+    commands = [line for line in block.text.splitlines() if line.startswith("trunnion ")]
+    output = ""
+    for number, command in enumerate(commands):
+        wanted = block.exit if number == len(commands) - 1 else 0
+        status, printed = run(command, monkeypatch)
+        assert status == wanted, f"{where}: {command}: exit status {status}, not {wanted}\n{printed}"
+        output += printed
+    return output
+
+
+def run(command: str, monkeypatch: pytest.MonkeyPatch) -> tuple[int, str]:
+    """Exit status and text of a command, run in this process as the console script would."""
+    monkeypatch.setattr(sys, "argv", shlex.split(command, comments=True))
+    output, status = io.StringIO(), 0
+    with contextlib.redirect_stdout(output), contextlib.redirect_stderr(output):
+        try:
+            main()
+        except SystemExit as end:
+            status = int(end.code or 0)
+    return status, output.getvalue()
+
+
+def _compare(expected: str, actual: str, where: str) -> None:
+    """Every line shown occurs in the output, in order; `…` stands for lines left out, rules of tables do not count."""
+    lines = iter([_words(line) for line in actual.splitlines()])
+    for line in (one for one in expected.splitlines() if one.strip() and one.strip() != "…"):
+        if not _words(line):
+            continue
+        assert any(_alike(_words(line), other) for other in lines), f"{where}: not in the output: {line}\n{actual}"
+
+
+def _words(line: str) -> list[str]:
+    return re.sub("[┃│━╇─┼]", " ", line).split()
+
+
+def _alike(expected: list[str], actual: list[str]) -> bool:
+    """Word for word; numbers to four digits, rounding noise as equal."""
+    return len(expected) == len(actual) and all(_same(a, b) for a, b in zip(expected, actual, strict=True))
+
+
+def _same(a: str, b: str) -> bool:
+    if a == b:
+        return True
+    values = [[float(found.replace("−", "-")) for found in NUMBER.findall(word)] for word in (a, b)]
+    if not values[0] or len(values[0]) != len(values[1]) or NUMBER.sub("#", a) != NUMBER.sub("#", b):
+        return False
+    return all(math.isclose(x, y, rel_tol=5e-5, abs_tol=1e-12) for x, y in zip(*values, strict=True))
+
+
+def test_comparison() -> None:
+    """The comparison itself sees a wrong figure and a missing line."""
+    _compare(" torque │ -18552.9 │ N m\n", "other\ntorque ┃ -18552.8749 N m\n", "here")
+    with pytest.raises(AssertionError):
+        _compare("torque 18552.9\n", "torque 18562.9\n", "here")
+    with pytest.raises(AssertionError):
+        _compare("one\ntwo\n", "two\none\n", "here")
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_code_named_exists(page: Path) -> None:
+    """A module, class or function that the text names by its path inside the package is there."""
+    text = FENCE.sub("", page.read_text("utf-8"))
+    for path in sorted(set(re.findall(rf"`((?:{LAYERS})(?:\.\w+)+)`", text))):
+        if not path.endswith((".py", ".json")):
+            assert _resolve(f"trunnion.{path}"), f"{page.relative_to(ROOT)}: there is no {path}"
+
+
+def _resolve(path: str) -> bool:
+    parts = path.split(".")
+    for cut in range(len(parts), 0, -1):
+        try:
+            found: Any = importlib.import_module(".".join(parts[:cut]))
+        except ModuleNotFoundError:
+            continue
+        for name in parts[cut:]:
+            if not hasattr(found, name) and name not in getattr(found, "__annotations__", {}):
+                return False
+            found = getattr(found, name, None)
+        return True
+    return False
+
+
+def test_every_key_of_the_model_is_told() -> None:
+    """docs/meanings.yaml tells every key of every section, and no other."""
+    yaml = pytest.importorskip("yaml")
+    from trunnion.model import mechanism, parts
+
+    told = yaml.safe_load((ROOT / "docs" / "meanings.yaml").read_text("utf-8"))
+    for name, keys in told.items():
+        section = mechanism.Mechanism if name == "Mechanism" else getattr(parts, name)
+        assert keys.keys() == section.model_fields.keys(), name
+
+
+def test_every_table_is_placed() -> None:
+    """Each generated table stands on a page, and each place for one has a table."""
+    pytest.importorskip("mkdocs")
+    pytest.importorskip("latex2mathml")
+    hooks = importlib.machinery.SourceFileLoader("docs_hooks", str(ROOT / "docs" / "hooks.py")).load_module()
+    places = [
+        found.split()[0] for page in PAGES for found in re.findall(r"<!-- generated: (.+?) -->", page.read_text("utf-8"))
+    ]
+    assert set(places) == set(hooks.TABLES)

@@ -194,7 +194,9 @@ def laws_table() -> str:
             )
             for key, one in law.parameters.items()
         ]
-        head = f"**`{name}`** — {law.validity}. Source: {law.source}. Function: `joints.friction.{law.function.__name__}`."
+        head = (
+            f"**`{name}`** — {law.validity}. Source: {law.source}. Function: `joints.friction.{law.function.__name__}`."
+        )
         parts.append(head + "\n\n" + _rows(("parameter", "unit", "default", "range", "meaning"), rows))
     return "\n".join(parts)
 
@@ -237,7 +239,9 @@ def formats_table() -> str:
     """Every format a result is written in."""
     from trunnion.export import FORMATS
 
-    rows = [(_code(name), f"`pip install 'trunnion[{extra}]'`" if extra else "") for name, (_, _, extra) in FORMATS.items()]
+    rows = [
+        (_code(name), f"`pip install 'trunnion[{extra}]'`" if extra else "") for name, (_, _, extra) in FORMATS.items()
+    ]
     return _rows(("extension", "needs"), rows)
 
 
@@ -330,7 +334,9 @@ def _class(name: str) -> type[BaseModel]:
 
 
 def _takes(field: Any) -> str:
-    found = list(dict.fromkeys(_forms(Annotated[field.annotation, *field.metadata] if field.metadata else field.annotation)))
+    found = list(
+        dict.fromkeys(_forms(Annotated[field.annotation, *field.metadata] if field.metadata else field.annotation))
+    )
     return " or ".join(found)
 
 

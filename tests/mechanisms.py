@@ -375,18 +375,20 @@ def transformed(data: Data, turn: float = 0.0, shift: Sequence[float] = (0.0, 0.
         if "moment" in load:
             load["moment"] = sign * load["moment"]
     data["assembly"] = {key: place(value) for key, value in data.get("assembly", {}).items()}
-    moving = set(data["links"]) - {"ground"}
     for name, driver in data["drivers"].items():
-        joint = data["joints"][name]
-        if joint["type"] == "prismatic":
-            continue
-        offset = 0.0 if set(joint["links"]) <= moving else turn * (1.0 if joint["links"][0] == "ground" else -1.0)
-        driver["speed"] = sign * driver["speed"]
-        if "range" in driver:
-            driver["range"] = [sign * q + offset for q in driver["range"]]
-        else:
-            driver["start"] = sign * driver.get("start", 0.0) + offset
+        if data["joints"][name]["type"] == "revolute":
+            _turn_driver(driver, data["joints"][name]["links"], turn, sign)
     return data
+
+
+def _turn_driver(driver: Data, links: Sequence[str], turn: float, sign: float) -> None:
+    """A driven rotation against the ground counts from the frame's x axis, which has turned."""
+    offset = {0: turn, 1: -turn}[list(links).index("ground")] if "ground" in links else 0.0
+    driver["speed"] = sign * driver["speed"]
+    if "range" in driver:
+        driver["range"] = [sign * q + offset for q in driver["range"]]
+    else:
+        driver["start"] = sign * driver.get("start", 0.0) + offset
 
 
 # ---- groups by hand -------------------------------------------------------------------------------------------

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import importlib
+import importlib.util
 import io
 import math
 import re
@@ -200,8 +201,23 @@ def test_every_table_is_placed() -> None:
     """Each generated table stands on a page, and each place for one has a table."""
     pytest.importorskip("mkdocs")
     pytest.importorskip("latex2mathml")
-    hooks = importlib.machinery.SourceFileLoader("docs_hooks", str(ROOT / "docs" / "hooks.py")).load_module()
+    spec = importlib.util.spec_from_file_location("docs_hooks", ROOT / "docs" / "hooks.py")
+    assert spec is not None
+    assert spec.loader is not None
+    hooks = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(hooks)
     places = [
-        found.split()[0] for page in PAGES for found in re.findall(r"<!-- generated: (.+?) -->", page.read_text("utf-8"))
+        found.split()[0]
+        for page in PAGES
+        for found in re.findall(r"<!-- generated: (.+?) -->", page.read_text("utf-8"))
     ]
     assert set(places) == set(hooks.TABLES)
+
+
+def test_readme_names_the_closed_forms() -> None:
+    """The README's list of groups with a closed form is that of the table."""
+    from trunnion.groups import GROUPS
+
+    found = re.search(r"Closed forms: ([A-Z, ]+?)\.", (ROOT / "README.md").read_text("utf-8"))
+    assert found
+    assert found[1].split(", ") == [name for name in GROUPS if len(name) == 3]

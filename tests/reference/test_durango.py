@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from mechanisms import DURANGO, findings
 
 import trunnion
+from mechanisms import DURANGO, findings
 from trunnion import FrictionMethod, Status
 
 RATE = 10.0  # rad/s, of the crank

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from mechanisms import body, build, revolute, slider_crank
 
 import trunnion
+from mechanisms import body, build, revolute, slider_crank
 from trunnion.algebra.dual import Dual, derivative, primal
 
 MM = 1e-3

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from mechanisms import MODELS, Array, Data, build, model
-from reference import newton_euler
 
 import trunnion
+from mechanisms import MODELS, Array, Data, build, model
+from reference import newton_euler
 from trunnion.analysis.analyse import Run
 
 STEPS = 24

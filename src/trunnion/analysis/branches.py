@@ -7,7 +7,7 @@ starts Newton from the track, all lanes in parallel, and a lane that ends on ano
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -107,7 +107,7 @@ def choose(system: System, values: Values) -> Chosen:
                 drive, _, _ = driven_coordinates(system, module, system.places[number], values, times)
                 assembly, count = _track(walk, number, group, drive, times, cycle.periodic)
             else:
-                assembly, count = _branch(walk, number, times), 2
+                assembly, count = _branch(walk, number, times), len(group.BRANCHES)
             if module.rank > 1 and count > 1 and not _hints(walk, module):
                 findings.append(_unstated(module, count))
             chosen.append(assembly)
@@ -181,9 +181,17 @@ def _direction(walk: Forward, module: Module, frames: Sequence[Frame], link: str
     return np.arctan2(frame.s, frame.c)
 
 
-def _first(number: Number) -> Any:
-    """The value at the start of the cycle."""
-    return np.ravel(number)[0]
+def _nth(lane: int) -> Callable[[Number], Any]:
+    """Picks the value at one position of the cycle."""
+
+    def pick(number: Number) -> Any:
+        values = np.ravel(number)
+        return values[min(lane, len(values) - 1)]
+
+    return pick
+
+
+_first = _nth(0)
 
 
 # ---- closed forms ---------------------------------------------------------------------------------------------
@@ -192,14 +200,18 @@ def _first(number: Number) -> Any:
 def _branch(walk: Forward, number: int, times: Array) -> int:
     """+1 or −1: the nearer to the hints at the start; where it does not close there, the side the hint lies on."""
     module = walk.system.plan.modules[number]
-    if not _hints(walk, module):
-        return 1
-    distances = [
-        _first(_distance(walk, module, pose_of(walk, number, branch, times).frames, _first)) for branch in (1, -1)
-    ]
-    if np.all(np.isfinite(distances)):
-        return 1 if distances[0] <= distances[1] else -1
-    return _side(walk, number)
+    branches = walk.system.groups[number].BRANCHES
+    if len(branches) == 1 or not _hints(walk, module):
+        return branches[0]
+    poses = [pose_of(walk, number, branch, times) for branch in branches]
+    distances = [_first(_distance(walk, module, pose.frames, _first)) for pose in poses]
+    if not np.all(np.isfinite(distances)) and module.kind == "RRR":
+        return _side(walk, number)
+    for lane in range(len(times)):  # the start if it closes there, else the first position that does
+        distances = [float(_distance(walk, module, pose.frames, _nth(lane))) for pose in poses]
+        if np.all(np.isfinite(distances)):
+            break
+    return branches[0] if not distances[1] < distances[0] else branches[1]
 
 
 def _side(walk: Forward, number: int) -> int:

@@ -8,11 +8,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.algebra.namespace import Number
 from trunnion.analysis.kinematics import Forward, pairs_of
 from trunnion.analysis.kinetostatics import Backward
 from trunnion.analysis.system import System, rubbing
 from trunnion.errors import Finding, Severity, Status
-from trunnion.groups.rrr import Pose as RrrPose
+from trunnion.groups import rpr, rrp, rrr
 
 __all__ = ["Causes", "findings"]
 
@@ -22,12 +23,11 @@ Positions = NDArray[np.intp]
 
 
 class _Open(NamedTuple):
-    """Positions at which one module does not close, with the figure of it (m; NaN if there is none)."""
+    """Positions at which one module does not close, and for each possible reason by how much (m) it holds there."""
 
     module: int
     positions: Positions
-    too_far: NDArray[np.float64]
-    too_near: NDArray[np.float64]
+    reasons: dict[str, NDArray[np.float64]]
 
 
 @dataclass
@@ -66,13 +66,10 @@ class Causes:
             left = left & ~bad
             if not len(here):
                 continue
-            far = near = np.full(len(here), np.nan)
-            if isinstance(pose, RrrPose):
-                (b, _), _, (d, _) = pairs_of(walk, self.system.places[number])
-                gap = np.broadcast_to(np.hypot(d.x - b.x, d.y - b.y), status.shape)[here]
-                bc, cd = (np.broadcast_to(n, status.shape)[here] for n in pose.lengths)
-                far, near = gap - (bc + cd), np.abs(bc - cd) - gap
-            self._open.append(_Open(number, here + offset, far, near))
+            reasons = {
+                text: np.broadcast_to(figure, status.shape)[here] for text, figure in _shortfalls(walk, number).items()
+            }
+            self._open.append(_Open(number, here + offset, reasons))
 
     def zero_slip(self) -> dict[str, Positions]:
         """Positions at which the relative speed of a joint with friction is zero."""
@@ -83,7 +80,8 @@ class Causes:
         merged: dict[int, _Open] = {}
         for number in sorted({part.module for part in self._open}):
             parts = [part for part in self._open if part.module == number]
-            merged[number] = _Open(number, *(np.concatenate([part[i] for part in parts]) for i in (1, 2, 3)))
+            reasons = {text: np.concatenate([part.reasons[text] for part in parts]) for text in parts[0].reasons}
+            merged[number] = _Open(number, np.concatenate([part.positions for part in parts]), reasons)
         return merged
 
     def locked(self) -> dict[int, tuple[Positions, NDArray[np.float64]]]:
@@ -152,15 +150,35 @@ def _not_assembled(causes: Causes, dial: Dial, part: _Open) -> Finding:
     head = f"cannot be assembled {dial.intervals(part.positions)}"
     where = f"links {', '.join(module.links)}"
     remedy = "change the lengths or the range of the driver"
-    if module.kind != "RRR":
+    if not part.reasons:
         return Finding(f"{head}: no position of these links closes its loops", where, remedy)
-    b, c, d = module.joints
-    reasons = []
-    if np.any(part.too_far > 0):
-        reasons.append(f"|{b}{d}| exceeds {b}{c} + {c}{d} by up to {_length(np.nanmax(part.too_far))}")
-    if np.any(part.too_near > 0):
-        reasons.append(f"|{b}{d}| falls short of |{b}{c} − {c}{d}| by up to {_length(np.nanmax(part.too_near))}")
-    return Finding(f"{head}: {'; '.join(reasons) or 'an earlier module has no position'}", where, remedy)
+    told = [
+        f"{text} by up to {_length(float(np.nanmax(figure)))}"
+        for text, figure in part.reasons.items()
+        if np.any(figure > 0)
+    ]
+    return Finding(f"{head}: {'; '.join(told) or 'an earlier module has no position'}", where, remedy)
+
+
+def _shortfalls(walk: Forward, number: int) -> dict[str, Number]:
+    """Why a closed form has no position: each reason with the length by which it holds where it is positive."""
+    module, pose = walk.system.plan.modules[number], walk.poses[number]
+    if isinstance(pose, rrr.Pose):
+        b, c, d = module.joints
+        (pin_b, _), _, (pin_d, _) = pairs_of(walk, walk.system.places[number])
+        gap = np.hypot(pin_d.x - pin_b.x, pin_d.y - pin_b.y)
+        bc, cd = pose.lengths
+        return {
+            f"|{b}{d}| exceeds {b}{c} + {c}{d}": gap - (bc + cd),
+            f"|{b}{d}| falls short of |{b}{c} − {c}{d}|": np.abs(bc - cd) - gap,
+        }
+    if isinstance(pose, rrp.Pose):
+        b, c, _ = module.joints
+        return {f"the path of {c} is farther from {b} than |{b}{c}|": np.abs(pose.p) - pose.length}
+    if isinstance(pose, rpr.Pose):
+        b, c, d = module.joints
+        return {f"|{b}{d}| falls short of the offset of the slide {c}": np.abs(pose.offset) - pose.length}
+    return {}
 
 
 def _locked(system: System, dial: Dial, number: int, positions: Positions, share: NDArray[np.float64]) -> Finding:

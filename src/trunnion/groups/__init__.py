@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from trunnion.groups import driver, rrr
+from trunnion.groups import driver, prp, rpp, rpr, rrp, rrr
 from trunnion.groups.protocol import Group
 
 __all__ = ["GROUPS", "Group"]
@@ -14,4 +14,8 @@ GROUPS: dict[str, Group] = {
     "R": driver.REVOLUTE,
     "P": driver.PRISMATIC,
     "RRR": rrr,
+    "RRP": rrp,
+    "RPR": rpr,
+    "PRP": prp,
+    "RPP": rpp,
 }

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.groups.planar import (
@@ -40,6 +40,7 @@ class Driver:
     """A driver; `slides` tells a prismatic pair from a revolute one."""
 
     slides: bool
+    BRANCHES: ClassVar[tuple[int, ...]] = (1,)
 
     def position(self, elements: Elements, assembly: object, drive: Sequence[Number] = ()) -> Pose:
         """Pose of the driven link from the base element (global), its own (local) and the coordinate."""

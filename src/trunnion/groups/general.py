@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -73,6 +73,7 @@ class General:
     links: int
     joints: tuple[GroupJoint, ...]
     driven: tuple[int, ...] = ()
+    BRANCHES: ClassVar[tuple[int, ...]] = ()
 
     @cached_property
     def steps(self) -> tuple[Step, ...]:

@@ -18,12 +18,15 @@ __all__ = [
     "about",
     "accelerated",
     "added",
+    "along_slide",
     "compose",
     "is_zero",
     "moved",
+    "pinned",
     "point",
     "relative",
     "scaled",
+    "shifted",
     "turned",
 ]
 
@@ -99,6 +102,35 @@ def relative(element: Frame, local: Frame) -> Frame:
     c, s = turned(element.c, element.s, local.c, -local.s)
     dx, dy = turned(c, s, local.x, local.y)
     return Frame(element.x - dx, element.y - dy, c, s)
+
+
+def pinned(
+    pin: Frame, local: Frame, reach: tuple[Number, Number], side: tuple[Number, Number], square: Number
+) -> tuple[Frame, tuple[Number, Number]]:
+    """Frame of a link whose pin (`local`) has a known place and whose side, `side` in local axes, lies along `reach`.
+
+    square: squared length of the side, m². Also the vector from the frame's origin to the pin.
+    """
+    c, s = turned(side[0] / square, -side[1] / square, *reach)
+    arm = turned(c, s, local.x, local.y)
+    return Frame(pin.x - arm[0], pin.y - arm[1], c, s), arm
+
+
+def shifted(frame: Frame, direction: tuple[Number, Number], by: Number) -> Frame:
+    """The frame moved along a direction."""
+    return Frame(frame.x + by * direction[0], frame.y + by * direction[1], frame.c, frame.s)
+
+
+def along_slide(
+    carried: Acceleration, w: Number, direction: tuple[Number, Number], speed: Number, second: Number
+) -> Acceleration:
+    """Acceleration of a point that slides on a body turning at w: that of the body there, Coriolis, and its own."""
+    coriolis = 2 * w * speed
+    return Acceleration(
+        carried.x - coriolis * direction[1] + second * direction[0],
+        carried.y + coriolis * direction[0] + second * direction[1],
+        carried.w,
+    )
 
 
 def moved(velocity: Twist, dx: Number, dy: Number) -> Twist:

@@ -22,7 +22,11 @@ class Group(Protocol):
     """The four questions, answered in this order; `pose` is what `position` returned, opaque to the caller.
 
     Wherever there is no answer (circles that do not meet, Newton not converged) the numbers are NaN.
+    BRANCHES: the assemblies that `position` takes, none for a group that is solved by Newton.
     """
+
+    @property
+    def BRANCHES(self) -> tuple[int, ...]: ...  # noqa: N802
 
     def position(self, elements: Elements, assembly: Any, drive: Sequence[Number] = ()) -> Any:
         """Pose of the group's links. assembly: the branch; drive: coordinates of driven joints, rad or m.

@@ -13,11 +13,12 @@ from typing import NamedTuple, TypeVar
 
 from trunnion.algebra.linalg import Vector, cross, dot
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.groups.planar import Acceleration, Frame, Twist, Wrench, about, accelerated, is_zero, moved, turned
+from trunnion.groups.planar import Acceleration, Frame, Twist, Wrench, about, accelerated, is_zero, moved, pinned
 from trunnion.groups.protocol import Elements
 
-__all__ = ["Pose", "acceleration", "closure", "condition", "meet", "position", "reactions", "velocity"]
+__all__ = ["BRANCHES", "Pose", "acceleration", "closure", "condition", "meet", "position", "reactions", "velocity"]
 
+BRANCHES = (1, -1)
 _Motion = TypeVar("_Motion", Twist, Acceleration)
 
 
@@ -63,20 +64,11 @@ def position(elements: Elements, assembly: int, drive: Sequence[Number] = ()) ->
     lengths = xp.hypot(*side_i), xp.hypot(*side_j)
     bc = meet((b.x, b.y), (d.x, d.y), *lengths, assembly)
     dc = (bc[0] - (d.x - b.x), bc[1] - (d.y - b.y))
-    frame_i, arm_b = _frame(b, b_i, bc, side_i, lengths[0])
-    frame_j, arm_d = _frame(d, d_j, dc, side_j, lengths[1])
+    frame_i, arm_b = pinned(b, b_i, bc, side_i, lengths[0] * lengths[0])
+    frame_j, arm_d = pinned(d, d_j, dc, side_j, lengths[1] * lengths[1])
     xp = namespace(*bc)
     gap = xp.abs(xp.sqrt(dot(bc, bc)) - lengths[0]) + xp.abs(xp.sqrt(dot(dc, dc)) - lengths[1])
     return Pose((frame_i, frame_j), bc, dc, arm_b, arm_d, lengths, 1 / cross(bc, dc), gap)
-
-
-def _frame(pin: Frame, local: Frame, reach: Vector, side: Vector, length: Number) -> tuple[Frame, Vector]:
-    """Frame of a link with its pin at a known place and its side along `reach`; and its origin → pin."""
-    square = length * length
-    x, y = side[0] / square, side[1] / square
-    c, s = turned(x, -y, *reach)
-    arm = turned(c, s, local.x, local.y)
-    return Frame(pin.x - arm[0], pin.y - arm[1], c, s), arm
 
 
 def velocity(pose: Pose, outer: Sequence[Twist | None], drive: Sequence[Number] = ()) -> list[Twist]:

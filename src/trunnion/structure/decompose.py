@@ -20,6 +20,7 @@ from trunnion.model.mechanism import Mechanism
 __all__ = ["Module", "Plan", "decompose", "mobility_by_formula"]
 
 PLANAR_FREEDOMS = 3
+CLOSED_FORMS = ("RRR", "RRP", "RPR", "PRP", "RPP")  # outer, inner, outer joint; those of `groups.GROUPS`
 ROMAN = {1: "I", 2: "II", 3: "III", 4: "IV", 5: "V", 6: "VI", 7: "VII", 8: "VIII", 9: "IX", 10: "X"}
 
 
@@ -199,9 +200,11 @@ def _dyad(mechanism: Mechanism, links: list[str], joints: list[str]) -> tuple[st
         return None
     if links[0] not in pairs[first]:
         first, last = last, first
-    order = [first, inner[0], last]
-    kind = "".join(PAIRS[mechanism.joints[name].type].symbol for name in order)
-    return ("RRR", links, order) if kind == "RRR" else None
+    for order, sides in (([first, inner[0], last], links), ([last, inner[0], first], links[::-1])):
+        kind = "".join(PAIRS[mechanism.joints[name].type].symbol for name in order)
+        if kind in CLOSED_FORMS:
+            return kind, sides, order
+    return None
 
 
 def _class(mechanism: Mechanism, links: list[str], joints: list[str]) -> int:

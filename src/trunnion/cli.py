@@ -326,7 +326,7 @@ def _summary(result: xr.Dataset) -> None:
     table.add_column("value", justify="right")
     table.add_column("unit")
     for row in json.loads(result.attrs["summary"]):
-        value = "no answer" if row["value"] is None else f"{row['value']:.6g}"
+        value = "no answer" if row["value"] is None else f"{row['value'] + 0.0:.6g}"  # + 0.0: no negative zero
         table.add_row(row["label"], value, "" if row["unit"] == "1" else row["unit"])
     _console().print(table, markup=False, highlight=False)
     _say(_findings(result))

@@ -203,8 +203,7 @@ def _summary(run: Run, arrays: Arrays, value: float, time: NDArray[np.float64]) 
             if np.any(np.isfinite(lost)):
                 top = int(np.nanargmax(lost))
                 rows.append({"label": f"friction power, largest, at {dial.at(top)}", "value": lost[top], "unit": "W"})
-        label = "efficiency of the cycle" + (" (the useful loads do no net work)" if value == 0 else "")
-        rows.append({"label": label, "value": value, "unit": "1"})
+        rows.append({"label": f"efficiency of the cycle{_why(value, arrays)}", "value": value, "unit": "1"})
         rows.append({"label": "power residual, largest, of peak drive power", "value": balance(arrays), "unit": "1"})
     solved = int(np.count_nonzero(arrays["status"] < Status.NOT_CONVERGED))
     rows.append(
@@ -212,6 +211,17 @@ def _summary(run: Run, arrays: Arrays, value: float, time: NDArray[np.float64]) 
     )
     rows.append({"label": f"positions solved, of {len(time)}", "value": solved, "unit": "1"})
     return [{**row, "value": None if not np.isfinite(row["value"]) else float(row["value"])} for row in rows]
+
+
+def _why(value: float, arrays: Arrays) -> str:
+    """What an efficiency of 0, or none, means."""
+    if value == 0:
+        return " (the useful loads do no net work)"
+    if np.isfinite(value):
+        return ""
+    if np.any(arrays["status"] >= Status.NOT_CONVERGED):
+        return " (not every position has an answer)"
+    return " (the driver does no net work)"
 
 
 def balance(arrays: Arrays) -> float:

@@ -177,7 +177,7 @@ def build(mechanism: Mechanism) -> System:
     """Decompose a mechanism and prepare its modules. Raises MechanismError if its structure does not determine it."""
     if mechanism.space != "planar":
         raise MechanismError(
-            Finding("spatial mechanisms can be read and checked, not yet analysed", "space", "use a planar mechanism")
+            Finding("spatial mechanisms are read and written by this version, not analysed", "space", "use a planar mechanism")
         )
     return System(mechanism, decompose(mechanism))
 

@@ -141,5 +141,5 @@ def closure(pose: Pose) -> Number:
 
 
 def condition(pose: Pose) -> Number:
-    """2/|sin μ|, μ between the rod and the normal of the guide … the rod across the guide is a dead centre."""
+    """2 |BC|/|r|: a dead centre is where the rod stands across the guide."""
     return 2 * pose.length / namespace(pose.r).abs(pose.r)

@@ -57,7 +57,7 @@ VARIABLES: dict[str, Variable] = {
     "closure_residual": Variable((), "m", "largest opening of a closed loop"),
     "condition": Variable((), "1", "largest condition number of a module's Jacobian"),
     "power_residual": Variable((), "W", "drive + loads + inertia − friction power; 0 but for rounding"),
-    "friction_iterations": Variable((), "1", "rounds to settle friction and reactions, most of the positions computed together"),
+    "friction_iterations": Variable((), "1", "rounds to settle friction and reactions"),
     "friction_change": Variable((), "N", "largest change of a reaction in the last round"),
     "friction_contraction": Variable((), "1", "contraction of the friction iteration; from 1 on it may diverge"),
     "status": Variable((), "1", "code of the position's status; see the attribute flag_meanings"),

@@ -16,7 +16,7 @@ from trunnion.analysis import account, diagnosis
 from trunnion.analysis.branches import Chosen, choose
 from trunnion.analysis.friction import FrictionMethod
 from trunnion.analysis.kinetostatics import Backward, solve
-from trunnion.analysis.system import Cycle, System, Values, build, rubbing
+from trunnion.analysis.system import Cycle, System, Values, build, sticking
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.groups.planar import accelerated
 from trunnion.model.mechanism import Mechanism
@@ -143,7 +143,7 @@ def _status(back: Backward, shape: tuple[int, ...]) -> NDArray[np.int8]:
         for frame in pose.frames:
             placed = placed & np.isfinite(frame.x + frame.y + frame.c + frame.s)
         condition = np.maximum(condition, group.condition(pose))
-    for name in rubbing(walk.system):
+    for name in sticking(walk.system):
         raise_to(Status.ZERO_SLIP, back.slips[name].zero)
     raise_to(Status.NEAR_SINGULAR, condition > NEAR_SINGULAR)
     for settled in back.settled:
@@ -207,8 +207,11 @@ def _fill_forces(arrays: Arrays, back: Backward, window: slice) -> None:
     for i, name in enumerate(system.mechanism.drivers):
         arrays["drive_effort"][i, window] = back.efforts[name]
     settled = back.settled
-    arrays["friction_iterations"][window] = max((one.iterations for one in settled), default=0)
-    for key, field in (("friction_change", "change"), ("friction_contraction", "contraction")):
+    for key, field in (
+        ("friction_iterations", "iterations"),
+        ("friction_change", "change"),
+        ("friction_contraction", "contraction"),
+    ):
         worst = functools.reduce(np.maximum, (getattr(one, field) for one in settled), 0.0)
         arrays[key][window] = worst
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from trunnion.algebra.namespace import Number
 from trunnion.analysis.kinematics import Forward, pairs_of
 from trunnion.analysis.kinetostatics import Backward
-from trunnion.analysis.system import System, rubbing
+from trunnion.analysis.system import System, rubbing, sticking
 from trunnion.errors import Finding, Severity, Status
 from trunnion.groups import rpr, rrp, rrr
 
@@ -43,7 +43,7 @@ class Causes:
         """Look at one chunk, whose first position has the number `offset`."""
         if np.any(status == Status.NOT_ASSEMBLED):
             self._note_open(back.walk, status, offset)
-        for name in rubbing(self.system):
+        for name in sticking(self.system):
             zero = np.broadcast_to(back.slips[name].zero, status.shape) & (status < Status.NOT_CONVERGED)
             if np.any(zero):
                 self._zero.setdefault(name, []).append(np.flatnonzero(zero) + offset)

@@ -100,7 +100,7 @@ class Settled(NamedTuple):
 
     reactions: list[Wrench]
     forces: list[Number]
-    iterations: int
+    iterations: Number
     change: Number
     contraction: Number
     converged: Number
@@ -217,18 +217,20 @@ def _newton(problem: _Problem, method: FrictionMethod) -> Settled:
     rows: list[list[Number]] = []
     inverse: list[list[Number]] = []
     change: Number = np.inf
-    iterations = 0
+    rounds: Number = 0
     done: Number = False
     renew = True
-    while iterations < method.limit and not np.all(done):
-        iterations += 1
+    for round_ in range(method.limit):
+        rounds = rounds + ~np.asarray(done)
         if renew:
-            rows = real.map_derivative(state, slopes if iterations == 1 else real.slopes(state.normals))
+            rows = real.map_derivative(state, slopes if round_ == 0 else real.slopes(state.normals))
             inverse = linalg.inverse(_identity_minus(rows))
         forces = _corrected(real, state, forces, inverse)
         before, state = state, real.state(forces)
         previous, change = change, _changed(state, before)
         done = ~(change > method.tolerance(state.normals)) | ~certain  # nor has a lane of NaN anything to wait for
+        if np.all(done):
+            break
         renew = bool(np.any((change > 0.01 * previous) & ~done))
     shares: Number = 1.0
     if not np.all(certain):
@@ -241,7 +243,7 @@ def _newton(problem: _Problem, method: FrictionMethod) -> Settled:
         forces = _corrected(problem, problem.state(forces), forces, inverse)
         state = problem.state(forces)
     contraction = _largest([sum(np.abs(entry) for entry in row) for row in rows])
-    return Settled(problem.reactions(forces, state), forces, iterations, change, contraction, done, shares)
+    return Settled(problem.reactions(forces, state), forces, rounds, change, contraction, done, shares)
 
 
 def _corrected(
@@ -267,16 +269,18 @@ def _successive(problem: _Problem, method: FrictionMethod) -> Settled:
     change: Number = np.inf
     previous: Number = np.inf
     done: Number = False
-    iterations = 0
-    while iterations < method.limit and not np.all(done):
-        iterations += 1
+    rounds: Number = 0
+    for _ in range(method.limit):
+        rounds = rounds + ~np.asarray(done)
         forces = problem.target(state.normals)
         before, state = state, problem.state(forces)
         previous, change = change, _changed(state, before)
         done = ~(change > method.tolerance(state.normals))
+        if np.all(done):
+            break
     measurable = np.isfinite(previous) & (previous > 0)
     ratio = np.where(measurable, change / np.where(measurable, previous, 1.0), 0.0)
-    return Settled(problem.reactions(forces, state), forces, iterations, change, ratio, done, 1.0)
+    return Settled(problem.reactions(forces, state), forces, rounds, change, ratio, done, 1.0)
 
 
 def _follow(problem: _Problem, forces: Sequence[Number], lanes: Number) -> tuple[list[Number], NDArray[np.float64]]:

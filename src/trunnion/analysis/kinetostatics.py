@@ -12,9 +12,8 @@ from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.analysis.friction import Contact, FrictionMethod, Settled, settle
 from trunnion.analysis.kinematics import Assembly, Forward, forward
-from trunnion.analysis.system import Place, System, Values
+from trunnion.analysis.system import Place, System, Values, law_of
 from trunnion.groups.planar import ZERO_LOAD, Wrench, about
-from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.joints.pairs import Load
 
 __all__ = ["Backward", "Slip", "backward", "solve"]
@@ -197,8 +196,7 @@ def _contact(
 ) -> tuple[Contact, Number]:
     """A joint with friction as its module sees it, and its lever arm (radius of a pin, 1 of a slide)."""
     walk, values = back.walk, back.walk.values
-    friction = walk.system.mechanism.effective_joints[place.joint].friction
-    law = FRICTION_LAWS[friction.law if friction and friction.law else "coulomb"]
+    law = law_of(walk.system, place.joint)
     parameters = {name: values[f"joints.{place.joint}.friction.{name}"] for name in law.parameters}
     slip = back.slips[place.joint]
     sign = -1.0 if place.reversed_ else 1.0

@@ -15,6 +15,7 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.groups import GROUPS, Group
 from trunnion.groups.general import OUTER, General, GroupJoint
 from trunnion.groups.planar import Frame
+from trunnion.joints.friction import FRICTION_LAWS, FrictionLaw
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.mechanism import Mechanism
 from trunnion.structure.decompose import Module, Plan, decompose
@@ -176,9 +177,8 @@ class System:
 def build(mechanism: Mechanism) -> System:
     """Decompose a mechanism and prepare its modules. Raises MechanismError if its structure does not determine it."""
     if mechanism.space != "planar":
-        raise MechanismError(
-            Finding("spatial mechanisms are read and written by this version, not analysed", "space", "use a planar mechanism")
-        )
+        what = "spatial mechanisms are read and written by this version, not analysed"
+        raise MechanismError(Finding(what, "space", "use a planar mechanism"))
     return System(mechanism, decompose(mechanism))
 
 
@@ -200,3 +200,14 @@ def driven_coordinates(
 def rubbing(system: System) -> list[str]:
     """Joints that have friction."""
     return [name for name, joint in system.mechanism.effective_joints.items() if joint.friction is not None]
+
+
+def law_of(system: System, joint: str) -> FrictionLaw:
+    """Friction law of a joint that has friction."""
+    friction = system.mechanism.effective_joints[joint].friction
+    return FRICTION_LAWS[friction.law if friction and friction.law else "coulomb"]
+
+
+def sticking(system: System) -> list[str]:
+    """Joints whose friction is an interval where their relative speed is zero."""
+    return [name for name in rubbing(system) if law_of(system, name).interval_at_rest]

@@ -13,7 +13,16 @@ from typing import Protocol
 
 from trunnion.algebra.namespace import Number, namespace
 
-__all__ = ["FRICTION_LAWS", "FrictionLaw", "LawParameter", "coulomb"]
+__all__ = [
+    "FRICTION_LAWS",
+    "FrictionLaw",
+    "LawParameter",
+    "brown_mcphee",
+    "coulomb",
+    "rolling_bearing",
+    "stribeck",
+    "viscous",
+]
 
 
 @dataclass(frozen=True)
@@ -38,12 +47,14 @@ class FrictionLaw:
     """A friction law with what it needs and where it comes from.
 
     function: `(normal, slip, **parameters) -> force`, odd in slip, dissipative, zero at zero load.
+    interval_at_rest: whether at slip 0 the force may be anything up to its value beside 0.
     """
 
     function: LawFunction
     parameters: Mapping[str, LawParameter] = field(default_factory=dict)
     source: str = ""
     validity: str = ""
+    interval_at_rest: bool = True
 
 
 def coulomb(normal: Number, slip: Number, **parameters: Number) -> Number:
@@ -58,6 +69,60 @@ def coulomb(normal: Number, slip: Number, **parameters: Number) -> Number:
     return -xp.sign(slip) * (parameters["pair_factor"] * parameters["coefficient"]) * normal
 
 
+def viscous(normal: Number, slip: Number, **parameters: Number) -> Number:
+    """Coulomb friction that grows with speed: −(sgn(v) f′ + c v) N, f′ = pair_factor · coefficient.
+
+    The viscous part is stated per load (c in s/m), so that an unloaded contact does not resist.
+    Source: H. Olsson, K. J. Åström, C. Canudas de Wit, M. Gäfvert, P. Lischinsky, Friction models and friction
+    compensation, Eur. J. Control 4 (1998) 176-195, doi:10.1016/S0947-3580(98)70113-X, section 2.
+    """
+    return coulomb(normal, slip, **parameters) - parameters["viscous"] * slip * normal
+
+
+def stribeck(normal: Number, slip: Number, **parameters: Number) -> Number:
+    """Friction that falls from rest to sliding and rises with speed:
+    −sgn(v) [f + (f_s − f) exp(−(v/v_s)²) + c |v|] N, f = coefficient, f_s = static.
+
+    Source: R. Stribeck (1902); this form: B. Armstrong-Hélouvry, P. Dupont, C. Canudas de Wit, A survey of models,
+    analysis tools and compensation methods for the control of machines with friction, Automatica 30 (1994)
+    1083-1138, doi:10.1016/0005-1098(94)90209-7.
+    """
+    xp = namespace(normal, slip, *parameters.values())
+    f, static, speed = parameters["coefficient"], parameters["static"], parameters["stribeck_speed"]
+    ratio = slip / speed
+    coefficient = f + (static - f) * xp.exp(-(ratio * ratio))
+    return -(xp.sign(slip) * coefficient + parameters["viscous"] * slip) * normal
+
+
+def brown_mcphee(normal: Number, slip: Number, **parameters: Number) -> Number:
+    """Friction that is a smooth function of speed, with a peak near the transition speed v_t:
+    −N [f tanh(4 r) + (f_s − f) r/(r²/4 + 3/4)² + c v], r = v/v_t, f = coefficient, f_s = static.
+
+    Source: P. Brown, J. McPhee, A continuous velocity-based friction model for dynamics and control with physically
+    meaningful parameters, J. Comput. Nonlinear Dyn. 11 (2016) 054502, doi:10.1115/1.4033658; the viscous part is
+    stated per load.
+    """
+    xp = namespace(normal, slip, *parameters.values())
+    f, static = parameters["coefficient"], parameters["static"]
+    ratio = slip / parameters["transition_speed"]
+    bell = ratio * ratio / 4 + 0.75
+    return -(f * xp.tanh(4 * ratio) + (static - f) * ratio / (bell * bell) + parameters["viscous"] * slip) * normal
+
+
+def rolling_bearing(normal: Number, slip: Number, **parameters: Number) -> Number:
+    """Rolling bearing: friction torque ½ μ P d with the bore diameter d, so the force on the bore is −sgn(v) μ P.
+
+    The pin's radius is that of the bore. Source: SKF, Rolling bearings (catalogue), "Estimating the frictional
+    moment": M = 0.5 μ P d, with μ from 0.001 (self-aligning ball) to 0.0025 (cage-less needle roller).
+    """
+    xp = namespace(normal, slip)
+    return -xp.sign(slip) * parameters["coefficient"] * normal
+
+
+_COEFFICIENT = LawParameter(meaning="friction coefficient of sliding")
+_STATIC = LawParameter(meaning="friction coefficient at rest, not below that of sliding")
+_VISCOUS = LawParameter("s/m", default=0.0, meaning="growth of the coefficient with the slip speed")
+
 FRICTION_LAWS: dict[str, FrictionLaw] = {
     "coulomb": FrictionLaw(
         coulomb,
@@ -69,5 +134,48 @@ FRICTION_LAWS: dict[str, FrictionLaw] = {
         },
         source="Durango, Calle, Ruiz (2010), eq. 8",
         validity="dry or boundary-lubricated sliding; speed-independent",
+    ),
+    "viscous": FrictionLaw(
+        viscous,
+        {
+            "coefficient": _COEFFICIENT,
+            "pair_factor": LawParameter(default=1.0, meaning="factor from the material's coefficient to the pair's"),
+            "viscous": LawParameter("s/m", meaning="growth of the coefficient with the slip speed"),
+        },
+        source="H. Olsson et al., Eur. J. Control 4 (1998) 176-195, doi:10.1016/S0947-3580(98)70113-X",
+        validity="lubricated sliding; the viscous part is taken as proportional to the load",
+    ),
+    "stribeck": FrictionLaw(
+        stribeck,
+        {
+            "coefficient": _COEFFICIENT,
+            "static": _STATIC,
+            "stribeck_speed": LawParameter("m/s", minimum=1e-12, meaning="speed at which the peak at rest has decayed"),
+            "viscous": _VISCOUS,
+        },
+        source="B. Armstrong-Hélouvry et al., Automatica 30 (1994) 1083-1138, doi:10.1016/0005-1098(94)90209-7",
+        validity="boundary to mixed lubrication in steady sliding; no memory",
+    ),
+    "brown-mcphee": FrictionLaw(
+        brown_mcphee,
+        {
+            "coefficient": _COEFFICIENT,
+            "static": _STATIC,
+            "transition_speed": LawParameter("m/s", minimum=1e-12, meaning="speed near which friction peaks"),
+            "viscous": _VISCOUS,
+        },
+        source="P. Brown, J. McPhee, J. Comput. Nonlinear Dyn. 11 (2016) 054502, doi:10.1115/1.4033658",
+        validity="steady or slowly varying sliding; creeps instead of sticking below the transition speed",
+        interval_at_rest=False,
+    ),
+    "rolling-bearing": FrictionLaw(
+        rolling_bearing,
+        {
+            "coefficient": LawParameter(
+                default=0.0015, meaning="bearing's friction coefficient; 0.0015: deep groove ball"
+            )
+        },
+        source="SKF, Rolling bearings, estimating the frictional moment: M = 0.5 μ P d",
+        validity="load about 0.1 of the dynamic rating, good lubrication, normal speed",
     ),
 }

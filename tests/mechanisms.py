@@ -43,7 +43,20 @@ def body(points: Data, number: int = 1, size: float = 1.0) -> Data:
     }
 
 
-def model(data: Data, friction: float | None = 0.12, radius: float = 0.01, guide: float = 0.4) -> Data:
+def law_named(name: str) -> Data:
+    """Friction by a law of the table, with a sensible value for each of its parameters."""
+    from trunnion.joints.friction import FRICTION_LAWS
+
+    def value(parameter: str, declared: Any) -> float:
+        if declared.default is not None:
+            return float(declared.default)
+        wanted = 0.01 if "speed" in parameter else 0.2 if parameter == "static" else 0.15
+        return min(max(wanted, declared.minimum), declared.maximum)
+
+    return {"law": name, **{key: value(key, declared) for key, declared in FRICTION_LAWS[name].parameters.items()}}
+
+
+def model(data: Data, friction: float | Data | None = 0.12, radius: float = 0.01, guide: float = 0.4) -> Data:
     """The data with gravity and friction in every joint."""
     defaults: Data = {"pin": {"radius": radius}}
     if any(joint["type"] == "prismatic" for joint in data["joints"].values()):

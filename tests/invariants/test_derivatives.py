@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 import trunnion
-from mechanisms import MODELS, Array, build
+from mechanisms import MODELS, Array, Data, build, law_named
 from trunnion import FrictionMethod
 from trunnion.algebra.dual import Dual, derivative, primal
+from trunnion.joints.friction import FRICTION_LAWS
 
 POSITIONS = 7
 # Settled far below what the differences can see: the differences divide noise by a step of 2e-4 of the value.
@@ -42,9 +43,14 @@ def steps_of(run: Any, paths: list[str]) -> Array:
     return np.array([2e-4 * max(abs(run.values[path]), 0.1) for path in paths])
 
 
-@pytest.mark.parametrize("friction", [None, 0.15])
-@pytest.mark.parametrize("name", MODELS)
-def test_duals_equal_central_differences(name: str, friction: float | None) -> None:
+CASES = [
+    *((name, friction) for name in MODELS for friction in (None, 0.15)),
+    *((name, law_named(law)) for name in ("four-bar", "slider-crank") for law in FRICTION_LAWS),
+]
+
+
+@pytest.mark.parametrize(("name", "friction"), CASES)
+def test_duals_equal_central_differences(name: str, friction: float | Data | None) -> None:
     """To 1e-7 of the largest derivative or value per step-scale: sixth-order differences, all numbers at once."""
     run = trunnion.prepare(build(MODELS[name](), friction=friction, radius=0.03))
     paths = [path for path in run.values if not path.startswith(("assembly.", "joint_defaults."))]

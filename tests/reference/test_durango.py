@@ -142,12 +142,12 @@ def test_three_iterations_suffice(limit: int, share: float) -> None:
     time = run.cycle.times(10)
     few = run.solve(time, method=FrictionMethod("successive-approximation", None, limit))
     exact = run.solve(time)
-    assert all(settled.iterations <= limit for settled in few.settled)
+    assert all(np.max(settled.iterations) <= limit for settled in few.settled)
     for joint, reaction in exact.reactions.items():
         size = np.hypot(reaction.x, reaction.y)
         error = np.hypot(few.reactions[joint].x - reaction.x, few.reactions[joint].y - reaction.y)
         assert np.all(error < share * size), joint
-    assert few.settled[0].iterations == limit
+    assert np.max(few.settled[0].iterations) == limit
 
 
 def test_iteration_figures(results: dict[str, Any]) -> None:

@@ -11,6 +11,7 @@ import {
   hull,
   magnitude,
   nearest,
+  say,
   total,
   usualPeak,
 } from "../../src/trunnion/views/web/data.js";
@@ -24,7 +25,7 @@ import {
   tickLabel,
   ticks,
 } from "../../src/trunnion/views/web/format.js";
-import { arrow } from "../../src/trunnion/views/web/mechanism.js";
+import { arrow, bentArrow, longest } from "../../src/trunnion/views/web/arrow.js";
 import { command } from "../../src/trunnion/views/web/player.js";
 
 const cases = JSON.parse(readFileSync(new URL("number_cases.json", import.meta.url), "utf8"));
@@ -101,6 +102,24 @@ test("geometry", () => {
   assert.equal(bounds({ points: { "a.A": { x: [null], y: [null] } } }), null);
   assert.equal(arrow(0, 0, 0, 0), "");
   assert.match(arrow(0, 0, 30, 0), /^M0.0,0.0L20.0,0.0M30.0,0.0/);
+});
+
+test("arrows", () => {
+  const room = { left: 0, right: 100, top: 0, bottom: 50 };
+  assert.equal(longest([[50, 25, 10, 0]], room), 5);
+  assert.equal(longest([[50, 25, 10, 0], [50, 25, 0, -10], [10, 25, -20, 0]], room), 0.5); // prettier-ignore
+  assert.equal(longest([], room), Infinity);
+  const [left, right] = [bentArrow(20, 1), bentArrow(20, -1)];
+  assert.match(left.shaft, /0 1 0/); // counter-clockwise on the screen, its head at the left
+  assert.match(left.head, /^M-20.0/);
+  assert.match(right.shaft, /0 1 1/);
+  assert.match(right.head, /^M20.0/);
+});
+
+test("places of the drive in words", () => {
+  assert.equal(say({ abscissa: { values: [32], unit: "°" } }, 0), "32°");
+  assert.equal(say({ abscissa: { values: [12.5], unit: "mm" } }, 0), "12.5\u00a0mm");
+  assert.equal(say({ abscissa: { values: [-7], unit: "" } }, 0), "−7");
 });
 
 test("keys", () => {

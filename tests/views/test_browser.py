@@ -1,19 +1,64 @@
-"""The pure functions of the browser modules, run by node where there is one; the page itself needs none."""
+"""The browser modules, run by node where there is one: their arithmetic, and the page in a document of our own."""
 
 from __future__ import annotations
 
+import json
+import re
 import shutil
 import subprocess
 from pathlib import Path
 
+import numpy as np
 import pytest
+from stand_in import four_bar
+
+from trunnion.errors import Status
+from trunnion.views.scene import scene
 
 NODE = shutil.which("node")
 
-if NODE:  # not a skip: what must hold everywhere is tested in Python; this is the browser's own arithmetic
+if NODE:  # not a skip: what must hold everywhere is tested in Python; this is the browser's own part
 
-    def test_browser_modules():
-        script = Path(__file__).with_name("format.test.mjs")
-        done = subprocess.run([NODE, "--test", str(script)], capture_output=True, text=True, timeout=120)
+    def run(script, *arguments):
+        """What a script of this folder prints."""
+        command = [NODE, str(Path(__file__).with_name(script)), *map(str, arguments)]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=120)
         if done.returncode:
-            pytest.fail(done.stdout[-4000:])
+            pytest.fail((done.stdout + done.stderr)[-4000:])
+        return done.stdout
+
+    def page(result, folder, ideal=None):
+        """What the report's page shows of a result."""
+        path = folder / "scene.json"
+        path.write_text(json.dumps(scene(result, ideal)), encoding="utf-8")
+        return json.loads(run("page.test.mjs", path))
+
+    def test_arithmetic():
+        run("format.test.mjs")
+
+    def test_every_kind_of_result_makes_a_page(case, tmp_path):
+        _, result = case
+        shown = page(result, tmp_path, result)
+        assert shown["charts"] >= 4
+        assert shown["polars"] == result.sizes["joint"]
+
+    def test_loads_are_drawn_forces_and_moments(plain, tmp_path):
+        shown = page(plain, tmp_path)
+        assert (shown["loads"], shown["moments"]) == (2, 1)
+
+    def test_locked_everywhere_is_said_in_the_charts(tmp_path):
+        assert page(four_bar(36, gap=(0, 36, Status.LOCKED)), tmp_path)["silent"] >= 3
+
+    def test_a_polar_diagram_says_what_it_leaves_out(plain, tmp_path):
+        plain["reaction_force"][:, :, 40] *= 1e4
+        remarks = page(plain, tmp_path)["remarks"]
+        assert len(remarks) == 4
+        assert all(re.fullmatch(r"The peak of .*N lies outside\.", text) for text in remarks)
+
+    def test_the_longest_reaction_stays_in_the_picture(plain, tmp_path):
+        largest = int(np.hypot(*plain.reaction_force.sel(joint="A").values).argmax())
+        turned = plain.roll(position=-1 - largest, roll_coords=False)  # then it is the last that the page shows
+        for path in page(turned, tmp_path)["reaction"]:
+            numbers = [float(text) for text in re.findall(r"-?[\d.]+", path)]
+            assert min(numbers) >= 0
+            assert max(numbers) <= 490  # the width it is printed at, the last it was drawn at

@@ -9,9 +9,10 @@ import pytest
 from matplotlib.figure import Figure
 from stand_in import four_bar, slider
 
-from trunnion.errors import Status
+from trunnion.errors import MechanismError, Status
 from trunnion.views import plots
 from trunnion.views.drawing import hull
+from trunnion.views.lettering import OTHERS, _signs, families, plain
 from trunnion.views.plots import PLOTS, mechanism, save
 
 SIGNATURES = {".png": b"\x89PNG", ".pdf": b"%PDF", ".svg": b"<?xml"}
@@ -21,7 +22,7 @@ SIGNATURES = {".png": b"\x89PNG", ".pdf": b"%PDF", ".svg": b"<?xml"}
 def test_every_figure_of_every_result(name, case, tmp_path):
     kind, result = case
     if (name, kind) == ("mechanism", "nowhere"):
-        with pytest.raises(ValueError, match="nothing to draw"):
+        with pytest.raises(MechanismError, match="nothing to draw"):
             PLOTS[name](result, None)
         return
     path = save(PLOTS[name](result, None), tmp_path / "figure.png")
@@ -77,6 +78,35 @@ def test_names_are_shown_as_they_are():
     assert [label.strip("\u2009") for label in labels] == ["_α", r"\$B\$", r"C\$", "D_{1}"]
 
 
+@pytest.fixture
+def fonts(monkeypatch):
+    """Choose the fonts beside the first one; the machine's own come back afterwards."""
+
+    def choose(*others):
+        monkeypatch.setattr("trunnion.views.lettering.OTHERS", others)
+        families.cache_clear()
+        _signs.cache_clear()
+
+    yield choose
+    monkeypatch.undo()
+    choose(*OTHERS)
+
+
+def test_a_sign_without_a_font_is_written_as_its_code(fonts):
+    fonts()
+    assert plain("曲柄 ω") == r"\u66f2\u67c4 ω"
+    assert plain("a\u200bb\n𠮷") == r"a\u200bb\u000a\U00020bb7"
+
+
+def test_a_font_that_has_the_sign_is_used(fonts, tmp_path):
+    sign = "𝐀"
+    fonts()
+    without = plain(sign)
+    fonts("STIXGeneral")  # comes with matplotlib; stands for a font of another script
+    assert (without, plain(sign)) == (r"\U0001d400", sign)
+    assert save(PLOTS["polar"](four_bar(12, rename={"A": sign}), None), tmp_path / "polar.png").exists()
+
+
 def test_a_hundred_thousand_positions(tmp_path):
     short = four_bar(400)
     long = short.isel(position=np.arange(100_000) * 400 // 100_000)
@@ -92,6 +122,21 @@ def test_mechanism_at_a_chosen_position(plain):
     assert "drive angle A = 60°" in figure.axes[0].get_title(loc="left")
 
 
+def test_a_position_that_is_not_there_is_refused(plain):
+    with pytest.raises(MechanismError, match="no position 360 among the 360 — name one from 0 to 359"):
+        mechanism(plain, index=360)
+
+
+def test_a_position_without_an_answer_says_so():
+    figure = mechanism(four_bar(gap=(10, 20, Status.LOCKED)), index=12)
+    assert "locked by friction" in figure.axes[0].get_title(loc="left")
+
+
+def test_the_same_figure_gives_the_same_file(plain, tmp_path):
+    first, second = (save(PLOTS["power"](plain, None), tmp_path / name).read_bytes() for name in ("a.svg", "b.svg"))
+    assert first == second
+
+
 @pytest.mark.parametrize("suffix", SIGNATURES)
 def test_formats(suffix, plain, tmp_path):
     path = save(PLOTS["polar"](plain, None), tmp_path / f"polar{suffix}")
@@ -100,7 +145,7 @@ def test_formats(suffix, plain, tmp_path):
 
 
 def test_an_unknown_format_is_refused_before_anything_is_written(plain, tmp_path):
-    with pytest.raises(ValueError, match=r"\.png, \.svg or \.pdf"):
+    with pytest.raises(MechanismError, match=r"\.png, \.svg or \.pdf"):
         save(PLOTS["torque"](plain, None), tmp_path / "torque.bmp")
     assert not list(tmp_path.iterdir())
 
@@ -110,7 +155,7 @@ def test_a_failed_write_leaves_the_old_file_and_no_draft(plain, tmp_path, monkey
     target.write_text("old")
     figure = PLOTS["torque"](plain, None)
     monkeypatch.setattr(figure, "savefig", lambda *_, **__: (_ for _ in ()).throw(OSError("disk full")))
-    with pytest.raises(OSError, match="disk full"):
+    with pytest.raises(MechanismError, match="disk full"):
         save(figure, target)
     assert [file.name for file in tmp_path.iterdir()] == ["torque.png"]
     assert target.read_text() == "old"

@@ -13,7 +13,7 @@ from stand_in import NASTY, four_bar
 
 from trunnion.errors import Status
 from trunnion.views.bundle import bundle, web_text
-from trunnion.views.report import embedded, report
+from trunnion.views.report import _summary, embedded, report
 
 VOID = {"meta", "link", "br", "img", "input", "hr"}
 
@@ -106,6 +106,30 @@ def test_contents(plain, ideal):
         "30 deg", "doi:10.1590", "Trunnion 0.1.0", "9f2c41d07ab35e68",
     ):  # fmt: skip
         assert expected.replace("\u00a0", " ") in words.replace("\u00a0", " "), expected
+
+
+@pytest.mark.parametrize(
+    ("label", "subject", "remark"),
+    [
+        ("drive torque of A, least, at 350°", "drive torque of A", "least, at 350°"),
+        ("drive torque of crank (left), RMS", "drive torque of crank (left)", "RMS"),
+        ("power residual, largest, of peak drive power", "power residual", "largest, of peak drive power"),
+        ("efficiency of the cycle (the useful loads do no net work)", "efficiency of the cycle",
+         "the useful loads do no net work"),
+        ("locking margin (times the friction), least, at 3°", "locking margin", "times the friction, least, at 3°"),
+        ("positions solved, of 360", "positions solved", "of 360"),
+        ("Anything else", "Anything else", ""),
+    ],
+)  # fmt: skip
+def test_a_summary_label_is_a_subject_and_a_remark(plain, label, subject, remark):
+    plain.attrs["summary"] = json.dumps([{"label": label, "value": 7.0, "unit": "W"}])
+    assert _summary(plain) == [(subject, [("7.000\u00a0W", remark)])]
+
+
+def test_figures_of_one_subject_stand_together(plain):
+    rows = [{"label": f"force, {which}", "value": 1.0, "unit": "1"} for which in ("least", "largest", "more than")]
+    plain.attrs["summary"] = json.dumps(rows)
+    assert _summary(plain) == [("force", [("1", "least"), ("1", "largest"), ("> 1", "")])]
 
 
 def test_a_gap_is_told_even_if_no_finding_speaks_of_it():

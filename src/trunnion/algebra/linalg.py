@@ -89,6 +89,8 @@ def determinant(matrix: Sequence[Sequence[Number]]) -> Number:
     n = len(matrix)
     rows = [list(row) for row in matrix]
     xp = namespace(*(entry for row in rows for entry in row))
+    if xp is np:  # as in `solve`
+        rows = [[np.asarray(entry, float) for entry in row] for row in rows]
     product: Number = 1.0
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         for k in range(n):

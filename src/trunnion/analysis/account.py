@@ -26,7 +26,9 @@ if TYPE_CHECKING:
 
     from trunnion.analysis.analyse import Run
 
-__all__ = ["fill_power", "finish"]
+__all__ = ["MARGIN", "fill_power", "finish"]
+
+MARGIN = 10.0  # multiple of the friction up to which the locking margin is looked for
 
 Arrays = Mapping[str, NDArray[np.float64]]
 
@@ -199,6 +201,7 @@ def _summary(run: Run, arrays: Arrays, value: float, time: NDArray[np.float64]) 
                 ]
         lost = np.sum(arrays["friction_power"], axis=0)
         if rubbing(run.system):
+            rows.append(_margin(arrays["locking_margin"], dial))
             rows.append({"label": "friction power, mean", "value": mean(lost, run.cycle), "unit": "W"})
             if np.any(np.isfinite(lost)):
                 top = int(np.nanargmax(lost))
@@ -211,6 +214,15 @@ def _summary(run: Run, arrays: Arrays, value: float, time: NDArray[np.float64]) 
     )
     rows.append({"label": f"positions solved, of {len(time)}", "value": solved, "unit": "1"})
     return [{**row, "value": None if not np.isfinite(row["value"]) else float(row["value"])} for row in rows]
+
+
+def _margin(margin: NDArray[np.float64], dial: diagnosis.Dial) -> dict[str, Any]:
+    """The least multiple of the friction at which the mechanism locks."""
+    least = np.nanmin(margin, initial=np.inf)
+    if not np.isfinite(least):
+        return {"label": "locking margin (times the friction), more than", "value": MARGIN, "unit": "1"}
+    at = dial.at(int(np.nanargmin(margin)))
+    return {"label": f"locking margin (times the friction), least, at {at}", "value": least, "unit": "1"}
 
 
 def _why(value: float, arrays: Arrays) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -77,7 +77,7 @@ def analyse(
     if not 1 <= steps <= MOST_STEPS:
         remedy = f"give a number from 1 to {MOST_STEPS:,}"
         raise MechanismError(Finding(f"cannot analyse {steps} positions", "steps", remedy))
-    method = method or FrictionMethod()
+    method = replace(method or FrictionMethod(), margin_up_to=account.MARGIN)
     run = prepare(mechanism)
     steps = steps if run.cycle.duration > 0 else 1
     time = run.cycle.times(steps)
@@ -214,6 +214,7 @@ def _fill_forces(arrays: Arrays, back: Backward, window: slice) -> None:
     ):
         worst = functools.reduce(np.maximum, (getattr(one, field) for one in settled), 0.0)
         arrays[key][window] = worst
+    arrays["locking_margin"][window] = functools.reduce(np.minimum, (one.margin for one in settled), np.inf)
 
 
 FORCES = [
@@ -229,7 +230,7 @@ def _blank(arrays: Arrays, status: NDArray[np.int8], window: slice) -> None:
         return
     for names, where in (
         (FORCES, status >= Status.NOT_CONVERGED),
-        (RATES, status >= Status.SINGULAR),
+        ([*RATES, "locking_margin"], status >= Status.SINGULAR),
         (["useful_power", "efficiency_instant"], status >= Status.NOT_CONVERGED),
     ):
         for name in names:

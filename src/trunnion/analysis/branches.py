@@ -20,12 +20,13 @@ from trunnion.analysis.kinematics import Forward, pairs_of, pose_of, start, take
 from trunnion.analysis.system import System, Values, driven_coordinates
 from trunnion.errors import Finding, Severity
 from trunnion.groups.general import General, Pose
-from trunnion.groups.planar import Frame, point
+from trunnion.groups.planar import Frame, compose, point
 from trunnion.structure.decompose import Module
 
 __all__ = ["Chosen", "Track", "choose"]
 
 Array = NDArray[np.float64]
+Pick = Callable[[Number], Any]
 
 GRID = 720  # intervals of the nominal cycle along which general groups are followed
 GUESSES = 512
@@ -160,28 +161,41 @@ def _point_of(system: System, module: Module, key: str) -> tuple[str, str]:
     return (link, name) if link in module.links else ("", "")
 
 
-def _distance(walk: Forward, module: Module, frames: Sequence[Frame], lane: Any) -> Array:
-    """Sum of the squared distances of an assembly from the hints, m² and rad²; `lane` picks the start."""
+def _distance(walk: Forward, module: Module, frames: Sequence[Frame], pick: Pick, known: Pick) -> Array:
+    """Sum of the squared distances of an assembly from the hints, m² and rad².
+
+    pick, known: take the position looked at from the numbers of the module's links and of the known ones.
+    """
     total: Any = 0.0
     for link, name, place in _hints(walk, module):
         if link:
-            frame = frames[module.links.index(link)]
             path = f"links.{link}.points.{name}"
+            frame = frames[module.links.index(link)]
             x, y = point(frame, walk.values[f"{path}.x"], walk.values[f"{path}.y"])
-            total = total + (lane(x) - place[0]) ** 2 + (lane(y) - place[1]) ** 2
+            total = total + (pick(x) - place[0]) ** 2 + (pick(y) - place[1]) ** 2
+            continue
+        kind, links = walk.system.joints[name]
+        first, second = (_element(walk, module, frames, side, name, pick, known) for side in links)
+        if kind == "prismatic":
+            slide = first.c * (second.x - first.x) + first.s * (second.y - first.y)
+            total = total + (slide - place[0]) ** 2
         else:
-            first, second = (_direction(walk, module, frames, side) for side in walk.system.joints[name][1])
-            turn = lane(second) - lane(first) - place[0]
-            total = total + np.angle(np.exp(1j * turn)) ** 2
+            turn = np.arctan2(second.s, second.c) - np.arctan2(first.s, first.c) - place[0]
+            total = total + np.arctan2(np.sin(turn), np.cos(turn)) ** 2
     return np.asarray(total, float)
 
 
-def _direction(walk: Forward, module: Module, frames: Sequence[Frame], link: str) -> Number:
-    frame = frames[module.links.index(link)] if link in module.links else walk.motions[link].frame
-    return np.arctan2(frame.s, frame.c)
+def _element(
+    walk: Forward, module: Module, frames: Sequence[Frame], link: str, joint: str, pick: Pick, known: Pick
+) -> Frame:
+    """Global element of a joint on one of its links, in the module or known, at the position looked at."""
+    if link not in module.links:
+        return Frame(*(known(n) for n in walk.element(link, joint)))
+    element = compose(frames[module.links.index(link)], walk.local[link, joint])
+    return Frame(*(pick(n) for n in element))
 
 
-def _nth(lane: int) -> Callable[[Number], Any]:
+def _nth(lane: int) -> Pick:
     """Picks the value at one position of the cycle."""
 
     def pick(number: Number) -> Any:
@@ -204,11 +218,11 @@ def _branch(walk: Forward, number: int, times: Array) -> int:
     if len(branches) == 1 or not _hints(walk, module):
         return branches[0]
     poses = [pose_of(walk, number, branch, times) for branch in branches]
-    distances = [_first(_distance(walk, module, pose.frames, _first)) for pose in poses]
+    distances = [_distance(walk, module, pose.frames, _first, _first) for pose in poses]
     if not np.all(np.isfinite(distances)) and module.kind == "RRR":
         return _side(walk, number)
     for lane in range(len(times)):  # the start if it closes there, else the first position that does
-        distances = [float(_distance(walk, module, pose.frames, _nth(lane))) for pose in poses]
+        distances = [_distance(walk, module, pose.frames, _nth(lane), _nth(lane)) for pose in poses]
         if np.all(np.isfinite(distances)):
             break
     return branches[0] if not distances[1] < distances[0] else branches[1]
@@ -243,7 +257,8 @@ def _track(
             break
     else:
         return Track(times, rows, 0.0, periodic), 0
-    distance = np.broadcast_to(_distance(walk, module, found.frames, lambda n: n), found.orientation.shape)
+    every = _distance(walk, module, found.frames, lambda n: n, _nth(first))
+    distance = np.broadcast_to(every, found.orientation.shape)
     best = int(np.argmin(distance))
     orientation = float(found.orientation[best])
     here = np.array([found.q[i][best] for i in group.free])

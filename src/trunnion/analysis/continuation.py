@@ -21,30 +21,31 @@ Array = NDArray[np.float64]
 System = Callable[[Sequence[Array], Array], tuple[list[Number], list[list[Number]]]]
 
 FIRST_STEP = 0.05
+LONGEST_STEP = 0.2
 LAST_STEP = 1e-9  # to which the share at which a lane locks is found
 NEWTON_LIMIT = 12
 CONVERGED = 1e-12  # of the largest unknown
 
 
-def follow(system: System, unknowns: int, lanes: int) -> tuple[list[Array], Array]:
-    """(solution, share) of each lane: the share is 1, or that at which the lane's solution ceases to exist.
+def follow(system: System, unknowns: int, lanes: int, most: float = 1.0) -> tuple[list[Array], Array]:
+    """(solution, share) of each lane: the share is `most`, or that at which the lane's solution ceases to exist.
 
     system(x, s) gives residual and Jacobian, lane by lane, and x = 0 solves it at s = 0. The solution of a lane
-    that stops before 1 is NaN.
+    that stops before `most` is NaN.
     """
     x = [np.zeros(lanes) for _ in range(unknowns)]
     share = np.zeros(lanes)
     step = np.full(lanes, FIRST_STEP)
     active = np.ones(lanes, bool)
     while np.any(active):
-        trial = np.minimum(share + step, 1.0)
+        trial = np.minimum(share + step, most)
         found, good = _correct(system, x, trial)
         advance = active & good
         x = [np.where(advance, new, old) for new, old in zip(found, x, strict=True)]
         share = np.where(advance, trial, share)
-        step = np.where(advance, np.minimum(2 * step, 0.2), np.where(active, step / 2, step))
-        active = active & (share < 1.0) & (step > LAST_STEP)
-    solved = share >= 1.0
+        step = np.where(advance, np.minimum(2 * step, LONGEST_STEP), np.where(active, step / 2, step))
+        active = active & (share < most) & (step > LAST_STEP)
+    solved = share >= most
     return [np.where(solved, value, np.nan) for value in x], share
 
 

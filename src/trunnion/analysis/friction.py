@@ -42,11 +42,13 @@ class FrictionMethod:
     criterion: largest change of a joint's reaction between two rounds, N, at which the iteration ends ([D] used
     1e-3 N); None: 1e-8 of the largest reaction for Newton, which is then exact to rounding, 1e-3 N for [D].
     limit: most rounds; a position that needs more is not converged.
+    margin_up_to: how far, in multiples of the friction, to look for the point at which it locks; 0: not at all.
     """
 
     name: Method = "newton"
     criterion: float | None = None
     limit: int = 200
+    margin_up_to: float = 0.0
 
     def tolerance(self, normals: Sequence[Number]) -> Number:
         """Allowed change, N."""
@@ -94,7 +96,8 @@ class Settled(NamedTuple):
     """Reactions (friction not included) and friction forces, with the figures of the iteration.
 
     share: largest share of the friction for which a solution that starts frictionless was found, 1 unless the
-    module locks; contraction: ∞-norm of the derivative of φ → law(N(R(φ))) (Newton), or the ratio of the last two
+    module locks; margin: multiple of the friction at which it would lock, ∞ beyond what was asked for;
+    contraction: ∞-norm of the derivative of φ → law(N(R(φ))) (Newton), or the ratio of the last two
     changes (successive approximation).
     """
 
@@ -105,6 +108,7 @@ class Settled(NamedTuple):
     contraction: Number
     converged: Number
     share: Number
+    margin: Number = np.inf
 
 
 def settle(
@@ -153,6 +157,12 @@ class _Problem:
 
         self.mapped(note)
         return found
+
+    def picked(self, lanes: Number) -> tuple[_Problem, NDArray[np.bool_]]:
+        """The problem of the chosen lanes alone, each number a flat array, and the choice in full shape."""
+        shape = np.broadcast_shapes(np.shape(lanes), *(np.shape(number) for number in self.numbers()))
+        chosen = np.broadcast_to(lanes, shape)
+        return self.mapped(lambda number: np.broadcast_to(np.asarray(number, float), shape)[chosen]), chosen
 
     def at(self, joint: int, forces: Sequence[Number]) -> Wrench:
         """Reaction of one joint under friction forces; without any, the frictionless one."""
@@ -213,7 +223,8 @@ def _newton(problem: _Problem, method: FrictionMethod) -> Settled:
     forces: list[Number] = [0.0] * len(real.contacts)
     state = real.state(forces)
     slopes = real.slopes(state.normals)
-    certain = ~(real.bound(slopes) >= 1.0)
+    bound = real.bound(slopes)
+    certain = ~(bound >= 1.0)
     rows: list[list[Number]] = []
     inverse: list[list[Number]] = []
     change: Number = np.inf
@@ -239,11 +250,16 @@ def _newton(problem: _Problem, method: FrictionMethod) -> Settled:
         done = np.where(certain, done, shares >= 1.0)
         rows = real.map_derivative(state, real.slopes(state.normals))
         inverse = linalg.inverse(_identity_minus(rows))
-    for _ in range(_depth(problem)):
+    depth = _depth(problem)
+    if depth:  # the ε parts need the matrix of the solution, not that of the way there
+        rows = real.map_derivative(state, real.slopes(state.normals))
+        inverse = linalg.inverse(_identity_minus(rows))
+    for _ in range(depth):
         forces = _corrected(problem, problem.state(forces), forces, inverse)
         state = problem.state(forces)
     contraction = _largest([sum(np.abs(entry) for entry in row) for row in rows])
-    return Settled(problem.reactions(forces, state), forces, rounds, change, contraction, done, shares)
+    margin = _margin(real, bound, method.margin_up_to)
+    return Settled(problem.reactions(forces, state), forces, rounds, change, contraction, done, shares, margin)
 
 
 def _corrected(
@@ -283,11 +299,22 @@ def _successive(problem: _Problem, method: FrictionMethod) -> Settled:
     return Settled(problem.reactions(forces, state), forces, rounds, change, ratio, done, 1.0)
 
 
+def _margin(problem: _Problem, bound: Number, most: float) -> Number:
+    """Multiple of the friction at which the module locks; ∞ where it does not up to `most`."""
+    doubtful = bound * most >= 1.0
+    if most <= 0 or not np.any(doubtful):
+        return np.inf
+    part, chosen = problem.picked(doubtful)
+    _, reached = continuation.follow(_scaled_system(part), len(problem.contacts), int(np.count_nonzero(chosen)), most)
+    margin = np.full(chosen.shape, np.inf)
+    margin[chosen] = np.where(reached >= most, np.inf, reached)
+    return margin
+
+
 def _follow(problem: _Problem, forces: Sequence[Number], lanes: Number) -> tuple[list[Number], NDArray[np.float64]]:
     """Forces with the chosen lanes followed from no friction; NaN where they lock, and the share reached."""
-    shape = np.broadcast_shapes(np.shape(lanes), *(np.shape(number) for number in problem.numbers()))
-    chosen = np.broadcast_to(lanes, shape)
-    part = problem.mapped(lambda number: np.broadcast_to(np.asarray(number, float), shape)[chosen])
+    part, chosen = problem.picked(lanes)
+    shape = chosen.shape
     found, reached = continuation.follow(_scaled_system(part), len(problem.contacts), int(np.count_nonzero(chosen)))
     result = []
     for force, value in zip(forces, found, strict=True):

@@ -207,8 +207,11 @@ def _contact(
     else:
         lever = 1.0
         axis = walk.element(place.links[0], place.joint)
-        load = Load((-axis.s, axis.c), values[f"joints.{place.joint}.guide.length"])
         at = walk.element(place.links[1], place.joint)
+        # the guide has its middle at the point of the link that the file names second
+        middle = walk.element(walk.system.joints[place.joint][1][1], place.joint)
+        arm = (middle.x - at.x, middle.y - at.y) if place.reversed_ else (0.0, 0.0)
+        load = Load((-axis.s, axis.c), values[f"joints.{place.joint}.guide.length"], arm)
         units = []
         for link in links:
             frame = walk.motions[link].frame

@@ -134,11 +134,11 @@ class General:
             gap = self._gap(placed, drive)
             lengths = [n for n, row in zip(gap, self._rows, strict=True) if row.is_length]
             size = _size(self, elements)
+            orientation = np.sign(primal(linalg.determinant(jacobian)))
         xp = namespace(*lengths) if lengths else np
         opening: Number = 0.0
         for value in lengths:
             opening = xp.maximum(opening, xp.abs(value))
-            orientation = np.sign(primal(linalg.determinant(jacobian)))
         return Pose(frames, placed, tuple(q), inverse, opening, self._condition(jacobian, inverse, size), orientation)
 
     def _newton(self, elements: Elements, start: Sequence[Number], drive: Sequence[Number]) -> list[Number]:

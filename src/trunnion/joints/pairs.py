@@ -39,11 +39,12 @@ class Load(NamedTuple):
     A pin (across is None) presses with N = |F|.  [D 8]
     A guide of the given length (m), loaded off its middle, carries on its two ends:
     N = |F_n/2 + M/length| + |F_n/2 − M/length|, F_n along the unit vector `across`: the planar twin of a bearing
-    that carries its load at its two ends.
+    that carries its load at its two ends. arm: from the point that the moment is about to the middle of the guide, m.
     """
 
     across: tuple[Number, Number] | None = None
     length: Number = 0.0
+    arm: tuple[Number, Number] = (0.0, 0.0)
 
     def normal(self, reaction: Reaction) -> Number:
         """Normal load N ≥ 0, N."""
@@ -63,7 +64,7 @@ class Load(NamedTuple):
             return x * share, y * share, 0.0
         one, other = (xp.sign(end) for end in self._ends(reaction))
         half, turn = (one + other) / 2, (one - other) / self.length
-        return half * self.across[0], half * self.across[1], turn
+        return half * self.across[0] + turn * self.arm[1], half * self.across[1] - turn * self.arm[0], turn
 
     def bound(self, reaction: Reaction) -> Number:
         """At least the most by which this reaction, added to any other, can change N."""
@@ -74,13 +75,14 @@ class Load(NamedTuple):
     def mapped(self, change: Callable[[Number], Number]) -> Load:
         """The same with `change` applied to every number."""
         across = None if self.across is None else (change(self.across[0]), change(self.across[1]))
-        return Load(across, change(self.length))
+        return Load(across, change(self.length), (change(self.arm[0]), change(self.arm[1])))
 
     def _ends(self, reaction: Reaction) -> tuple[Number, Number]:
         x, y, m = reaction
         if self.across is None:
             raise ValueError("a pin has no ends")
-        half, turn = (x * self.across[0] + y * self.across[1]) / 2, m / self.length
+        half = (x * self.across[0] + y * self.across[1]) / 2
+        turn = (m - (self.arm[0] * y - self.arm[1] * x)) / self.length
         return half + turn, half - turn
 
 

@@ -9,8 +9,10 @@ import numpy as np
 from matplotlib.patches import Circle, Polygon, Rectangle
 from matplotlib.transforms import Affine2D
 
+from trunnion.errors import Finding, MechanismError
 from trunnion.views.cycle import Array, column, layout, names
-from trunnion.views.figures import INK, MUTED, PALETTE, plain
+from trunnion.views.figures import INK, MUTED, PALETTE
+from trunnion.views.lettering import plain
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -50,13 +52,14 @@ class Picture:
 
 
 def picture(result: xr.Dataset) -> Picture:
-    """Gather what the drawings need; raises ValueError if no position can be drawn."""
+    """Gather what the drawings need; raises MechanismError if no position can be drawn."""
     tracks = {key: _track(result, key) for key in names(result, "point")}
     angles = {link: column(result, "link_angle", link=link) for link in names(result, "link")}
     points = np.concatenate([track.T for track in tracks.values()]) if tracks else np.empty((0, 2))
     points = points[np.isfinite(points).all(axis=1)]
     if not points.size:
-        raise ValueError("no position of the mechanism could be assembled: there is nothing to draw")
+        what = "no position of the mechanism can be assembled: there is nothing to draw"
+        raise MechanismError(Finding(what, remedy="change the lengths or the range of the driver"))
     low, high = points.min(axis=0), points.max(axis=0)
     size = float(np.hypot(*(high - low))) or 1.0
     stated = layout(result)

@@ -9,16 +9,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.ticker import AutoMinorLocator, MaxNLocator, MultipleLocator
 
 from trunnion.views.cycle import Abscissa, Array, intervals, thin
+from trunnion.views.lettering import Sheet, plain
 from trunnion.views.quantities import quantity
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 INK, MUTED, RULE, SHADE = "#1b1f24", "#5d6670", "#d9dde2", "#eceef1"
 # Okabe and Ito's colours, which people with any colour vision tell apart; yellow is left out, it fades on white.
@@ -32,16 +33,10 @@ def style_of(index: int) -> dict[str, Any]:
     return {"color": PALETTE[index % len(PALETTE)], "linestyle": DASHES[index // len(PALETTE) % len(DASHES)]}
 
 
-def plain(name: str) -> str:
-    """A name that matplotlib shows as it is: `$` starts no formula, a leading `_` hides no legend entry."""
-    text = name.replace("$", r"\$")
-    return f"\u2009{text}" if text.startswith("_") else text
-
-
 def new(title: str, result: xr.Dataset, height: float = 4.3, width: float = WIDTH) -> Figure:
     """An empty figure with its title and, smaller, the name of the mechanism."""
     layout = ConstrainedLayoutEngine(w_pad=0.08, h_pad=0.06, hspace=0.03, wspace=0.04)
-    figure = Figure(figsize=(width, height), dpi=150, facecolor="white", layout=layout)
+    figure = Sheet(figsize=(width, height), dpi=150, facecolor="white", layout=layout)
     FigureCanvasAgg(figure)
     name = str(result.attrs.get("name", ""))
     figure.suptitle(plain(title), x=0.012, ha="left", fontsize=12, fontweight="bold", color=INK)
@@ -74,7 +69,10 @@ def along(axes: Axes, over: Abscissa, y: str) -> None:
     elif over.unit == "":
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.xaxis.set_minor_locator(AutoMinorLocator(2))
-    if span > 0:
+    if over.values.size == 1:  # one position, one tick
+        axes.set_xticks([float(over.values[0])])
+        axes.set_xticks([], minor=True)
+    elif span > 0:
         low = float(over.values.min() if over.period >= 0 else over.values.max() + over.period)
         axes.set_xlim(low, low + span)
     axes.axhline(0, color=MUTED, linewidth=0.8, zorder=1.5)
@@ -102,8 +100,10 @@ def curve(axes: Axes, over: Abscissa, values: Array, label: str | None, *, close
     axes.plot(x, y, label=None if label is None else plain(label), **look)
     known = np.isfinite(y)
     alone = known & ~np.append(False, known[:-1]) & ~np.append(known[1:], False)
-    if alone.any():  # a single position makes no line
-        axes.plot(x[alone], y[alone], "o", markersize=4, color=style.get("color", INK))
+    if alone.any():  # a single position makes no line; a dashed curve's dots are open
+        face = "none" if look.get("linestyle", "-") != "-" else None
+        paint = style.get("color", INK)
+        axes.plot(x[alone], y[alone], "o", markersize=4.5, color=paint, markerfacecolor=face or paint)
 
 
 def shade(axes: Axes, result: xr.Dataset, over: Abscissa) -> None:
@@ -151,7 +151,7 @@ def square(axes: Axes, most: float, shown: float, factor: float, unit: str) -> N
     """Equal scales on both axes; where a vector grows far beyond `shown`, the window around the origin of that size."""
     if shown >= most:
         axes.set_aspect("equal", adjustable="datalim")
-        axes.margins(0.1)
+        axes.margins(0.13)
         return
     half = shown * factor
     axes.set_aspect("equal", adjustable="box")
@@ -164,7 +164,7 @@ def legend(axes: Axes, most: int = 6) -> None:
     handles, labels = axes.get_legend_handles_labels()
     if len(handles) < 2:
         return
-    fits = sum(map(len, labels)) + 7 * len(labels) <= 100  # characters a row holds beside the line samples
+    fits = sum(map(len, labels)) + 7 * len(labels) <= 90  # characters a row holds beside the line samples
     columns = len(labels) if fits else max(1, min(most, 100 // (max(map(len, labels)) + 7)))
     axes.legend(
         handles, labels, loc="lower left", bbox_to_anchor=(-0.02, 1.0), ncols=columns, frameon=False, fontsize=8.5,

@@ -6,16 +6,28 @@
 from __future__ import annotations
 
 import os
-import tempfile
-import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib import rc_context
 from matplotlib.lines import Line2D
 
-from trunnion.views.cycle import Abscissa, Array, abscissa, attribute, column, layout, names, thin, usual_peak
+from trunnion.errors import Finding, MechanismError, Status
+from trunnion.output import whole
+from trunnion.views.cycle import (
+    Abscissa,
+    Array,
+    abscissa,
+    attribute,
+    column,
+    layout,
+    names,
+    status_text,
+    thin,
+    usual_peak,
+)
 from trunnion.views.drawing import draw, picture
 from trunnion.views.figures import (
     INK,
@@ -28,11 +40,11 @@ from trunnion.views.figures import (
     frame_peak,
     legend,
     new,
-    plain,
     shade,
     square,
     style_of,
 )  # fmt: skip
+from trunnion.views.lettering import plain
 from trunnion.views.quantities import prefixed, quantity
 
 if TYPE_CHECKING:
@@ -43,7 +55,7 @@ if TYPE_CHECKING:
 __all__ = ["PLOTS", "friction_power", "mechanism", "motion", "polar", "power", "reactions", "save", "torque"]
 
 FORMATS = ("png", "svg", "pdf")
-NOTE: dict[str, Any] = {"textcoords": "offset points", "fontsize": 7.5, "color": INK}
+NOTE: dict[str, Any] = {"textcoords": "offset points", "fontsize": 7.5, "color": INK, "ha": "center", "va": "center"}
 FREE: dict[str, Any] = {"color": INK, "linewidth": 0.9, "linestyle": (0, (3, 2))}  # without friction, among many curves
 
 
@@ -72,9 +84,10 @@ def torque(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
         noun = "force" if unit == "N" else "torque"
         along(axes, over, f"{noun} {plain(driver)} [{shown}]")
         shade(axes, result, over)
-        curve(axes, over, effort * factor, "with friction" if free is not None else noun, color=PALETTE[0])
+        label = "with friction" if free is not None else noun
+        curve(axes, over, effort * factor, label, color=PALETTE[0], linewidth=2.0)
         if free is not None:
-            curve(axes, over, free * factor, "without friction", color=PALETTE[1], linestyle=(0, (5, 2)), linewidth=1.3)
+            curve(axes, over, free * factor, "without friction", **FREE)
         _band(axes, result, over, driver, factor)
         frame_peak(axes, peak(effort, free), scope, factor, unit)
     _only_last_titled(list(panels))
@@ -175,7 +188,8 @@ def polar(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
 
 
 def _hodograph(axes: Axes, over: Abscissa, joint: str, force: Array, free: Array | None, colour: str) -> None:
-    scope = usual_peak(np.hypot(*force), None if free is None else np.hypot(*free))
+    sizes = [np.hypot(*vector) for vector in (force, free) if vector is not None]
+    scope = usual_peak(*sizes)
     factor, unit = prefixed(scope, "N")
     dress(axes, f"Fx [{unit}]", f"Fy [{unit}]")
     axes.set_title(plain(joint), fontsize=10, fontweight="bold", color=INK, loc="left")
@@ -184,8 +198,10 @@ def _hodograph(axes: Axes, over: Abscissa, joint: str, force: Array, free: Array
     if free is not None:
         axes.plot(*_loop(free, over) * factor, **FREE)
     axes.plot(*_loop(force, over) * factor, color=colour, linewidth=1.6)
-    _marks(axes, over, force * factor, colour, 0.12 * scope * factor)
-    square(axes, peak(np.hypot(*force)), scope, factor, "N")
+    if force.shape[1] == 1:  # one position has no track
+        axes.plot(*np.hstack([np.zeros((2, 1)), force * factor]), color=colour, linewidth=1.6)
+    _marks(axes, over, force * factor, colour, scope * factor)
+    square(axes, peak(*sizes), scope, factor, "N")
 
 
 def _loop(force: Array, over: Abscissa) -> Array:
@@ -195,27 +211,44 @@ def _loop(force: Array, over: Abscissa) -> Array:
     return np.hstack([kept, force[:, :1]]) if over.closed else kept
 
 
-def _marks(axes: Axes, over: Abscissa, force: Array, colour: str, apart: float) -> None:
+def _marks(axes: Axes, over: Abscissa, force: Array, colour: str, scope: float) -> None:
     """Dots every 30°, with the angle at every 90° unless it would lie on another; without a turn only the start."""
     labelled: list[Array] = []
     wanted = np.arange(0, 360, 30) if over.closed else over.values[:1]
     for angle in wanted:
         index = int(np.argmin(np.abs((over.values - angle + 180) % 360 - 180))) if over.closed else 0
         place = force[:, index]
-        if not np.isfinite(place).all():
+        if not np.isfinite(place).all() or np.abs(place).max() > scope:
             continue
         axes.plot(*place, "o", markersize=3.2, color=colour, markeredgecolor="white", markeredgewidth=0.5, zorder=4)
-        crowded = any(np.hypot(*(place - other)) < apart for other in labelled)
+        crowded = any(np.hypot(*(place - other)) < 0.12 * scope for other in labelled)
         if not over.closed or (angle % 90 == 0 and not crowded):
             labelled.append(place)
-            axes.annotate(over.say(index), (place[0], place[1]), xytext=(5, 4), **NOTE)
+            away = _outward(force, index)
+            axes.annotate(over.say(index), (place[0], place[1]), xytext=(13 * away[0], 10 * away[1]), **NOTE)
+
+
+def _outward(force: Array, index: int) -> Array:
+    """Direction across the track of a vector at a position, away from the middle of the track."""
+    known = force[:, np.isfinite(force).all(axis=0)]
+    along = force[:, (index + 1) % force.shape[1]] - force[:, index - 1]
+    size = np.hypot(*along)
+    if not size > 0.0:  # one position, or a vector that stands still or has no value beside it
+        return np.array([0.7, 0.9])
+    across: Array = np.array([along[1], -along[0]]) / size
+    inwards = across @ (force[:, index] - known.mean(axis=1)) < 0
+    return -across if inwards else across
 
 
 def mechanism(result: xr.Dataset, ideal: xr.Dataset | None = None, index: int | None = None) -> Figure:
     """The mechanism at a position (the first that can be drawn, if not told), ghosts, coupler curves, joints named."""
     shown = picture(result)
+    count = result.sizes["position"]
     if index is None:
         index = _first_drawable(list(shown.tracks.values()))
+    elif not 0 <= index < count:
+        remedy = f"name one from 0 to {count - 1}"
+        raise MechanismError(Finding(f"there is no position {index} among the {count}", "index", remedy))
     low_x, low_y, high_x, high_y = shown.box
     margin = 0.09 * shown.size
     width, height = high_x - low_x + 2 * margin, high_y - low_y + 2 * margin
@@ -227,8 +260,11 @@ def mechanism(result: xr.Dataset, ideal: xr.Dataset | None = None, index: int | 
     axes.axis("off")
     draw(axes, shown, index)
     over = abscissa(result)
-    formula = str(result.attrs.get("formula", ""))
-    axes.set_title(f"{over.label} = {over.say(index)}    {formula}", fontsize=8.5, color=MUTED, loc="left")
+    facts = [f"{over.label} = {over.say(index)}", str(result.attrs.get("formula", ""))]
+    status = int(result["status"].values[index])
+    if status >= Status.NOT_CONVERGED:
+        facts.append(status_text(status).split(":")[0])
+    axes.set_title(plain("    ".join(facts)), fontsize=8.5, color=MUTED, loc="left")
     return figure
 
 
@@ -320,28 +356,15 @@ PLOTS: dict[str, Callable[[xr.Dataset, xr.Dataset | None], Figure]] = {
 
 
 def save(figure: Figure, path: str | os.PathLike[str]) -> Path:
-    """Write a figure by its extension, whole or not at all: to a file beside the target, then renamed over it."""
+    """Write a figure by its extension, whole or not at all; the same figure gives the same file.
+
+    Raises MechanismError for another extension than .png, .svg and .pdf, and where it cannot be written.
+    """
     target = Path(path)
     kind = target.suffix.lower().lstrip(".")
     if kind not in FORMATS:
-        raise ValueError(f"cannot write a figure as “{target.name}”: end the name in .png, .svg or .pdf")
-    handle, draft = tempfile.mkstemp(dir=target.parent, prefix=f".{target.stem}-", suffix=f".{kind}")
-    os.close(handle)
-    try:
-        with warnings.catch_warnings():
-            # A name in a script that the font lacks is drawn as boxes; that is no reason to fail.
-            warnings.filterwarnings("ignore", message="Glyph .* missing from font")
-            figure.savefig(draft, format=kind, dpi=200, metadata={"Date": None} if kind == "svg" else None)
-        os.chmod(draft, 0o666 & ~_umask())
-        os.replace(draft, target)
-    except BaseException:
-        Path(draft).unlink(missing_ok=True)
-        raise
+        raise MechanismError(Finding("is no kind of figure", str(target), "end the name in .png, .svg or .pdf"))
+    undated = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind)
+    with whole(target) as draft, rc_context({"svg.hashsalt": "trunnion"}):
+        figure.savefig(draft, format=kind, dpi=200, metadata=undated)
     return target
-
-
-def _umask() -> int:
-    """The process's mask for new files; mkstemp ignores it."""
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask

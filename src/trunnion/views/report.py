@@ -10,8 +10,10 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
+import re
 from functools import cache
 from itertools import groupby
+from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,6 +28,11 @@ if TYPE_CHECKING:
     from jinja2 import Template
 
 __all__ = ["embedded", "report"]
+
+# A label of the summary: the subject with its unit in words, which of its figures, or in brackets why it is so.
+ASPECT = re.compile(
+    r"(.*?)(?: \((times [^)]*)\))?(?:, ((?:least|largest|mean|RMS|most|more than|of)\b.*)| \((.*)\))?", re.DOTALL
+)
 
 # Variable, label, unit, what a reader may make of it.
 BALANCE = (
@@ -90,10 +97,18 @@ def _ordinal(shown: dict[str, Any]) -> str:
     return f"{stride}{suffix}"
 
 
-def _summary(result: xr.Dataset) -> list[tuple[str, str]]:
-    """Label and value with unit of each summary row."""
-    rows = attribute(result, "summary", [])
-    return [(str(row["label"]), quantity(row["value"], str(row.get("unit") or "")) or "—") for row in rows]
+def _summary(result: xr.Dataset) -> list[tuple[str, list[tuple[str, str]]]]:
+    """Subjects, each with its figures and what they are: ("drive torque of A", [("9.3 kN m", "largest, at 24°")])."""
+    rows = []
+    for row in attribute(result, "summary", []):
+        subject, *remarks = ASPECT.fullmatch(str(row["label"])).groups()  # type: ignore[union-attr]
+        value = quantity(row["value"], str(row.get("unit") or "")) or "—"
+        if "more than" in remarks:
+            remarks.remove("more than")
+            value = f"> {value}"
+        rows.append((subject, value, ", ".join(filter(None, remarks))))
+    grouped = groupby(rows, key=itemgetter(0))
+    return [(subject, [(value, remark) for _, value, remark in members]) for subject, members in grouped]
 
 
 def _findings(result: xr.Dataset) -> list[dict[str, str]]:

@@ -8,7 +8,8 @@ const MARGIN = { top: 8, right: 14, bottom: 40, left: 58 };
 
 /**
  * A chart of `series` [{label, values, kind, quiet}] in one unit; `kind` is a class that colours the curve.
- * `band` {low, high, kind, label} is filled. `limits` caps the vertical axis. `pick(index)` is called when the reader points.
+ * `band` {low, high, kind, label} is filled. `limits` caps the vertical axis, `note` is a remark below it.
+ * `pick(index, firm)` is called when the reader points.
  */
 export function lineChart(scene, { title, unit, series, band = null, limits = null, note = "", pick }) {
   const columns = series.map((one) => one.values);
@@ -103,6 +104,7 @@ function draw(chart, width) {
   const curves = series.map((one) =>
     svg("path", { class: `curve ${one.kind}`, d: curvePath(scene, frame, one.values, scale.factor) }),
   );
+  const silent = extent(series.map((one) => one.values)) === null;
   const bars = band ? svg("path", { class: `band ${band.kind}`, d: bandPath(chart, band) }) : null;
   chart.plot.replaceChildren(
     svg(
@@ -113,19 +115,24 @@ function draw(chart, width) {
       clipped(box, ...curves, bars),
       chart.cursor,
       ...chart.dots,
+      silent ? svg("text", { class: "mark middle", ...centre(box) }, "no values") : null,
     ),
   );
   moveCursor(chart);
+}
+
+function centre({ x, y, width, height }) {
+  return { x: x + width / 2, y: y + height / 2, dy: "0.32em" };
 }
 
 /** Ends of the vertical axis in display units: around the data and zero, within the limits if there are any. */
 function vertical(chart) {
   const { scale, series, band, limits } = chart;
   const shown = [...series.map((one) => one.values), ...(band ? [band.low, band.high] : [])];
-  let [low, high] = extent(shown) ?? [0, 1];
+  let [low, high] = extent(shown) ?? [0, 0];
   if (limits) [low, high] = [Math.max(low, limits[0]), Math.min(high, limits[1])];
   [low, high] = [Math.min(low, 0) * scale.factor, Math.max(high, 0) * scale.factor];
-  if (!(high - low > 0)) return [low - 1, high + 1];
+  if (!(high - low > 0)) return limits ? [0, 100] : [low - 1, high + 1];
   const room = 0.05 * (high - low);
   return [low < 0 ? low - room : 0, high > 0 ? high + room : 0];
 }
@@ -139,7 +146,8 @@ function describe(chart) {
 }
 
 function axes(abscissa, frame, [x0, x1], [y0, y1]) {
-  const across = ticks(x0, x1, frame.width < 420 ? 5 : 9, abscissa.unit === "°");
+  const single = abscissa.values.length === 1;
+  const across = single ? abscissa.values : ticks(x0, x1, frame.width < 420 ? 5 : 9, abscissa.unit === "°");
   const up = ticks(y0, y1, 6);
   const step = (list) => (list.length > 1 ? list[1] - list[0] : 1);
   const parts = up.map((value) =>
@@ -197,14 +205,18 @@ export function curvePath(scene, frame, values, factor) {
   const count = abscissa.values.length;
   let path = "";
   let pen = "M";
+  let last = null;
   for (let index = 0; index < count + (abscissa.closed ? 1 : 0); index += 1) {
     const value = values[index % count];
     if (value === null) {
       pen = "M";
       continue;
     }
+    const y = frame.y(value * factor);
+    if ((y < 0 && last > frame.height) || (y > frame.height && last < 0)) pen = "M"; // through infinity, not through the frame
+    last = y;
     const x = abscissa.values[index % count] + (index === count ? abscissa.period : 0);
-    path += `${pen}${frame.x(x).toFixed(1)},${frame.y(value * factor).toFixed(1)}`;
+    path += `${pen}${frame.x(x).toFixed(1)},${y.toFixed(1)}`;
     if (pen === "M") path += "h0"; // a value that stands alone still leaves a dot
     pen = "L";
   }

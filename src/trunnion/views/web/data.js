@@ -1,5 +1,7 @@
 // Reading a scene (trunnion/views/scene.py): series, vectors, extents, state. No drawing here.
 
+import { stated } from "./format.js";
+
 const FIRST_UNSOLVED = 3; // errors.Status.NOT_CONVERGED: from here on the forces have no value
 
 /** The value of a series at a position; a series of one number holds everywhere. */
@@ -126,6 +128,11 @@ export function solved(scene, index) {
 /** The state of a position in a sentence. */
 export function state(scene, index) {
   return scene.states[String(scene.status[index])] ?? "no answer";
+}
+
+/** The place of a position in words: "132°", "12.5 mm". */
+export function say({ abscissa: { values, unit } }, index) {
+  return unit === "°" ? `${stated(values[index], "")}°` : stated(values[index], unit);
 }
 
 /** Runs [first, last] of positions without an answer. */

@@ -76,7 +76,8 @@ export function tickLabel(value, step) {
 /** A stated quantity, without zeros that promise precision: "1 kN". */
 export function stated(value, unit) {
   const scale = prefixed(value, unit);
-  return `${grouped(String(Number((value * scale.factor).toPrecision(4))))}\u00a0${scale.unit}`;
+  const text = grouped(String(Number((value * scale.factor).toPrecision(4))));
+  return scale.unit ? `${text}\u00a0${scale.unit}` : text;
 }
 
 function grouped(text) {

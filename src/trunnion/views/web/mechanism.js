@@ -1,10 +1,14 @@
 // The mechanism as SVG: ground, links as bodies, joints, coupler curves, loads, reaction vectors.
 
-import { at, bounds, guide, hull, magnitude, place, quantile, solved, state, usualPeak } from "./data.js";
+import { arrow, longest } from "./arrow.js";
+import { at, bounds, guide, hull, magnitude, peak, place, quantile, say, solved, state, usualPeak } from "./data.js";
 import { html, onWidth, set, svg } from "./dom.js";
-import { number, roundBelow, stated } from "./format.js";
+import { roundBelow, stated } from "./format.js";
+import { loadsOf, poseLoad } from "./load.js";
 
 const MARGIN = 62; // room for labels and arrows, px
+const KEY = 30; // height of the strip with the scales, px
+const BELOW = 300; // height of what stands below the drawing, so that all of it stays in the window, px
 
 /** The drawing; `show(index)` moves it, `reactions(names, factor)` chooses the vectors and their size. */
 export function mechanismView(scene, kinds) {
@@ -30,7 +34,9 @@ export function mechanismView(scene, kinds) {
     shown: new Set(scene.joints.map((joint) => joint.name)),
   };
   const forces = scene.joints.flatMap((joint) => magnitude(joint.reaction, scene.count));
-  view.usual = Math.max(quantile(forces, 0.9), usualPeak(forces) / 2); // long vectors stay in sight, common ones legible
+  view.peak = usualPeak(forces);
+  view.towers = view.peak < peak(forces); // a few vectors leave the picture whatever the scale
+  view.usual = Math.max(quantile(forces, 0.9), view.peak / 2); // long vectors stay in sight, common ones legible
   onWidth(stage, (width) => build(view, width), 490);
   return {
     element,
@@ -47,25 +53,39 @@ export function mechanismView(scene, kinds) {
   };
 }
 
-function build(view, width) {
-  const { scene, box } = view;
-  const margin = Math.min(MARGIN, width * 0.12);
+/** Where the mechanism lies in the picture; `margin` px around it are for labels and arrows. */
+function framed({ box }, width, margin) {
   const tall = Math.min(
     Math.max(((width - 2 * margin) * box.height) / (box.width || 1) + 2 * margin, width * 0.5),
     width * 0.95,
+    window.innerWidth > 900 ? Math.max(window.innerHeight - BELOW, 250) : 620,
     620,
   );
   const scale = Math.min((width - 2 * margin) / (box.width || 1e-9), (tall - 2 * margin) / (box.height || 1e-9));
   const left = (width - scale * box.width) / 2 - scale * box.x;
   const foot = (tall + scale * box.height) / 2 + scale * box.y;
-  view.frame = { width, height: tall, scale, to: ([x, y]) => [left + scale * x, foot - scale * y] };
+  return { width, height: tall, scale, to: ([x, y]) => [left + scale * x, foot - scale * y] };
+}
+
+/** Choose frame and scale of the vectors: the margin grows until the longest vector is well seen. */
+function fit(view, width) {
+  for (const growth of [1, 1.3, 1.6]) {
+    view.frame = framed(view, width, growth * Math.min(MARGIN, width * 0.12));
+    view.fitting = fitting(view);
+    if (view.towers || view.peak * view.fitting > 0.18 * Math.min(width, view.frame.height)) return;
+  }
+}
+
+function build(view, width) {
+  const { scene } = view;
+  fit(view, width);
   view.parts = {
     bodies: scene.links.filter((link) => !link.ground).map((link) => body(link, scene)),
     joints: scene.joints.map((one) => joint(one, scene)),
     points: scene.links
       .filter((link) => !link.ground)
       .flatMap((link) => link.free.map((key) => freePoint(key, link.name))),
-    loads: scene.loads.filter((load) => load.at && Math.hypot(...load.force) > 0).map(load),
+    loads: loadsOf(scene),
     vectors: scene.joints.map((one) => svg("path", { class: `reaction ${view.kinds.get(one.name)}` })),
     drives: scene.drivers.map(() => svg("path", { class: "drive" })),
   };
@@ -84,7 +104,7 @@ function build(view, width) {
   view.stage.replaceChildren(
     svg(
       "svg",
-      { viewBox: `0 0 ${width} ${Math.round(tall)}`, role: "img", "aria-label": `Mechanism: ${scene.name}` },
+      { viewBox: `0 0 ${width} ${Math.round(view.frame.height)}`, role: "img", "aria-label": `Mechanism: ${scene.name}` },
       ...ground(view),
       ...tracks(view),
       view.moving,
@@ -93,6 +113,21 @@ function build(view, width) {
   );
   scales(view);
   pose(view);
+}
+
+/** Pixels a newton at which every usual reaction of the run ends inside the picture, and none hides the mechanism. */
+function fitting({ scene, frame, usual, peak: most }) {
+  if (!(usual > 0)) return 0;
+  const rays = [];
+  for (const one of scene.joints) {
+    for (let index = 0; index < scene.count; index += 1) {
+      const spot = place(scene, one.at, index);
+      const [x, y] = [at(one.reaction.x, index), at(one.reaction.y, index)];
+      if (spot && x !== null && y !== null && Math.hypot(x, y) <= most) rays.push([...frame.to(spot), x, -y]);
+    }
+  }
+  const room = { left: 6, right: frame.width - 6, top: 6, bottom: frame.height - KEY };
+  return Math.min((Math.min(frame.width, frame.height) * 0.24) / usual, longest(rays, room));
 }
 
 /** Bearings and guides that stand on the ground; they do not move. */
@@ -201,14 +236,6 @@ function freePoint(key, link) {
   };
 }
 
-function load(one) {
-  const size = stated(Math.hypot(...one.force), "N");
-  return {
-    load: one,
-    node: svg("g", { class: "load" }, svg("title", {}, `${one.name}: ${size}`), svg("path", {}), svg("text", {}, size)),
-  };
-}
-
 /** A name that fits into the drawing; the whole of it is in the tooltip. */
 function short(name) {
   const signs = [...name];
@@ -217,7 +244,7 @@ function short(name) {
 
 /** Length bar and reference arrow, with round numbers. */
 function scales(view) {
-  const { frame, usual, factor } = view;
+  const { frame, fitting, factor } = view;
   const y = frame.height - 14;
   const length = roundBelow((frame.width * 0.2) / frame.scale);
   const bar = length * frame.scale;
@@ -225,26 +252,14 @@ function scales(view) {
     svg("path", { class: "bar", d: `M14,${y - 4}v8m0,-4h${bar}m0,-4v8` }),
     svg("text", { x: 14 + bar + 7, y, dy: "0.32em" }, stated(length, "m")),
   ];
-  view.perNewton = usual > 0 ? (Math.min(frame.width, frame.height) * 0.24 * factor) / usual : 0;
+  view.perNewton = fitting * factor;
   if (view.perNewton > 0 && view.shown.size) {
     const force = roundBelow((frame.width * 0.17) / view.perNewton);
-    const x = frame.width * 0.55;
+    const x = frame.width * 0.5;
     parts.push(svg("path", { class: "reaction reference", d: arrow(x, y, force * view.perNewton, 0) }));
-    parts.push(svg("text", { x: x + force * view.perNewton + 8, y, dy: "0.32em" }, stated(force, "N")));
+    parts.push(svg("text", { x: x + force * view.perNewton + 8, y, dy: "0.32em" }, `reaction ${stated(force, "N")}`));
   }
   view.key.replaceChildren(...parts);
-}
-
-/** A vector as a path: shaft and filled head, from (x, y) by (dx, dy) px. */
-export function arrow(x, y, dx, dy) {
-  const length = Math.hypot(dx, dy);
-  if (!(length > 0.5)) return "";
-  const [ux, uy] = [dx / length, dy / length];
-  const head = Math.min(10, length);
-  const [bx, by] = [x + dx - head * ux, y + dy - head * uy];
-  const wing = 0.36 * head;
-  const at_ = (a, b) => `${a.toFixed(1)},${b.toFixed(1)}`;
-  return `M${at_(x, y)}L${at_(bx, by)}M${at_(x + dx, y + dy)}L${at_(bx - wing * uy, by + wing * ux)}L${at_(bx + wing * uy, by - wing * ux)}Z`;
 }
 
 /** Everything that moves, at the present position; where it cannot be assembled, the last pose in grey. */
@@ -264,7 +279,7 @@ function pose(view) {
   parts.bodies.forEach((one) => poseBody(view, one));
   parts.points.forEach((one) => moveTo(one.node, spotOf(view, one.key)));
   parts.joints.forEach((one) => poseJoint(view, one));
-  parts.loads.forEach((one) => poseLoad(view, one));
+  parts.loads.forEach((one) => poseLoad(one, spotsOf(view, one.keys)));
   scene.drivers.forEach((driver, order) => poseDrive(view, driver, parts.drives[order]));
   scene.joints.forEach((one, order) => poseVector(view, one, parts.vectors[order]));
 }
@@ -279,16 +294,18 @@ function cause(scene, index) {
   let [first, last] = [index, index];
   while (first > 0 && same(first - 1)) first -= 1;
   while (last < scene.count - 1 && same(last + 1)) last += 1;
-  const { values, unit } = scene.abscissa;
-  const say = (one) => `${number(values[one])}${unit === "°" || !unit ? "" : "\u00a0"}${unit}`;
   const text = state(scene, index);
-  const stretch = first < last ? ` (${say(first)} to ${say(last)})` : "";
+  const stretch = first < last ? ` (${say(scene, first)} to ${say(scene, last)})` : "";
   return `${text.charAt(0).toUpperCase()}${text.slice(1)}${stretch}.`;
 }
 
 function spotOf(view, key) {
   const spot = place(view.scene, key, view.posed);
   return spot ? view.frame.to(spot) : null;
+}
+
+function spotsOf(view, keys) {
+  return keys.map((key) => spotOf(view, key)).filter(Boolean);
 }
 
 function moveTo(node, spot, angle = 0) {
@@ -300,7 +317,7 @@ function moveTo(node, spot, angle = 0) {
 }
 
 function poseBody(view, { link, parts }) {
-  const spots = link.points.map((key) => spotOf(view, key)).filter(Boolean);
+  const spots = spotsOf(view, link.points);
   const corners = hull(spots).map(([x, y]) => `${x.toFixed(1)},${y.toFixed(1)}`);
   const path = corners.length ? `M${corners.join("L")}${corners.length > 2 ? "Z" : ""}` : "";
   parts.forEach((part) => part.setAttribute("d", path));
@@ -310,17 +327,6 @@ function poseJoint(view, one) {
   const spot = spotOf(view, one.joint.at);
   moveTo(one.node, spot, one.joint.type === "prismatic" ? guide(view.scene, one.joint, view.posed) : 0);
   moveTo(one.label, spot && [spot[0] + one.beside[0], spot[1] + one.beside[1]]);
-}
-
-function poseLoad(view, { load: one, node }) {
-  const spot = spotOf(view, one.at);
-  const size = Math.hypot(...one.force);
-  const [dx, dy] = [(44 * one.force[0]) / size, (-44 * one.force[1]) / size];
-  const [path, text] = node.querySelectorAll("path, text");
-  moveTo(node, spot);
-  path.setAttribute("d", arrow(0, 0, dx, dy));
-  const lean = dx / 44;
-  set(text, { x: dx + (lean < -0.3 ? -8 : 8), y: dy, dy: "0.32em", "text-anchor": lean < -0.3 ? "end" : "start" });
 }
 
 /** An arc around a turning drive in the sense it turns; along its way, for a sliding one an arrow. */

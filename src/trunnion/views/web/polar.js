@@ -2,15 +2,17 @@
 
 import { at, extent, magnitude, peak, usualPeak } from "./data.js";
 import { clipped, html, onWidth, set, svg } from "./dom.js";
-import { fixed, prefixed, tickLabel, ticks } from "./format.js";
+import { fixed, prefixed, quantity, tickLabel, ticks } from "./format.js";
 
-const MARGIN = { top: 8, right: 10, bottom: 36, left: 50 };
+const MARGIN = { top: 10, right: 14, bottom: 42, left: 60 };
 
 /** The diagram of `joint`; `kind` colours it, `pick(index, firm)` is called when the reader points at the curve. */
 export function polarChart(scene, joint, kind, pick) {
   const sizes = magnitude(joint.reaction, scene.count);
-  const most = usualPeak(sizes, joint.ideal ? magnitude(joint.ideal, scene.count) : []);
-  const cut = most < peak(sizes) ? most : null; // then the window shows what is usual, around the origin
+  const free = joint.ideal ? magnitude(joint.ideal, scene.count) : [];
+  const most = usualPeak(sizes, free);
+  const highest = peak(sizes, free);
+  const cut = most < highest ? most : null; // then the window shows what is usual, around the origin
   const scale = prefixed(most, "N");
   const plot = html("div", { class: "plot" });
   const value = html("span", { class: "value" }, "—");
@@ -25,6 +27,7 @@ export function polarChart(scene, joint, kind, pick) {
       value,
     ),
     plot,
+    cut === null ? null : html("p", { class: "remark" }, `The peak of ${quantity(highest, "N")} lies outside.`),
   );
   const chart = { scene, joint, kind, scale, cut, plot, frame: null, index: 0 };
   onWidth(plot, (width) => draw(chart, width), 220);
@@ -49,6 +52,7 @@ function draw(chart, width) {
   const { middle, half } = around(chart);
   const frame = {
     width,
+    side,
     x: (value) => MARGIN.left + ((value - middle[0]) / half + 1) * (side / 2),
     y: (value) => MARGIN.top + (1 - (value - middle[1]) / half) * (side / 2),
   };
@@ -66,16 +70,17 @@ function draw(chart, width) {
         "aria-label": `Polar diagram of the reaction in joint ${joint.name}`,
       },
       ...grid(frame, across, up, side),
-      svg("text", { class: "axis middle", x: MARGIN.left + side / 2, y: height - 4 }, "Fx"),
-      svg("text", { class: "axis middle", x: 11, y: MARGIN.top + side / 2, dy: "0.32em" }, "Fy"),
+      svg("text", { class: "axis middle", x: MARGIN.left + side / 2, y: height - 5 }, "Fx"),
+      svg("text", { class: "axis", x: 0, y: MARGIN.top + side / 2, dy: "0.32em" }, "Fy"),
       clipped(
         { x: MARGIN.left, y: MARGIN.top, width: side, height: side },
         joint.ideal ? svg("path", { class: "curve free", d: loop(chart, joint.ideal) }) : null,
         svg("path", { class: `curve ${kind}`, d: loop(chart, joint.reaction) }),
-        ...marks(chart),
         chart.vector,
-        chart.tip,
       ),
+      ...marks(chart, side),
+      chart.tip,
+      ...captions(chart, side),
     ),
   );
   moveVector(chart);
@@ -83,11 +88,11 @@ function draw(chart, width) {
 
 /** A square window around the curves and the origin. */
 function around({ joint, cut, scale: { factor } }) {
-  if (cut !== null) return { middle: [0, 0], half: cut * factor };
+  if (cut !== null) return { middle: [0, 0], half: 1.07 * cut * factor };
   const both = [joint.reaction, ...(joint.ideal ? [joint.ideal] : [])];
   const [x0, x1] = extent([[0], ...both.map((one) => one.x)]);
   const [y0, y1] = extent([[0], ...both.map((one) => one.y)]);
-  const half = (Math.max(x1 - x0, y1 - y0) / 2) * factor * 1.1 || 1;
+  const half = (Math.max(x1 - x0, y1 - y0) / 2) * factor * 1.14 || 1;
   return { middle: [((x0 + x1) / 2) * factor, ((y0 + y1) / 2) * factor], half };
 }
 
@@ -114,12 +119,12 @@ function grid(frame, across, up, side) {
       }),
     ),
     ...across.map((value) =>
-      svg("text", { class: "tick middle", x: frame.x(value), y: bottom + 15 }, tickLabel(value, step(across))),
+      svg("text", { class: "tick middle", x: frame.x(value), y: bottom + 18 }, tickLabel(value, step(across))),
     ),
     ...up.map((value) =>
       svg(
         "text",
-        { class: "tick end", x: MARGIN.left - 6, y: frame.y(value), dy: "0.32em" },
+        { class: "tick end", x: MARGIN.left - 8, y: frame.y(value), dy: "0.32em" },
         tickLabel(value, step(up)),
       ),
     ),
@@ -144,31 +149,67 @@ function loop(chart, vector) {
   return path;
 }
 
-/** Dots at every twelfth of a closed turn, with the angle at every quarter unless it would lie on another. */
-function marks(chart) {
-  const { scene, joint, kind } = chart;
+/** The places of every twelfth of a closed turn that lie in the window, [{index, place, quarter}]. */
+function twelfths(chart, side) {
+  const { scene, joint } = chart;
   if (!scene.abscissa.closed || scene.count < 12) return [];
+  return Array.from({ length: 12 }, (_, order) => Math.round((order * scene.count) / 12))
+    .map((index, order) => ({ index, place: spot(chart, joint.reaction, index), quarter: order % 3 === 0 }))
+    .filter(({ place }) => place && within(place, side));
+}
+
+function marks(chart, side) {
+  return twelfths(chart, side).map(({ place: [cx, cy] }) =>
+    svg("circle", { class: `milestone ${chart.kind}`, cx, cy, r: 2.2 }),
+  );
+}
+
+/** The angle at every quarter of a turn, unless it would lie on another. */
+function captions(chart, side) {
+  const dots = twelfths(chart, side);
+  const middle = [0, 1].map((axis) => dots.reduce((sum, { place }) => sum + place[axis], 0) / dots.length);
   const labelled = [];
-  return Array.from({ length: 12 }, (_, order) => {
-    const index = Math.round((order * scene.count) / 12);
-    const place = spot(chart, joint.reaction, index);
-    if (!place) return null;
-    const free = labelled.every(([x, y]) => Math.hypot(place[0] - x, place[1] - y) > 24);
-    const named = order % 3 === 0 && free;
-    if (named) labelled.push(place);
-    const text = `${Math.round(scene.abscissa.values[index])}°`;
-    const label = named ? svg("text", { class: "mark", x: place[0] + 6, y: place[1] - 5 }, text) : null;
-    return svg("g", {}, svg("circle", { class: `milestone ${kind}`, cx: place[0], cy: place[1], r: 2.2 }), label);
-  }).filter(Boolean);
+  for (const dot of dots) {
+    const crowded = labelled.some(({ place: [x, y] }) => Math.hypot(dot.place[0] - x, dot.place[1] - y) < 26);
+    if (dot.quarter && !crowded) labelled.push(dot);
+  }
+  return labelled.map((dot) => caption(chart, dot, middle, side));
+}
+
+function within([x, y], side) {
+  return x >= MARGIN.left && x <= MARGIN.left + side && y >= MARGIN.top && y <= MARGIN.top + side;
+}
+
+/** The angle beside its dot: across the curve, away from its middle, inside the frame. */
+function caption(chart, { index, place: [x, y] }, middle, side) {
+  const { scene, joint } = chart;
+  const text = `${Math.round(scene.abscissa.values[index])}°`;
+  const half = 3.2 * text.length;
+  const before = spot(chart, joint.reaction, (index + scene.count - 1) % scene.count) ?? [x, y];
+  const after = spot(chart, joint.reaction, (index + 1) % scene.count) ?? [x, y];
+  const [ax, ay] = [after[1] - before[1], before[0] - after[0]];
+  const size = (Math.hypot(ax, ay) || 1) * (ax * (x - middle[0]) + ay * (y - middle[1]) < 0 ? -1 : 1);
+  const inside = (value, low, room, space) => Math.min(Math.max(value, low + space), low + room - space);
+  return svg(
+    "text",
+    {
+      class: "mark middle",
+      x: inside(x + (ax / size) * (half + 8), MARGIN.left, side + 10, half),
+      y: inside(y + (ay / size) * 13, MARGIN.top, side, 7),
+      dy: "0.34em",
+    },
+    text,
+  );
 }
 
 function moveVector(chart) {
   if (!chart.frame) return;
   const tip = spot(chart, chart.joint.reaction, chart.index);
   const hidden = tip ? null : "hidden";
+  const seen = tip && within(tip, chart.frame.side);
   const [x, y] = tip ?? [0, 0];
   set(chart.vector, { x1: chart.frame.x(0), y1: chart.frame.y(0), x2: x, y2: y, visibility: hidden });
-  set(chart.tip, { cx: x, cy: y, visibility: hidden });
+  set(chart.tip, { cx: x, cy: y, visibility: seen ? null : "hidden" });
 }
 
 function closest(chart, event) {

@@ -37,14 +37,15 @@ function charts(scene, kinds, pick) {
   list.push(powerChart(scene, lost, pick));
   if (sums.efficiency_instant) {
     const values = full(sums.efficiency_instant, count).map((value) => (value === null ? null : 100 * value));
-    const note = !scene.efficiency ? "" : `Over the whole run: ${quantity(100 * scene.efficiency, "%")}.`;
+    const whole = scene.efficiency === null ? "" : `Over the whole run: ${quantity(100 * scene.efficiency, "%")}. `;
+    const far = peak(values) > 100 ? "Beyond ±100 %, where the drive power nears zero, it is not shown." : "";
     list.push(
       lineChart(scene, {
         title: "Efficiency at each position",
         unit: "%",
         pick,
         limits: [-100, 100],
-        note,
+        note: whole + far,
         series: [{ label: "efficiency", values, kind: "k2" }],
       }),
     );
@@ -56,7 +57,7 @@ function effortChart(scene, driver, pick) {
   const { count } = scene;
   const noun = driver.unit === "N" ? "force" : "torque";
   const series = [{ label: driver.ideal ? "with friction" : noun, values: full(driver.effort, count), kind: "k0" }];
-  if (driver.ideal) series.push({ label: "without friction", values: full(driver.ideal, count), kind: "k1 dashed" });
+  if (driver.ideal) series.push({ label: "without friction", values: full(driver.ideal, count), kind: "ink fine", quiet: true });
   const low = full(driver.effort_lower, count);
   const high = full(driver.effort_upper, count);
   const open = low.some((value, index) => value !== null && high[index] - value > 0.002 * usualPeak(low, high));

@@ -1,0 +1,189 @@
+"""Every entry of every table keeps its table's promise; a new entry is tested by being there."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mechanisms import KIND
+from trunnion.algebra.dual import Dual, derivative, functions, primal
+from trunnion.errors import Status
+from trunnion.groups import GROUPS
+from trunnion.joints.friction import FRICTION_LAWS
+from trunnion.joints.pairs import PAIRS, Load
+
+loads = st.floats(0, 1e6)
+slips = st.floats(-1e3, 1e3).filter(lambda v: abs(v) > 1e-9)
+components = st.floats(-1e4, 1e4)
+
+
+def parameters(name: str) -> dict[str, Any]:
+    """A value for every parameter of a law, inside its range."""
+    found = {}
+    for key, declared in FRICTION_LAWS[name].parameters.items():
+        default = 0.3 if declared.default is None else declared.default
+        found[key] = min(max(default, declared.minimum), declared.maximum)
+    return found
+
+
+# ---- friction laws --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", FRICTION_LAWS)
+def test_law_states_where_it_comes_from(name: str) -> None:
+    law = FRICTION_LAWS[name]
+    assert law.source
+    assert law.validity
+    assert law.function.__doc__
+    for declared in law.parameters.values():
+        assert declared.meaning
+        assert declared.minimum < declared.maximum
+        if declared.default is not None:
+            assert declared.minimum <= declared.default <= declared.maximum
+
+
+@pytest.mark.parametrize("name", FRICTION_LAWS)
+@given(loads, slips)
+def test_law_is_odd_and_dissipative(name: str, normal: float, slip: float) -> None:
+    function, given_ = FRICTION_LAWS[name].function, parameters(name)
+    force = function(normal, slip, **given_)
+    assert function(normal, -slip, **given_) == -force
+    assert force * slip <= 0
+    assert np.isfinite(force)
+
+
+@pytest.mark.parametrize("name", FRICTION_LAWS)
+@given(slips)
+def test_law_is_zero_at_zero_load_and_grows_with_it(name: str, slip: float) -> None:
+    function, given_ = FRICTION_LAWS[name].function, parameters(name)
+    assert function(0.0, slip, **given_) == 0
+    sizes = np.abs([function(n, slip, **given_) for n in (1.0, 2.0, 50.0)])
+    assert np.all(np.diff(sizes) >= 0)
+
+
+@pytest.mark.parametrize("name", FRICTION_LAWS)
+def test_law_without_slip(name: str) -> None:
+    """The middle of the interval: 0."""
+    assert FRICTION_LAWS[name].function(5.0, 0.0, **parameters(name)) == 0
+
+
+@pytest.mark.parametrize("name", FRICTION_LAWS)
+def test_law_takes_arrays_and_duals(name: str) -> None:
+    """(sample, position) broadcasting, and the derivative by load and every parameter against differences."""
+    function, given_ = FRICTION_LAWS[name].function, parameters(name)
+    normal, slip = np.linspace(1, 9, 5), np.array([-2.0, -0.1, 0.1, 0.7, 3.0])
+    force = function(normal[:, None], slip, **given_)
+    assert np.shape(force) == (5, 5)
+    for i in range(5):
+        for k in range(5):
+            assert force[i, k] == pytest.approx(function(float(normal[i]), float(slip[k]), **given_))
+    h = 1e-5
+    by_load = derivative(function(Dual(normal, 1.0), slip, **given_))
+    expected = (function(normal + h, slip, **given_) - function(normal - h, slip, **given_)) / (2 * h)
+    np.testing.assert_allclose(by_load, expected, rtol=1e-7, atol=1e-9)
+    for key, value in given_.items():
+        found = function(normal, slip, **{**given_, key: Dual(value, 1.0)})
+        ends = [function(normal, slip, **{**given_, key: value + sign * h}) for sign in (1, -1)]
+        np.testing.assert_allclose(primal(found), function(normal, slip, **given_))
+        np.testing.assert_allclose(derivative(found), (ends[0] - ends[1]) / (2 * h), rtol=1e-7, atol=1e-9)
+
+
+# ---- pairs and their loads ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", PAIRS)
+def test_pair(name: str) -> None:
+    pair = PAIRS[name]
+    assert pair.name == name
+    assert len(pair.symbol) == 1
+    assert set(pair.freedoms) <= {"rotation", "slide"}
+    assert len(pair.freedoms) == 1
+    assert KIND[pair.symbol] == name
+
+
+def load_of(turn: float | None) -> Load:
+    return Load() if turn is None else Load((-np.sin(turn), np.cos(turn)), 0.37)
+
+
+@given(st.one_of(st.none(), st.floats(-3, 3)), components, components, components, st.floats(0.01, 50))
+def test_normal_load(turn: float | None, x: float, y: float, m: float, factor: float) -> None:
+    """N ≥ 0, the same for the opposite reaction, and proportional to it."""
+    load = load_of(turn)
+    normal = float(load.normal((x, y, m)))
+    assert normal >= 0
+    assert float(load.normal((-x, -y, -m))) == pytest.approx(normal)
+    scaled = float(load.normal((factor * x, factor * y, factor * m)))
+    assert scaled == pytest.approx(factor * normal, rel=1e-9, abs=1e-9)
+    if turn is None:
+        assert normal == pytest.approx(np.hypot(x, y))
+    else:  # the same as |F| where the force lies between the ends, as the couple 2|M|/L where it does not
+        across = -np.sin(turn) * x + np.cos(turn) * y
+        assert normal == pytest.approx(max(abs(across), 2 * abs(m) / 0.37), rel=1e-9, abs=1e-9)
+
+
+@given(st.one_of(st.none(), st.floats(-3, 3)), st.lists(components, min_size=6, max_size=6))
+def test_bound_of_the_normal_load(turn: float | None, numbers: list[float]) -> None:
+    """|N(R + δ) − N(R)| ≤ bound(δ): the certificate for a unique solution rests on it."""
+    load, one, change = load_of(turn), np.array(numbers[:3]), np.array(numbers[3:])
+    difference = float(load.normal(tuple(one + change))) - float(load.normal(tuple(one)))
+    assert abs(difference) <= float(load.bound(tuple(change))) * (1 + 1e-12) + 1e-9
+
+
+@given(st.one_of(st.none(), st.floats(-3, 3)), components, components, components)
+def test_gradient_of_the_normal_load(turn: float | None, x: float, y: float, m: float) -> None:
+    """Against the dual part of N, wherever N has one."""
+    load = load_of(turn)
+    normal = load.normal((x, y, m))
+    if turn is None and normal < 1e-3:
+        return
+    if turn is not None and min(abs(float(end)) for end in load._ends((x, y, m))) < 1e-6:
+        return
+    gradient = load.gradient((x, y, m), normal)
+    for k in range(3):
+        parts = [Dual(value, 1.0 if i == k else 0.0) for i, value in enumerate((x, y, m))]
+        expected = derivative(load.normal(tuple(parts)))
+        assert float(gradient[k]) == pytest.approx(float(expected), rel=1e-9, abs=1e-9)
+
+
+def test_gradient_without_load_is_zero() -> None:
+    assert [float(g) for g in Load().gradient((0.0, 0.0, 0.0), 0.0)] == [0.0, 0.0, 0.0]
+
+
+# ---- groups and statuses --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", GROUPS)
+def test_group_answers_the_four_questions(kind: str) -> None:
+    """Equality with the general group, power and mirror are tested over the same table in invariants/test_groups."""
+    for question in ("position", "velocity", "acceleration", "reactions", "closure", "condition"):
+        assert callable(getattr(GROUPS[kind], question))
+    assert set(kind) <= {pair.symbol for pair in PAIRS.values()}
+
+
+def test_statuses_are_sentences_in_order() -> None:
+    assert [int(status) for status in Status] == list(range(len(Status)))
+    for status in Status:
+        assert status.text
+        assert status.solved == (status < Status.NOT_CONVERGED)
+
+
+def test_dual_functions_mirror_numpy() -> None:
+    """Whatever a kernel may call on duals exists in NumPy under the same name and agrees on real numbers."""
+    x = np.array([0.2, 0.5, 0.7])
+    for name, function in vars(functions).items():
+        twin = getattr(np, name)
+        if name == "where":
+            arguments: tuple[Any, ...] = (x > 0.4, x, -x)
+        elif name in ("arctan2", "hypot", "minimum", "maximum"):
+            arguments = (x, x[::-1].copy())
+        elif name == "full_like":
+            arguments = (x, 3.0)
+        else:
+            arguments = (x,)
+        np.testing.assert_array_equal(function(*arguments), twin(*arguments), err_msg=name)
+        lifted = tuple(Dual(a, 1.0) if np.ndim(a) and a.dtype == float else a for a in arguments)
+        np.testing.assert_allclose(primal(function(*lifted)), twin(*arguments), rtol=1e-15, err_msg=name)

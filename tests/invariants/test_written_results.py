@@ -1,0 +1,252 @@
+"""Results as files: names, every bit of the numbers, whole or not at all."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import trunnion
+from mechanisms import DURANGO, MODELS, analyse, four_bar
+from trunnion import MechanismError, Status
+from trunnion.export import FORMATS
+
+export = sys.modules["trunnion.export"]
+
+
+@pytest.fixture(scope="module")
+def result() -> Any:
+    return trunnion.analyse(trunnion.read(DURANGO), 20)
+
+
+@pytest.fixture(scope="module")
+def sliding() -> Any:
+    return analyse(MODELS["slider-crank"](), 15)
+
+
+@pytest.fixture(scope="module")
+def gap() -> Any:
+    return analyse(four_bar(0.8, 0.65, 0.5, 1.0), 24)
+
+
+def table(path: Path) -> tuple[list[str], list[list[str]]]:
+    with path.open(encoding="utf-8", newline="") as file:
+        header, *rows = csv.reader(file)
+    return header, rows
+
+
+def test_csv_columns(result: Any, tmp_path: Path) -> None:
+    """As the design names them: time, joints, driver, points, powers, status."""
+    trunnion.save(result, tmp_path / "r.csv")
+    header, rows = table(tmp_path / "r.csv")
+    wanted = ["time", "A.effort", "power_in", "power_useful", "status", "coupler.E.x", "coupler.E.y", "ground.D.x"]
+    for joint in "ABCD":
+        wanted += [
+            f"{joint}.{n}" for n in ("rotation", "reaction_x", "reaction_y", "friction_torque", "friction_power")
+        ]
+    assert set(wanted) <= set(header)
+    assert len(header) == len(set(header))
+    assert header[0] == "time"
+    assert header[-1] == "status"
+    assert len(rows) == 20
+    assert {row[-1] for row in rows} <= {status.name.lower() for status in Status}
+
+
+def test_csv_columns_of_a_slide(sliding: Any, tmp_path: Path) -> None:
+    trunnion.save(sliding, tmp_path / "r.csv")
+    header, _ = table(tmp_path / "r.csv")
+    assert {"C.slide", "C.slide_velocity", "C.reaction_moment", "C.friction_force", "C.friction_power"} <= set(header)
+    assert "C.friction_torque" not in header
+    assert "A.slide" not in header
+
+
+@pytest.mark.parametrize("units_row", [False, True])
+def test_csv_holds_every_bit(result: Any, tmp_path: Path, units_row: bool) -> None:
+    trunnion.save(result, tmp_path / "r.csv", units_row=units_row)
+    header, rows = table(tmp_path / "r.csv")
+    if units_row:
+        units = dict(zip(header, rows.pop(0), strict=True))
+        assert units["time"] == "s"
+        assert units["A.effort"] == "N m"
+        assert units["A.rotation"] == "rad"
+        assert units["B.reaction_x"] == "N"
+        assert units["coupler.E.x"] == "m"
+        assert units["power_in"] == "W"
+        assert units["status"] == ""
+    column = dict(zip(header, zip(*rows, strict=True), strict=True))
+
+    def numbers(name: str) -> Any:
+        return np.array([float(text) for text in column[name]])
+
+    np.testing.assert_array_equal(numbers("time"), result["time"])
+    np.testing.assert_array_equal(numbers("A.effort"), result["drive_effort"].sel(driver="A"))
+    np.testing.assert_array_equal(numbers("C.rotation"), result["joint_rotation"].sel(joint="C"))
+    np.testing.assert_array_equal(numbers("D.reaction_y"), result["reaction_force"].sel(joint="D", axis="y"))
+    np.testing.assert_array_equal(numbers("B.friction_torque"), result["friction_torque"].sel(joint="B"))
+    point = result["point_position"].sel(point="coupler.E")
+    np.testing.assert_array_equal(numbers("coupler.E.y"), point.sel(axis="y"))
+    np.testing.assert_array_equal(numbers("power_in"), result["drive_power"].sum("driver"))
+    np.testing.assert_array_equal(numbers("power_useful"), result["useful_power"])
+
+
+def test_drive_unit_of_a_ram(tmp_path: Path) -> None:
+    ram = analyse(MODELS["elliptic bar"](), 3)
+    trunnion.save(ram, tmp_path / "r.csv", units_row=True)
+    header, rows = table(tmp_path / "r.csv")
+    assert dict(zip(header, rows[0], strict=True))["X.effort"] == "N"
+
+
+def test_csv_in_chunks_is_one_table(result: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    trunnion.save(result, tmp_path / "whole.csv", units_row=True)
+    monkeypatch.setattr(export, "ROWS", 7)
+    trunnion.save(result, tmp_path / "parts.csv", units_row=True)
+    assert (tmp_path / "whole.csv").read_bytes() == (tmp_path / "parts.csv").read_bytes()
+
+
+def test_csv_with_positions_without_an_answer(gap: Any, tmp_path: Path) -> None:
+    trunnion.save(gap, tmp_path / "r.csv")
+    header, rows = table(tmp_path / "r.csv")
+    effort, status = header.index("A.effort"), header.index("status")
+    missing = [row[effort] in ("", "nan") for row in rows]
+    assert missing == [row[status] == "not_assembled" for row in rows]
+    assert any(missing)
+    assert not all(missing)
+
+
+@pytest.mark.parametrize("suffix", [".nc", ".zarr"])
+def test_reopened_is_the_same_dataset(result: Any, gap: Any, tmp_path: Path, suffix: str) -> None:
+    if suffix == ".zarr" and not _installed("zarr"):
+        with pytest.raises(MechanismError):
+            trunnion.save(result, tmp_path / "r.zarr")
+        return
+    for number, one in enumerate((result, gap)):
+        path = tmp_path / f"{number}{suffix}"
+        trunnion.save(one, path)
+        again = xr.open_zarr(path) if suffix == ".zarr" else xr.open_dataset(path)
+        with again:
+            assert set(again.data_vars) == set(one.data_vars)
+            for name in one.data_vars:
+                assert again[name].dims == one[name].dims
+                np.testing.assert_array_equal(np.asarray(again[name], float), np.asarray(one[name], float))
+                assert again[name].attrs["long_name"] == one[name].attrs["long_name"]
+                assert again[name].attrs["units"] == one[name].attrs["units"]
+            assert list(again["joint"].values) == list(one["joint"].values)
+            assert again.attrs["formula"] == one.attrs["formula"]
+            assert json.loads(again.attrs["findings"]) == json.loads(one.attrs["findings"])
+
+
+def _installed(package: str) -> bool:
+    from importlib.util import find_spec
+
+    return find_spec(package) is not None
+
+
+def test_json_is_strict_json(gap: Any, tmp_path: Path) -> None:
+    """No NaN or Infinity, which JSON does not have; null in their place; numbers to the last bit."""
+
+    def refuse(word: str) -> None:
+        raise AssertionError(word)
+
+    trunnion.save(gap, tmp_path / "r.json")
+    data = json.loads((tmp_path / "r.json").read_text("utf-8"), parse_constant=refuse)
+    found = np.array(data["data_vars"]["drive_effort"]["data"][0], float)
+    np.testing.assert_array_equal(found, gap["drive_effort"].values[0])
+    assert data["data_vars"]["efficiency"]["data"] is None
+    assert data["coords"]["joint"]["data"] == ["A", "B", "C", "D"]
+
+
+def test_every_number_has_a_unit(result: Any) -> None:
+    for name in result.data_vars:
+        assert result[name].attrs["units"]
+        assert result[name].attrs["long_name"]
+    for attribute in ("model_hash", "trunnion_version", "references", "formula", "method"):
+        assert result.attrs[attribute]
+    assert "Durango" in result.attrs["references"]
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_a_failing_writer_leaves_nothing(
+    result: Any, tmp_path: Path, suffix: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whatever was there stays; no half file, no temporary file."""
+    path = tmp_path / f"r{suffix}"
+    if suffix != ".zarr":
+        path.write_text("before")
+
+    def breaks(result: Any, path: Path, units_row: bool) -> None:
+        if path.exists():
+            path.write_text("half")
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setitem(FORMATS, suffix, (breaks, "", ""))
+    with pytest.raises(MechanismError) as error:
+        trunnion.save(result, path)
+    assert "No space left" in str(error.value)
+    if suffix == ".zarr":
+        assert list(tmp_path.iterdir()) == []
+    else:
+        assert path.read_text() == "before"
+        assert list(tmp_path.iterdir()) == [path]
+
+
+def test_interrupted_while_writing(result: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(result: Any, path: Path, units_row: bool) -> None:
+        path.write_text("half")
+        raise KeyboardInterrupt
+
+    monkeypatch.setitem(FORMATS, ".csv", (interrupted, "", ""))
+    with pytest.raises(KeyboardInterrupt):
+        trunnion.save(result, tmp_path / "r.csv")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", ["r.xlsx", "r", "r.csv.gz", ".csv"])
+def test_unknown_extension(result: Any, tmp_path: Path, name: str) -> None:
+    with pytest.raises(MechanismError) as error:
+        trunnion.save(result, tmp_path / name)
+    assert ".csv" in str(error.value)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_missing_folder(result: Any, tmp_path: Path) -> None:
+    with pytest.raises(MechanismError) as error:
+        trunnion.save(result, tmp_path / "nowhere" / "r.csv")
+    assert "folder" in str(error.value)
+
+
+def test_a_folder_is_no_file(result: Any, tmp_path: Path) -> None:
+    (tmp_path / "r.csv").mkdir()
+    with pytest.raises(MechanismError):
+        trunnion.save(result, tmp_path / "r.csv")
+    assert list((tmp_path / "r.csv").iterdir()) == []
+
+
+def test_extension_in_capitals(result: Any, tmp_path: Path) -> None:
+    trunnion.save(result, tmp_path / "R.CSV")
+    assert (tmp_path / "R.CSV").stat().st_size > 1000
+
+
+def test_names_with_commas_and_quotes(tmp_path: Path) -> None:
+    data = four_bar()
+    name = 'crank, "big"'
+    data["links"][name] = data["links"].pop("crank")
+    for joint in data["joints"].values():
+        joint["links"] = [name if link == "crank" else link for link in joint["links"]]
+    trunnion.save(analyse(data, 3), tmp_path / "r.csv")
+    header, rows = table(tmp_path / "r.csv")
+    assert f"{name}.B.x" in header
+    assert all(len(row) == len(header) for row in rows)
+
+
+def test_infinite_numbers_do_not_reach_json(result: Any, tmp_path: Path) -> None:
+    odd = result.copy(deep=True)
+    odd["drive_effort"].values[0, 0] = math.inf
+    trunnion.save(odd, tmp_path / "r.json")
+    assert "Infinity" not in (tmp_path / "r.json").read_text("utf-8")

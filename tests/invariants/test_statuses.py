@@ -278,6 +278,16 @@ def test_two_drivers_of_different_speed_make_one_cycle() -> None:
     np.testing.assert_allclose(right, 4.0, rtol=1e-12)  # named second to the ground: −(−4)
 
 
+def test_many_turns_in_one_range() -> None:
+    """A linkage that assembles over a turn assembles over 500, at the positions it has in one."""
+    one, many = MODELS["class III"](), MODELS["class III"]()
+    many["drivers"]["A"] = {"speed": 5.0, "range": [0.0, 1000 * np.pi]}
+    result = analyse(many, 501)
+    assert np.all(result["status"] < Status.NOT_CONVERGED)
+    start = analyse(one, 4)["drive_effort"].values[0, 0]
+    np.testing.assert_allclose(result["drive_effort"].values[0], start, rtol=1e-6)
+
+
 def test_range_includes_both_ends() -> None:
     data = four_bar()
     data["drivers"]["A"] = {"speed": -2.0, "range": [1.0, -0.5]}

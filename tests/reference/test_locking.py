@@ -93,7 +93,7 @@ def test_successive_approximation_never_calls_a_locked_position_solved() -> None
 # ---- homotopy on the oracle -----------------------------------------------------------------------------------
 
 STEPS = oracle.STEPS
-GRID = 200  # steps of the share from 0 to 1
+GRID = 120  # steps of the share from 0 to 1
 
 
 def affine(run: Any, data: Data) -> tuple[list[str], Array, Array]:

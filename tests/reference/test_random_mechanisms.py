@@ -18,7 +18,7 @@ from mechanisms import KIND, Data, transformed
 from reference import newton_euler
 from trunnion import FrictionMethod, Mechanism, Status
 
-SEEDS = range(20)
+SEEDS = range(16)
 GROWN = ("R", "P", "RRR", "RRP", "PRR", "RPR", "PRP", "RPP", "PPR", "R[P]RR", "RR[R]R", "triad", "triad with slides")
 
 

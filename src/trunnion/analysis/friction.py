@@ -294,6 +294,7 @@ def _successive(problem: _Problem, method: FrictionMethod) -> Settled:
         done = ~(change > method.tolerance(state.normals))
         if np.all(done):
             break
+    done = change <= method.tolerance(state.normals)  # not so where it ran off to infinity
     measurable = np.isfinite(previous) & (previous > 0)
     ratio = np.where(measurable, change / np.where(measurable, previous, 1.0), 0.0)
     return Settled(problem.reactions(forces, state), forces, rounds, change, ratio, done, 1.0)

@@ -70,7 +70,6 @@ def check(mechanism: Mechanism, steps: int = 360) -> Check:
 def _rank(walk: Forward) -> int | None:
     """Mobility by rank at the first assembled position."""
     system = walk.system
-    size = float(np.max(system.size(walk.values)))
     places = {}
     for name, (_, (_, second)) in system.joints.items():
         places[name] = np.broadcast_arrays(*(np.atleast_1d(primal(n)) for n in walk.element(second, name)))
@@ -84,4 +83,4 @@ def _rank(walk: Forward) -> int | None:
         name: (float(p[0, first]), float(p[1, first]), float(p[2, first]), float(p[3, first]))
         for name, p in table.items()
     }
-    return mobility_by_rank(list(system.mechanism.links), system.mechanism.fixed_link, system.joints, at, size)
+    return mobility_by_rank(list(system.mechanism.links), system.mechanism.fixed_link, system.joints, at)

@@ -125,9 +125,9 @@ class General:
             )
             depth = max((_depth(n) for pair in elements for frame in pair for n in frame), default=0)
             depth = max([depth, *(_depth(value) for value in drive)])
+            q = self.coordinates(elements, [q[i] for i in self.free], drive)
             for _ in range(depth):
                 q = self._step(elements, q, drive)
-            q = self.coordinates(elements, [q[i] for i in self.free], drive)
             frames, placed = self._place(elements, q)
             jacobian = self._jacobian(placed)
             inverse = linalg.inverse(jacobian) if jacobian else []
@@ -158,7 +158,7 @@ class General:
         return [np.where(closed, value, np.nan) for value in q]
 
     def _iterate(
-        self, elements: Elements, q: list[Number], drive: Sequence[Number], scale: Sequence[float], rounds: int
+        self, elements: Elements, q: list[Number], drive: Sequence[Number], scale: Sequence[Number], rounds: int
     ) -> tuple[list[Number], Number]:
         """Newton steps until no lane moves by more than NEARLY (of its scale), at most `rounds`."""
         last: Number = np.inf
@@ -172,7 +172,7 @@ class General:
         return q, last
 
     def _finish_late(
-        self, elements: Elements, q: list[Number], drive: Sequence[Number], scale: Sequence[float], late: Number
+        self, elements: Elements, q: list[Number], drive: Sequence[Number], scale: Sequence[Number], late: Number
     ) -> tuple[list[Number], Number]:
         """Go on with the lanes that are still open, and with those alone: they are few or beyond help."""
         shape = late.shape
@@ -181,7 +181,9 @@ class General:
             return np.broadcast_to(number, shape)[late]
 
         some = [(Frame(*(part(n) for n in a)), Frame(*(part(n) for n in b))) for a, b in elements]
-        found, last = self._iterate(some, [part(v) for v in q], [part(v) for v in drive], scale, NEWTON_LIMIT)
+        found, last = self._iterate(
+            some, [part(v) for v in q], [part(v) for v in drive], [part(s) for s in scale], NEWTON_LIMIT
+        )
         moved_by = np.zeros(shape)
         moved_by[late] = last
         merged = []
@@ -192,7 +194,7 @@ class General:
         return merged, moved_by
 
     def _step(
-        self, elements: Elements, q: Sequence[Number], drive: Sequence[Number], limits: Sequence[float] | None = None
+        self, elements: Elements, q: Sequence[Number], drive: Sequence[Number], limits: Sequence[Number] | None = None
     ) -> list[Number]:
         """One Newton step, shortened as a whole where an entry would exceed its limit."""
         _, placed = self._place(elements, q)
@@ -263,7 +265,7 @@ class General:
         return matrix
 
     def _condition(
-        self, jacobian: Sequence[Sequence[Number]], inverse: Sequence[Sequence[Number]], size: float
+        self, jacobian: Sequence[Sequence[Number]], inverse: Sequence[Sequence[Number]], size: Number
     ) -> Number:
         """‖S J‖·‖(S J)⁻¹‖ (Frobenius) with lengths measured in `size`."""
         if not jacobian:
@@ -484,15 +486,14 @@ def _real(frame: Frame) -> Frame:
     return Frame(*(primal(n) for n in frame))
 
 
-def _size(group: General, elements: Elements) -> float:
-    """A length typical of the group, m: the widest spread of joint elements on one link (or on all known links)."""
-    places: dict[int, list[tuple[np.ndarray, np.ndarray]]] = {}
+def _size(group: General, elements: Elements) -> Number:
+    """A length typical of each lane, m: the widest spread of joint elements on one link (or on all known links)."""
+    places: dict[int, list[tuple[Number, Number]]] = {}
     for joint, pair in zip(group.joints, elements, strict=True):
         for link, frame in zip(joint.sides, pair, strict=True):
-            places.setdefault(link, []).append((np.asarray(primal(frame.x)), np.asarray(primal(frame.y))))
-    spans = [
-        float(np.nanmax(np.hypot(x - x0, y - y0), initial=0.0))
-        for (x0, y0), *others in places.values()
-        for x, y in others
-    ]
-    return max(spans, default=0.0) or 1.0
+            places.setdefault(link, []).append((primal(frame.x), primal(frame.y)))
+    size: Number = 0.0
+    for (x0, y0), *others in places.values():
+        for x, y in others:
+            size = np.fmax(size, np.hypot(x - x0, y - y0))
+    return np.where(size > 0, size, 1.0)

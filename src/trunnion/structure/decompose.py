@@ -12,14 +12,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import networkx as nx
+import numpy as np
+from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.mechanism import Mechanism
+from trunnion.structure.mobility import RANK_TOLERANCE, constraints, rank
 
 __all__ = ["Module", "Plan", "decompose", "mobility_by_formula"]
 
 PLANAR_FREEDOMS = 3
+SEED = 1916  # of the generic dimensions
 CLOSED_FORMS = ("RRR", "RRP", "RPR", "PRP", "RPP")  # outer, inner, outer joint; those of `groups.GROUPS`
 ROMAN = {1: "I", 2: "II", 3: "III", 4: "IV", 5: "V", 6: "VI", 7: "VII", 8: "VIII", 9: "IX", 10: "X"}
 
@@ -69,10 +73,10 @@ def decompose(mechanism: Mechanism) -> Plan:
     ground = mechanism.fixed_link
     mobility = mobility_by_formula(mechanism)
     bodies = [link for link in mechanism.links if link != ground]
-    determines = _match(mechanism, bodies, ground)
-    findings = _undetermined(mechanism, mobility, bodies, determines)
+    findings = _undetermined(mechanism, mobility, bodies)
     if findings:
         raise MechanismError(findings)
+    determines = _match(mechanism, bodies, ground)
     dependence = nx.DiGraph()
     dependence.add_nodes_from(bodies)
     for constraint, body in determines.items():
@@ -117,16 +121,9 @@ def _match(mechanism: Mechanism, bodies: list[str], ground: str) -> dict[Constra
     return {c: matching[c][1] for c in constraints if c in matching}
 
 
-def _undetermined(
-    mechanism: Mechanism, mobility: int, bodies: list[str], determines: dict[Constraint, str]
-) -> list[Finding]:
+def _undetermined(mechanism: Mechanism, mobility: int, bodies: list[str]) -> list[Finding]:
     """What keeps the drivers from determining the motion exactly."""
     drivers = len(mechanism.drivers)
-    findings: list[Finding] = []
-    loose = sorted(
-        {body for body in bodies if sum(b == body for b in determines.values()) < PLANAR_FREEDOMS}, key=bodies.index
-    )
-    surplus = [c for c in _constraints(mechanism) if c not in determines]
     if mobility != drivers:
         has = "no driver" if drivers == 0 else "one driver" if drivers == 1 else f"{drivers} drivers"
         remedy = (
@@ -134,19 +131,32 @@ def _undetermined(
             if mobility > drivers
             else "remove a driver, or a joint or link that constrains twice"
         )
-        findings.append(
-            Finding(f"the mobility is {mobility} by Grübler's formula, but there is {has}", "drivers", remedy)
-        )
-    for name, number in surplus:
-        if number == PLANAR_FREEDOMS:
-            what = "cannot be driven: the relative motion of its links is already determined"
-            findings.append(Finding(what, f"drivers.{name}", "drive a joint of the part that is still free"))
-    if not findings and (surplus or loose):
-        joints = ", ".join(sorted({name for name, _ in surplus}))
-        links = ", ".join(loose)
-        what = f"one part is constrained twice (joints {joints}) while links {links} stay undetermined"
-        findings.append(Finding(what, "joints", "move a joint or driver from the rigid part to the free one"))
-    return findings
+        what = f"the mobility is {mobility} by Grübler's formula, but there is {has}"
+        return [Finding(what, "drivers", remedy)]
+    matrix, owners = _generic_constraints(mechanism)
+    if rank(matrix) == matrix.shape[1]:
+        return []
+    left, values, right = np.linalg.svd(matrix)
+    free = values <= RANK_TOLERANCE * max(values, default=0.0)
+    strained = np.abs(left[:, : len(values)][:, free]).max(axis=1) > RANK_TOLERANCE
+    loose = np.abs(right[: len(values)][free]).max(axis=0).reshape(-1, PLANAR_FREEDOMS).max(axis=1) > RANK_TOLERANCE
+    twice = list(dict.fromkeys(name for name, bad in zip(owners, strained, strict=True) if bad))
+    links = [body for body, bad in zip(bodies, loose, strict=True) if bad]
+    told = ", ".join(f"{name} (driven)" if name in mechanism.drivers else name for name in twice)
+    what = f"one part is constrained twice, by the joints {told}, while the links {', '.join(links)} stay undetermined"
+    return [Finding(what, "joints", "move a joint or a driver from the part that is held twice to the loose one")]
+
+
+def _generic_constraints(mechanism: Mechanism) -> tuple[NDArray[np.float64], list[str]]:
+    """Constraints of joints and drivers for dimensions without any special relation."""
+    rng = np.random.default_rng(SEED)
+    joints = {name: (joint.type, joint.links) for name, joint in mechanism.joints.items()}
+    angles = rng.uniform(0.0, 2 * np.pi, len(joints))
+    places = {
+        name: (*rng.uniform(-1.0, 1.0, 2), float(np.cos(angle)), float(np.sin(angle)))
+        for name, angle in zip(joints, angles, strict=True)
+    }
+    return constraints(list(mechanism.links), mechanism.fixed_link, joints, places, list(mechanism.drivers))
 
 
 def _module(mechanism: Mechanism, links: list[str], known: set[str]) -> Module:

@@ -1,4 +1,4 @@
-"""Mobility by rank: what the joints really leave free at one position."""
+"""Mobility by rank: what the joints really leave free."""
 
 from __future__ import annotations
 
@@ -7,43 +7,58 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["mobility_by_rank"]
+__all__ = ["Joints", "Places", "constraints", "mobility_by_rank", "rank"]
 
 RANK_TOLERANCE = 1e-9  # of the largest singular value
 
+Joints = Mapping[str, tuple[str, tuple[str, str]]]  # kind and links, by name
+Places = Mapping[str, tuple[float, float, float, float]]  # point and direction of the slide (x, y, c, s), by joint
 
-def mobility_by_rank(
-    links: Sequence[str],
-    ground: str,
-    joints: Mapping[str, tuple[str, tuple[str, str]]],
-    places: Mapping[str, tuple[float, float, float, float]],
-    size: float,
-) -> int:
-    """Freedoms of the links less the rank of the joints' constraints on their twists.
 
-    joints: kind and links by name; places: of each joint its point and the direction of its slide (x, y, c, s),
-    global, m; size: a length by which lengths are made comparable with angles, m.
-    It exceeds Grübler's count where constraints repeat each other, as in a parallelogram with a third crank.
+def constraints(
+    links: Sequence[str], ground: str, joints: Joints, places: Places, drivers: Sequence[str] = ()
+) -> tuple[NDArray[np.float64], list[str]]:
+    """Constraints on the twists of the links, one row each, and the joint that each row belongs to.
+
+    Columns: (v_x, v_y at the mean of the places, ω · length) of every link but the ground, lengths in units of the
+    spread of the places, so that the rows do not depend on where the mechanism stands nor on its size.
     """
     number = {link: i for i, link in enumerate(link for link in links if link != ground)}
+    points = np.array([places[name][:2] for name in joints]).reshape(-1, 2)
+    middle = points.mean(axis=0) if len(points) else np.zeros(2)
+    spread = float(np.max(np.abs(points - middle), initial=0.0)) or 1.0
     rows: list[NDArray[np.float64]] = []
-    for name, (kind, (first, second)) in joints.items():
-        x, y, c, s = _scaled(places[name], size)
-        # twist of a link as (v_x, v_y of its point at the origin, ω): velocity at (x, y) is v + ω (−y, x)
-        at_x, at_y, turn = np.array([1, 0, -y]), np.array([0, 1, x]), np.array([0.0, 0.0, 1.0])
-        constraints = [at_x, at_y] if kind == "revolute" else [c * at_y - s * at_x, turn]
-        for constraint in constraints:
+    owners: list[str] = []
+    for name, (kind, sides) in joints.items():
+        x, y = (np.asarray(places[name][:2]) - middle) / spread
+        c, s = places[name][2:]
+        at_x, at_y, turn = np.array([1.0, 0.0, -y]), np.array([0.0, 1.0, x]), np.array([0.0, 0.0, 1.0])
+        across, along = c * at_y - s * at_x, c * at_x + s * at_y
+        held = [at_x, at_y] if kind == "revolute" else [across, turn]
+        if name in drivers:
+            held.append(turn if kind == "revolute" else along)
+        for constraint in held:
             row = np.zeros(3 * len(number))
-            for link, sign in ((first, -1.0), (second, 1.0)):
+            for link, sign in zip(sides, (-1.0, 1.0), strict=True):
                 if link != ground:
                     row[3 * number[link] : 3 * number[link] + 3] += sign * constraint
             rows.append(row)
-    if not rows:
-        return 3 * len(number)
-    values = np.linalg.svd(np.array(rows), compute_uv=False)
-    return 3 * len(number) - int(np.sum(values > RANK_TOLERANCE * values[0]))
+            owners.append(name)
+    return np.array(rows).reshape(len(rows), 3 * len(number)), owners
 
 
-def _scaled(place: tuple[float, float, float, float], size: float) -> tuple[float, float, float, float]:
-    x, y, c, s = place
-    return x / size, y / size, c, s
+def rank(matrix: NDArray[np.float64]) -> int:
+    """Rank by singular values."""
+    if not matrix.size:
+        return 0
+    values = np.linalg.svd(matrix, compute_uv=False)
+    return int(np.sum(values > RANK_TOLERANCE * values[0]))
+
+
+def mobility_by_rank(links: Sequence[str], ground: str, joints: Joints, places: Places) -> int:
+    """Freedoms of the links less the rank of the joints' constraints at one position.
+
+    It exceeds Grübler's count where constraints repeat each other, as in a parallelogram with a third crank.
+    """
+    matrix, _ = constraints(links, ground, joints, places)
+    return matrix.shape[1] - rank(matrix)

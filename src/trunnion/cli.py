@@ -29,6 +29,8 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
+PLOT_KINDS = "torque, friction-power, reactions, polar, power, mechanism or motion"  # views.plots.PLOTS, not loaded yet
+
 File = Annotated[Path, typer.Argument(help="Model file: YAML, JSON or TOML.", show_default=False)]
 Steps = Annotated[int, typer.Option("--steps", help="Equally spaced positions over the turn or range.")]
 Set = Annotated[
@@ -111,7 +113,8 @@ def plot(
     file: File,
     out: Annotated[Path, typer.Option("--out", help="Folder, or a .png, .svg or .pdf file of one plot.")],
     kind: Annotated[
-        list[str] | None, typer.Option("--kind", help="Plot to draw; repeatable; all if not given.", show_default=False)
+        list[str] | None,
+        typer.Option("--kind", help=f"{PLOT_KINDS}. Repeatable; all if not given.", show_default=False),
     ] = None,
     steps: Steps = 360,
     set_: Set = None,
@@ -134,7 +137,7 @@ def plot(
     result = _run(mechanism, steps, None)
     ideal = _ideal(mechanism, steps, None)
     if not single:
-        out.mkdir(parents=True, exist_ok=True)
+        _folder(out)
     for name in kinds:
         path = out if single else out / f"{name}.{image.lstrip('.')}"
         save(PLOTS[name](result, ideal), path)
@@ -182,6 +185,7 @@ def examples(
         raise MechanismError(Finding(f"there is no example '{name}'", remedy=f"use one of {', '.join(found)}"))
     from trunnion.output import whole
 
+    _folder(to)
     target = to / source.name
     if target.exists() and not force:
         raise MechanismError(Finding("exists already", str(target), "use --force to overwrite it"))
@@ -205,6 +209,15 @@ def schema(
 
     with whole(out) as temporary:
         temporary.write_text(text, encoding="utf-8")
+
+
+def _folder(path: Path) -> None:
+    """Make a folder; MechanismError if it cannot be one."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        what = f"cannot be made a folder: {error.strerror or error}"
+        raise MechanismError(Finding(what, str(path), "name a folder, or a .png, .svg or .pdf file")) from None
 
 
 def _version(show: bool) -> None:

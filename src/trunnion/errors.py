@@ -71,7 +71,7 @@ class Status(IntEnum):
         return status
 
     SOLVED = 0, "solved"
-    ZERO_SLIP = 1, "a relative speed is zero: the friction of that joint is an interval"
+    ZERO_SLIP = 1, "a relative speed is zero: what resists that joint is an interval"
     NEAR_SINGULAR = 2, "close to a singular position: forces and speeds are very sensitive to the dimensions"
     NOT_CONVERGED = 3, "the friction iteration did not converge"
     LOCKED = 4, "locked by friction: no drive effort moves the mechanism"

@@ -55,6 +55,12 @@ def columns(result: xr.Dataset) -> list[Column]:
     ):
         name, _, values = _column(result, "drive_effort", f"{driver}.effort", (i,))
         found.append((name, unit, values))
+        for end in ("lower", "upper"):
+            _, _, values = _column(result, f"drive_effort_{end}", "", (i,))
+            found.append((f"{driver}.effort_{end}", unit, values))
+    for i, link in enumerate(result["link"].values):
+        for variable in ("link_angle", "link_angle_velocity", "link_angle_acceleration"):
+            found.append(_column(result, variable, f"{link}.{variable.removeprefix('link_')}", (i,)))
     for i, point in enumerate(result["point"].values):
         found += [_column(result, "point_position", f"{point}.{axis}", (i, k)) for k, axis in enumerate("xy")]
     drive = result["drive_power"].values

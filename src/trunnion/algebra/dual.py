@@ -42,12 +42,13 @@ class Dual:
         return functions
 
     def __getitem__(self, index: Any) -> Dual:
-        return Dual(_item(self.real, index), _item(self.dual, index))
+        lanes: Dual = _item(self, index, self.shape)
+        return lanes
 
     @property
     def shape(self) -> tuple[int, ...]:
         """Shape to which both parts broadcast."""
-        return np.broadcast_shapes(np.shape(primal(self.real)), np.shape(primal(self.dual)))
+        return np.broadcast_shapes(_shape(self.real), _shape(self.dual))
 
     def __neg__(self) -> Dual:
         return Dual(-self.real, -self.dual)
@@ -95,7 +96,12 @@ class Dual:
             return Dual.__rpow__(exponent, self)
         if exponent == 0:
             return Dual(self.real**0, self.dual * 0.0)
-        return Dual(self.real**exponent, exponent * self.real ** (exponent - 1) * self.dual)
+        base = self.real
+        if not float(exponent).is_integer():
+            base = _positive(base)
+        elif exponent < 0:
+            base = _nonzero(base)
+        return Dual(base**exponent, exponent * base ** (exponent - 1) * self.dual)
 
     def __rpow__(self, base: Any) -> Dual:
         power: Dual = _exp(self * _of(base).log(base))
@@ -137,6 +143,10 @@ def derivative(number: Any) -> Any:
     return number.dual if isinstance(number, Dual) else np.zeros_like(number)
 
 
+def _shape(number: Any) -> tuple[int, ...]:
+    return number.shape if isinstance(number, Dual) else np.shape(number)
+
+
 def _depth(number: Any) -> int:
     return number.depth if isinstance(number, Dual) else 0
 
@@ -150,8 +160,11 @@ def _of(number: Any) -> Any:
     return number.__array_namespace__()
 
 
-def _item(part: Any, index: Any) -> Any:
-    return part[index] if isinstance(part, Dual) or np.ndim(part) else part
+def _item(part: Any, index: Any, shape: tuple[int, ...]) -> Any:
+    """The same lanes of every part, whatever shape each has before broadcasting."""
+    if isinstance(part, Dual):
+        return Dual(_item(part.real, index, shape), _item(part.dual, index, shape))
+    return _of(part).broadcast_to(part, shape)[index]
 
 
 def _pair(x: Any, y: Any) -> tuple[Dual, Dual]:
@@ -250,11 +263,11 @@ def _other(x: Any, y: Any) -> Any:
 
 
 def _minimum(x: Any, y: Any) -> Any:
-    return _where(primal(x) <= primal(y), x, y)
+    return _where(~(primal(x) > primal(y)) & ~np.isnan(primal(y)), x, y)
 
 
 def _maximum(x: Any, y: Any) -> Any:
-    return _where(primal(x) >= primal(y), x, y)
+    return _where(~(primal(x) < primal(y)) & ~np.isnan(primal(y)), x, y)
 
 
 def _on_real(name: str) -> Callable[..., Any]:
@@ -271,8 +284,8 @@ functions: SimpleNamespace = SimpleNamespace(
     sin=_chain("sin", lambda xp, a: xp.cos(a)),
     cos=_chain("cos", lambda xp, a: -xp.sin(a)),
     tan=_chain("tan", lambda xp, a: 1 + xp.tan(a) ** 2),
-    arcsin=_chain("arcsin", lambda xp, a: 1 / functions.sqrt(1 - a * a)),
-    arccos=_chain("arccos", lambda xp, a: -1 / functions.sqrt(1 - a * a)),
+    arcsin=_chain("arcsin", lambda xp, a: 1 / functions.sqrt(_positive(1 - a * a))),
+    arccos=_chain("arccos", lambda xp, a: -1 / functions.sqrt(_positive(1 - a * a))),
     arctan=_chain("arctan", lambda xp, a: 1 / (1 + a * a)),
     sinh=_chain("sinh", lambda xp, a: xp.cosh(a)),
     cosh=_chain("cosh", lambda xp, a: xp.sinh(a)),

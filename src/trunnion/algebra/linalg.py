@@ -38,8 +38,7 @@ def solve(matrix: Sequence[Sequence[Number]], *sides: Sequence[Number]) -> list[
     columns = n + len(sides)
     rows = [[*row, *(side[i] for side in sides)] for i, row in enumerate(matrix)]
     xp = namespace(*(entry for row in rows for entry in row))
-    if xp is np:  # array scalars divide by zero quietly under errstate, plain floats raise
-        rows = [[np.asarray(entry, float) for entry in row] for row in rows]
+    rows = _quiet(rows)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         for k in range(n - 1):
             _pivot(rows, k, columns, xp)
@@ -57,6 +56,11 @@ def solve(matrix: Sequence[Sequence[Number]], *sides: Sequence[Number]) -> list[
                 x[i] = total / rows[i][i]
             solutions.append(x)
     return solutions
+
+
+def _quiet(rows: list[list[Number]]) -> list[list[Number]]:
+    """Plain Python numbers as NumPy ones: those divide by zero quietly under errstate, Python's raise."""
+    return [[np.float64(entry) if isinstance(entry, (int, float)) else entry for entry in row] for row in rows]
 
 
 def _pivot(rows: list[list[Number]], k: int, columns: int, xp: Number) -> Number:
@@ -89,8 +93,7 @@ def determinant(matrix: Sequence[Sequence[Number]]) -> Number:
     n = len(matrix)
     rows = [list(row) for row in matrix]
     xp = namespace(*(entry for row in rows for entry in row))
-    if xp is np:  # as in `solve`
-        rows = [[np.asarray(entry, float) for entry in row] for row in rows]
+    rows = _quiet(rows)
     product: Number = 1.0
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         for k in range(n):

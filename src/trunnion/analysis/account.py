@@ -19,7 +19,8 @@ from trunnion.errors import Finding, Severity, Status
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.model.check import check_model
 from trunnion.model.mechanism import Mechanism
-from trunnion.model.units import Dimension, si_unit
+from trunnion.model.quantity import Quantity
+from trunnion.model.units import KINDS, Dimension, si_unit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,6 +32,7 @@ __all__ = ["MARGIN", "fill_power", "finish"]
 MARGIN = 10.0  # multiple of the friction up to which the locking margin is looked for
 
 Arrays = Mapping[str, NDArray[np.float64]]
+ZERO_INERTIA = Quantity(0, KINDS["moment of inertia"])
 
 DURANGO = (
     "S. Durango, G. Calle, O. Ruiz, Analytical method for the kinetostatic analysis of the second-class RRR Assur "
@@ -148,6 +150,16 @@ def _model_notes(mechanism: Mechanism) -> list[Finding]:
         for name, joint in mechanism.effective_joints.items()
         if (joint.pin and (joint.pin.clearance or joint.pin.fit)) or (joint.guide and joint.guide.clearance)
     ]
+    bodies = {name: link for name, link in mechanism.links.items() if name != mechanism.fixed_link}
+    heavy = [name for name, link in bodies.items() if link.mass.source != 0]
+    if heavy and mechanism.gravity is None:
+        what = f"gravity is not stated and taken as none, though {', '.join(heavy)} have mass"
+        notes.append(Finding(what, "gravity", "state gravity: [0, -9.81], or [0, 0] to say so", Severity.NOTE))
+    sliding = {link for joint in mechanism.joints.values() if joint.type == "prismatic" for link in joint.links}
+    points = [name for name in heavy if bodies[name].inertia == ZERO_INERTIA and name not in sliding]
+    if points:
+        what = f"{', '.join(points)} have a mass but no inertia: they are taken as point masses at their centres"
+        notes.append(Finding(what, "links", "state inertia: …", Severity.NOTE))
     if playing:
         what = f"clearance and fit of {', '.join(playing)} are not in this analysis: the joints have no play"
         notes.append(Finding(what, "joints", severity=Severity.NOTE))
@@ -160,7 +172,13 @@ def _over_the_cycle(run: Run, arrays: Arrays, causes: diagnosis.Causes, time: ND
         name: (arrays["drive_effort_lower"][i], arrays["drive_effort_upper"][i], units[i])
         for i, name in enumerate(run.system.mechanism.drivers)
     }
-    return diagnosis.findings(causes, _dial(run, time), arrays["status"], arrays["condition"], efforts)
+    found = diagnosis.findings(causes, _dial(run, time), arrays["status"], arrays["condition"], efforts)
+    drivers = run.system.mechanism.drivers
+    if len(drivers) > 1 and not run.cycle.periodic and all(driver.range is None for driver in drivers.values()):
+        what = f"the drivers do not come back together; the cycle is the slowest one's turn, {run.cycle.duration:g} s"
+        remedy = "means and efficiency are of that time; choose speeds with a common period, or ranges"
+        found.append(Finding(what, "drivers", remedy, Severity.WARNING))
+    return found
 
 
 def _dial(run: Run, time: NDArray[np.float64]) -> diagnosis.Dial:
@@ -184,12 +202,14 @@ def _summary(run: Run, arrays: Arrays, value: float, time: NDArray[np.float64]) 
     """The figures one looks at first."""
     rows: list[dict[str, Any]] = []
     dial = _dial(run, time)
+    # extremes are of positions that can be relied on: beside a dead centre they depend on the sampling
+    sound = _sound(arrays["status"])
     with np.errstate(all="ignore"):
         for i, (name, unit) in enumerate(zip(run.system.mechanism.drivers, effort_units(run.system), strict=True)):
             effort = arrays["drive_effort"][i]
             kind = "torque" if unit == "N m" else "force"
-            if np.any(np.isfinite(effort)):
-                low, high = int(np.nanargmin(effort)), int(np.nanargmax(effort))
+            if len(sound):
+                low, high = (int(sound[pick(effort[sound])]) for pick in (np.argmin, np.argmax))
                 rows += [
                     {"label": f"drive {kind} of {name}, least, at {dial.at(low)}", "value": effort[low], "unit": unit},
                     {
@@ -197,14 +217,16 @@ def _summary(run: Run, arrays: Arrays, value: float, time: NDArray[np.float64]) 
                         "value": effort[high],
                         "unit": unit,
                     },
-                    {"label": f"drive {kind} of {name}, RMS", "value": np.sqrt(np.nanmean(effort**2)), "unit": unit},
                 ]
+            rms = np.sqrt(mean(effort**2, run.cycle))
+            rows.append({"label": f"drive {kind} of {name}, RMS", "value": rms, "unit": unit})
+        rows += _reaction_rows(run.system, arrays, dial, sound)
         lost = np.sum(arrays["friction_power"], axis=0)
         if rubbing(run.system):
             rows.append(_margin(arrays["locking_margin"], dial))
             rows.append({"label": "friction power, mean", "value": mean(lost, run.cycle), "unit": "W"})
-            if np.any(np.isfinite(lost)):
-                top = int(np.nanargmax(lost))
+            if len(sound):
+                top = int(sound[np.argmax(lost[sound])])
                 rows.append({"label": f"friction power, largest, at {dial.at(top)}", "value": lost[top], "unit": "W"})
         rows.append({"label": f"efficiency of the cycle{_why(value, arrays)}", "value": value, "unit": "1"})
         rows.append({"label": "power residual, largest, of peak drive power", "value": balance(arrays), "unit": "1"})
@@ -214,6 +236,29 @@ def _summary(run: Run, arrays: Arrays, value: float, time: NDArray[np.float64]) 
     )
     rows.append({"label": f"positions solved, of {len(time)}", "value": solved, "unit": "1"})
     return [{**row, "value": None if not np.isfinite(row["value"]) else float(row["value"])} for row in rows]
+
+
+def _sound(status: NDArray[Any]) -> NDArray[np.intp]:
+    """Positions whose figures can be relied on: solved; those with a zero speed only if there are no others."""
+    best = np.flatnonzero(status == Status.SOLVED)
+    return best if len(best) else np.flatnonzero(status == Status.ZERO_SLIP)
+
+
+def _reaction_rows(
+    system: System, arrays: Arrays, dial: diagnosis.Dial, sound: NDArray[np.intp]
+) -> list[dict[str, Any]]:
+    """Largest reaction of every joint; stroke of every slide."""
+    rows: list[dict[str, Any]] = []
+    for i, (name, (kind, _)) in enumerate(system.joints.items()):
+        if len(sound):
+            size = np.hypot(*arrays["reaction_force"][i])
+            top = int(sound[np.argmax(size[sound])])
+            rows.append({"label": f"reaction of {name}, largest, at {dial.at(top)}", "value": size[top], "unit": "N"})
+        slide = arrays["joint_slide"][i]
+        if kind == "prismatic" and np.any(np.isfinite(slide)):
+            stroke = np.nanmax(slide) - np.nanmin(slide)
+            rows.append({"label": f"stroke of {name}", "value": stroke, "unit": "m"})
+    return rows
 
 
 def _margin(margin: NDArray[np.float64], dial: diagnosis.Dial) -> dict[str, Any]:

@@ -29,7 +29,7 @@ __all__ = ["Run", "analyse", "prepare"]
 CHUNK = 8192  # positions at a time: the arrays of a walk stay in cache
 MOST_STEPS = 100_000_000
 SINGULAR = 1e6  # condition from which less than about four digits would be left
-NEAR_SINGULAR = 1e4
+NEAR_SINGULAR = 200.0  # a transmission angle of half a degree
 
 
 @dataclass(frozen=True)

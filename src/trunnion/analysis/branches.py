@@ -7,6 +7,7 @@ starts Newton from the track, all lanes in parallel, and a lane that ends on ano
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -19,7 +20,7 @@ from trunnion.algebra.namespace import Number
 from trunnion.analysis.kinematics import Forward, pairs_of, pose_of, start, take
 from trunnion.analysis.system import System, Values, driven_coordinates
 from trunnion.errors import Finding, Severity
-from trunnion.groups.general import General, Pose
+from trunnion.groups.general import General, Pose, size_of
 from trunnion.groups.planar import Frame, compose, point
 from trunnion.structure.decompose import Module
 
@@ -28,7 +29,8 @@ __all__ = ["Chosen", "Track", "choose"]
 Array = NDArray[np.float64]
 Pick = Callable[[Number], Any]
 
-GRID = 720  # intervals of the nominal cycle along which general groups are followed
+GRID = 720  # intervals of one turn of the fastest driver, along which general groups are followed
+MOST_INTERVALS = 720_000
 GUESSES = 512
 SEED = 20060704  # of the guesses: the same assemblies every time
 TURN_JUMP = 0.35  # rad between neighbours of the grid: more is another branch
@@ -93,7 +95,8 @@ class Chosen:
 def choose(system: System, values: Values) -> Chosen:
     """The assembly of every module that lies nearest the hints, at the nominal values and the start of the cycle."""
     cycle = system.cycle(values)
-    times = np.linspace(0.0, cycle.duration, GRID + 1 if cycle.duration > 0 else 1)
+    intervals = min(GRID * max(1, math.ceil(cycle.turns)), MOST_INTERVALS) if cycle.duration > 0 else 0
+    times = np.linspace(0.0, cycle.duration, intervals + 1)
     walk = start(system, values)
     chosen: list[Any] = []
     counts: list[int] = []
@@ -295,7 +298,7 @@ def _gap_backward(rows: Array) -> list[int]:
 def _assemblies(group: General, elements: Sequence[tuple[Frame, Frame]], drive: Sequence[Number]) -> Pose:
     """All assemblies found at one position from many guesses, each once, along the last axis."""
     rng = np.random.default_rng(SEED)
-    spread = max(_extent(elements), 1e-300)
+    spread = _extent(group, elements)
     guesses = [
         rng.uniform(-np.pi, np.pi, GUESSES)
         if group.joints[group.steps[i].joint].kind == "revolute"
@@ -324,10 +327,10 @@ def _assemblies(group: General, elements: Sequence[tuple[Frame, Frame]], drive: 
     )
 
 
-def _extent(elements: Sequence[tuple[Frame, Frame]]) -> float:
-    """Largest distance between any two coordinates that occur: how far a slide may reach."""
-    xs = [float(np.nanmax(np.abs(n), initial=0.0)) for pair in elements for frame in pair for n in frame[:2]]
-    return max(xs, default=0.0)
+def _extent(group: General, elements: Sequence[tuple[Frame, Frame]]) -> float:
+    """How far a slide may reach: the largest size of the group over the lanes, m."""
+    sizes = size_of(group, elements)
+    return float(np.max(sizes[np.isfinite(sizes)], initial=0.0)) or 1.0
 
 
 def _lane(number: Number, index: int | NDArray[np.intp]) -> Number:
@@ -387,7 +390,7 @@ class _Follower:
         found = np.array([np.broadcast_to(pose.q[i], indices.shape) for i in self.group.free])
         change = np.diff(found, axis=1, prepend=q[:, None])
         bend = np.abs(np.diff(change, axis=1, prepend=change[:, :1]))
-        limits = self._limits(max(_extent(elements), 1e-300))[:, None]
+        limits = self._limits(_extent(self.group, elements))[:, None]
         good = np.all((np.abs(change) <= limits) & (bend <= limits / 4), axis=0)
         good = good & (np.broadcast_to(pose.orientation, indices.shape) == self.orientation)
         return found[:, : len(ahead) if good.all() else int(np.argmin(good))]
@@ -415,7 +418,7 @@ class _Follower:
         found = np.array([float(pose.q[i]) for i in self.group.free])
         if not np.all(np.isfinite(found)) or pose.orientation != self.orientation:
             return None
-        limits = self._limits(max(_extent(elements), 1e-300))
+        limits = self._limits(_extent(self.group, elements))
         return found if np.all(np.abs(found - before) <= limits) else None
 
 

@@ -51,7 +51,7 @@ class Causes:
             modules = reversed(range(len(back.settled)))  # settled from the last module to the first
             for number, settled in zip(modules, back.settled, strict=True):
                 share = np.broadcast_to(settled.share, status.shape)
-                locked = np.flatnonzero(share < 1.0)
+                locked = np.flatnonzero((share < 1.0) & (status == Status.LOCKED))
                 if len(locked):
                     self._locked.setdefault(number, []).append((locked + offset, share[locked]))
 
@@ -206,8 +206,9 @@ def _zero_slip(
             worst = int(np.nanargmax(widths))
             place = positions[worst]
             parts.append(f"effort of {driver} {lower[place]:.6g} … {upper[place]:.6g} {unit} at {dial.at(place)}")
-    bounds = ", ".join(parts) or "with one sign it locks, so the effort has no bounds"
-    what = f"relative speed zero {dial.intervals(positions)}: its friction is an interval; {bounds}"
+    bounds = ", ".join(parts) or ("with one sign it locks, so the effort has no bounds" if efforts else "")
+    what = f"relative speed zero {dial.intervals(positions)}: what resists it is an interval"
+    what += f"; {bounds}" if bounds else ""
     return Finding(
         what, f"joints.{joint}", "the bounds are in drive_effort_lower and drive_effort_upper", Severity.NOTE
     )

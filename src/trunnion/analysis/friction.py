@@ -223,7 +223,8 @@ def _newton(problem: _Problem, method: FrictionMethod) -> Settled:
     forces: list[Number] = [0.0] * len(real.contacts)
     state = real.state(forces)
     slopes = real.slopes(state.normals)
-    bound = real.bound(slopes)
+    # a lane whose loads are no numbers, because another module locked or opened, is not this module's affair
+    bound = np.where(np.isfinite(_largest(state.normals)), real.bound(slopes), 0.0)
     certain = ~(bound >= 1.0)
     rows: list[list[Number]] = []
     inverse: list[list[Number]] = []

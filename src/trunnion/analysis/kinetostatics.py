@@ -72,7 +72,7 @@ def backward(walk: Forward, method: FrictionMethod, zero_slip: Mapping[str, floa
     for name in system.joints:
         back.slips[name] = _slip(walk, name)
     _add_body_loads(back)
-    _add_stated_loads(back)
+    _add_stated_loads(back, zero_slip)
     for number in reversed(range(len(system.plan.modules))):
         _settle_module(back, number, method, zero_slip)
     return back
@@ -104,13 +104,13 @@ def _add_body_loads(back: Backward) -> None:
         _add(back, link, Wrench(*force, moment), centre.place)
 
 
-def _add_stated_loads(back: Backward) -> None:
+def _add_stated_loads(back: Backward, zero_slip: Mapping[str, float]) -> None:
     """The loads of the model, with the power each gives the mechanism."""
     walk, values = back.walk, back.walk.values
     for name, load in walk.system.mechanism.loads.items():
         path = f"loads.{name}"
         if load.joint is not None:
-            back.load_powers[name] = _resist(back, load.joint, path)
+            back.load_powers[name] = _resist(back, load.joint, path, zero_slip.get(load.joint, 0.0))
             continue
         link = load.link or ""
         power: Number = 0.0
@@ -126,12 +126,15 @@ def _add_stated_loads(back: Backward) -> None:
         back.load_powers[name] = power
 
 
-def _resist(back: Backward, joint: str, path: str) -> Number:
-    """A torque or force that opposes the motion of a joint, whichever way it goes; its power (never positive)."""
+def _resist(back: Backward, joint: str, path: str, at_rest: float) -> Number:
+    """A torque or force that opposes the motion of a joint, whichever way it goes; its power (never positive).
+
+    at_rest: the sign of the motion to take where there is none; 0: the load is zero there.
+    """
     walk, values = back.walk, back.walk.values
     _, (first, second) = walk.system.joints[joint]
     slip = back.slips[joint]
-    sign = np.sign(np.where(slip.zero, 0.0, primal(slip.speed)))
+    sign = np.sign(np.where(slip.zero, at_rest, primal(slip.speed)))
     if f"{path}.resisting_torque" in values:
         size = -sign * values[f"{path}.resisting_torque"]
         _add(back, second, Wrench(0.0, 0.0, size), None)

@@ -22,6 +22,7 @@ from trunnion.structure.decompose import Module, Plan, decompose
 
 __all__ = ["Cycle", "Place", "System", "Values", "build"]
 
+COMMON_TURNS = 60  # of the slowest driver, within which the others must come back too
 Values = Mapping[str, Number]  # every number of a mechanism by its path, SI
 
 
@@ -38,10 +39,12 @@ class Place:
 
 @dataclass(frozen=True)
 class Cycle:
-    """One turn or range of the drivers: how long it takes, s, and whether its end is its start again."""
+    """One turn or range of the drivers: how long it takes, s, whether its end is its start again, and the most
+    turns that a driver makes in it."""
 
     duration: float
     periodic: bool
+    turns: float = 1.0
 
     def times(self, steps: int) -> np.ndarray:
         """`steps` equally spaced times, s; the end is left out where it repeats the start."""
@@ -142,8 +145,9 @@ class System:
         return np.where(widest > 0, widest, 1.0)
 
     def cycle(self, values: Values) -> Cycle:
-        """How long the drivers take: the slowest full turn, or the ranges.
+        """How long the drivers take: the ranges, or the least time in which all make whole turns.
 
+        Where that is over COMMON_TURNS turns of the slowest, the cycle is its one turn and not periodic.
         Raises MechanismError where a range runs against its speed or two drivers do not fit one cycle.
         """
         drivers = self.mechanism.drivers
@@ -170,8 +174,15 @@ class System:
         if findings:
             raise MechanismError(findings)
         turns = [longest / duration for duration in durations.values()]
-        closed = all(abs(n - round(n)) < 1e-9 for n in turns)
-        return Cycle(longest, periodic=not ranged and closed)
+        whole = next((n for n in range(1, COMMON_TURNS + 1) if all(_is_whole(n * turn) for turn in turns)), 0)
+        if ranged or not whole:
+            return Cycle(longest, periodic=False, turns=max(abs(self._turns(nominal, n, longest)) for n in drivers))
+        return Cycle(whole * longest, periodic=True, turns=whole * max(turns))
+
+    def _turns(self, nominal: Mapping[str, float], driver: str, duration: float) -> float:
+        """Turns that a driver makes in a time; a slide makes none."""
+        revolute = self.joints[driver][0] == "revolute"
+        return nominal[f"drivers.{driver}.speed"] * duration / (2 * np.pi) if revolute else 0.0
 
 
 def build(mechanism: Mechanism) -> System:
@@ -197,6 +208,10 @@ def driven_coordinates(
     return q, rate, second
 
 
+def _is_whole(number: float) -> bool:
+    return abs(number - round(number)) < 1e-9 * max(1.0, number)
+
+
 def rubbing(system: System) -> list[str]:
     """Joints that have friction."""
     return [name for name, joint in system.mechanism.effective_joints.items() if joint.friction is not None]
@@ -209,5 +224,7 @@ def law_of(system: System, joint: str) -> FrictionLaw:
 
 
 def sticking(system: System) -> list[str]:
-    """Joints whose friction is an interval where their relative speed is zero."""
-    return [name for name in rubbing(system) if law_of(system, name).interval_at_rest]
+    """Joints whose friction, or a load that resists them, is an interval where their relative speed is zero."""
+    resisted = {load.joint for load in system.mechanism.loads.values() if load.joint is not None}
+    rubbed = {name for name in rubbing(system) if law_of(system, name).interval_at_rest}
+    return [name for name in system.joints if name in resisted | rubbed]

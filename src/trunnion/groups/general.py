@@ -43,7 +43,7 @@ from trunnion.groups.planar import (
 from trunnion.groups.protocol import Elements
 from trunnion.groups.tree import OUTER, GroupJoint, Step
 
-__all__ = ["OUTER", "General", "GroupJoint", "Pose"]
+__all__ = ["OUTER", "General", "GroupJoint", "Pose", "size_of"]
 
 QUICK = 8  # rounds for all lanes
 NEWTON_LIMIT = 60  # more for those that need them
@@ -133,7 +133,7 @@ class General:
             inverse = linalg.inverse(jacobian) if jacobian else []
             gap = self._gap(placed, drive)
             lengths = [n for n, row in zip(gap, self._rows, strict=True) if row.is_length]
-            size = _size(self, elements)
+            size = size_of(self, elements)
             orientation = np.sign(primal(linalg.determinant(jacobian)))
         xp = namespace(*lengths) if lengths else np
         opening: Number = 0.0
@@ -146,7 +146,7 @@ class General:
         q = [np.asarray(v, float) for v in self.coordinates(elements, start, drive)]
         if not self.free:
             return list(q)
-        size = _size(self, elements)
+        size = size_of(self, elements)
         kinds = [self.joints[self.steps[i].joint].kind for i in self.free]
         scale = [TURN_LIMIT if kind == "revolute" else 0.3 * size for kind in kinds]
         q, moved_by = self._iterate(elements, q, drive, scale, QUICK)
@@ -486,7 +486,7 @@ def _real(frame: Frame) -> Frame:
     return Frame(*(primal(n) for n in frame))
 
 
-def _size(group: General, elements: Elements) -> Number:
+def size_of(group: General, elements: Elements) -> Number:
     """A length typical of each lane, m: the widest spread of joint elements on one link (or on all known links)."""
     places: dict[int, list[tuple[Number, Number]]] = {}
     for joint, pair in zip(group.joints, elements, strict=True):

@@ -278,6 +278,10 @@ class ParameterSet:
             raise MechanismError(
                 Finding(f"the name '{name}' stands for {len(paths)} numbers", remedy=f"say which: {some}")
             )
+        below = [path for path in self.entries if f".{path}.".find(f".{name}.") >= 0]
+        if below:
+            some = ", ".join(below[:6]) + (", …" if len(below) > 6 else "")
+            raise MechanismError(Finding(f"'{name}' is not one number", remedy=f"set one of {some}"))
         dimensions = [path.partition(".")[2] for path in self.entries if path.startswith("dimensions.")]
         # a short name is most likely a mistyped dimension; endings such as `x` resemble everything
         known = [*self.entries, *self._endings] if "." in name or not dimensions else dimensions

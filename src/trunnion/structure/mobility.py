@@ -61,4 +61,4 @@ def mobility_by_rank(links: Sequence[str], ground: str, joints: Joints, places: 
     It exceeds Grübler's count where constraints repeat each other, as in a parallelogram with a third crank.
     """
     matrix, _ = constraints(links, ground, joints, places)
-    return matrix.shape[1] - rank(matrix)
+    return int(matrix.shape[1]) - rank(matrix)

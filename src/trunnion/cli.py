@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+import click
 import typer
 
 from trunnion import __version__
@@ -241,16 +242,23 @@ def main() -> None:
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(encoding="utf-8", errors="replace")
     try:
-        app()
+        code = app(standalone_mode=False)
     except MechanismError as error:
         _say(error.findings)
-        sys.exit(2)
-    except KeyboardInterrupt:
-        print("stopped; nothing was written", file=sys.stderr)
-        sys.exit(130)
+        code = 2
+    except click.ClickException as error:
+        error.show()
+        code = error.exit_code
+    except (KeyboardInterrupt, click.Abort):
+        print("stopped; a file named above as written is whole, no other was begun", file=sys.stderr)
+        code = 130
     except MemoryError:
         print("error: not enough memory — use fewer --steps", file=sys.stderr)
-        sys.exit(2)
+        code = 2
+    except OSError as error:
+        print(f"error: {error.filename or ''}: {error.strerror or error}", file=sys.stderr)
+        code = 2
+    sys.exit(int(code or 0))
 
 
 # ---- shared by the verbs --------------------------------------------------------------------------------------

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,6 +12,15 @@ from pathlib import Path
 from trunnion.errors import Finding, MechanismError
 
 __all__ = ["whole"]
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
+UMASK = _umask()  # read once: reading it means setting it, for the whole process
 
 
 @contextmanager
@@ -31,15 +41,12 @@ def whole(path: str | os.PathLike[str]) -> Iterator[Path]:
     temporary = Path(name)
     try:
         yield temporary
-        temporary.chmod(0o666 & ~_umask())  # mkstemp makes it private; a result is an ordinary file
+        mode = 0o777 if temporary.is_dir() else 0o666  # mkstemp makes it private; a result is an ordinary file
+        temporary.chmod(mode & ~UMASK)
         temporary.replace(target)
     except OSError as error:
         raise MechanismError(Finding(f"cannot be written: {error.strerror or error}", str(target))) from None
     finally:
+        if temporary.is_dir():
+            shutil.rmtree(temporary, ignore_errors=True)
         temporary.unlink(missing_ok=True)
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask

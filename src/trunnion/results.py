@@ -63,7 +63,7 @@ VARIABLES: dict[str, Variable] = {
     "locking_margin": Variable((), "1", "multiple of the friction at which the position locks, ∞ if beyond 10"),
     "status": Variable((), "1", "code of the position's status; see the attribute flag_meanings"),
 }
-INTEGERS = {"status": np.int8, "friction_iterations": np.int16}
+INTEGERS = {"status": np.int8, "friction_iterations": np.int32}
 # the same array until something sets them apart
 SAME_AS = {"drive_effort_lower": "drive_effort", "drive_effort_upper": "drive_effort"}
 

@@ -14,7 +14,7 @@ from trunnion.algebra.namespace import Number
 from trunnion.analysis import diagnosis
 from trunnion.analysis.friction import FrictionMethod
 from trunnion.analysis.kinetostatics import Backward
-from trunnion.analysis.system import Cycle, System, rubbing
+from trunnion.analysis.system import Cycle, Dial, System, rubbing
 from trunnion.errors import Finding, Severity, Status
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.model.check import check_model
@@ -172,23 +172,15 @@ def _over_the_cycle(run: Run, arrays: Arrays, causes: diagnosis.Causes, time: ND
         name: (arrays["drive_effort_lower"][i], arrays["drive_effort_upper"][i], units[i])
         for i, name in enumerate(run.system.mechanism.drivers)
     }
-    found = diagnosis.findings(causes, _dial(run, time), arrays["status"], arrays["condition"], efforts)
+    found = diagnosis.findings(
+        causes, run.system.dial(run.values, time), arrays["status"], arrays["condition"], efforts
+    )
     drivers = run.system.mechanism.drivers
     if len(drivers) > 1 and not run.cycle.periodic and all(driver.range is None for driver in drivers.values()):
         what = f"the drivers do not come back together; the cycle is the slowest one's turn, {run.cycle.duration:g} s"
         remedy = "means and efficiency are of that time; choose speeds with a common period, or ranges"
         found.append(Finding(what, "drivers", remedy, Severity.WARNING))
     return found
-
-
-def _dial(run: Run, time: NDArray[np.float64]) -> diagnosis.Dial:
-    """The coordinate of the only driver, else time."""
-    drivers = list(run.system.mechanism.drivers)
-    if len(drivers) != 1:
-        return diagnosis.Dial(time, " s", "")
-    q = np.broadcast_to(run.system.drive(run.values, drivers[0], time)[0], time.shape)
-    revolute = run.system.joints[drivers[0]][0] == "revolute"
-    return diagnosis.Dial(np.degrees(q) if revolute else q * 1e3, "°" if revolute else " mm", drivers[0])
 
 
 def _references(mechanism: Mechanism) -> list[str]:
@@ -201,7 +193,7 @@ def _references(mechanism: Mechanism) -> list[str]:
 def _summary(run: Run, arrays: Arrays, value: float, time: NDArray[np.float64]) -> list[dict[str, Any]]:
     """The figures one looks at first."""
     rows: list[dict[str, Any]] = []
-    dial = _dial(run, time)
+    dial = run.system.dial(run.values, time)
     # extremes are of positions that can be relied on: beside a dead centre they depend on the sampling
     sound = _sound(arrays["status"])
     with np.errstate(all="ignore"):
@@ -244,9 +236,7 @@ def _sound(status: NDArray[Any]) -> NDArray[np.intp]:
     return best if len(best) else np.flatnonzero(status == Status.ZERO_SLIP)
 
 
-def _reaction_rows(
-    system: System, arrays: Arrays, dial: diagnosis.Dial, sound: NDArray[np.intp]
-) -> list[dict[str, Any]]:
+def _reaction_rows(system: System, arrays: Arrays, dial: Dial, sound: NDArray[np.intp]) -> list[dict[str, Any]]:
     """Largest reaction of every joint; stroke of every slide."""
     rows: list[dict[str, Any]] = []
     for i, (name, (kind, _)) in enumerate(system.joints.items()):
@@ -261,7 +251,7 @@ def _reaction_rows(
     return rows
 
 
-def _margin(margin: NDArray[np.float64], dial: diagnosis.Dial) -> dict[str, Any]:
+def _margin(margin: NDArray[np.float64], dial: Dial) -> dict[str, Any]:
     """The least multiple of the friction at which the mechanism locks."""
     least = np.nanmin(margin, initial=np.inf)
     if not np.isfinite(least):

@@ -29,7 +29,7 @@ __all__ = ["Run", "analyse", "prepare"]
 CHUNK = 8192  # positions at a time: the arrays of a walk stay in cache
 MOST_STEPS = 100_000_000
 SINGULAR = 1e6  # condition from which less than about four digits would be left
-NEAR_SINGULAR = 200.0  # a transmission angle of half a degree
+NEAR_SINGULAR = 100.0  # a transmission angle of about a degree
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ def analyse(
         if progress:
             progress(window.stop)
     _bracket(arrays, run, time, method, causes)
-    _unwrap(arrays, run.system)
+    _unwrap(arrays, run, time)
     return account.finish(run, arrays, labels, time, method, causes)
 
 
@@ -277,24 +277,41 @@ def _widen(
         upper[i, positions] += np.maximum(0.0, np.maximum(*changes))
 
 
-def _unwrap(arrays: Arrays, system: System) -> None:
-    """Angles without jumps of a whole turn along each run of solved positions, and the joints' rotations."""
-    angles = arrays["link_angle"]
+def _unwrap(arrays: Arrays, run: Run, time: NDArray[np.float64]) -> None:
+    """Angles without jumps of a whole turn along each run of solved positions, and the joints' rotations.
+
+    A driven rotation is the prescribed coordinate itself, whole turns included.
+    """
+    system, angles = run.system, arrays["link_angle"]
     order = list(system.mechanism.links)
-    for angle in angles:
-        _unwrap_row(angle)
-    for i, (_, (first, second)) in enumerate(system.joints.values()):
+    step = float(time[1] - time[0]) if len(time) > 1 else 0.0
+    for angle, rate in zip(angles, arrays["link_angle_velocity"], strict=True):
+        _unwrap_row(angle, rate, step)
+    for i, (name, (kind, (first, second))) in enumerate(system.joints.items()):
         rotation = arrays["joint_rotation"][i]
         np.subtract(angles[order.index(second)], angles[order.index(first)], out=rotation)
+        if name in system.mechanism.drivers and kind == "revolute":
+            rotation[:] = np.where(np.isfinite(rotation), system.drive(run.values, name, time)[0], np.nan)
 
 
-def _unwrap_row(angle: NDArray[np.float64]) -> None:
-    """In place, some positions at a time to save memory; a gap of NaN is bridged to the nearest turn."""
-    last = np.nan
+def _unwrap_row(angle: NDArray[np.float64], rate: NDArray[np.float64], step: float) -> None:
+    """Add whole turns in place so that the angle follows its rate from position to position (`step` s apart).
+
+    A gap of NaN is bridged to the nearest turn. Some positions at a time, to save memory.
+    """
+    turns, last, last_rate, last_at = 0, np.nan, 0.0, -1
     for low in range(0, len(angle), CHUNK):
         part = angle[low : low + CHUNK]
         solved = np.flatnonzero(np.isfinite(part))
-        if len(solved):
-            start = last if np.isfinite(last) else part[solved[0]]
-            part[solved] = np.unwrap(np.concatenate([[start], part[solved]]))[1:]
-            last = part[solved[-1]]
+        if not len(solved):
+            continue
+        values, rates = part[solved], np.nan_to_num(rate[low : low + CHUNK][solved])
+        before = np.concatenate([[last if np.isfinite(last) else values[0]], values[:-1]])
+        mean_rate = (np.concatenate([[last_rate], rates[:-1]]) + rates) / 2
+        next_to = np.diff(np.concatenate([[last_at], solved + low])) == 1
+        expected = np.where(next_to & np.isfinite(before), mean_rate * step, 0.0)
+        if not np.isfinite(last):
+            expected[0] = 0.0
+        added = np.cumsum(np.rint((expected - (values - before)) / (2 * np.pi)))
+        part[solved] = values + 2 * np.pi * (turns + added)
+        turns, last, last_rate, last_at = turns + added[-1], values[-1], rates[-1], int(solved[-1]) + low

@@ -10,14 +10,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
-from trunnion.analysis.kinematics import Forward, pairs_of, pose_of, start, take
+from trunnion.analysis.kinematics import GROUND, Forward, pairs_of, pose_of, start, take
 from trunnion.analysis.system import System, Values, driven_coordinates
 from trunnion.errors import Finding, Severity
 from trunnion.groups.general import General, Pose, size_of
@@ -35,6 +35,7 @@ GUESSES = 512
 SEED = 20060704  # of the guesses: the same assemblies every time
 TURN_JUMP = 0.35  # rad between neighbours of the grid: more is another branch
 SLIDE_JUMP = 0.25  # of the group's size, likewise
+TOUCHING = 1e-6  # of 1/condition: below it two assemblies meet
 BLOCK = 32  # grid points tried at a time
 
 
@@ -49,21 +50,54 @@ class Track:
     coordinates: Array
     orientation: float
     periodic: bool
+    clock: Clock
 
     def pose(
-        self, group: General, elements: Sequence[tuple[Frame, Frame]], drive: Sequence[Number], time: Number
+        self,
+        group: General,
+        elements: Sequence[tuple[Frame, Frame]],
+        drive: Sequence[Number],
+        walk: Forward,
+        time: Number,
     ) -> Pose:
         """Pose by Newton from the track; NaN in the lanes that left its branch."""
-        moment = np.mod(primal(time), self.times[-1]) if self.periodic else primal(time)
+        moment = primal(self.clock.nominal(walk, time))
+        moment = np.mod(moment, self.times[-1]) if self.periodic else moment
         near = np.clip(np.searchsorted(self.times, moment), 1, len(self.times) - 1) if len(self.times) > 1 else 0
         guess = [_interpolated(self.times, row, moment, near) for row in self.coordinates]
         pose = group.position(elements, guess, drive)
         stays = pose.orientation == self.orientation
-        for i, value, from_ in zip(group.free, (pose.q[i] for i in group.free), guess, strict=True):
+        size = size_of(group, elements)
+        for i, from_ in zip(group.free, guess, strict=True):
             revolute = group.joints[group.steps[i].joint].kind == "revolute"
-            reach = 4 * TURN_JUMP if revolute else np.inf
-            stays = stays & (np.abs(primal(value) - from_) < reach)
+            reach = 4 * TURN_JUMP if revolute else 4 * SLIDE_JUMP * size
+            stays = stays & (np.abs(primal(pose.q[i]) - from_) < reach)
         return pose._replace(frames=tuple(_kept(frame, stays) for frame in pose.frames))
+
+
+class Clock(NamedTuple):
+    """The drive by which a track is read: its driver, and where and how fast that went in the nominal cycle.
+
+    A run at another speed passes the same coordinates at other times.
+    """
+
+    driver: str
+    start: float
+    speed: float
+
+    @classmethod
+    def of(cls, system: System, values: Values) -> Clock:
+        """The first driver's."""
+        for name in system.mechanism.drivers:
+            start, speed, _ = (float(np.ravel(primal(n))[0]) for n in system.drive(values, name, 0.0))
+            return cls(name, start, speed)
+        return cls("", 0.0, 1.0)
+
+    def nominal(self, walk: Forward, time: Number) -> Number:
+        """The time at which the nominal cycle has the coordinate that this run has at `time`, s."""
+        if not self.driver:
+            return time
+        return (walk.system.drive(walk.values, self.driver, time)[0] - self.start) / self.speed
 
 
 def _interpolated(times: Array, row: Array, moment: Array, near: NDArray[np.intp] | int) -> Array:
@@ -115,10 +149,15 @@ def choose(system: System, values: Values) -> Chosen:
             if module.rank > 1 and count > 1 and not _hints(walk, module):
                 findings.append(_unstated(module, count))
             chosen.append(assembly)
+            walk.assembly.append(assembly)
             counts.append(count)
             if isinstance(assembly, Track) and not np.any(np.isfinite(assembly.coordinates)):
                 findings.append(_never(module))
-            take(walk, number, pose_of(walk, number, assembly, times), times)
+            pose = pose_of(walk, number, assembly, times)
+            take(walk, number, pose, times)
+            if module.rank > 1 and group.BRANCHES:
+                meeting = change_points(walk, number, assembly, times, pose)
+                findings += [_change_point(system, values, module, meeting)] if meeting else []
     return Chosen(tuple(chosen), tuple(counts), tuple(findings))
 
 
@@ -128,6 +167,16 @@ def _unstated(module: Module, count: int) -> Finding:
     joint = module.joints[len(module.joints) // 2]
     remedy = f"say roughly where a point is at the start, e.g. assembly: {{{joint}: [x, y]}}"
     return Finding(what, "assembly", remedy, Severity.WARNING)
+
+
+def _change_point(system: System, values: Values, module: Module, at: Sequence[float]) -> Finding:
+    where = ", ".join(system.dial(values, np.array([moment])).at(0) for moment in at)
+    what = f"passes a change point at {where}: two assemblies of the links {', '.join(module.links)} meet there"
+    remedy = (
+        f"which way it goes on is not determined; here {module.joints[1]} stays on its side. Change a length, or "
+        "drive it over a range that ends before"
+    )
+    return Finding(what, f"links {', '.join(module.links)}", remedy)
 
 
 def _never(module: Module) -> Finding:
@@ -243,6 +292,39 @@ def _side(walk: Forward, number: int) -> int:
     return 1
 
 
+def change_points(walk: Forward, number: int, assembly: Any, times: Array, pose: Any) -> list[float]:
+    """Times at which a closed form passes a position where its assemblies meet, s.
+
+    There 1/condition touches zero between two assembled positions: found on the grid as a minimum that its
+    neighbours' slope would reach, then by golden section.
+    """
+    if len(times) < 3:
+        return []
+    margin = np.broadcast_to(1 / walk.system.groups[number].condition(pose), times.shape)
+    before, here, after = margin[:-2], margin[1:-1], margin[2:]
+    steep = np.maximum(np.abs(here - before), np.abs(after - here))
+    suspects = np.flatnonzero((here <= before) & (here <= after) & (here <= 1.1 * steep)) + 1
+
+    def margin_at(moment: float) -> float:
+        trial = Forward(walk.system, walk.values, walk.local, {walk.system.mechanism.fixed_link: GROUND})
+        for earlier in range(number):
+            take(trial, earlier, pose_of(trial, earlier, walk.assembly[earlier], moment), moment)
+        found = 1 / walk.system.groups[number].condition(pose_of(trial, number, assembly, moment))
+        return float(np.nan_to_num(np.ravel(found)[0], nan=1.0))
+
+    moments = [_lowest(margin_at, times[k - 1], times[k + 1]) for k in suspects]
+    return [moment for moment in moments if margin_at(moment) < TOUCHING]
+
+
+def _lowest(function: Callable[[float], float], low: float, high: float) -> float:
+    """Where a function with one minimum in an interval has it, by golden section."""
+    ratio = (np.sqrt(5) - 1) / 2
+    for _ in range(60):
+        left, right = high - ratio * (high - low), low + ratio * (high - low)
+        low, high = (low, right) if function(left) < function(right) else (left, high)
+    return float((low + high) / 2)
+
+
 # ---- general groups -------------------------------------------------------------------------------------------
 
 
@@ -254,12 +336,13 @@ def _track(
     elements = pairs_of(walk, places)
     grid = len(times)
     rows = np.full((len(group.free), grid), np.nan)
+    clock = Clock.of(walk.system, walk.values)
     for first in _starts(grid):
         found = _assemblies(group, _at(elements, first), [_lane(q, first) for q in drive])
         if found.q[0].size:
             break
     else:
-        return Track(times, rows, 0.0, periodic), 0
+        return Track(times, rows, 0.0, periodic, clock), 0
     every = _distance(walk, module, found.frames, lambda n: n, _nth(first))
     distance = np.broadcast_to(every, found.orientation.shape)
     best = int(np.argmin(distance))
@@ -272,7 +355,7 @@ def _track(
     if periodic:
         _wrap(rows, group)
         follower.run(rows, _gap_backward(rows))
-    return Track(times, rows, orientation, periodic), len(distance)
+    return Track(times, rows, orientation, periodic, clock), len(distance)
 
 
 def _starts(grid: int) -> Iterator[int]:

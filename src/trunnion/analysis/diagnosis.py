@@ -11,15 +11,11 @@ from numpy.typing import NDArray
 from trunnion.algebra.namespace import Number
 from trunnion.analysis.kinematics import Forward, pairs_of
 from trunnion.analysis.kinetostatics import Backward
-from trunnion.analysis.system import System, rubbing, sticking
+from trunnion.analysis.system import Dial, Positions, System, rubbing, sticking
 from trunnion.errors import Finding, Severity, Status
 from trunnion.groups import rpr, rrp, rrr
 
 __all__ = ["Causes", "findings"]
-
-MOST_INTERVALS = 6  # named in one finding; the rest are counted
-
-Positions = NDArray[np.intp]
 
 
 class _Open(NamedTuple):
@@ -92,31 +88,6 @@ class Causes:
         }
 
 
-class Dial(NamedTuple):
-    """How positions are named to a person: the drive coordinate in degrees or mm, or time."""
-
-    values: NDArray[np.float64]
-    unit: str
-    of: str
-
-    def at(self, position: int) -> str:
-        """One position."""
-        number = f"{self.values[position]:.4g}"
-        return f"{number}{self.unit}"
-
-    def intervals(self, positions: Positions) -> str:
-        """Positions as intervals: 'at 12° and between 132° and 228° of A'."""
-        runs = np.split(positions, np.flatnonzero(np.diff(positions) > 1) + 1)
-        if len(positions) == len(self.values):
-            return "at every position" if len(self.values) > 1 else "in its one position"
-        texts = [
-            f"at {self.at(run[0])}" if len(run) == 1 else f"between {self.at(run[0])} and {self.at(run[-1])}"
-            for run in runs[:MOST_INTERVALS]
-        ]
-        more = f" and in {len(runs) - MOST_INTERVALS} more places" if len(runs) > MOST_INTERVALS else ""
-        return ", ".join(texts) + more + (f" of {self.of}" if self.of else "")
-
-
 def findings(
     causes: Causes,
     dial: Dial,
@@ -141,7 +112,9 @@ def findings(
         what = f"close to a dead centre {dial.intervals(near)}: condition up to {_most(condition[near])}"
         found.append(Finding(what, "links", "forces there are very sensitive to the dimensions", Severity.WARNING))
     for joint, positions in causes.zero_slip().items():
-        found.append(_zero_slip(dial, joint, positions, efforts))
+        widths = [upper[positions] - lower[positions] for lower, upper, _ in efforts.values()]
+        if not widths or np.any(np.array(widths) != 0):  # a coefficient of 0 leaves no interval
+            found.append(_zero_slip(dial, joint, positions, efforts))
     return found
 
 
@@ -151,7 +124,9 @@ def _not_assembled(causes: Causes, dial: Dial, part: _Open) -> Finding:
     where = f"links {', '.join(module.links)}"
     remedy = "change the lengths or the range of the driver"
     if not part.reasons:
-        return Finding(f"{head}: no position of these links closes its loops", where, remedy)
+        return Finding(
+            f"{head}: these links do not get there from their start without being taken apart", where, remedy
+        )
     told = [
         f"{text} by up to {_length(float(np.nanmax(figure)))}"
         for text, figure in part.reasons.items()

@@ -46,7 +46,7 @@ class Forward:
     local: dict[tuple[str, str], Frame]
     motions: dict[str, Motion]
     poses: list[Any] = field(default_factory=list)
-    drives: list[tuple[list[Number], list[Number], list[Number]]] = field(default_factory=list)
+    assembly: list[Any] = field(default_factory=list)
     _elements: dict[tuple[str, str], Frame] = field(default_factory=dict)
 
     def element(self, link: str, joint: str) -> Frame:
@@ -110,7 +110,7 @@ def pose_of(walk: Forward, number: int, assembly: Any, time: Number) -> Any:
     module, group, places = system.plan.modules[number], system.groups[number], system.places[number]
     drive, _, _ = driven_coordinates(system, module, places, walk.values, time)
     if isinstance(group, General) and hasattr(assembly, "pose"):
-        return assembly.pose(group, pairs_of(walk, places), drive, time)
+        return assembly.pose(group, pairs_of(walk, places), drive, walk, time)
     return group.position(pairs_of(walk, places), assembly, drive)
 
 
@@ -142,4 +142,3 @@ def take(walk: Forward, number: int, pose: Any, time: Number) -> None:
     for link, frame, twist, second in zip(module.links, pose.frames, twists, seconds, strict=True):
         walk.motions[link] = Motion(frame, twist, second)
     walk.poses.append(pose)
-    walk.drives.append(drives)

@@ -6,8 +6,10 @@ import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
@@ -20,10 +22,40 @@ from trunnion.joints.pairs import PAIRS
 from trunnion.model.mechanism import Mechanism
 from trunnion.structure.decompose import Module, Plan, decompose
 
-__all__ = ["Cycle", "Place", "System", "Values", "build"]
+__all__ = ["Cycle", "Dial", "Place", "Positions", "System", "Values", "build"]
 
 COMMON_TURNS = 60  # of the slowest driver, within which the others must come back too
 Values = Mapping[str, Number]  # every number of a mechanism by its path, SI
+
+
+MOST_INTERVALS = 6  # named in one finding; the rest are counted
+
+Positions = NDArray[np.intp]
+
+
+class Dial(NamedTuple):
+    """How positions are named to a person: the drive coordinate in degrees or mm, or time."""
+
+    values: NDArray[np.float64]
+    unit: str
+    of: str
+
+    def at(self, position: int) -> str:
+        """One position."""
+        number = f"{self.values[position]:.4g}"
+        return f"{number}{self.unit}"
+
+    def intervals(self, positions: Positions) -> str:
+        """Positions as intervals: 'at 12° and between 132° and 228° of A'."""
+        runs = np.split(positions, np.flatnonzero(np.diff(positions) > 1) + 1)
+        if len(positions) == len(self.values):
+            return "at every position" if len(self.values) > 1 else "in its one position"
+        texts = [
+            f"at {self.at(run[0])}" if len(run) == 1 else f"between {self.at(run[0])} and {self.at(run[-1])}"
+            for run in runs[:MOST_INTERVALS]
+        ]
+        more = f" and in {len(runs) - MOST_INTERVALS} more places" if len(runs) > MOST_INTERVALS else ""
+        return ", ".join(texts) + more + (f" of {self.of}" if self.of else "")
 
 
 @dataclass(frozen=True)
@@ -124,6 +156,15 @@ class System:
         speed = values[f"drivers.{name}.speed"]
         start = values.get(f"drivers.{name}.range.from", values.get(f"drivers.{name}.start", 0.0))
         return start + speed * time, speed, 0.0
+
+    def dial(self, values: Values, time: NDArray[np.float64]) -> Dial:
+        """Positions by the coordinate of the only driver, else by time (s)."""
+        drivers = list(self.mechanism.drivers)
+        if len(drivers) != 1:
+            return Dial(time, " s", "")
+        q = np.broadcast_to(self.drive(values, drivers[0], time)[0], time.shape)
+        revolute = self.joints[drivers[0]][0] == "revolute"
+        return Dial(np.degrees(q) if revolute else q * 1e3, "°" if revolute else " mm", drivers[0])
 
     def pace(self, values: Values) -> Number:
         """Angular speed typical of the mechanism, rad/s: that of its fastest driver, a slide's per size."""

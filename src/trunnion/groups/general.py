@@ -267,7 +267,7 @@ class General:
     def _condition(
         self, jacobian: Sequence[Sequence[Number]], inverse: Sequence[Sequence[Number]], size: Number
     ) -> Number:
-        """‖S J‖·‖(S J)⁻¹‖ (Frobenius) with lengths measured in `size`."""
+        """2/n ‖S J‖·‖(S J)⁻¹‖ (Frobenius, n × n) with lengths measured in `size`: 2 at best, as for a dyad."""
         if not jacobian:
             return 1.0
         rows = [1.0 / size if row.is_length else 1.0 for row in self._rows]
@@ -283,7 +283,7 @@ class General:
             for v, r in zip(line, rows, strict=True)
         )
         with np.errstate(all="ignore"):
-            return np.sqrt(direct * reverse)
+            return 2 * np.sqrt(direct * reverse) / len(jacobian)
 
     # ---- velocity and acceleration --------------------------------------------------------------------------
 

@@ -37,7 +37,10 @@ class LawParameter:
 
 
 class LawFunction(Protocol):
-    """Tangential force (N) on the second body of a contact, from normal load (N) and slip speed (m/s)."""
+    """Tangential force (N) on the second body of a contact, from normal load (N) and slip speed (m/s).
+
+    It is proportional to the normal load: what certifies that friction and reactions have one solution rests on it.
+    """
 
     def __call__(self, normal: Number, slip: Number, **parameters: Number) -> Number: ...
 

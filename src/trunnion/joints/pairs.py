@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
 
 __all__ = ["PAIRS", "Load", "Pair", "Reaction"]
@@ -50,7 +51,12 @@ class Load(NamedTuple):
         """Normal load N ≥ 0, N."""
         x, y, _ = reaction
         if self.across is None:
-            return namespace(x, y).sqrt(x * x + y * y)  # hypot guards against overflow and costs four times as much
+            square = x * x + y * y  # hypot guards against overflow and costs four times as much
+            xp = namespace(square)
+            if xp is np:
+                return np.sqrt(square)
+            loaded = primal(square) > 0  # |F| has no derivative at 0; an unloaded pin stays unloaded
+            return xp.where(loaded, xp.sqrt(xp.where(loaded, square, 1.0)), 0.0)
         one, other = self._ends(reaction)
         xp = namespace(one, other)
         return xp.abs(one) + xp.abs(other)

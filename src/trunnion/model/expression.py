@@ -26,8 +26,8 @@ __all__ = ["RESERVED", "Expression", "literal", "parse"]
 MAX_LENGTH = 500
 MAX_DEPTH = 40
 
-_NUMBER = r"(?:[0-9]++(?:\.[0-9]*+)?+|\.[0-9]++)(?:[eE][-+]?[0-9]++)?+"
-_WORD = r"(?:[^\W\d_]++|%|°[A-Za-z]?+)(?!\w|\s*\()(?:(?:\^|\*\*)[-+]?[0-9](?![\w.]))?"
+_NUMBER = r"(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?(?![0-9.])"  # whole: a part of a number is none
+_WORD = r"(?:[^\W\d_]+|%|°[A-Za-z]?)(?!\w|\s*\()(?:(?:\^|\*\*)[-+]?[0-9](?![\w.]))?"
 _UNIT = rf"(?:{_WORD})(?:[ /*·⋅](?:{_WORD}))*"
 LITERAL = re.compile(rf"(?P<number>{_NUMBER})(?:\s*(?P<unit>{_UNIT})|\s+(?P<per>1/{_UNIT}))?")
 _TOKEN = re.compile(rf"\s*(?:(?P<literal>{LITERAL.pattern})|(?P<name>[^\W\d]\w*)|(?P<operator>\*\*|[-+*/^(),]))")

@@ -110,6 +110,21 @@ def analyse(
 
 
 @app.command()
+def design(
+    file: File,
+    steps: Steps = 720,
+    set_: Set = None,
+    friction: FrictionLaw = None,
+    fluctuation: Annotated[float, typer.Option("--fluctuation", help="Of the drive speed, for the flywheel.")] = 0.05,
+) -> None:
+    """Transmission angles, dead centres, range, Grashof type, shaking force, balance, flywheel, motor."""
+    from trunnion.analysis.design import report_rows
+
+    mechanism = _mechanism(file, set_, friction)
+    _table(mechanism.name or str(file), report_rows(mechanism, steps, fluctuation))
+
+
+@app.command()
 def plot(
     file: File,
     out: Annotated[Path, typer.Option("--out", help="Folder, or a .png, .svg or .pdf file of one plot.")],
@@ -340,17 +355,24 @@ def _summary(result: xr.Dataset) -> None:
     """The short table of an analysis, and its findings."""
     import json
 
+    _table(f"{result.attrs['name']}\n{result.attrs['formula']}", json.loads(result.attrs["summary"]))
+    _say(_findings(result))
+
+
+def _table(title: str, rows: list[dict[str, Any]]) -> None:
+    """Figures with label, value and unit; a value may be a text."""
     from rich.table import Table
 
-    table = Table(title=f"{result.attrs['name']}\n{result.attrs['formula']}", title_justify="left", show_edge=False)
+    table = Table(title=title, title_justify="left", show_edge=False)
     table.add_column("")
     table.add_column("value", justify="right")
     table.add_column("unit")
-    for row in json.loads(result.attrs["summary"]):
-        value = "no answer" if row["value"] is None else f"{row['value'] + 0.0:.6g}"  # + 0.0: no negative zero
+    for row in rows:
+        value = row["value"]
+        if not isinstance(value, str):
+            value = "no answer" if value is None else f"{value + 0.0:.6g}"  # + 0.0: no negative zero
         table.add_row(row["label"], value, "" if row["unit"] == "1" else row["unit"])
     _console().print(table, markup=False, highlight=False)
-    _say(_findings(result))
 
 
 def _say(findings: Any) -> None:

@@ -1,0 +1,390 @@
+"""What a designer also asks of a planar linkage: does it transmit well, where does it turn back, how does it shake.
+
+Everything is read off one run over the cycle: the poses of the dyads, the twists of the links, the efforts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.analysis.analyse import Run, prepare
+from trunnion.analysis.kinematics import Forward, forward
+from trunnion.analysis.kinetostatics import Backward
+from trunnion.errors import Finding, MechanismError
+from trunnion.groups import rpr, rrp, rrr
+from trunnion.model.mechanism import Mechanism
+
+__all__ = [
+    "Counterweight",
+    "Design",
+    "all_instant_centres",
+    "counterweights",
+    "curvature",
+    "dead_centres",
+    "design",
+    "grashof",
+    "instant_centre",
+    "limits",
+    "report_rows",
+    "shaking",
+    "transmission_angles",
+]
+
+Array = NDArray[np.float64]
+
+ROOT_TOLERANCE = 1e-12  # of the cycle, to which times of dead centres and limits are found
+
+
+@dataclass(frozen=True)
+class Counterweight:
+    """Mass times place (kg m, in the link's frame) to add to a link that turns about the ground."""
+
+    link: str
+    x: float
+    y: float
+
+
+@dataclass(frozen=True)
+class Design:
+    """Figures of a linkage over its cycle; angles in rad, SI.
+
+    transmission_angle: least of each dyad, folded into 0 … π/2 (π/2 is best); dead_centres: of each link that
+    turns about the ground or slides on it, the drive coordinates where it turns back; limits: drive coordinates
+    between which the linkage can be assembled; shaking_force, shaking_moment (about the ground's origin): largest
+    that inertia puts on the frame; rms_effort, peak_power: of the first driver; energy_swing: largest change of
+    its energy about the mean, J; grashof: type of a four-bar, empty if it is none.
+    """
+
+    grashof: str
+    transmission_angle: dict[str, float]
+    dead_centres: dict[str, tuple[float, ...]]
+    limits: tuple[tuple[float, float], ...]
+    shaking_force: float
+    shaking_moment: float
+    rms_effort: float
+    peak_power: float
+    mean_power: float
+    energy_swing: float
+    mean_speed: float
+
+    def flywheel(self, fluctuation: float) -> float:
+        """Inertia on the drive shaft, kg m², that keeps its speed within mean · (1 ± fluctuation/2).
+
+        J = ΔE / (δ ω²): the energy swing over the coefficient of fluctuation and the mean speed squared.
+        Source: any textbook of machine theory, e.g. R. L. Norton, Design of Machinery, "Flywheels".
+        """
+        if not fluctuation > 0:
+            raise MechanismError(Finding(f"a fluctuation of {fluctuation:g} needs no end of inertia", "fluctuation"))
+        return self.energy_swing / (fluctuation * self.mean_speed**2)
+
+
+def design(mechanism: Mechanism, steps: int = 720) -> Design:
+    """The figures of `Design` over `steps` positions of the cycle."""
+    run = prepare(mechanism)
+    time = run.cycle.times(steps)
+    back = run.solve(time)
+    walk = back.walk
+    force, moment = shaking(back)
+    driver = next(iter(mechanism.drivers), "")
+    effort = np.broadcast_to(back.efforts[driver], time.shape) if driver else np.zeros(steps)
+    rate = np.broadcast_to(run.system.drive(run.values, driver, time)[1], time.shape) if driver else np.zeros(steps)
+    power = effort * rate
+    swing = np.cumsum(power - np.mean(power)) * (time[1] - time[0] if steps > 1 else 0.0)
+    return Design(
+        grashof(mechanism, run),
+        {name: _least(np.broadcast_to(angle, time.shape)) for name, angle in transmission_angles(walk).items()},
+        dead_centres(run, steps),
+        limits(run, steps),
+        _largest(np.hypot(*force)),
+        _largest(moment),
+        float(np.sqrt(np.mean(effort**2))),
+        _largest(power),
+        float(np.mean(power)),
+        float(np.max(swing) - np.min(swing)),
+        float(np.mean(rate)),
+    )
+
+
+def _least(values: Array) -> float:
+    return float(np.nanmin(values)) if np.any(np.isfinite(values)) else float("nan")
+
+
+def _largest(values: Array) -> float:
+    return float(np.nanmax(np.abs(values))) if np.any(np.isfinite(values)) else float("nan")
+
+
+def transmission_angles(walk: Forward) -> dict[str, Array]:
+    """Transmission angle of every dyad along the walk, rad in 0 … π/2, by its joints' names.
+
+    RRR: between the two links at their common pin; RRP: between the rod and the normal of the guide's path, so
+    that π/2 less the pressure angle; RPR: between the line of the outer pins and the normal of the slide.
+    """
+    found: dict[str, Array] = {}
+    with np.errstate(all="ignore"):
+        for module, pose in zip(walk.system.plan.modules, walk.poses, strict=True):
+            name = "-".join(module.joints)
+            if isinstance(pose, rrr.Pose):
+                sine = np.abs(1 / (pose.area * pose.lengths[0] * pose.lengths[1]))
+                found[name] = np.arctan2(sine, np.abs(_dot(pose.bc, pose.dc)) / (pose.lengths[0] * pose.lengths[1]))
+            elif isinstance(pose, rrp.Pose):
+                found[name] = np.arctan2(np.abs(pose.r), np.abs(pose.p))
+            elif isinstance(pose, rpr.Pose):
+                found[name] = np.arctan2(np.abs(pose.along), np.abs(pose.offset))
+    return found
+
+
+def _dot(a: tuple[Array, Array], b: tuple[Array, Array]) -> Array:
+    return a[0] * b[0] + a[1] * b[1]
+
+
+def shaking(back: Backward) -> tuple[tuple[Array, Array], Array]:
+    """Force (x, y), N, and moment about the ground's origin, N m, that inertia and weightless links put on the frame.
+
+    −Σ m a of all mass centres, and −Σ (r × m a + J α): what the foundation feels of the motion alone.
+    """
+    walk, values = back.walk, back.walk.values
+    shape = np.shape(back.walk.motions[walk.system.mechanism.fixed_link].twist.w)
+    x, y, turn = np.zeros(shape), np.zeros(shape), np.zeros(shape)
+    for name, link in walk.system.mechanism.links.items():
+        if name == walk.system.mechanism.fixed_link:
+            continue
+        mass, inertia = values[f"links.{name}.mass"], values[f"links.{name}.inertia"]
+        local = walk.system.centre(values, name)
+        if link.inertia_about == "origin":
+            inertia = inertia - mass * (local[0] ** 2 + local[1] ** 2)
+        centre = walk.local_point(name, *local)
+        fx, fy = -mass * centre.acceleration[0], -mass * centre.acceleration[1]
+        x, y = x + fx, y + fy
+        alpha = walk.motions[name].acceleration.w
+        turn = turn + centre.place[0] * fy - centre.place[1] * fx - inertia * alpha
+    return (x, y), turn
+
+
+def instant_centre(walk: Forward, first: str, second: str) -> tuple[Array, Array]:
+    """Point (x, y), m, where two links have the same velocity; at infinity (±inf or NaN) where they turn alike."""
+    one, two = walk.motions[first], walk.motions[second]
+    w = two.twist.w - one.twist.w
+    # velocities at the origin of the drawing: v − ω × place
+    x1, y1 = one.twist.x + one.twist.w * one.frame.y, one.twist.y - one.twist.w * one.frame.x
+    x2, y2 = two.twist.x + two.twist.w * two.frame.y, two.twist.y - two.twist.w * two.frame.x
+    with np.errstate(all="ignore"):
+        return -(y2 - y1) / w, (x2 - x1) / w
+
+
+def curvature(walk: Forward, link: str, point: str) -> Array:
+    """Curvature of the path of a point, 1/m: (v × a)/|v|³, positive where it bends to the left."""
+    motion = walk.point(link, point)
+    (vx, vy), (ax, ay) = motion.velocity, motion.acceleration
+    with np.errstate(all="ignore"):
+        return np.asarray((vx * ay - vy * ax) / np.hypot(vx, vy) ** 3, float)
+
+
+def grashof(mechanism: Mechanism, run: Run | None = None) -> str:
+    """Type of a four-bar by Grashof's rule; empty for any other linkage.
+
+    With s shortest, l longest, p, q the others: s + l < p + q lets a link turn fully; which one depends on where the
+    shortest link is.
+    """
+    run = run or prepare(mechanism)
+    kinds = [module.kind for module in run.system.plan.modules]
+    if kinds != ["R", "RRR"]:
+        return ""
+    driver, dyad = run.system.plan.modules
+    local = run.system.elements(run.values)
+    ground, crank = mechanism.fixed_link, driver.links[0]
+    a = driver.joints[0]
+    b, c, d = dyad.joints
+    if crank not in run.system.joints[b][1]:
+        b, d = d, b
+    if crank not in run.system.joints[b][1] or ground not in run.system.joints[d][1]:
+        return ""
+    coupler = next(link for link in run.system.joints[b][1] if link != crank)
+    rocker = next(link for link in run.system.joints[d][1] if link != ground)
+
+    def span(link: str, one: str, two: str) -> float:
+        p, q = local[link, one], local[link, two]
+        return float(np.hypot(p.x - q.x, p.y - q.y))
+
+    sides = {
+        "ground": span(ground, a, d),
+        "input": span(crank, a, b),
+        "coupler": span(coupler, b, c),
+        "output": span(rocker, c, d),
+    }
+    lengths = sorted(sides.values())
+    margin = lengths[1] + lengths[2] - lengths[0] - lengths[3]
+    if abs(margin) <= 1e-12 * lengths[3]:
+        return "change point"
+    if margin < 0:
+        return "triple rocker"
+    shortest = min(sides, key=sides.__getitem__)
+    return {
+        "ground": "double crank",
+        "input": "crank-rocker",
+        "coupler": "double rocker",
+        "output": "rocker-crank",
+    }[shortest]
+
+
+def dead_centres(run: Run, steps: int = 720) -> dict[str, tuple[float, ...]]:
+    """Drive coordinates (rad, m) at which each link on the ground turns back; times (s) without a driver."""
+    system = run.system
+    time = np.append(run.cycle.times(steps), run.cycle.duration) if run.cycle.periodic else run.cycle.times(steps)
+    found: dict[str, tuple[float, ...]] = {}
+    for name, (kind, links) in system.joints.items():
+        if system.mechanism.fixed_link not in links or name in system.mechanism.drivers:
+            continue
+
+        def speed(moment: Array, joint: str = name, slides: bool = kind == "prismatic") -> Array:
+            motion = forward(system, run.values, run.chosen.assembly, moment)
+            first, second = system.joints[joint][1]
+            if not slides:
+                return np.asarray(motion.motions[second].twist.w - motion.motions[first].twist.w, float)
+            axis = motion.element(first, joint)
+            one, two = motion.twist(first, joint), motion.twist(second, joint)
+            return np.asarray(axis.c * (two.x - one.x) + axis.s * (two.y - one.y), float)
+
+        values = np.broadcast_to(speed(time), time.shape)
+        turning = np.flatnonzero(values[:-1] * values[1:] < 0)
+        exact = time[:-1][values[:-1] == 0] if np.any(np.abs(values) > 0) else []  # a link at rest never turns back
+        roots = [_root(speed, time[k], time[k + 1]) for k in turning]
+        found[name] = tuple(sorted({round(_coordinate(run, moment), 14) for moment in [*roots, *exact]}))
+    return found
+
+
+def _root(function: Callable[[Array], Array], low: float, high: float) -> float:
+    """Zero of a function that changes sign in an interval."""
+    from scipy.optimize import brentq
+
+    return float(brentq(lambda t: float(np.ravel(function(np.array([t])))[0]), low, high, xtol=1e-15, rtol=1e-15))
+
+
+def _coordinate(run: Run, moment: float) -> float:
+    """Coordinate of the first driver at a time; the time itself if there is none."""
+    driver = next(iter(run.system.mechanism.drivers), "")
+    return float(run.system.drive(run.values, driver, moment)[0]) if driver else moment
+
+
+def limits(run: Run, steps: int = 720) -> tuple[tuple[float, float], ...]:
+    """Intervals of the drive coordinate (rad, m) over which the linkage can be assembled, ends found by bisection."""
+    time = run.cycle.times(steps)
+    if run.cycle.periodic:
+        time = np.append(time, run.cycle.duration)
+
+    def closed(moments: Array) -> NDArray[np.bool_]:
+        walk = forward(run.system, run.values, run.chosen.assembly, moments)
+        good = np.ones(np.shape(moments), bool)
+        for motion in walk.motions.values():
+            good &= np.isfinite(np.broadcast_to(motion.frame.x + motion.frame.c, good.shape))
+        return good
+
+    good = closed(time)
+    found = []
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], good, [False]]).astype(int)))
+    for first, after in zip(edges[::2], edges[1::2], strict=True):
+        low = time[first] if first == 0 else _edge(closed, time[first], time[first - 1])
+        high = time[after - 1] if after == len(time) else _edge(closed, time[after - 1], time[after])
+        found.append((_coordinate(run, low), _coordinate(run, high)))
+    return tuple(found)
+
+
+def _edge(closed: Callable[[Array], NDArray[np.bool_]], inside: float, outside: float) -> float:
+    """The last time that can be assembled between one that can and one that cannot."""
+    while abs(outside - inside) > ROOT_TOLERANCE * max(abs(inside), abs(outside)):
+        middle = (inside + outside) / 2
+        if middle in (inside, outside):
+            break
+        if closed(np.array([middle]))[0]:
+            inside = middle
+        else:
+            outside = middle
+    return inside
+
+
+def counterweights(run: Run, steps: int = 90) -> tuple[tuple[Counterweight, ...], float]:
+    """Counterweights on the links that turn about the ground that best cancel the shaking force, and what is left.
+
+    The momentum of the counterweight with mass times place p on link i is ω_i z × R_i p: linear in p. p is found so
+    that the total momentum is nearest to constant over the cycle (least squares). The second number is the share of the
+    RMS shaking force that remains: 0 to rounding for a four-bar of revolute pairs (Berkof and Lowen 1969).
+    Raises MechanismError if no link turns about the ground.
+    """
+    system, time = run.system, run.cycle.times(steps)
+    back = run.solve(time)
+    walk, ground = back.walk, system.mechanism.fixed_link
+    turning = [
+        next(link for link in links if link != ground)
+        for kind, links in system.joints.values()
+        if kind == "revolute" and ground in links
+    ]
+    if not turning:
+        raise MechanismError(Finding("no link turns about the ground", "joints", "counterweights need one that does"))
+    columns = []
+    for link in turning:
+        frame, w = walk.motions[link].frame, walk.motions[link].twist.w
+        alpha = walk.motions[link].acceleration.w
+        for c, s in ((frame.c, frame.s), (-frame.s, frame.c)):  # R p for the unit vectors p = x, p = y
+            # acceleration of the place: α × r − ω² r
+            columns.append(np.concatenate([_full(-alpha * s - w * w * c, time), _full(alpha * c - w * w * s, time)]))
+    force = np.concatenate([_full(part, time) for part in shaking(back)[0]])
+    matrix = np.array(columns).T
+    solution, *_ = np.linalg.lstsq(matrix, force, rcond=None)
+    left = np.linalg.norm(force - matrix @ solution) / max(float(np.linalg.norm(force)), 1e-300)
+    weights = tuple(
+        Counterweight(link, float(solution[2 * i]), float(solution[2 * i + 1])) for i, link in enumerate(turning)
+    )
+    return weights, float(left)
+
+
+def _full(values: Array, time: Array) -> Array:
+    return np.broadcast_to(values, time.shape)
+
+
+def all_instant_centres(walk: Forward) -> dict[tuple[str, str], tuple[Array, Array]]:
+    """Instant centres of every pair of links: n (n − 1)/2 of them."""
+    return {(a, b): instant_centre(walk, a, b) for a, b in combinations(walk.system.mechanism.links, 2)}
+
+
+def report_rows(mechanism: Mechanism, steps: int = 720, fluctuation: float = 0.05) -> list[dict[str, Any]]:
+    """The figures as rows with label, value (number, text or None) and unit, as a table shows them."""
+    run = prepare(mechanism)
+    found = design(mechanism, steps)
+    driver = next(iter(mechanism.drivers), "")
+    turns = not driver or run.system.joints[driver][0] == "revolute"
+    unit, scale = ("°", 180 / np.pi) if turns else ("mm", 1e3)
+    rows: list[dict[str, Any]] = []
+
+    def row(label: str, value: float | str, unit: str = "1") -> None:
+        told = value if isinstance(value, str) or np.isfinite(value) else None
+        rows.append({"label": label, "value": told, "unit": unit})
+
+    if found.grashof:
+        row("four-bar type (Grashof)", found.grashof)
+    for name, angle in found.transmission_angle.items():
+        row(f"transmission angle of {name}, least", angle * 180 / np.pi, "°")
+    for name, places in found.dead_centres.items():
+        if places:
+            row(f"{name} turns back at", ", ".join(f"{place * scale:.8g}" for place in places), f"{unit} of {driver}")
+    told = ", ".join(f"{low * scale:.8g} … {high * scale:.8g}" for low, high in found.limits)
+    row("can be assembled over", told or "no position", f"{unit} of {driver}" if driver else "")
+    row("shaking force, largest", found.shaking_force, "N")
+    row("shaking moment about the ground's origin, largest", found.shaking_moment, "N m")
+    row("drive effort, RMS", found.rms_effort, "N m" if turns else "N")
+    row("drive power, largest", found.peak_power, "W")
+    row("drive power, mean", found.mean_power, "W")
+    row("energy swing about the mean", found.energy_swing, "J")
+    if turns and driver and run.cycle.periodic:
+        row(f"flywheel for a fluctuation of {fluctuation:g}", found.flywheel(fluctuation), "kg m^2")
+    if any(kind == "revolute" and mechanism.fixed_link in links for kind, links in run.system.joints.values()):
+        weights, left = counterweights(run)
+        for weight in weights:
+            place = f"({weight.x:.5g}, {weight.y:.5g})"
+            row(f"counterweight on {weight.link}, mass × place in its frame", place, "kg m")
+        row("shaking force left with these", left if left > 1e-12 else 0.0, "of its RMS")
+    return rows

@@ -9,7 +9,6 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import click
 import typer
 
 from trunnion import __version__
@@ -31,6 +30,8 @@ app = typer.Typer(
 )
 
 PLOT_KINDS = "torque, friction-power, reactions, polar, power, mechanism or motion"  # views.plots.PLOTS, not loaded yet
+
+INTERRUPTED = 130  # exit status after Ctrl-C
 
 File = Annotated[Path, typer.Argument(help="Model file: YAML, JSON or TOML.", show_default=False)]
 Steps = Annotated[int, typer.Option("--steps", help="Equally spaced positions over the turn or range.")]
@@ -256,17 +257,16 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):  # names may be Greek whatever the terminal's code page is
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(encoding="utf-8", errors="replace")
+    code: Any = 0
     try:
-        code = app(standalone_mode=False)
+        app()
+    except SystemExit as stop:  # typer's own end, of a usage error or of Ctrl-C too
+        code = stop.code
+        if code == INTERRUPTED:
+            print("stopped; a file named above as written is whole, no other was begun", file=sys.stderr)
     except MechanismError as error:
         _say(error.findings)
         code = 2
-    except click.ClickException as error:
-        error.show()
-        code = error.exit_code
-    except (KeyboardInterrupt, click.Abort):
-        print("stopped; a file named above as written is whole, no other was begun", file=sys.stderr)
-        code = 130
     except MemoryError:
         print("error: not enough memory — use fewer --steps", file=sys.stderr)
         code = 2

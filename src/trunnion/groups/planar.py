@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from trunnion.algebra.namespace import Number
+from trunnion.algebra.namespace import Number, namespace
 
 __all__ = [
     "ZERO_LOAD",
@@ -25,10 +25,14 @@ __all__ = [
     "pinned",
     "point",
     "relative",
+    "root",
     "scaled",
     "shifted",
     "turned",
 ]
+
+
+ROUNDING = 1e-15  # of the terms of a difference: a few units in the last place
 
 
 class Frame(NamedTuple):
@@ -114,6 +118,15 @@ def pinned(
     c, s = turned(side[0] / square, -side[1] / square, *reach)
     arm = turned(c, s, local.x, local.y)
     return Frame(pin.x - arm[0], pin.y - arm[1], c, s), arm
+
+
+def root(square: Number, scale: Number) -> Number:
+    """√square, where a dead centre makes it 0: what rounding leaves below 0, of the terms `scale`, counts as 0.
+
+    Anything further below is NaN: there is no position.
+    """
+    xp = namespace(square, scale)
+    return xp.sqrt(xp.where((square < 0) & (square > -ROUNDING * scale), 0.0, square))
 
 
 def shifted(frame: Frame, direction: tuple[Number, Number], by: Number) -> Frame:

@@ -59,4 +59,4 @@ class Group(Protocol):
         """Largest distance by which a joint is open, m."""
 
     def condition(self, pose: Any) -> Number:
-        """Frobenius condition number of the group's Jacobian; it grows without bound at a dead centre."""
+        """Condition of the group's Jacobian (Frobenius, times 2/n: 2 at best); without bound at a dead centre."""

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from trunnion.algebra.linalg import Vector
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.groups.planar import Acceleration, Frame, Twist, Wrench, about, accelerated, moved, relative, turned
+from trunnion.groups.planar import Acceleration, Frame, Twist, Wrench, about, accelerated, moved, relative, root, turned
 from trunnion.groups.protocol import Elements
 
 __all__ = ["BRANCHES", "Pose", "acceleration", "closure", "condition", "position", "reactions", "velocity"]
@@ -48,7 +48,7 @@ def position(elements: Elements, assembly: int, drive: Sequence[Number] = ()) ->
     x, y = d.x - b.x, d.y - b.y
     square = x * x + y * y
     xp = namespace(square, offset)
-    along = assembly * xp.sqrt(square - offset * offset)
+    along = assembly * root(square - offset * offset, square)
     u = ((along * x + offset * y) / square, (along * y - offset * x) / square)
     to_b, to_d = turned(*u, b_along, b_across), turned(*u, d_along, d_across)
     frame_i = relative(Frame(b.x - to_b[0], b.y - to_b[1], *u), c_i)

@@ -25,6 +25,7 @@ from trunnion.groups.planar import (
     moved,
     pinned,
     relative,
+    root,
     turned,
 )
 from trunnion.groups.protocol import Elements
@@ -63,7 +64,7 @@ def position(elements: Elements, assembly: int, drive: Sequence[Number] = ()) ->
     p = u[0] * (at_rest.y - b.y) - u[1] * (at_rest.x - b.x)
     xp = namespace(p, *side)
     square = side[0] * side[0] + side[1] * side[1]
-    r = assembly * xp.sqrt(square - p * p)
+    r = assembly * root(square - p * p, square)
     bc = (r * u[0] - p * u[1], r * u[1] + p * u[0])
     frame_i, arm_b = pinned(b, b_i, bc, side, square)
     shift = (b.x + bc[0] - at_rest.x, b.y + bc[1] - at_rest.y)

@@ -13,7 +13,7 @@ from typing import NamedTuple, TypeVar
 
 from trunnion.algebra.linalg import Vector, cross, dot
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.groups.planar import Acceleration, Frame, Twist, Wrench, about, accelerated, is_zero, moved, pinned
+from trunnion.groups.planar import Acceleration, Frame, Twist, Wrench, about, accelerated, is_zero, moved, pinned, root
 from trunnion.groups.protocol import Elements
 
 __all__ = ["BRANCHES", "Pose", "acceleration", "closure", "condition", "meet", "position", "reactions", "velocity"]
@@ -44,11 +44,11 @@ def meet(b: Vector, d: Vector, bc: Number, cd: Number, branch: int) -> Vector:
     |C − B| = bc, |C − D| = cd; branch +1 puts C left of B→D, −1 right of it.  [D fig. 5]
     b, d: (x, y) m; bc, cd: m; all broadcast over (sample, position). NaN where the circles do not meet.
     """
-    xp = namespace(*b, *d, bc, cd)
     x, y = d[0] - b[0], d[1] - b[1]
     square = x * x + y * y
     along = (square + (bc - cd) * (bc + cd)) / (2 * square)
-    across = branch * xp.sqrt(bc * bc / square - along * along)
+    reach = bc * bc / square
+    across = branch * root(reach - along * along, reach)
     return along * x - across * y, along * y + across * x
 
 

@@ -201,6 +201,25 @@ def laws_table() -> str:
     return "\n".join(parts)
 
 
+def motion_table() -> str:
+    """Every motion law of a driver."""
+    from trunnion.joints.motion import MOTION_LAWS
+
+    rows = [
+        (
+            _code(name),
+            ", ".join(_code(key) for key in law.needs),
+            ", ".join(_code(key) for key in law.takes),
+            f"{law.peak_rate:.4f}, {law.peak_second:.4f}" if law.profile else "",
+            law.validity,
+            law.source,
+        )
+        for name, law in MOTION_LAWS.items()
+    ]
+    head = ("`law`", "needs", "takes", "peak of s′, s″", "validity", "source")
+    return _rows(head, rows)
+
+
 def pairs_table() -> str:
     """Every pair that the analysis knows."""
     from trunnion.joints.pairs import PAIRS
@@ -386,6 +405,7 @@ TABLES: dict[str, Callable[..., str]] = {
     "results": results_table,
     "statuses": status_table,
     "laws": laws_table,
+    "motion": motion_table,
     "pairs": pairs_table,
     "groups": groups_table,
     "plots": plots_table,

@@ -75,8 +75,9 @@ class Status(IntEnum):
     NEAR_SINGULAR = 2, "close to a singular position: forces and speeds are very sensitive to the dimensions"
     NOT_CONVERGED = 3, "the friction iteration did not converge"
     LOCKED = 4, "locked by friction: no drive effort moves the mechanism"
-    SINGULAR = 5, "singular position (dead centre): speeds and forces have no finite value"
-    NOT_ASSEMBLED = 6, "cannot be assembled"
+    LOAD_UNDEFINED = 5, "a load or spring has no value: outside its table, a division by zero, a length of zero"
+    SINGULAR = 6, "singular position (dead centre): speeds and forces have no finite value"
+    NOT_ASSEMBLED = 7, "cannot be assembled"
 
     @property
     def solved(self) -> bool:

@@ -58,6 +58,12 @@ def columns(result: xr.Dataset) -> list[Column]:
         for end in ("lower", "upper"):
             _, _, values = _column(result, f"drive_effort_{end}", "", (i,))
             found.append((f"{driver}.effort_{end}", unit, values))
+    for i, spring in enumerate(result["spring"].values if "spring" in result.dims else ()):
+        for variable, unit in zip(("force", "elongation"), json.loads(result.attrs["spring_units"])[i], strict=True):
+            name, _, values = _column(result, f"spring_{variable}", f"{spring}.{variable}", (i,))
+            found.append((name, unit, values))
+        found.append(_column(result, "spring_power", f"{spring}.spring_power", (i,)))
+        found.append(_column(result, "damping_power", f"{spring}.damping_power", (i,)))
     for i, link in enumerate(result["link"].values):
         for variable in ("link_angle", "link_angle_velocity", "link_angle_acceleration"):
             found.append(_column(result, variable, f"{link}.{variable.removeprefix('link_')}", (i,)))

@@ -1,6 +1,7 @@
 """Results with names, units, long names and provenance, put on once.
 
-`VARIABLES` is the whole vocabulary. Dims: position last; joint, link, point ("link.point"), axis (x, y), driver.
+`VARIABLES` is the whole vocabulary. Dims: position last; joint, link, point ("link.point"), axis (x, y), driver,
+spring (only of a mechanism that has any).
 """
 
 from __future__ import annotations
@@ -52,6 +53,10 @@ VARIABLES: dict[str, Variable] = {
     "drive_effort_lower": Variable(("driver",), "N m", "least drive effort where a friction is an interval"),
     "drive_effort_upper": Variable(("driver",), "N m", "largest drive effort where a friction is an interval"),
     "drive_power": Variable(("driver",), "W", "power of the driver"),
+    "spring_force": Variable(("spring",), "N", "pull of the spring and its damper; N m in a joint that turns"),
+    "spring_elongation": Variable(("spring",), "m", "length beyond the free length; angle, rad, in a joint that turns"),
+    "spring_power": Variable(("spring",), "W", "power that the spring and its damper give the mechanism"),
+    "damping_power": Variable(("spring",), "W", "power lost in the spring's damper"),
     "useful_power": Variable((), "W", "power taken by the useful loads"),
     "efficiency_instant": Variable((), "1", "useful power over drive power"),
     "closure_residual": Variable((), "m", "largest opening of a closed loop"),
@@ -74,7 +79,7 @@ def allocate(labels: Labels, positions: int, absent: Sequence[str] = ()) -> dict
     """Arrays for every variable, to be filled, position last; those in `absent` are zero and take no memory."""
     arrays: dict[str, NDArray[np.float64]] = {}
     for name, variable in VARIABLES.items():
-        if name in SAME_AS:
+        if name in SAME_AS or not labels.keys() >= set(variable.dims):  # no springs, no spring_force
             continue
         shape = (*(len(labels[dim]) for dim in variable.dims), positions)
         if name in absent:

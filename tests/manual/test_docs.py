@@ -68,9 +68,8 @@ def files() -> dict[str, str]:
 
 @pytest.fixture
 def place(tmp_path: Path, files: dict[str, str], monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The folder a page is worked through in: the examples, the titled blocks, and an example copied to models/."""
+    """The folder a page is worked through in, with the examples and the titled blocks."""
     shutil.copytree(ROOT / "examples", tmp_path / "examples")
-    (tmp_path / "models").mkdir()
     for name, text in files.items():
         (tmp_path / name).write_text(text, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
@@ -212,6 +211,24 @@ def test_every_table_is_placed() -> None:
         for found in re.findall(r"<!-- generated: (.+?) -->", page.read_text("utf-8"))
     ]
     assert set(places) == set(hooks.TABLES)
+
+
+def test_theory_tells_every_friction_law() -> None:
+    """The table of the friction laws has a row for each."""
+    from trunnion.joints.friction import FRICTION_LAWS
+
+    text = (ROOT / "docs" / "theory" / "friction.md").read_text("utf-8")
+    assert re.findall(r"^\| `([a-z-]+)`", text, re.MULTILINE) == list(FRICTION_LAWS)
+
+
+def test_changelog_names_the_verbs() -> None:
+    """The verbs that the changelog lists are those of the command line."""
+    from trunnion.cli import app
+
+    found = re.search(r"Command line: (.+?)\.\n", (ROOT / "CHANGELOG.md").read_text("utf-8"), re.DOTALL)
+    assert found
+    verbs = [command.name or getattr(command.callback, "__name__", "") for command in app.registered_commands]
+    assert sorted(re.findall(r"`(\w+)`", found[1])) == sorted(verbs)
 
 
 def test_readme_names_the_closed_forms() -> None:

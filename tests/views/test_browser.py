@@ -46,6 +46,17 @@ if NODE:  # not a skip: what must hold everywhere is tested in Python; this is t
         shown = page(plain, tmp_path)
         assert (shown["loads"], shown["moments"]) == (2, 1)
 
+    def test_springs_and_following_forces_are_drawn(tmp_path):
+        result = four_bar(36)
+        stated = json.loads(result.attrs["scene"])
+        stated["springs"] = {"S": {"between": ["ground.A", "coupler.E"], "joint": None}}
+        stated["loads"]["work"] |= {"frame": "link", "varies": True}
+        result.attrs["scene"] = json.dumps(stated)
+        shown = page(result, tmp_path)
+        assert shown["loads"] == 2
+        assert len(shown["springs"]) == 1
+        assert re.fullmatch(r"M[-\d.,]+(L[-\d.]+,[-\d.]+)+", shown["springs"][0])
+
     def test_locked_everywhere_is_said_in_the_charts(tmp_path):
         assert page(four_bar(36, gap=(0, 36, Status.LOCKED)), tmp_path)["silent"] >= 3
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,7 +13,9 @@ from trunnion import __version__, results
 from trunnion.algebra.namespace import Number
 from trunnion.analysis import diagnosis
 from trunnion.analysis.friction import FrictionMethod
+from trunnion.analysis.kinematics import start
 from trunnion.analysis.kinetostatics import Backward
+from trunnion.analysis.loads import Stated
 from trunnion.analysis.system import Cycle, Dial, System, rubbing
 from trunnion.errors import Finding, Severity, Status
 from trunnion.joints.friction import FRICTION_LAWS
@@ -29,6 +31,7 @@ if TYPE_CHECKING:
 
 __all__ = ["MARGIN", "fill_power", "finish"]
 
+DRAWN = 360  # positions at which a load that varies is looked at for the drawing
 MARGIN = 10.0  # multiple of the friction up to which the locking margin is looked for
 
 Arrays = Mapping[str, NDArray[np.float64]]
@@ -46,8 +49,10 @@ def useful_loads(mechanism: Mechanism) -> list[str]:
     return marked or list(mechanism.loads)
 
 
-def fill_power(arrays: dict[str, NDArray[np.float64]], back: Backward, window: slice) -> None:
-    """Power of drivers, loads and friction, and what is left over: drive + loads + inertia and gravity − friction."""
+def fill_power(
+    arrays: dict[str, NDArray[np.float64]], back: Backward, time: NDArray[np.float64], window: slice
+) -> None:
+    """Power of drivers, loads, springs and friction, and what is left over: their sum with inertia and gravity."""
     walk = back.walk
     total: Number = back.body_power
     for power in back.load_powers.values():
@@ -56,9 +61,13 @@ def fill_power(arrays: dict[str, NDArray[np.float64]], back: Backward, window: s
         lost = -(back.friction[name] * back.slips[name].speed)
         arrays["friction_power"][i, window] = lost
         total = total - lost
+    for i, state in enumerate(back.springs.values()):
+        arrays["spring_power"][i, window] = state.power
+        arrays["damping_power"][i, window] = state.loss
+        total = total + state.power
     driven: Number = 0.0
     for i, name in enumerate(walk.system.mechanism.drivers):
-        power = back.efforts[name] * walk.values[f"drivers.{name}.speed"]
+        power = back.efforts[name] * walk.system.drive(walk.values, name, time)[1]
         arrays["drive_power"][i, window] = power
         driven = driven + power
     useful: Number = 0.0
@@ -119,10 +128,11 @@ def finish(
         "flag_values": " ".join(str(int(code)) for code in Status),
         "flag_meanings": " ".join(code.name.lower() for code in Status),
         "driver_units": json.dumps(effort_units(run.system)),
+        "spring_units": json.dumps(spring_units(run.system)),
         "findings": json.dumps([_row(finding) for finding in found], ensure_ascii=False),
         "summary": json.dumps(_summary(run, arrays, value, time), ensure_ascii=False),
         "inputs": json.dumps(_inputs(mechanism), ensure_ascii=False),
-        "scene": json.dumps(_scene(run.system), ensure_ascii=False),
+        "scene": json.dumps(_scene(run), ensure_ascii=False),
         "periodic": int(run.cycle.periodic),
     }
     return results.dataset(arrays, labels, time, value, attributes)
@@ -131,6 +141,15 @@ def finish(
 def effort_units(system: System) -> list[str]:
     """Unit of every driver's effort."""
     return ["N m" if system.joints[name][0] == "revolute" else "N" for name in system.mechanism.drivers]
+
+
+def spring_units(system: System) -> list[list[str]]:
+    """Units of every spring's force and elongation."""
+    turns = [
+        spring.joint is not None and system.joints[spring.joint][0] == "revolute"
+        for spring in system.mechanism.springs.values()
+    ]
+    return [["N m", "rad"] if turn else ["N", "m"] for turn in turns]
 
 
 def _row(finding: Finding) -> dict[str, str]:
@@ -175,12 +194,31 @@ def _over_the_cycle(run: Run, arrays: Arrays, causes: diagnosis.Causes, time: ND
     found = diagnosis.findings(
         causes, run.system.dial(run.values, time), arrays["status"], arrays["condition"], efforts
     )
-    drivers = run.system.mechanism.drivers
-    if len(drivers) > 1 and not run.cycle.periodic and all(driver.range is None for driver in drivers.values()):
-        what = f"the drivers do not come back together; the cycle is the slowest one's turn, {run.cycle.duration:g} s"
+    spans = [run.system.span(run.values, name) for name in run.system.mechanism.drivers]
+    if len(spans) > 1 and not run.cycle.periodic and all(span.periodic for span in spans):
+        what = f"the drivers do not come back together; the cycle is the slowest one's period, {run.cycle.duration:g} s"
         remedy = "means and efficiency are of that time; choose speeds with a common period, or ranges"
         found.append(Finding(what, "drivers", remedy, Severity.WARNING))
-    return found
+    return [*found, *_loads_over_the_cycle(run, arrays, time)]
+
+
+def _loads_over_the_cycle(run: Run, arrays: Arrays, time: NDArray[np.float64]) -> Iterator[Finding]:
+    """What only the motion shows of a load or spring: a resistance that drives, a torsional spring that unwinds."""
+    walk, dial = start(run.system, run.values), run.system.dial(run.values, time)
+    walk.time = time
+    stated = Stated(walk)
+    for path, entry in run.system.mechanism.parameter_set.entries.items():
+        if entry.varies and entry.location[-1] in ("resisting_torque", "resisting_force"):
+            negative = np.flatnonzero(np.broadcast_to(np.asarray(stated.get(path)), time.shape) < 0)
+            if len(negative):
+                what = f"is negative {dial.intervals(negative)}: it drives the joint there"
+                yield Finding(what, path, "use max(0 N, …), or a load with a sign", Severity.WARNING)
+    for i, (name, spring) in enumerate(run.system.mechanism.springs.items()):
+        if spring.joint is not None and spring_units(run.system)[i][1] == "rad":
+            jumps = np.flatnonzero(np.abs(np.diff(arrays["spring_elongation"][i])) > np.pi)
+            if len(jumps):
+                what = f"turns through half a turn from its free angle at {dial.at(int(jumps[0]))} and jumps there"
+                yield Finding(what, f"springs.{name}", "no whole turns are counted in this joint", Severity.WARNING)
 
 
 def _references(mechanism: Mechanism) -> list[str]:
@@ -274,9 +312,8 @@ def _why(value: float, arrays: Arrays) -> str:
 def balance(arrays: Arrays) -> float:
     """Largest power residual over the largest power that any driver, or else any load, has."""
     residual = np.nanmax(np.abs(arrays["power_residual"]), initial=0.0)
-    powers = [
-        np.nanmax(np.abs(arrays[name]), initial=0.0) for name in ("drive_power", "useful_power", "friction_power")
-    ]
+    kinds = ("drive_power", "useful_power", "friction_power", "spring_power")
+    powers = [np.nanmax(np.abs(arrays[name]), initial=0.0) for name in kinds if name in arrays]
     return float(residual / max(powers)) if max(powers) > 0 else float(residual)
 
 
@@ -293,31 +330,58 @@ def _inputs(mechanism: Mechanism) -> list[dict[str, Any]]:
             unit = si_unit(dimensions[name])
         text = str(entry.quantity.source)
         if not entry.alias and text != "0":
-            rows.append({"path": path, "value": float(values[path]), "unit": unit, "text": text})
+            value = float(values[path]) if path in values else None  # an expression of the motion has many
+            rows.append({"path": path, "value": value, "unit": unit, "text": text})
     return rows
 
 
-def _scene(system: System) -> dict[str, Any]:
+def _scene(run: Run) -> dict[str, Any]:
     """What a drawing needs to know beside the positions of the points."""
-    mechanism, values = system.mechanism, system.mechanism.parameters()
+    system, values = run.system, run.values
+    mechanism = system.mechanism
     joints: dict[str, Any] = {}
     for name, (kind, links) in system.joints.items():
         joints[name] = {"type": kind, "links": list(links), "friction": name in rubbing(system)}
         if kind == "prismatic":
             axis = system.elements(values)[links[0], name]
             joints[name]["axis"] = [float(axis.c), float(axis.s)]
-    loads: dict[str, Any] = {}
-    useful = useful_loads(mechanism)
-    for name, load in mechanism.loads.items():
-        path = f"loads.{name}"
-        force = [float(values[f"{path}.force.{axis}"]) for axis in "xy"] if load.force else None
-        moment = float(values[f"{path}.moment"]) if f"{path}.moment" in values else None
-        loads[name] = {"link": load.link, "joint": load.joint, "at": load.at, "force": force, "moment": moment}
-        loads[name]["useful"] = name in useful
     return {
         "ground": mechanism.fixed_link,
         "links": {name: {"points": list(link.points)} for name, link in mechanism.links.items()},
         "joints": joints,
         "drivers": list(mechanism.drivers),
-        "loads": loads,
+        "loads": _loads_drawn(run),
+        "springs": {
+            name: {"between": spring.between and list(spring.between), "joint": spring.joint}
+            for name, spring in mechanism.springs.items()
+        },
     }
+
+
+def _loads_drawn(run: Run) -> dict[str, Any]:
+    """The loads as a drawing shows them; of one that varies, its largest value among DRAWN over the cycle."""
+    mechanism, walk = run.system.mechanism, start(run.system, run.values)
+    walk.time = run.cycle.times(DRAWN)
+    stated, useful = Stated(walk), useful_loads(mechanism)
+    found: dict[str, Any] = {}
+    for name, load in mechanism.loads.items():
+        path = f"loads.{name}"
+        force, moment = stated.vector(f"{path}.force"), stated.get(f"{path}.moment")
+        found[name] = {
+            "link": load.link,
+            "joint": load.joint,
+            "at": load.at,
+            "force": None if force is None else _largest(*force),
+            "moment": None if moment is None else _largest(moment)[0],
+            "frame": load.frame,
+            "varies": not run.values.keys() >= {p for p in mechanism.parameter_set.entries if p.startswith(f"{path}.")},
+            "useful": name in useful,
+        }
+    return found
+
+
+def _largest(*components: Number) -> list[float]:
+    """The components where the vector is longest; zeros if it never has a value."""
+    columns = np.broadcast_arrays(*(np.atleast_1d(one) for one in components))
+    size = np.nan_to_num(np.hypot.reduce(np.array(columns)) if len(columns) > 1 else np.abs(columns[0]))
+    return [float(np.nan_to_num(one[np.argmax(size)])) for one in columns]

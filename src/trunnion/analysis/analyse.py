@@ -97,7 +97,8 @@ def analyse(
 
 def _labels(system: System) -> dict[str, list[str]]:
     mechanism = system.mechanism
-    return {
+    springs = {"spring": list(mechanism.springs)} if mechanism.springs else {}
+    return springs | {
         "joint": list(system.joints),
         "link": list(mechanism.links),
         "point": [f"{link}.{point}" for link, point in system.points],
@@ -125,7 +126,7 @@ def _fill(arrays: Arrays, back: Backward, time: NDArray[np.float64], window: sli
     with np.errstate(all="ignore"):
         _fill_motion(arrays, back, time, window)
         _fill_forces(arrays, back, window)
-        account.fill_power(arrays, back, window)
+        account.fill_power(arrays, back, time, window)
     _blank(arrays, status, window)
 
 
@@ -149,6 +150,8 @@ def _status(back: Backward, shape: tuple[int, ...]) -> NDArray[np.int8]:
     for settled in back.settled:
         raise_to(Status.NOT_CONVERGED, ~np.asarray(settled.converged, bool))
         raise_to(Status.LOCKED, np.asarray(settled.share) < 1.0)
+    for undefined in back.undefined.values():
+        raise_to(Status.LOAD_UNDEFINED, undefined)
     raise_to(Status.SINGULAR, ~(condition <= SINGULAR))
     raise_to(Status.NOT_ASSEMBLED, ~np.asarray(placed))
     return status
@@ -206,6 +209,10 @@ def _fill_forces(arrays: Arrays, back: Backward, window: slice) -> None:
             arrays["friction_force"][i, window] = 0.0 if rotates else friction
     for i, name in enumerate(system.mechanism.drivers):
         arrays["drive_effort"][i, window] = back.efforts[name]
+    for i, name in enumerate(system.mechanism.springs):
+        state = back.springs[name]
+        for key, number in zip(("spring_force", "spring_elongation"), state[:2], strict=True):
+            arrays[key][i, window] = number
     settled = back.settled
     for key, field in (
         ("friction_iterations", "iterations"),
@@ -220,6 +227,7 @@ def _fill_forces(arrays: Arrays, back: Backward, window: slice) -> None:
 FORCES = [
     *("reaction_force", "reaction_moment", "friction_torque", "friction_force", "friction_power"),
     *("drive_effort", "drive_power", "power_residual", "friction_change", "friction_contraction"),
+    *("spring_force", "spring_power", "damping_power"),
 ]
 RATES = [name for name in results.VARIABLES if name.endswith(("_velocity", "_acceleration"))]
 
@@ -234,11 +242,11 @@ def _blank(arrays: Arrays, status: NDArray[np.int8], window: slice) -> None:
         (["useful_power", "efficiency_instant"], status >= Status.NOT_CONVERGED),
     ):
         for name in names:
-            if arrays[name].flags.writeable:
+            if name in arrays and arrays[name].flags.writeable:
                 arrays[name][..., window][..., where] = np.nan
     # a driver's own link is known where the rest is not; a whole position is either assembled or not
-    for name in ("point_position", "link_angle", "joint_slide", "closure_residual", "condition"):
-        if arrays[name].flags.writeable:
+    for name in ("point_position", "link_angle", "joint_slide", "spring_elongation", "closure_residual", "condition"):
+        if name in arrays and arrays[name].flags.writeable:
             arrays[name][..., window][..., status == Status.NOT_ASSEMBLED] = np.nan
 
 

@@ -76,27 +76,33 @@ class Track:
 
 
 class Clock(NamedTuple):
-    """The drive by which a track is read: its driver, and where and how fast that went in the nominal cycle.
+    """How a track is read: by a driver of constant speed, and where and how fast that went in the nominal cycle.
 
-    A run at another speed passes the same coordinates at other times.
+    A run at another speed passes the same coordinates at other times. Without such a driver (speed 0) it is read
+    by time, in shares of the cycle of the first.
     """
 
     driver: str
     start: float
     speed: float
+    duration: float
 
     @classmethod
     def of(cls, system: System, values: Values) -> Clock:
-        """The first driver's."""
-        for name in system.mechanism.drivers:
+        """The first driver's of constant speed, else the first one's."""
+        drivers = system.mechanism.drivers
+        for name in [*(name for name, one in drivers.items() if one.law == "constant"), *drivers]:
             start, speed, _ = (float(np.ravel(primal(n))[0]) for n in system.drive(values, name, 0.0))
-            return cls(name, start, speed)
-        return cls("", 0.0, 1.0)
+            duration = float(np.ravel(system.span(values, name).duration)[0])
+            return cls(name, start, speed if drivers[name].law == "constant" else 0.0, duration)
+        return cls("", 0.0, 0.0, 1.0)
 
     def nominal(self, walk: Forward, time: Number) -> Number:
         """The time at which the nominal cycle has the coordinate that this run has at `time`, s."""
         if not self.driver:
             return time
+        if not self.speed:
+            return time * (self.duration / walk.system.span(walk.values, self.driver).duration)
         return (walk.system.drive(walk.values, self.driver, time)[0] - self.start) / self.speed
 
 

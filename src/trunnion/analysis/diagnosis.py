@@ -34,6 +34,7 @@ class Causes:
     _open: list[_Open] = field(default_factory=list)
     _zero: dict[str, list[Positions]] = field(default_factory=dict)
     _locked: dict[int, list[tuple[Positions, NDArray[np.float64]]]] = field(default_factory=dict)
+    _undefined: dict[str, list[Positions]] = field(default_factory=dict)
 
     def note(self, back: Backward, status: NDArray[np.int8], offset: int) -> None:
         """Look at one chunk, whose first position has the number `offset`."""
@@ -43,6 +44,11 @@ class Causes:
             zero = np.broadcast_to(back.slips[name].zero, status.shape) & (status < Status.NOT_CONVERGED)
             if np.any(zero):
                 self._zero.setdefault(name, []).append(np.flatnonzero(zero) + offset)
+        if np.any(status == Status.LOAD_UNDEFINED):
+            for path, where in back.undefined.items():
+                bad = np.broadcast_to(where, status.shape) & (status == Status.LOAD_UNDEFINED)
+                if np.any(bad):
+                    self._undefined.setdefault(path, []).append(np.flatnonzero(bad) + offset)
         if np.any(status == Status.LOCKED):
             modules = reversed(range(len(back.settled)))  # settled from the last module to the first
             for number, settled in zip(modules, back.settled, strict=True):
@@ -70,6 +76,10 @@ class Causes:
     def zero_slip(self) -> dict[str, Positions]:
         """Positions at which the relative speed of a joint with friction is zero."""
         return {name: np.concatenate(parts) for name, parts in self._zero.items()}
+
+    def undefined(self) -> dict[str, Positions]:
+        """Positions at which a load or spring, by path, has no value."""
+        return {path: np.concatenate(parts) for path, parts in self._undefined.items()}
 
     def open_modules(self) -> dict[int, _Open]:
         """What each module that does not close everywhere said, over the whole cycle."""
@@ -101,6 +111,12 @@ def findings(
     if len(singular):
         what = f"dead centre (singular position) {dial.intervals(singular)}: condition {_most(condition[singular])}"
         found.append(Finding(what, "links", "speeds and forces have no finite value there; keep out of it"))
+    for path, positions in causes.undefined().items():
+        what = f"has no value {dial.intervals(positions)}"
+        remedy = "its line has no direction where its ends meet: move one"
+        if path.startswith("loads."):
+            remedy = "let its tables reach over the whole cycle, or be periodic; check divisions and roots"
+        found.append(Finding(what, path, remedy))
     for number, (positions, share) in causes.locked().items():
         found.append(_locked(causes.system, dial, number, positions, share))
     late = np.flatnonzero(status == Status.NOT_CONVERGED)
@@ -111,11 +127,19 @@ def findings(
     if len(near):
         what = f"close to a dead centre {dial.intervals(near)}: condition up to {_most(condition[near])}"
         found.append(Finding(what, "links", "forces there are very sensitive to the dimensions", Severity.WARNING))
-    for joint, positions in causes.zero_slip().items():
+    for joints, positions in _together(causes.zero_slip()):
         widths = [upper[positions] - lower[positions] for lower, upper, _ in efforts.values()]
         if not widths or np.any(np.array(widths) != 0):  # a coefficient of 0 leaves no interval
-            found.append(_zero_slip(dial, joint, positions, efforts))
+            found.append(_zero_slip(dial, joints, positions, efforts))
     return found
+
+
+def _together(zero: dict[str, Positions]) -> list[tuple[str, Positions]]:
+    """Joints that rest at the same positions, as all do in a dwell, with these."""
+    found: dict[bytes, tuple[list[str], Positions]] = {}
+    for joint, positions in zero.items():
+        found.setdefault(positions.tobytes(), ([], positions))[0].append(joint)
+    return [(", ".join(joints), positions) for joints, positions in found.values()]
 
 
 def _not_assembled(causes: Causes, dial: Dial, part: _Open) -> Finding:
@@ -170,7 +194,7 @@ def _locked(system: System, dial: Dial, number: int, positions: Positions, share
 
 def _zero_slip(
     dial: Dial,
-    joint: str,
+    joints: str,
     positions: Positions,
     efforts: dict[str, tuple[NDArray[np.float64], NDArray[np.float64], str]],
 ) -> Finding:
@@ -185,7 +209,7 @@ def _zero_slip(
     what = f"relative speed zero {dial.intervals(positions)}: what resists it is an interval"
     what += f"; {bounds}" if bounds else ""
     return Finding(
-        what, f"joints.{joint}", "the bounds are in drive_effort_lower and drive_effort_upper", Severity.NOTE
+        what, f"joints.{joints}", "the bounds are in drive_effort_lower and drive_effort_upper", Severity.NOTE
     )
 
 

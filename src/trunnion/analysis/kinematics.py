@@ -39,12 +39,13 @@ GROUND = Motion(Frame(0.0, 0.0, 1.0, 0.0), Twist(0.0, 0.0, 0.0), Acceleration(0.
 
 @dataclass
 class Forward:
-    """What one walk forward found; element frames are worked out once and kept."""
+    """What one walk forward found at the times (s) it was asked for; element frames are worked out once and kept."""
 
     system: System
     values: Values
     local: dict[tuple[str, str], Frame]
     motions: dict[str, Motion]
+    time: Number = 0.0
     poses: list[Any] = field(default_factory=list)
     assembly: list[Any] = field(default_factory=list)
     _elements: dict[tuple[str, str], Frame] = field(default_factory=dict)
@@ -120,6 +121,7 @@ def forward(system: System, values: Values, assembly: Assembly, time: Number) ->
     NaN from the first module that cannot be assembled onward, lane by lane.
     """
     walk = start(system, values)
+    walk.time = time
     with np.errstate(all="ignore"):
         for number in range(len(system.plan.modules)):
             take(walk, number, pose_of(walk, number, assembly[number], time), time)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 
@@ -12,20 +11,14 @@ from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.analysis.friction import Contact, FrictionMethod, Settled, settle
 from trunnion.analysis.kinematics import Assembly, Forward, forward
+from trunnion.analysis.loads import Action, Slip, SpringState, springs, stated_loads
 from trunnion.analysis.system import Place, System, Values, law_of
 from trunnion.groups.planar import ZERO_LOAD, Wrench, about
 from trunnion.joints.pairs import Load
 
-__all__ = ["Backward", "Slip", "backward", "solve"]
+__all__ = ["Backward", "backward", "solve"]
 
 ZERO_SLIP = 1e-10  # of the speeds about the joint: below it the sign of a relative speed is rounding noise
-
-
-class Slip(NamedTuple):
-    """Relative speed of a joint, second link against first (rad/s, m/s), and where it is zero to rounding."""
-
-    speed: Number
-    zero: Number
 
 
 @dataclass
@@ -33,7 +26,8 @@ class Backward:
     """What one walk backward found, by joint and driver as the file names them.
 
     reactions: on the second link by the first, about the joint's point on the second, friction and drive effort
-    not included; friction: torque (N m) or force along the slide (N) on the second link; settled: per module.
+    not included; friction: torque (N m) or force along the slide (N) on the second link; settled: per module;
+    undefined: where each load or spring (by path) has no value.
     """
 
     walk: Forward
@@ -45,6 +39,8 @@ class Backward:
     settled: list[Settled] = field(default_factory=list)
     load_powers: dict[str, Number] = field(default_factory=dict)
     body_power: Number = 0.0
+    springs: dict[str, SpringState] = field(default_factory=dict)
+    undefined: dict[str, Number] = field(default_factory=dict)
 
 
 def solve(
@@ -105,46 +101,20 @@ def _add_body_loads(back: Backward) -> None:
 
 
 def _add_stated_loads(back: Backward, zero_slip: Mapping[str, float]) -> None:
-    """The loads of the model, with the power each gives the mechanism."""
-    walk, values = back.walk, back.walk.values
-    for name, load in walk.system.mechanism.loads.items():
-        path = f"loads.{name}"
-        if load.joint is not None:
-            back.load_powers[name] = _resist(back, load.joint, path, zero_slip.get(load.joint, 0.0))
-            continue
-        link = load.link or ""
-        power: Number = 0.0
-        if f"{path}.force.x" in values:
-            force = values[f"{path}.force.x"], values[f"{path}.force.y"]
-            at = walk.point(link, load.at) if load.at else walk.local_point(link, 0.0, 0.0)
-            _add(back, link, Wrench(*force, 0.0), at.place)
-            power = power + force[0] * at.velocity[0] + force[1] * at.velocity[1]
-        if f"{path}.moment" in values:
-            moment = values[f"{path}.moment"]
-            _add(back, link, Wrench(0.0, 0.0, moment), None)
-            power = power + moment * walk.motions[link].twist.w
-        back.load_powers[name] = power
+    """The loads and springs of the model, with the power each gives the mechanism."""
+    mechanism = back.walk.system.mechanism
+    for name, action in stated_loads(back.walk, back.slips, zero_slip):
+        back.load_powers[name] = action.power
+        _act(back, f"loads.{name}", action)
+    for name, action, state in springs(back.walk, back.slips) if mechanism.springs else ():
+        back.springs[name] = state
+        _act(back, f"springs.{name}", action)
 
 
-def _resist(back: Backward, joint: str, path: str, at_rest: float) -> Number:
-    """A torque or force that opposes the motion of a joint, whichever way it goes; its power (never positive).
-
-    at_rest: the sign of the motion to take where there is none; 0: the load is zero there.
-    """
-    walk, values = back.walk, back.walk.values
-    _, (first, second) = walk.system.joints[joint]
-    slip = back.slips[joint]
-    sign = np.sign(np.where(slip.zero, at_rest, primal(slip.speed)))
-    if f"{path}.resisting_torque" in values:
-        size = -sign * values[f"{path}.resisting_torque"]
-        _add(back, second, Wrench(0.0, 0.0, size), None)
-        _add(back, first, Wrench(0.0, 0.0, -size), None)
-    else:
-        size = -sign * values[f"{path}.resisting_force"]
-        axis, at = walk.element(first, joint), walk.element(second, joint)
-        _add(back, second, Wrench(size * axis.c, size * axis.s, 0.0), (at.x, at.y))
-        _add(back, first, Wrench(-size * axis.c, -size * axis.s, 0.0), (at.x, at.y))
-    return size * slip.speed
+def _act(back: Backward, path: str, action: Action) -> None:
+    back.undefined[path] = action.undefined
+    for link, wrench, at in action.on:
+        _add(back, link, wrench, at)
 
 
 def _add(back: Backward, link: str, load: Wrench, at: tuple[Number, Number] | None) -> None:

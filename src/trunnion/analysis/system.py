@@ -18,6 +18,7 @@ from trunnion.groups import GROUPS, Group
 from trunnion.groups.general import OUTER, General, GroupJoint
 from trunnion.groups.planar import Frame
 from trunnion.joints.friction import FRICTION_LAWS, FrictionLaw
+from trunnion.joints.motion import Span
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.mechanism import Mechanism
 from trunnion.structure.decompose import Module, Plan, decompose
@@ -71,8 +72,8 @@ class Place:
 
 @dataclass(frozen=True)
 class Cycle:
-    """One turn or range of the drivers: how long it takes, s, whether its end is its start again, and the most
-    turns that a driver makes in it."""
+    """One period or range of the drivers: how long it takes, s, whether its end is its start again, and the most
+    turns that a driver makes in it, at its largest rate."""
 
     duration: float
     periodic: bool
@@ -152,25 +153,45 @@ class System:
         return values[f"{path}.x"], values[f"{path}.y"]
 
     def drive(self, values: Values, name: str, time: Number) -> tuple[Number, Number, Number]:
-        """Coordinate, rate and second derivative of a driver at `time` (s) from the start: constant speed."""
-        speed = values[f"drivers.{name}.speed"]
-        start = values.get(f"drivers.{name}.range.from", values.get(f"drivers.{name}.start", 0.0))
-        return start + speed * time, speed, 0.0
+        """Coordinate, rate and second derivative of a driver at `time` (s) from the start, by its motion law."""
+        law = self.mechanism.drivers[name].motion
+        return law.function(time, self._motion(values, name))
+
+    def span(self, values: Values, name: str) -> Span:
+        """One cycle of a driver."""
+        return self.mechanism.drivers[name].motion.span(self._motion(values, name))
+
+    def _motion(self, values: Values, name: str) -> dict[str, Number]:
+        """What the motion law of a driver is given."""
+        found: dict[str, Number] = {key: values[path] for key, path in self._driver_paths[name] if path in values}
+        found.update(self.mechanism.drivers[name].options)
+        return found
+
+    @cached_property
+    def _driver_paths(self) -> dict[str, list[tuple[str, str]]]:
+        """(key, path) of the numbers of each driver."""
+        found: dict[str, list[tuple[str, str]]] = {name: [] for name in self.mechanism.drivers}
+        for path in self.mechanism.parameter_set.entries:
+            section, _, rest = path.partition(".")
+            if section == "drivers":
+                name, _, key = rest.partition(".")
+                found[name].append((key, path))
+        return found
 
     def dial(self, values: Values, time: NDArray[np.float64]) -> Dial:
-        """Positions by the coordinate of the only driver, else by time (s)."""
+        """Positions by the coordinate of the only driver if it runs one way, else by time (s)."""
         drivers = list(self.mechanism.drivers)
-        if len(drivers) != 1:
+        if len(drivers) != 1 or not self.span(values, drivers[0]).one_way:
             return Dial(time, " s", "")
         q = np.broadcast_to(self.drive(values, drivers[0], time)[0], time.shape)
         revolute = self.joints[drivers[0]][0] == "revolute"
         return Dial(np.degrees(q) if revolute else q * 1e3, "°" if revolute else " mm", drivers[0])
 
     def pace(self, values: Values) -> Number:
-        """Angular speed typical of the mechanism, rad/s: that of its fastest driver, a slide's per size."""
+        """Angular speed typical of the mechanism, rad/s: the peak of its fastest driver, a slide's per size."""
         rates: list[Number] = [0.0]
         for name in self.mechanism.drivers:
-            speed = np.abs(primal(values[f"drivers.{name}.speed"]))
+            speed = self.span(values, name).peak
             rates.append(speed if self.joints[name][0] == "revolute" else speed / self.size(values))
         return functools.reduce(np.maximum, rates)
 
@@ -186,44 +207,40 @@ class System:
         return np.where(widest > 0, widest, 1.0)
 
     def cycle(self, values: Values) -> Cycle:
-        """How long the drivers take: the ranges, or the least time in which all make whole turns.
+        """How long the drivers take: the longest that ends, or the least time in which all make whole periods.
 
-        Where that is over COMMON_TURNS turns of the slowest, the cycle is its one turn and not periodic.
+        Where that is over COMMON_TURNS periods of the slowest, the cycle is its one period and not periodic.
         Raises MechanismError where a range runs against its speed or two drivers do not fit one cycle.
         """
         drivers = self.mechanism.drivers
         if not drivers:
             return Cycle(0.0, periodic=False)
         nominal = {path: float(np.ravel(primal(value))[0]) for path, value in values.items() if "drivers." in path}
-        ranged = [name for name in drivers if f"drivers.{name}.range.from" in nominal]
-        durations: dict[str, float] = {}
+        spans = {name: self.span(nominal, name) for name in drivers}
         findings: list[Finding] = []
-        for name in drivers:
-            speed = nominal[f"drivers.{name}.speed"]
-            extent = float(np.copysign(2 * np.pi, speed))
-            if name in ranged:
-                extent = nominal[f"drivers.{name}.range.to"] - nominal[f"drivers.{name}.range.from"]
-            durations[name] = extent / speed
-            if durations[name] < 0:
-                what = f"the range runs {'up' if extent > 0 else 'down'}, the speed is {speed:g} (SI)"
+        for name, span in spans.items():
+            if span.duration < 0:
+                speed = nominal[f"drivers.{name}.speed"]
+                what = f"the range runs {'down' if speed > 0 else 'up'}, the speed is {speed:g} (SI)"
                 findings.append(Finding(what, f"drivers.{name}.range", "swap the ends of the range, or the sign"))
-        longest = max(durations.values())
-        for name in ranged:
-            if not findings and abs(durations[name] - longest) > 1e-9 * longest:
-                what = f"its range takes {durations[name]:g} s, the whole cycle takes {longest:g} s"
+        longest = float(max(span.duration for span in spans.values()))
+        ending = [name for name, span in spans.items() if not span.periodic]
+        for name in ending:
+            if not findings and not spans[name].rests and abs(spans[name].duration - longest) > 1e-9 * longest:
+                what = f"its range takes {spans[name].duration:g} s, the whole cycle takes {longest:g} s"
                 findings.append(Finding(what, f"drivers.{name}", "let all drivers with a range take the same time"))
         if findings:
             raise MechanismError(findings)
-        turns = [longest / duration for duration in durations.values()]
-        whole = next((n for n in range(1, COMMON_TURNS + 1) if all(_is_whole(n * turn) for turn in turns)), 0)
-        if ranged or not whole:
-            return Cycle(longest, periodic=False, turns=max(abs(self._turns(nominal, n, longest)) for n in drivers))
-        return Cycle(whole * longest, periodic=True, turns=whole * max(turns))
+        periods = [longest / span.duration for span in spans.values()]
+        whole = next((n for n in range(1, COMMON_TURNS + 1) if all(_is_whole(n * period) for period in periods)), 0)
+        periodic = bool(whole and not ending)
+        duration = whole * longest if periodic else longest
+        return Cycle(duration, periodic, max(self._turns(name, span, duration) for name, span in spans.items()))
 
-    def _turns(self, nominal: Mapping[str, float], driver: str, duration: float) -> float:
-        """Turns that a driver makes in a time; a slide makes none."""
+    def _turns(self, driver: str, span: Span, duration: float) -> float:
+        """Turns that a driver would make in a time at its largest rate; of a slide, how often it would travel."""
         revolute = self.joints[driver][0] == "revolute"
-        return nominal[f"drivers.{driver}.speed"] * duration / (2 * np.pi) if revolute else 0.0
+        return float(span.peak * duration / (2 * np.pi if revolute else span.travel))
 
 
 def build(mechanism: Mechanism) -> System:

@@ -13,12 +13,14 @@ import numpy as np
 
 from trunnion.errors import Finding, Severity
 from trunnion.joints.friction import FRICTION_LAWS
+from trunnion.joints.motion import MOTION_LAWS
 from trunnion.joints.pairs import PAIRS
+from trunnion.model.check_loads import motion_dimensions, springs, tables, unknown_name
 from trunnion.model.check_values import check_values
-from trunnion.model.expression import RESERVED
+from trunnion.model.expression import MOTION, RESERVED
 from trunnion.model.names import nearest
 from trunnion.model.parameters import ParameterSet, entries, evaluation_order
-from trunnion.model.parts import Friction, Joint, Load, Measure, freedoms
+from trunnion.model.parts import Driver, Friction, Joint, Load, Measure, freedoms
 from trunnion.model.quantity import UNREADABLE
 from trunnion.model.units import ANY, Dimension, UnitError
 
@@ -36,7 +38,7 @@ def check_model(mechanism: Mechanism, lost: Collection[str] = ()) -> list[Findin
     unreadable: set[str] = set()
     findings = [*_quantities(mechanism, unreadable), *_links(mechanism), *_joints(mechanism)]
     findings += [] if lost else _absent(mechanism)
-    findings += [*_loop(mechanism), *_drivers(mechanism), *_loads(mechanism), *_others(mechanism)]
+    findings += [*_loop(mechanism), *_drivers(mechanism), *_loads(mechanism), *springs(mechanism), *_others(mechanism)]
     numbers = ParameterSet(mechanism, unreadable) if unreadable else mechanism.parameter_set
     with np.errstate(all="ignore"):  # absurd numbers may overflow in a check; they are still only numbers
         findings += check_values(mechanism, numbers)
@@ -52,6 +54,8 @@ def _quantities(mechanism: Mechanism, unreadable: set[str]) -> Iterator[Finding]
     """Names and dimensions in every expression; `unreadable` receives the paths that have no value."""
     known: dict[str, Dimension | None] = {}
     yield from _dimensions(mechanism, known, unreadable)
+    yield from tables(mechanism, known)
+    moving = {**motion_dimensions(mechanism, known), **known}
     used: set[str] = set()
     for entry in entries(mechanism):
         names = entry.quantity.names
@@ -60,14 +64,17 @@ def _quantities(mechanism: Mechanism, unreadable: set[str]) -> Iterator[Finding]
             unreadable.add(entry.path)
         if entry.alias or entry.path in unreadable:
             continue
-        if missing := [name for name in names if name not in known]:
+        sayable = moving if entry.varies else known
+        if missing := [name for name in names if name not in sayable]:
             unreadable.add(entry.path)
             for name in missing:
-                what = f"'{entry.quantity.source}' speaks of '{name}', which is not one of the dimensions"
-                yield Finding(what, entry.path, nearest(name, known))
+                yield unknown_name(mechanism, name, entry.path, entry.quantity.source, known)
             continue
+        if entry.varies and entry.quantity.tolerance:
+            what = f"'{entry.quantity.source}' varies with the motion and has a tolerance"
+            yield Finding(what, entry.path, "state a dimension with the tolerance and use it in the expression")
         try:
-            entry.quantity.check(known, entry.kind)
+            entry.quantity.check(sayable, entry.kind)
         except UnitError as error:
             yield Finding(error.what, entry.path, error.remedy)
     for name in mechanism.dimensions:
@@ -97,7 +104,7 @@ def _dimensions(mechanism: Mechanism, known: dict[str, Dimension | None], unread
 
 def _dimension_name(name: str) -> Iterator[Finding]:
     where = f"dimensions.{name}"
-    if name in RESERVED:
+    if name in RESERVED or name in MOTION:
         yield Finding(f"'{name}' is a name of the expressions themselves", where, "call the dimension otherwise")
     elif not name.isidentifier() or name.startswith("_"):
         yield Finding(
@@ -242,8 +249,39 @@ def _drivers(mechanism: Mechanism) -> Iterator[Finding]:
         where = f"drivers.{name}"
         if name not in joints:
             yield Finding(f"there is no joint '{name}' to drive", where, nearest(name, joints))
-        elif "rotation" not in freedoms(joints[name].type) and driver.range is None:
+        elif "rotation" not in freedoms(joints[name].type) and driver.law == "constant" and driver.range is None:
             yield Finding(f"a driven {joints[name].type} joint needs a range", where, "add range: [0 mm, 50 mm]")
+        yield from _motion(driver, where)
+
+
+def _motion(driver: Driver, where: str) -> Iterator[Finding]:
+    """Whether a driver states what its law needs and nothing else."""
+    law, takes = driver.motion, (*driver.motion.needs, *driver.motion.takes)
+    stray = [key for key in driver.model_fields_set if key != "law" and key not in takes]
+    for key in sorted(stray):
+        others = [name for name, one in MOTION_LAWS.items() if key in (*one.needs, *one.takes)]
+        remedy = f"remove it, or state law: {' or '.join(others)}; {driver.law} takes {', '.join(takes)}"
+        yield Finding(f"'{key}' means nothing to the motion law {driver.law}", f"{where}.{key}", remedy)
+    for key in law.needs:
+        if getattr(driver, key) is None:
+            law_too = "" if "law" in driver.model_fields_set else f", or a law: {', '.join(MOTION_LAWS)}"
+            yield Finding(f"'{key}' is missing", where, f"add {key}: {MOTION_EXAMPLES[key]}{law_too}")
+    if driver.points is not None and driver.periodic and len(driver.points) < 3:
+        yield Finding("a periodic table needs three points", f"{where}.points", "add points")
+    if driver.points is not None and driver.ends == "natural":
+        for key in ("periodic", "delay"):
+            if key in driver.model_fields_set and getattr(driver, key):
+                yield Finding(f"a table with natural ends has no '{key}'", f"{where}.{key}", f"remove ends or {key}")
+
+
+MOTION_EXAMPLES = {
+    "speed": "60 rpm",
+    "amplitude": "20 deg",
+    "period": "0.5 s",
+    "range": "[0 deg, 90 deg]",
+    "duration": "0.2 s",
+    "points": "[[0 s, 0 deg], [0.1 s, 20 deg]]",
+}
 
 
 def _loads(mechanism: Mechanism) -> Iterator[Finding]:
@@ -260,6 +298,8 @@ def _loads(mechanism: Mechanism) -> Iterator[Finding]:
 def _link_load(mechanism: Mechanism, load: Load, link: str, where: str) -> Iterator[Finding]:
     if load.resisting_torque is not None or load.resisting_force is not None:
         yield Finding("a resisting load acts on a joint, not a link", where, "state joint: … instead of link: …")
+    elif load.only is not None:
+        yield Finding("only is for a load that resists a joint", f"{where}.only", "remove it, or state joint: …")
     elif load.force is None and load.moment is None:
         yield Finding("there is nothing in this load", where, "state a force or a moment")
     if load.force is not None:
@@ -280,6 +320,8 @@ def _link_load(mechanism: Mechanism, load: Load, link: str, where: str) -> Itera
 
 def _joint_load(mechanism: Mechanism, load: Load, where: str) -> Iterator[Finding]:
     joints = mechanism.effective_joints
+    if load.frame != "global":
+        yield Finding("frame is for a load on a link", f"{where}.frame", "remove it")
     if load.force is not None or load.moment is not None or load.at is not None:
         yield Finding(
             "at, force and moment are for a load on a link", where, "state resisting_torque or resisting_force"

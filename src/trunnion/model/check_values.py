@@ -11,6 +11,7 @@ import numpy as np
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, Severity
 from trunnion.joints.friction import FRICTION_LAWS, LawParameter
+from trunnion.model.check_loads import spring_values, table_values
 from trunnion.model.parameters import ParameterSet
 from trunnion.model.parts import InertiaTensor, Link, freedoms
 
@@ -28,6 +29,8 @@ def check_values(mechanism: Mechanism, numbers: ParameterSet) -> Iterator[Findin
     """Findings about the nominal values; a nan in them stands for what is reported already and passes every check."""
     values = numbers.nominal
     for path, entry in numbers.entries.items():
+        if path not in values:  # an expression of the motion
+            continue
         broken = any(np.isnan(values[one]) for one in entry.depends if one in values)
         if entry.quantity.names and not broken and not np.isfinite(values[path]) and not numbers.is_unreadable(path):
             yield Finding(
@@ -40,12 +43,14 @@ def check_values(mechanism: Mechanism, numbers: ParameterSet) -> Iterator[Findin
     for name in mechanism.effective_joints:
         yield from _joint(mechanism, name, numbers)
     for name in mechanism.drivers:
-        yield from _driver(values, f"drivers.{name}")
+        yield from _driver(mechanism, name, values)
+    yield from table_values(mechanism, values)
+    yield from spring_values(mechanism, values)
     yield from _directions(mechanism, values)
     yield from _sides(mechanism, values)
 
 
-_NOT_NEGATIVE = frozenset({"mass", "radius", "length", "bearing", "clearance"})
+_NOT_NEGATIVE = frozenset({"mass", "radius", "length", "bearing", "clearance", "resisting_torque", "resisting_force"})
 
 
 def _joint(mechanism: Mechanism, name: str, numbers: ParameterSet) -> Iterator[Finding]:
@@ -90,12 +95,48 @@ def _law_value(declared: LawParameter, parameter: str, number: Number, where: st
         yield Finding(f"is {number:g}, above 1", where, "check it: dry metals have 0.1 to 0.6", Severity.WARNING)
 
 
-def _driver(values: Values, where: str) -> Iterator[Finding]:
-    if values[f"{where}.speed"] == 0:
+def _driver(mechanism: Mechanism, name: str, values: Values) -> Iterator[Finding]:
+    where, driver = f"drivers.{name}", mechanism.drivers[name]
+    for key in ("period", "duration"):
+        if values.get(f"{where}.{key}", np.nan) <= 0:
+            number = values[f"{where}.{key}"]
+            yield Finding(f"is {number:g} s, which is not above 0", f"{where}.{key}", "give a time above 0")
+    for key in ("dwell", "delay"):
+        if values.get(f"{where}.{key}", np.nan) < 0:
+            number = values[f"{where}.{key}"]
+            yield Finding(f"is {number:g} s, which is negative", f"{where}.{key}", "give a time of at least 0")
+    if values.get(f"{where}.amplitude") == 0:
+        yield Finding("the amplitude is 0: it never moves", f"{where}.amplitude", "give it an extent")
+    if driver.points is not None:
+        yield from _table(mechanism, name, values)
+    if values.get(f"{where}.speed") == 0:
         yield Finding("the speed is 0", f"{where}.speed", "give a speed, however small, with its sign")
     start, end = (values.get(f"{where}.range.{end}", np.nan) for end in ("from", "to"))
     if start == end:
         yield Finding(f"the range begins and ends at {start:g}", f"{where}.range", "give it an extent")
+
+
+def _table(mechanism: Mechanism, name: str, values: Values) -> Iterator[Finding]:
+    """Whether the points of a driver's table make a motion."""
+    driver, where = mechanism.drivers[name], f"drivers.{name}.points"
+    rows = range(len(driver.points or ()))
+    times, coordinates = ([values[f"{where}.{k}.{key}"] for k in rows] for key in ("time", "coordinate"))
+    if times[0] != 0 and not np.isnan(times[0]):
+        what = f"the table begins at {times[0]:g} s"
+        yield Finding(what, f"{where}.0", "begin it at 0 s and shift it by delay: …")
+    for k in rows[1:]:
+        if times[k] <= times[k - 1]:
+            what = f"its time {times[k]:g} s does not come after {times[k - 1]:g} s of the point before"
+            yield Finding(what, f"{where}.{k}", "sort the points by time")
+    if all(coordinate == coordinates[0] for coordinate in coordinates):
+        yield Finding("the table never moves", where, "give it an extent")
+    joint = mechanism.effective_joints.get(name)
+    gap = coordinates[-1] - coordinates[0]
+    if driver.periodic and joint and abs(gap) > 1e-9 * np.max(np.abs(coordinates)):
+        turns = gap / (2 * np.pi)
+        if "rotation" not in freedoms(joint.type) or abs(turns - np.round(turns)) > 1e-9:
+            what = f"a periodic table that begins at {coordinates[0]:g} and ends at {coordinates[-1]:g} (SI)"
+            yield Finding(what, where, "end it where it begins, or whole turns from there, or state periodic: false")
 
 
 def _directions(mechanism: Mechanism, values: Values) -> Iterator[Finding]:

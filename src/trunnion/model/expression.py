@@ -21,7 +21,7 @@ import numpy as np
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.model.units import ANGLE, NUMBER, Dimension, UnitError, dimension_text, fits, unit
 
-__all__ = ["RESERVED", "Expression", "literal", "parse"]
+__all__ = ["MOTION", "RESERVED", "Expression", "literal", "parse"]
 
 MAX_LENGTH = 500
 MAX_DEPTH = 40
@@ -64,8 +64,10 @@ FUNCTIONS: Final[Mapping[str, _Function]] = {
     "abs": _Function("abs", (1, 1), "same", "same"),
     "min": _Function("minimum", (2, _MANY), "same", "same"),
     "max": _Function("maximum", (2, _MANY), "same", "same"),
+    "between": _Function("between", (3, 3), "same", "number"),
 }
 RESERVED = frozenset({"pi", *FUNCTIONS})  # names a dimension cannot have
+MOTION = ("drive", "speed", "time")  # nor these: in loads, coordinate and rate of the first driver, and time
 
 
 @dataclass(frozen=True)
@@ -252,10 +254,18 @@ def _call(name: Literal | str, arguments: list[Evaluator]) -> Evaluator:
 
     def call(names: Mapping[str, Number]) -> Number:
         values = [argument(names) for argument in arguments]
+        if name == "between":
+            return _between(*values)
         apply = getattr(namespace(*values), function.name)
         return reduce(apply, values) if len(values) > 1 else apply(values[0])
 
     return call
+
+
+def _between(value: Number, low: Number, high: Number) -> Number:
+    """1 from `low` up to `high`, 0 elsewhere: it switches a load on over part of the motion."""
+    xp = namespace(value, low, high)
+    return xp.where((value >= low) & (value < high), 1.0, 0.0)
 
 
 def _dimension(tree: ast.expr, operands: Mapping[str, Literal | str], names: Dimensions) -> Dimension | None:

@@ -12,6 +12,7 @@ from pydantic_core import ErrorDetails
 
 from trunnion.errors import Finding
 from trunnion.model.names import nearest
+from trunnion.model.parameters import item_name
 from trunnion.model.parts import FORMS
 from trunnion.model.quantity import UNREADABLE
 
@@ -84,8 +85,7 @@ def _path(location: tuple[int | str, ...], data: Mapping[str, Any]) -> str:
             row = data["loop"][part]
             parts.append(str(row["joint"]) if isinstance(row, Mapping) and "joint" in row else str(part))
         else:
-            names = ("from", "to") if location[place - 1] == "range" else ("x", "y", "z")
-            parts.append(names[part] if part < len(names) else str(part))
+            parts.append(item_name(location[:place], part))
     return ".".join(parts)
 
 

@@ -30,6 +30,8 @@ from trunnion.model.parts import (
     Measure,
     Name,
     Part,
+    Spring,
+    Table,
 )
 from trunnion.model.quantity import Acceleration, AnyQuantity, Quantity
 from trunnion.model.units import Kind
@@ -57,7 +59,9 @@ class Mechanism(Part):
     joint_defaults: JointDefaults = JointDefaults()
     loop: tuple[LoopJoint, ...] = ()
     drivers: Mapping[Name, Driver] = {}
+    tables: Mapping[Name, Table] = {}
     loads: Mapping[Name, Load] = {}
+    springs: Mapping[Name, Spring] = {}
     assembly: Mapping[str, Hint] = {}
     measures: Mapping[Name, Measure] = {}
     references: tuple[str, ...] = ()
@@ -137,6 +141,7 @@ class Mechanism(Part):
 
         overrides: values by path or by an ending that is unique (`AB`, `crank.mass`): floats, arrays (sample, 1)
         or dual numbers; what depends on them follows. MechanismError names the nearest if a name is unknown.
+        A load that is an expression of the motion is no number: it is there only if an override makes it one.
         """
         return self.parameter_set.evaluate(overrides)
 

@@ -18,8 +18,20 @@ from pydantic import BaseModel
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, MechanismError
 from trunnion.joints.friction import FRICTION_LAWS
+from trunnion.model.expression import MOTION
 from trunnion.model.names import nearest
-from trunnion.model.parts import Friction, Guide, Joint, JointDefaults, Measure, Pin, Point, freedoms
+from trunnion.model.parts import (
+    Driver,
+    Friction,
+    Guide,
+    Joint,
+    JointDefaults,
+    Measure,
+    Pin,
+    Point,
+    Spring,
+    freedoms,
+)
 from trunnion.model.quantity import Quantity
 from trunnion.model.units import ANY, KINDS, Kind, unit
 
@@ -38,6 +50,8 @@ class Entry:
     """One named number: its path, where it stands in the model's sections, what was written, what it measures.
 
     alias: path of the number it follows while it has no value of its own (a default of all joints).
+    varies: it speaks of the motion: not a number of the set until an override makes it one, but an expression that
+    the analysis evaluates at every position.
     """
 
     path: str
@@ -45,6 +59,7 @@ class Entry:
     quantity: Quantity
     kind: Kind
     alias: str = ""
+    varies: bool = False
 
     @property
     def depends(self) -> tuple[str, ...]:
@@ -72,10 +87,13 @@ def entries(mechanism: Mechanism) -> Iterator[Entry]:
             yield from _walk(getattr(loop_joint, key), f"loop.{loop_joint.joint}.{key}", ("loop", row, key))
     for name, joint in mechanism.effective_joints.items():
         yield from _joint_entries(mechanism, name, joint)
-    for section in ("drivers", "loads", "assembly", "measures"):
+    for section in ("drivers", "tables", "loads", "springs", "assembly", "measures"):
         for name, part in getattr(mechanism, section).items():
-            for entry in _walk(part, f"{section}.{name}", (section, name)):
-                yield Entry(entry.path, entry.location, entry.quantity, _narrow(mechanism, section, name, entry))
+            stated = part.complete() if isinstance(part, Driver) else part
+            for entry in _walk(stated, f"{section}.{name}", (section, name)):
+                kind = _narrow(mechanism, section, name, entry)
+                varies = section == "loads" and not {*MOTION, *mechanism.tables}.isdisjoint(entry.quantity.names)
+                yield Entry(entry.path, entry.location, entry.quantity, kind, varies=varies)
 
 
 def _walk(value: object, path: str, location: Location) -> Iterator[Entry]:
@@ -92,9 +110,19 @@ def _walk(value: object, path: str, location: Location) -> Iterator[Entry]:
             for key, item in value.items():
                 yield from _walk(item, f"{path}.{key}", (*location, key))
         case tuple():
-            names = ("from", "to") if location[-1] == "range" else ("x", "y", "z")
             for index, item in enumerate(value):
-                yield from _walk(item, f"{path}.{names[index]}", (*location, index))
+                yield from _walk(item, f"{path}.{item_name(location, index)}", (*location, index))
+
+
+def item_name(location: Location, index: int) -> str:
+    """What an item of the list at a location is called in a path: a coordinate, an end, or its number."""
+    if location[-1] == "points":
+        return str(index)
+    row = len(location) > 1 and location[-2] == "points" and isinstance(location[-1], int)
+    if row and location[0] == "tables":
+        return ("at", "value")[index] if index < 2 else str(index)
+    names = ("time", "coordinate") if row else ("from", "to") if location[-1] == "range" else ("x", "y", "z")
+    return names[index] if index < len(names) else str(index)
 
 
 def _joint_entries(mechanism: Mechanism, name: str, joint: Joint) -> Iterator[Entry]:
@@ -136,12 +164,36 @@ def _narrow(mechanism: Mechanism, section: str, name: str, entry: Entry) -> Kind
     if section == "measures":
         measure = mechanism.measures[name]
         return _measure_kind(mechanism, measure)
+    if section == "tables":
+        return _table_kind(mechanism, name) if entry.location[-1] == 0 else ANY
+    if section == "springs":
+        return _spring_kind(mechanism, mechanism.springs[name], entry)
     if joint is None or section == "loads" or entry.kind in KINDS.values():
         return entry.kind
     slides = "rotation" not in freedoms(joint.type)
     if entry.location[-1] == "speed":
         return KINDS["speed" if slides else "angular speed"]
     return KINDS["length" if slides else "angle"]
+
+
+def _table_kind(mechanism: Mechanism, name: str) -> Kind:
+    """What the first column of a table measures: a time, or the coordinate of the first driver."""
+    if mechanism.tables[name].over == "time":
+        return KINDS["time"]
+    joint = mechanism.effective_joints.get(next(iter(mechanism.drivers), ""))
+    return KINDS["length" if joint and "rotation" not in freedoms(joint.type) else "angle"]
+
+
+def _spring_kind(mechanism: Mechanism, spring: Spring, entry: Entry) -> Kind:
+    """A spring in a joint that turns has a torsional stiffness; every other acts along a line."""
+    joint = mechanism.effective_joints.get(spring.joint or "")
+    turns = joint is not None and "rotation" in freedoms(joint.type)
+    match entry.location[-1]:
+        case "stiffness" | "damping" as key:
+            return KINDS[f"torsional {key}" if turns else key]
+        case "preload":
+            return KINDS["moment" if turns else "force"]
+    return entry.kind
 
 
 def _measure_kind(mechanism: Mechanism, measure: Measure) -> Kind:
@@ -216,10 +268,11 @@ class ParameterSet:
         found.sort(key=lambda entry: rank.get(entry.path, len(rank)))  # stable: the rest keeps its order
         self.entries: dict[str, Entry] = {entry.path: entry for entry in found}
         self._unreadable = frozenset(unreadable)
-        self._dependent = [entry for entry in self.entries.values() if entry.depends]
+        numbers = [entry for entry in self.entries.values() if not entry.varies]
+        self._dependent = [entry for entry in numbers if entry.depends]
         self.nominal: dict[str, Number] = {}
         self._nominal_names: dict[str, Number] = {}
-        for entry in self.entries.values():
+        for entry in numbers:
             self._evaluate(entry, self.nominal, self._nominal_names)
         self._endings: dict[str, list[str]] | None = None
 

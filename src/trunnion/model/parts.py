@@ -31,20 +31,25 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError
 
 from trunnion.joints.friction import FRICTION_LAWS
+from trunnion.joints.motion import MOTION_LAWS, MotionLaw
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.names import nearest
 from trunnion.model.quantity import (
     Angle,
     AngleOrLength,
     AnyQuantity,
+    Damping,
     Dimensionless,
     Force,
+    ForceOrMoment,
     Inertia,
     Length,
     Mass,
     Moment,
     Quantity,
     Rate,
+    Stiffness,
+    Time,
 )
 from trunnion.model.units import KINDS, UnitError
 
@@ -66,6 +71,8 @@ __all__ = [
     "Pin",
     "Point",
     "PolarPoint",
+    "Spring",
+    "Table",
     "freedoms",
 ]
 
@@ -128,6 +135,7 @@ def _forms(text: str) -> Discriminator:
 
 _check_type, _schema_type = _known(JOINT_TYPES, "joint type")
 _check_law, _schema_law = _known(tuple(FRICTION_LAWS), "friction law")
+_check_motion, _schema_motion = _known(tuple(MOTION_LAWS), "motion law")
 _check_model, _schema_model = _known(FRICTION_MODELS, "friction model")
 
 Name = Annotated[str, AfterValidator(_name)]
@@ -337,15 +345,55 @@ class LoopJoint(Part):
 
 
 class Driver(Part):
-    """Prescribed motion of the joint it is named after; one turn from `start` unless a range is given."""
+    """Prescribed motion of the joint it is named after, by a law of `joints.motion`: `constant` if none is stated."""
 
-    speed: Rate
-    start: AngleOrLength = Quantity(0, KINDS["angle"] | KINDS["length"])
+    law: Annotated[str, _check_motion, _schema_motion] = "constant"
+    speed: Rate | None = None
+    start: AngleOrLength | None = None
     range: tuple[AngleOrLength, AngleOrLength] | None = None
+    mean: AngleOrLength | None = None
+    amplitude: AngleOrLength | None = None
+    period: Time | None = None
+    phase: Angle | None = None
+    duration: Time | None = None
+    dwell: Time | None = None
+    returns: bool = True
+    points: Annotated[tuple[tuple[Time, AngleOrLength], ...], Field(min_length=2)] | None = None
+    periodic: bool = False
+    ends: Literal["clamped", "natural"] = "clamped"
+    delay: Time | None = None
+
+    @property
+    def motion(self) -> MotionLaw:
+        """The law."""
+        return MOTION_LAWS[self.law]
+
+    @property
+    def options(self) -> Mapping[str, bool | str]:
+        """What the law is told beside numbers."""
+        return {"returns": self.returns, "periodic": self.periodic, "ends": self.ends}
+
+    def complete(self) -> Driver:
+        """With zeros for what its law takes and was not stated."""
+        missing = {key: zero for key, zero in _DRIVER_ZEROS.items() if key in self.motion.takes}
+        return self.model_copy(update={key: zero for key, zero in missing.items() if getattr(self, key) is None})
+
+
+_ANGLE_OR_LENGTH = KINDS["angle"] | KINDS["length"]
+_DRIVER_ZEROS = {
+    "start": Quantity(0, _ANGLE_OR_LENGTH),
+    "mean": Quantity(0, _ANGLE_OR_LENGTH),
+    "phase": Quantity(0, KINDS["angle"]),
+    "dwell": Quantity(0, KINDS["time"]),
+    "delay": Quantity(0, KINDS["time"]),
+}
 
 
 class Load(Part):
-    """A load on a link (force at a point, moment) in global axes, or one that resists the motion of a joint."""
+    """A load on a link (force at a point, moment), or one that resists the motion of a joint.
+
+    Its numbers may be expressions of the motion: of `drive`, `speed`, `time` and the names of tables.
+    """
 
     link: str | None = None
     at: str | None = None
@@ -358,10 +406,36 @@ class Load(Part):
         ]
         | None
     ) = None
+    frame: Literal["global", "link"] = "global"
     joint: str | None = None
     resisting_torque: Moment | None = None
     resisting_force: Force | None = None
+    only: Literal["positive", "negative"] | None = None
     useful: bool = False
+
+
+class Table(Part):
+    """A quantity stated by points (coordinate of the first driver or time, value), for the expressions of loads."""
+
+    over: Literal["drive", "time"] = "drive"
+    points: Annotated[tuple[tuple[AnyQuantity, AnyQuantity], ...], Field(min_length=2)]
+    interpolation: Literal["linear", "spline"] = "linear"
+    periodic: bool = False
+
+
+class Spring(Part):
+    """A spring, a damper or both: along the line between two points of two links, or in the freedom of a joint.
+
+    It pulls with preload + stiffness · (length − free length) + damping · rate; so does a torsional one, by angles.
+    """
+
+    between: tuple[str, str] | None = None
+    joint: str | None = None
+    stiffness: Stiffness | None = None
+    free_length: Length | None = None
+    free_angle: Angle | None = None
+    damping: Damping | None = None
+    preload: ForceOrMoment | None = None
 
 
 class Measure(Part):

@@ -26,14 +26,18 @@ __all__ = [
     "Angle",
     "AngleOrLength",
     "AnyQuantity",
+    "Damping",
     "Dimensionless",
     "Force",
+    "ForceOrMoment",
     "Inertia",
     "Length",
     "Mass",
     "Moment",
     "Quantity",
     "Rate",
+    "Stiffness",
+    "Time",
 ]
 
 _SYMMETRIC = re.compile(r"^(.*?)\s*(?:±|\+/-|\+-)\s*(.*)$", re.DOTALL)
@@ -232,5 +236,9 @@ Inertia = Annotated[Quantity, _Read(KINDS["moment of inertia"])]
 Force = Annotated[Quantity, _Read(KINDS["force"])]
 Moment = Annotated[Quantity, _Read(KINDS["moment"])]
 Acceleration = Annotated[Quantity, _Read(KINDS["acceleration"])]
+Time = Annotated[Quantity, _Read(KINDS["time"])]
 Rate = Annotated[Quantity, _Read(KINDS["angular speed"] | KINDS["speed"])]
+ForceOrMoment = Annotated[Quantity, _Read(KINDS["force"] | KINDS["moment"])]
+Stiffness = Annotated[Quantity, _Read(KINDS["stiffness"] | KINDS["torsional stiffness"])]
+Damping = Annotated[Quantity, _Read(KINDS["damping"] | KINDS["torsional damping"])]
 AngleOrLength = Annotated[Quantity, _Read(KINDS["angle"] | KINDS["length"])]

@@ -83,12 +83,17 @@ KINDS: dict[str, Kind] = {
         Kind("length", "m", "60 mm", (_dimension(length=1),)),
         Kind("angle", "rad", "30 deg", (ANGLE,)),
         Kind("mass", "kg", "1.2 kg", (_dimension(mass=1),)),
+        Kind("time", "s", "0.2 s", (_dimension(time=1),)),
         Kind("moment of inertia", "kg m^2", "4e-4 kg m^2", (_dimension(length=2, mass=1),)),
         Kind("force", "N", "1 kN", (_dimension(length=1, mass=1, time=-2),)),
         Kind("moment", "N m", "10 N m", (_dimension(length=2, mass=1, time=-2),)),
         Kind("angular speed", "rad/s", "1500 rpm", (_dimension(time=-1, angle=1),)),
         Kind("speed", "m/s", "50 mm/s", (_dimension(length=1, time=-1),)),
         Kind("acceleration", "m/s^2", "9.81 m/s^2", (_dimension(length=1, time=-2),)),
+        Kind("stiffness", "N/m", "2 N/mm", (_dimension(mass=1, time=-2),)),
+        Kind("torsional stiffness", "N m/rad", "3 N m/rad", (_dimension(length=2, mass=1, time=-2, angle=-1),)),
+        Kind("damping", "N s/m", "50 N s/m", (_dimension(mass=1, time=-1),)),
+        Kind("torsional damping", "N m s/rad", "0.1 N m s/rad", (_dimension(length=2, mass=1, time=-1, angle=-1),)),
     )
 }
 ANY = Kind("quantity", "SI", "60 mm", ())

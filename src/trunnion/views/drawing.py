@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -78,6 +79,8 @@ def draw(axes: Axes, shown: Picture, index: int) -> None:
     moving = [link for link in shown.stated["links"] if link != shown.ground]
     for order, link in enumerate(moving):
         _body(axes, shown, link, index, PALETTE[order % len(PALETTE)])
+    for spring in shown.stated["springs"].values():
+        _spring(axes, shown, spring.get("between") or (), index)
     for name, joint in shown.stated["joints"].items():
         _joint(axes, shown, name, joint, index)
     _labels(axes, shown, index)
@@ -163,6 +166,20 @@ def tint(colour: str, share: float = 0.28) -> str:
     """The colour mixed with white."""
     parts = (int(colour[place : place + 2], 16) for place in (1, 3, 5))
     return "#" + "".join(f"{round(255 - share * (255 - part)):02x}" for part in parts)
+
+
+COILS = np.array([[0.0, 0.18, *np.linspace(0.2, 0.8, 16), 0.82, 1.0], [0, 0, *np.tile([1.0, -1.0], 8), 0, 0]])
+
+
+def _spring(axes: Axes, shown: Picture, ends: Sequence[str], index: int) -> None:
+    """A zigzag between the ends of a spring."""
+    places = [shown.tracks[end][:, index] for end in ends if end in shown.tracks]
+    if len(places) < 2 or not np.isfinite(places).all():
+        return
+    along = places[1] - places[0]
+    across = np.array([-along[1], along[0]]) / (np.hypot(*along) or 1.0) * 0.012 * shown.size
+    path = places[0][:, None] + np.outer(along, COILS[0]) + np.outer(across, COILS[1])
+    axes.plot(*path, color=MUTED, linewidth=1.1, zorder=4.5, solid_joinstyle="round")
 
 
 def _joint(axes: Axes, shown: Picture, name: str, joint: dict[str, Any], index: int) -> None:

@@ -292,7 +292,7 @@ def power(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
     curve(axes, over, useful * factor, "useful", color=PALETTE[2])
     curve(axes, over, lost * factor, "friction", color=PALETTE[1])
     if peak(rest) > 1e-9 * peak(drive, useful, lost):
-        label = "masses and other loads"
+        label = "masses, springs and other loads" if "spring" in result.dims else "masses and other loads"
         curve(axes, over, rest * factor, label, color=MUTED, linestyle=(0, (2, 1.5)), linewidth=1.2)
     frame_peak(axes, peak(drive, useful, lost), scope, factor, "W")
     legend(axes)

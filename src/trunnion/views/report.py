@@ -171,6 +171,8 @@ def _stated(row: dict[str, Any]) -> str:
     unit = "" if unit in ("1", "SI") else unit  # a dimension is a length or an angle, as its own text says
     if not text:
         return quantity(value, unit)
+    if value is None:  # an expression of the motion
+        return text
     if not text[0].isdigit() and text[0] not in "+-.":
         return f"{text} = {quantity(value, unit)}"
     return f"{text}\u00a0{unit}" if unit and _is_number(text) else text

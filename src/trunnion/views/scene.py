@@ -54,6 +54,7 @@ def scene(result: xr.Dataset, ideal: xr.Dataset | None = None, max_positions: in
         "links": _links(stated, kept, points),
         "joints": _joints(stated, kept, other),
         "loads": _loads(stated, points),
+        "springs": _springs(stated, points),
         "drivers": _drivers(kept, other, stated),
         "sums": {name: _series(column(kept, name)) for name in SUMS if name in kept},
         "efficiency": _single(result, "efficiency"),
@@ -137,8 +138,15 @@ def _loads(stated: dict[str, Any], points: dict[str, Any]) -> list[dict[str, Any
         force = [float(part) for part in load.get("force") or (0.0, 0.0)]
         rows.append({"name": name, "link": load.get("link"), "at": at if at in points else None,
                      "force": force, "moment": float(load.get("moment") or 0.0),
+                     "frame": load.get("frame", "global"), "varies": bool(load.get("varies")),
                      "useful": bool(load.get("useful"))})  # fmt: skip
     return rows
+
+
+def _springs(stated: dict[str, Any], points: dict[str, Any]) -> list[dict[str, Any]]:
+    """Springs between two known points."""
+    ends = {name: spring.get("between") or () for name, spring in stated["springs"].items()}
+    return [{"name": name, "ends": list(two)} for name, two in ends.items() if two and set(two) <= points.keys()]
 
 
 def _drivers(result: xr.Dataset, ideal: xr.Dataset | None, stated: dict[str, Any]) -> list[dict[str, Any]]:

@@ -5,6 +5,7 @@ import { at, bounds, guide, hull, magnitude, peak, place, quantile, say, solved,
 import { html, onWidth, set, svg } from "./dom.js";
 import { roundBelow, stated } from "./format.js";
 import { loadsOf, poseLoad } from "./load.js";
+import { coil } from "./spring.js";
 
 const MARGIN = 62; // room for labels and arrows, px
 const KEY = 30; // height of the strip with the scales, px
@@ -86,6 +87,10 @@ function build(view, width) {
       .filter((link) => !link.ground)
       .flatMap((link) => link.free.map((key) => freePoint(key, link.name))),
     loads: loadsOf(scene),
+    springs: scene.springs.map(({ name, ends }) => ({
+      ends,
+      node: svg("path", { class: "spring" }, svg("title", {}, name)),
+    })),
     vectors: scene.joints.map((one) => svg("path", { class: `reaction ${view.kinds.get(one.name)}` })),
     drives: scene.drivers.map(() => svg("path", { class: "drive" })),
   };
@@ -96,6 +101,7 @@ function build(view, width) {
     ...view.parts.bodies.map((one) => one.node),
     ...view.parts.points.map((one) => one.node),
     ...view.parts.joints.map((one) => one.node),
+    ...view.parts.springs.map((one) => one.node),
     ...view.parts.drives,
     ...view.parts.loads.map((one) => one.node),
     ...view.parts.vectors,
@@ -279,7 +285,11 @@ function pose(view) {
   parts.bodies.forEach((one) => poseBody(view, one));
   parts.points.forEach((one) => moveTo(one.node, spotOf(view, one.key)));
   parts.joints.forEach((one) => poseJoint(view, one));
-  parts.loads.forEach((one) => poseLoad(one, spotsOf(view, one.keys)));
+  parts.loads.forEach((one) => {
+    one.aim?.(at(scene.links.find((link) => link.name === one.link).angle, view.posed));
+    poseLoad(one, spotsOf(view, one.keys));
+  });
+  parts.springs.forEach((one) => set(one.node, { d: coil(spotsOf(view, one.ends)) }));
   scene.drivers.forEach((driver, order) => poseDrive(view, driver, parts.drives[order]));
   scene.joints.forEach((one, order) => poseVector(view, one, parts.vectors[order]));
 }

@@ -1,0 +1,163 @@
+"""Checks of what loads may speak of (the motion, tables) and of springs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from trunnion.algebra.namespace import Number
+from trunnion.errors import Finding, Severity
+from trunnion.model.expression import MOTION, RESERVED
+from trunnion.model.names import nearest
+from trunnion.model.parts import Spring, freedoms
+from trunnion.model.quantity import Quantity
+from trunnion.model.units import ANGLE, ANY, KINDS, Dimension, UnitError, dimension_text, fits
+
+if TYPE_CHECKING:
+    from trunnion.model.mechanism import Mechanism
+
+__all__ = ["motion_dimensions", "spring_values", "springs", "table_values", "tables", "unknown_name"]
+
+Values = Mapping[str, Number]
+Dimensions = Mapping[str, Dimension | None]
+
+
+# ---- names in the expressions of loads ------------------------------------------------------------------------
+
+
+def motion_dimensions(mechanism: Mechanism, known: Dimensions) -> dict[str, Dimension | None]:
+    """What an expression in a load may speak of beside the dimensions, and what each measures."""
+    found: dict[str, Dimension | None] = {"time": KINDS["time"].dimensions[0]}
+    joint = mechanism.effective_joints.get(next(iter(mechanism.drivers), ""))
+    if joint is not None:
+        slides = "rotation" not in freedoms(joint.type)
+        found["drive"] = KINDS["length"].dimensions[0] if slides else ANGLE
+        found["speed"] = KINDS["speed" if slides else "angular speed"].dimensions[0]
+    for name, table in mechanism.tables.items():
+        found[name] = next((one for _, value in table.points if (one := _measure(value, known)) is not None), None)
+    return found
+
+
+def _measure(value: Quantity, known: Dimensions) -> Dimension | None:
+    if not set(value.names) <= known.keys():
+        return None
+    try:
+        return value.check(known, ANY)
+    except UnitError:
+        return None
+
+
+def unknown_name(mechanism: Mechanism, name: str, path: str, source: object, known: Dimensions) -> Finding:
+    """A name in an expression that means nothing there."""
+    section = path.partition(".")[0]
+    what = f"'{source}' speaks of '{name}', which is not one of the dimensions"
+    if name not in MOTION and name not in mechanism.tables:
+        remedy = nearest(name, [*known, *(motion_dimensions(mechanism, known) if section == "loads" else ())])
+        return Finding(what, path, remedy)
+    if section == "loads":
+        return Finding(f"'{source}' speaks of '{name}', but nothing is driven", path, "state a driver")
+    return Finding(what, path, "drive, speed, time and tables are for loads; give a number or a dimension")
+
+
+# ---- tables ---------------------------------------------------------------------------------------------------
+
+
+def tables(mechanism: Mechanism, known: Dimensions) -> Iterator[Finding]:
+    """Names of the tables, and whether the values of each measure one thing."""
+    for name, table in mechanism.tables.items():
+        where = f"tables.{name}"
+        if name in RESERVED or name in MOTION or name in mechanism.dimensions:
+            other = "a dimension" if name in mechanism.dimensions else "a name of the expressions themselves"
+            yield Finding(f"'{name}' is {other}", where, "call the table otherwise")
+        elif not name.isidentifier() or name.startswith("_"):
+            remedy = "name it with letters, digits and _, a letter first"
+            yield Finding(f"'{name}' cannot be used in an expression", where, remedy)
+        if table.over == "drive" and not mechanism.drivers:
+            yield Finding("is over the coordinate of the first driver, but nothing is driven", where, "state a driver")
+        if table.periodic and len(table.points) < 3:
+            yield Finding("a periodic table needs three points", f"{where}.points", "add points")
+        first: Dimension | None = None
+        for k, (_, value) in enumerate(table.points):
+            measured = _measure(value, known)
+            first = first if first is not None else measured
+            if measured is not None and first is not None and not (fits(measured, first) and fits(first, measured)):
+                what = f"is {dimension_text(measured)}, the values before are {dimension_text(first)}"
+                yield Finding(what, f"{where}.points.{k}.value", "let a table measure one thing")
+
+
+def table_values(mechanism: Mechanism, values: Values) -> Iterator[Finding]:
+    """Whether the points of each table come in order and a periodic one ends as it begins."""
+    for name, table in mechanism.tables.items():
+        where = f"tables.{name}.points"
+        rows = range(len(table.points))
+        places, column = ([values[f"{where}.{k}.{key}"] for k in rows] for key in ("at", "value"))
+        for k in rows[1:]:
+            if places[k] <= places[k - 1]:
+                what = f"its place {places[k]:g} does not come after {places[k - 1]:g} of the point before (SI)"
+                yield Finding(what, f"{where}.{k}", "sort the points; make a jump steep, not upright")
+        if table.periodic and abs(column[-1] - column[0]) > 1e-9 * np.max(np.abs(column)):
+            what = f"a periodic table that begins at {column[0]:g} and ends at {column[-1]:g} (SI)"
+            yield Finding(what, where, "end it with the value it begins with, one period later")
+
+
+# ---- springs --------------------------------------------------------------------------------------------------
+
+
+def springs(mechanism: Mechanism) -> Iterator[Finding]:
+    """Whether each spring stands somewhere and states what it needs."""
+    for name, spring in mechanism.springs.items():
+        where = f"springs.{name}"
+        if (spring.between is None) == (spring.joint is None):
+            remedy = "state between: [link.point, link.point] or joint: …"
+            yield Finding("stands neither or both between two points and in a joint", where, remedy)
+            continue
+        joints, joint = mechanism.effective_joints, spring.joint or ""
+        if spring.between is not None:
+            yield from _ends(mechanism, spring.between, f"{where}.between")
+        elif joint not in joints:
+            yield Finding(f"there is no joint '{joint}'", f"{where}.joint", nearest(joint, joints))
+            continue
+        turns = spring.between is None and "rotation" in freedoms(joints[joint].type)
+        yield from _free(spring, turns, where)
+
+
+def _ends(mechanism: Mechanism, ends: tuple[str, str], where: str) -> Iterator[Finding]:
+    known = [f"{link}.{point}" for link, part in mechanism.links.items() for point in part.points]
+    for end in ends:
+        if end not in known:
+            yield Finding(f"there is no point '{end}'", where, nearest(end, known) + " (write link.point)")
+    if ends[0].partition(".")[0] == ends[1].partition(".")[0]:
+        yield Finding(f"both ends are on the link '{ends[0].partition('.')[0]}'", where, "name points of two links")
+
+
+def _free(spring: Spring, turns: bool, where: str) -> Iterator[Finding]:
+    """What the spring states of itself."""
+    own, other = ("free_angle", "free_length") if turns else ("free_length", "free_angle")
+    if getattr(spring, other) is not None:
+        kind = "turns" if turns else "acts along a line"
+        yield Finding(f"this spring {kind}", f"{where}.{other}", f"state {own} instead")
+    elif spring.stiffness is None and spring.damping is None and spring.preload is None:
+        yield Finding("there is nothing in this spring", where, "state a stiffness, a damping or a preload")
+    elif spring.stiffness is not None and getattr(spring, own) is None:
+        example = "20 deg" if turns else "40 mm"
+        yield Finding(f"a stiffness without a {own}", where, f"add {own}: {example}; its force there is the preload")
+    elif spring.stiffness is None and getattr(spring, own) is not None:
+        yield Finding(f"a {own} means nothing without a stiffness", f"{where}.{own}", "add stiffness: … or remove it")
+
+
+def spring_values(mechanism: Mechanism, values: Values) -> Iterator[Finding]:
+    """Signs, and a free angle that would count whole turns where nothing counts them."""
+    for name, spring in mechanism.springs.items():
+        where = f"springs.{name}"
+        for key in ("stiffness", "damping", *(["free_length"] if spring.between else [])):
+            number = values.get(f"{where}.{key}", np.nan)
+            if number < 0:
+                yield Finding(f"is {number:g}, which is negative", f"{where}.{key}", "give a value of at least 0")
+        if values.get(f"{where}.stiffness", np.nan) == 0:
+            yield Finding("is 0: the spring does not pull", f"{where}.stiffness", "remove it", Severity.WARNING)
+        turns = np.abs(values.get(f"{where}.free_angle", np.nan)) / (2 * np.pi)
+        if spring.joint not in mechanism.drivers and turns > 1:
+            what = f"is {turns:.3g} turns, but the rotation of '{spring.joint}', which is not driven, counts none"
+            yield Finding(what, f"{where}.free_angle", "state the angle within a turn and the winding as preload: …")

@@ -1,0 +1,565 @@
+"""Loads that vary and follow, tables, springs and dampers: closed forms, energy, virtual work, and refusals."""
+
+from __future__ import annotations
+
+import copy
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import trunnion
+from mechanisms import Array, Data, findings, four_bar, prismatic, revolute, slide, slider_crank
+from trunnion import Mechanism, MechanismError
+from trunnion.algebra.dual import Dual, derivative
+from trunnion.algebra.table import look_up
+
+STEPS = 48
+TURN = 2 * np.pi
+FULL_TURN = np.arange(STEPS) * (TURN / STEPS)
+
+
+def bare(data: Data) -> Data:
+    """Massless links, no loads."""
+    data = copy.deepcopy(data)
+    for link in data["links"].values():
+        link.pop("mass", None), link.pop("inertia", None), link.pop("centre", None)
+    return {**data, "loads": {}}
+
+
+def run(data: Data, steps: int = STEPS, **extra: Any) -> Any:
+    return trunnion.analyse(Mechanism(**{**data, **extra}), steps)
+
+
+def effort(result: Any) -> Array:
+    return np.asarray(result["drive_effort"].values[0])
+
+
+def balanced(result: Any) -> None:
+    """The powers cancel to rounding, and there are some."""
+    powers = [np.abs(result[name].values).max() for name in ("drive_power", "useful_power", "spring_power")
+              if name in result]  # fmt: skip
+    assert max(powers) > 0
+    assert np.abs(result["power_residual"].values).max() < 1e-12 * max(powers)
+
+
+def refused(**data: Any) -> str:
+    with pytest.raises(MechanismError) as caught:
+        Mechanism(**data)
+    return str(caught.value)
+
+
+# ---- expressions of the motion --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("friction", [None, 0.1])
+def test_expression_equals_the_constant_force_of_each_position(friction: float | None) -> None:
+    data = slider_crank()
+    data |= {"gravity": [0, -9.81], "dimensions": {"F": 600}}
+    data["joint_defaults"] = {"pin": {"radius": 0.02}, "guide": {"length": 0.4}, "friction": friction or 0}
+    data["loads"] = {
+        "gas": {
+            "link": "piston",
+            "at": "H",
+            "force": ["-1 N * F * (1 + cos(drive))", "3 N s * speed / 1 rad"],
+            "moment": "2 N m * sin(2 * drive) + 1 N m/s * time",
+        }
+    }
+    result = run(data)
+    balanced(result)
+    speed = data["drivers"]["A"]["speed"]
+    for k in range(0, STEPS, 5):
+        time = float(result["time"].values[k])
+        q = speed * time
+        constant = copy.deepcopy(data)
+        del constant["dimensions"]
+        load = {"force": [-600 * (1 + np.cos(q)), 3 * speed], "moment": 2 * np.sin(2 * q) + time}
+        constant["loads"]["gas"] |= load
+        same = run(constant)
+        for name in ("drive_effort", "reaction_force", "useful_power"):
+            np.testing.assert_allclose(result[name].values[..., k], same[name].values[..., k], rtol=1e-12, atol=1e-9)
+
+
+def test_load_over_part_of_the_motion() -> None:
+    """`between` switches a press force on; outside, the drive works for nothing."""
+    data = bare(slider_crank())
+    data["loads"] = {"press": {"link": "piston", "at": "P", "force": ["5 kN * between(-drive, 91 deg, 1.26 * pi)", 0]}}
+    result = run(data)
+    on = (np.radians(91) <= FULL_TURN) & (1.26 * np.pi > FULL_TURN)
+    np.testing.assert_array_equal(np.abs(effort(result)) > 0, on)
+
+
+def test_the_drive_of_a_slide_is_a_length() -> None:
+    data = press_of_two_slides()
+    data["loads"] = {"back": {"link": "ram", "at": "X", "force": ["-2 N/mm * drive", 0]}}
+    result = run(data, 5)
+    np.testing.assert_allclose(effort(result), 2000 * np.linspace(0.05, 0.25, 5), rtol=1e-12)
+    balanced(result)
+    data["loads"]["back"]["force"] = ["-2 N * cos(drive)", 0]
+    assert "cos is given a length" in refused(**data)
+
+
+def press_of_two_slides() -> Data:
+    return {
+        "links": {"ground": {"points": {"X": slide(0, 0)}}, "ram": {"points": {"X": slide(0, 0)}}},
+        "joints": {"X": prismatic("ground", "ram")},
+        "drivers": {"X": {"speed": 0.1, "range": [0.05, 0.25]}},
+    }
+
+
+def test_expressions_of_loads_take_samples_and_duals() -> None:
+    data = bare(slider_crank()) | {"dimensions": {"F": "600 N ± 20 N"}}
+    data["loads"] = {"gas": {"link": "piston", "at": "P", "force": ["-F * (1 + cos(drive))", 0]}}
+    mechanism = Mechanism(**data)
+    prepared = trunnion.prepare(mechanism)
+    time = prepared.cycle.times(9)
+    assert "loads.gas.force.x" not in mechanism.parameters()
+    one = prepared.solve(time).efforts["A"]
+    samples = prepared.solve(time, mechanism.parameters({"F": np.array([[600.0], [1200.0]])})).efforts["A"]
+    np.testing.assert_allclose(samples, np.stack([one, 2 * one]), atol=1e-9)
+    slope = derivative(prepared.solve(time, mechanism.parameters({"F": Dual(600.0, 1.0)})).efforts["A"])
+    np.testing.assert_allclose(slope, one / 600, atol=1e-12)
+    # an override makes a number of the expression, and so does `with_values`
+    fixed = prepared.solve(time, mechanism.parameters({"gas.force.x": -600.0})).efforts["A"]
+    again = trunnion.prepare(mechanism.with_values({"gas.force.x": "-600 N"})).solve(time).efforts["A"]
+    np.testing.assert_allclose(fixed, again)
+    np.testing.assert_allclose(one, fixed * (1 + np.cos(data["drivers"]["A"]["speed"] * time)), atol=1e-9)
+
+
+def test_what_the_inputs_say_of_an_expression() -> None:
+    data = bare(slider_crank())
+    data["loads"] = {"gas": {"link": "piston", "at": "P", "force": ["-600 N * cos(drive)", 0]}}
+    from trunnion import report
+
+    assert "-600 N * cos(drive)" in report(run(data))
+
+
+# ---- following forces, one-way resistance ---------------------------------------------------------------------
+
+
+def test_following_force_equals_the_force_turned_by_hand() -> None:
+    data = four_bar()
+    data["loads"] = {"push": {"link": "coupler", "at": "E", "force": [12.0, -30.0], "frame": "link"}}
+    result = run(data)
+    balanced(result)
+    angle = result["link_angle"].sel(link="coupler").values
+    for k in range(0, STEPS, 7):
+        c, s = np.cos(angle[k]), np.sin(angle[k])
+        data["loads"]["push"] = {"link": "coupler", "at": "E", "force": [12 * c + 30 * s, 12 * s - 30 * c]}
+        np.testing.assert_allclose(effort(result)[k], effort(run(data))[k], rtol=1e-11)
+
+
+@pytest.mark.parametrize("only", ["positive", "negative"])
+def test_resistance_of_one_direction(only: str) -> None:
+    data = bare(slider_crank())
+    data["loads"] = {"cut": {"joint": "C", "resisting_force": 100.0, "only": only}}
+    result = run(data, 49)
+    balanced(result)
+    speed = result["joint_slide_velocity"].sel(joint="C").values
+    acts = speed > 0 if only == "positive" else speed < 0
+    np.testing.assert_allclose(result["useful_power"].values, np.where(acts, 100 * np.abs(speed), 0), atol=1e-9)
+
+
+def test_resistance_that_varies_and_one_that_drives() -> None:
+    data = bare(slider_crank())
+    data["loads"] = {"cut": {"joint": "C", "resisting_force": "100 N * (1 + cos(drive))"}}
+    result = run(data)
+    speed = np.abs(result["joint_slide_velocity"].sel(joint="C").values)
+    np.testing.assert_allclose(result["useful_power"].values, 100 * (1 + np.cos(FULL_TURN)) * speed, atol=1e-9)
+    data["loads"]["cut"]["resisting_force"] = "100 N * cos(drive)"
+    assert any("is negative between" in row["what"] for row in findings(run(data)))
+    data["loads"]["cut"]["resisting_force"] = "-3 N"
+    assert "loads.cut.resisting_force: is -3, which is negative" in refused(**data)
+
+
+# ---- tables ---------------------------------------------------------------------------------------------------
+
+KNOTS = [0.0, 0.4, 1.1, 2.5, 4.0, TURN]
+VALUES = [3.0, -1.0, 2.0, 7.0, 1.0, 3.0]
+
+
+@pytest.mark.parametrize("smooth", [False, True])
+@pytest.mark.parametrize("periodic", [False, True])
+def test_table_at_and_between_its_knots(smooth: bool, periodic: bool) -> None:
+    np.testing.assert_allclose(look_up(KNOTS, VALUES, np.array(KNOTS), smooth, periodic), VALUES, atol=1e-12)
+    place = np.linspace(0.05, TURN - 0.1, 37)
+    found = look_up(KNOTS, VALUES, place, smooth, periodic)
+    from scipy.interpolate import CubicSpline
+
+    expected = CubicSpline(KNOTS, VALUES, bc_type="periodic" if periodic else "natural")(place)
+    np.testing.assert_allclose(found, expected if smooth else np.interp(place, KNOTS, VALUES), rtol=1e-12)
+    outside = look_up(KNOTS, VALUES, place + TURN, smooth, periodic)
+    np.testing.assert_allclose(outside, found if periodic else np.where(place + TURN > TURN, np.nan, 0), rtol=1e-9)
+    # samples of the values, and duals of place and value
+    samples = look_up(KNOTS, [np.array([[v], [2 * v]]) for v in VALUES], place, smooth, periodic)
+    np.testing.assert_allclose(samples, np.stack([found, 2 * found]), rtol=1e-9, atol=1e-12)
+    dual = look_up(KNOTS, [Dual(v, v) for v in VALUES], place, smooth, periodic)
+    np.testing.assert_allclose(derivative(dual), found, rtol=1e-9, atol=1e-12)
+    by_place = derivative(look_up(KNOTS, VALUES, Dual(place, np.ones_like(place)), smooth, periodic))
+    h = 1e-6
+    ends = [look_up(KNOTS, VALUES, place + sign * h, smooth, periodic) for sign in (-1, 1)]
+    np.testing.assert_allclose(by_place, (ends[1] - ends[0]) / (2 * h), atol=1e-6)
+
+
+def table_of(interpolation: str = "linear", periodic: bool = True) -> Data:
+    points = [[f"{np.degrees(a)} deg", f"{v} bar"] for a, v in zip(KNOTS, VALUES, strict=True)]
+    return {"over": "drive", "points": points, "interpolation": interpolation, "periodic": periodic}
+
+
+@pytest.mark.parametrize("interpolation", ["linear", "spline"])
+def test_load_by_a_table(interpolation: str) -> None:
+    """An indicator diagram: pressure over the crank angle, times the area of the piston."""
+    data = bare(slider_crank()) | {"tables": {"p": table_of(interpolation)}, "dimensions": {"area": "20 cm^2"}}
+    data["drivers"] = {"A": {"speed": 5.0, "start": 2.0}}  # the drive runs beyond a turn
+    data["loads"] = {"gas": {"link": "piston", "at": "P", "force": ["-p * area", 0]}}
+    result = run(data)
+    balanced(result)
+    drive = 2.0 + 5.0 * result["time"].values
+    pressure = 1e5 * look_up(KNOTS, VALUES, drive, interpolation == "spline", True)
+    data["loads"]["gas"]["force"] = [-1, 0]
+    one = run(data)
+    np.testing.assert_allclose(effort(result), effort(one) * pressure * 20e-4, rtol=1e-9, atol=1e-9)
+    mechanism = Mechanism(**data)
+    assert mechanism.parameters()["tables.p.points.1.value"] == pytest.approx(-1e5)
+    assert mechanism.parameter_kinds()["tables.p.points.1.at"].name == "angle"
+
+
+def test_outside_its_table_a_load_has_no_value() -> None:
+    data = bare(slider_crank()) | {"tables": {"f": {"over": "time", "points": [[0, "1 N"], ["0.5 s", "3 N"]]}}}
+    data["loads"] = {"push": {"link": "piston", "at": "P", "force": ["f", 0]}}
+    result = run(data)
+    out = result["time"].values > 0.5
+    status = result["status"].values
+    np.testing.assert_array_equal(status == trunnion.Status.LOAD_UNDEFINED, out)
+    assert np.all(np.isnan(effort(result)) == out)
+    assert np.all(np.isfinite(result["point_velocity"].values))
+    row = next(row for row in findings(result) if row["where"] == "loads.push")
+    assert "has no value between" in row["what"]
+    assert "periodic" in row["remedy"]
+
+
+# ---- springs --------------------------------------------------------------------------------------------------
+
+
+def spring_four_bar(**spring: Any) -> Data:
+    data = bare(four_bar())
+    data["links"]["ground"]["points"]["S"] = [0.2, 1.1]
+    data["springs"] = {"S": {"between": ["ground.S", "coupler.E"], **spring}}
+    return data
+
+
+def test_effort_of_a_spring_is_the_slope_of_its_energy() -> None:
+    """Massless, no friction: the drive torque is dV/dθ, V = F₀ e + k e²/2 with e = L − L₀."""
+    k, free, preload = 900.0, 0.3, 20.0
+    data = spring_four_bar(stiffness=k, free_length=free, preload=preload)
+    result = run(data)
+    balanced(result)
+
+    def energy(shift: float) -> Array:
+        moved = copy.deepcopy(data)
+        moved["drivers"]["A"]["start"] = shift
+        e = run(moved)["spring_elongation"].values[0]
+        return np.asarray(preload * e + k * e * e / 2)
+
+    h = 1e-3
+    slope = (8 * (energy(h) - energy(-h)) - (energy(2 * h) - energy(-2 * h))) / (12 * h)
+    np.testing.assert_allclose(effort(result), slope, atol=1e-8 * np.abs(slope).max())
+    place = result["point_position"].sel(point="coupler.E").values.T - [0.2, 1.1]
+    length = np.hypot(*place.T) if place.shape[1] == 2 else np.hypot(*place)
+    np.testing.assert_allclose(result["spring_elongation"].values[0], length - free, rtol=1e-12)
+    np.testing.assert_allclose(result["spring_force"].values[0], preload + k * (length - free), rtol=1e-10)
+    # what it takes it gives back: no net work over the turn
+    power = result["spring_power"].values[0]
+    assert abs(power.mean()) < 1e-6 * np.abs(power).max()
+    assert abs(run(data, 400)["drive_power"].values.mean()) < 1e-12 * np.abs(power).max()
+    assert np.all(result["damping_power"].values == 0)
+    assert np.all(result["useful_power"].values == 0)
+
+
+def test_damper_takes_what_the_drive_gives() -> None:
+    result = run(spring_four_bar(damping=35.0), 400)
+    balanced(result)
+    lost = result["damping_power"].values[0]
+    assert np.all(lost >= 0)
+    assert lost.max() > 0
+    np.testing.assert_allclose(result["spring_power"].values[0], -lost, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(result["drive_power"].values[0], lost, rtol=1e-9, atol=1e-9)
+    # the integral ∮ c L̇² dt with L̇ from the lengths alone
+    length, time = result["spring_elongation"].values[0], result["time"].values
+    step = time[1] - time[0]
+    wave = np.fft.fftfreq(len(length), step) * TURN
+    rate = np.fft.ifft(1j * wave * np.fft.fft(length)).real
+    np.testing.assert_allclose(35.0 * np.mean(rate**2), lost.mean(), rtol=1e-9)
+
+
+def test_gas_spring_and_links_in_either_order() -> None:
+    one = run(spring_four_bar(preload=-300.0))
+    data = spring_four_bar(preload=-300.0)
+    data["springs"]["S"]["between"].reverse()
+    np.testing.assert_allclose(effort(one), effort(run(data)), atol=1e-11)
+    assert np.all(one["spring_force"].values == -300.0)
+    balanced(one)
+
+
+def test_torsional_spring_in_the_driven_joint() -> None:
+    """Closed form: the drive turns against k (θ − θ₀) + c ω, whole turns counted."""
+    data = bare(four_bar())
+    data["springs"] = {
+        "S": {"joint": "A", "stiffness": "3 N m/rad", "free_angle": "20 deg", "damping": "0.1 N m s/rad"}
+    }
+    data["drivers"]["A"] = {"speed": 4.0, "range": ["-30 deg", "500 deg"]}
+    result = run(data)
+    angle = np.radians(np.linspace(-30, 500, STEPS))
+    np.testing.assert_allclose(effort(result), 3 * (angle - np.radians(20)) + 0.1 * 4.0, rtol=1e-12)
+    np.testing.assert_allclose(result["damping_power"].values[0], 0.1 * 16.0)
+    balanced(result)
+
+
+def test_torsional_spring_in_another_joint() -> None:
+    """Virtual work: effort · ω_A = k φ · ω_C, φ the rotation of C from the free angle; no net work over a turn."""
+    data = bare(four_bar())
+    data["springs"] = {"S": {"joint": "C", "stiffness": 3.0, "free_angle": 1.0, "preload": "2 N m"}}
+    result = run(data, 360)
+    balanced(result)
+    turned = result["joint_rotation"].sel(joint="C").values - 1.0
+    phi = (turned + np.pi) % TURN - np.pi
+    np.testing.assert_allclose(result["spring_elongation"].values[0], phi, atol=1e-12)
+    rate = result["joint_rotation_velocity"].sel(joint="C").values
+    np.testing.assert_allclose(effort(result) * 4.0, (2 + 3 * phi) * rate, atol=1e-10)
+    assert abs(result["spring_power"].values.mean()) < 1e-10
+    assert not [row for row in findings(result) if row["where"] == "springs.S"]
+    data["springs"]["S"] |= {"joint": "B", "free_angle": 0.0}  # B turns round and round
+    assert "half a turn" in next(row["what"] for row in findings(run(data)) if row["where"] == "springs.S")
+
+
+def test_spring_in_a_slide() -> None:
+    data = press_of_two_slides()
+    data["springs"] = {"S": {"joint": "X", "stiffness": "2 N/mm", "free_length": "-10 mm", "damping": "50 N s/m"}}
+    result = run(data, 5)
+    np.testing.assert_allclose(effort(result), 2000 * (np.linspace(0.05, 0.25, 5) + 0.01) + 50 * 0.1, rtol=1e-12)
+    balanced(result)
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.1])
+def test_duals_of_spring_numbers_equal_central_differences(friction: float) -> None:
+    data = spring_four_bar(stiffness=900.0, free_length=0.3, damping=20.0, preload=5.0)
+    data["springs"]["T"] = {"joint": "C", "stiffness": 3.0, "free_angle": 1.0, "damping": 0.2}
+    data["joint_defaults"] = {"pin": {"radius": 0.02}, "friction": friction}
+    mechanism = Mechanism(**data)
+    prepared = trunnion.prepare(mechanism)
+    time = prepared.cycle.times(11)[1:]
+    method = trunnion.FrictionMethod("newton", 1e-12)
+    for path in [path for path in mechanism.parameters() if path.startswith("springs.")] + ["ground.points.S.x"]:
+        value = mechanism.parameters()[mechanism.parameter_set.resolve(path)]
+        step = 1e-4 * max(abs(value), 0.1)
+
+        def solved(number: Any, path: str = path) -> Any:
+            return prepared.solve(time, mechanism.parameters({path: number}), method).efforts["A"]
+
+        differences = (solved(value + step) - solved(value - step)) / (2 * step)
+        scale = np.abs(differences).max()
+        np.testing.assert_allclose(derivative(solved(Dual(value, 1.0))), differences, atol=2e-7 * scale, err_msg=path)
+
+
+def test_where_the_ends_of_a_spring_meet_it_has_no_value() -> None:
+    data = bare(four_bar())
+    data["links"]["ground"]["points"]["S"] = [0.3, 0.0]
+    data["springs"] = {"S": {"between": ["ground.S", "crank.B"], "stiffness": 10.0, "free_length": 0.1}}
+    result = run(data, 8)
+    np.testing.assert_array_equal(result["status"].values == trunnion.Status.LOAD_UNDEFINED, np.arange(8) == 0)
+    assert "has no value at 0°" in next(row["what"] for row in findings(result) if row["where"] == "springs.S")
+    assert np.isnan(effort(result)[0])
+    assert np.all(np.isfinite(effort(result)[1:]))
+
+
+def test_a_balanced_lamp_needs_no_torque() -> None:
+    """Zero free length: k = m g l / (a b) holds an arm of length l in every position."""
+    m, length, a, b = 2.0, 0.5, 0.2, 0.3
+    data: Data = {
+        "gravity": [0, -9.81],
+        "links": {
+            "ground": {"points": {"A": [0, 0], "S": [0, a]}},
+            "arm": {"points": {"A": [0, 0], "T": [b, 0]}, "mass": m, "centre": [length, 0]},
+        },
+        "joints": {"A": revolute("ground", "arm")},
+        "drivers": {"A": {"speed": 1.0, "range": ["-60 deg", "70 deg"]}},
+        "springs": {
+            "S": {"between": ["ground.S", "arm.T"], "stiffness": m * 9.81 * length / (a * b), "free_length": 0}
+        },
+    }
+    result = run(data)
+    assert np.abs(effort(result)).max() < 1e-12 * m * 9.81 * length
+
+
+def test_results_of_springs_are_written(tmp_path: Path) -> None:
+    import csv
+
+    from trunnion.export import save
+
+    data = spring_four_bar(stiffness=900.0, free_length=0.3)
+    data["springs"]["T"] = {"joint": "C", "stiffness": 3.0, "free_angle": 1.0}
+    result = run(data, 6)
+    save(result, tmp_path / "r.csv", units_row=True)
+    names, units = list(csv.reader((tmp_path / "r.csv").read_text().splitlines()))[:2]
+    told = dict(zip(names, units, strict=True))
+    assert (told["S.force"], told["S.elongation"]) == ("N", "m")
+    assert (told["T.force"], told["T.elongation"]) == ("N m", "rad")
+    save(result, tmp_path / "r.nc")
+    assert "spring" not in run(bare(four_bar()), 6).dims
+
+
+def test_round_trip(tmp_path: Path) -> None:
+    data = spring_four_bar(stiffness="0.9 N/mm", free_length="300 mm ± 2 mm", damping="20 N s/m", preload="5 N")
+    data["tables"] = {"p": table_of("spline")}
+    data["loads"] = {
+        "gas": {"link": "coupler", "at": "E", "force": ["-p * 1 cm^2", "1 N * drive"], "frame": "link"},
+        "cut": {"joint": "D", "resisting_torque": "1 N m * (1 + sin(drive))", "only": "positive"},
+    }
+    mechanism = Mechanism(**data)
+    for suffix in ("yaml", "json"):
+        mechanism.write(tmp_path / f"m.{suffix}")
+        again = Mechanism.read(tmp_path / f"m.{suffix}")
+        assert again == mechanism
+        assert again.digest == mechanism.digest
+    assert mechanism.tolerances() == {"springs.S.free_length": pytest.approx((-0.002, 0.002))}
+    changed = mechanism.with_values({"S.stiffness": "2 N/mm", "tables.p.points.1.value": "4 bar"})
+    assert changed.parameters()["springs.S.stiffness"] == pytest.approx(2000)
+    assert changed.parameters()["tables.p.points.1.value"] == pytest.approx(4e5)
+
+
+# ---- refusals -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("spring", "words"),
+    [
+        ({"stiffness": -5.0, "free_length": 0.1}, "springs.S.stiffness: is -5, which is negative"),
+        ({"damping": -5.0}, "springs.S.damping: is -5, which is negative"),
+        ({"stiffness": 5.0, "free_length": "-1 mm"}, "springs.S.free_length: is -0.001, which is negative"),
+        ({"stiffness": "5 N m", "free_length": 0.1}, "is a moment where a stiffness is needed"),
+        ({"stiffness": "5 N", "free_length": 0.1}, "is a force where a stiffness or torsional stiffness is needed"),
+        ({"damping": "5 N/m"}, "is a stiffness where a damping or torsional damping is needed"),
+        ({"preload": "5 N m"}, "is a moment where a force is needed"),
+        ({"stiffness": 5.0}, "a stiffness without a free_length"),
+        ({"stiffness": 5.0, "free_angle": 1.0}, "this spring acts along a line"),
+        ({"damping": 5.0, "free_length": 0.1}, "means nothing without a stiffness"),
+        ({}, "there is nothing in this spring"),
+        ({"stiffness": 5.0, "free_length": 0.1, "joint": "A"}, "stands neither or both"),
+        ({"between": ["ground.S", "coupler.F"], "preload": 1.0}, "there is no point 'coupler.F'"),
+        ({"between": ["coupler.B", "coupler.E"], "preload": 1.0}, "both ends are on the link 'coupler'"),
+        ({"stiffnes": 5.0}, "the key 'stiffnes' is unknown"),
+        ({"stiffness": "2 N/mm * cos(drive)", "free_length": 0.1}, "drive, speed, time and tables are for loads"),
+    ],
+)
+def test_bad_springs_are_refused(spring: Data, words: str) -> None:
+    assert words in refused(**spring_four_bar(**spring))
+
+
+def test_bad_torsional_springs_are_refused() -> None:
+    def message(**spring: Any) -> str:
+        return refused(**bare(four_bar()), springs={"S": {"joint": "C", **spring}})
+
+    assert "is a stiffness where a torsional stiffness is needed" in message(stiffness="2 N/mm", free_angle=0.0)
+    assert "this spring turns — state free_angle" in message(stiffness=2.0, free_length=0.1)
+    assert "is 2.5 turns" in message(stiffness=2.0, free_angle="900 deg")
+    assert "there is no joint 'Q'" in message(joint="Q", preload=1.0)
+
+
+def test_zero_stiffness_is_doubted() -> None:
+    from trunnion.model.check import check_model
+
+    found = check_model(Mechanism(**spring_four_bar(stiffness=0.0, free_length=0.1)))
+    assert [finding.severity for finding in found if finding.where == "springs.S.stiffness"] == ["warning"]
+
+
+@pytest.mark.parametrize(
+    ("force", "words"),
+    [
+        ("600 N * crank", "speaks of 'crank', which is not one of the dimensions"),
+        ("600 N * driv", "'drive'"),
+        ("600 N / drive * 1 m", "where a force is needed"),
+        ("600 N * (1 + time)", "added"),
+        ("600 N * cos(time)", "cos is given a time"),
+        ("600 N * cos(drive) ± 5 N", "varies with the motion and has a tolerance"),
+        ("cos(drive)", "is a number where a force is needed"),
+        ("600 N * between(drive, 0 deg)", "between takes 3 arguments"),
+        ("600 N * between(drive, 0 deg, 3 mm)", "put together in between"),
+    ],
+)
+def test_bad_expressions_are_refused(force: str, words: str) -> None:
+    data = four_bar()
+    data["loads"] = {"push": {"link": "coupler", "at": "E", "force": [force, 0]}}
+    assert words in refused(**data)
+
+
+def test_names_of_the_motion_are_not_for_dimensions_nor_for_other_sections() -> None:
+    for name in ("drive", "time", "speed"):
+        assert f"dimensions.{name}: '{name}' is a name of the expressions" in refused(
+            **four_bar(), dimensions={name: 1.0}
+        )
+    data = four_bar()
+    data["links"]["crank"]["mass"] = "1 kg * cos(drive)"
+    assert "drive, speed, time and tables are for loads" in refused(**data)
+    assert "drive, speed, time and tables are for loads" in refused(**four_bar(), dimensions={"L": "2 m * cos(drive)"})
+    still = four_bar() | {"drivers": {}}
+    still["loads"] = {"push": {"link": "coupler", "at": "E", "force": ["1 N * drive/1 rad", 0]}}
+    assert "but nothing is driven" in refused(**still)
+
+
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [
+        ({"points": [[0, "1 N"]]}, "at least 2 are needed"),
+        ({"points": [[0, "1 N"], ["10 mm", "2 N"]]}, "tables.t.points.1.at: '10 mm' is a length where an angle"),
+        ({"points": [[0, "1 N"], [0, "2 N"]]}, "does not come after"),
+        ({"points": [[0, "1 N"], [1, "2 mm"]]}, "let a table measure one thing"),
+        ({"points": [[0, "1 N"], [1, "2 N"], [2, "3 N"]], "periodic": True}, "begins at 1 and ends at 3"),
+        ({"points": [[0, "1 N"], [1, "2 N"]], "periodic": True}, "needs three points"),
+        ({"points": [[0, "1 N"], [1, "2 N"]], "interpolation": "cubic"}, "is none of"),
+        ({"points": [[0, "1 N"], [1, "2 N * drive"]]}, "are for loads"),
+        ({"over": "time", "points": [["0 deg", "1 N"], [1, "2 N"]]}, "is an angle where a time is needed"),
+    ],
+)
+def test_bad_tables_are_refused(table: Data, words: str) -> None:
+    assert words in refused(**four_bar(), tables={"t": table})
+
+
+def test_names_of_tables() -> None:
+    points = [[0, "1 N"], [1, "2 N"]]
+    assert "tables.time: 'time' is a name" in refused(**four_bar(), tables={"time": {"points": points}})
+    assert "is a dimension" in refused(**four_bar(), tables={"t": {"points": points}}, dimensions={"t": 1.0})
+    assert "cannot be used in an expression" in refused(**four_bar(), tables={"my table": {"points": points}})
+
+
+def test_keys_that_do_not_belong() -> None:
+    data = four_bar()
+    data["loads"] = {"push": {"link": "coupler", "at": "E", "force": [1, 0], "only": "positive"}}
+    assert "only is for a load that resists" in refused(**data)
+    data["loads"] = {"cut": {"joint": "D", "resisting_torque": 1.0, "frame": "link"}}
+    assert "frame is for a load on a link" in refused(**data)
+
+
+def test_example_of_the_lamp() -> None:
+    """The spring balances the arm in every position; with friction the hand works only against that."""
+    mechanism = Mechanism.read(Path(__file__).parents[2] / "examples" / "spring-balanced-lamp.yaml")
+    free = trunnion.analyse(mechanism.with_friction("off"), 30)
+    assert np.abs(effort(free)).max() < 1e-12
+    rubbing = trunnion.analyse(mechanism, 30)
+    np.testing.assert_allclose(rubbing["drive_power"][0], rubbing["friction_power"].sum("joint"), rtol=1e-9)
+    balanced(rubbing)
+
+
+def test_drawings_show_springs_and_following_loads(tmp_path: Path) -> None:
+    from trunnion.views.plots import PLOTS
+    from trunnion.views.scene import scene
+
+    data = spring_four_bar(stiffness=900.0, free_length=0.3)
+    data["loads"] = {"push": {"link": "coupler", "at": "E", "force": ["30 N * cos(drive)", 0], "frame": "link"}}
+    result = run(data)
+    shown = scene(result)
+    assert shown["springs"] == [{"name": "S", "ends": ["ground.S", "coupler.E"]}]
+    push = shown["loads"][0]
+    assert (push["frame"], push["varies"], abs(push["force"][0])) == ("link", True, pytest.approx(30))
+    for kind in ("mechanism", "power"):
+        PLOTS[kind](result, None).savefig(tmp_path / f"{kind}.png")

@@ -1,0 +1,375 @@
+"""Motion laws of drivers: published factors, exact derivatives, and what the analysis makes of them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+
+import trunnion
+from mechanisms import Data, analyse, build, class_three, elliptic_bar, five_bar, model, slider_crank
+from trunnion import Mechanism
+from trunnion.algebra.dual import Dual, derivative, primal
+from trunnion.algebra.spline import spline
+from trunnion.errors import Finding, MechanismError, Status
+from trunnion.joints.motion import MOTION_LAWS
+
+PROFILES = {name: law for name, law in MOTION_LAWS.items() if law.profile}
+TABLE = [[0.0, 0.1], [0.1, 0.5], [0.25, 0.9], [0.4, 0.3], [0.6, 0.1]]
+DRIVERS: dict[str, Data] = {
+    "constant": {"speed": -6.0},
+    "range": {"speed": 2.0, "range": [0.2, 1.4]},
+    "harmonic": {"law": "harmonic", "mean": 0.3, "amplitude": 0.7, "period": 0.5, "phase": "90 deg"},
+    **{
+        name: {"law": name, "range": [0.2, 1.9], "duration": 0.2, "dwell": 0.1, "delay": 0.05} for name in PROFILES
+    },
+    "one rise": {"law": "cycloidal", "range": [1.9, 0.2], "duration": 0.2, "returns": False},
+    "late rise": {"law": "cycloidal", "range": [0.2, 1.9], "duration": 0.2, "dwell": 0.1, "delay": 0.05,
+                  "returns": False},
+    "periodic table": {"law": "table", "points": TABLE, "periodic": True, "delay": 0.02},
+    "whole turns": {"law": "table", "points": [[0, 0.1], [0.3, 3.0], [0.5, 0.1 + 2 * np.pi]], "periodic": True},
+    "clamped table": {"law": "table", "points": TABLE, "delay": 0.05},
+    "natural table": {"law": "table", "points": TABLE, "ends": "natural"},
+}  # fmt: skip
+
+
+def driven(driver: Data, data: Data | None = None, name: str = "A", **options: Any) -> Mechanism:
+    """A slider-crank, or another mechanism, with one driver replaced."""
+    data = data or slider_crank()
+    data["drivers"] = {**data["drivers"], name: driver}
+    return build(data, **options)
+
+
+# ---- the laws -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", MOTION_LAWS)
+def test_a_law_states_where_it_comes_from(name: str) -> None:
+    law = MOTION_LAWS[name]
+    assert law.source
+    assert law.validity
+    assert law.needs
+    assert not set(law.needs) & set(law.takes)
+
+
+@pytest.mark.parametrize("name", PROFILES)
+def test_a_profile_starts_and_ends_at_rest(name: str) -> None:
+    profile = PROFILES[name].profile
+    assert profile is not None
+    np.testing.assert_allclose(profile(0.0), 0.0, atol=1e-15)
+    np.testing.assert_allclose(profile(1.0), (1.0, 0.0, 0.0), atol=2e-14)
+    u = np.linspace(0, 1, 101)
+    np.testing.assert_allclose(profile(u).value + profile(1 - u).value, 1.0, atol=1e-14)  # as far as it has come
+
+
+@pytest.mark.parametrize(
+    ("name", "peak_rate", "peak_second"),
+    [("cycloidal", 2.0, 6.2832), ("polynomial-345", 1.875, 5.7735), ("modified-sine", 1.7596, 5.5280)],
+)
+def test_peaks_are_the_published_factors(name: str, peak_rate: float, peak_second: float) -> None:
+    law = PROFILES[name]
+    assert law.profile is not None
+    _, rate, second = law.profile(np.linspace(0, 1, 100_001))
+    assert np.max(rate) == pytest.approx(peak_rate, abs=6e-5)
+    assert np.max(np.abs(second)) == pytest.approx(peak_second, abs=6e-5)
+    assert law.peak_rate == pytest.approx(np.max(rate), rel=1e-9)
+    assert law.peak_second == pytest.approx(np.max(np.abs(second)), rel=1e-9)
+
+
+@pytest.mark.parametrize("name", PROFILES)
+def test_a_profile_takes_nested_duals_and_is_smooth(name: str) -> None:
+    profile = PROFILES[name].profile
+    assert profile is not None
+    u = np.linspace(0.001, 0.999, 333)
+    s, rate, second = profile(u)
+    nested = profile(Dual(Dual(u, 1.0), Dual(1.0, 0.0))).value
+    np.testing.assert_allclose(primal(nested), s, rtol=1e-14)
+    np.testing.assert_allclose(derivative(nested.real), rate, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(derivative(derivative(nested)), second, rtol=1e-10, atol=1e-10)
+    for joint in (0.125, 0.875):  # where the pieces of the modified sine meet
+        below, above = profile(joint - 1e-12), profile(joint + 1e-12)
+        np.testing.assert_allclose(below, above, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", DRIVERS)
+def test_derivatives_by_time_are_exact(name: str) -> None:
+    """Closed-form rate and second derivative against nested duals of the coordinate."""
+    run = trunnion.prepare(driven(DRIVERS[name]))
+    time = np.linspace(0.003, 1.7 * run.cycle.duration, 211)
+    q, rate, second = run.system.drive(run.values, "A", time)
+    nested = run.system.drive(run.values, "A", Dual(Dual(time, 1.0), Dual(1.0, 0.0)))[0]
+    np.testing.assert_allclose(primal(nested), q, rtol=1e-13, atol=1e-13)
+    np.testing.assert_allclose(np.broadcast_to(derivative(nested).real, time.shape), rate * np.ones(211), atol=1e-9)
+    curved = np.broadcast_to(derivative(derivative(nested)), time.shape)
+    np.testing.assert_allclose(curved, second * np.ones(211), atol=1e-7)
+
+
+@pytest.mark.parametrize("ends", ["clamped", "natural", "periodic"])
+@pytest.mark.parametrize("count", [2, 3, 4, 30])
+def test_splines_are_those_of_scipy(ends: Any, count: int) -> None:
+    if ends == "periodic" and count == 2:
+        return
+    rng = np.random.default_rng(count)
+    knots, values = np.cumsum(rng.uniform(0.1, 1, count)), rng.normal(size=count)
+    values[-1] = values[0] if ends == "periodic" else values[-1]
+    place = np.linspace(knots[0], knots[-1], 97)
+    oracle = CubicSpline(knots, values, bc_type=ends)
+    plain = spline(list(map(float, knots)), list(map(float, values)), ends).at(place)
+    stacked = spline(list(knots[:, None, None]), list(values[:, None, None]), ends).at(place)
+    for order, (one, other) in enumerate(zip(plain, stacked, strict=True)):
+        np.testing.assert_allclose(one, oracle(place, order), rtol=1e-9, atol=1e-11)
+        np.testing.assert_allclose(other[0], one, rtol=1e-9, atol=1e-11)
+
+
+def test_rise_dwell_return_dwell() -> None:
+    run = trunnion.prepare(driven({"law": "polynomial-345", "range": [0.5, 1.5], "duration": 0.2, "dwell": 0.1}))
+    assert run.cycle.duration == pytest.approx(0.6)
+    assert run.cycle.periodic
+    q, rate, second = run.system.drive(run.values, "A", np.array([0.0, 0.1, 0.2, 0.25, 0.31, 0.4, 0.51, 0.55, 0.7]))
+    np.testing.assert_allclose(q, [0.5, 1.0, 1.5, 1.5, 1.498841875, 1.0, 0.5, 0.5, 1.0], atol=1e-12)
+    np.testing.assert_array_equal((rate == 0)[[0, 2, 3, 6, 7]], True)
+    np.testing.assert_array_equal((second == 0)[[0, 2, 3, 6, 7]], True)
+    np.testing.assert_allclose(rate[[1, 5, 8]], np.array([1, -1, 1]) * 1.875 / 0.2, rtol=1e-12)
+
+
+def test_a_single_rise_stays_and_a_delay_shifts_it() -> None:
+    run = trunnion.prepare(driven(DRIVERS["late rise"]))
+    assert (run.cycle.duration, run.cycle.periodic) == (pytest.approx(0.35), False)
+    q, rate, _ = run.system.drive(run.values, "A", np.array([0.0, 0.05, 0.15, 0.25, 0.35, 2.0]))
+    np.testing.assert_allclose(q, [0.2, 0.2, 1.05, 1.9, 1.9, 1.9], rtol=1e-14)
+    np.testing.assert_allclose(rate, [0, 0, 2 * 1.7 / 0.2, 0, 0, 0], atol=1e-12)
+
+
+def test_a_periodic_table_may_gain_whole_turns() -> None:
+    run = trunnion.prepare(driven(DRIVERS["whole turns"]))
+    time = np.linspace(0, 0.5, 40)
+    here, there = (np.array(run.system.drive(run.values, "A", t)) for t in (time, time + 1.0))
+    np.testing.assert_allclose(there[0] - here[0], 4 * np.pi, rtol=1e-12)
+    np.testing.assert_allclose(there[1:], here[1:], rtol=1e-9, atol=1e-9)
+    assert run.system.dial(run.values, time).unit == "°"  # it runs one way
+
+
+# ---- parameters -----------------------------------------------------------------------------------------------
+
+NUMBERS = [
+    ("harmonic", "amplitude"), ("harmonic", "period"), ("harmonic", "phase"), ("harmonic", "mean"),
+    ("cycloidal", "duration"), ("modified-sine", "dwell"), ("polynomial-345", "range.to"), ("cycloidal", "delay"),
+    ("periodic table", "points.2.coordinate"), ("clamped table", "points.1.time"), ("natural table", "points.4.time"),
+    ("constant", "speed"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("law", "key"), NUMBERS)
+def test_every_number_has_a_path_samples_and_a_derivative(law: str, key: str) -> None:
+    mechanism = driven(DRIVERS[law])
+    run = trunnion.prepare(mechanism)
+    path, time, h = f"drivers.A.{key}", run.cycle.times(31) + 0.0037, 1e-6
+    nominal = float(run.values[path])
+
+    def drive(value: Any) -> Any:
+        return run.system.drive(mechanism.parameters({path: value}), "A", time)
+
+    samples = drive(np.array([[nominal - h], [nominal], [nominal + h]]))
+    for one, plain in zip(samples, drive(nominal), strict=True):
+        np.testing.assert_allclose(np.broadcast_to(one, (3, 31))[1], plain, rtol=1e-12, atol=1e-12)
+    low, _, high = np.broadcast_to(samples[0], (3, 31))
+    slope = derivative(drive(Dual(nominal, 1.0))[0])
+    np.testing.assert_allclose(np.broadcast_to(slope, (31,)), (high - low) / (2 * h), rtol=1e-4, atol=1e-5)
+
+
+def test_values_set_by_path_are_kept_in_the_model() -> None:
+    mechanism = driven(DRIVERS["cycloidal"]).with_values({"drivers.A.duration": "0.3 s", "A.range.to": 1.5})
+    assert mechanism.parameters()["drivers.A.duration"] == 0.3
+    assert mechanism.data()["drivers"]["A"]["range"] == [0.2, 1.5]
+    table = driven(DRIVERS["periodic table"]).with_values({"drivers.A.points.1.coordinate": "30 deg"})
+    assert table.data()["drivers"]["A"]["points"][1] == [0.1, "30 deg"]
+    assert driven(DRIVERS["one rise"]).with_values({"drivers.A.dwell": 0.2}).data()["drivers"]["A"]["dwell"] == 0.2
+
+
+@pytest.mark.parametrize("name", DRIVERS)
+@pytest.mark.parametrize("extension", ["yaml", "json"])
+def test_written_and_read_again_it_is_the_same(name: str, extension: str, tmp_path: Path) -> None:
+    mechanism = driven(DRIVERS[name])
+    mechanism.write(tmp_path / f"model.{extension}")
+    again = Mechanism.read(tmp_path / f"model.{extension}")
+    assert again == mechanism
+    assert again.digest == mechanism.digest
+    assert again.parameters() == mechanism.parameters()
+
+
+# ---- the analysis ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", DRIVERS)
+def test_power_balances_and_the_motion_is_the_prescribed_one(name: str) -> None:
+    mechanism = driven(DRIVERS[name])
+    result = trunnion.analyse(mechanism, 72)
+    assert set(np.unique(result.status)) <= {Status.SOLVED, Status.ZERO_SLIP}
+    power = result.drive_power.sum("driver")
+    assert float(np.abs(result.power_residual).max()) < 1e-10 * float(np.abs(power).max())
+    run = trunnion.prepare(mechanism)
+    q, rate, second = (np.broadcast_to(n, 72) for n in run.system.drive(run.values, "A", result.time.values))
+    crank = result.sel(joint="A")
+    np.testing.assert_allclose(crank.joint_rotation, q, rtol=1e-12)
+    np.testing.assert_allclose(crank.joint_rotation_velocity, rate, rtol=1e-10, atol=1e-10)
+    np.testing.assert_allclose(crank.joint_rotation_acceleration, second, rtol=1e-10, atol=1e-8)
+    np.testing.assert_allclose(result.drive_power[0], result.drive_effort[0] * rate, rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["harmonic", "cycloidal", "modified-sine", "periodic table", "late rise"])
+def test_the_work_of_the_drive_is_that_of_friction_over_a_cycle_without_loads(name: str) -> None:
+    """Between two rests, or over a period, nothing else takes or gives: velocity and power belong together."""
+    data = slider_crank()
+    del data["loads"]
+    data["gravity"] = [0, 0]
+    run = trunnion.prepare(driven(DRIVERS[name], data))
+    result = trunnion.analyse(driven(DRIVERS[name], data), 2000)
+    drive = float(result.drive_power.sum("driver").mean())
+    lost = float(result.friction_power.sum("joint").mean())
+    assert lost > 0
+    assert drive == pytest.approx(lost, rel=2e-3)
+    assert run.cycle.periodic == (name != "late rise")
+
+
+def test_in_a_dwell_every_joint_rests_and_the_effort_is_an_interval() -> None:
+    result = analyse({**slider_crank(), "drivers": {"A": DRIVERS["cycloidal"]}}, 60)
+    resting = result.joint_rotation_velocity.sel(joint="A").values == 0
+    assert 15 <= np.count_nonzero(resting) <= 25
+    assert np.all(result.status.values[resting] == Status.ZERO_SLIP)
+    assert np.all(result.friction_power.values[:, resting] == 0)
+    assert np.all(result.drive_power.values[:, resting] == 0)
+    lower, upper = result.drive_effort_lower[0].values, result.drive_effort_upper[0].values
+    assert np.all(np.isfinite([lower, upper]))
+    assert np.all(upper[resting] - lower[resting] > 1e-3)
+    told = [row for row in json.loads(result.attrs["findings"]) if "relative speed zero" in row["what"]]
+    assert any(row["where"] == "joints.A, B, P, C" for row in told)  # once for all
+
+
+def test_positions_of_a_drive_that_turns_back_are_told_by_time() -> None:
+    for name, unit in (("constant", "°"), ("one rise", "°"), ("harmonic", " s"), ("late rise", " s")):
+        run = trunnion.prepare(driven(DRIVERS[name]))
+        assert run.system.dial(run.values, run.cycle.times(5)).unit == unit
+
+
+@pytest.mark.parametrize("law", ["harmonic", *PROFILES])
+def test_a_prismatic_driver(law: str) -> None:
+    ends = {"mean": "0.25 m", "amplitude": "200 mm", "period": 2.0}
+    driver = ends if law == "harmonic" else {"range": ["50 mm", 0.5], "duration": 1.0, "dwell": 0.2}
+    mechanism = driven({"law": law, **driver}, elliptic_bar(), "X")
+    result = trunnion.analyse(mechanism, 90)
+    assert result.status.values.max() <= Status.ZERO_SLIP
+    slide = result.joint_slide.sel(joint="X").values
+    longest = 0.45 if law == "harmonic" else 0.5
+    np.testing.assert_allclose((slide.min(), slide.max()), (0.05, longest), atol=1e-3)
+    assert float(np.abs(result.power_residual).max()) < 1e-10 * float(np.abs(result.drive_power).max())
+    assert mechanism.parameter_kinds()["drivers.X.period" if law == "harmonic" else "drivers.X.duration"].unit == "s"
+
+
+def test_two_drivers_one_later_than_the_other() -> None:
+    data = five_bar()
+    rise = {"law": "cycloidal", "range": [0.2, 1.2], "duration": 0.2, "dwell": 0.3}
+    data["drivers"] = {"A": rise, "E": {**rise, "range": [0.4, -0.3], "delay": 0.25}}
+    result = analyse(data, 100)
+    assert bool(result.attrs["periodic"])
+    assert float(result.time[1]) == pytest.approx(0.01)
+    assert result.status.values.max() <= Status.ZERO_SLIP
+    first = (result.joint_rotation.sel(joint="A").values - 0.2) / 1.0
+    later = (result.joint_rotation.sel(joint="E").values - 0.4) / -0.7
+    np.testing.assert_allclose(np.roll(first, 25), later, atol=1e-12)
+    assert float(np.abs(result.power_residual).max()) < 1e-9 * float(np.abs(result.drive_power).max())
+
+
+def test_periods_and_ranges_that_do_not_fit() -> None:
+    data = five_bar()
+    data["drivers"] = {"A": {"speed": 2 * np.pi}, "E": DRIVERS["harmonic"]}
+    assert trunnion.prepare(build(data)).cycle.duration == pytest.approx(1.0)
+    data["drivers"]["E"] = DRIVERS["one rise"]  # it waits at its end
+    run = trunnion.prepare(build(data))
+    assert (run.cycle.duration, run.cycle.periodic) == (pytest.approx(1.0), False)
+    data["drivers"]["E"] = DRIVERS["natural table"]
+    with pytest.raises(MechanismError, match=r"takes 0\.6 s, the whole cycle takes 1 s"):
+        trunnion.prepare(build(data))
+
+
+@pytest.mark.parametrize("name", ["harmonic", "modified-sine", "periodic table", "late rise", "clamped table"])
+def test_a_general_group_follows_any_law(name: str) -> None:
+    """Its track, read by time, and a slower run of the same motion."""
+    mechanism = driven(DRIVERS[name], class_three())
+    run = trunnion.prepare(mechanism)
+    result = trunnion.analyse(mechanism, 50)
+    assert result.status.values.max() <= Status.ZERO_SLIP
+    assert float(np.abs(result.power_residual).max()) < 1e-9 * float(np.abs(result.drive_power).max())
+    slower = {path: 3 * value for path, value in run.values.items() if path in TIMES and path.startswith("drivers.A")}
+    slower |= {p: 3 * v for p, v in run.values.items() if p.startswith("drivers.A.points") and p.endswith("time")}
+    time = run.cycle.times(50)
+    plain, slow = run.solve(time), run.solve(3 * time, mechanism.parameters(slower))
+    for link, motion in plain.walk.motions.items():
+        for one, other in zip(motion.frame, slow.walk.motions[link].frame, strict=True):
+            np.testing.assert_allclose(np.broadcast_to(other, 50), np.broadcast_to(one, 50), atol=1e-9)
+
+
+TIMES = {f"drivers.A.{key}" for key in ("period", "duration", "dwell", "delay")}
+
+
+def test_a_fast_rise_between_long_dwells_is_followed() -> None:
+    """The grid of a general group's track is as fine as the peak of the drive needs."""
+    driver = {"law": "cycloidal", "range": [0.0, 6.0], "duration": 0.01, "dwell": 1.0}
+    mechanism = driven(driver, class_three())
+    run = trunnion.prepare(mechanism)
+    time = np.linspace(0, 0.01, 40)
+    back = run.solve(time)
+    steady = trunnion.prepare(driven({"speed": 1.0, "range": [0.0, 6.0]}, class_three()))
+    q = run.system.drive(run.values, "A", time)[0]
+    same = steady.solve(q)
+    np.testing.assert_allclose(back.walk.motions["plate"].frame.x, same.walk.motions["plate"].frame.x, atol=1e-10)
+
+
+# ---- bad input ------------------------------------------------------------------------------------------------
+
+RISE = {"law": "cycloidal", "range": [0.2, 1.0], "duration": 0.2}
+BAD: list[tuple[Data, str, str]] = [
+    ({"law": "cycloidal", "range": [0.2, 1.0]}, "drivers.A", "'duration' is missing"),
+    ({}, "drivers.A", "'speed' is missing"),
+    ({"law": "harmonic", "amplitude": 0.1, "period": -0.5}, "drivers.A.period", "is -0.5 s, which is not above 0"),
+    ({"law": "harmonic", "amplitude": 0, "period": 0.5}, "drivers.A.amplitude", "never moves"),
+    ({"law": "harmonic", "amplitude": "20 mm", "period": 0.5}, "drivers.A.amplitude", "is a length where an angle"),
+    ({"law": "harmonic", "amplitude": 0.1, "period": "20 mm"}, "drivers.A.period", "is a length where a time"),
+    ({**RISE, "speed": 3.0}, "drivers.A.speed", "'speed' means nothing to the motion law cycloidal"),
+    ({"speed": 3.0, "duration": 0.2}, "drivers.A.duration", "means nothing to the motion law constant"),
+    ({**RISE, "dwell": -0.1}, "drivers.A.dwell", "is -0.1 s, which is negative"),
+    ({**RISE, "range": [1, 1]}, "drivers.A.range", "begins and ends at 1"),
+    ({**RISE, "law": "cycloid"}, "drivers.A.law", "'cycloid' is not a motion law"),
+    ({**RISE, "return": True}, "drivers.A.return", "the key 'return' is unknown"),
+    ({"law": "table", "points": [[0, 0], [0.2, 1], [0.1, 2]]}, "drivers.A.points.2", "does not come after 0.2 s"),
+    ({"law": "table", "points": [[0.1, 0], [0.2, 1]]}, "drivers.A.points.0", "begins at 0.1 s"),
+    ({"law": "table", "points": [[0, 0]]}, "drivers.A.points", "at least 2 are needed"),
+    ({"law": "table", "points": [[0, 1], [1, 1]]}, "drivers.A.points", "never moves"),
+    ({"law": "table", "points": [[0, "0 mm"], ["1 s", "3 mm"]]}, "drivers.A.points.1.coordinate", "is a length"),
+    ({"law": "table", "points": [[0, 0], [1, 1], [2, 2]], "periodic": True}, "drivers.A.points", "ends at 2 (SI)"),
+    ({"law": "table", "points": [[0, 0], [1, 0]], "periodic": True}, "drivers.A.points", "needs three points"),
+    ({"law": "table", "points": [[0, 0], [1, 2]], "ends": "natural", "delay": 1}, "drivers.A.delay", "natural ends"),
+]
+
+
+@pytest.mark.parametrize(("driver", "where", "what"), BAD)
+def test_bad_input_is_told(driver: Data, where: str, what: str) -> None:
+    with pytest.raises(MechanismError) as raised:
+        Mechanism(**model({**slider_crank(), "drivers": {"A": driver}}))
+    found: list[Finding] = [one for one in raised.value.findings if one.where == where and what in one.what]
+    assert found, [f"{one.where}: {one.what}" for one in raised.value.findings]
+    assert found[0].remedy
+
+
+def test_a_bad_point_of_a_table_has_its_line(tmp_path: Path) -> None:
+    driven(DRIVERS["clamped table"]).write(tmp_path / "model.yaml")
+    text = (tmp_path / "model.yaml").read_text("utf-8").replace("[0.25, 0.9]", "[0.05, 0.9]")
+    (tmp_path / "model.yaml").write_text(text, encoding="utf-8")
+    with pytest.raises(MechanismError) as raised:
+        Mechanism.read(tmp_path / "model.yaml")
+    line = raised.value.findings[0].line
+    assert line is not None
+    assert "0.05" in text.splitlines()[line - 1]

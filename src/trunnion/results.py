@@ -85,7 +85,8 @@ def allocate(labels: Labels, positions: int, absent: Sequence[str] = ()) -> dict
         if name in absent:
             arrays[name] = np.broadcast_to(np.zeros(()), shape)
         else:
-            arrays[name] = np.empty(shape, INTEGERS.get(name, np.float64))
+            # zeroed pages take no memory until something is written: rows of the ground never are
+            arrays[name] = np.zeros(shape, INTEGERS.get(name, np.float64))
     for name, other in SAME_AS.items():
         arrays[name] = arrays[other]
     return arrays

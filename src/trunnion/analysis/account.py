@@ -311,10 +311,15 @@ def _why(value: float, arrays: Arrays) -> str:
 
 def balance(arrays: Arrays) -> float:
     """Largest power residual over the largest power that any driver, or else any load, has."""
-    residual = np.nanmax(np.abs(arrays["power_residual"]), initial=0.0)
+    residual = _peak(arrays["power_residual"])
     kinds = ("drive_power", "useful_power", "friction_power", "spring_power")
-    powers = [np.nanmax(np.abs(arrays[name]), initial=0.0) for name in kinds if name in arrays]
-    return float(residual / max(powers)) if max(powers) > 0 else float(residual)
+    highest = max(_peak(arrays[name]) for name in kinds if name in arrays)
+    return residual / highest if highest > 0 else residual
+
+
+def _peak(values: NDArray[np.float64]) -> float:
+    """Largest magnitude, without a copy of the values."""
+    return float(max(np.nanmax(values, initial=0.0), -np.nanmin(values, initial=0.0)))
 
 
 def _inputs(mechanism: Mechanism) -> list[dict[str, Any]]:

@@ -159,7 +159,11 @@ def _status(back: Backward, shape: tuple[int, ...]) -> NDArray[np.int8]:
 
 def _fill_motion(arrays: Arrays, back: Backward, time: NDArray[np.float64], window: slice) -> None:
     walk = back.walk
-    for i, motion in enumerate(walk.motions[link] for link in walk.system.mechanism.links):
+    ground = walk.system.mechanism.fixed_link
+    for i, link in enumerate(walk.system.mechanism.links):
+        if link == ground:
+            continue
+        motion = walk.motions[link]
         arrays["link_angle"][i, window] = np.arctan2(motion.frame.s, motion.frame.c)
         arrays["link_angle_velocity"][i, window] = motion.twist.w
         arrays["link_angle_acceleration"][i, window] = motion.acceleration.w
@@ -167,6 +171,8 @@ def _fill_motion(arrays: Arrays, back: Backward, time: NDArray[np.float64], wind
         moved = walk.point(link, name)
         for axis in (0, 1):
             arrays["point_position"][i, axis, window] = moved.place[axis]
+            if link == ground:
+                continue
             arrays["point_velocity"][i, axis, window] = moved.velocity[axis]
             arrays["point_acceleration"][i, axis, window] = moved.acceleration[axis]
     for i, (kind, links) in enumerate(walk.system.joints.values()):
@@ -293,8 +299,9 @@ def _unwrap(arrays: Arrays, run: Run, time: NDArray[np.float64]) -> None:
     system, angles = run.system, arrays["link_angle"]
     order = list(system.mechanism.links)
     step = float(time[1] - time[0]) if len(time) > 1 else 0.0
-    for angle, rate in zip(angles, arrays["link_angle_velocity"], strict=True):
-        _unwrap_row(angle, rate, step)
+    for link, angle, rate in zip(order, angles, arrays["link_angle_velocity"], strict=True):
+        if link != system.mechanism.fixed_link:
+            _unwrap_row(angle, rate, step)
     for i, (name, (kind, (first, second))) in enumerate(system.joints.items()):
         rotation = arrays["joint_rotation"][i]
         np.subtract(angles[order.index(second)], angles[order.index(first)], out=rotation)

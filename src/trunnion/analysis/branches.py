@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
-from trunnion.analysis.kinematics import GROUND, Forward, pairs_of, pose_of, start, take
+from trunnion.analysis import change_points
+from trunnion.analysis.kinematics import Forward, pairs_of, pose_of, start, take
 from trunnion.analysis.system import System, Values, driven_coordinates
 from trunnion.errors import Finding, Severity
 from trunnion.groups.general import General, Pose, size_of
@@ -35,7 +36,6 @@ GUESSES = 512
 SEED = 20060704  # of the guesses: the same assemblies every time
 TURN_JUMP = 0.35  # rad between neighbours of the grid: more is another branch
 SLIDE_JUMP = 0.25  # of the group's size, likewise
-TOUCHING = 1e-6  # of 1/condition: below it two assemblies meet
 BLOCK = 32  # grid points tried at a time
 
 
@@ -162,8 +162,8 @@ def choose(system: System, values: Values) -> Chosen:
             pose = pose_of(walk, number, assembly, times)
             take(walk, number, pose, times)
             if module.rank > 1 and group.BRANCHES:
-                meeting = change_points(walk, number, assembly, times, pose)
-                findings += [_change_point(system, values, module, meeting)] if meeting else []
+                meeting = change_points.find(walk, number, assembly, times, pose)
+                findings += [change_points.finding(system, values, module, meeting)] if meeting else []
     return Chosen(tuple(chosen), tuple(counts), tuple(findings))
 
 
@@ -173,16 +173,6 @@ def _unstated(module: Module, count: int) -> Finding:
     joint = module.joints[len(module.joints) // 2]
     remedy = f"say roughly where a point is at the start, e.g. assembly: {{{joint}: [x, y]}}"
     return Finding(what, "assembly", remedy, Severity.WARNING)
-
-
-def _change_point(system: System, values: Values, module: Module, at: Sequence[float]) -> Finding:
-    where = ", ".join(system.dial(values, np.array([moment])).at(0) for moment in at)
-    what = f"passes a change point at {where}: two assemblies of the links {', '.join(module.links)} meet there"
-    remedy = (
-        f"which way it goes on is not determined; here {module.joints[1]} stays on its side. Change a length, or "
-        "drive it over a range that ends before"
-    )
-    return Finding(what, f"links {', '.join(module.links)}", remedy)
 
 
 def _never(module: Module) -> Finding:
@@ -296,39 +286,6 @@ def _side(walk: Forward, number: int) -> int:
             side = (_first(d.x) - x) * (place[1] - y) - (_first(d.y) - y) * (place[0] - x)
             return 1 if side >= 0 else -1
     return 1
-
-
-def change_points(walk: Forward, number: int, assembly: Any, times: Array, pose: Any) -> list[float]:
-    """Times at which a closed form passes a position where its assemblies meet, s.
-
-    There 1/condition touches zero between two assembled positions: found on the grid as a minimum that its
-    neighbours' slope would reach, then by golden section.
-    """
-    if len(times) < 3:
-        return []
-    margin = np.broadcast_to(1 / walk.system.groups[number].condition(pose), times.shape)
-    before, here, after = margin[:-2], margin[1:-1], margin[2:]
-    steep = np.maximum(np.abs(here - before), np.abs(after - here))
-    suspects = np.flatnonzero((here <= before) & (here <= after) & (here <= 1.1 * steep)) + 1
-
-    def margin_at(moment: float) -> float:
-        trial = Forward(walk.system, walk.values, walk.local, {walk.system.mechanism.fixed_link: GROUND})
-        for earlier in range(number):
-            take(trial, earlier, pose_of(trial, earlier, walk.assembly[earlier], moment), moment)
-        found = 1 / walk.system.groups[number].condition(pose_of(trial, number, assembly, moment))
-        return float(np.nan_to_num(np.ravel(found)[0], nan=1.0))
-
-    moments = [_lowest(margin_at, times[k - 1], times[k + 1]) for k in suspects]
-    return [moment for moment in moments if margin_at(moment) < TOUCHING]
-
-
-def _lowest(function: Callable[[float], float], low: float, high: float) -> float:
-    """Where a function with one minimum in an interval has it, by golden section."""
-    ratio = (np.sqrt(5) - 1) / 2
-    for _ in range(60):
-        left, right = high - ratio * (high - low), low + ratio * (high - low)
-        low, high = (low, right) if function(left) < function(right) else (left, high)
-    return float((low + high) / 2)
 
 
 # ---- general groups -------------------------------------------------------------------------------------------

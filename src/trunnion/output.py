@@ -31,7 +31,7 @@ def whole(path: str | os.PathLike[str]) -> Iterator[Path]:
     """
     target = Path(path)
     if target.is_dir():
-        raise MechanismError(Finding("is a folder", str(target), "name a file"))
+        raise MechanismError(Finding("cannot be written: it is a folder", str(target), "name a file"))
     try:
         handle, name = tempfile.mkstemp(suffix=target.suffix, prefix=f".{target.stem[:40]}-", dir=target.parent)
         os.close(handle)

@@ -5,7 +5,8 @@ All entries are numbers of `algebra.namespace` that broadcast over (sample, posi
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple, TypeVar
 
 from trunnion.algebra.namespace import Number, namespace
 
@@ -19,6 +20,7 @@ __all__ = [
     "accelerated",
     "added",
     "along_slide",
+    "both_ends",
     "compose",
     "is_zero",
     "moved",
@@ -61,6 +63,9 @@ class Acceleration(NamedTuple):
     x: Number
     y: Number
     w: Number
+
+
+_Motion = TypeVar("_Motion", Twist, Acceleration)
 
 
 class Wrench(NamedTuple):
@@ -118,6 +123,14 @@ def pinned(
     c, s = turned(side[0] / square, -side[1] / square, *reach)
     arm = turned(c, s, local.x, local.y)
     return Frame(pin.x - arm[0], pin.y - arm[1], c, s), arm
+
+
+def both_ends(outer: Sequence[_Motion | None], group: str) -> tuple[_Motion, _Motion]:
+    """Motion of the outer elements of a dyad, first and last of its joints; ValueError if one is not given."""
+    first, _, last = outer
+    if first is None or last is None:
+        raise ValueError(f"the {group} group needs the motion of both its outer joints")
+    return first, last
 
 
 def root(square: Number, scale: Number) -> Number:

@@ -21,6 +21,7 @@ from trunnion.groups.planar import (
     about,
     accelerated,
     along_slide,
+    both_ends,
     compose,
     moved,
     relative,
@@ -78,9 +79,7 @@ def position(elements: Elements, assembly: int = 1, drive: Sequence[Number] = ()
 
 def velocity(pose: Pose, outer: Sequence[Twist | None], drive: Sequence[Number] = ()) -> list[Twist]:
     """Velocities from v_h(C) + ṡ u = v_k(C) + ṫ v; outer: (of B on h, None, of D on k)."""
-    b, _, d = outer
-    if b is None or d is None:
-        raise ValueError("the PRP group needs the motion of both guides")
+    b, d = both_ends(outer, "PRP")
     one, two = moved(b, *pose.from_guides[0]), moved(d, *pose.from_guides[1])
     s, t = _rates(pose, (two.x - one.x, two.y - one.y))
     on_i = Twist(one.x + s * pose.u[0], one.y + s * pose.u[1], b.w)
@@ -97,9 +96,7 @@ def acceleration(
     rates: Sequence[Number] = (),
 ) -> list[Acceleration]:
     """Accelerations from a_h(C) + 2 ω_h × ṡ u + s̈ u = a_k(C) + 2 ω_k × ṫ v + ẗ v."""
-    (b, _, d), (b_twist, _, d_twist) = outer, outer_twists
-    if b is None or d is None or b_twist is None or d_twist is None:
-        raise ValueError("the PRP group needs the motion of both guides")
+    (b, d), (b_twist, d_twist) = both_ends(outer, "PRP"), both_ends(outer_twists, "PRP")
     one, two = moved(b_twist, *pose.from_guides[0]), moved(d_twist, *pose.from_guides[1])
     s, t = _rates(pose, (two.x - one.x, two.y - one.y))
     at_i = along_slide(accelerated(b, b_twist.w, *pose.from_guides[0]), b_twist.w, pose.u, s, 0.0)

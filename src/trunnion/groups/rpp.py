@@ -21,6 +21,7 @@ from trunnion.groups.planar import (
     about,
     accelerated,
     along_slide,
+    both_ends,
     compose,
     moved,
     relative,
@@ -79,9 +80,7 @@ def position(elements: Elements, assembly: int = 1, drive: Sequence[Number] = ()
 
 def velocity(pose: Pose, outer: Sequence[Twist | None], drive: Sequence[Number] = ()) -> list[Twist]:
     """Velocities from v_i(C) + ṡ u = v_k(C) + ṫ v with ω_i = ω_j = ω_k; outer: (of B, None, of D on k)."""
-    b, _, d = outer
-    if b is None or d is None:
-        raise ValueError("the RPP group needs the motion of B and of the guide at D")
+    b, d = both_ends(outer, "RPP")
     on_i = Twist(b.x, b.y, d.w)
     _, t = _rates(pose, on_i, d)
     carried = moved(d, *pose.to_c[1])
@@ -98,9 +97,7 @@ def acceleration(
     rates: Sequence[Number] = (),
 ) -> list[Acceleration]:
     """Accelerations from a_i(C) + 2 ω × ṡ u + s̈ u = a_k(C) + 2 ω × ṫ v + ẗ v."""
-    (b, _, d), (b_twist, _, d_twist) = outer, outer_twists
-    if b is None or d is None or b_twist is None or d_twist is None:
-        raise ValueError("the RPP group needs the motion of B and of the guide at D")
+    (b, d), (b_twist, d_twist) = both_ends(outer, "RPP"), both_ends(outer_twists, "RPP")
     w = d_twist.w
     s, t = _rates(pose, Twist(b_twist.x, b_twist.y, w), d_twist)
     on_i = Acceleration(b.x, b.y, d.w)

@@ -13,7 +13,19 @@ from typing import NamedTuple
 
 from trunnion.algebra.linalg import Vector
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.groups.planar import Acceleration, Frame, Twist, Wrench, about, accelerated, moved, relative, root, turned
+from trunnion.groups.planar import (
+    Acceleration,
+    Frame,
+    Twist,
+    Wrench,
+    about,
+    accelerated,
+    both_ends,
+    moved,
+    relative,
+    root,
+    turned,
+)
 from trunnion.groups.protocol import Elements
 
 __all__ = ["BRANCHES", "Pose", "acceleration", "closure", "condition", "position", "reactions", "velocity"]
@@ -60,9 +72,7 @@ def position(elements: Elements, assembly: int, drive: Sequence[Number] = ()) ->
 
 def velocity(pose: Pose, outer: Sequence[Twist | None], drive: Sequence[Number] = ()) -> list[Twist]:
     """Velocities from v_D − v_B = Ẋ u + ω × BD; outer: (of B, None, of D)."""
-    b, _, d = outer
-    if b is None or d is None:
-        raise ValueError("the RPR group needs the motion of both outer pins, B and D")
+    b, d = both_ends(outer, "RPR")
     w, _ = _rates(pose, (d.x - b.x, d.y - b.y))
     return [
         moved(Twist(b.x, b.y, w), -pose.b[0], -pose.b[1]),
@@ -79,9 +89,7 @@ def acceleration(
     rates: Sequence[Number] = (),
 ) -> list[Acceleration]:
     """Accelerations from a_D − a_B = Ẍ u + 2 ω × Ẋ u + α × BD − ω² BD."""
-    (b, _, d), (b_twist, _, d_twist) = outer, outer_twists
-    if b is None or d is None or b_twist is None or d_twist is None:
-        raise ValueError("the RPR group needs the motion of both outer pins, B and D")
+    (b, d), (b_twist, d_twist) = both_ends(outer, "RPR"), both_ends(outer_twists, "RPR")
     u, w = pose.u, twists[0].w
     _, slide = _rates(pose, (d_twist.x - b_twist.x, d_twist.y - b_twist.y))
     reach = (pose.along * u[0] - pose.offset * u[1], pose.along * u[1] + pose.offset * u[0])

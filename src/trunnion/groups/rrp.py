@@ -21,6 +21,7 @@ from trunnion.groups.planar import (
     Wrench,
     about,
     accelerated,
+    both_ends,
     compose,
     moved,
     pinned,
@@ -78,9 +79,7 @@ def position(elements: Elements, assembly: int, drive: Sequence[Number] = ()) ->
 
 def velocity(pose: Pose, outer: Sequence[Twist | None], drive: Sequence[Number] = ()) -> list[Twist]:
     """Velocities from v_B + ω_i × BC = v_k(C) + ṡ u; outer: (of B, None, of D on k)."""
-    b, _, d = outer
-    if b is None or d is None:
-        raise ValueError("the RRP group needs the motion of B and of the guide at D")
+    b, d = both_ends(outer, "RRP")
     carried = moved(d, *pose.to_c)
     w, slide = _rates(pose, (carried.x - b.x, carried.y - b.y))
     c = Twist(carried.x + slide * pose.u[0], carried.y + slide * pose.u[1], d.w)
@@ -96,9 +95,7 @@ def acceleration(
     rates: Sequence[Number] = (),
 ) -> list[Acceleration]:
     """Accelerations from a_B + α_i × BC − ω_i² BC = a_k(C) + 2 ω_k × ṡ u + s̈ u."""
-    (b, _, d), (b_twist, _, d_twist) = outer, outer_twists
-    if b is None or d is None or b_twist is None or d_twist is None:
-        raise ValueError("the RRP group needs the motion of B and of the guide at D")
+    (b, d), (b_twist, d_twist) = both_ends(outer, "RRP"), both_ends(outer_twists, "RRP")
     w, wk, u = twists[0].w, d_twist.w, pose.u
     speed = moved(d_twist, *pose.to_c)
     _, slide = _rates(pose, (speed.x - b_twist.x, speed.y - b_twist.y))

@@ -9,17 +9,28 @@ Joint order B, C, D: `elements` is ((B on h, B on i), (C on i, C on j), (D on k,
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 from trunnion.algebra.linalg import Vector, cross, dot
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.groups.planar import Acceleration, Frame, Twist, Wrench, about, accelerated, is_zero, moved, pinned, root
+from trunnion.groups.planar import (
+    Acceleration,
+    Frame,
+    Twist,
+    Wrench,
+    about,
+    accelerated,
+    both_ends,
+    is_zero,
+    moved,
+    pinned,
+    root,
+)
 from trunnion.groups.protocol import Elements
 
 __all__ = ["BRANCHES", "Pose", "acceleration", "closure", "condition", "meet", "position", "reactions", "velocity"]
 
 BRANCHES = (1, -1)
-_Motion = TypeVar("_Motion", Twist, Acceleration)
 
 
 class Pose(NamedTuple):
@@ -73,7 +84,7 @@ def position(elements: Elements, assembly: int, drive: Sequence[Number] = ()) ->
 
 def velocity(pose: Pose, outer: Sequence[Twist | None], drive: Sequence[Number] = ()) -> list[Twist]:
     """Velocities from v_B + ω_i × BC = v_D + ω_j × DC; outer: (of B, None, of D)."""
-    b, d = _known(outer)
+    b, d = both_ends(outer, "RRR")
     w_i, w_j = _rates(pose, (d.x - b.x, d.y - b.y))
     return [
         moved(Twist(b.x, b.y, w_i), -pose.b[0], -pose.b[1]),
@@ -90,7 +101,7 @@ def acceleration(
     rates: Sequence[Number] = (),
 ) -> list[Acceleration]:
     """Accelerations from a_B + α_i × BC − ω_i² BC = a_D + α_j × DC − ω_j² DC."""
-    b, d = _known(outer)
+    b, d = both_ends(outer, "RRR")
     w_i, w_j = twists[0].w, twists[1].w
     wi2, wj2 = w_i * w_i, w_j * w_j
     jump = (
@@ -102,13 +113,6 @@ def acceleration(
         accelerated(Acceleration(b.x, b.y, a_i), w_i, -pose.b[0], -pose.b[1]),
         accelerated(Acceleration(d.x, d.y, a_j), w_j, -pose.d[0], -pose.d[1]),
     ]
-
-
-def _known(outer: Sequence[_Motion | None]) -> tuple[_Motion, _Motion]:
-    b, _, d = outer
-    if b is None or d is None:
-        raise ValueError("the RRR group needs the motion of both outer pins, B and D")
-    return b, d
 
 
 def _rates(pose: Pose, jump: Vector) -> tuple[Number, Number]:

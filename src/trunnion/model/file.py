@@ -21,6 +21,7 @@ from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.mechanism import Mechanism
+from trunnion.output import whole
 
 __all__ = ["read_mechanism", "write_mechanism"]
 
@@ -60,21 +61,12 @@ def write_mechanism(mechanism: Mechanism, path: str | os.PathLike[str]) -> None:
     kind = _file_type(path)
     if kind == "TOML":
         raise MechanismError(Finding("TOML is read but not written", file=str(path), remedy="write .yaml or .json"))
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
-        with temporary.open("w", encoding="utf-8", newline="\n") as stream:
-            if kind == "JSON":
-                json.dump(mechanism.data(), stream, indent=2, ensure_ascii=False)
-                stream.write("\n")
-            else:
-                _yaml().dump(mechanism.data(), stream)
-        temporary.replace(path)
-    except OSError as error:
-        raise MechanismError(
-            Finding(f"cannot be written: {error.strerror}", file=str(path), remedy="check folder and permissions")
-        ) from error
-    finally:
-        temporary.unlink(missing_ok=True)
+    with whole(path) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as stream:
+        if kind == "JSON":
+            json.dump(mechanism.data(), stream, indent=2, ensure_ascii=False)
+            stream.write("\n")
+        else:
+            _yaml().dump(mechanism.data(), stream)
 
 
 def _yaml() -> YAML:

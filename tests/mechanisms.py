@@ -12,35 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 import trunnion
+from geared import geared_five_bar, geared_loop, planet_drive, rocker_train
+from mechanisms_parts import Data, body, prismatic, revolute, slide
 from trunnion import Mechanism
 from trunnion.groups.general import OUTER, General, GroupJoint
 
-Data = dict[str, Any]
 Array = NDArray[np.float64]
 DURANGO = Path(__file__).parents[1] / "examples" / "durango-fourbar.yaml"
-
-
-def revolute(*links: str) -> Data:
-    return {"type": "revolute", "links": list(links)}
-
-
-def prismatic(*links: str) -> Data:
-    return {"type": "prismatic", "links": list(links)}
-
-
-def slide(x: float, y: float, angle: float = 0.0) -> Data:
-    """Point of a prismatic joint with the direction of its slide."""
-    return {"at": [x, y], "axis": [float(np.cos(angle)), float(np.sin(angle))]}
-
-
-def body(points: Data, number: int = 1, size: float = 1.0) -> Data:
-    """A link with mass properties off its axes, different for each number."""
-    return {
-        "points": points,
-        "mass": 1.0 + 0.7 * number,
-        "centre": [size * (0.2 + 0.07 * number), size * (0.1 - 0.05 * number)],
-        "inertia": size**2 * (0.05 + 0.02 * number),
-    }
 
 
 def law_named(name: str) -> Data:
@@ -337,6 +315,10 @@ MODELS: Mapping[str, Callable[[], Data]] = {
     "Scotch yoke": scotch_yoke,
     "elliptic bar": elliptic_bar,
     "tangent drive": tangent_drive,
+    "geared five-bar": geared_five_bar,
+    "planet drive": planet_drive,
+    "geared loop": geared_loop,
+    "rocker train": rocker_train,
 }
 
 
@@ -391,12 +373,35 @@ def transformed(data: Data, turn: float = 0.0, shift: Sequence[float] = (0.0, 0.
     for name, driver in data["drivers"].items():
         if data["joints"][name]["type"] == "revolute":
             _turn_driver(driver, data["joints"][name]["links"], turn, sign)
+    _turn_gears(data, turn, sign)
     return data
+
+
+def _turn_gears(data: Data, turn: float, sign: float) -> None:
+    """Rotations against the ground count from the frame's x axis, which has turned."""
+    for gear in data.get("gears", {}).values():
+        first, second = (_offset(data["joints"][joint]["links"], turn) for joint in gear["joints"])
+        gear["phase"] = sign * gear["phase"] + second - gear["ratio"] * first
+
+
+def reverse_links(data: Data, joints: Sequence[str]) -> None:
+    """List the links of some joints the other way round: their rotations change sign."""
+    for joint in joints:
+        data["joints"][joint]["links"].reverse()
+    for gear in data.get("gears", {}).values():
+        first, second = (-1.0 if joint in joints else 1.0 for joint in gear["joints"])
+        gear["ratio"] *= first * second
+        gear["phase"] *= second
+
+
+def _offset(links: Sequence[str], turn: float) -> float:
+    """What a turned frame adds to the rotation of a joint of the ground."""
+    return {0: turn, 1: -turn}[list(links).index("ground")] if "ground" in links else 0.0
 
 
 def _turn_driver(driver: Data, links: Sequence[str], turn: float, sign: float) -> None:
     """A driven rotation against the ground counts from the frame's x axis, which has turned."""
-    offset = {0: turn, 1: -turn}[list(links).index("ground")] if "ground" in links else 0.0
+    offset = _offset(links, turn)
     driver["speed"] = sign * driver["speed"]
     if "range" in driver:
         driver["range"] = [sign * q + offset for q in driver["range"]]

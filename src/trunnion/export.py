@@ -64,6 +64,9 @@ def columns(result: xr.Dataset) -> list[Column]:
             found.append((name, unit, values))
         found.append(_column(result, "spring_power", f"{spring}.spring_power", (i,)))
         found.append(_column(result, "damping_power", f"{spring}.damping_power", (i,)))
+    for i, gear in enumerate(result["gear"].values if "gear" in result.dims else ()):
+        found.append(_column(result, "gear_torque", f"{gear}.torque", (i,)))
+        found += [_column(result, "gear_force", f"{gear}.force_{axis}", (i, k)) for k, axis in enumerate("xy")]
     for i, link in enumerate(result["link"].values):
         for variable in ("link_angle", "link_angle_velocity", "link_angle_acceleration"):
             found.append(_column(result, variable, f"{link}.{variable.removeprefix('link_')}", (i,)))

@@ -57,6 +57,8 @@ VARIABLES: dict[str, Variable] = {
     "spring_elongation": Variable(("spring",), "m", "length beyond the free length; angle, rad, in a joint that turns"),
     "spring_power": Variable(("spring",), "W", "power that the spring and its damper give the mechanism"),
     "damping_power": Variable(("spring",), "W", "power lost in the spring's damper"),
+    "gear_torque": Variable(("gear",), "N m", "torque of the gear pair in its second joint, on its second link"),
+    "gear_force": Variable(("gear", "axis"), "N", "tooth force on the gear of the second joint by that of the first"),
     "useful_power": Variable((), "W", "power taken by the useful loads"),
     "efficiency_instant": Variable((), "1", "useful power over drive power"),
     "closure_residual": Variable((), "m", "largest opening of a closed loop"),

@@ -29,6 +29,9 @@ def outputs(back: Any) -> Iterator[tuple[str, Any]]:
         for name, value in getattr(back, kind).items():
             for i, number in enumerate(value if isinstance(value, tuple) else (value,)):
                 yield f"{kind} {name} {i}", number
+    for name, gear in back.gears.items():
+        for i, number in enumerate((gear.torque, *gear.force)):
+            yield f"gear {name} {i}", number
     yield "power of weight and inertia", back.body_power
 
 

@@ -102,7 +102,7 @@ def test_continuation_never_claims_a_solution_beyond_the_fold(seed: int) -> None
     """Lanes that fine stepping loses on the way are not reported solved at full friction."""
     lanes = 800
     system = _scattered(np.random.default_rng(seed), lanes)
-    _, share = continuation.follow(system, 3, lanes)
+    _, share = continuation.follow(system, [np.zeros(lanes)] * 3)
     fine = _finely(system, lanes, 1000)
     claimed, true = share >= 1.0, fine >= 1.0
     assert np.count_nonzero(true) > 50

@@ -27,6 +27,10 @@ FORMULAS = {
     "Scotch yoke": "I(0,1)R → II(2,3)RPP",
     "elliptic bar": "I(0,1)P → II(2,3)RRP",
     "tangent drive": "I(0,1)R → II(2,3)PRP",
+    "geared five-bar": "I(0,1)R → II(4)RG → II(2,3)RRR",
+    "planet drive": "I(0,1)R → II(2)RG → II(3,4)RRP",
+    "geared loop": "I(0,1)R → II(2,3,4)RRRRG",
+    "rocker train": "I(0,1)R → II(2,3)RRR → II(4)RG → II(5,6)RRP",
 }
 
 
@@ -54,7 +58,7 @@ def _check_plan(mechanism: Mechanism, plan: Plan) -> None:
     for module in plan.modules:
         for joint in module.joints:
             assert set(mechanism.joints[joint].links) <= known | set(module.links), (joint, module)
-        assert 3 * len(module.links) == 2 * len(module.joints) + len(module.driven)
+        assert 3 * len(module.links) == 2 * len(module.joints) + len(module.driven) + len(module.gears)
         known |= set(module.links)
     assert plan.formula == " → ".join(module.label for module in plan.modules)
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import trunnion
-from mechanisms import MODELS, Data, analyse, build, law_named, model, transformed
+from mechanisms import MODELS, Data, analyse, build, law_named, model, reverse_links, transformed
 from trunnion import FrictionMethod, Mechanism, Status
 from trunnion.joints.friction import FRICTION_LAWS
 
@@ -188,8 +188,7 @@ def test_order_of_links_in_pins(name: str) -> None:
     flipped = [
         name for name, joint in data["joints"].items() if joint["type"] == "revolute" and name not in data["drivers"]
     ]
-    for joint in flipped:
-        other["joints"][joint]["links"].reverse()
+    reverse_links(other, flipped)
     plain, turned = (trunnion.analyse(Mechanism(**d), STEPS) for d in (data, other))
     np.testing.assert_array_equal(turned["status"], plain["status"])
     for variable in ("point_position", "point_acceleration", "drive_effort", "drive_power", "friction_power"):
@@ -205,8 +204,7 @@ def test_order_of_links_in_ideal_joints(name: str) -> None:
     data = model(MODELS[name](), friction=None)
     other = copy.deepcopy(data)
     flipped = [joint for joint in data["joints"] if joint not in data["drivers"]]
-    for joint in flipped:
-        other["joints"][joint]["links"].reverse()
+    reverse_links(other, flipped)
     plain, turned = (trunnion.analyse(Mechanism(**d), STEPS) for d in (data, other))
     sign = np.array([-1.0 if joint in flipped else 1.0 for joint in plain["joint"].values])
     same(turned["reaction_force"], plain["reaction_force"].values * sign[:, None, None], "reaction_force")

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Vector = NDArray[np.float64]
+PARTS = {"revolute": ("first", "second"), "prismatic": ("first", "second"), "contact": ("first",)}
 
 __all__ = ["Body", "Joint", "Load", "Solution", "solve"]
 
@@ -55,9 +56,10 @@ class Joint:
     about which its moment counts (prismatic: the joint's point on the second body). axis: global direction of
     the guide, positive slide of the second body (prismatic only, any length). friction: torque (revolute) or
     force along the axis (prismatic) on the second body. driven: the joint carries an unknown drive effort.
+    A contact transmits a force along its axis; its friction is a known force a quarter turn from the axis.
     """
 
-    kind: Literal["revolute", "prismatic"]
+    kind: Literal["revolute", "prismatic", "contact"]
     first: str | None
     second: str | None
     point: ArrayLike
@@ -89,7 +91,7 @@ def solve(bodies: Mapping[str, Body], joints: Mapping[str, Joint], gravity: Arra
     Raises ValueError if the equations are not as many as the unknowns (mobility ≠ number of drives).
     """
     rows = {name: 3 * k for k, name in enumerate(bodies)}
-    columns: list[tuple[str, str]] = [(name, part) for name in joints for part in ("first", "second")]
+    columns: list[tuple[str, str]] = [(name, part) for name, joint in joints.items() for part in PARTS[joint.kind]]
     columns += [(name, "effort") for name, joint in joints.items() if joint.driven]
     if len(columns) != 3 * len(bodies):
         raise ValueError(f"{3 * len(bodies)} equations but {len(columns)} unknowns: not determinate")
@@ -126,6 +128,8 @@ def _unit_load(joint: Joint, part: str) -> tuple[Vector, float]:
         return {"first": x, "second": y, "effort": effort}[part]
     axis = _vector(joint.axis) / np.hypot(*_vector(joint.axis))
     across = np.array([-axis[1], axis[0]])
+    if joint.kind == "contact":
+        return {"first": (axis, 0.0), "effort": (across, 0.0)}[part]
     return {"first": (across, 0.0), "second": (np.zeros(2), 1.0), "effort": (axis, 0.0)}[part]
 
 

@@ -99,7 +99,13 @@ test("geometry", () => {
     ]).length,
     3,
   );
-  assert.equal(bounds({ points: { "a.A": { x: [null], y: [null] } } }), null);
+  assert.equal(bounds({ points: { "a.A": { x: [null], y: [null] } }, gears: [] }), null);
+  assert.deepEqual(bounds({ points: { "a.A": { x: [1], y: [0, 2] } }, gears: [{ at: "a.A", radius: 3 }] }), {
+    x: -2,
+    y: -3,
+    width: 6,
+    height: 8,
+  });
   assert.equal(arrow(0, 0, 0, 0), "");
   assert.match(arrow(0, 0, 30, 0), /^M0.0,0.0L20.0,0.0M30.0,0.0/);
 });

@@ -69,6 +69,7 @@ console.log(
     loads: seen("stage", "load"),
     moments: seen("stage", "arc"),
     springs: places.stage.find(classes("spring")).map((element) => element.attributes.d),
+    circles: places.stage.find(classes("pitch-circle")).map((element) => element.attributes.r),
     remarks: places.polars.find(classes("remark")).map((element) => element.textContent),
     silent: places.charts.find((element) => element.textContent === "no values" && element.name === "text").length,
     reaction: places.stage.find(classes("reaction")).map((element) => element.attributes.d),

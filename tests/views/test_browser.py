@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 from stand_in import four_bar
 
+from geared import geared_five_bar
+from mechanisms import analyse
 from trunnion.errors import Status
 from trunnion.views.scene import scene
 
@@ -56,6 +58,10 @@ if NODE:  # not a skip: what must hold everywhere is tested in Python; this is t
         assert shown["loads"] == 2
         assert len(shown["springs"]) == 1
         assert re.fullmatch(r"M[-\d.,]+(L[-\d.]+,[-\d.]+)+", shown["springs"][0])
+
+    def test_pitch_circles_are_drawn(tmp_path):
+        result = analyse(geared_five_bar(), 24)
+        assert len(page(result, tmp_path)["circles"]) == 2
 
     def test_locked_everywhere_is_said_in_the_charts(tmp_path):
         assert page(four_bar(36, gap=(0, 36, Status.LOCKED)), tmp_path)["silent"] >= 3

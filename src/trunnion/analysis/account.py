@@ -195,8 +195,10 @@ def _over_the_cycle(run: Run, arrays: Arrays, causes: diagnosis.Causes, time: ND
         causes, run.system.dial(run.values, time), arrays["status"], arrays["condition"], efforts
     )
     spans = [run.system.span(run.values, name) for name in run.system.mechanism.drivers]
-    if len(spans) > 1 and not run.cycle.periodic and all(span.periodic for span in spans):
-        what = f"the drivers do not come back together; the cycle is the slowest one's period, {run.cycle.duration:g} s"
+    several = len(spans) > 1 or run.system.mechanism.gears
+    if several and not run.cycle.periodic and spans and all(span.periodic for span in spans):
+        whom = "drivers" if len(spans) > 1 else "driver and the gears"
+        what = f"the {whom} do not come back together; the cycle is the slowest period, {run.cycle.duration:g} s"
         remedy = "means and efficiency are of that time; choose speeds with a common period, or ranges"
         found.append(Finding(what, "drivers", remedy, Severity.WARNING))
     return [*found, *_loads_over_the_cycle(run, arrays, time)]
@@ -356,11 +358,30 @@ def _scene(run: Run) -> dict[str, Any]:
         "joints": joints,
         "drivers": list(mechanism.drivers),
         "loads": _loads_drawn(run),
+        "gears": {name: _circles(run, name) for name, gear in mechanism.gears.items() if gear.teeth},
         "springs": {
             name: {"between": spring.between and list(spring.between), "joint": spring.joint}
             for name, spring in mechanism.springs.items()
         },
     }
+
+
+def _circles(run: Run, name: str) -> list[dict[str, Any]]:
+    """Pitch circles of a gear pair: the point each turns about, and its radius, m."""
+    system, gear = run.system, run.system.mechanism.gears[name]
+    carriers = system.mechanism.carriers(name) or (0, 0)
+    links = [system.joints[joint][1] for joint in gear.joints]
+    carrier = links[0][carriers[0]]
+    elements = system.elements(run.values)
+    one, two = (elements[carrier, joint] for joint in gear.joints)
+    sign = 1.0 if carriers[0] == carriers[1] else -1.0
+    ratio = sign * float(run.values[f"gears.{name}.ratio"])
+    centres = float(np.hypot(two.x - one.x, two.y - one.y))
+    radii = abs(ratio / (ratio - 1)) * centres, abs(1 / (ratio - 1)) * centres
+    return [
+        {"at": f"{pair[1 - side]}.{joint}", "radius": radius}
+        for pair, side, joint, radius in zip(links, carriers, gear.joints, radii, strict=True)
+    ]
 
 
 def _loads_drawn(run: Run) -> dict[str, Any]:

@@ -15,9 +15,11 @@ from trunnion.algebra.namespace import Number
 from trunnion.analysis import account, diagnosis
 from trunnion.analysis.branches import Chosen, choose
 from trunnion.analysis.friction import FrictionMethod
+from trunnion.analysis.kinematics import forward
 from trunnion.analysis.kinetostatics import Backward, solve
 from trunnion.analysis.system import Cycle, System, Values, build, sticking
 from trunnion.errors import Finding, MechanismError, Status
+from trunnion.groups.gear import rotation
 from trunnion.groups.planar import accelerated
 from trunnion.model.mechanism import Mechanism
 
@@ -29,6 +31,7 @@ __all__ = ["Run", "analyse", "prepare"]
 CHUNK = 8192  # positions at a time: the arrays of a walk stay in cache
 MOST_STEPS = 100_000_000
 SINGULAR = 1e6  # condition from which less than about four digits would be left
+TURN_STEPS = 720
 NEAR_SINGULAR = 100.0  # a transmission angle of about a degree
 
 
@@ -57,7 +60,29 @@ def prepare(mechanism: Mechanism) -> Run:
     """Decompose a mechanism and choose its assembly. Raises MechanismError if its structure is not determined."""
     system = build(mechanism)
     values = mechanism.parameters()
-    return Run(system, values, system.cycle(values), choose(system, values))
+    cycle = system.cycle(values)
+    run = Run(system, values, cycle, choose(system, values, cycle))
+    turns = _whole_turns(run)
+    if any(turns.values()):
+        cycle = system.cycle(values, turns)
+        run = Run(system, values, cycle, choose(system, values, cycle))
+    return run
+
+
+def _whole_turns(run: Run) -> dict[str, float]:
+    """Whole turns that a cycle adds to joints that a gear pair starts from and that are neither driven nor geared."""
+    mechanism = run.system.mechanism
+    geared = {gear.joints[1] for gear in mechanism.gears.values()}
+    asked = {gear.joints[0] for gear in mechanism.gears.values()} - geared - mechanism.drivers.keys()
+    if not asked or not run.cycle.periodic:
+        return {}
+    walk = forward(run.system, run.values, run.chosen.assembly, run.cycle.times(TURN_STEPS))
+    found = {}
+    for joint in sorted(asked):
+        first, second = (walk.motions[link].frame for link in run.system.joints[joint][1])
+        angle = np.unwrap(np.ravel(rotation((first, second))))
+        found[joint] = float(np.rint((angle[-1] - angle[0]) / (2 * np.pi))) if np.all(np.isfinite(angle)) else 0.0
+    return found
 
 
 def analyse(
@@ -98,13 +123,18 @@ def analyse(
 def _labels(system: System) -> dict[str, list[str]]:
     mechanism = system.mechanism
     springs = {"spring": list(mechanism.springs)} if mechanism.springs else {}
-    return springs | {
-        "joint": list(system.joints),
-        "link": list(mechanism.links),
-        "point": [f"{link}.{point}" for link, point in system.points],
-        "axis": ["x", "y"],
-        "driver": list(mechanism.drivers),
-    }
+    gears = {"gear": list(mechanism.gears)} if mechanism.gears else {}
+    return (
+        springs
+        | gears
+        | {
+            "joint": list(system.joints),
+            "link": list(mechanism.links),
+            "point": [f"{link}.{point}" for link, point in system.points],
+            "axis": ["x", "y"],
+            "driver": list(mechanism.drivers),
+        }
+    )
 
 
 def _absent(system: System) -> list[str]:
@@ -219,6 +249,11 @@ def _fill_forces(arrays: Arrays, back: Backward, window: slice) -> None:
         state = back.springs[name]
         for key, number in zip(("spring_force", "spring_elongation"), state[:2], strict=True):
             arrays[key][i, window] = number
+    for i, name in enumerate(system.mechanism.gears):
+        gear = back.gears[name]
+        arrays["gear_torque"][i, window] = gear.torque
+        for axis in (0, 1):
+            arrays["gear_force"][i, axis, window] = gear.force[axis]
     settled = back.settled
     for key, field in (
         ("friction_iterations", "iterations"),
@@ -233,7 +268,7 @@ def _fill_forces(arrays: Arrays, back: Backward, window: slice) -> None:
 FORCES = [
     *("reaction_force", "reaction_moment", "friction_torque", "friction_force", "friction_power"),
     *("drive_effort", "drive_power", "power_residual", "friction_change", "friction_contraction"),
-    *("spring_force", "spring_power", "damping_power"),
+    *("spring_force", "spring_power", "damping_power", "gear_torque", "gear_force"),
 ]
 RATES = [name for name in results.VARIABLES if name.endswith(("_velocity", "_acceleration"))]
 

@@ -8,7 +8,7 @@ starts Newton from the track, all lanes in parallel, and a lane that ends on ano
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -18,21 +18,26 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
 from trunnion.analysis import change_points
+from trunnion.analysis.hints import distance, first, hints, is_chosen, named_way, nth
 from trunnion.analysis.kinematics import Forward, pairs_of, pose_of, start, take
-from trunnion.analysis.system import System, Values, driven_coordinates
+from trunnion.analysis.system import Cycle, System, Values, driven_coordinates
 from trunnion.errors import Finding, Severity
-from trunnion.groups.general import General, Pose, size_of
-from trunnion.groups.planar import Frame, compose, point
+from trunnion.groups.gear import NUMBERS, rotation
+from trunnion.groups.general import OUTER, General, Pose
+from trunnion.groups.planar import Frame
+from trunnion.groups.protocol import Elements
+from trunnion.groups.tree import size_of
 from trunnion.structure.decompose import Module
 
 __all__ = ["Chosen", "Track", "choose"]
 
 Array = NDArray[np.float64]
-Pick = Callable[[Number], Any]
 
 GRID = 720  # intervals of one turn of the fastest driver, along which general groups are followed
 MOST_INTERVALS = 720_000
 GUESSES = 512
+FEW = 128  # guesses where an assembly is looked for again
+PROBES = 12  # of the gaps of a track
 SEED = 20060704  # of the guesses: the same assemblies every time
 TURN_JUMP = 0.35  # rad between neighbours of the grid: more is another branch
 SLIDE_JUMP = 0.25  # of the group's size, likewise
@@ -43,7 +48,9 @@ BLOCK = 32  # grid points tried at a time
 class Track:
     """Free tree coordinates of a general group along the nominal cycle, and the sign of det J on its branch.
 
-    times: (grid,) s; coordinates: (free, grid), NaN where the group cannot be assembled.
+    times: (grid,) s; coordinates: (free, grid), NaN where the group cannot be assembled. turns: rotations, whole
+    turns counted, that gear pairs ask for and the group does not hold, by their place in the drive. again: times, s, at
+    which it was put together anew after it had come apart.
     """
 
     times: Array
@@ -51,6 +58,8 @@ class Track:
     orientation: float
     periodic: bool
     clock: Clock
+    turns: Mapping[int, Array]
+    again: tuple[float, ...]
 
     def pose(
         self,
@@ -65,9 +74,12 @@ class Track:
         moment = np.mod(moment, self.times[-1]) if self.periodic else moment
         near = np.clip(np.searchsorted(self.times, moment), 1, len(self.times) - 1) if len(self.times) > 1 else 0
         guess = [_interpolated(self.times, row, moment, near) for row in self.coordinates]
+        drive = list(drive)
+        for slot, row in self.turns.items():
+            drive[slot] = _interpolated(self.times, row, moment, near)
         pose = group.position(elements, guess, drive)
         stays = pose.orientation == self.orientation
-        size = size_of(group, elements)
+        size = size_of(group.joints, elements)
         for i, from_ in zip(group.free, guess, strict=True):
             revolute = group.joints[group.steps[i].joint].kind == "revolute"
             reach = 4 * TURN_JUMP if revolute else 4 * SLIDE_JUMP * size
@@ -132,9 +144,8 @@ class Chosen:
     findings: tuple[Finding, ...]
 
 
-def choose(system: System, values: Values) -> Chosen:
+def choose(system: System, values: Values, cycle: Cycle) -> Chosen:
     """The assembly of every module that lies nearest the hints, at the nominal values and the start of the cycle."""
-    cycle = system.cycle(values)
     intervals = min(GRID * max(1, math.ceil(cycle.turns)), MOST_INTERVALS) if cycle.duration > 0 else 0
     times = np.linspace(0.0, cycle.duration, intervals + 1)
     walk = start(system, values)
@@ -152,13 +163,15 @@ def choose(system: System, values: Values) -> Chosen:
                 assembly, count = _track(walk, number, group, drive, times, cycle.periodic)
             else:
                 assembly, count = _branch(walk, number, times), len(group.BRANCHES)
-            if module.rank > 1 and count > 1 and not _hints(walk, module):
+            if module.rank > 1 and count > 1 and not is_chosen(walk, module):
                 findings.append(_unstated(module, count))
             chosen.append(assembly)
             walk.assembly.append(assembly)
             counts.append(count)
             if isinstance(assembly, Track) and not np.any(np.isfinite(assembly.coordinates)):
                 findings.append(_never(module))
+            if isinstance(assembly, Track) and assembly.again:
+                findings.append(_anew(system, values, module, assembly.again))
             pose = pose_of(walk, number, assembly, times)
             take(walk, number, pose, times)
             if module.rank > 1 and group.BRANCHES:
@@ -175,85 +188,16 @@ def _unstated(module: Module, count: int) -> Finding:
     return Finding(what, "assembly", remedy, Severity.WARNING)
 
 
+def _anew(system: System, values: Values, module: Module, at: Sequence[float]) -> Finding:
+    where = ", ".join(system.dial(values, np.array([moment])).at(0) for moment in at)
+    what = f"links {', '.join(module.links)} come apart on the way and are put together anew at {where}"
+    remedy = "there the assembly of the same sense nearest to the one before is shown; limit the range of the driver"
+    return Finding(what, "links", remedy, Severity.WARNING)
+
+
 def _never(module: Module) -> Finding:
     what = f"links {', '.join(module.links)} cannot be assembled anywhere along the cycle"
     return Finding(what, "links", "check the lengths, or give a better assembly hint", Severity.WARNING)
-
-
-# ---- hints ----------------------------------------------------------------------------------------------------
-
-
-def _hints(walk: Forward, module: Module) -> list[tuple[str, str, tuple[Number, ...]]]:
-    """(link, point, (x, y)) or ("", joint, (angle,)) of the hints that tell assemblies of this module apart."""
-    found: list[tuple[str, str, tuple[Number, ...]]] = []
-    values = walk.values
-    for key in walk.system.mechanism.assembly:
-        path = f"assembly.{key}"
-        if f"{path}.x" in values:
-            link, name = _point_of(walk.system, module, key)
-            if link:
-                found.append((link, name, (values[f"{path}.x"], values[f"{path}.y"])))
-        elif key in module.joints:
-            found.append(("", key, (values[path],)))
-    return found
-
-
-def _point_of(system: System, module: Module, key: str) -> tuple[str, str]:
-    """The link of the module that carries the hinted point, if the place of the point is not known without it."""
-    if key in system.joints:
-        links = system.joints[key][1]
-        inside = [link for link in links if link in module.links]
-        known = system.joints[key][0] == "revolute" and len(inside) == 1
-        return ("", "") if not inside or known else (inside[-1], key)
-    link, _, name = key.partition(".")
-    return (link, name) if link in module.links else ("", "")
-
-
-def _distance(walk: Forward, module: Module, frames: Sequence[Frame], pick: Pick, known: Pick) -> Array:
-    """Sum of the squared distances of an assembly from the hints, m² and rad².
-
-    pick, known: take the position looked at from the numbers of the module's links and of the known ones.
-    """
-    total: Any = 0.0
-    for link, name, place in _hints(walk, module):
-        if link:
-            path = f"links.{link}.points.{name}"
-            frame = frames[module.links.index(link)]
-            x, y = point(frame, walk.values[f"{path}.x"], walk.values[f"{path}.y"])
-            total = total + (pick(x) - place[0]) ** 2 + (pick(y) - place[1]) ** 2
-            continue
-        kind, links = walk.system.joints[name]
-        first, second = (_element(walk, module, frames, side, name, pick, known) for side in links)
-        if kind == "prismatic":
-            slide = first.c * (second.x - first.x) + first.s * (second.y - first.y)
-            total = total + (slide - place[0]) ** 2
-        else:
-            turn = np.arctan2(second.s, second.c) - np.arctan2(first.s, first.c) - place[0]
-            total = total + np.arctan2(np.sin(turn), np.cos(turn)) ** 2
-    return np.asarray(total, float)
-
-
-def _element(
-    walk: Forward, module: Module, frames: Sequence[Frame], link: str, joint: str, pick: Pick, known: Pick
-) -> Frame:
-    """Global element of a joint on one of its links, in the module or known, at the position looked at."""
-    if link not in module.links:
-        return Frame(*(known(n) for n in walk.element(link, joint)))
-    element = compose(frames[module.links.index(link)], walk.local[link, joint])
-    return Frame(*(pick(n) for n in element))
-
-
-def _nth(lane: int) -> Pick:
-    """Picks the value at one position of the cycle."""
-
-    def pick(number: Number) -> Any:
-        values = np.ravel(number)
-        return values[min(lane, len(values) - 1)]
-
-    return pick
-
-
-_first = _nth(0)
 
 
 # ---- closed forms ---------------------------------------------------------------------------------------------
@@ -263,14 +207,17 @@ def _branch(walk: Forward, number: int, times: Array) -> int:
     """+1 or −1: the nearer to the hints at the start; where it does not close there, the side the hint lies on."""
     module = walk.system.plan.modules[number]
     branches = walk.system.groups[number].BRANCHES
-    if len(branches) == 1 or not _hints(walk, module):
+    named = named_way(walk.system, module, len(branches))
+    if named is not None:
+        return branches[named]
+    if len(branches) == 1 or not hints(walk, module):
         return branches[0]
     poses = [pose_of(walk, number, branch, times) for branch in branches]
-    distances = [_distance(walk, module, pose.frames, _first, _first) for pose in poses]
+    distances = [distance(walk, module, pose.frames, first, first) for pose in poses]
     if not np.all(np.isfinite(distances)) and module.kind == "RRR":
         return _side(walk, number)
     for lane in range(len(times)):  # the start if it closes there, else the first position that does
-        distances = [_distance(walk, module, pose.frames, _nth(lane), _nth(lane)) for pose in poses]
+        distances = [distance(walk, module, pose.frames, nth(lane), nth(lane)) for pose in poses]
         if np.all(np.isfinite(distances)):
             break
     return branches[0] if not distances[1] < distances[0] else branches[1]
@@ -280,10 +227,10 @@ def _side(walk: Forward, number: int) -> int:
     """Side of the line between the outer pins on which the hinted inner pin lies."""
     module, places = walk.system.plan.modules[number], walk.system.places[number]
     (b, _), _, (d, _) = pairs_of(walk, places)
-    for _, name, place in _hints(walk, module):
+    for _, name, place in hints(walk, module):
         if name == module.joints[1] and len(place) == 2:
-            x, y = _first(b.x), _first(b.y)
-            side = (_first(d.x) - x) * (place[1] - y) - (_first(d.y) - y) * (place[0] - x)
+            x, y = first(b.x), first(b.y)
+            side = (first(d.x) - x) * (place[1] - y) - (first(d.y) - y) * (place[0] - x)
             return 1 if side >= 0 else -1
     return 1
 
@@ -294,31 +241,48 @@ def _side(walk: Forward, number: int) -> int:
 def _track(
     walk: Forward, number: int, group: General, drive: Sequence[Number], times: Array, periodic: bool
 ) -> tuple[Track, int]:
-    """The assembly nearest the hints, followed both ways from the first position where there is one."""
+    """The assembly that is named or nearest the hints, followed both ways from the first position where there is one.
+
+    Where it ends and the links can be assembled again farther on, in the same sense, the assembly nearest to what
+    was left is taken there and followed too.
+    """
     module, places = walk.system.plan.modules[number], walk.system.places[number]
     elements = pairs_of(walk, places)
+    turns = _turns(walk, module, group, elements, times)
+    drive = [turns.get(slot, number) for slot, number in enumerate(drive)]
     grid = len(times)
     rows = np.full((len(group.free), grid), np.nan)
     clock = Clock.of(walk.system, walk.values)
-    for first in _starts(grid):
-        found = _assemblies(group, _at(elements, first), [_lane(q, first) for q in drive])
+    for begin in _starts(grid):
+        found = _assemblies(group, _at(elements, begin), [_lane(q, begin) for q in drive])
         if found.q[0].size:
             break
     else:
-        return Track(times, rows, 0.0, periodic, clock), 0
-    every = _distance(walk, module, found.frames, lambda n: n, _nth(first))
-    distance = np.broadcast_to(every, found.orientation.shape)
-    best = int(np.argmin(distance))
+        return Track(times, rows, 0.0, periodic, clock, turns, ()), 0
+    ways = len(found.orientation)
+    named = named_way(walk.system, module, ways)
+    every = np.broadcast_to(distance(walk, module, found.frames, lambda n: n, nth(begin)), (ways,))
+    best = int(np.argmin(every)) if named is None else named
     orientation = float(found.orientation[best])
-    here = np.array([found.q[i][best] for i in group.free])
-    rows[:, first] = here
+    rows[:, begin] = [found.q[i][best] for i in group.free]
     follower = _Follower(group, elements, drive, orientation)
-    follower.run(rows, list(range(first, grid)))
-    follower.run(rows, list(range(first, -1, -1)))
-    if periodic:
-        _wrap(rows, group)
-        follower.run(rows, _gap_backward(rows))
-    return Track(times, rows, orientation, periodic, clock), len(distance)
+    follower.both_ways(rows, begin, periodic)
+    again = follower.revisit(rows, periodic)
+    return Track(times, rows, orientation, periodic, clock, turns, tuple(times[list(again)])), ways
+
+
+def _turns(walk: Forward, module: Module, group: General, elements: Elements, times: Array) -> dict[int, Array]:
+    """Rotations of the known joints that gear pairs speak of and nothing drives, followed from that nearest to 0."""
+    found = {}
+    for i, (name, gear) in enumerate(zip(module.gears, group.gears, strict=True)):
+        driven = walk.system.mechanism.gears[name].joints[0] in walk.system.mechanism.drivers
+        if not driven and group.joints[gear.first].sides == (OUTER, OUTER):
+            angle = np.broadcast_to(primal(rotation(elements[gear.first])), times.shape)
+            solved = np.isfinite(angle)
+            unwrapped = np.full(times.shape, np.nan)
+            unwrapped[solved] = np.unwrap(angle[solved])
+            found[len(group.driven) + NUMBERS * i + NUMBERS - 1] = unwrapped
+    return found
 
 
 def _starts(grid: int) -> Iterator[int]:
@@ -341,18 +305,30 @@ def _gap_backward(rows: Array) -> list[int]:
     return list(range(rows.shape[1] - 1, -1, -1))
 
 
-def _assemblies(group: General, elements: Sequence[tuple[Frame, Frame]], drive: Sequence[Number]) -> Pose:
+def _probes(rows: Array) -> list[int]:
+    """Some grid points in every gap of a track, in all no more than PROBES."""
+    gaps = np.flatnonzero(~np.isfinite(rows[0]))
+    if not len(gaps) or len(gaps) == rows.shape[1]:
+        return []
+    parts = np.split(gaps, np.flatnonzero(np.diff(gaps) > 1) + 1)
+    each = max(1, PROBES // len(parts))
+    return [int(part[i]) for part in parts[:PROBES] for i in np.linspace(0, len(part) - 1, each + 2, dtype=int)[1:-1]]
+
+
+def _assemblies(
+    group: General, elements: Sequence[tuple[Frame, Frame]], drive: Sequence[Number], count: int = GUESSES
+) -> Pose:
     """All assemblies found at one position from many guesses, each once, along the last axis."""
     rng = np.random.default_rng(SEED)
     spread = _extent(group, elements)
     guesses = [
-        rng.uniform(-np.pi, np.pi, GUESSES)
+        rng.uniform(-np.pi, np.pi, count)
         if group.joints[group.steps[i].joint].kind == "revolute"
-        else rng.uniform(-2 * spread, 2 * spread, GUESSES)
+        else rng.uniform(-2 * spread, 2 * spread, count)
         for i in group.free
     ]
     pose = group.position(elements, guesses, drive)
-    shape = (GUESSES,)
+    shape = (count,)
     key = np.array(
         [
             np.broadcast_to(n, shape)
@@ -360,11 +336,17 @@ def _assemblies(group: General, elements: Sequence[tuple[Frame, Frame]], drive: 
             for n in (frame.x / spread, frame.y / spread, frame.c, frame.s)
         ]
     )
-    good = np.flatnonzero(np.isfinite(key).all(axis=0) & (np.broadcast_to(pose.condition, shape) < 1e8))
+    sound = np.isfinite(key).all(axis=0) & (np.broadcast_to(pose.condition, shape) < 1e8)
+    geared = {gear.first for gear in group.gears}
+    for value, step in zip(pose.q, group.steps, strict=True):
+        if step.joint in geared and step.joint not in group.driven:  # whole turns more would be another tooth
+            sound = sound & (np.abs(np.broadcast_to(value, shape)) <= np.pi)
+    good = np.flatnonzero(sound)
     kept: list[int] = []
     for lane in good:
         if all(np.max(np.abs(key[:, lane] - key[:, other])) > 1e-6 for other in kept):
             kept.append(int(lane))
+    kept.sort(key=lambda lane: tuple(np.round(key[:, lane], 6)))  # a numbering that does not depend on the guesses
     frames = tuple(Frame(*(np.broadcast_to(n, shape)[kept] for n in frame)) for frame in pose.frames)
     return pose._replace(
         frames=frames,
@@ -375,7 +357,7 @@ def _assemblies(group: General, elements: Sequence[tuple[Frame, Frame]], drive: 
 
 def _extent(group: General, elements: Sequence[tuple[Frame, Frame]]) -> float:
     """How far a slide may reach: the largest size of the group over the lanes, m."""
-    sizes = size_of(group, elements)
+    sizes = size_of(group.joints, elements)
     return float(np.max(sizes[np.isfinite(sizes)], initial=0.0)) or 1.0
 
 
@@ -426,6 +408,42 @@ class _Follower:
                 slope = found[:, -1] - before
             place += kept
             block = min(2 * block, BLOCK) if kept == len(ahead) else max(1, kept)
+
+    def both_ways(self, rows: Array, begin: int, periodic: bool) -> None:
+        """Follow from one grid point forward and back, and over the end of a periodic cycle."""
+        run = range(begin, rows.shape[1])
+        self.run(rows, list(run))
+        self.run(rows, list(range(begin, -1, -1)))
+        if periodic:
+            _wrap(rows, self.group)
+            self.run(rows, _gap_backward(rows))
+
+    def revisit(self, rows: Array, periodic: bool) -> list[int]:
+        """Grid points in the gaps at which the group can be assembled again, and was; their neighbours are filled."""
+        again: list[int] = []
+        for probe in _probes(rows):
+            if np.isfinite(rows[0, probe]):
+                continue
+            found = _assemblies(self.group, _at(self.elements, probe), [_lane(q, probe) for q in self.drive], FEW)
+            alike = np.flatnonzero(found.orientation == self.orientation)
+            if not len(alike):
+                continue
+            known = np.flatnonzero(np.isfinite(rows[0]))
+            before = rows[:, known[np.argmin(np.abs(known - probe))]]
+            ways = np.array([found.q[i][alike] for i in self.group.free])
+            best = int(np.argmin(self._apart(ways, before)))
+            rows[:, probe] = ways[:, best]
+            self.both_ways(rows, probe, periodic)
+            again.append(probe)
+        return again
+
+    def _apart(self, ways: Array, before: Array) -> Array:
+        """How far assemblies (free, way) are from another, turns and slides counted against their sizes."""
+        revolute = self._limits(1.0) == TURN_JUMP
+        change = ways - before[:, None]
+        turned = np.arctan2(np.sin(change), np.cos(change))
+        size = _extent(self.group, self.elements)
+        return np.asarray(np.sum(np.where(revolute[:, None], turned, change / size) ** 2, axis=0))
 
     def _block(self, q: Array, slope: Array, ahead: Sequence[int]) -> Array:
         """Coordinates (free, k) at the first k points of `ahead`, k as far as they follow q smoothly."""

@@ -29,13 +29,14 @@ NEAR_AIM = 0.25  # of Newton's first step by which the corrected point may miss 
 TINY_MOVE = 0.02  # of the largest unknown
 
 
-def follow(system: System, unknowns: int, lanes: int, most: float = 1.0) -> tuple[list[Array], Array]:
+def follow(system: System, start: Sequence[Array], most: float = 1.0) -> tuple[list[Array], Array]:
     """(solution, share) of each lane: the share is `most`, or that at which the lane's solution ceases to exist.
 
-    system(x, s) gives residual and Jacobian, lane by lane, and x = 0 solves it at s = 0. The solution of a lane
+    system(x, s) gives residual and Jacobian, lane by lane, and `start` solves it at s = 0. The solution of a lane
     that stops before `most` is NaN.
     """
-    x = [np.zeros(lanes) for _ in range(unknowns)]
+    x = list(start)
+    lanes = len(x[0])
     share = np.zeros(lanes)
     step = np.full(lanes, FIRST_STEP)
     active = np.ones(lanes, bool)

@@ -77,6 +77,8 @@ class Contact(NamedTuple):
 
     joint: its number in the module; unit_loads: what a friction force of 1 N on the second side does to the
     links; load: normal load and its gradient from the joint's reaction; law with parameters; slip: m/s.
+    rubs: False for the separating force of a gear pair, which follows the tooth force as friction follows the
+    normal load, but is there in full whatever the friction.
     """
 
     joint: int
@@ -85,6 +87,7 @@ class Contact(NamedTuple):
     law: FrictionLaw
     parameters: dict[str, Number]
     slip: Number
+    rubs: bool = True
 
     def mapped(self, change: Callable[[Number], Number]) -> Contact:
         """The same with `change` applied to every number that the laws see."""
@@ -307,7 +310,7 @@ def _margin(problem: _Problem, bound: Number, most: float) -> Number:
     if most <= 0 or not np.any(doubtful):
         return np.inf
     part, chosen = problem.picked(doubtful)
-    _, reached = continuation.follow(_scaled_system(part), len(problem.contacts), int(np.count_nonzero(chosen)), most)
+    _, reached = continuation.follow(_scaled_system(part), _frictionless(part, chosen), most)
     margin = np.full(chosen.shape, np.inf)
     margin[chosen] = np.where(reached >= most, np.inf, reached)
     return margin
@@ -317,7 +320,7 @@ def _follow(problem: _Problem, forces: Sequence[Number], lanes: Number) -> tuple
     """Forces with the chosen lanes followed from no friction; NaN where they lock, and the share reached."""
     part, chosen = problem.picked(lanes)
     shape = chosen.shape
-    found, reached = continuation.follow(_scaled_system(part), len(problem.contacts), int(np.count_nonzero(chosen)))
+    found, reached = continuation.follow(_scaled_system(part), _frictionless(part, chosen))
     result = []
     for force, value in zip(forces, found, strict=True):
         whole = np.array(np.broadcast_to(force, shape), float)
@@ -334,13 +337,23 @@ def _scaled_system(problem: _Problem) -> continuation.System:
     def system(
         forces: Sequence[NDArray[np.float64]], share: NDArray[np.float64]
     ) -> tuple[list[Number], list[list[Number]]]:
+        shares = [share if contact.rubs else 1.0 for contact in problem.contacts]
         state = problem.state(forces)
-        residual = [f - share * t for f, t in zip(forces, problem.target(state.normals), strict=True)]
+        residual = [f - s * t for f, s, t in zip(forces, shares, problem.target(state.normals), strict=True)]
         slopes = problem.slopes(state.normals)
-        rows = [[share * entry for entry in row] for row in problem.map_derivative(state, slopes)]
+        rows = [
+            [s * entry for entry in row] for s, row in zip(shares, problem.map_derivative(state, slopes), strict=True)
+        ]
         return residual, _identity_minus(rows)
 
     return system
+
+
+def _frictionless(problem: _Problem, chosen: NDArray[np.bool_]) -> list[NDArray[np.float64]]:
+    """Forces without friction, lane by lane: none but those that push gears apart."""
+    none = [np.zeros(int(np.count_nonzero(chosen))) for _ in problem.contacts]
+    target = problem.target(problem.state(none).normals)
+    return [zero if c.rubs else zero + t for zero, c, t in zip(none, problem.contacts, target, strict=True)]
 
 
 def _identity_minus(rows: Sequence[Sequence[Number]]) -> list[list[Number]]:

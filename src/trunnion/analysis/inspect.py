@@ -83,4 +83,8 @@ def _rank(walk: Forward) -> int | None:
         name: (float(p[0, first]), float(p[1, first]), float(p[2, first]), float(p[3, first]))
         for name, p in table.items()
     }
-    return mobility_by_rank(list(system.mechanism.links), system.mechanism.fixed_link, system.joints, at)
+    gears = {
+        name: (gear.joints, float(np.ravel(primal(walk.values[f"gears.{name}.ratio"]))[0]))
+        for name, gear in system.mechanism.gears.items()
+    }
+    return mobility_by_rank(list(system.mechanism.links), system.mechanism.fixed_link, system.joints, at, gears)

@@ -136,6 +136,11 @@ def take(walk: Forward, number: int, pose: Any, time: Number) -> None:
     twists_out: list[Twist | None] = []
     accelerations_out: list[Acceleration | None] = []
     for place in places:
+        if place.witness:  # its relative motion is what a gear pair sees
+            one, two = (walk.motions[link] for link in place.links)
+            twists_out.append(Twist(0.0, 0.0, two.twist.w - one.twist.w))
+            accelerations_out.append(Acceleration(0.0, 0.0, two.acceleration.w - one.acceleration.w))
+            continue
         outside = next((link for link, outer in zip(place.links, place.outer, strict=True) if outer), None)
         twists_out.append(walk.twist(outside, place.joint) if outside else None)
         accelerations_out.append(walk.acceleration(outside, place.joint) if outside else None)

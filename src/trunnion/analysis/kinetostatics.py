@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,12 +14,23 @@ from trunnion.analysis.friction import Contact, FrictionMethod, Settled, settle
 from trunnion.analysis.kinematics import Assembly, Forward, forward
 from trunnion.analysis.loads import Action, Slip, SpringState, springs, stated_loads
 from trunnion.analysis.system import Place, System, Values, law_of
-from trunnion.groups.planar import ZERO_LOAD, Wrench, about
+from trunnion.groups.gear import Gear, Mesh, actions, apart, mesh
+from trunnion.groups.general import General
+from trunnion.groups.planar import ZERO_LOAD, Wrench, about, added
+from trunnion.groups.protocol import Group
+from trunnion.joints.friction import FrictionLaw
 from trunnion.joints.pairs import Load
 
 __all__ = ["Backward", "backward", "solve"]
 
 ZERO_SLIP = 1e-10  # of the speeds about the joint: below it the sign of a relative speed is rounding noise
+
+
+class GearLoad(NamedTuple):
+    """What a gear pair does: torque in its second joint, on the second link, N m; tooth force on the second gear, N."""
+
+    torque: Number
+    force: tuple[Number, Number]
 
 
 @dataclass
@@ -40,6 +52,7 @@ class Backward:
     load_powers: dict[str, Number] = field(default_factory=dict)
     body_power: Number = 0.0
     springs: dict[str, SpringState] = field(default_factory=dict)
+    gears: dict[str, GearLoad] = field(default_factory=dict)
     undefined: dict[str, Number] = field(default_factory=dict)
 
 
@@ -153,15 +166,20 @@ def _settle_module(back: Backward, number: int, method: FrictionMethod, zero_sli
     loads = [back.loads[link] for link in module.links]
     contacts, levers = [], {}
     for k, place in enumerate(places):
-        if system.mechanism.effective_joints[place.joint].friction is not None:
+        if system.mechanism.effective_joints[place.joint].friction is not None and not place.witness:
             contact, levers[k] = _contact(back, module.links, k, place, zero_slip)
             contacts.append(contact)
+    contacts += [_teeth(back, number, i) for i, gear in enumerate(_gears(group)) if gear.carriers]
     settled = settle(group, walk.poses[number], loads, contacts, method)
     back.settled.append(settled)
     forces = {contact.joint: force for contact, force in zip(contacts, settled.forces, strict=True)}
     for k, place in enumerate(places):
-        friction = forces[k] * levers[k] if k in forces else 0.0
-        _record(back, place, settled.reactions[k], friction, driven=place.joint in module.driven)
+        if not place.witness:
+            friction = forces[k] * levers[k] if k in forces else 0.0
+            _record(back, place, settled.reactions[k], friction, driven=place.joint in module.driven)
+    for i, name in enumerate(module.gears):
+        k = len(places) + i
+        _record_gear(back, number, i, name, settled.reactions[k].m, forces.get(k, 0.0))
 
 
 def _contact(
@@ -229,3 +247,60 @@ def _record(back: Backward, place: Place, reaction: Wrench, friction: Number, dr
         if outer and link != walk.system.mechanism.fixed_link:
             sign = 1.0 if link == second else -1.0
             _add(back, link, Wrench(*(sign * n for n in whole)), (at.x, at.y))
+
+
+# ---- gear pairs -----------------------------------------------------------------------------------------------
+
+
+def _gears(group: Group) -> tuple[Gear, ...]:
+    return group.gears if isinstance(group, General) else ()
+
+
+def _mesh(back: Backward, number: int, i: int) -> tuple[Gear, Mesh]:
+    """A gear pair of a module and where its gears touch."""
+    pose = back.walk.poses[number]
+    gear = _gears(back.walk.system.groups[number])[i]
+    return gear, mesh(gear, (pose.elements[gear.first], pose.elements[gear.second]), pose.ratios[i])
+
+
+def _teeth(back: Backward, number: int, i: int) -> Contact:
+    """The force with which inclined flanks push two gears apart: tan α times the tooth force."""
+    walk = back.walk
+    module, places = walk.system.plan.modules[number], walk.system.places[number]
+    gear, touch = _mesh(back, number, i)
+    units = dict.fromkeys(module.links, ZERO_LOAD)
+    for joint, side, wrench, at in apart(gear, touch, 1.0):
+        link = places[joint].links[side]
+        if link in units:
+            frame = walk.motions[link].frame
+            units[link] = added(units[link], about(wrench, frame.x - at.x, frame.y - at.y), 1.0)
+    angle = walk.values[f"gears.{module.gears[i]}.pressure_angle"]
+    # a guide of length 2/|f/λ| under the moment λ alone presses with |f|
+    load = Load((1.0, 0.0), 2 / namespace(touch.factor).abs(touch.factor))
+    slope = namespace(angle).sin(angle) / namespace(angle).cos(angle)
+    return Contact(len(places) + i, list(units.values()), load, SEPARATION, {"slope": slope}, 0.0, rubs=False)
+
+
+def _separation(normal: Number, slip: Number, **parameters: Number) -> Number:
+    return parameters["slope"] * normal
+
+
+SEPARATION = FrictionLaw(_separation)
+
+
+def _record_gear(back: Backward, number: int, i: int, name: str, torque: Number, separation: Number) -> None:
+    """Keep what a gear pair does, and load the known links with it."""
+    walk = back.walk
+    places, pose = walk.system.places[number], walk.poses[number]
+    gear = _gears(walk.system.groups[number])[i]
+    done = actions(gear, pose.elements, pose.ratios[i], torque)
+    force: tuple[Number, Number] = (0.0, 0.0)
+    if gear.carriers:
+        pushes = apart(gear, _mesh(back, number, i)[1], separation)
+        force = done[0].wrench.x + pushes[0].wrench.x, done[0].wrench.y + pushes[0].wrench.y
+        done += pushes
+    back.gears[name] = GearLoad(torque, force)
+    for joint, side, wrench, at in done:
+        place = places[joint]
+        if place.outer[side] and place.links[side] != walk.system.mechanism.fixed_link:
+            _add(back, place.links[side], wrench, (at.x, at.y))

@@ -15,6 +15,7 @@ from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.errors import Finding, MechanismError
 from trunnion.groups import GROUPS, Group
+from trunnion.groups.gear import Gear
 from trunnion.groups.general import OUTER, General, GroupJoint
 from trunnion.groups.planar import Frame
 from trunnion.joints.friction import FRICTION_LAWS, FrictionLaw
@@ -61,13 +62,20 @@ class Dial(NamedTuple):
 
 @dataclass(frozen=True)
 class Place:
-    """A joint as its module sees it: kind, links and whether each is outside, in the module's order of sides."""
+    """A joint as its module sees it: kind, links and whether each is outside, in the module's order of sides.
+
+    A witness is a joint between two known links, of which only the module's gear pairs speak.
+    """
 
     joint: str
     kind: str
     links: tuple[str, str]
     outer: tuple[bool, bool]
     reversed_: bool
+
+    @property
+    def witness(self) -> bool:
+        return all(self.outer)
 
 
 @dataclass(frozen=True)
@@ -98,8 +106,11 @@ class System:
 
     @cached_property
     def places(self) -> tuple[tuple[Place, ...], ...]:
-        """The joints of each module."""
-        return tuple(tuple(self._place(module, k) for k in range(len(module.joints))) for module in self.plan.modules)
+        """The joints of each module, then its witnesses."""
+        return tuple(
+            tuple(self._place(module, name) for name in (*module.joints, *module.witnesses))
+            for module in self.plan.modules
+        )
 
     @cached_property
     def joints(self) -> dict[str, tuple[str, tuple[str, str]]]:
@@ -111,22 +122,29 @@ class System:
         """(link, point) of every named point."""
         return tuple((name, point) for name, link in self.mechanism.links.items() for point in link.points)
 
-    def _place(self, module: Module, k: int) -> Place:
-        name = module.joints[k]
+    def _place(self, module: Module, name: str) -> Place:
         kind, (first, second) = self.joints[name]
-        links = (second, first) if module.reversed_[k] else (first, second)
+        reversed_ = name in module.joints and module.reversed_[module.joints.index(name)]
+        links = (second, first) if reversed_ else (first, second)
         outer = (links[0] not in module.links, links[1] not in module.links)
-        return Place(name, kind, links, outer, module.reversed_[k])
+        return Place(name, kind, links, outer, reversed_)
 
     def _group(self, module: Module) -> Group:
         if module.kind in GROUPS:
             return GROUPS[module.kind]
         number = {link: i for i, link in enumerate(module.links)}
+        names = (*module.joints, *module.witnesses)
         joints = tuple(
             GroupJoint(kind, (number.get(first, OUTER), number.get(second, OUTER)))
-            for kind, (first, second) in (self.joints[name] for name in module.joints)
+            for kind, (first, second) in (self.joints[name] for name in names)
         )
-        return General(len(module.links), joints, tuple(module.joints.index(name) for name in module.driven))
+        driven = tuple(names.index(name) for name in module.driven)
+        return General(len(module.links), joints, driven, tuple(self._gear(name, names) for name in module.gears))
+
+    def _gear(self, name: str, names: Sequence[str]) -> Gear:
+        gear = self.mechanism.gears[name]
+        first, second = (names.index(joint) for joint in gear.joints)
+        return Gear(first, second, self.mechanism.carriers(name) if gear.teeth else None)
 
     def elements(self, values: Values) -> dict[tuple[str, str], Frame]:
         """Local frame of every joint's element, by (link, joint); c, s is the direction of a slide."""
@@ -206,10 +224,12 @@ class System:
                 widest = np.maximum(widest, np.hypot(x - places[0][0], y - places[0][1]))
         return np.where(widest > 0, widest, 1.0)
 
-    def cycle(self, values: Values) -> Cycle:
+    def cycle(self, values: Values, turns: Mapping[str, float] | None = None) -> Cycle:
         """How long the drivers take: the longest that ends, or the least time in which all make whole periods.
 
-        Where that is over COMMON_TURNS periods of the slowest, the cycle is its one period and not periodic.
+        So do joints behind gear pairs. turns: whole turns, in one period of the drivers, of joints that a gear pair
+        starts from and that are neither driven nor geared; none if not given.
+        Where it is over COMMON_TURNS periods of the slowest, the cycle is its one period and not periodic.
         Raises MechanismError where a range runs against its speed or two drivers do not fit one cycle.
         """
         drivers = self.mechanism.drivers
@@ -232,10 +252,31 @@ class System:
         if findings:
             raise MechanismError(findings)
         periods = [longest / span.duration for span in spans.values()]
+        periods += self._geared_turns(nominal, values, longest, turns or {})
         whole = next((n for n in range(1, COMMON_TURNS + 1) if all(_is_whole(n * period) for period in periods)), 0)
         periodic = bool(whole and not ending)
         duration = whole * longest if periodic else longest
         return Cycle(duration, periodic, max(self._turns(name, span, duration) for name, span in spans.items()))
+
+    def _geared_turns(
+        self, nominal: Values, values: Values, duration: float, known: Mapping[str, float]
+    ) -> list[float]:
+        """Turns of every joint behind a gear pair in a time."""
+        turns = dict(known)
+        for name in self.mechanism.drivers:
+            if self.joints[name][0] == "revolute":
+                ends = [float(np.ravel(self.drive(nominal, name, time)[0])[0]) for time in (0.0, duration)]
+                turns[name] = (ends[1] - ends[0]) / (2 * np.pi)
+        found: list[float] = []
+        waiting = list(self.mechanism.gears.items())
+        while waiting:
+            ready = next((one for one in waiting if one[1].joints[0] in turns), waiting[0])
+            waiting.remove(ready)
+            first, second = ready[1].joints
+            ratio = float(np.ravel(primal(values[f"gears.{ready[0]}.ratio"]))[0])
+            found.append(ratio * turns.get(first, 0.0))
+            turns.setdefault(second, found[-1])
+        return found
 
     def _turns(self, driver: str, span: Span, duration: float) -> float:
         """Turns that a driver would make in a time at its largest rate; of a slide, how often it would travel."""
@@ -254,7 +295,11 @@ def build(mechanism: Mechanism) -> System:
 def driven_coordinates(
     system: System, module: Module, places: Sequence[Place], values: Values, time: Number
 ) -> tuple[list[Number], list[Number], list[Number]]:
-    """Coordinates, rates and second derivatives of a module's driven joints, in the module's sense."""
+    """Coordinates, rates and second derivatives of a module's driven joints, in the module's sense.
+
+    Then come three numbers for each of its gear pairs: ratio, phase and rotation of the first joint, which is known
+    with its whole turns if it is driven and otherwise taken as the nearest to 0.
+    """
     q: list[Number] = []
     rate: list[Number] = []
     second: list[Number] = []
@@ -263,6 +308,13 @@ def driven_coordinates(
         sign = -1.0 if place.reversed_ else 1.0
         for target, value in zip((q, rate, second), system.drive(values, name, time), strict=True):
             target.append(sign * value)
+    for name in module.gears:
+        first = system.mechanism.gears[name].joints[0]
+        turned = system.drive(values, first, time)[0] if first in system.mechanism.drivers else 0.0
+        ratio = values[f"gears.{name}.ratio"]
+        q += [ratio, values[f"gears.{name}.phase"], turned]
+        rate += [ratio, 0.0, 0.0]
+        second += [ratio, 0.0, 0.0]
     return q, rate, second
 
 

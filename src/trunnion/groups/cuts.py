@@ -7,14 +7,17 @@ turn for a revolute pair, along for a prismatic one.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from trunnion.algebra.namespace import Number, namespace
+from trunnion.groups.gear import NUMBERS, ONE, Gear, GearRow
 from trunnion.groups.planar import Acceleration, Frame, Twist, Wrench, accelerated, moved, turned
-from trunnion.groups.tree import GroupJoint
+from trunnion.groups.tree import OUTER, GroupJoint, Step
 
 __all__ = ["Row", "rows"]
+
+Pairs = Sequence[tuple[Frame, Frame]]
 
 
 class Row(NamedTuple):
@@ -52,8 +55,13 @@ class Row(NamedTuple):
         ux, uy = self.direction(first)
         return ux * x + uy * y
 
-    def gap(self, first: Frame, second: Frame, drive: Sequence[Number]) -> Number:
+    def terms(self, drive: Sequence[Number]) -> list[tuple[int, Number]]:
+        """Joints whose relative motion opens it, with factors."""
+        return [(self.joint, ONE)]
+
+    def gap(self, placed: Pairs, q: Sequence[Number], drive: Sequence[Number]) -> Number:
         """By how much the joint is open, m or rad (turned back by the prescribed angle, within half a turn)."""
+        first, second = placed[self.joint]
         if self.kind != "turn":
             return self.component(first, second.x - first.x, second.y - first.y) - self._driven(drive)
         driven = self._driven(drive)
@@ -66,9 +74,9 @@ class Row(NamedTuple):
         """Rate of the gap when the second side moves by `screw` (of the second point) against the first."""
         return screw.w if self.kind == "turn" else self.component(first, screw.x, screw.y)
 
-    def rate(self, elements: tuple[Frame, Frame], twists: tuple[Twist, Twist], drive: Sequence[Number]) -> Number:
-        """Rate of the gap."""
-        (first, second), (one, two) = elements, twists
+    def rate(self, placed: Pairs, ends: Callable[[int], tuple[Twist, Twist]], drive: Sequence[Number]) -> Number:
+        """Rate of the gap. ends: velocities of the two elements of a joint."""
+        (first, second), (one, two) = placed[self.joint], ends(self.joint)
         if self.kind == "turn":
             return two.w - one.w - self._driven(drive)
         carried = moved(one, second.x - first.x, second.y - first.y)
@@ -76,13 +84,13 @@ class Row(NamedTuple):
 
     def second(
         self,
-        elements: tuple[Frame, Frame],
-        twists: tuple[Twist, Twist],
-        accelerations: tuple[Acceleration, Acceleration],
+        placed: Pairs,
+        ends: Callable[[int], tuple[Twist, Twist]],
+        seconds: Callable[[int], tuple[Acceleration, Acceleration]],
         drive: Sequence[Number],
     ) -> Number:
         """Second derivative of the gap; across a slide it holds the Coriolis term 2 ω ṡ."""
-        (first, second), (v1, v2), (one, two) = elements, twists, accelerations
+        (first, second), (v1, v2), (one, two) = placed[self.joint], ends(self.joint), seconds(self.joint)
         if self.kind == "turn":
             return two.w - one.w - self._driven(drive)
         dx, dy = second.x - first.x, second.y - first.y
@@ -101,12 +109,19 @@ class Row(NamedTuple):
         return Wrench(size * x, size * y, 0.0)
 
 
-def rows(joints: Sequence[GroupJoint], cuts: Sequence[int], driven: Sequence[int]) -> tuple[Row, ...]:
-    """Constraints of the cut joints, in the order of the rows of J."""
-    found: list[Row] = []
-    for k in cuts:
-        revolute = joints[k].kind == "revolute"
+def rows(
+    joints: Sequence[GroupJoint], steps: Sequence[Step], driven: Sequence[int], gears: Sequence[Gear]
+) -> tuple[Row | GearRow, ...]:
+    """Constraints of the joints that the tree leaves out and of the gear pairs, in the order of the rows of J."""
+    found: list[Row | GearRow] = []
+    place = {step.joint: i for i, step in enumerate(steps)}
+    for k, joint in enumerate(joints):
+        if k in place or joint.sides == (OUTER, OUTER):
+            continue
+        revolute = joint.kind == "revolute"
         found += [Row(k, kind, -1) for kind in (("x", "y") if revolute else ("across", "turn"))]
         if k in driven:
             found.append(Row(k, "turn" if revolute else "along", driven.index(k)))
+    for i, gear in enumerate(gears):
+        found.append(GearRow(gear, len(driven) + NUMBERS * i, place.get(gear.first, -1)))
     return tuple(found)

@@ -25,6 +25,7 @@ from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.groups import tree as spanning
 from trunnion.groups.cuts import Row, rows
+from trunnion.groups.gear import NUMBERS, ONE, Gear, GearRow, actions
 from trunnion.groups.planar import (
     ZERO_LOAD,
     Acceleration,
@@ -38,12 +39,11 @@ from trunnion.groups.planar import (
     moved,
     relative,
     scaled,
-    turned,
 )
 from trunnion.groups.protocol import Elements
-from trunnion.groups.tree import OUTER, GroupJoint, Step
+from trunnion.groups.tree import OUTER, GroupJoint, Step, across, size_of
 
-__all__ = ["OUTER", "General", "GroupJoint", "Pose", "size_of"]
+__all__ = ["OUTER", "General", "GroupJoint", "Pose"]
 
 QUICK = 8  # rounds for all lanes
 NEWTON_LIMIT = 60  # more for those that need them
@@ -54,7 +54,7 @@ TURN_LIMIT = 0.4  # rad a step: keeps Newton on the branch it starts on
 class Pose(NamedTuple):
     """Frames of the links; both elements of each joint (global); tree coordinates q; J⁻¹; gap; condition.
 
-    orientation: sign of det J, which is the same all along one branch of assembly.
+    orientation: sign of det J, which is the same all along one branch of assembly; ratios: of the gear pairs.
     """
 
     frames: tuple[Frame, ...]
@@ -64,27 +64,27 @@ class Pose(NamedTuple):
     gap: Number
     condition: Number
     orientation: Number
+    ratios: tuple[Number, ...] = ()
 
 
 @dataclass(frozen=True)
 class General:
-    """The module with the given joints; `driven` lists the indices of joints whose coordinate is prescribed."""
+    """The module with the given joints; `driven` lists the indices of joints whose coordinate is prescribed.
+
+    A gear pair may speak of a joint between two known links: it is listed too, at the end, with both sides OUTER.
+    After the driven coordinates `drive` holds three numbers for each gear pair (see `gear.NUMBERS`).
+    """
 
     links: int
     joints: tuple[GroupJoint, ...]
     driven: tuple[int, ...] = ()
+    gears: tuple[Gear, ...] = ()
     BRANCHES: ClassVar[tuple[int, ...]] = ()
 
     @cached_property
     def steps(self) -> tuple[Step, ...]:
         """The tree, outermost link last; driven joints are kept in it where they can be."""
-        return spanning.grow(self.links, self.joints, self.driven)
-
-    @cached_property
-    def cuts(self) -> tuple[int, ...]:
-        """Joints not in the tree, one for each loop."""
-        in_tree = {step.joint for step in self.steps}
-        return tuple(k for k in range(len(self.joints)) if k not in in_tree)
+        return spanning.grow(self.links, self.joints, [*self.driven, *(gear.first for gear in self.gears)])
 
     @cached_property
     def free(self) -> tuple[int, ...]:
@@ -104,7 +104,7 @@ class General:
         q: list[Number] = [0.0] * len(self.steps)
         for i, value in zip(self.free, assembly, strict=True):
             q[i] = value
-        prescribed = dict(zip(self.driven, drive, strict=True))
+        prescribed = dict(zip(self.driven, drive, strict=False))
         for i, step in enumerate(self.steps):
             if step.joint in prescribed:
                 q[i] = prescribed[step.joint]
@@ -129,24 +129,26 @@ class General:
             for _ in range(depth):
                 q = self._step(elements, q, drive)
             frames, placed = self._place(elements, q)
-            jacobian = self._jacobian(placed)
+            jacobian = self._jacobian(placed, drive)
             inverse = linalg.inverse(jacobian) if jacobian else []
-            gap = self._gap(placed, drive)
+            gap = self._gap(placed, q, drive)
             lengths = [n for n, row in zip(gap, self._rows, strict=True) if row.is_length]
-            size = size_of(self, elements)
+            size = size_of(self.joints, elements)
             orientation = np.sign(primal(linalg.determinant(jacobian)))
         xp = namespace(*lengths) if lengths else np
         opening: Number = 0.0
         for value in lengths:
             opening = xp.maximum(opening, xp.abs(value))
-        return Pose(frames, placed, tuple(q), inverse, opening, self._condition(jacobian, inverse, size), orientation)
+        condition = self._condition(jacobian, inverse, size)
+        ratios = tuple(drive[len(self.driven) :: NUMBERS])
+        return Pose(frames, placed, tuple(q), inverse, opening, condition, orientation, ratios)
 
     def _newton(self, elements: Elements, start: Sequence[Number], drive: Sequence[Number]) -> list[Number]:
         """Newton on real numbers from `start`; lanes that do not converge are NaN."""
         q = [np.asarray(v, float) for v in self.coordinates(elements, start, drive)]
         if not self.free:
             return list(q)
-        size = size_of(self, elements)
+        size = size_of(self.joints, elements)
         kinds = [self.joints[self.steps[i].joint].kind for i in self.free]
         scale = [TURN_LIMIT if kind == "revolute" else 0.3 * size for kind in kinds]
         q, moved_by = self._iterate(elements, q, drive, scale, QUICK)
@@ -198,7 +200,7 @@ class General:
     ) -> list[Number]:
         """One Newton step, shortened as a whole where an entry would exceed its limit."""
         _, placed = self._place(elements, q)
-        (step,) = linalg.solve(self._jacobian(placed), self._gap(placed, drive))
+        (step,) = linalg.solve(self._jacobian(placed, drive), self._gap(placed, q, drive))
         if limits is not None:
             worst = np.maximum.reduce(
                 np.broadcast_arrays(*(np.abs(s) / limit for s, limit in zip(step, limits, strict=True)))
@@ -223,7 +225,7 @@ class General:
         for value, step in zip(q, self.steps, strict=True):
             near = placed(step.joint, step.near)
             turn = value if step.near == 0 else -value
-            far = _across(self.joints[step.joint].kind, near, turn)
+            far = across(self.joints[step.joint].kind, near, turn)
             frames[step.child] = relative(far, elements[step.joint][1 - step.near])
         pairs = tuple((placed(k, 0), placed(k, 1)) for k in range(len(self.joints)))
         return tuple(frames[link] for link in range(self.links)), pairs
@@ -231,12 +233,12 @@ class General:
     # ---- the Jacobian ---------------------------------------------------------------------------------------
 
     @cached_property
-    def _rows(self) -> tuple[Row, ...]:
-        return rows(self.joints, self.cuts, self.driven)
+    def _rows(self) -> tuple[Row | GearRow, ...]:
+        return rows(self.joints, self.steps, self.driven, self.gears)
 
-    def _gap(self, placed: Sequence[tuple[Frame, Frame]], drive: Sequence[Number]) -> list[Number]:
+    def _gap(self, placed: Sequence[tuple[Frame, Frame]], q: Sequence[Number], drive: Sequence[Number]) -> list[Number]:
         """By how much each constraint of the cuts is open, m or rad."""
-        return [row.gap(*placed[row.joint], drive) for row in self._rows]
+        return [row.gap(placed, q, drive) for row in self._rows]
 
     def _screws(self, placed: Sequence[tuple[Frame, Frame]], at: Frame) -> list[Twist]:
         """Motion of the point `at` of the outboard side for a unit rate of each tree coordinate."""
@@ -250,17 +252,20 @@ class General:
                 screws.append(Twist(sign * pivot.c, sign * pivot.s, 0.0))
         return screws
 
-    def _jacobian(self, placed: Sequence[tuple[Frame, Frame]]) -> list[list[Number]]:
+    def _jacobian(self, placed: Sequence[tuple[Frame, Frame]], drive: Sequence[Number]) -> list[list[Number]]:
         """Rate of every gap for a unit rate of every free coordinate; square for an Assur group."""
         matrix: list[list[Number]] = []
         for row in self._rows:
-            first, second = placed[row.joint]
-            screws = self._screws(placed, second)
-            to_first, to_second = (self._paths[link] for link in self.joints[row.joint].sides)
-            entries: list[Number] = []
-            for i in self.free:
-                weight = (i in to_second) - (i in to_first)
-                entries.append(weight * row.entry(first, screws[i]) if weight else 0.0)
+            entries: list[Number] = [0.0] * len(self.free)
+            for joint, factor in row.terms(drive):
+                first, second = placed[joint]
+                screws = self._screws(placed, second)
+                to_first, to_second = (self._paths[link] for link in self.joints[joint].sides)
+                for place, i in enumerate(self.free):
+                    weight = (i in to_second) - (i in to_first)
+                    if weight:
+                        entry = weight * row.entry(first, screws[i])
+                        entries[place] = entries[place] + (entry if factor is ONE else factor * entry)
             matrix.append(entries)
         return matrix
 
@@ -296,10 +301,11 @@ class General:
         """Rates of all tree coordinates, rad/s and m/s."""
         rates = self.coordinates((), [0.0] * len(self.free), drive)
         twists = self._twists(pose, outer, rates)
-        open_rates = []
-        for row in self._rows:
-            ends = self._at(pose, twists, outer, row.joint, 0), self._at(pose, twists, outer, row.joint, 1)
-            open_rates.append(row.rate(pose.elements[row.joint], ends, drive))
+
+        def ends(k: int) -> tuple[Twist, Twist]:
+            return self._at(pose, twists, outer, k, 0), self._at(pose, twists, outer, k, 1)
+
+        open_rates = [row.rate(pose.elements, ends, drive) for row in self._rows]
         for i, line in zip(self.free, pose.inverse, strict=True):
             rates[i] = -_weighted(line, open_rates)
         return rates
@@ -327,8 +333,10 @@ class General:
         k: int,
         side: int,
     ) -> Twist:
-        """Velocity of the element of joint k on one side."""
+        """Velocity of the element of joint k on one side; between two known links that of the second to the first."""
         link = self.joints[k].sides[side]
+        if side == 0 and self.joints[k].sides == (OUTER, OUTER):
+            return Twist(0.0, 0.0, 0.0)
         known = outer[k] if link == OUTER else None
         if known is not None:
             return known
@@ -375,8 +383,10 @@ class General:
     def _acceleration_at(
         self, known: _Motion, found: dict[int, Acceleration] | list[Acceleration], k: int, side: int
     ) -> Acceleration:
-        """Acceleration of the element of joint k on one side."""
+        """Acceleration of the element of joint k on one side; see `_at`."""
         link = self.joints[k].sides[side]
+        if side == 0 and self.joints[k].sides == (OUTER, OUTER):
+            return Acceleration(0.0, 0.0, 0.0)
         given = known.outer[k] if link == OUTER else None
         if given is not None:
             return given
@@ -384,26 +394,43 @@ class General:
         return accelerated(found[link], known.twists[link].w, element.x - frame.x, element.y - frame.y)
 
     def _gap_accelerations(self, known: _Motion, found: list[Acceleration], drive: Sequence[Number]) -> list[Number]:
-        gaps: list[Number] = []
-        for row in self._rows:
-            k = row.joint
+        def ends(k: int) -> tuple[Twist, Twist]:
             v1, v2 = (self._at(known.pose, known.twists, known.outer_twists, k, side) for side in (0, 1))
-            one, two = (self._acceleration_at(known, found, k, side) for side in (0, 1))
-            gaps.append(row.second(known.pose.elements[k], (v1, v2), (one, two), drive))
-        return gaps
+            return v1, v2
+
+        def seconds(k: int) -> tuple[Acceleration, Acceleration]:
+            return self._acceleration_at(known, found, k, 0), self._acceleration_at(known, found, k, 1)
+
+        return [row.second(known.pose.elements, ends, seconds, drive) for row in self._rows]
 
     # ---- reactions ------------------------------------------------------------------------------------------
 
     def reactions(self, pose: Pose, loads: Sequence[Wrench]) -> list[Wrench]:
-        """Cut wrenches from Jᵀ λ = −(outboard power on each screw), the others link by link from outside in."""
+        """Cut wrenches from Jᵀ λ = −(outboard power on each screw), the others link by link from outside in.
+
+        After the joints come the gear pairs, each with the torque it puts into its second joint.
+        """
         carried = {link: _moved_to(pose, loads[link], pose.frames[link]) for link in range(self.links)}
-        found = self._cut_wrenches(pose, carried)
+        multipliers = self._multipliers(pose, carried)
+        found = {k: ZERO_LOAD for k, joint in enumerate(self.joints) if joint.sides == (OUTER, OUTER)}
+        torques: list[Number] = []
+        for row, size in zip(self._rows, multipliers, strict=True):
+            if isinstance(row, GearRow):
+                torques.append(size)
+            else:
+                wrench = row.wrench(pose.elements[row.joint][0], size)
+                found[row.joint] = added(found.get(row.joint, ZERO_LOAD), wrench, 1.0)
         for k, wrench in found.items():
             first, second = self.joints[k].sides
             at = pose.elements[k][1]
             for link, sign in ((second, 1.0), (first, -1.0)):
                 if link != OUTER:
                     carried[link] = added(carried[link], _moved_to(pose, wrench, at), sign)
+        for gear, ratio, torque in zip(self.gears, pose.ratios, torques, strict=True):
+            for joint, side, wrench, place in actions(gear, pose.elements, ratio, torque):
+                link = self.joints[joint].sides[side]
+                if link != OUTER:
+                    carried[link] = added(carried[link], _moved_to(pose, wrench, place), 1.0)
         for step in reversed(self.steps):
             at = pose.elements[step.joint][1]
             total = carried[step.child]
@@ -411,10 +438,10 @@ class General:
             found[step.joint] = scaled(_moved_from(pose, total, at), sign)
             if step.parent != OUTER:
                 carried[step.parent] = added(carried[step.parent], total, 1.0)
-        return [found[k] for k in range(len(self.joints))]
+        return [found[k] for k in range(len(self.joints))] + [Wrench(0.0, 0.0, torque) for torque in torques]
 
-    def _cut_wrenches(self, pose: Pose, carried: dict[int, Wrench]) -> dict[int, Wrench]:
-        """Wrench on the second link of every cut joint, about its point there."""
+    def _multipliers(self, pose: Pose, carried: dict[int, Wrench]) -> list[Number]:
+        """λ of every constraint."""
         powers: list[Number] = []
         for i in self.free:
             outboard = ZERO_LOAD
@@ -423,11 +450,7 @@ class General:
                     outboard = added(outboard, carried[link], 1.0)
             screw = self._screws(pose.elements, _reference(pose))[i]
             powers.append(screw.x * outboard.x + screw.y * outboard.y + screw.w * outboard.m)
-        found = dict.fromkeys(self.cuts, ZERO_LOAD)
-        for j, row in enumerate(self._rows):
-            size = -_weighted([line[j] for line in pose.inverse], powers)
-            found[row.joint] = added(found[row.joint], row.wrench(pose.elements[row.joint][0], size), 1.0)
-        return found
+        return [-_weighted([line[j] for line in pose.inverse], powers) for j in range(len(self._rows))]
 
     def closure(self, pose: Pose) -> Number:
         """Largest distance by which a cut joint is open, m."""
@@ -443,15 +466,6 @@ class _Motion(NamedTuple):
     twists: list[Twist]
     outer_twists: Sequence[Twist | None]
     outer: Sequence[Acceleration | None]
-
-
-def _across(kind: str, near: Frame, value: Number) -> Frame:
-    """The far element of a joint from its near one and the coordinate, seen from the near side."""
-    if kind == "revolute":
-        xp = namespace(value)
-        c, s = turned(xp.cos(value), xp.sin(value), near.c, near.s)
-        return Frame(near.x, near.y, c, s)
-    return Frame(near.x + near.c * value, near.y + near.s * value, near.c, near.s)
 
 
 def _weighted(weights: Sequence[Number], values: Sequence[Number]) -> Number:
@@ -484,16 +498,3 @@ def _depth(number: Number) -> int:
 
 def _real(frame: Frame) -> Frame:
     return Frame(*(primal(n) for n in frame))
-
-
-def size_of(group: General, elements: Elements) -> Number:
-    """A length typical of each lane, m: the widest spread of joint elements on one link (or on all known links)."""
-    places: dict[int, list[tuple[Number, Number]]] = {}
-    for joint, pair in zip(group.joints, elements, strict=True):
-        for link, frame in zip(joint.sides, pair, strict=True):
-            places.setdefault(link, []).append((primal(frame.x), primal(frame.y)))
-    size: Number = 0.0
-    for (x0, y0), *others in places.values():
-        for x, y in others:
-            size = np.fmax(size, np.hypot(x - x0, y - y0))
-    return np.where(size > 0, size, 1.0)

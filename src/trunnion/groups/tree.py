@@ -1,11 +1,18 @@
-"""Which joints of a module carry its tree and which close its loops."""
+"""Which joints of a module carry its tree, and how one link hangs on the next."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import NamedTuple
 
-__all__ = ["OUTER", "GroupJoint", "Step", "grow"]
+import numpy as np
+
+from trunnion.algebra.dual import primal
+from trunnion.algebra.namespace import Number, namespace
+from trunnion.groups.planar import Frame, turned
+from trunnion.groups.protocol import Elements
+
+__all__ = ["OUTER", "GroupJoint", "Step", "across", "grow", "size_of"]
 
 OUTER = -1  # stands for every link outside the module: all are known, so they count as one
 
@@ -57,3 +64,25 @@ def grow(links: int, joints: Sequence[GroupJoint], first: Sequence[int]) -> tupl
         if len(reached) == before:
             raise ValueError("a link of the module is joined to nothing")
     return tuple(steps)
+
+
+def across(kind: str, near: Frame, value: Number) -> Frame:
+    """The far element of a joint from its near one and the coordinate, seen from the near side."""
+    if kind == "revolute":
+        xp = namespace(value)
+        c, s = turned(xp.cos(value), xp.sin(value), near.c, near.s)
+        return Frame(near.x, near.y, c, s)
+    return Frame(near.x + near.c * value, near.y + near.s * value, near.c, near.s)
+
+
+def size_of(joints: Sequence[GroupJoint], elements: Elements) -> Number:
+    """A length typical of each lane, m: the widest spread of joint elements on one link (or on all known links)."""
+    places: dict[int, list[tuple[Number, Number]]] = {}
+    for joint, pair in zip(joints, elements, strict=True):
+        for link, frame in zip(joint.sides, pair, strict=True):
+            places.setdefault(link, []).append((primal(frame.x), primal(frame.y)))
+    size: Number = 0.0
+    for (x0, y0), *others in places.values():
+        for x, y in others:
+            size = np.fmax(size, np.hypot(x - x0, y - y0))
+    return np.where(size > 0, size, 1.0)

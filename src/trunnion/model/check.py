@@ -15,6 +15,7 @@ from trunnion.errors import Finding, Severity
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.joints.motion import MOTION_LAWS
 from trunnion.joints.pairs import PAIRS
+from trunnion.model.check_gears import gears
 from trunnion.model.check_loads import motion_dimensions, springs, tables, unknown_name
 from trunnion.model.check_values import check_values
 from trunnion.model.expression import MOTION, RESERVED
@@ -38,7 +39,8 @@ def check_model(mechanism: Mechanism, lost: Collection[str] = ()) -> list[Findin
     unreadable: set[str] = set()
     findings = [*_quantities(mechanism, unreadable), *_links(mechanism), *_joints(mechanism)]
     findings += [] if lost else _absent(mechanism)
-    findings += [*_loop(mechanism), *_drivers(mechanism), *_loads(mechanism), *springs(mechanism), *_others(mechanism)]
+    findings += [*_loop(mechanism), *gears(mechanism), *_drivers(mechanism), *_loads(mechanism)]
+    findings += [*springs(mechanism), *_others(mechanism)]
     numbers = ParameterSet(mechanism, unreadable) if unreadable else mechanism.parameter_set
     with np.errstate(all="ignore"):  # absurd numbers may overflow in a check; they are still only numbers
         findings += check_values(mechanism, numbers)
@@ -345,6 +347,12 @@ def _others(mechanism: Mechanism) -> Iterator[Finding]:
     for name, hint in mechanism.assembly.items():
         where = f"assembly.{name}"
         link, _, point = name.partition(".")
+        if isinstance(hint, str):
+            if name not in links or name == mechanism.fixed_link:
+                moving = [one for one in links if one != mechanism.fixed_link]
+                what = f"'{hint}' chooses an assembly of a moving link, and '{name}' is none"
+                yield Finding(what, where, nearest(name, moving))
+            continue
         if point and (link not in links or point not in links[link].points):
             yield from _point(mechanism, name, where)
         elif not point and name not in joints:

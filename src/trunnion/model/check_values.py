@@ -11,6 +11,7 @@ import numpy as np
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, Severity
 from trunnion.joints.friction import FRICTION_LAWS, LawParameter
+from trunnion.model.check_gears import gear_values
 from trunnion.model.check_loads import spring_values, table_values
 from trunnion.model.parameters import ParameterSet
 from trunnion.model.parts import InertiaTensor, Link, freedoms
@@ -44,6 +45,7 @@ def check_values(mechanism: Mechanism, numbers: ParameterSet) -> Iterator[Findin
         yield from _joint(mechanism, name, numbers)
     for name in mechanism.drivers:
         yield from _driver(mechanism, name, values)
+    yield from gear_values(mechanism, values)
     yield from table_values(mechanism, values)
     yield from spring_values(mechanism, values)
     yield from _directions(mechanism, values)

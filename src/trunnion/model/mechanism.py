@@ -21,6 +21,7 @@ from trunnion.model.names import nearest
 from trunnion.model.parameters import Location, ParameterSet, merge_joint
 from trunnion.model.parts import (
     Driver,
+    Gear,
     Hint,
     Joint,
     JointDefaults,
@@ -57,6 +58,7 @@ class Mechanism(Part):
     links: Mapping[Name, Link] = {}
     joints: Mapping[Name, Joint] = {}
     joint_defaults: JointDefaults = JointDefaults()
+    gears: Mapping[Name, Gear] = {}
     loop: tuple[LoopJoint, ...] = ()
     drivers: Mapping[Name, Driver] = {}
     tables: Mapping[Name, Table] = {}
@@ -130,6 +132,12 @@ class Mechanism(Part):
     def effective_joints(self) -> Mapping[str, Joint]:
         """Every joint with the defaults merged in and its friction complete: law, model and all parameters."""
         return {name: merge_joint(joint, self.joint_defaults) for name, joint in self.stated_joints.items()}
+
+    def carriers(self, gear: str) -> tuple[int, int] | None:
+        """On which side (0, 1) of each of its joints a gear pair has the link common to both; None without one."""
+        one, two = (self.effective_joints[joint].links for joint in self.gears[gear].joints)
+        shared = next((link for link in one if link in two), None)
+        return None if shared is None else (one.index(shared), two.index(shared))
 
     @cached_property
     def parameter_set(self) -> ParameterSet:

@@ -23,6 +23,7 @@ from trunnion.model.names import nearest
 from trunnion.model.parts import (
     Driver,
     Friction,
+    Gear,
     Guide,
     Joint,
     JointDefaults,
@@ -87,9 +88,9 @@ def entries(mechanism: Mechanism) -> Iterator[Entry]:
             yield from _walk(getattr(loop_joint, key), f"loop.{loop_joint.joint}.{key}", ("loop", row, key))
     for name, joint in mechanism.effective_joints.items():
         yield from _joint_entries(mechanism, name, joint)
-    for section in ("drivers", "tables", "loads", "springs", "assembly", "measures"):
+    for section in ("gears", "drivers", "tables", "loads", "springs", "assembly", "measures"):
         for name, part in getattr(mechanism, section).items():
-            stated = part.complete() if isinstance(part, Driver) else part
+            stated = part.complete() if isinstance(part, Driver | Gear) else part
             for entry in _walk(stated, f"{section}.{name}", (section, name)):
                 kind = _narrow(mechanism, section, name, entry)
                 varies = section == "loads" and not {*MOTION, *mechanism.tables}.isdisjoint(entry.quantity.names)

@@ -59,6 +59,7 @@ __all__ = [
     "Driver",
     "Fit",
     "Friction",
+    "Gear",
     "Guide",
     "InertiaTensor",
     "Joint",
@@ -438,6 +439,25 @@ class Spring(Part):
     preload: ForceOrMoment | None = None
 
 
+class Gear(Part):
+    """A gear pair: the rotation of the second joint is ratio · rotation of the first + phase.
+
+    With teeth the joints share a link, the carrier, and the tooth force acts at the pitch point, inclined by the
+    pressure angle (20 deg if not stated); without, a train, belt or chain passes torques alone.
+    """
+
+    joints: tuple[str, str]
+    ratio: Dimensionless
+    phase: Angle = Quantity(0, KINDS["angle"])
+    teeth: bool = True
+    pressure_angle: Angle | None = None
+
+    def complete(self) -> Gear:
+        """With the usual pressure angle if it has teeth and states none."""
+        usual = Quantity.read("20 deg", KINDS["angle"]) if self.teeth else None
+        return self if self.pressure_angle else self.model_copy(update={"pressure_angle": usual})
+
+
 class Measure(Part):
     """A number to watch over the cycle: a coordinate of a point, the effort of a driver, or the angle of a link."""
 
@@ -448,7 +468,20 @@ class Measure(Part):
     limit: AnyQuantity | None = None
 
 
+_WAY = re.compile(r"^way-[1-9][0-9]{0,3}$")
+
+
+def _hint_shape(value: object) -> str:
+    return ":way" if isinstance(value, str) and _WAY.match(value) else _shape(value)
+
+
 Hint = Annotated[
-    Annotated[Position, Tag(":list")] | Annotated[AngleOrLength, Tag(":value")],
-    _forms("[x, y] of a point, or the rotation of a joint"),
+    Annotated[Position, Tag(":list")]
+    | Annotated[AngleOrLength, Tag(":value")]
+    | Annotated[str, Field(pattern=_WAY.pattern), Tag(":way")],
+    Discriminator(
+        _hint_shape,
+        custom_error_type="forms",
+        custom_error_message="takes [x, y] of a point, the rotation or slide of a joint, or way-1, way-2, … of a link",
+    ),
 ]

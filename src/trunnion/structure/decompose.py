@@ -9,7 +9,7 @@ work.  [THEORY of the docs, "Structure"; D 17 for the formula]
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import networkx as nx
 import numpy as np
@@ -35,6 +35,7 @@ class Module:
     kind: key of `groups.GROUPS`, or "general". links: in file order, for a closed form in its own order.
     joints: in the order of the group; `reversed_` tells which of them name their links in the file the other way
     round than the group does. driven: joints whose coordinate is prescribed. rank: the class (1 for a driver).
+    gears: gear pairs that it holds; witnesses: joints between known links that these speak of.
     """
 
     kind: str
@@ -44,6 +45,8 @@ class Module:
     driven: tuple[str, ...]
     rank: int
     label: str
+    gears: tuple[str, ...] = ()
+    witnesses: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -60,9 +63,9 @@ class Plan:
 
 
 def mobility_by_formula(mechanism: Mechanism) -> int:
-    """Grübler's count 3 (n − 1) − Σ (3 − f_j) of a planar mechanism with n links, ground included."""
+    """Grübler's count 3 (n − 1) − Σ (3 − f_j) − gear pairs of a planar mechanism with n links, ground included."""
     taken = sum(PLANAR_FREEDOMS - len(PAIRS[joint.type].freedoms) for joint in mechanism.joints.values())
-    return PLANAR_FREEDOMS * (len(mechanism.links) - 1) - taken
+    return PLANAR_FREEDOMS * (len(mechanism.links) - 1) - taken - len(mechanism.gears)
 
 
 def decompose(mechanism: Mechanism) -> Plan:
@@ -80,7 +83,7 @@ def decompose(mechanism: Mechanism) -> Plan:
     dependence = nx.DiGraph()
     dependence.add_nodes_from(bodies)
     for constraint, body in determines.items():
-        for other in mechanism.joints[constraint[0]].links:
+        for other in _links_of(mechanism, constraint):
             if other not in (body, ground):
                 dependence.add_edge(other, body)
     parts = nx.condensation(dependence)
@@ -92,20 +95,30 @@ def decompose(mechanism: Mechanism) -> Plan:
     modules: list[Module] = []
     for part in order:
         members = sorted(parts.nodes[part]["members"], key=place.__getitem__)
-        modules.append(_module(mechanism, members, known))
+        gears = [name for (name, i), body in determines.items() if i == GEAR and body in members]
+        modules.append(_module(mechanism, members, known, gears))
         known |= set(members)
     return Plan(tuple(modules), mobility)
 
 
-Constraint = tuple[str, int]
+GEAR = -1
+Constraint = tuple[str, int]  # of a joint, the number of a freedom it takes; of a gear pair, GEAR
 
 
 def _constraints(mechanism: Mechanism) -> list[Constraint]:
-    """(joint, number) for every freedom a joint takes, drivers last."""
+    """Every freedom that joints, gear pairs and drivers take."""
     found: list[Constraint] = []
     for name, joint in mechanism.joints.items():
         found += [(name, i) for i in range(PLANAR_FREEDOMS - len(PAIRS[joint.type].freedoms))]
+    found += [(name, GEAR) for name in mechanism.gears]
     return found + [(name, PLANAR_FREEDOMS) for name in mechanism.drivers]
+
+
+def _links_of(mechanism: Mechanism, constraint: Constraint) -> list[str]:
+    """Links whose motion a constraint relates."""
+    name, number = constraint
+    joints = mechanism.gears[name].joints if number == GEAR else (name,)
+    return list(dict.fromkeys(link for joint in joints for link in mechanism.joints[joint].links))
 
 
 def _match(mechanism: Mechanism, bodies: list[str], ground: str) -> dict[Constraint, str]:
@@ -114,7 +127,7 @@ def _match(mechanism: Mechanism, bodies: list[str], ground: str) -> dict[Constra
     constraints = _constraints(mechanism)
     graph.add_nodes_from(constraints)
     for constraint in constraints:
-        for link in mechanism.joints[constraint[0]].links:
+        for link in _links_of(mechanism, constraint):
             if link != ground:
                 graph.add_edges_from((constraint, ("freedom", link, i)) for i in range(PLANAR_FREEDOMS))
     matching = nx.bipartite.maximum_matching(graph, top_nodes=constraints)
@@ -156,11 +169,12 @@ def _generic_constraints(mechanism: Mechanism) -> tuple[NDArray[np.float64], lis
         name: (*rng.uniform(-1.0, 1.0, 2), float(np.cos(angle)), float(np.sin(angle)))
         for name, angle in zip(joints, angles, strict=True)
     }
-    return constraints(list(mechanism.links), mechanism.fixed_link, joints, places, list(mechanism.drivers))
+    gears = {name: (gear.joints, float(rng.uniform(0.3, 0.9))) for name, gear in mechanism.gears.items()}
+    return constraints(list(mechanism.links), mechanism.fixed_link, joints, places, list(mechanism.drivers), gears)
 
 
-def _module(mechanism: Mechanism, links: list[str], known: set[str]) -> Module:
-    """The module that the given links form on the links known so far."""
+def _module(mechanism: Mechanism, links: list[str], known: set[str], gears: list[str]) -> Module:
+    """The module that the given links form on the links known so far, and through these gear pairs."""
     joints = [name for name, joint in mechanism.joints.items() if _belongs(joint.links, links, known)]
     driven = [name for name in joints if name in mechanism.drivers]
     numbers = _numbers(mechanism)
@@ -169,21 +183,25 @@ def _module(mechanism: Mechanism, links: list[str], known: set[str]) -> Module:
         if name in driven
         else PAIRS[mechanism.joints[name].type].symbol
         for name in joints
-    )
-    if len(links) == 1 and driven == joints:
+    ) + "G" * len(gears)
+    if len(links) == 1 and driven == joints and not gears:
         base = next(link for link in mechanism.joints[joints[0]].links if link not in links)
         letter = PAIRS[mechanism.joints[joints[0]].type].symbol
         label = f"I({numbers[base]},{numbers[links[0]]}){letter}"
         return _assembled(mechanism, letter, links, joints, driven, 1, label)
     rank = _class(mechanism, links, joints)
-    dyad = _dyad(mechanism, links, joints) if not driven else None
+    dyad = _dyad(mechanism, links, joints) if not driven and not gears else None
     if dyad:
         kind, links, joints = dyad
         letters = kind
     else:
         kind = "general"
     listed = ",".join(str(numbers[link]) for link in links)
-    return _assembled(mechanism, kind, links, joints, driven, rank, f"{ROMAN.get(rank, rank)}({listed}){letters}")
+    label = f"{ROMAN.get(rank, rank)}({listed}){letters}"
+    module = _assembled(mechanism, kind, links, joints, driven, rank, label)
+    spoken = dict.fromkeys(joint for gear in gears for joint in mechanism.gears[gear].joints)
+    witnesses = tuple(joint for joint in spoken if joint not in joints)
+    return replace(module, gears=tuple(gears), witnesses=witnesses)
 
 
 def _belongs(pair: tuple[str, str], links: list[str], known: set[str]) -> bool:

@@ -7,18 +7,24 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Joints", "Places", "constraints", "mobility_by_rank", "rank"]
+__all__ = ["Gears", "Joints", "Places", "constraints", "mobility_by_rank", "rank"]
 
 RANK_TOLERANCE = 1e-9  # of the largest singular value
 
 Joints = Mapping[str, tuple[str, tuple[str, str]]]  # kind and links, by name
+Gears = Mapping[str, tuple[tuple[str, str], float]]  # joints and ratio, by name
 Places = Mapping[str, tuple[float, float, float, float]]  # point and direction of the slide (x, y, c, s), by joint
 
 
 def constraints(
-    links: Sequence[str], ground: str, joints: Joints, places: Places, drivers: Sequence[str] = ()
+    links: Sequence[str],
+    ground: str,
+    joints: Joints,
+    places: Places,
+    drivers: Sequence[str] = (),
+    gears: Gears | None = None,
 ) -> tuple[NDArray[np.float64], list[str]]:
-    """Constraints on the twists of the links, one row each, and the joint that each row belongs to.
+    """Constraints on the twists of the links, one row each, and the joint or gear pair that each row belongs to.
 
     Columns: (v_x, v_y at the mean of the places, ω · length) of every link but the ground, lengths in units of the
     spread of the places, so that the rows do not depend on where the mechanism stands nor on its size.
@@ -44,6 +50,14 @@ def constraints(
                     row[3 * number[link] : 3 * number[link] + 3] += sign * constraint
             rows.append(row)
             owners.append(name)
+    for name, (pair, ratio) in (gears or {}).items():
+        row = np.zeros(3 * len(number))
+        for joint, factor in zip(pair, (-ratio, 1.0), strict=True):
+            for link, sign in zip(joints[joint][1], (-1.0, 1.0), strict=True):
+                if link != ground:
+                    row[3 * number[link] + 2] += sign * factor
+        rows.append(row)
+        owners.append(name)
     return np.array(rows).reshape(len(rows), 3 * len(number)), owners
 
 
@@ -55,10 +69,12 @@ def rank(matrix: NDArray[np.float64]) -> int:
     return int(np.sum(values > RANK_TOLERANCE * values[0]))
 
 
-def mobility_by_rank(links: Sequence[str], ground: str, joints: Joints, places: Places) -> int:
+def mobility_by_rank(
+    links: Sequence[str], ground: str, joints: Joints, places: Places, gears: Gears | None = None
+) -> int:
     """Freedoms of the links less the rank of the joints' constraints at one position.
 
     It exceeds Grübler's count where constraints repeat each other, as in a parallelogram with a third crank.
     """
-    matrix, _ = constraints(links, ground, joints, places)
+    matrix, _ = constraints(links, ground, joints, places, gears=gears)
     return int(matrix.shape[1]) - rank(matrix)

@@ -69,7 +69,7 @@ def attribute(result: xr.Dataset, name: str, default: Any) -> Any:
 def layout(result: xr.Dataset) -> dict[str, Any]:
     """The mechanism as a small dict: ground, links with points, joints with links, loads."""
     stated: dict[str, Any] = attribute(result, "scene", {})
-    return {"ground": "", "links": {}, "joints": {}, "loads": {}, "springs": {}} | stated
+    return {"ground": "", "links": {}, "joints": {}, "loads": {}, "springs": {}, "gears": {}} | stated
 
 
 def names(result: xr.Dataset, dim: str) -> list[str]:

@@ -61,11 +61,18 @@ def picture(result: xr.Dataset) -> Picture:
     if not points.size:
         what = "no position of the mechanism can be assembled: there is nothing to draw"
         raise MechanismError(Finding(what, remedy="change the lengths or the range of the driver"))
+    stated = layout(result)
+    rims = [_rim(tracks[circle["at"]], circle["radius"]) for pair in stated["gears"].values() for circle in pair]
+    points = np.concatenate([points, *rims])
     low, high = points.min(axis=0), points.max(axis=0)
     size = float(np.hypot(*(high - low))) or 1.0
-    stated = layout(result)
     known = {link: angle for link, angle in angles.items() if angle is not None}
     return Picture(stated, tracks, known, size, (float(low[0]), float(low[1]), float(high[0]), float(high[1])))
+
+
+def _rim(track: Array, radius: float) -> Array:
+    """Corners of the box that a circle sweeps, (corner, axis)."""
+    return np.array([np.nanmin(track, axis=1) - radius, np.nanmax(track, axis=1) + radius])
 
 
 def _track(result: xr.Dataset, key: str) -> Array:
@@ -81,6 +88,9 @@ def draw(axes: Axes, shown: Picture, index: int) -> None:
         _body(axes, shown, link, index, PALETTE[order % len(PALETTE)])
     for spring in shown.stated["springs"].values():
         _spring(axes, shown, spring.get("between") or (), index)
+    for pair in shown.stated["gears"].values():
+        for circle in pair:
+            _pitch_circle(axes, shown.tracks[circle["at"]][:, index], circle["radius"])
     for name, joint in shown.stated["joints"].items():
         _joint(axes, shown, name, joint, index)
     _labels(axes, shown, index)
@@ -180,6 +190,13 @@ def _spring(axes: Axes, shown: Picture, ends: Sequence[str], index: int) -> None
     across = np.array([-along[1], along[0]]) / (np.hypot(*along) or 1.0) * 0.012 * shown.size
     path = places[0][:, None] + np.outer(along, COILS[0]) + np.outer(across, COILS[1])
     axes.plot(*path, color=MUTED, linewidth=1.1, zorder=4.5, solid_joinstyle="round")
+
+
+def _pitch_circle(axes: Axes, place: Array, radius: float) -> None:
+    """The pitch circle of a gear, dash-dotted as on a drawing."""
+    if np.isfinite(place).all():
+        line = (0, (8, 2, 1.5, 2))
+        axes.add_patch(Circle((place[0], place[1]), radius, fill=False, edgecolor=INK, linestyle=line, zorder=3.5))
 
 
 def _joint(axes: Axes, shown: Picture, name: str, joint: dict[str, Any], index: int) -> None:

@@ -55,6 +55,7 @@ def scene(result: xr.Dataset, ideal: xr.Dataset | None = None, max_positions: in
         "joints": _joints(stated, kept, other),
         "loads": _loads(stated, points),
         "springs": _springs(stated, points),
+        "gears": [{"name": name, **circle} for name, pair in stated["gears"].items() for circle in pair],
         "drivers": _drivers(kept, other, stated),
         "sums": {name: _series(column(kept, name)) for name in SUMS if name in kept},
         "efficiency": _single(result, "efficiency"),

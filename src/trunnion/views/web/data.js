@@ -95,11 +95,19 @@ export function place(scene, key, index) {
   return x === null || y === null ? null : [x, y];
 }
 
-/** The smallest box around all tracks, {x, y, width, height} in metres; null if nothing was ever assembled. */
+/** The smallest box around all tracks and pitch circles, {x, y, width, height} in metres; null if nothing was ever
+ * assembled. */
 export function bounds(scene) {
   const tracks = Object.values(scene.points);
-  const across = extent(tracks.map((track) => track.x));
-  const up = extent(tracks.map((track) => track.y));
+  const reach = (axis) => {
+    const rims = scene.gears.map(({ at: key, radius }) => {
+      const ends = extent([scene.points[key][axis]]);
+      return ends ? [ends[0] - radius, ends[1] + radius] : [];
+    });
+    return extent([...tracks.map((track) => track[axis]), ...rims]);
+  };
+  const across = reach("x");
+  const up = reach("y");
   if (!across || !up) return null;
   return { x: across[0], y: up[0], width: across[1] - across[0], height: up[1] - up[0] };
 }

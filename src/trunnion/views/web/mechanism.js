@@ -91,6 +91,11 @@ function build(view, width) {
       ends,
       node: svg("path", { class: "spring" }, svg("title", {}, name)),
     })),
+    gears: scene.gears.map(({ name, at: key, radius }) => ({
+      key,
+      radius,
+      node: svg("circle", { class: "pitch-circle" }, svg("title", {}, name)),
+    })),
     vectors: scene.joints.map((one) => svg("path", { class: `reaction ${view.kinds.get(one.name)}` })),
     drives: scene.drivers.map(() => svg("path", { class: "drive" })),
   };
@@ -99,6 +104,7 @@ function build(view, width) {
     "g",
     {},
     ...view.parts.bodies.map((one) => one.node),
+    ...view.parts.gears.map((one) => one.node),
     ...view.parts.points.map((one) => one.node),
     ...view.parts.joints.map((one) => one.node),
     ...view.parts.springs.map((one) => one.node),
@@ -290,6 +296,10 @@ function pose(view) {
     poseLoad(one, spotsOf(view, one.keys));
   });
   parts.springs.forEach((one) => set(one.node, { d: coil(spotsOf(view, one.ends)) }));
+  parts.gears.forEach((one) => {
+    moveTo(one.node, spotOf(view, one.key));
+    set(one.node, { r: one.radius * frame.scale });
+  });
   scene.drivers.forEach((driver, order) => poseDrive(view, driver, parts.drives[order]));
   scene.joints.forEach((one, order) => poseVector(view, one, parts.vectors[order]));
 }

@@ -1,0 +1,118 @@
+"""What a hint says of an assembly: which point it speaks of, and how far an assembly is from it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.algebra.namespace import Number
+from trunnion.analysis.kinematics import Forward
+from trunnion.analysis.system import System
+from trunnion.errors import Finding, MechanismError
+from trunnion.groups.planar import Frame, compose, point
+from trunnion.structure.decompose import Module
+
+__all__ = ["Pick", "distance", "first", "hints", "is_chosen", "named_way", "nth", "way_name"]
+
+Array = NDArray[np.float64]
+Pick = Callable[[Number], Any]
+
+
+def way_name(index: int) -> str:
+    """The name of an assembly, as `check` lists it and a hint may choose it."""
+    return f"way-{index + 1}"
+
+
+def named_way(system: System, module: Module, count: int) -> int | None:
+    """Which of `count` assemblies of a module its hint names, None if none does; MechanismError if there is no such."""
+    for key, hint in system.mechanism.assembly.items():
+        if key in module.links and isinstance(hint, str):
+            index = int(hint.partition("-")[2]) - 1
+            if not 0 <= index < count:
+                names = ", ".join(way_name(i) for i in range(count)) or "none"
+                what = f"the links {', '.join(module.links)} have no assembly '{hint}' at the start"
+                raise MechanismError(Finding(what, f"assembly.{key}", f"there are: {names}"))
+            return index
+    return None
+
+
+def is_chosen(walk: Forward, module: Module) -> bool:
+    """Whether a hint tells the assemblies of a module apart."""
+    named = any(key in module.links and isinstance(hint, str) for key, hint in walk.system.mechanism.assembly.items())
+    return named or bool(hints(walk, module))
+
+
+def hints(walk: Forward, module: Module) -> list[tuple[str, str, tuple[Number, ...]]]:
+    """(link, point, (x, y)) or ("", joint, (angle,)) of the hints that tell assemblies of this module apart."""
+    found: list[tuple[str, str, tuple[Number, ...]]] = []
+    values = walk.values
+    for key in walk.system.mechanism.assembly:
+        path = f"assembly.{key}"
+        if f"{path}.x" in values:
+            link, name = _point_of(walk.system, module, key)
+            if link:
+                found.append((link, name, (values[f"{path}.x"], values[f"{path}.y"])))
+        elif key in module.joints:
+            found.append(("", key, (values[path],)))
+    return found
+
+
+def _point_of(system: System, module: Module, key: str) -> tuple[str, str]:
+    """The link of the module that carries the hinted point, if the place of the point is not known without it."""
+    if key in system.joints:
+        links = system.joints[key][1]
+        inside = [link for link in links if link in module.links]
+        known = system.joints[key][0] == "revolute" and len(inside) == 1
+        return ("", "") if not inside or known else (inside[-1], key)
+    link, _, name = key.partition(".")
+    return (link, name) if link in module.links else ("", "")
+
+
+def distance(walk: Forward, module: Module, frames: Sequence[Frame], pick: Pick, known: Pick) -> Array:
+    """Sum of the squared distances of an assembly from the hints, m² and rad².
+
+    pick, known: take the position looked at from the numbers of the module's links and of the known ones.
+    """
+    total: Any = 0.0
+    for link, name, place in hints(walk, module):
+        if link:
+            path = f"links.{link}.points.{name}"
+            frame = frames[module.links.index(link)]
+            x, y = point(frame, walk.values[f"{path}.x"], walk.values[f"{path}.y"])
+            total = total + (pick(x) - place[0]) ** 2 + (pick(y) - place[1]) ** 2
+            continue
+        kind, links = walk.system.joints[name]
+        first, second = (_element(walk, module, frames, side, name, pick, known) for side in links)
+        if kind == "prismatic":
+            slide = first.c * (second.x - first.x) + first.s * (second.y - first.y)
+            total = total + (slide - place[0]) ** 2
+        else:
+            turn = np.arctan2(second.s, second.c) - np.arctan2(first.s, first.c) - place[0]
+            total = total + np.arctan2(np.sin(turn), np.cos(turn)) ** 2
+    return np.asarray(total, float)
+
+
+def _element(
+    walk: Forward, module: Module, frames: Sequence[Frame], link: str, joint: str, pick: Pick, known: Pick
+) -> Frame:
+    """Global element of a joint on one of its links, in the module or known, at the position looked at."""
+    if link not in module.links:
+        return Frame(*(known(n) for n in walk.element(link, joint)))
+    element = compose(frames[module.links.index(link)], walk.local[link, joint])
+    return Frame(*(pick(n) for n in element))
+
+
+def nth(lane: int) -> Pick:
+    """Picks the value at one position of the cycle."""
+
+    def pick(number: Number) -> Any:
+        values = np.ravel(number)
+        return values[min(lane, len(values) - 1)]
+
+    return pick
+
+
+first = nth(0)

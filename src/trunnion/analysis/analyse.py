@@ -115,7 +115,7 @@ def analyse(
         _fill(arrays, back, time[window], window, causes)
         if progress:
             progress(window.stop)
-    _bracket(arrays, run, time, method, causes)
+    _bracket(arrays, run, time, replace(method, margin_up_to=0.0), causes)  # the margin is known by now
     _unwrap(arrays, run, time)
     return account.finish(run, arrays, labels, time, method, causes)
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
 from trunnion.analysis import change_points
-from trunnion.analysis.hints import distance, first, hints, is_chosen, named_way, nth
+from trunnion.analysis.hints import distance, first, hints, named_way, nth
 from trunnion.analysis.kinematics import Forward, pairs_of, pose_of, start, take
 from trunnion.analysis.system import Cycle, System, Values, driven_coordinates
 from trunnion.errors import Finding, Severity
@@ -157,13 +157,14 @@ def choose(system: System, values: Values, cycle: Cycle) -> Chosen:
             group = system.groups[number]
             assembly: Any
             if module.rank == 1:
-                assembly, count = None, 1
+                assembly, count, decided = None, 1, True
             elif isinstance(group, General):
                 drive, _, _ = driven_coordinates(system, module, system.places[number], values, times)
-                assembly, count = _track(walk, number, group, drive, times, cycle.periodic)
+                assembly, count, decided = _track(walk, number, group, drive, times, cycle.periodic)
             else:
-                assembly, count = _branch(walk, number, times), len(group.BRANCHES)
-            if module.rank > 1 and count > 1 and not is_chosen(walk, module):
+                count = len(group.BRANCHES)
+                assembly, decided = _branch(walk, number, times)
+            if count > 1 and not decided:
                 findings.append(_unstated(module, count))
             chosen.append(assembly)
             walk.assembly.append(assembly)
@@ -184,7 +185,7 @@ def _unstated(module: Module, count: int) -> Finding:
     links = ", ".join(module.links)
     what = f"links {links} can be assembled in {count} ways and no hint says which; one was taken"
     joint = module.joints[len(module.joints) // 2]
-    remedy = f"say roughly where a point is at the start, e.g. assembly: {{{joint}: [x, y]}}"
+    remedy = f"say roughly where a point is at the start, e.g. assembly: {{{joint}: [x, y]}}, or choose from `check`"
     return Finding(what, "assembly", remedy, Severity.WARNING)
 
 
@@ -203,24 +204,33 @@ def _never(module: Module) -> Finding:
 # ---- closed forms ---------------------------------------------------------------------------------------------
 
 
-def _branch(walk: Forward, number: int, times: Array) -> int:
-    """+1 or −1: the nearer to the hints at the start; where it does not close there, the side the hint lies on."""
+def _branch(walk: Forward, number: int, times: Array) -> tuple[int, bool]:
+    """+1 or −1, and whether a name or hint decides it.
+
+    By hints it is the nearer at the start; where it does not close there, the side the hint lies on.
+    """
     module = walk.system.plan.modules[number]
     branches = walk.system.groups[number].BRANCHES
     named = named_way(walk.system, module, len(branches))
     if named is not None:
-        return branches[named]
+        return branches[named], True
     if len(branches) == 1 or not hints(walk, module):
-        return branches[0]
+        return branches[0], False
     poses = [pose_of(walk, number, branch, times) for branch in branches]
     distances = [distance(walk, module, pose.frames, first, first) for pose in poses]
     if not np.all(np.isfinite(distances)) and module.kind == "RRR":
-        return _side(walk, number)
+        return _side(walk, number), True
     for lane in range(len(times)):  # the start if it closes there, else the first position that does
         distances = [distance(walk, module, pose.frames, nth(lane), nth(lane)) for pose in poses]
         if np.all(np.isfinite(distances)):
             break
-    return branches[0] if not distances[1] < distances[0] else branches[1]
+    return branches[0] if not distances[1] < distances[0] else branches[1], _differ(distances)
+
+
+def _differ(distances: Sequence[float] | Array) -> bool:
+    """Whether the nearest assembly is nearer than the next, but for rounding."""
+    least, second = np.sort(np.nan_to_num(np.asarray(distances), nan=np.inf))[:2]
+    return bool(second - least > 1e-9 * (second + least))
 
 
 def _side(walk: Forward, number: int) -> int:
@@ -240,11 +250,11 @@ def _side(walk: Forward, number: int) -> int:
 
 def _track(
     walk: Forward, number: int, group: General, drive: Sequence[Number], times: Array, periodic: bool
-) -> tuple[Track, int]:
+) -> tuple[Track, int, bool]:
     """The assembly that is named or nearest the hints, followed both ways from the first position where there is one.
 
     Where it ends and the links can be assembled again farther on, in the same sense, the assembly nearest to what
-    was left is taken there and followed too.
+    was left is taken there and followed too. Also how many there are, and whether a name or hint decides.
     """
     module, places = walk.system.plan.modules[number], walk.system.places[number]
     elements = pairs_of(walk, places)
@@ -258,7 +268,7 @@ def _track(
         if found.q[0].size:
             break
     else:
-        return Track(times, rows, 0.0, periodic, clock, turns, ()), 0
+        return Track(times, rows, 0.0, periodic, clock, turns, ()), 0, True
     ways = len(found.orientation)
     named = named_way(walk.system, module, ways)
     every = np.broadcast_to(distance(walk, module, found.frames, lambda n: n, nth(begin)), (ways,))
@@ -268,7 +278,8 @@ def _track(
     follower = _Follower(group, elements, drive, orientation)
     follower.both_ways(rows, begin, periodic)
     again = follower.revisit(rows, periodic)
-    return Track(times, rows, orientation, periodic, clock, turns, tuple(times[list(again)])), ways
+    decided = named is not None or (ways > 1 and _differ(every))
+    return Track(times, rows, orientation, periodic, clock, turns, tuple(times[again])), ways, decided
 
 
 def _turns(walk: Forward, module: Module, group: General, elements: Elements, times: Array) -> dict[int, Array]:

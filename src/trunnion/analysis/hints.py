@@ -15,7 +15,7 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.groups.planar import Frame, compose, point
 from trunnion.structure.decompose import Module
 
-__all__ = ["Pick", "distance", "first", "hints", "is_chosen", "named_way", "nth", "way_name"]
+__all__ = ["Pick", "distance", "first", "hints", "named_way", "nth", "way_name"]
 
 Array = NDArray[np.float64]
 Pick = Callable[[Number], Any]
@@ -39,12 +39,6 @@ def named_way(system: System, module: Module, count: int) -> int | None:
     return None
 
 
-def is_chosen(walk: Forward, module: Module) -> bool:
-    """Whether a hint tells the assemblies of a module apart."""
-    named = any(key in module.links and isinstance(hint, str) for key, hint in walk.system.mechanism.assembly.items())
-    return named or bool(hints(walk, module))
-
-
 def hints(walk: Forward, module: Module) -> list[tuple[str, str, tuple[Number, ...]]]:
     """(link, point, (x, y)) or ("", joint, (angle,)) of the hints that tell assemblies of this module apart."""
     found: list[tuple[str, str, tuple[Number, ...]]] = []
@@ -65,7 +59,7 @@ def _point_of(system: System, module: Module, key: str) -> tuple[str, str]:
     if key in system.joints:
         links = system.joints[key][1]
         inside = [link for link in links if link in module.links]
-        known = system.joints[key][0] == "revolute" and len(inside) == 1
+        known = key in module.joints and system.joints[key][0] == "revolute" and len(inside) == 1
         return ("", "") if not inside or known else (inside[-1], key)
     link, _, name = key.partition(".")
     return (link, name) if link in module.links else ("", "")

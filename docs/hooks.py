@@ -3,11 +3,13 @@
 - `<!-- generated: NAME -->` in a page becomes the table of that name, made from the code's own tables.
 - `figures/MODEL/KIND.svg` and `figures/MODEL/report.html` are drawn when a page refers to them. MODEL is a file of
   `examples/`, a block of a page titled `MODEL.yaml`, or an entry of `VARIANTS`.
+- The gallery is made of the examples and of `tests/gallery/facts.py`; see `gallery_page.py`.
 - `$x$` and `$$x$$` become MathML, which browsers set without any script.
 """
 
 from __future__ import annotations
 
+import importlib.util
 import inspect
 import re
 import tempfile
@@ -68,11 +70,13 @@ def on_config(config: Any) -> Any:
 def on_files(files: Files, config: Any) -> Files:
     """Draw what the pages refer to; put the examples and the schema beside them."""
     pages = {path: path.read_text("utf-8") for path in sorted(DOCS.rglob("*.md"))}
-    wanted = {found for text in pages.values() for found in re.findall(r"figures/([\w-]+)/([\w-]+)\.(svg|html)", text)}
+    told = {found for text in pages.values() for found in re.findall(r"figures/([\w-]+)/([\w-]+)\.(svg|html)", text)}
+    wanted = told | _gallery().wanted()
     models = models_of(pages.values())
     for model in sorted({name for name, _, _ in wanted}):
         kinds = [kind for name, kind, suffix in sorted(wanted) if name == model and suffix == "svg"]
-        drawn = _drawn(model, models, kinds, report=any(name == model and s == "html" for name, _, s in wanted))
+        steps = 360 if any(name == model for name, _, _ in told) else _gallery().STEPS
+        drawn = _drawn(model, models, kinds, steps, report=(model, "report", "html") in wanted)
         for name, content in drawn.items():
             files.append(File.generated(config, f"figures/{model}/{name}", content=content))
     for path in sorted(EXAMPLES.glob("*.yaml")):
@@ -90,7 +94,7 @@ def models_of(pages: Any) -> dict[str, str]:
     return models
 
 
-def _drawn(model: str, models: dict[str, str], kinds: list[str], report: bool) -> dict[str, bytes]:
+def _drawn(model: str, models: dict[str, str], kinds: list[str], steps: int, report: bool) -> dict[str, bytes]:
     """The figures of a model, and its report, by file name."""
     from trunnion import analyse, read
     from trunnion import report as page
@@ -105,7 +109,7 @@ def _drawn(model: str, models: dict[str, str], kinds: list[str], report: bool) -
         file.write_text(models[base], encoding="utf-8")
         mechanism = read(file)
         mechanism = mechanism.with_values(values) if values else mechanism
-        result, ideal = analyse(mechanism), analyse(mechanism.with_friction("off"))
+        result, ideal = analyse(mechanism, steps), analyse(mechanism.with_friction("off"), steps)
         for kind in kinds:
             path = Path(folder) / f"{kind}.svg"
             save(PLOTS[kind](result, ideal), path)
@@ -113,6 +117,16 @@ def _drawn(model: str, models: dict[str, str], kinds: list[str], report: bool) -
         if report:
             drawn["report.html"] = page(result, ideal).encode()
     return drawn
+
+
+def _gallery() -> Any:
+    """The module beside this one, which MkDocs has on the path while it loads this one only."""
+    spec = importlib.util.spec_from_file_location("gallery_page", DOCS / "gallery_page.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
 
 
 # ---- tables ---------------------------------------------------------------------------------------------------
@@ -414,4 +428,5 @@ TABLES: dict[str, Callable[..., str]] = {
     "command-line": command_line,
     "public-names": public_names,
     "section": section,
+    "gallery": lambda: _gallery().page(),
 }

@@ -131,15 +131,15 @@ def repair(error: ValidationError, data: Mapping[str, Any]) -> tuple[dict[str, A
     """The data without what could not be read, to check the rest; and the names of the entries lost with it."""
     mended = {key: _mutable(value) for key, value in data.items()}
     lost: set[str] = set()
-    for one in _errors(error):
+    for one in reversed(list(_errors(error))):  # from the end, so that places in lists stay right
         location = _plain(one["loc"])
         if one["type"] == "extra_forbidden":
-            _at(mended, location, lambda holder, key: holder.pop(key, None))
+            _at(mended, location, lambda holder, key: holder.pop(key))
         elif one["type"] == "quantity":
             _at(mended, location, _unreadable)
         else:
             entry = location[: 2 if len(location) > 1 and location[0] not in ("gravity", "loop") else 1]
-            _at(mended, entry, lambda holder, key: holder.pop(key, None))
+            _at(mended, entry, lambda holder, key: holder.pop(key))
             lost.update(str(part) for part in entry[-1:])
     return mended, frozenset(lost)
 

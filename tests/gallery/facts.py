@@ -1,0 +1,24 @@
+"""The gallery: every example that is analysed, by section, with its checked fact.
+
+`docs/gallery_page.py` makes the page of it, `test_gallery.py` checks it. To add an example: put the file into
+`examples/`, with `notes:` that say in a sentence or two what it is, and an `Entry` of the file's name into one of the
+modules below, or into a module of its own that gets a line here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from gallery import four_bars, several_loops, sliders
+from gallery.entry import Entry
+
+__all__ = ["ENTRIES", "ONLY_READ", "SECTIONS"]
+
+SECTIONS: Mapping[str, Mapping[str, Entry]] = {
+    "Four-bars": four_bars.ENTRIES,
+    "Linkages with slides": sliders.ENTRIES,
+    "Several loops": several_loops.ENTRIES,
+}
+ENTRIES: Mapping[str, Entry] = {name: entry for section in SECTIONS.values() for name, entry in section.items()}
+
+ONLY_READ = {"pezzuti-cardan": "Spatial: it can be read and written, not analysed yet."}

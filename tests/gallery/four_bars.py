@@ -1,0 +1,76 @@
+"""Four-bars of the gallery."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import trunnion
+from gallery.entry import Entry, Outcome
+from gallery.plane import bend, corner, slope
+
+# ---- durango-fourbar: the crank's torque without friction at 60°, by virtual work ---------------------------------
+
+
+def torque_at_60(one: Outcome) -> float:
+    ideal = trunnion.analyse(one.mechanism.with_friction("off"), 6)
+    return float(ideal["drive_effort"].sel(driver="A")[1])
+
+
+def torque_by_virtual_work() -> float:
+    """T = Σ (m r̈·r' + J φ̈ φ') − F·r'_E − M φ'_CD, ' by the crank angle, at a constant 10 rad/s without weight."""
+
+    def pins(q: float) -> tuple[complex, complex]:
+        b = 2.0 * np.exp(1j * q)
+        return b, corner(b, 5.5, 6.0, 3.0, 1)
+
+    def on_coupler(q: float, distance: float, angle: float) -> complex:
+        b, c = pins(q)
+        return b + distance * (c - b) / 6.0 * np.exp(1j * angle)
+
+    def coupler(q: float) -> complex:
+        return complex(np.angle(pins(q)[1] - pins(q)[0]))
+
+    def rocker(q: float) -> complex:
+        return complex(np.angle(pins(q)[1] - 5.5))
+
+    centres = (
+        (30.0, lambda q: on_coupler(q, 2.8, 0.152)),
+        (7.2, lambda q: (5.5 + pins(q)[1]) / 2),
+    )
+    q, speed = np.pi / 3, 10.0
+    torque = sum(m * speed**2 * (bend(r, q) * np.conj(slope(r, q))).real for m, r in centres)
+    for inertia, angle in ((48.80, coupler), (5.50, rocker)):
+        torque += inertia * speed**2 * (bend(angle, q) * slope(angle, q)).real
+    tip = slope(lambda q: on_coupler(q, 2.5, np.pi / 6), q)
+    return float(torque - (-1000.0) * tip.imag - (-250.0) * slope(rocker, q).real)
+
+
+# ---- spring-balanced-lamp -----------------------------------------------------------------------------------------
+
+
+def hold(one: Outcome) -> float:
+    """Largest torque at the pivot without friction."""
+    ideal = trunnion.analyse(one.mechanism.with_friction("off"), 36)
+    return float(np.abs(ideal["drive_effort"]).max())
+
+
+ENTRIES = {
+    "durango-fourbar": Entry(
+        says="Drive torque without friction at 60° of the crank",
+        unit="N m",
+        found=torque_at_60,
+        expected=torque_by_virtual_work,
+        source="virtual work on pins found by intersecting circles",
+        tolerance=1e-4,
+        figures=("mechanism", "torque"),
+    ),
+    "spring-balanced-lamp": Entry(
+        says="Largest torque at the pivot without friction",
+        unit="N m",
+        found=hold,
+        expected=lambda: 0.0,
+        source="the balance k a b = Σ m g r of a spring of free length zero (M. J. French, M. B. Widden, Proc. IMechE "
+        "C 214 (2000) 501–508)",
+        tolerance=1e-12,
+    ),
+}

@@ -1,0 +1,41 @@
+"""Every example is read, checked and analysed, and its fact of the gallery holds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import trunnion
+from gallery.entry import STEPS, Outcome
+from gallery.facts import ENTRIES, ONLY_READ
+from trunnion import Status
+from trunnion.errors import Severity
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+def test_every_example_has_an_entry() -> None:
+    assert sorted([*ENTRIES, *ONLY_READ]) == sorted(path.stem for path in EXAMPLES.glob("*.yaml"))
+
+
+@pytest.mark.parametrize("name", [*ENTRIES, *ONLY_READ])
+def test_every_example_has_a_name_and_notes(name: str) -> None:
+    mechanism = trunnion.read(EXAMPLES / f"{name}.yaml")
+    assert mechanism.name
+    assert mechanism.notes.strip().endswith("."), "the gallery shows the notes: give a sentence or two"
+
+
+@pytest.mark.parametrize("name", ENTRIES)
+def test_example(name: str) -> None:
+    """No error but those of the entry, no position without forces but those of the entry, and the fact."""
+    entry = ENTRIES[name]
+    mechanism = trunnion.read(EXAMPLES / f"{name}.yaml")
+    errors = [str(one) for one in trunnion.check(mechanism, STEPS).findings if one.severity is Severity.ERROR]
+    unexpected = [error for error in errors if not any(part in error for part in entry.errors)]
+    assert not unexpected
+    result = trunnion.analyse(mechanism, STEPS)
+    assert np.count_nonzero(result["status"] >= Status.NOT_CONVERGED) == entry.lost
+    found, expected = entry.found(Outcome(mechanism, result)), entry.expected()
+    assert found == pytest.approx(expected, rel=0, abs=entry.tolerance), entry.says

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import trunnion
-from mechanisms import MODELS, build, five_bar, four_bar, slider_crank
+from mechanisms import MODELS, build, five_bar, four_bar, slider_crank, watt_six_bar
 from trunnion import Status
 from trunnion.algebra import linalg
 from trunnion.algebra.dual import Dual, derivative, primal
@@ -35,6 +35,19 @@ def test_a_change_point_is_an_error_not_a_silent_change_of_assembly() -> None:
 def test_an_ordinary_linkage_has_no_change_point(name: str) -> None:
     result = trunnion.analyse(build(MODELS[name]()), 12)
     assert not any("change point" in row["what"] for row in findings(result))
+
+
+@pytest.mark.parametrize("branch", [1, -1])
+def test_a_hint_on_a_joint_of_a_later_group_counts(branch: int) -> None:
+    """F joins the rocker to a later dyad: its place tells the assemblies of the rocker's own dyad apart."""
+    data = watt_six_bar()
+    data["assembly"]["C"][1] *= branch
+    stated = trunnion.analyse(build(data), 3)
+    f = stated["point_position"].sel(point="rocker.F")[:, 0].values
+    data["assembly"] = {"F": f.tolist(), "H": data["assembly"]["H"]}
+    hinted = trunnion.analyse(build(data), 3)
+    np.testing.assert_array_equal(hinted["point_position"], stated["point_position"])
+    assert not any("no hint" in row["what"] for row in findings(hinted))
 
 
 def test_a_driven_rotation_is_the_prescribed_coordinate() -> None:

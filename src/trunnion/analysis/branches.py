@@ -203,7 +203,7 @@ def _point_of(system: System, module: Module, key: str) -> tuple[str, str]:
     if key in system.joints:
         links = system.joints[key][1]
         inside = [link for link in links if link in module.links]
-        known = system.joints[key][0] == "revolute" and len(inside) == 1
+        known = key in module.joints and system.joints[key][0] == "revolute" and len(inside) == 1
         return ("", "") if not inside or known else (inside[-1], key)
     link, _, name = key.partition(".")
     return (link, name) if link in module.links else ("", "")

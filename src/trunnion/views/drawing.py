@@ -40,6 +40,15 @@ class Picture:
         """The name of the fixed link."""
         return str(self.stated["ground"])
 
+    @property
+    def moving(self) -> list[str]:
+        """The names of the other links."""
+        return [link for link in self.stated["links"] if link != self.ground]
+
+    def colour(self, link: str) -> str:
+        """What a moving link is drawn in."""
+        return PALETTE[self.moving.index(link) % len(PALETTE)]
+
     def joints(self, link: str) -> list[str]:
         """Keys of a link's points that are drawn as its body."""
         return [f"{link}.{point}" for point in self.stated["links"][link]["points"] if f"{link}.{point}" in self.tracks]
@@ -76,9 +85,8 @@ def draw(axes: Axes, shown: Picture, index: int) -> None:
     """Everything at position `index`, over the ghosts and the coupler curves."""
     _ghosts(axes, shown, index)
     _curves(axes, shown)
-    moving = [link for link in shown.stated["links"] if link != shown.ground]
-    for order, link in enumerate(moving):
-        _body(axes, shown, link, index, PALETTE[order % len(PALETTE)])
+    for link in shown.moving:
+        _body(axes, shown, link, index, shown.colour(link))
     for spring in shown.stated["springs"].values():
         _spring(axes, shown, spring.get("between") or (), index)
     for name, joint in shown.stated["joints"].items():
@@ -228,9 +236,26 @@ def _slider(axes: Axes, shown: Picture, name: str, index: int, place: Array, gro
         middle = place + ((low + high) / 2 - here) * np.array([np.cos(angle), np.sin(angle)])
         below = np.array([np.sin(angle), -np.cos(angle)]) * r
         _hatched(axes, middle + below, angle, (high - low) / 2 + 2.4 * r, r)
+    else:
+        _slot(axes, shown, name, index, 2.4 * r)
     turned = Affine2D().rotate(angle).translate(*place) + axes.transData
     axes.add_patch(Rectangle((-1.7 * r, -r), 3.4 * r, 2 * r, transform=turned, facecolor="white", edgecolor=INK,
                              linewidth=1.3, zorder=5))  # fmt: skip
+
+
+def _slot(axes: Axes, shown: Picture, name: str, index: int, beyond: float) -> None:
+    """The guide on a moving first link: as long as the block travels in it, and a little beyond."""
+    first, second = shown.stated["joints"][name]["links"]
+    on, at = shown.tracks[f"{first}.{name}"], shown.tracks[f"{second}.{name}"]
+    turns = np.array([shown.axis(name, position) for position in range(on.shape[1])])
+    along = np.array([np.cos(turns), np.sin(turns)])
+    slide = np.sum((at - on) * along, axis=0)
+    travel = np.array([np.nanmin(slide) - beyond, np.nanmax(slide) + beyond])
+    body = np.array([min(travel[0], 0.0), max(travel[1], 0.0)])  # as far as the link's own point
+    colour = shown.colour(first)
+    for reach, width, paint in ((body, 12.0, colour), (body, 9.6, tint(colour)), (travel, 2.4, "white")):
+        ends = on[:, index, None] + along[:, index, None] * reach
+        axes.plot(*ends, color=paint, linewidth=width, solid_capstyle="round", zorder=4.2)
 
 
 def _labels(axes: Axes, shown: Picture, index: int) -> None:
@@ -256,7 +281,7 @@ def _labels(axes: Axes, shown: Picture, index: int) -> None:
         elif any(shown.ground in joint.get("links", ()) for joint in joints):
             away = np.array([-1.05 if away[0] < 0 else 1.05, -0.5])  # beside the bearing, not on the link
         axes.annotate(
-            plain(text), (place[0], place[1]), xytext=away * 17, textcoords="offset points", ha="center", va="center",
+            plain(text), (place[0], place[1]), xytext=away * (14 + 3 * len(text), 17), textcoords="offset points", ha="center", va="center",
             fontsize=10, fontweight="bold", color=INK, zorder=7,
             bbox={"boxstyle": "round,pad=0.12", "facecolor": "white", "edgecolor": "none", "alpha": 0.75},
         )  # fmt: skip

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.yaml"))
+DURANGO = next(path for path in EXAMPLES if path.stem == "durango-fourbar")
 
 FOURBAR = """\
 trunnion: 1

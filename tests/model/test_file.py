@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from model_samples import EXAMPLES, FOURBAR
+from model_samples import DURANGO, EXAMPLES, FOURBAR
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.check import check_model
@@ -68,7 +68,7 @@ speed = "10 rad/s"
 
 
 def test_json_with_tabs_and_lines(tmp_path: Path, findings_of: FindingsOf) -> None:
-    data = read_mechanism(EXAMPLES[0]).data()
+    data = read_mechanism(DURANGO).data()
     text = json.dumps(data, indent="\t", ensure_ascii=True)
     path = tmp_path / "model.json"
     path.write_text(text)
@@ -173,7 +173,7 @@ def test_a_huge_file_is_refused_at_once(tmp_path: Path) -> None:
 
 
 def test_writing_fails_whole(tmp_path: Path) -> None:
-    mechanism = read_mechanism(EXAMPLES[0])
+    mechanism = read_mechanism(DURANGO)
     with pytest.raises(MechanismError, match="cannot be written: No such file or directory"):
         mechanism.write(tmp_path / "none" / "model.yaml")
     folder = tmp_path / "model.yaml"
@@ -205,7 +205,7 @@ VALUES = st.one_of(
 @settings(deadline=None, max_examples=50)
 @given(VALUES, st.sampled_from(["yaml", "json"]))
 def test_any_value_is_read_back_as_written(tmp_path_factory: pytest.TempPathFactory, value: object, kind: str) -> None:
-    base = read_mechanism(EXAMPLES[0]).data()
+    base = read_mechanism(DURANGO).data()
     base["dimensions"] = {**base["dimensions"], "yes": 2, "extra": value}
     mechanism = Mechanism(**base)
     path = tmp_path_factory.mktemp("written") / f"model.{kind}"

@@ -6,10 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from trunnion import Mechanism, analyse
+
 if TYPE_CHECKING:
     import xarray as xr
-
-    from trunnion import Mechanism
 
 __all__ = ["STEPS", "Entry", "Outcome"]
 
@@ -23,10 +23,18 @@ class Outcome:
     mechanism: Mechanism
     result: xr.Dataset
 
+    def over(self, steps: int) -> Outcome:
+        """The same over another number of positions."""
+        return Outcome(self.mechanism, analyse(self.mechanism, steps))
+
     def track(self, point: str) -> tuple[Any, Any]:
         """x and y of "link.point" at every position, m."""
         x, y = self.result["point_position"].sel(point=point).transpose("axis", "position").values
         return x, y
+
+    def angle(self, link: str) -> Any:
+        """Angle of a link at every position, rad."""
+        return self.result["link_angle"].sel(link=link).values
 
 
 @dataclass(frozen=True)

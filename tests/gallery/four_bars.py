@@ -54,6 +54,35 @@ def hold(one: Outcome) -> float:
     return float(np.abs(ideal["drive_effort"]).max())
 
 
+# ---- straight lines: largest less least height of the point, at every half degree ---------------------------------
+
+FINE = 720
+
+
+def height_of_hoecken(one: Outcome) -> float:
+    """While the crank turns from 90° to 270°."""
+    return float(np.ptp(one.over(FINE).track("coupler.P")[1][180:541]))
+
+
+def height_of_hoecken_by_hand() -> float:
+    b = 0.04 * np.exp(1j * np.radians(np.arange(90, 270.25, 0.5)))
+    c = corner(b, 0.08, 0.1, 0.1, -1)
+    return float(np.ptp((b + 2 * (c - b)).imag))
+
+
+def height_of_chebyshev(one: Outcome) -> float:
+    """While the coupler turns from 60° to 180° against the left rocker."""
+    return float(np.ptp(one.over(FINE).track("coupler.P")[1][:241]))
+
+
+def height_of_chebyshev_by_hand() -> float:
+    """Left rocker and coupler are one rigid arm A C at every angle between them."""
+    unit, turn = 0.03, np.exp(1j * np.radians(np.arange(60, 180.25, 0.5)))
+    arm = 5 + 2 * turn
+    c = corner(0j, 4, np.abs(arm), 5, 1)
+    return float(np.ptp(unit * ((5 + turn) * c / arm).imag))
+
+
 ENTRIES = {
     "durango-fourbar": Entry(
         says="Drive torque without friction at 60° of the crank",
@@ -71,6 +100,22 @@ ENTRIES = {
         expected=lambda: 0.0,
         source="the balance k a b = Σ m g r of a spring of free length zero (M. J. French, M. B. Widden, Proc. IMechE "
         "C 214 (2000) 501–508)",
+        tolerance=1e-12,
+    ),
+    "hoecken": Entry(
+        says="Height of the path of P over half a turn of the crank, 90° to 270°",
+        unit="m",
+        found=height_of_hoecken,
+        expected=height_of_hoecken_by_hand,
+        source="intersecting circles at every half degree",
+        tolerance=1e-13,
+    ),
+    "chebyshev-line": Entry(
+        says="Height of the path of P from 60° to 180° of the coupler",
+        unit="m",
+        found=height_of_chebyshev,
+        expected=height_of_chebyshev_by_hand,
+        source="intersecting circles at every half degree",
         tolerance=1e-12,
     ),
 }

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
+from scipy.optimize import fsolve
 
 from gallery.entry import Entry, Outcome
 from gallery.plane import corner
@@ -26,6 +30,64 @@ def lift_by_hand() -> float:
     return abs(punch(0.08) - punch(0.0))
 
 
+# ---- six-bars: both loops closed by a root finder, all four angles at once ----------------------------------------
+
+Loops = Callable[[complex, Any], tuple[complex, complex]]
+
+
+def closed(loops: Loops, crank: Any, guess: tuple[float, ...]) -> Any:
+    """Angles (crank, 4) that close both loops at each angle of the crank, from each to the next."""
+    found: list[Any] = [np.array(guess)]
+    for angle in crank:
+
+        def gap(x: Any, turn: complex = np.exp(1j * angle)) -> list[float]:
+            return [part for loop in loops(turn, np.exp(1j * x)) for part in (loop.real, loop.imag)]
+
+        found.append(fsolve(gap, found[-1], xtol=1e-13))
+        assert np.max(np.abs(gap(found[-1]))) < 1e-12
+    return np.array(found[1:])
+
+
+FINE = 720
+
+
+def swing_of_agitator(one: Outcome) -> float:
+    return float(np.ptp(one.over(FINE).angle("agitator")))
+
+
+def swing_of_watt() -> float:
+    """Unknown: directions of coupler, C from D, rod, agitator."""
+
+    def loops(crank: complex, u: Any) -> tuple[complex, complex]:
+        coupler, bell, rod, agitator = u
+        first = 0.045 * crank + 0.110 * coupler - 0.075 * bell - 0.120
+        second = 0.120 - 0.075j * bell + 0.070 * rod - 0.040 * agitator - (0.160 - 0.040j)
+        return first, second
+
+    found = closed(loops, np.arange(FINE) * 2 * np.pi / FINE, (0.75, 1.5, -1.77, -1.03))
+    return float(np.ptp(found[:, 3]))
+
+
+def rest(one: Outcome) -> float:
+    """How far the output turns while the crank goes from 120° to 240°; the cycle begins at 90°."""
+    return float(np.ptp(one.angle("output")[6:31]))
+
+
+def rest_of_stephenson() -> float:
+    """Unknown: directions of B from C, C from D, rod, output."""
+
+    def loops(crank: complex, u: Any) -> tuple[complex, complex]:
+        coupler, rocker, rod, output = u
+        first = 0.080 + 0.120 * rocker + 0.120 * coupler - 0.050 * crank
+        p = 0.080 + 0.120 * rocker + 0.120 * coupler * np.exp(-1j * np.radians(75))
+        second = p + 0.1598 * rod - 0.1003 * output - (0.104 + 0.105j)
+        return first, second
+
+    crank = np.radians(np.arange(90, 241, 5))
+    found = closed(loops, crank, (4.1, 1.9, 5.3, 3.9))
+    return float(np.ptp(found[6:, 3]))
+
+
 ENTRIES = {
     "indexing-press": Entry(
         says="Lift of the punch",
@@ -34,6 +96,24 @@ ENTRIES = {
         expected=lift_by_hand,
         source="intersecting circles at both ends of the ram",
         tolerance=1e-12,
+        figures=("mechanism", "motion"),
+    ),
+    "watt-six-bar": Entry(
+        says="Swing of the agitator",
+        unit="rad",
+        found=swing_of_agitator,
+        expected=swing_of_watt,
+        source="closing both loops with scipy's fsolve",
+        tolerance=1e-10,
+        figures=("mechanism", "motion"),
+    ),
+    "stephenson-six-bar": Entry(
+        says="Turn of the output from 120° to 240° of the crank",
+        unit="rad",
+        found=rest,
+        expected=rest_of_stephenson,
+        source="closing both loops with scipy's fsolve",
+        tolerance=1e-10,
         figures=("mechanism", "motion"),
     ),
 }

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 import trunnion
-from gallery.entry import Entry, Outcome
+from gallery.entry import STEPS, Entry, Outcome
 from trunnion.algebra.dual import Dual, derivative
+from trunnion.analysis.design import design
 
 # ---- toleranced-slider-crank: ∂x/∂r of the piston at 60° ----------------------------------------------------------
 
@@ -24,7 +27,86 @@ def sensitivity_by_hand() -> float:
     return float(np.cos(q) - r * np.sin(q) ** 2 / np.sqrt(length**2 - (r * np.sin(q)) ** 2))
 
 
+# ---- slider-crank: acceleration at the top dead centre ------------------------------------------------------------
+
+
+def at_top(one: Outcome) -> float:
+    return float(one.result["point_acceleration"].sel(point="piston.Q", axis="x")[0])
+
+
+def at_top_by_hand() -> float:
+    r, length, speed = 0.035, 0.130, 1450 * 2 * np.pi / 60
+    return -r * speed**2 * (1 + r / length)
+
+
+# ---- quick returns: time of the stroke outwards over that of the return -------------------------------------------
+
+
+def time_ratio(slide: str) -> Callable[[Outcome], float]:
+    """From the two places at which the slide turns back; over half of the positions move the slow way."""
+
+    def found(one: Outcome) -> float:
+        first, second = design(one.mechanism).dead_centres[slide]
+        between = second - first
+        outwards = float(np.mean(one.result["joint_slide_velocity"].sel(joint=slide) > 0))
+        slow, fast = max(between, 2 * np.pi - between), min(between, 2 * np.pi - between)
+        return slow / fast if outwards > 0.5 else fast / slow
+
+    return found
+
+
+def ratio_of_offset() -> float:
+    """Crank and rod in line at ±: the lines to the guide's ends differ by φ, the strokes take 180° ± φ."""
+    r, length, e = 0.08, 0.24, 0.1
+    phi = np.arcsin(e / (length - r)) - np.arcsin(e / (length + r))
+    return float((np.pi + phi) / (np.pi - phi))
+
+
+def ratio_of_whitworth() -> float:
+    """The ram turns back where the lever is level; the crank pin is then at ± acos(d/r) from straight down."""
+    fast = 2 * np.arccos(60 / 120)
+    return float((2 * np.pi - fast) / fast)
+
+
+# ---- scotch-yoke, elliptic-trammel: exact curves ------------------------------------------------------------------
+
+
+def off_the_cosine(one: Outcome) -> float:
+    """x − r cos θ, m."""
+    x, _ = one.track("yoke.S")
+    return float(np.abs(x - 0.05 * np.cos(np.arange(STEPS) * 2 * np.pi / STEPS)).max())
+
+
+def off_the_ellipse(one: Outcome) -> float:
+    """(x/a)² + (y/b)² − 1."""
+    x, y = one.track("bar.T")
+    return float(np.abs((x / 0.15) ** 2 + (y / 0.09) ** 2 - 1).max())
+
+
+# ---- inverted-slider-crank: the boom's swing by the law of cosines ------------------------------------------------
+
+
+def swing(one: Outcome) -> float:
+    return float(np.ptp(one.angle("boom")))
+
+
+def swing_by_hand() -> float:
+    def at_pivot(cylinder: float) -> float:
+        return float(np.arccos((1.1**2 + 0.9**2 - cylinder**2) / (2 * 1.1 * 0.9)))
+
+    return at_pivot(0.95 + 0.75) - at_pivot(0.95)
+
+
 ENTRIES = {
+    "slider-crank": Entry(
+        says="Acceleration of the piston at the top dead centre",
+        unit="m/s^2",
+        found=at_top,
+        expected=at_top_by_hand,
+        source="the closed form −r ω² (1 + r/l)",
+        tolerance=1e-9,
+        figures=("mechanism", "torque"),
+    ),
     "toleranced-slider-crank": Entry(
         says="Shift of the piston at 60° of the crank per shift of the crank pin along the crank",
         unit="1",
@@ -32,6 +114,49 @@ ENTRIES = {
         expected=sensitivity_by_hand,
         source="the derivative of x = r cos θ + √(l² − r² sin² θ)",
         tolerance=1e-12,
+        figures=("mechanism", "torque"),
+    ),
+    "offset-slider-crank": Entry(
+        says="Time of the stroke outwards over that of the return",
+        unit="1",
+        found=time_ratio("S"),
+        expected=ratio_of_offset,
+        source="the closed form (180° + φ)/(180° − φ), φ = asin(e/(l − r)) − asin(e/(l + r))",
+        tolerance=1e-10,
+    ),
+    "whitworth-quick-return": Entry(
+        says="Time of the cutting stroke over that of the return",
+        unit="1",
+        found=time_ratio("G"),
+        expected=ratio_of_whitworth,
+        source="the closed form (360° − φ)/φ, φ = 2 acos(d/r)",
+        tolerance=1e-10,
+        figures=("mechanism", "torque"),
+    ),
+    "scotch-yoke": Entry(
+        says="Largest difference of the yoke's place from r cos θ",
+        unit="m",
+        found=off_the_cosine,
+        expected=lambda: 0.0,
+        source="geometry",
+        tolerance=1e-15,
+        figures=("mechanism", "friction-power"),
+    ),
+    "elliptic-trammel": Entry(
+        says="Largest value of (x/a)² + (y/b)² − 1 at T",
+        unit="1",
+        found=off_the_ellipse,
+        expected=lambda: 0.0,
+        source="geometry",
+        tolerance=1e-13,
+    ),
+    "inverted-slider-crank": Entry(
+        says="Swing of the boom over the stroke of the cylinder",
+        unit="rad",
+        found=swing,
+        expected=swing_by_hand,
+        source="the law of cosines in the triangle of pivot, foot and eye",
+        tolerance=1e-13,
         figures=("mechanism", "torque"),
     ),
 }

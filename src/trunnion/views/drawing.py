@@ -280,8 +280,9 @@ def _labels(axes: Axes, shown: Picture, index: int) -> None:
             away = np.array([0.0, 1.3])
         elif any(shown.ground in joint.get("links", ()) for joint in joints):
             away = np.array([-1.05 if away[0] < 0 else 1.05, -0.5])  # beside the bearing, not on the link
+        beside = away * (14 + 3 * len(text), 17)
         axes.annotate(
-            plain(text), (place[0], place[1]), xytext=away * (14 + 3 * len(text), 17), textcoords="offset points", ha="center", va="center",
+            plain(text), (place[0], place[1]), xytext=beside, textcoords="offset points", ha="center", va="center",
             fontsize=10, fontweight="bold", color=INK, zorder=7,
             bbox={"boxstyle": "round,pad=0.12", "facecolor": "white", "edgecolor": "none", "alpha": 0.75},
         )  # fmt: skip

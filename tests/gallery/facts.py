@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from gallery import four_bars, several_loops, sliders
+from gallery import benchmarks, drawing, four_bars, presses, several_loops, sliders
 from gallery.entry import Entry
 
 __all__ = ["ENTRIES", "ONLY_READ", "SECTIONS"]
@@ -18,6 +18,9 @@ SECTIONS: Mapping[str, Mapping[str, Entry]] = {
     "Four-bars": four_bars.ENTRIES,
     "Linkages with slides": sliders.ENTRIES,
     "Several loops": several_loops.ENTRIES,
+    "Straight lines and walking legs": drawing.ENTRIES,
+    "Presses": presses.ENTRIES,
+    "Two drives, a large group, a benchmark": benchmarks.ENTRIES,
 }
 ENTRIES: Mapping[str, Entry] = {name: entry for section in SECTIONS.values() for name, entry in section.items()}
 

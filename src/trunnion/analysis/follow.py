@@ -1,0 +1,233 @@
+"""All assemblies of a general group at one position, and following one of them along the cycle."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.algebra.namespace import Number
+from trunnion.groups.general import General, Pose
+from trunnion.groups.planar import Frame
+from trunnion.groups.tree import size_of
+
+__all__ = ["GUESSES", "SLIDE_JUMP", "TURN_JUMP", "Follower", "assemblies", "at", "lane_of"]
+
+Array = NDArray[np.float64]
+
+GUESSES = 512
+FEW = 128  # guesses where an assembly is looked for again
+PROBES = 12  # of the gaps of a track
+SEED = 20060704  # of the guesses: the same assemblies every time
+TURN_JUMP = 0.35  # rad between neighbours of the grid: more is another branch
+SLIDE_JUMP = 0.25  # of the group's size, likewise
+BLOCK = 32  # grid points tried at a time
+
+
+def _wrap(rows: Array, group: General) -> None:
+    """Carry the start over to the end of a periodic cycle: the same position, turned by whole turns."""
+    if np.isfinite(rows[0, 0]) and not np.isfinite(rows[0, -1]):
+        rows[:, -1] = rows[:, 0]
+    elif np.isfinite(rows[0, -1]) and not np.isfinite(rows[0, 0]):
+        rows[:, 0] = rows[:, -1]
+
+
+def _gap_backward(rows: Array) -> list[int]:
+    """Indices from the end of the cycle down to the first gap, if the end was reached only by wrapping."""
+    if np.all(np.isfinite(rows[0])) or not np.isfinite(rows[0, -1]):
+        return []
+    return list(range(rows.shape[1] - 1, -1, -1))
+
+
+def _probes(rows: Array) -> list[int]:
+    """Some grid points in every gap of a track, in all no more than PROBES."""
+    gaps = np.flatnonzero(~np.isfinite(rows[0]))
+    if not len(gaps) or len(gaps) == rows.shape[1]:
+        return []
+    parts = np.split(gaps, np.flatnonzero(np.diff(gaps) > 1) + 1)
+    each = max(1, PROBES // len(parts))
+    return [int(part[i]) for part in parts[:PROBES] for i in np.linspace(0, len(part) - 1, each + 2, dtype=int)[1:-1]]
+
+
+def assemblies(
+    group: General, elements: Sequence[tuple[Frame, Frame]], drive: Sequence[Number], count: int = GUESSES
+) -> Pose:
+    """All assemblies found at one position from many guesses, each once, along the last axis."""
+    rng = np.random.default_rng(SEED)
+    spread = extent(group, elements)
+    guesses = [
+        rng.uniform(-np.pi, np.pi, count)
+        if group.joints[group.steps[i].joint].kind == "revolute"
+        else rng.uniform(-2 * spread, 2 * spread, count)
+        for i in group.free
+    ]
+    pose = group.position(elements, guesses, drive)
+    shape = (count,)
+    key = np.array(
+        [
+            np.broadcast_to(n, shape)
+            for frame in pose.frames
+            for n in (frame.x / spread, frame.y / spread, frame.c, frame.s)
+        ]
+    )
+    sound = np.isfinite(key).all(axis=0) & (np.broadcast_to(pose.condition, shape) < 1e8)
+    geared = {gear.first for gear in group.gears}
+    for value, step in zip(pose.q, group.steps, strict=True):
+        if step.joint in geared and step.joint not in group.driven:  # whole turns more would be another tooth
+            sound = sound & (np.abs(np.broadcast_to(value, shape)) <= np.pi)
+    good = np.flatnonzero(sound)
+    kept: list[int] = []
+    for lane in good:
+        if all(np.max(np.abs(key[:, lane] - key[:, other])) > 1e-6 for other in kept):
+            kept.append(int(lane))
+    kept.sort(key=lambda lane: tuple(np.round(key[:, lane], 6)))  # a numbering that does not depend on the guesses
+    frames = tuple(Frame(*(np.broadcast_to(n, shape)[kept] for n in frame)) for frame in pose.frames)
+    return pose._replace(
+        frames=frames,
+        q=tuple(np.broadcast_to(q, shape)[kept] for q in pose.q),
+        orientation=np.broadcast_to(pose.orientation, shape)[kept],
+    )
+
+
+def extent(group: General, elements: Sequence[tuple[Frame, Frame]]) -> float:
+    """How far a slide may reach: the largest size of the group over the lanes, m."""
+    sizes = size_of(group.joints, elements)
+    return float(np.max(sizes[np.isfinite(sizes)], initial=0.0)) or 1.0
+
+
+def lane_of(number: Number, index: int | NDArray[np.intp]) -> Number:
+    return number[index] if np.ndim(number) else number
+
+
+def at(elements: Sequence[tuple[Frame, Frame]], index: int) -> list[tuple[Frame, Frame]]:
+    return [(_frame_at(a, index), _frame_at(b, index)) for a, b in elements]
+
+
+def _frame_at(frame: Frame, index: int | NDArray[np.intp]) -> Frame:
+    return Frame(*(lane_of(n, index) for n in frame))
+
+
+@dataclass(frozen=True)
+class Follower:
+    """Follows one assembly of a general group from grid point to grid point."""
+
+    group: General
+    elements: Sequence[tuple[Frame, Frame]]
+    drive: Sequence[Number]
+    orientation: float
+
+    def run(self, rows: Array, order: Sequence[int]) -> None:
+        """Fill `rows` (free, grid) along `order`, whose first column is known, up to where the branch ends.
+
+        Several grid points are tried at a time, all lanes in parallel, and kept as far as they follow smoothly.
+        """
+        slope = np.zeros(len(rows))
+        block, place = 1, 0
+        while place + 1 < len(order):
+            here, ahead = order[place], list(order[place + 1 : place + 1 + block])
+            if np.isfinite(rows[0, ahead[0]]):
+                slope = rows[:, ahead[0]] - rows[:, here]
+                place += 1
+                continue
+            found = self._block(rows[:, here], slope, ahead)
+            kept = found.shape[1]
+            if kept == 0 and block == 1:
+                found_one = self._advance(rows[:, here], slope, here, ahead[0], 0.0, 1.0)
+                if found_one is None:
+                    return
+                found, kept = found_one[:, None], 1
+            if kept:
+                rows[:, ahead[:kept]] = found
+                before = rows[:, ahead[kept - 2]] if kept > 1 else rows[:, here]
+                slope = found[:, -1] - before
+            place += kept
+            block = min(2 * block, BLOCK) if kept == len(ahead) else max(1, kept)
+
+    def both_ways(self, rows: Array, begin: int, periodic: bool) -> None:
+        """Follow from one grid point forward and back, and over the end of a periodic cycle."""
+        run = range(begin, rows.shape[1])
+        self.run(rows, list(run))
+        self.run(rows, list(range(begin, -1, -1)))
+        if periodic:
+            _wrap(rows, self.group)
+            self.run(rows, _gap_backward(rows))
+
+    def revisit(self, rows: Array, periodic: bool) -> list[int]:
+        """Grid points in the gaps at which the group can be assembled again, and was; their neighbours are filled."""
+        again: list[int] = []
+        for probe in _probes(rows):
+            if np.isfinite(rows[0, probe]):
+                continue
+            found = assemblies(self.group, at(self.elements, probe), [lane_of(q, probe) for q in self.drive], FEW)
+            alike = np.flatnonzero(found.orientation == self.orientation)
+            if not len(alike):
+                continue
+            known = np.flatnonzero(np.isfinite(rows[0]))
+            before = rows[:, known[np.argmin(np.abs(known - probe))]]
+            ways = np.array([found.q[i][alike] for i in self.group.free])
+            best = int(np.argmin(self._apart(ways, before)))
+            rows[:, probe] = ways[:, best]
+            self.both_ways(rows, probe, periodic)
+            again.append(probe)
+        return again
+
+    def _apart(self, ways: Array, before: Array) -> Array:
+        """How far assemblies (free, way) are from another, turns and slides counted against their sizes."""
+        revolute = self._limits(1.0) == TURN_JUMP
+        change = ways - before[:, None]
+        turned = np.arctan2(np.sin(change), np.cos(change))
+        size = extent(self.group, self.elements)
+        return np.asarray(np.sum(np.where(revolute[:, None], turned, change / size) ** 2, axis=0))
+
+    def _block(self, q: Array, slope: Array, ahead: Sequence[int]) -> Array:
+        """Coordinates (free, k) at the first k points of `ahead`, k as far as they follow q smoothly."""
+        guess = q[:, None] + slope[:, None] * np.arange(1, len(ahead) + 1)
+        indices = np.asarray(ahead)
+        elements = [(_frame_at(a, indices), _frame_at(b, indices)) for a, b in self.elements]
+        pose = self.group.position(elements, list(guess), [lane_of(n, indices) for n in self.drive])
+        found = np.array([np.broadcast_to(pose.q[i], indices.shape) for i in self.group.free])
+        change = np.diff(found, axis=1, prepend=q[:, None])
+        bend = np.abs(np.diff(change, axis=1, prepend=change[:, :1]))
+        limits = self._limits(extent(self.group, elements))[:, None]
+        good = np.all((np.abs(change) <= limits) & (bend <= limits / 4), axis=0)
+        good = good & (np.broadcast_to(pose.orientation, indices.shape) == self.orientation)
+        return found[:, : len(ahead) if good.all() else int(np.argmin(good))]
+
+    def _limits(self, size: float) -> Array:
+        """Largest change of each free coordinate between neighbours of the grid, rad or m."""
+        kinds = [self.group.joints[self.group.steps[i].joint].kind for i in self.group.free]
+        return np.array([TURN_JUMP if kind == "revolute" else SLIDE_JUMP * size for kind in kinds])
+
+    def _advance(self, q: Array, slope: Array, here: int, there: int, low: float, high: float) -> Array | None:
+        """From share `low` to `high` of the way between two grid points, halving the step where Newton strays."""
+        found = self._solve(q + slope * (high - low), q, here, there, high)
+        if found is not None:
+            return found
+        if high - low < 1 / 16:
+            return None
+        middle = (low + high) / 2
+        half = self._advance(q, slope, here, there, low, middle)
+        return None if half is None else self._advance(half, slope, here, there, middle, high)
+
+    def _solve(self, guess: Array, before: Array, here: int, there: int, share: float) -> Array | None:
+        elements = [(_mixed(a, here, there, share), _mixed(b, here, there, share)) for a, b in self.elements]
+        drive = [_between(q, here, there, share) for q in self.drive]
+        pose = self.group.position(elements, list(guess), drive)
+        found = np.array([float(pose.q[i]) for i in self.group.free])
+        if not np.all(np.isfinite(found)) or pose.orientation != self.orientation:
+            return None
+        limits = self._limits(extent(self.group, elements))
+        return found if np.all(np.abs(found - before) <= limits) else None
+
+
+def _between(number: Number, here: int, there: int, share: float) -> Number:
+    return number[here] + share * (number[there] - number[here]) if np.ndim(number) else number
+
+
+def _mixed(frame: Frame, here: int, there: int, share: float) -> Frame:
+    """A frame part of the way between two grid points; directions stay unit vectors."""
+    x, y, c, s = (_between(n, here, there, share) for n in frame)
+    length = np.hypot(c, s)
+    return Frame(x, y, c / length, s / length)

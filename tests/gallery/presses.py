@@ -1,0 +1,85 @@
+"""Linkages of the gallery that press: a knuckle joint and a crusher."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from scipy.optimize import brentq, minimize_scalar
+
+import trunnion
+from gallery.entry import Entry, Outcome
+from gallery.plane import corner
+from trunnion.analysis import design
+
+# ---- toggle-press: where it begins to hold by itself ----------------------------------------------------------------
+
+
+def holds_from(one: Outcome) -> float:
+    """Offset of the knee on the way back at which the cylinder's force changes its sign, m."""
+    run = trunnion.prepare(one.mechanism)
+
+    def force(time: float) -> float:
+        return float(np.ravel(run.solve(np.array([time])).efforts["Z"])[0])
+
+    time = brentq(force, 2.1, 3.0, xtol=1e-14)
+    return -float(np.ravel(run.solve(np.array([time])).walk.point("upper", "A").place[0])[0])
+
+
+# ---- jaw-crusher: stroke of the jaw's lip ----------------------------------------------------------------------------
+
+
+def jaw_angle(turn: Any) -> Any:
+    """Rotation of the jaw, rad: pitman and rear toggle over the eccentric, front toggle and jaw over the pitman."""
+    eccentric = 0.75 + 0.02 * np.exp(1j * turn)
+    arm, seat = 0.06 - 1.15j, 0.255 - 1.035j  # on the pitman from the eccentric, on the jaw from its pivot
+    rear = corner(eccentric, 1.27 - 1.035j, abs(arm), 0.45, -1)
+    front = eccentric + (rear - eccentric) / arm * (-0.06 - 1.15j)
+    return np.angle(corner(front, 0, 0.45, abs(seat), 1) / seat)
+
+
+def turning_points() -> tuple[float, float]:
+    """Least and greatest rotation of the jaw, rad."""
+    grid = 2 * np.pi * np.arange(72) / 72
+    ends = []
+    for sign in (1.0, -1.0):
+        near = grid[np.argmin(sign * jaw_angle(grid))]
+        best = minimize_scalar(lambda q, sign=sign: sign * jaw_angle(q), bounds=(near - 0.1, near + 0.1),
+                               method="bounded", options={"xatol": 1e-9})  # fmt: skip
+        ends.append(sign * best.fun)
+    return ends[0], ends[1]
+
+
+def stroke(one: Outcome) -> float:
+    """Chord of the lip between the positions where the jaw turns back."""
+    run = trunnion.prepare(one.mechanism)
+    turns = np.array(design.dead_centres(run)["J"])
+    x, y = run.solve(turns / (2 * np.pi) * run.cycle.duration).walk.point("jaw", "lip").place
+    return float(np.hypot(np.ptp(x), np.ptp(y)))
+
+
+def stroke_by_hand() -> float:
+    low, high = turning_points()
+    return float(2 * np.hypot(0.06, 1.26) * np.sin((high - low) / 2))
+
+
+ENTRIES = {
+    "toggle-press": Entry(
+        says="Distance of the knee from its dead centre below which the press holds by itself",
+        unit="m",
+        found=holds_from,
+        expected=lambda: 2 * 0.1 * 0.02,
+        source="the friction circles of the three pins, 2 f ρ",
+        tolerance=1e-10,
+        figures=("mechanism", "torque"),
+    ),
+    "jaw-crusher": Entry(
+        says="Stroke of the jaw at its lip",
+        unit="m",
+        found=stroke,
+        expected=stroke_by_hand,
+        source="intersecting circles and looking for the extremes (SciPy)",
+        tolerance=1e-12,
+        figures=("mechanism", "torque"),
+    ),
+}

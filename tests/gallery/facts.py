@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from gallery import benchmarks, drawing, four_bars, presses, several_loops, sliders
+from gallery import benchmarks, drawing, four_bars, geared, presses, several_loops, sliders
 from gallery.entry import Entry
 
 __all__ = ["ENTRIES", "ONLY_READ", "SECTIONS"]
@@ -19,6 +19,7 @@ SECTIONS: Mapping[str, Mapping[str, Entry]] = {
     "Linkages with slides": sliders.ENTRIES,
     "Several loops": several_loops.ENTRIES,
     "Straight lines and walking legs": drawing.ENTRIES,
+    "Gears": geared.ENTRIES,
     "Presses": presses.ENTRIES,
     "Two drives, a large group, a benchmark": benchmarks.ENTRIES,
 }

@@ -28,7 +28,7 @@ def law_named(name: str) -> Data:
     def value(parameter: str, declared: Any) -> float:
         if declared.default is not None:
             return float(declared.default)
-        wanted = 0.01 if "speed" in parameter else 0.2 if parameter == "static" else 0.15
+        wanted = {"stiffness": 3e3, "static": 0.2}.get(parameter, 0.01 if "speed" in parameter else 0.15)
         return min(max(wanted, declared.minimum), declared.maximum)
 
     return {"law": name, **{key: value(key, declared) for key, declared in FRICTION_LAWS[name].parameters.items()}}

@@ -14,9 +14,10 @@ from trunnion import results
 from trunnion.algebra.namespace import Number
 from trunnion.analysis import account, diagnosis
 from trunnion.analysis.branches import Chosen, choose
+from trunnion.analysis.bristles import History, histories
 from trunnion.analysis.friction import FrictionMethod
 from trunnion.analysis.kinematics import forward
-from trunnion.analysis.kinetostatics import Backward, solve
+from trunnion.analysis.kinetostatics import Backward, Given, solve
 from trunnion.analysis.system import Cycle, System, Values, build, sticking
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.groups.gear import rotation
@@ -51,9 +52,24 @@ class Run:
         method: FrictionMethod | None = None,
         zero_slip: Mapping[str, float] | None = None,
     ) -> Backward:
-        """Motion and forces at the given times (s), nominal or with other values; see `kinetostatics.solve`."""
+        """Motion and forces at the given times (s), nominal or with other values; see `kinetostatics.solve`.
+
+        zero_slip: see `kinetostatics.Given`.
+        """
         values = self.values if values is None else values
-        return solve(self.system, values, self.chosen.assembly, time, method, zero_slip)
+        past = self._past if values is self.values else self._histories(values)
+        deflections = {joint: history.at(time) for joint, history in past.items()}
+        given = Given(zero_slip or {}, deflections)
+        return solve(self.system, values, self.chosen.assembly, time, method, given)
+
+    def _histories(self, values: Values) -> dict[str, History]:
+        with np.errstate(all="ignore"):
+            return histories(self.system, values, self.chosen.assembly, self.cycle)
+
+    @functools.cached_property
+    def _past(self) -> dict[str, History]:
+        """Histories of the bristles at the nominal values."""
+        return self._histories(self.values)
 
 
 def prepare(mechanism: Mechanism) -> Run:

@@ -21,9 +21,21 @@ from trunnion.groups.protocol import Group
 from trunnion.joints.friction import FrictionLaw
 from trunnion.joints.pairs import Load
 
-__all__ = ["Backward", "backward", "solve"]
+__all__ = ["Backward", "Given", "backward", "solve"]
 
 ZERO_SLIP = 1e-10  # of the speeds about the joint: below it the sign of a relative speed is rounding noise
+
+
+@dataclass(frozen=True)
+class Given:
+    """What the joints bring along beside their motion, by joint.
+
+    zero_slip: sign of the slip to take where the relative speed is zero; 0 if not stated. deflections: of the bristles
+    of laws that have them, m, in the sense of the slip; that of steady sliding if not stated.
+    """
+
+    zero_slip: Mapping[str, float] = field(default_factory=dict)
+    deflections: Mapping[str, Number] = field(default_factory=dict)
 
 
 class GearLoad(NamedTuple):
@@ -62,28 +74,28 @@ def solve(
     assembly: Assembly,
     time: Number,
     method: FrictionMethod | None = None,
-    zero_slip: Mapping[str, float] | None = None,
+    given: Given | None = None,
 ) -> Backward:
     """Motion and forces at the given times (s): one walk forward, one back.
 
     values: every number by path; floats, arrays (sample, 1) or dual numbers. time: (position,).
-    zero_slip: sign of the slip to take for a joint where its relative speed is zero; 0 if not given.
+    given: what is known of the joints beside the motion.
     """
     walk = forward(system, values, assembly, time)
     with np.errstate(all="ignore"):
-        return backward(walk, method or FrictionMethod(), zero_slip or {})
+        return backward(walk, method or FrictionMethod(), given or Given())
 
 
-def backward(walk: Forward, method: FrictionMethod, zero_slip: Mapping[str, float]) -> Backward:
+def backward(walk: Forward, method: FrictionMethod, given: Given) -> Backward:
     """Reactions and friction of every module, last module first."""
     system = walk.system
     back = Backward(walk, dict.fromkeys(system.mechanism.links, ZERO_LOAD))
     for name in system.joints:
         back.slips[name] = _slip(walk, name)
     _add_body_loads(back)
-    _add_stated_loads(back, zero_slip)
+    _add_stated_loads(back, given.zero_slip)
     for number in reversed(range(len(system.plan.modules))):
-        _settle_module(back, number, method, zero_slip)
+        _settle_module(back, number, method, given)
     return back
 
 
@@ -160,14 +172,14 @@ def _slip(walk: Forward, joint: str) -> Slip:
     return Slip(speed, np.abs(primal(speed)) <= ZERO_SLIP * scale)
 
 
-def _settle_module(back: Backward, number: int, method: FrictionMethod, zero_slip: Mapping[str, float]) -> None:
+def _settle_module(back: Backward, number: int, method: FrictionMethod, given: Given) -> None:
     walk, system = back.walk, back.walk.system
     module, group, places = system.plan.modules[number], system.groups[number], system.places[number]
     loads = [back.loads[link] for link in module.links]
     contacts, levers = [], {}
     for k, place in enumerate(places):
         if system.mechanism.effective_joints[place.joint].friction is not None and not place.witness:
-            contact, levers[k] = _contact(back, module.links, k, place, zero_slip)
+            contact, levers[k] = _contact(back, module.links, k, place, given)
             contacts.append(contact)
     contacts += [_teeth(back, number, i) for i, gear in enumerate(_gears(group)) if gear.carriers]
     settled = settle(group, walk.poses[number], loads, contacts, method)
@@ -182,9 +194,7 @@ def _settle_module(back: Backward, number: int, method: FrictionMethod, zero_sli
         _record_gear(back, number, i, name, settled.reactions[k].m, forces.get(k, 0.0))
 
 
-def _contact(
-    back: Backward, links: tuple[str, ...], k: int, place: Place, zero_slip: Mapping[str, float]
-) -> tuple[Contact, Number]:
+def _contact(back: Backward, links: tuple[str, ...], k: int, place: Place, given: Given) -> tuple[Contact, Number]:
     """A joint with friction as its module sees it, and its lever arm (radius of a pin, 1 of a slide)."""
     walk, values = back.walk, back.walk.values
     law = law_of(walk.system, place.joint)
@@ -209,8 +219,10 @@ def _contact(
             push = about(Wrench(axis.c, axis.s, 0.0), frame.x - at.x, frame.y - at.y)
             units.append(_signed(link, place.links, push))
     xp = namespace(slip.speed, lever)
-    forced = zero_slip.get(place.joint, 0.0) * np.maximum(np.abs(primal(slip.speed)), 1e-300)
+    forced = given.zero_slip.get(place.joint, 0.0) * np.maximum(np.abs(primal(slip.speed)), 1e-300)
     speed = sign * lever * xp.where(slip.zero, forced, slip.speed)
+    if place.joint in given.deflections:
+        parameters["deflection"] = sign * given.deflections[place.joint]
     return Contact(k, units, load, law, parameters, speed), sign * lever
 
 

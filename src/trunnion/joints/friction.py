@@ -19,6 +19,8 @@ __all__ = [
     "LawParameter",
     "brown_mcphee",
     "coulomb",
+    "dahl",
+    "lugre",
     "rolling_bearing",
     "stribeck",
     "viscous",
@@ -45,12 +47,21 @@ class LawFunction(Protocol):
     def __call__(self, normal: Number, slip: Number, **parameters: Number) -> Number: ...
 
 
+class LawRelaxation(Protocol):
+    """Rate at which bristles forget their deflection, 1/s, from the slip speed (m/s)."""
+
+    def __call__(self, slip: Number, **parameters: Number) -> Number: ...
+
+
 @dataclass(frozen=True)
 class FrictionLaw:
     """A friction law with what it needs and where it comes from.
 
     function: `(normal, slip, **parameters) -> force`, odd in slip, dissipative, zero at zero load.
     interval_at_rest: whether at slip 0 the force may be anything up to its value beside 0.
+    relaxation: of a law with bristles, `(slip, **parameters)` → d in ż = slip − d z, 1/s. Their deflection z, m,
+    depends on the slip alone; it is integrated along the cycle (`analysis.bristles`) and given to the function as
+    `deflection`. Without it the function takes that of steady sliding, slip/d.
     """
 
     function: LawFunction
@@ -58,6 +69,7 @@ class FrictionLaw:
     source: str = ""
     validity: str = ""
     interval_at_rest: bool = True
+    relaxation: LawRelaxation | None = None
 
 
 def coulomb(normal: Number, slip: Number, **parameters: Number) -> Number:
@@ -91,10 +103,7 @@ def stribeck(normal: Number, slip: Number, **parameters: Number) -> Number:
     1083-1138, doi:10.1016/0005-1098(94)90209-7.
     """
     xp = namespace(normal, slip, *parameters.values())
-    f, static, speed = parameters["coefficient"], parameters["static"], parameters["stribeck_speed"]
-    ratio = slip / speed
-    coefficient = f + (static - f) * xp.exp(-(ratio * ratio))
-    return -(xp.sign(slip) * coefficient + parameters["viscous"] * slip) * normal
+    return -(xp.sign(slip) * _stribeck_curve(slip, parameters) + parameters["viscous"] * slip) * normal
 
 
 def brown_mcphee(normal: Number, slip: Number, **parameters: Number) -> Number:
@@ -110,6 +119,54 @@ def brown_mcphee(normal: Number, slip: Number, **parameters: Number) -> Number:
     ratio = slip / parameters["transition_speed"]
     bell = ratio * ratio / 4 + 0.75
     return -(f * xp.tanh(4 * ratio) + (static - f) * ratio / (bell * bell) + parameters["viscous"] * slip) * normal
+
+
+def dahl(normal: Number, slip: Number, **parameters: Number) -> Number:
+    """Friction with memory, a function of the path alone: −κ z N with ż = v − (κ/f) |v| z, f = coefficient.
+
+    From rest the force rises as f N (1 − exp(−κ x/f)) over the way x. κ (stiffness) is the stiffness of the contact per
+    load, 1/m, so that f/κ is the way over which the friction turns round.
+    Source: P. R. Dahl, A solid friction model, Aerospace Corporation, TOR-0158(3107-18)-1, 1968; this form (i = 1):
+    H. Olsson et al., Eur. J. Control 4 (1998) 176-195, doi:10.1016/S0947-3580(98)70113-X.
+    """
+    stiffness = parameters["stiffness"]
+    deflection = parameters.get("deflection")
+    if deflection is None:
+        deflection = namespace(slip).sign(slip) * parameters["coefficient"] / stiffness
+    return -stiffness * deflection * normal
+
+
+def dahl_relaxation(slip: Number, **parameters: Number) -> Number:
+    """(κ/f) |v|."""
+    return namespace(slip).abs(slip) * (parameters["stiffness"] / parameters["coefficient"])
+
+
+def lugre(normal: Number, slip: Number, **parameters: Number) -> Number:
+    """Bristles that also slide by Stribeck's curve: −(κ z + σ ż + c v) N with ż = v − κ |v| z/g(v),
+    g(v) = f + (f_s − f) exp(−(v/v_s)²), f = coefficient, f_s = static.
+
+    In steady sliding it is −sgn(v) g(v) N − c v N. κ, σ and c are stated per load, 1/m and s/m.
+    Source: C. Canudas de Wit, H. Olsson, K. J. Åström, P. Lischinsky, A new model for control of systems with
+    friction, IEEE Trans. Autom. Control 40 (1995) 419-425, doi:10.1109/9.376053.
+    """
+    stiffness, decay = parameters["stiffness"], lugre_relaxation(slip, **parameters)
+    deflection = parameters.get("deflection")
+    if deflection is None:
+        steady = namespace(slip).sign(slip) * _stribeck_curve(slip, parameters)
+        return -(steady + parameters["viscous"] * slip) * normal
+    rate = slip - decay * deflection
+    return -(stiffness * deflection + parameters["damping"] * rate + parameters["viscous"] * slip) * normal
+
+
+def lugre_relaxation(slip: Number, **parameters: Number) -> Number:
+    """κ |v|/g(v)."""
+    return namespace(slip).abs(slip) * parameters["stiffness"] / _stribeck_curve(slip, parameters)
+
+
+def _stribeck_curve(slip: Number, parameters: Mapping[str, Number]) -> Number:
+    """Coefficient of steady sliding without its viscous part."""
+    f, ratio = parameters["coefficient"], slip / parameters["stribeck_speed"]
+    return f + (parameters["static"] - f) * namespace(ratio).exp(-(ratio * ratio))
 
 
 def rolling_bearing(normal: Number, slip: Number, **parameters: Number) -> Number:
@@ -170,6 +227,32 @@ FRICTION_LAWS: dict[str, FrictionLaw] = {
         source="P. Brown, J. McPhee, J. Comput. Nonlinear Dyn. 11 (2016) 054502, doi:10.1115/1.4033658",
         validity="steady or slowly varying sliding; creeps instead of sticking below the transition speed",
         interval_at_rest=False,
+    ),
+    "dahl": FrictionLaw(
+        dahl,
+        {
+            "coefficient": LawParameter(minimum=1e-12, meaning="friction coefficient of sliding"),
+            "stiffness": LawParameter("1/m", minimum=1e-6, meaning="stiffness of the contact per load"),
+        },
+        source="P. R. Dahl, A solid friction model, Aerospace Corporation, TOR-0158(3107-18)-1, 1968",
+        validity="presliding and reversals without Stribeck effect; a change of load acts at once",
+        interval_at_rest=False,
+        relaxation=dahl_relaxation,
+    ),
+    "lugre": FrictionLaw(
+        lugre,
+        {
+            "coefficient": LawParameter(minimum=1e-12, meaning="friction coefficient of sliding"),
+            "static": _STATIC,
+            "stribeck_speed": LawParameter("m/s", minimum=1e-12, meaning="speed at which the peak at rest has decayed"),
+            "stiffness": LawParameter("1/m", minimum=1e-6, meaning="stiffness of the contact per load"),
+            "damping": LawParameter("s/m", default=0.0, meaning="damping of the bristles per load"),
+            "viscous": _VISCOUS,
+        },
+        source="C. Canudas de Wit et al., IEEE Trans. Autom. Control 40 (1995) 419-425, doi:10.1109/9.376053",
+        validity="boundary to mixed lubrication with reversals; a change of load acts at once",
+        interval_at_rest=False,
+        relaxation=lugre_relaxation,
     ),
     "rolling-bearing": FrictionLaw(
         rolling_bearing,

@@ -1,0 +1,227 @@
+"""Deflection of the bristles of Dahl's and the LuGre law along the cycle.
+
+Their state follows ż = v − d(v) z, linear in z, where v is the slip speed of the joint: known from the motion alone,
+for the laws are proportional to the load. Over one interval of the cycle z therefore changes by an affine map
+z ↦ A z + B; the maps are found for all intervals at once, chained, and closed over a periodic cycle by
+z₀ = B/(1 − A). Over a range the bristles start at rest, z₀ = 0.
+
+Inside an interval v is the cubic through the speeds and accelerations at its ends. It is cut at the reversal of v, if
+there is one, and into steps that grow with the distance from it; in each the way is integrated exactly and d per way
+is taken at its middle, so that Dahl's law, whose d per way is constant, is solved without error.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.algebra.dual import primal
+from trunnion.algebra.namespace import Number, namespace
+from trunnion.analysis.kinematics import Assembly, Forward, forward
+from trunnion.analysis.system import Cycle, System, Values, law_of, rubbing
+from trunnion.groups.planar import accelerated, moved
+from trunnion.joints.friction import FrictionLaw
+
+__all__ = ["History", "histories"]
+
+INTERVALS = 720  # of one turn of the fastest driver
+GROWN = np.linspace(0.0, 1.0, 13) ** 2  # steps on either side of a reversal, by the distance from it
+REFINEMENTS = 6  # of the place of a reversal
+Array = NDArray[np.float64]
+
+
+class _Slip(NamedTuple):
+    """Slip speed at the ends of intervals and its derivative by the share of the interval; interval length, s."""
+
+    v0: Number
+    v1: Number
+    a0: Number
+    a1: Number
+    length: Number
+
+    def speed(self, s: Number) -> Number:
+        """Cubic at the share s."""
+        u = 1 - s
+        return u * u * ((1 + 2 * s) * self.v0 + s * self.a0) + s * s * ((3 - 2 * s) * self.v1 - u * self.a1)
+
+    def reversal(self) -> Number:
+        """Share at which the speed changes sign; 0 where it does not.
+
+        Exact to rounding, for the step beside it then has no way to lose: so nothing depends on where it is cut.
+        """
+        real = _Slip(*(primal(number) for number in self))
+        v0, v1 = np.broadcast_arrays(real.v0, real.v1)
+        changes = v0 * v1 < 0
+        low, high = np.zeros(v0.shape), np.ones(v0.shape)
+        s = np.where(changes, v0 / np.where(changes, v0 - v1, 1.0), 0.0)
+        for _ in range(REFINEMENTS):
+            value = real.speed(s)
+            same = value * v0 > 0
+            low, high = np.where(same, s, low), np.where(same, high, s)
+            better = s - value / np.where(changes, real.slope(s), 1.0)
+            s = np.where((better > low) & (better < high), better, (low + high) / 2)
+        step = self.speed(s) / np.where(changes, real.slope(s), 1.0)  # 0 but for its dual part
+        return namespace(step).where(changes, s - step, 0.0)
+
+    def slope(self, s: Number) -> Number:
+        """Derivative of the cubic by the share."""
+        u = 1 - s
+        return 6 * s * u * (self.v1 - self.v0) + u * (1 - 3 * s) * self.a0 - s * (2 - 3 * s) * self.a1
+
+
+@dataclass(frozen=True)
+class History:
+    """Deflections of one joint's bristles at the ends of the intervals of a cycle, and how to get between them."""
+
+    law: FrictionLaw
+    parameters: dict[str, Number]
+    speeds: Number  # (…, interval + 1), m/s
+    rates: Number  # likewise, m/s²
+    length: Number  # of an interval, s
+    deflections: Number  # (…, interval + 1), m
+    periodic: bool
+
+    def at(self, time: Number) -> Number:
+        """Deflection at times from the start of the cycle, m."""
+        count = np.shape(primal(self.speeds))[-1] - 1
+        place = time / self.length
+        if self.periodic:
+            place = place - count * np.floor(primal(place) / count)
+        index = np.clip(np.floor(primal(place)).astype(int), 0, count - 1)
+        v0, v1 = _picked(self.speeds, index), _picked(self.speeds, index + 1)
+        a0, a1 = _picked(self.rates, index), _picked(self.rates, index + 1)
+        slip = _Slip(v0, v1, a0 * self.length, a1 * self.length, self.length)
+        keep, gain = _mapped(self.law, self.parameters, slip, place - index)
+        return keep * _picked(self.deflections, index) + gain
+
+
+def histories(
+    system: System, values: Values, assembly: Assembly, cycle: Cycle, reverse: bool = False
+) -> dict[str, History]:
+    """The history of every joint whose law has bristles, for these values; reverse: with the cycle run backward."""
+    joints = [name for name in rubbing(system) if law_of(system, name).relaxation is not None]
+    if not joints or cycle.duration <= 0:
+        return {}
+    count = INTERVALS * max(1, int(np.ceil(cycle.turns)))
+    duration = cycle.duration * _stretch(system, values)
+    walk = forward(system, values, assembly, np.linspace(0.0, 1.0, count + 1) * duration)
+    return {name: _history(walk, name, duration / count, cycle.periodic, reverse) for name in joints}
+
+
+def _stretch(system: System, values: Values) -> Number:
+    """How much longer the cycle takes than the nominal one, as its slowest driver does."""
+    nominal = system.mechanism.parameters()
+    spans = {name: float(np.ravel(primal(system.span(nominal, name).duration))[0]) for name in system.mechanism.drivers}
+    slowest = max(spans, key=spans.__getitem__)
+    return system.span(values, slowest).duration / spans[slowest]
+
+
+def _history(walk: Forward, joint: str, length: Number, periodic: bool, reverse: bool) -> History:
+    law = law_of(walk.system, joint)
+    path = f"joints.{joint}.friction"
+    parameters = {name: walk.values[f"{path}.{name}"] for name in law.parameters}
+    speed, rate = _slip_motion(walk, joint)
+    if walk.system.joints[joint][0] == "revolute":
+        lever = walk.values[f"joints.{joint}.pin.radius"]
+        speed, rate = speed * lever, rate * lever
+    count = np.shape(primal(walk.time))[-1]
+    speed, rate = (_full(number, count) for number in (speed, rate))
+    if reverse:
+        speed, rate = -_picked(speed, np.arange(count)[::-1]), _picked(rate, np.arange(count)[::-1])
+    lower, upper = np.arange(count - 1), np.arange(1, count)
+    ends = _picked(speed, lower), _picked(speed, upper)
+    slip = _Slip(*ends, _picked(rate, lower) * length, _picked(rate, upper) * length, length)
+    keep, gain = _mapped(law, parameters, slip, np.ones(count - 1))
+    deflections = _chained(keep, gain, periodic)
+    return History(law, parameters, speed, rate, length, deflections, periodic)
+
+
+def _slip_motion(walk: Forward, joint: str) -> tuple[Number, Number]:
+    """Speed and acceleration along the freedom of a joint, second link against first (rad or m)."""
+    kind, (first, second) = walk.system.joints[joint]
+    one, two = walk.motions[first], walk.motions[second]
+    if kind == "revolute":
+        return two.twist.w - one.twist.w, two.acceleration.w - one.acceleration.w
+    a, b = walk.element(first, joint), walk.element(second, joint)
+    dx, dy = b.x - a.x, b.y - a.y
+    v1, v2 = moved(walk.twist(first, joint), dx, dy), walk.twist(second, joint)
+    a1, a2 = accelerated(walk.acceleration(first, joint), v1.w, dx, dy), walk.acceleration(second, joint)
+    speed = a.c * (v2.x - v1.x) + a.s * (v2.y - v1.y)
+    return speed, a.c * (a2.x - a1.x) + a.s * (a2.y - a1.y)
+
+
+def _mapped(law: FrictionLaw, parameters: dict[str, Number], slip: _Slip, until: Number) -> tuple[Number, Number]:
+    """A and B of z ↦ A z + B from the start of intervals to the share `until` of them."""
+    cut = slip.reversal()
+    cut = namespace(cut, until).minimum(cut, until)
+    keep: Number = 1.0
+    gain: Number = 0.0
+    for low, high, shares in ((0.0, cut, 1 - GROWN[::-1]), (cut, until, GROWN)):
+        for left, right in pairwise(shares):
+            step = low + left * (high - low), low + right * (high - low)
+            keep, gain = _stepped(law, parameters, slip, step, (keep, gain))
+    return keep, gain
+
+
+def _stepped(
+    law: FrictionLaw,
+    parameters: dict[str, Number],
+    slip: _Slip,
+    step: tuple[Number, Number],
+    known: tuple[Number, Number],
+) -> tuple[Number, Number]:
+    """One step: z ↦ e z + (1 − e) z_s with e = exp(−d Δt), z_s = v/d, where d/|v| is that of the middle."""
+    if law.relaxation is None:
+        raise ValueError("the law has no bristles")
+    (left, right), (keep, gain) = step, known
+    middle = slip.speed((left + right) / 2)
+    way = slip.length * (right - left) * (slip.speed(left) + 4 * middle + slip.speed(right)) / 6
+    xp = namespace(way, middle)
+    moving = primal(middle) != 0
+    per_way = law.relaxation(middle, **parameters) / xp.where(moving, xp.abs(middle), 1.0)
+    per_way = xp.where(moving & (primal(way) != 0), per_way, 1.0)
+    left_over = namespace(way, per_way).exp(-per_way * xp.abs(way))
+    steady = xp.sign(way) / per_way
+    return left_over * keep, left_over * gain + (1 - left_over) * steady
+
+
+def _chained(keep: Number, gain: Number, periodic: bool) -> Number:
+    """Deflections at all ends of intervals from their maps, periodic or from rest: by doubling the span of the maps."""
+    xp = namespace(keep, gain)
+    count = np.shape(primal(gain))[-1]
+    whole_keep, whole_gain = keep, gain
+    index = np.arange(count)
+    reach = 1
+    while reach < count:
+        earlier = np.maximum(index - reach, 0)
+        inside = index >= reach
+        before_keep, before_gain = _picked(whole_keep, earlier), _picked(whole_gain, earlier)
+        whole_gain = xp.where(inside, whole_keep * before_gain + whole_gain, whole_gain)
+        whole_keep = xp.where(inside, whole_keep * before_keep, whole_keep)
+        reach *= 2
+    start: Number = 0.0
+    if periodic:
+        last = np.array([count - 1])
+        lost = 1 - _picked(whole_keep, last)
+        moves = primal(lost) > 0
+        start = xp.where(moves, _picked(whole_gain, last) / xp.where(moves, lost, 1.0), 0.0)
+    ends = whole_keep * start + whole_gain
+    first = np.arange(count + 1) == 0
+    return xp.where(first, start, _picked(ends, np.maximum(np.arange(count + 1) - 1, 0)))
+
+
+def _full(number: Number, count: int) -> Number:
+    """The number with all its lanes along the last axis."""
+    return number + np.zeros(count)
+
+
+def _picked(number: Number, index: NDArray[np.intp]) -> Number:
+    """Entries along the last axis: the same for all samples, or a row of indices for each."""
+    if np.ndim(index) <= 1:
+        return number[..., index]
+    rows = np.arange(np.shape(index)[0])[:, None]
+    return number[rows if np.shape(primal(number))[0] > 1 else 0 * rows, index]

@@ -1,0 +1,117 @@
+"""Dahl's and the LuGre law: published curves, and the state along a cycle against a stiff integrator."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import trunnion
+from mechanisms import Array, analyse, build, four_bar, slider_crank
+from trunnion.joints.friction import FRICTION_LAWS
+
+DAHL = {"law": "dahl", "coefficient": 0.12, "stiffness": 4e3}
+LUGRE = {
+    "law": "lugre", "coefficient": 0.1, "static": 0.16, "stribeck_speed": 2e-3, "stiffness": 2e4, "damping": 0.3,
+    "viscous": 0.2,
+}  # fmt: skip
+
+
+def state_by_integrator(run: Any, joint: str, law: dict[str, Any], turns: int) -> tuple[Array, Array]:
+    """(time, deflection) over the last of some turns from rest, by Radau, the speed asked of the walk itself."""
+    lever = run.values.get(f"joints.{joint}.pin.radius", 1.0)
+    duration = run.cycle.duration
+
+    def speed(time: float) -> float:
+        slip = run.solve(np.array([time % duration])).slips[joint].speed
+        return float(np.ravel(lever * slip)[0])
+
+    fine = np.linspace(0, duration, 4001)
+    speeds = np.ravel(lever * run.solve(fine).slips[joint].speed)
+
+    def v_of(time: float) -> float:
+        return float(np.interp(time % duration, fine, speeds))
+
+    def curve(v: float) -> float:
+        if law["law"] == "dahl":
+            return float(law["coefficient"])
+        peak = law["static"] - law["coefficient"]
+        return float(law["coefficient"] + peak * np.exp(-((v / law["stribeck_speed"]) ** 2)))
+
+    def rate(time: float, z: Array) -> list[float]:
+        v = v_of(time)
+        return [v - law["stiffness"] * abs(v) / curve(v) * z[0]]
+
+    wanted = (turns - 1) * duration + np.linspace(0, duration, 90, endpoint=False)
+    found = solve_ivp(
+        rate, (0, turns * duration), [0.0], "Radau", wanted, rtol=1e-8, atol=1e-13, max_step=duration / 400
+    )
+    assert speed(0.1 * duration) == pytest.approx(v_of(0.1 * duration), rel=1e-4)
+    return wanted - (turns - 1) * duration, found.y[0]
+
+
+@pytest.mark.parametrize("law", [DAHL, LUGRE], ids=["dahl", "lugre"])
+@pytest.mark.parametrize(("data", "joint"), [(four_bar(), "D"), (slider_crank(), "P")])
+def test_state_against_a_stiff_integrator(data: Any, joint: str, law: dict[str, Any]) -> None:
+    """In a rocker's pin and a slider's guide, both of which turn back twice a turn, once the start is forgotten."""
+    run = trunnion.prepare(build(data, friction=law))
+    time, expected = state_by_integrator(run, joint, law, 2)
+    found = run._past[joint].at(time)
+    largest = np.abs(expected).max()
+    np.testing.assert_allclose(found, expected, rtol=0, atol=2e-4 * largest)
+
+
+@pytest.mark.parametrize("law", [DAHL, LUGRE], ids=["dahl", "lugre"])
+def test_state_is_periodic_and_settled_whatever_the_steps(law: dict[str, Any]) -> None:
+    run = trunnion.prepare(build(four_bar(), friction=law))
+    history, duration = run._past["D"], run.cycle.duration
+    time = np.linspace(0, 1, 37) * duration
+    np.testing.assert_allclose(history.at(time + 3 * duration), history.at(time), rtol=1e-9, atol=1e-15)
+    few, many = analyse(four_bar(), 18, friction=law), analyse(four_bar(), 36, friction=law)
+    np.testing.assert_allclose(many["drive_effort"].values[:, ::2], few["drive_effort"].values, rtol=1e-12)
+
+
+def test_dahl_from_rest() -> None:
+    """Over a range the bristles start at rest: F = f N (1 − exp(−κ x/f)), exactly."""
+    data = {
+        "links": {
+            "ground": {"points": {"S": {"at": [0, 0], "axis": [1, 0]}}},
+            "block": {"points": {"S": {"at": [0, 0], "axis": [1, 0]}}, "mass": 2.0},
+        },
+        "joints": {"S": {"type": "prismatic", "links": ["ground", "block"]}},
+        "drivers": {"S": {"speed": 1e-4, "range": [0.0, 2e-4]}},
+    }
+    result = analyse(data, 41, friction=DAHL, guide=0.3)
+    slide = result["joint_slide"].sel(joint="S").values
+    expected = 0.12 * 2.0 * 9.81 * (1 - np.exp(-4e3 * slide / 0.12))
+    np.testing.assert_allclose(-result["friction_force"].sel(joint="S").values, expected, rtol=1e-9, atol=1e-12)
+
+
+def test_lugre_slides_steadily_by_stribecks_curve() -> None:
+    """A fast drive leaves no trace of the bristles between reversals: the pin A always turns one way."""
+    steady = {**LUGRE, "law": "stribeck"}
+    for key in ("stiffness", "damping"):
+        del steady[key]
+    bristles, curve = analyse(four_bar(), 24, friction=LUGRE), analyse(four_bar(), 24, friction=steady)
+    ratios = [
+        one["friction_torque"].sel(joint="A").values / np.hypot(*one["reaction_force"].sel(joint="A").values)
+        for one in (bristles, curve)
+    ]
+    np.testing.assert_allclose(*ratios, rtol=1e-3)
+
+
+def test_presliding_is_a_spring() -> None:
+    """Far below the turning way f/κ the contact is a spring of stiffness κ N."""
+    law = FRICTION_LAWS["lugre"].function
+    options = {key: value for key, value in LUGRE.items() if key != "law"} | {"damping": 0.0, "viscous": 0.0}
+    assert law(50.0, 1e-12, deflection=1e-7, **options) == pytest.approx(-2e4 * 1e-7 * 50.0, rel=1e-6)
+
+
+@pytest.mark.parametrize("law", [DAHL, LUGRE], ids=["dahl", "lugre"])
+def test_power_balance_and_loss_over_the_cycle(law: dict[str, Any]) -> None:
+    """Bristles store a little and give it back; over the cycle they only lose."""
+    result = analyse(slider_crank(), 720, friction=law)
+    assert float(np.abs(result["power_residual"]).max()) < 1e-9
+    assert float(result["friction_power"].mean("position").min()) > 0

@@ -14,13 +14,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra import linalg
-from trunnion.algebra.dual import Dual, derivative, primal
+from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number
 from trunnion.analysis import continuation
 from trunnion.errors import Finding, MechanismError
@@ -186,30 +187,28 @@ class _Problem:
         at = [self.at(contact.joint, forces) for contact in self.contacts]
         return _State(at, [c.load.normal(reaction) for c, reaction in zip(self.contacts, at, strict=True)])
 
+    @cached_property
+    def slopes(self) -> list[Number]:
+        """Friction force for each newton of normal load: every law is proportional to it."""
+        return [contact.law.function(1.0, contact.slip, **contact.parameters) for contact in self.contacts]
+
     def target(self, normals: Sequence[Number]) -> list[Number]:
         """What the laws say for these normal loads."""
-        return [c.law.function(n, c.slip, **c.parameters) for c, n in zip(self.contacts, normals, strict=True)]
+        return [slope * normal for slope, normal in zip(self.slopes, normals, strict=True)]
 
-    def slopes(self, normals: Sequence[Number]) -> list[Number]:
-        """Derivative of each law by its normal load."""
-        return [
-            derivative(c.law.function(Dual(n, 1.0), c.slip, **c.parameters))
-            for c, n in zip(self.contacts, normals, strict=True)
-        ]
-
-    def map_derivative(self, state: _State, slopes: Sequence[Number]) -> list[list[Number]]:
+    def map_derivative(self, state: _State) -> list[list[Number]]:
         """A with A_kl = ∂ law_k / ∂ φ_l."""
         rows = []
-        for contact, reaction, normal, slope in zip(self.contacts, *state, slopes, strict=True):
+        for contact, reaction, normal, slope in zip(self.contacts, *state, self.slopes, strict=True):
             gradient = contact.load.gradient(reaction, normal)
             rows.append([slope * _along(gradient, column[contact.joint]) for column in self.influence])
         return rows
 
-    def bound(self, slopes: Sequence[Number]) -> Number:
+    def bound(self) -> Number:
         """Largest row sum of |A| over all reactions: below 1 the solution exists, alone, for any share of friction."""
         rows = [
             np.abs(slope) * sum(contact.load.bound(column[contact.joint]) for column in self.influence)
-            for contact, slope in zip(self.contacts, slopes, strict=True)
+            for contact, slope in zip(self.contacts, self.slopes, strict=True)
         ]
         return _largest(rows)
 
@@ -222,9 +221,8 @@ def _newton(problem: _Problem, method: FrictionMethod) -> Settled:
     real = _primal(problem)
     forces: list[Number] = [0.0] * len(real.contacts)
     state = real.state(forces)
-    slopes = real.slopes(state.normals)
     # a lane whose loads are no numbers, because another module locked or opened, is not this module's affair
-    bound = np.where(np.isfinite(_largest(state.normals)), real.bound(slopes), 0.0)
+    bound = np.where(np.isfinite(_largest(state.normals)), real.bound(), 0.0)
     certain = ~(bound >= 1.0)
     rows: list[list[Number]] = []
     inverse: list[list[Number]] = []
@@ -232,10 +230,10 @@ def _newton(problem: _Problem, method: FrictionMethod) -> Settled:
     rounds: Number = 0
     done: Number = False
     renew = True
-    for round_ in range(method.limit):
+    for _ in range(method.limit):
         rounds = rounds + ~np.asarray(done)
         if renew:
-            rows = real.map_derivative(state, slopes if round_ == 0 else real.slopes(state.normals))
+            rows = real.map_derivative(state)
             inverse = linalg.inverse(_identity_minus(rows))
         forces = _corrected(real, state, forces, inverse)
         before, state = state, real.state(forces)
@@ -249,11 +247,11 @@ def _newton(problem: _Problem, method: FrictionMethod) -> Settled:
         forces, shares = _follow(real, forces, ~certain)
         state = real.state(forces)
         done = np.where(certain, done, shares >= 1.0)
-        rows = real.map_derivative(state, real.slopes(state.normals))
+        rows = real.map_derivative(state)
         inverse = linalg.inverse(_identity_minus(rows))
     depth = _depth(problem)
     if depth:  # the ε parts need the matrix of the solution, not that of the way there
-        rows = real.map_derivative(state, real.slopes(state.normals))
+        rows = real.map_derivative(state)
         inverse = linalg.inverse(_identity_minus(rows))
     for _ in range(depth):
         forces = _corrected(problem, problem.state(forces), forces, inverse)
@@ -336,8 +334,7 @@ def _scaled_system(problem: _Problem) -> continuation.System:
     ) -> tuple[list[Number], list[list[Number]]]:
         state = problem.state(forces)
         residual = [f - share * t for f, t in zip(forces, problem.target(state.normals), strict=True)]
-        slopes = problem.slopes(state.normals)
-        rows = [[share * entry for entry in row] for row in problem.map_derivative(state, slopes)]
+        rows = [[share * entry for entry in row] for row in problem.map_derivative(state)]
         return residual, _identity_minus(rows)
 
     return system

@@ -12,6 +12,8 @@ happens is reported.
 
 from __future__ import annotations
 
+import functools
+import operator
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -25,7 +27,7 @@ from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number
 from trunnion.analysis import continuation
 from trunnion.errors import Finding, MechanismError
-from trunnion.groups.planar import Wrench, is_zero
+from trunnion.groups.planar import Wrench, added, is_zero
 from trunnion.groups.protocol import Group
 from trunnion.joints.friction import FrictionLaw
 from trunnion.joints.pairs import Load, Reaction
@@ -121,7 +123,9 @@ def settle(
         return Settled(start, [], 0, 0.0, 0.0, True, 1.0)
     influence = [group.reactions(pose, contact.unit_loads) for contact in contacts]
     problem = _Problem(contacts, start, influence)
-    return _newton(problem, method) if method.name == "newton" else _successive(problem, method)
+    if method.name == "successive-approximation":
+        return _successive(problem, method)
+    return _at_once(problem) if problem.one_way else _newton(problem, method)
 
 
 class _State(NamedTuple):
@@ -165,26 +169,49 @@ class _Problem:
         chosen = np.broadcast_to(lanes, shape)
         return self.mapped(lambda number: np.broadcast_to(np.asarray(number, float), shape)[chosen]), chosen
 
-    def at(self, joint: int, forces: Sequence[Number]) -> Wrench:
-        """Reaction of one joint under friction forces; without any, the frictionless one."""
-        x, y, m = self.start[joint]
-        if all(is_zero(force) for force in forces):
-            return Wrench(x, y, m)
-        for force, column in zip(forces, self.influence, strict=True):
-            dx, dy, dm = column[joint]
-            x, y = x + dx * force, y + dy * force
-            if not is_zero(dm):
-                m = m + dm * force
+    @cached_property
+    def one_way(self) -> bool:
+        """Whether friction changes no load of a pin with friction, as in a driver on a pin: nothing to iterate then."""
+        entries = [n for column in self.influence for contact in self.contacts for n in column[contact.joint][:2]]
+        return all(contact.load.across is None for contact in self.contacts) and all(is_zero(n) for n in entries)
+
+    @cached_property
+    def _alike(self) -> dict[int, int]:
+        """For each joint the first one whose reaction every friction force changes just as much."""
+        found: dict[int, int] = {}
+        for joint in range(len(self.start)):
+            for other in range(joint + 1):
+                pairs = [(column[joint], column[other]) for column in self.influence]
+                if all(a is b for one, two in pairs for a, b in zip(one, two, strict=True)):
+                    found[joint] = other
+                    break
+        return found
+
+    def _changes(self, joint: int, forces: Sequence[Number]) -> Wrench:
+        """What friction forces change in the reaction of one joint."""
+        x, y, m = (
+            _total([entry * force for entry, force in zip(entries, forces, strict=True) if not is_zero(entry)])
+            for entries in zip(*(column[joint] for column in self.influence), strict=True)
+        )
         return Wrench(x, y, m)
+
+    def at(self, joints: Sequence[int], forces: Sequence[Number]) -> list[Wrench]:
+        """Reactions of some joints under friction forces; without any, the frictionless ones."""
+        if all(is_zero(force) for force in forces):
+            return [self.start[joint] for joint in joints]
+        changes = {lead: self._changes(lead, forces) for lead in {self._alike[joint] for joint in joints}}
+        return [added(self.start[joint], changes[self._alike[joint]], 1.0) for joint in joints]
 
     def reactions(self, forces: Sequence[Number], known: _State) -> list[Wrench]:
         """Reactions of all joints; those of the contacts are in the state that belongs to the forces."""
         found = {c.joint: reaction for c, reaction in zip(self.contacts, known.reactions, strict=True)}
-        return [found[j] if j in found else self.at(j, forces) for j in range(len(self.start))]
+        others = [joint for joint in range(len(self.start)) if joint not in found]
+        found.update(zip(others, self.at(others, forces), strict=True))
+        return [found[joint] for joint in range(len(self.start))]
 
     def state(self, forces: Sequence[Number]) -> _State:
         """Reactions and normal loads at the contacts under friction forces."""
-        at = [self.at(contact.joint, forces) for contact in self.contacts]
+        at = self.at([contact.joint for contact in self.contacts], forces)
         return _State(at, [c.load.normal(reaction) for c, reaction in zip(self.contacts, at, strict=True)])
 
     @cached_property
@@ -207,7 +234,7 @@ class _Problem:
     def bound(self) -> Number:
         """Largest row sum of |A| over all reactions: below 1 the solution exists, alone, for any share of friction."""
         rows = [
-            np.abs(slope) * sum(contact.load.bound(column[contact.joint]) for column in self.influence)
+            np.abs(slope) * _total([contact.load.bound(column[contact.joint]) for column in self.influence])
             for contact, slope in zip(self.contacts, self.slopes, strict=True)
         ]
         return _largest(rows)
@@ -256,9 +283,15 @@ def _newton(problem: _Problem, method: FrictionMethod) -> Settled:
     for _ in range(depth):
         forces = _corrected(problem, problem.state(forces), forces, inverse)
         state = problem.state(forces)
-    contraction = _largest([sum(np.abs(entry) for entry in row) for row in rows])
+    contraction = _largest([_total([np.abs(entry) for entry in row]) for row in rows])
     margin = _margin(real, bound, method.margin_up_to)
     return Settled(problem.reactions(forces, state), forces, rounds, change, contraction, done, shares, margin)
+
+
+def _at_once(problem: _Problem) -> Settled:
+    """Friction from the frictionless reactions, which it does not change but in what no law looks at."""
+    forces = problem.target(problem.state([0.0] * len(problem.contacts)).normals)
+    return Settled(problem.at(range(len(problem.start)), forces), forces, 1, 0.0, 0.0, True, 1.0)
 
 
 def _corrected(
@@ -267,7 +300,7 @@ def _corrected(
     """φ + (1 − A)⁻¹ (law − φ)."""
     residual = [a - b for a, b in zip(problem.target(state.normals), forces, strict=True)]
     return [
-        force + sum(entry * part for entry, part in zip(row, residual, strict=True))
+        force + _total([entry * part for entry, part in zip(row, residual, strict=True)])
         for force, row in zip(forces, inverse, strict=True)
     ]
 
@@ -350,6 +383,11 @@ def _along(gradient: Reaction, column: Reaction) -> Number:
     if is_zero(gradient[2]):
         return total
     return total + gradient[2] * column[2]
+
+
+def _total(parts: Sequence[Number]) -> Number:
+    """Sum; of nothing a literal zero. The built-in sum would add the first part to 0."""
+    return functools.reduce(operator.add, parts) if parts else 0.0
 
 
 def _largest(values: Sequence[Number]) -> Number:

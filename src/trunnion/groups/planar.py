@@ -23,6 +23,7 @@ __all__ = [
     "both_ends",
     "compose",
     "is_zero",
+    "less",
     "moved",
     "pinned",
     "point",
@@ -82,6 +83,11 @@ ZERO_LOAD = Wrench(0.0, 0.0, 0.0)
 def is_zero(number: Number) -> bool:
     """A literal zero, as most local coordinates are: skipping it saves whole passes over an array."""
     return isinstance(number, float) and number == 0.0
+
+
+def less(a: Number, b: Number) -> Number:
+    """a − b; where b is a literal zero, a itself."""
+    return a if is_zero(b) else a - b
 
 
 def turned(c: Number, s: Number, x: Number, y: Number) -> tuple[Number, Number]:
@@ -182,10 +188,14 @@ def about(wrench: Wrench, dx: Number, dy: Number) -> Wrench:
 
 
 def added(a: Wrench, b: Wrench, sign: float) -> Wrench:
-    """a + sign · b, both about the same point."""
-    return Wrench(a.x + sign * b.x, a.y + sign * b.y, a.m + sign * b.m)
+    """a + sign · b, both about the same point; sign: ±1. A literal zero costs nothing."""
+    if sign < 0:
+        return Wrench(less(a.x, b.x), less(a.y, b.y), less(a.m, b.m))
+    return Wrench(*(p if is_zero(q) else q if is_zero(p) else p + q for p, q in zip(a, b, strict=True)))
 
 
 def scaled(a: Wrench, factor: float) -> Wrench:
     """The wrench multiplied by a number."""
-    return Wrench(factor * a.x, factor * a.y, factor * a.m)
+    if factor == 1.0:
+        return a
+    return Wrench(-a.x, -a.y, -a.m) if factor == -1.0 else Wrench(factor * a.x, factor * a.y, factor * a.m)

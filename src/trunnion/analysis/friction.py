@@ -27,7 +27,7 @@ from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number
 from trunnion.analysis import continuation
 from trunnion.errors import Finding, MechanismError
-from trunnion.groups.planar import Wrench, added, is_zero
+from trunnion.groups.planar import Wrench, added, is_zero, less
 from trunnion.groups.protocol import Group
 from trunnion.joints.friction import FrictionLaw
 from trunnion.joints.pairs import Load, Reaction
@@ -59,7 +59,7 @@ class FrictionMethod:
             return self.criterion
         if self.name == "successive-approximation":
             return 1e-3
-        return 1e-8 * _largest(normals)
+        return 1e-8 * _peak(normals)
 
 
 def method_named(name: str, criterion: float | None, limit: int) -> FrictionMethod:
@@ -227,8 +227,9 @@ class _Problem:
         """A with A_kl = ∂ law_k / ∂ φ_l."""
         rows = []
         for contact, reaction, normal, slope in zip(self.contacts, *state, self.slopes, strict=True):
-            gradient = contact.load.gradient(reaction, normal)
-            rows.append([slope * _along(gradient, column[contact.joint]) for column in self.influence])
+            x, y, m = contact.load.gradient(reaction, normal)
+            scaled = slope * x, slope * y, m if is_zero(m) else slope * m
+            rows.append([_along(scaled, column[contact.joint]) for column in self.influence])
         return rows
 
     def bound(self) -> Number:
@@ -249,7 +250,7 @@ def _newton(problem: _Problem, method: FrictionMethod) -> Settled:
     forces: list[Number] = [0.0] * len(real.contacts)
     state = real.state(forces)
     # a lane whose loads are no numbers, because another module locked or opened, is not this module's affair
-    bound = np.where(np.isfinite(_largest(state.normals)), real.bound(), 0.0)
+    bound = np.where(np.isfinite(_peak(state.normals)), real.bound(), 0.0)
     certain = ~(bound >= 1.0)
     rows: list[list[Number]] = []
     inverse: list[list[Number]] = []
@@ -298,11 +299,9 @@ def _corrected(
     problem: _Problem, state: _State, forces: Sequence[Number], inverse: Sequence[Sequence[Number]]
 ) -> list[Number]:
     """φ + (1 − A)⁻¹ (law − φ)."""
-    residual = [a - b for a, b in zip(problem.target(state.normals), forces, strict=True)]
-    return [
-        force + _total([entry * part for entry, part in zip(row, residual, strict=True)])
-        for force, row in zip(forces, inverse, strict=True)
-    ]
+    residual = [less(a, b) for a, b in zip(problem.target(state.normals), forces, strict=True)]
+    moves = [_total([entry * part for entry, part in zip(row, residual, strict=True)]) for row in inverse]
+    return [move if is_zero(force) else force + move for force, move in zip(forces, moves, strict=True)]
 
 
 def _changed(state: _State, before: _State) -> Number:
@@ -388,6 +387,11 @@ def _along(gradient: Reaction, column: Reaction) -> Number:
 def _total(parts: Sequence[Number]) -> Number:
     """Sum; of nothing a literal zero. The built-in sum would add the first part to 0."""
     return functools.reduce(operator.add, parts) if parts else 0.0
+
+
+def _peak(normals: Sequence[Number]) -> Number:
+    """Largest of numbers that are not negative; NaN if one is NaN."""
+    return functools.reduce(np.maximum, [primal(normal) for normal in normals])
 
 
 def _largest(values: Sequence[Number]) -> Number:

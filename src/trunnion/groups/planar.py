@@ -101,6 +101,8 @@ def turned(c: Number, s: Number, x: Number, y: Number) -> tuple[Number, Number]:
 
 def point(frame: Frame, x: Number, y: Number) -> tuple[Number, Number]:
     """Global place of the point with local coordinates (x, y)."""
+    if is_zero(x) and is_zero(y):
+        return frame.x, frame.y
     dx, dy = turned(frame.c, frame.s, x, y)
     return frame.x + dx, frame.y + dy
 
@@ -167,11 +169,15 @@ def along_slide(
 
 def moved(velocity: Twist, dx: Number, dy: Number) -> Twist:
     """Velocity of the point that lies (dx, dy) from the one given, on the same body."""
+    if is_zero(dx) and is_zero(dy):
+        return velocity
     return Twist(velocity.x - velocity.w * dy, velocity.y + velocity.w * dx, velocity.w)
 
 
 def accelerated(acceleration: Acceleration, w: Number, dx: Number, dy: Number) -> Acceleration:
     """Acceleration of the point that lies (dx, dy) from the one given, on a body that turns at w."""
+    if is_zero(dx) and is_zero(dy):
+        return acceleration
     ww = w * w
     return Acceleration(
         acceleration.x - acceleration.w * dy - ww * dx,
@@ -182,7 +188,7 @@ def accelerated(acceleration: Acceleration, w: Number, dx: Number, dy: Number) -
 
 def about(wrench: Wrench, dx: Number, dy: Number) -> Wrench:
     """The wrench about the point that lies (dx, dy) from its present one."""
-    if is_zero(wrench.x) and is_zero(wrench.y):  # a pure moment is the same about every point
+    if (is_zero(wrench.x) and is_zero(wrench.y)) or (is_zero(dx) and is_zero(dy)):  # a pure moment, or the same point
         return wrench
     return Wrench(wrench.x, wrench.y, wrench.m - (dx * wrench.y - dy * wrench.x))
 

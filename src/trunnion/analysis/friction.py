@@ -379,7 +379,7 @@ def _identity_minus(rows: Sequence[Sequence[Number]]) -> list[list[Number]]:
 def _along(gradient: Reaction, column: Reaction) -> Number:
     """Derivative of a normal load along a change of the reaction."""
     total = gradient[0] * column[0] + gradient[1] * column[1]
-    if is_zero(gradient[2]):
+    if is_zero(gradient[2]) or is_zero(column[2]):
         return total
     return total + gradient[2] * column[2]
 

@@ -131,11 +131,11 @@ def reactions(pose: Pose, loads: Sequence[Wrench]) -> list[Wrench]:
     along = 0.0 if pure_moment else -(on_j.x * u[0] + on_j.y * u[1])
     across = (on_i.m if pure_moment else on_i.m + pose.p * along) / pose.r
     x, y = turned(*u, along, across)
-    arm = (pose.c[0] - pose.d[0], pose.c[1] - pose.d[1])
-    moment = on_j.m + arm[0] * y - arm[1] * x
+    at_c = Wrench(x, y, 0.0)
+    moment = less(on_j.m, about(at_c, pose.c[0] - pose.d[0], pose.c[1] - pose.d[1]).m)
     return [
         Wrench(less(x, on_i.x), less(y, on_i.y), 0.0),
-        Wrench(x, y, 0.0),
+        at_c,
         Wrench(less(-x, on_j.x), less(-y, on_j.y), -moment),
     ]
 

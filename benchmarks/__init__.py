@@ -1,4 +1,5 @@
-"""Trunnion measured against its peers on the four-bar of Durango, Calle and Ruiz (2010): `make bench`.
+"""Trunnion measured against its peers on the four-bar of Durango, Calle and Ruiz (2010), and what a group costs in
+other linkages: `make bench`.
 
 Everything runs on one thread: the settings below must be in place before NumPy or Numba is first imported.
 """

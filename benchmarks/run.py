@@ -1,7 +1,7 @@
-"""Trunnion against its peers, one table: `make bench`, or `python -m benchmarks.run`.
+"""Trunnion against its peers, and what a group costs: `make bench`, or `python -m benchmarks.run`.
 
-Two measurements. Time: all contenders for a job take turns in one process, the best of several rounds counts.
-Growth and memory: each contender alone in a fresh process per number of configurations, where the peak of the
+Two measurements of the four-bar. Time: all contenders for a job take turns in one process, the best of several rounds
+counts. Growth and memory: each contender alone in a fresh process per number of configurations, where the peak of the
 resident memory is read. One thread throughout.
 """
 
@@ -13,19 +13,17 @@ import math
 import resource
 import subprocess
 import sys
-import time
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.side import JOBS, MOTION_COLUMNS, OUTPUTS, Job, Side, crank_angles
+from benchmarks.side import JOBS, MOTION_COLUMNS, OUTPUTS, Job, Side, crank_angles, take_turns, timed, version
 
 SIZES = (10**2, 10**3, 10**4, 10**5, 10**6)
 BUDGET = 6.0  # s: a size expected to take longer is left out of the growth columns
@@ -68,25 +66,6 @@ def make(job: Job, name: str) -> Side | None:
     module, _, function = CONTENDERS[job][name].partition(".")
     side: Side | None = getattr(import_module(f"benchmarks.{module}"), function)(job)
     return side
-
-
-def timed(call: Callable[[], Any]) -> float:
-    """Seconds one call takes."""
-    start = time.perf_counter()
-    call()
-    return time.perf_counter() - start
-
-
-def take_turns(sides: Iterable[Side], rounds: int) -> dict[str, float]:
-    """Best µs per configuration of each side; they run in turn so that a busy spell hits all of them."""
-    sides = list(sides)
-    best = dict.fromkeys((side.name for side in sides), math.inf)
-    for round_ in range(rounds + 1):
-        for side in sides:
-            seconds = timed(partial(side.run, side.configurations))
-            if round_ > 0:  # the first warms caches and compilers
-                best[side.name] = min(best[side.name], seconds / side.configurations * 1e6)
-    return best
 
 
 def deviation(side: Side, n: int = 360) -> float:
@@ -224,6 +203,21 @@ def verdicts(found: dict[Job, dict[str, Measured]]) -> list[tuple[str, bool]]:
     return limits
 
 
+def linkages(console: Console, rounds: int) -> list[tuple[str, bool]]:
+    """The second table, what a group costs, and its limits."""
+    groups = import_module("benchmarks.groups")  # not above: a process measured alone shall not carry Trunnion
+    with console.status("cost of a group"):
+        table, found = groups.fill(rounds)
+    console.print(table)
+    console.print(
+        "µs per configuration, best of the rounds; forces: all less motion. Stacked: Newton-Euler equations of all "
+        "links at once, motion given and not timed, solved once with a right side for each joint's friction; "
+        "deviation: of its forces, friction and efforts from Trunnion's, relative to the largest of their kind."
+    )
+    limits: list[tuple[str, bool]] = groups.verdicts(found)
+    return limits
+
+
 def main() -> int:
     """Command line."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -250,6 +244,8 @@ def main() -> int:
         "included; deviation: from the Numba loop, relative to each output's peak."
     )
     limits = verdicts(found)
+    if version("trunnion"):
+        limits += linkages(console, options.rounds)
     for sentence, kept in limits:
         console.print(f"{'kept' if kept else 'BROKEN'}: {sentence}")
     return int(options.check and not all(kept for _, kept in limits))

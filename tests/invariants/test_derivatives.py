@@ -67,6 +67,8 @@ def test_duals_equal_central_differences(name: str, friction: float | Data | Non
         for k in (-3, -2, -1, 1, 2, 3)
     }
     nominal = dict(outputs(run.solve(time, method=METHOD)))
+    # a history is found in steps, which differences see where a time passes from one interval to the next
+    accuracy = 1e-5 if run._past else 1e-7
     checked = 0
     for output, number in outputs(dual):
         differences = [np.broadcast_to(moved[k][output] - moved[-k][output], shape) for k in (1, 2, 3)]
@@ -80,7 +82,7 @@ def test_duals_equal_central_differences(name: str, friction: float | Data | Non
         scale = np.maximum(np.abs(expected).max(axis=1), np.abs(value).max(axis=1) / (5000 * step))
         for i, path in enumerate(paths):
             np.testing.assert_allclose(
-                found[i], expected[i], rtol=0, atol=1e-7 * scale[i] + 1e-8, err_msg=f"∂({output})/∂({path})"
+                found[i], expected[i], rtol=0, atol=accuracy * scale[i] + 1e-8, err_msg=f"∂({output})/∂({path})"
             )
             checked += 1
     assert checked > 100

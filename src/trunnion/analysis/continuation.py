@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 from trunnion.algebra import linalg
 from trunnion.algebra.namespace import Number
 
-__all__ = ["System", "follow"]
+__all__ = ["Family", "System", "follow"]
 
 Array = NDArray[np.float64]
 System = Callable[[Sequence[Array], Array], tuple[list[Number], list[list[Number]]]]
+Family = Callable[[NDArray[np.intp]], System]
 
 FIRST_STEP = 0.05
 LONGEST_STEP = 0.05
@@ -29,27 +30,39 @@ NEAR_AIM = 0.25  # of Newton's first step by which the corrected point may miss 
 TINY_MOVE = 0.02  # of the largest unknown
 
 
-def follow(system: System, start: Sequence[Array], most: float = 1.0) -> tuple[list[Array], Array]:
+def follow(family: Family, start: Sequence[Array], most: float = 1.0) -> tuple[list[Array], Array]:
     """(solution, share) of each lane: the share is `most`, or that at which the lane's solution ceases to exist.
 
-    system(x, s) gives residual and Jacobian, lane by lane, and `start` solves it at s = 0. The solution of a lane
-    that stops before `most` is NaN.
+    family(lanes)(x, s) gives residual and Jacobian of some lanes, and `start` solves them at s = 0. The solution of a
+    lane that stops before `most` is NaN.
+
+    Steps double until one fails; from then on the share is sought by halving, and every other time all that is left is
+    tried, since it may have been a kink that smaller moves pass.
     """
-    x = list(start)
-    lanes = len(x[0])
-    share = np.zeros(lanes)
-    step = np.full(lanes, FIRST_STEP)
-    active = np.ones(lanes, bool)
-    while np.any(active):
-        trial = np.minimum(share + step, most)
-        found, good = _correct(system, x, trial)
-        advance = active & good
-        x = [np.where(advance, new, old) for new, old in zip(found, x, strict=True)]
-        share = np.where(advance, trial, share)
-        step = np.where(
-            advance, np.minimum(2 * step, LONGEST_STEP * np.maximum(1.0, share)), np.where(active, step / 2, step)
-        )
-        active = active & (share < most) & (step > LAST_STEP)
+    x = [value.copy() for value in start]
+    share = np.zeros(len(x[0]))
+    lanes = np.arange(len(share))
+    system, step = family(lanes), np.full(len(share), FIRST_STEP)
+    bad, eager = np.full(len(share), np.inf), np.zeros(len(share), bool)
+    while len(lanes):
+        here = share[lanes]
+        trial = np.minimum(here + step, most)
+        found, good = _correct(system, [value[lanes] for value in x], trial)
+        for value, new in zip(x, found, strict=True):
+            value[lanes] = np.where(good, new, value[lanes])
+        share[lanes] = here = np.where(good, trial, here)
+        passed = good & (trial >= bad)
+        last = ~good & (trial - here <= 2 * LAST_STEP)
+        bad = np.where(passed, np.inf, np.where(good, bad, np.minimum(bad, trial)))
+        eager = good & ~eager
+        left = bad - here
+        growing = np.minimum(2 * step, LONGEST_STEP * np.maximum(1.0, here))
+        closing = np.where(eager | (left <= 2 * LAST_STEP), left, left / 2)
+        step = np.where(np.isfinite(bad), closing, growing)
+        going = (here < most) & ~last
+        if not np.all(going):
+            lanes, step, bad, eager = lanes[going], step[going], bad[going], eager[going]
+            system = family(lanes)
     solved = share >= most
     return [np.where(solved, value, np.nan) for value in x], share
 
@@ -75,7 +88,7 @@ def _correct(system: System, start: Sequence[Array], share: Array) -> tuple[list
             if round_ == 0:
                 aim, first = list(x), error
             good = error <= CONVERGED * size + 1e-300
-            if np.all(good):
+            if np.all(good | ~calm | (error > first)):  # a lane that moves farther than at first has left the branch
                 break
         missed = np.maximum.reduce([np.abs(a - b) for a, b in zip(x, aim, strict=True)])
         calm &= (missed <= NEAR_AIM * first) | (first + missed <= TINY_MOVE * size)

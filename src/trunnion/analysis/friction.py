@@ -12,19 +12,22 @@ happens is reported.
 
 from __future__ import annotations
 
+import functools
+import operator
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra import linalg
-from trunnion.algebra.dual import Dual, derivative, primal
+from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number
 from trunnion.analysis import continuation
 from trunnion.errors import Finding, MechanismError
-from trunnion.groups.planar import Wrench, is_zero
+from trunnion.groups.planar import Wrench, added, is_zero, less
 from trunnion.groups.protocol import Group
 from trunnion.joints.friction import FrictionLaw
 from trunnion.joints.pairs import Load, Reaction
@@ -40,7 +43,7 @@ class FrictionMethod:
 
     name: "newton" or "successive-approximation" ([D] steps 1-5).
     criterion: largest change of a joint's reaction between two rounds, N, at which the iteration ends ([D] used
-    1e-3 N); None: 1e-8 of the largest reaction for Newton, which is then exact to rounding, 1e-3 N for [D].
+    1e-3 N); None: 1e-3 N for [D], and for Newton 1e-8 of the largest reaction, which leaves some 1e-10 of it.
     limit: most rounds; a position that needs more is not converged.
     margin_up_to: how far, in multiples of the friction, to look for the point at which it locks; 0: not at all.
     """
@@ -56,7 +59,7 @@ class FrictionMethod:
             return self.criterion
         if self.name == "successive-approximation":
             return 1e-3
-        return 1e-8 * _largest(normals)
+        return 1e-8 * _peak(normals)
 
 
 def method_named(name: str, criterion: float | None, limit: int) -> FrictionMethod:
@@ -123,7 +126,9 @@ def settle(
         return Settled(start, [], 0, 0.0, 0.0, True, 1.0)
     influence = [group.reactions(pose, contact.unit_loads) for contact in contacts]
     problem = _Problem(contacts, start, influence)
-    return _newton(problem, method) if method.name == "newton" else _successive(problem, method)
+    if method.name == "successive-approximation":
+        return _successive(problem, method)
+    return _at_once(problem) if problem.one_way else _newton(problem, method)
 
 
 class _State(NamedTuple):
@@ -167,52 +172,74 @@ class _Problem:
         chosen = np.broadcast_to(lanes, shape)
         return self.mapped(lambda number: np.broadcast_to(np.asarray(number, float), shape)[chosen]), chosen
 
-    def at(self, joint: int, forces: Sequence[Number]) -> Wrench:
-        """Reaction of one joint under friction forces; without any, the frictionless one."""
-        x, y, m = self.start[joint]
-        if all(is_zero(force) for force in forces):
-            return Wrench(x, y, m)
-        for force, column in zip(forces, self.influence, strict=True):
-            dx, dy, dm = column[joint]
-            x, y = x + dx * force, y + dy * force
-            if not is_zero(dm):
-                m = m + dm * force
+    @cached_property
+    def one_way(self) -> bool:
+        """Whether friction changes no load of a pin with friction, as in a driver on a pin: nothing to iterate then."""
+        entries = [n for column in self.influence for contact in self.contacts for n in column[contact.joint][:2]]
+        return all(contact.load.across is None for contact in self.contacts) and all(is_zero(n) for n in entries)
+
+    @cached_property
+    def _alike(self) -> dict[int, int]:
+        """For each joint the first one whose reaction every friction force changes just as much."""
+        found: dict[int, int] = {}
+        for joint in range(len(self.start)):
+            for other in range(joint + 1):
+                pairs = [(column[joint], column[other]) for column in self.influence]
+                if all(a is b for one, two in pairs for a, b in zip(one, two, strict=True)):
+                    found[joint] = other
+                    break
+        return found
+
+    def _changes(self, joint: int, forces: Sequence[Number]) -> Wrench:
+        """What friction forces change in the reaction of one joint."""
+        x, y, m = (
+            _total([entry * force for entry, force in zip(entries, forces, strict=True) if not is_zero(entry)])
+            for entries in zip(*(column[joint] for column in self.influence), strict=True)
+        )
         return Wrench(x, y, m)
+
+    def at(self, joints: Sequence[int], forces: Sequence[Number]) -> list[Wrench]:
+        """Reactions of some joints under friction forces; without any, the frictionless ones."""
+        if all(is_zero(force) for force in forces):
+            return [self.start[joint] for joint in joints]
+        changes = {lead: self._changes(lead, forces) for lead in {self._alike[joint] for joint in joints}}
+        return [added(self.start[joint], changes[self._alike[joint]], 1.0) for joint in joints]
 
     def reactions(self, forces: Sequence[Number], known: _State) -> list[Wrench]:
         """Reactions of all joints; those of the contacts are in the state that belongs to the forces."""
         found = {c.joint: reaction for c, reaction in zip(self.contacts, known.reactions, strict=True)}
-        return [found[j] if j in found else self.at(j, forces) for j in range(len(self.start))]
+        others = [joint for joint in range(len(self.start)) if joint not in found]
+        found.update(zip(others, self.at(others, forces), strict=True))
+        return [found[joint] for joint in range(len(self.start))]
 
     def state(self, forces: Sequence[Number]) -> _State:
         """Reactions and normal loads at the contacts under friction forces."""
-        at = [self.at(contact.joint, forces) for contact in self.contacts]
+        at = self.at([contact.joint for contact in self.contacts], forces)
         return _State(at, [c.load.normal(reaction) for c, reaction in zip(self.contacts, at, strict=True)])
+
+    @cached_property
+    def slopes(self) -> list[Number]:
+        """Friction force for each newton of normal load: every law is proportional to it."""
+        return [contact.law.function(1.0, contact.slip, **contact.parameters) for contact in self.contacts]
 
     def target(self, normals: Sequence[Number]) -> list[Number]:
         """What the laws say for these normal loads."""
-        return [c.law.function(n, c.slip, **c.parameters) for c, n in zip(self.contacts, normals, strict=True)]
+        return [slope * normal for slope, normal in zip(self.slopes, normals, strict=True)]
 
-    def slopes(self, normals: Sequence[Number]) -> list[Number]:
-        """Derivative of each law by its normal load."""
-        return [
-            derivative(c.law.function(Dual(n, 1.0), c.slip, **c.parameters))
-            for c, n in zip(self.contacts, normals, strict=True)
-        ]
-
-    def map_derivative(self, state: _State, slopes: Sequence[Number]) -> list[list[Number]]:
+    def map_derivative(self, state: _State) -> list[list[Number]]:
         """A with A_kl = ∂ law_k / ∂ φ_l."""
         rows = []
-        for contact, reaction, normal, slope in zip(self.contacts, *state, slopes, strict=True):
-            gradient = contact.load.gradient(reaction, normal)
-            rows.append([slope * _along(gradient, column[contact.joint]) for column in self.influence])
+        for contact, reaction, normal, slope in zip(self.contacts, *state, self.slopes, strict=True):
+            x, y, m = contact.load.gradient(reaction, normal)
+            scaled = slope * x, slope * y, m if is_zero(m) else slope * m
+            rows.append([_along(scaled, column[contact.joint]) for column in self.influence])
         return rows
 
-    def bound(self, slopes: Sequence[Number]) -> Number:
+    def bound(self) -> Number:
         """Largest row sum of |A| over all reactions: below 1 the solution exists, alone, for any share of friction."""
         rows = [
-            np.abs(slope) * sum(contact.load.bound(column[contact.joint]) for column in self.influence)
-            for contact, slope in zip(self.contacts, slopes, strict=True)
+            np.abs(slope) * _total([contact.load.bound(column[contact.joint]) for column in self.influence])
+            for contact, slope in zip(self.contacts, self.slopes, strict=True)
         ]
         return _largest(rows)
 
@@ -225,9 +252,8 @@ def _newton(problem: _Problem, method: FrictionMethod) -> Settled:
     real = _primal(problem)
     forces: list[Number] = [0.0] * len(real.contacts)
     state = real.state(forces)
-    slopes = real.slopes(state.normals)
     # a lane whose loads are no numbers, because another module locked or opened, is not this module's affair
-    bound = np.where(np.isfinite(_largest(state.normals)), real.bound(slopes), 0.0)
+    bound = np.where(np.isfinite(_peak(state.normals)), real.bound(), 0.0)
     certain = ~(bound >= 1.0)
     rows: list[list[Number]] = []
     inverse: list[list[Number]] = []
@@ -235,10 +261,10 @@ def _newton(problem: _Problem, method: FrictionMethod) -> Settled:
     rounds: Number = 0
     done: Number = False
     renew = True
-    for round_ in range(method.limit):
+    for _ in range(method.limit):
         rounds = rounds + ~np.asarray(done)
         if renew:
-            rows = real.map_derivative(state, slopes if round_ == 0 else real.slopes(state.normals))
+            rows = real.map_derivative(state)
             inverse = linalg.inverse(_identity_minus(rows))
         forces = _corrected(real, state, forces, inverse)
         before, state = state, real.state(forces)
@@ -252,29 +278,33 @@ def _newton(problem: _Problem, method: FrictionMethod) -> Settled:
         forces, shares = _follow(real, forces, ~certain)
         state = real.state(forces)
         done = np.where(certain, done, shares >= 1.0)
-        rows = real.map_derivative(state, real.slopes(state.normals))
+        rows = real.map_derivative(state)
         inverse = linalg.inverse(_identity_minus(rows))
     depth = _depth(problem)
     if depth:  # the ε parts need the matrix of the solution, not that of the way there
-        rows = real.map_derivative(state, real.slopes(state.normals))
+        rows = real.map_derivative(state)
         inverse = linalg.inverse(_identity_minus(rows))
     for _ in range(depth):
         forces = _corrected(problem, problem.state(forces), forces, inverse)
         state = problem.state(forces)
-    contraction = _largest([sum(np.abs(entry) for entry in row) for row in rows])
+    contraction = _largest([_total([np.abs(entry) for entry in row]) for row in rows])
     margin = _margin(real, bound, method.margin_up_to)
     return Settled(problem.reactions(forces, state), forces, rounds, change, contraction, done, shares, margin)
+
+
+def _at_once(problem: _Problem) -> Settled:
+    """Friction from the frictionless reactions, which it does not change but in what no law looks at."""
+    forces = problem.target(problem.state([0.0] * len(problem.contacts)).normals)
+    return Settled(problem.at(range(len(problem.start)), forces), forces, 1, 0.0, 0.0, True, 1.0)
 
 
 def _corrected(
     problem: _Problem, state: _State, forces: Sequence[Number], inverse: Sequence[Sequence[Number]]
 ) -> list[Number]:
     """φ + (1 − A)⁻¹ (law − φ)."""
-    residual = [a - b for a, b in zip(problem.target(state.normals), forces, strict=True)]
-    return [
-        force + sum(entry * part for entry, part in zip(row, residual, strict=True))
-        for force, row in zip(forces, inverse, strict=True)
-    ]
+    residual = [less(a, b) for a, b in zip(problem.target(state.normals), forces, strict=True)]
+    moves = [_total([entry * part for entry, part in zip(row, residual, strict=True)]) for row in inverse]
+    return [move if is_zero(force) else force + move for force, move in zip(forces, moves, strict=True)]
 
 
 def _changed(state: _State, before: _State) -> Number:
@@ -310,7 +340,7 @@ def _margin(problem: _Problem, bound: Number, most: float) -> Number:
     if most <= 0 or not np.any(doubtful):
         return np.inf
     part, chosen = problem.picked(doubtful)
-    _, reached = continuation.follow(_scaled_system(part), _frictionless(part, chosen), most)
+    _, reached = continuation.follow(_scaled(part), _frictionless(part, chosen), most)
     margin = np.full(chosen.shape, np.inf)
     margin[chosen] = np.where(reached >= most, np.inf, reached)
     return margin
@@ -320,7 +350,7 @@ def _follow(problem: _Problem, forces: Sequence[Number], lanes: Number) -> tuple
     """Forces with the chosen lanes followed from no friction; NaN where they lock, and the share reached."""
     part, chosen = problem.picked(lanes)
     shape = chosen.shape
-    found, reached = continuation.follow(_scaled_system(part), _frictionless(part, chosen))
+    found, reached = continuation.follow(_scaled(part), _frictionless(part, chosen))
     result = []
     for force, value in zip(forces, found, strict=True):
         whole = np.array(np.broadcast_to(force, shape), float)
@@ -331,22 +361,29 @@ def _follow(problem: _Problem, forces: Sequence[Number], lanes: Number) -> tuple
     return result, shares
 
 
-def _scaled_system(problem: _Problem) -> continuation.System:
-    """Residual φ − s law(N(φ)) and its Jacobian, for the share s of the friction."""
+Weights = Callable[[NDArray[np.float64]], Sequence[Number]]
 
-    def system(
-        forces: Sequence[NDArray[np.float64]], share: NDArray[np.float64]
-    ) -> tuple[list[Number], list[list[Number]]]:
-        shares = [share if contact.rubs else 1.0 for contact in problem.contacts]
-        state = problem.state(forces)
-        residual = [f - s * t for f, s, t in zip(forces, shares, problem.target(state.normals), strict=True)]
-        slopes = problem.slopes(state.normals)
-        rows = [
-            [s * entry for entry in row] for s, row in zip(shares, problem.map_derivative(state, slopes), strict=True)
-        ]
-        return residual, _identity_minus(rows)
 
-    return system
+def _scaled(problem: _Problem, weights: Weights | None = None) -> continuation.Family:
+    """Residual φ − w(s) law(N(φ)) and its Jacobian; w(s): multiple of each contact's friction, s if not given."""
+
+    def family(lanes: NDArray[np.intp]) -> continuation.System:
+        part = problem.mapped(lambda number: number[lanes])
+
+        def system(
+            forces: Sequence[NDArray[np.float64]], share: NDArray[np.float64]
+        ) -> tuple[list[Number], list[list[Number]]]:
+            found = [share] * len(part.contacts) if weights is None else weights(share)
+            shares = [weight if contact.rubs else 1.0 for weight, contact in zip(found, part.contacts, strict=True)]
+            state = part.state(forces)
+            residual = [f - s * t for f, s, t in zip(forces, shares, part.target(state.normals), strict=True)]
+            slopes = part.map_derivative(state)
+            rows = [[s * entry for entry in row] for s, row in zip(shares, slopes, strict=True)]
+            return residual, _identity_minus(rows)
+
+        return system
+
+    return family
 
 
 def _frictionless(problem: _Problem, chosen: NDArray[np.bool_]) -> list[NDArray[np.float64]]:
@@ -363,9 +400,19 @@ def _identity_minus(rows: Sequence[Sequence[Number]]) -> list[list[Number]]:
 def _along(gradient: Reaction, column: Reaction) -> Number:
     """Derivative of a normal load along a change of the reaction."""
     total = gradient[0] * column[0] + gradient[1] * column[1]
-    if is_zero(gradient[2]):
+    if is_zero(gradient[2]) or is_zero(column[2]):
         return total
     return total + gradient[2] * column[2]
+
+
+def _total(parts: Sequence[Number]) -> Number:
+    """Sum; of nothing a literal zero. The built-in sum would add the first part to 0."""
+    return functools.reduce(operator.add, parts) if parts else 0.0
+
+
+def _peak(normals: Sequence[Number]) -> Number:
+    """Largest of numbers that are not negative; NaN if one is NaN."""
+    return functools.reduce(np.maximum, [primal(normal) for normal in normals])
 
 
 def _largest(values: Sequence[Number]) -> Number:

@@ -23,6 +23,7 @@ __all__ = [
     "both_ends",
     "compose",
     "is_zero",
+    "less",
     "moved",
     "pinned",
     "point",
@@ -84,6 +85,11 @@ def is_zero(number: Number) -> bool:
     return isinstance(number, float) and number == 0.0
 
 
+def less(a: Number, b: Number) -> Number:
+    """a − b; where b is a literal zero, a itself."""
+    return a if is_zero(b) else a - b
+
+
 def turned(c: Number, s: Number, x: Number, y: Number) -> tuple[Number, Number]:
     """(x, y) turned by the angle whose cosine and sine are c, s."""
     if is_zero(y):
@@ -95,6 +101,8 @@ def turned(c: Number, s: Number, x: Number, y: Number) -> tuple[Number, Number]:
 
 def point(frame: Frame, x: Number, y: Number) -> tuple[Number, Number]:
     """Global place of the point with local coordinates (x, y)."""
+    if is_zero(x) and is_zero(y):
+        return frame.x, frame.y
     dx, dy = turned(frame.c, frame.s, x, y)
     return frame.x + dx, frame.y + dy
 
@@ -161,11 +169,15 @@ def along_slide(
 
 def moved(velocity: Twist, dx: Number, dy: Number) -> Twist:
     """Velocity of the point that lies (dx, dy) from the one given, on the same body."""
+    if is_zero(dx) and is_zero(dy):
+        return velocity
     return Twist(velocity.x - velocity.w * dy, velocity.y + velocity.w * dx, velocity.w)
 
 
 def accelerated(acceleration: Acceleration, w: Number, dx: Number, dy: Number) -> Acceleration:
     """Acceleration of the point that lies (dx, dy) from the one given, on a body that turns at w."""
+    if is_zero(dx) and is_zero(dy):
+        return acceleration
     ww = w * w
     return Acceleration(
         acceleration.x - acceleration.w * dy - ww * dx,
@@ -176,16 +188,20 @@ def accelerated(acceleration: Acceleration, w: Number, dx: Number, dy: Number) -
 
 def about(wrench: Wrench, dx: Number, dy: Number) -> Wrench:
     """The wrench about the point that lies (dx, dy) from its present one."""
-    if is_zero(wrench.x) and is_zero(wrench.y):  # a pure moment is the same about every point
+    if (is_zero(wrench.x) and is_zero(wrench.y)) or (is_zero(dx) and is_zero(dy)):  # a pure moment, or the same point
         return wrench
     return Wrench(wrench.x, wrench.y, wrench.m - (dx * wrench.y - dy * wrench.x))
 
 
 def added(a: Wrench, b: Wrench, sign: float) -> Wrench:
-    """a + sign · b, both about the same point."""
-    return Wrench(a.x + sign * b.x, a.y + sign * b.y, a.m + sign * b.m)
+    """a + sign · b, both about the same point; sign: ±1. A literal zero costs nothing."""
+    if sign < 0:
+        return Wrench(less(a.x, b.x), less(a.y, b.y), less(a.m, b.m))
+    return Wrench(*(p if is_zero(q) else q if is_zero(p) else p + q for p, q in zip(a, b, strict=True)))
 
 
 def scaled(a: Wrench, factor: float) -> Wrench:
     """The wrench multiplied by a number."""
-    return Wrench(factor * a.x, factor * a.y, factor * a.m)
+    if factor == 1.0:
+        return a
+    return Wrench(-a.x, -a.y, -a.m) if factor == -1.0 else Wrench(factor * a.x, factor * a.y, factor * a.m)

@@ -23,6 +23,7 @@ from trunnion.groups.planar import (
     along_slide,
     both_ends,
     compose,
+    less,
     moved,
     relative,
     shifted,
@@ -126,7 +127,11 @@ def reactions(pose: Pose, loads: Sequence[Wrench]) -> list[Wrench]:
     arm_j = (pose.c[1][0] - pose.d[0], pose.c[1][1] - pose.d[1])
     m_i = on_i.m - (arm_i[0] * y - arm_i[1] * x)
     m_j = on_j.m + arm_j[0] * y - arm_j[1] * x
-    return [Wrench(x - on_i.x, y - on_i.y, -m_i), Wrench(x, y, 0.0), Wrench(-x - on_j.x, -y - on_j.y, -m_j)]
+    return [
+        Wrench(less(x, on_i.x), less(y, on_i.y), -m_i),
+        Wrench(x, y, 0.0),
+        Wrench(less(-x, on_j.x), less(-y, on_j.y), -m_j),
+    ]
 
 
 def closure(pose: Pose) -> Number:

@@ -23,6 +23,7 @@ from trunnion.groups.planar import (
     along_slide,
     both_ends,
     compose,
+    less,
     moved,
     relative,
     shifted,
@@ -124,7 +125,11 @@ def reactions(pose: Pose, loads: Sequence[Wrench]) -> list[Wrench]:
     about_c = on_i.m - cross(pose.to_c[0], (x, y))  # the couple i puts on j, about C on j
     arm = (pose.c[0] - pose.d[0], pose.c[1] - pose.d[1])
     moment = on_j.m + about_c + cross(arm, (x, y))
-    return [Wrench(x - on_i.x, y - on_i.y, 0.0), Wrench(x, y, about_c), Wrench(-x - on_j.x, -y - on_j.y, -moment)]
+    return [
+        Wrench(less(x, on_i.x), less(y, on_i.y), 0.0),
+        Wrench(x, y, about_c),
+        Wrench(less(-x, on_j.x), less(-y, on_j.y), -moment),
+    ]
 
 
 def closure(pose: Pose) -> Number:

@@ -21,6 +21,7 @@ from trunnion.groups.planar import (
     about,
     accelerated,
     both_ends,
+    less,
     moved,
     relative,
     root,
@@ -118,7 +119,11 @@ def reactions(pose: Pose, loads: Sequence[Wrench]) -> list[Wrench]:
     normal = (on_i.m + on_j.m) / pose.along
     x, y = -normal * u[1], normal * u[0]
     moment = -on_j.m - (pose.to_c[0] * y - pose.to_c[1] * x)  # that on j about D is −M_j; here about C
-    return [Wrench(x - on_i.x, y - on_i.y, 0.0), Wrench(x, y, moment), Wrench(-x - on_j.x, -y - on_j.y, 0.0)]
+    return [
+        Wrench(less(x, on_i.x), less(y, on_i.y), 0.0),
+        Wrench(x, y, moment),
+        Wrench(less(-x, on_j.x), less(-y, on_j.y), 0.0),
+    ]
 
 
 def closure(pose: Pose) -> Number:

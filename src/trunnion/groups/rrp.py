@@ -23,6 +23,8 @@ from trunnion.groups.planar import (
     accelerated,
     both_ends,
     compose,
+    is_zero,
+    less,
     moved,
     pinned,
     relative,
@@ -125,12 +127,17 @@ def reactions(pose: Pose, loads: Sequence[Wrench]) -> list[Wrench]:
     u = pose.u
     on_i = about(loads[0], *pose.b)
     on_j = about(loads[1], *pose.d)
-    along = -(on_j.x * u[0] + on_j.y * u[1])
-    across = (on_i.m + pose.p * along) / pose.r
-    x, y = along * u[0] - across * u[1], along * u[1] + across * u[0]
-    arm = (pose.c[0] - pose.d[0], pose.c[1] - pose.d[1])
-    moment = on_j.m + arm[0] * y - arm[1] * x
-    return [Wrench(x - on_i.x, y - on_i.y, 0.0), Wrench(x, y, 0.0), Wrench(-x - on_j.x, -y - on_j.y, -moment)]
+    pure_moment = is_zero(on_j.x) and is_zero(on_j.y)  # as in a unit friction load of a pin: three passes spared
+    along = 0.0 if pure_moment else -(on_j.x * u[0] + on_j.y * u[1])
+    across = (on_i.m if pure_moment else on_i.m + pose.p * along) / pose.r
+    x, y = turned(*u, along, across)
+    at_c = Wrench(x, y, 0.0)
+    moment = less(on_j.m, about(at_c, pose.c[0] - pose.d[0], pose.c[1] - pose.d[1]).m)
+    return [
+        Wrench(less(x, on_i.x), less(y, on_i.y), 0.0),
+        at_c,
+        Wrench(less(-x, on_j.x), less(-y, on_j.y), -moment),
+    ]
 
 
 def closure(pose: Pose) -> Number:

@@ -22,6 +22,7 @@ from trunnion.groups.planar import (
     accelerated,
     both_ends,
     is_zero,
+    less,
     moved,
     pinned,
     root,
@@ -130,7 +131,11 @@ def reactions(pose: Pose, loads: Sequence[Wrench]) -> list[Wrench]:
     on_i = about(loads[0], *pose.b)
     on_j = about(loads[1], *pose.d)
     x, y = _shared(on_i.m, on_j.m, pose)
-    return [Wrench(x - on_i.x, y - on_i.y, 0.0), Wrench(x, y, 0.0), Wrench(-x - on_j.x, -y - on_j.y, 0.0)]
+    return [
+        Wrench(less(x, on_i.x), less(y, on_i.y), 0.0),
+        Wrench(x, y, 0.0),
+        Wrench(less(-x, on_j.x), less(-y, on_j.y), 0.0),
+    ]
 
 
 def _shared(m_i: Number, m_j: Number, pose: Pose) -> Vector:

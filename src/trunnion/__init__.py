@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from trunnion.analysis.analyse import analyse, prepare
     from trunnion.analysis.friction import FrictionMethod
     from trunnion.analysis.inspect import Check, check
+    from trunnion.analysis.locking import locking
     from trunnion.errors import Finding, MechanismError, Status
     from trunnion.export import save
     from trunnion.model.file import read_mechanism as read
@@ -29,6 +30,7 @@ _PLACES = {
     "Check": "trunnion.analysis.inspect",
     "analyse": "trunnion.analysis.analyse",
     "check": "trunnion.analysis.inspect",
+    "locking": "trunnion.analysis.locking",
     "prepare": "trunnion.analysis.analyse",
     "read": "trunnion.model.file",
     "report": "trunnion.views.report",
@@ -45,6 +47,7 @@ __all__ = [
     "Status",
     "analyse",
     "check",
+    "locking",
     "prepare",
     "read",
     "report",

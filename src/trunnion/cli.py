@@ -126,6 +126,15 @@ def design(
 
 
 @app.command()
+def locking(file: File, steps: Steps = 360, set_: Set = None, friction: FrictionLaw = None) -> None:
+    """How close to locking, by all friction and by each joint's; other solutions; whether it can be driven backward."""
+    from trunnion.analysis.locking import report_rows
+
+    mechanism = _mechanism(file, set_, friction)
+    _table(mechanism.name or str(file), report_rows(mechanism, steps))
+
+
+@app.command()
 def plot(
     file: File,
     out: Annotated[Path, typer.Option("--out", help="Folder, or a .png, .svg or .pdf file of one plot.")],

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from trunnion import __version__, results
 from trunnion.algebra.namespace import Number
-from trunnion.analysis import diagnosis
+from trunnion.analysis import diagnosis, near_locking
 from trunnion.analysis.friction import FrictionMethod
 from trunnion.analysis.kinematics import start
 from trunnion.analysis.kinetostatics import Backward
 from trunnion.analysis.loads import Stated
-from trunnion.analysis.system import Cycle, Dial, System, rubbing
+from trunnion.analysis.system import Cycle, Dial, System, law_of, rubbing
 from trunnion.errors import Finding, Severity, Status
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.model.check import check_model
@@ -87,20 +87,13 @@ def _worst(system: System, poses: Sequence[Any], figure: str) -> Number:
     return worst
 
 
-def mean(values: NDArray[np.float64], cycle: Cycle) -> float:
-    """Mean over the cycle: of equally spaced values over a period, by trapezoids over a range; NaN with a gap."""
-    if len(values) == 1 or cycle.periodic:
-        return float(np.mean(values))
-    return float(np.trapezoid(values) / (len(values) - 1))
-
-
 def efficiency(arrays: Arrays, cycle: Cycle) -> float:
     """Useful work over drive work of the cycle [D 1]; NaN where the loads drive or a position has no answer."""
     drive = np.sum(arrays["drive_power"], axis=0)
-    work, size = mean(drive, cycle), mean(np.abs(drive), cycle)
+    work, size = cycle.mean(drive), cycle.mean(np.abs(drive))
     if not work > 1e-9 * size:
         return float("nan")
-    useful = mean(arrays["useful_power"], cycle)
+    useful = cycle.mean(arrays["useful_power"])
     # what a load gives and takes back over a turn cancels but for rounding
     return useful / work if abs(useful) > 1e-12 * size else 0.0
 
@@ -116,7 +109,8 @@ def finish(
     """The Dataset with its attributes: formula, findings, summary, input data, drawing data, provenance."""
     mechanism = run.system.mechanism
     value = efficiency(arrays, run.cycle)
-    found = [*_model_notes(mechanism), *run.chosen.findings, *_over_the_cycle(run, arrays, causes, time)]
+    near = _near_locking(run, arrays, time, method)
+    found = [*_model_notes(mechanism), *run.chosen.findings, *_over_the_cycle(run, arrays, causes, time, near)]
     attributes: dict[str, str | float] = {
         "name": mechanism.name,
         "formula": run.system.plan.formula,
@@ -130,7 +124,7 @@ def finish(
         "driver_units": json.dumps(effort_units(run.system)),
         "spring_units": json.dumps(spring_units(run.system)),
         "findings": json.dumps([_row(finding) for finding in found], ensure_ascii=False),
-        "summary": json.dumps(_summary(run, arrays, value, time), ensure_ascii=False),
+        "summary": json.dumps(_summary(run, arrays, value, time, near), ensure_ascii=False),
         "inputs": json.dumps(_inputs(mechanism), ensure_ascii=False),
         "scene": json.dumps(_scene(run), ensure_ascii=False),
         "periodic": int(run.cycle.periodic),
@@ -185,15 +179,22 @@ def _model_notes(mechanism: Mechanism) -> list[Finding]:
     return notes
 
 
-def _over_the_cycle(run: Run, arrays: Arrays, causes: diagnosis.Causes, time: NDArray[np.float64]) -> list[Finding]:
+def _over_the_cycle(
+    run: Run,
+    arrays: Arrays,
+    causes: diagnosis.Causes,
+    time: NDArray[np.float64],
+    near: near_locking.Locking | None,
+) -> list[Finding]:
     units = effort_units(run.system)
     efforts = {
         name: (arrays["drive_effort_lower"][i], arrays["drive_effort_upper"][i], units[i])
         for i, name in enumerate(run.system.mechanism.drivers)
     }
     found = diagnosis.findings(
-        causes, run.system.dial(run.values, time), arrays["status"], arrays["condition"], efforts
+        causes, run.system.dial(run.values, time), arrays["status"], arrays["condition"], efforts, near
     )
+    found += near_locking.findings(near, run.system.dial(run.values, near.times)) if near else []
     spans = [run.system.span(run.values, name) for name in run.system.mechanism.drivers]
     several = len(spans) > 1 or run.system.mechanism.gears
     if several and not run.cycle.periodic and spans and all(span.periodic for span in spans):
@@ -230,7 +231,9 @@ def _references(mechanism: Mechanism) -> list[str]:
     return [DURANGO, *(f"{law}: {FRICTION_LAWS[law].source}" for law in sorted(laws)), *mechanism.references]
 
 
-def _summary(run: Run, arrays: Arrays, value: float, time: NDArray[np.float64]) -> list[dict[str, Any]]:
+def _summary(
+    run: Run, arrays: Arrays, value: float, time: NDArray[np.float64], near: near_locking.Locking | None
+) -> list[dict[str, Any]]:
     """The figures one looks at first."""
     rows: list[dict[str, Any]] = []
     dial = run.system.dial(run.values, time)
@@ -250,17 +253,19 @@ def _summary(run: Run, arrays: Arrays, value: float, time: NDArray[np.float64]) 
                         "unit": unit,
                     },
                 ]
-            rms = np.sqrt(mean(effort**2, run.cycle))
+            rms = np.sqrt(run.cycle.mean(effort**2))
             rows.append({"label": f"drive {kind} of {name}, RMS", "value": rms, "unit": unit})
         rows += _reaction_rows(run.system, arrays, dial, sound)
         lost = np.sum(arrays["friction_power"], axis=0)
         if rubbing(run.system):
             rows.append(_margin(arrays["locking_margin"], dial))
-            rows.append({"label": "friction power, mean", "value": mean(lost, run.cycle), "unit": "W"})
+            rows += _critical(run, near)
+            rows.append({"label": "friction power, mean", "value": run.cycle.mean(lost), "unit": "W"})
             if len(sound):
                 top = int(sound[np.argmax(lost[sound])])
                 rows.append({"label": f"friction power, largest, at {dial.at(top)}", "value": lost[top], "unit": "W"})
         rows.append({"label": f"efficiency of the cycle{_why(value, arrays)}", "value": value, "unit": "1"})
+        rows += _driven_back(run, near)
         rows.append({"label": "power residual, largest, of peak drive power", "value": balance(arrays), "unit": "1"})
     solved = int(np.count_nonzero(arrays["status"] < Status.NOT_CONVERGED))
     rows.append(
@@ -298,6 +303,42 @@ def _margin(margin: NDArray[np.float64], dial: Dial) -> dict[str, Any]:
         return {"label": "locking margin (times the friction), more than", "value": MARGIN, "unit": "1"}
     at = dial.at(int(np.nanargmin(margin)))
     return {"label": f"locking margin (times the friction), least, at {at}", "value": least, "unit": "1"}
+
+
+def _near_locking(
+    run: Run, arrays: Arrays, time: NDArray[np.float64], method: FrictionMethod
+) -> near_locking.Locking | None:
+    """What is to know of locking, if there is friction and a driver."""
+    if not rubbing(run.system) or not run.system.mechanism.drivers:
+        return None
+    with np.errstate(all="ignore"):
+        return near_locking.look(run, time, arrays["locking_margin"], method, useful_loads(run.system.mechanism))
+
+
+def _critical(run: Run, near: near_locking.Locking | None) -> list[dict[str, Any]]:
+    """The joint that decides where the margin is least, with its critical coefficient if its law has one."""
+    decides = near.responsible() if near else None
+    if decides is None:
+        return []
+    joint, multiple = decides
+    path = f"joints.{joint}.friction.coefficient"
+    if law_of(run.system, joint).interval_at_rest and path in run.values:
+        value = float(np.ravel(run.values[path])[0]) * multiple
+        return [{"label": f"critical friction coefficient, of {joint} alone", "value": value, "unit": "1"}]
+    return [{"label": f"critical multiple of the friction, of {joint} alone", "value": multiple, "unit": "1"}]
+
+
+def _driven_back(run: Run, near: near_locking.Locking | None) -> list[dict[str, Any]]:
+    """Efficiency with the useful loads driving and the motion turned round."""
+    value = near.efficiency(run.cycle) if near else None
+    if value is None:
+        return []
+    text = "efficiency driven backward by the useful loads"
+    if np.isnan(value):
+        text += " (it locks)"
+    elif value <= 0:
+        text += " (it holds itself)"
+    return [{"label": text, "value": value, "unit": "1"}]
 
 
 def _why(value: float, arrays: Arrays) -> str:

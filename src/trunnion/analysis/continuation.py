@@ -25,7 +25,7 @@ FIRST_STEP = 0.05
 LONGEST_STEP = 0.05
 LAST_STEP = 1e-9  # to which the share at which a lane locks is found
 NEWTON_LIMIT = 12
-CONVERGED = 1e-12  # of the largest unknown
+CONVERGED = 1e-9  # of the largest unknown: Newton is quadratic, what is left is its square
 NEAR_AIM = 0.25  # of Newton's first step by which the corrected point may miss its aim
 TINY_MOVE = 0.02  # of the largest unknown
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,12 @@ from trunnion.analysis.system import Dial, Positions, System, rubbing, sticking
 from trunnion.errors import Finding, Severity, Status
 from trunnion.groups import rpr, rrp, rrr
 
+if TYPE_CHECKING:
+    from trunnion.analysis.near_locking import Locking
+
 __all__ = ["Causes", "findings"]
+
+CLASS_TWO = 2
 
 
 class _Open(NamedTuple):
@@ -34,6 +39,7 @@ class Causes:
     _open: list[_Open] = field(default_factory=list)
     _zero: dict[str, list[Positions]] = field(default_factory=dict)
     _locked: dict[int, list[tuple[Positions, NDArray[np.float64]]]] = field(default_factory=dict)
+    _singular: dict[int, list[Positions]] = field(default_factory=dict)
     _undefined: dict[str, list[Positions]] = field(default_factory=dict)
 
     def note(self, back: Backward, status: NDArray[np.int8], offset: int) -> None:
@@ -49,6 +55,8 @@ class Causes:
                 bad = np.broadcast_to(where, status.shape) & (status == Status.LOAD_UNDEFINED)
                 if np.any(bad):
                     self._undefined.setdefault(path, []).append(np.flatnonzero(bad) + offset)
+        if np.any(status == Status.SINGULAR):
+            self._note_singular(back.walk, status, offset)
         if np.any(status == Status.LOCKED):
             modules = reversed(range(len(back.settled)))  # settled from the last module to the first
             for number, settled in zip(modules, back.settled, strict=True):
@@ -56,6 +64,22 @@ class Causes:
                 locked = np.flatnonzero((share < 1.0) & (status == Status.LOCKED))
                 if len(locked):
                     self._locked.setdefault(number, []).append((locked + offset, share[locked]))
+
+    def _note_singular(self, walk: Forward, status: NDArray[np.int8], offset: int) -> None:
+        """The module whose condition is the worst at each singular position."""
+        conditions = [
+            np.broadcast_to(np.nan_to_num(group.condition(pose), nan=np.inf), status.shape)
+            for group, pose in zip(walk.system.groups, walk.poses, strict=True)
+        ]
+        worst = np.argmax(conditions, axis=0)
+        for number in range(len(conditions)):
+            here = np.flatnonzero((status == Status.SINGULAR) & (worst == number))
+            if len(here):
+                self._singular.setdefault(number, []).append(here + offset)
+
+    def singular(self) -> dict[int, Positions]:
+        """Singular positions by module."""
+        return {number: np.concatenate(parts) for number, parts in self._singular.items()}
 
     def _note_open(self, walk: Forward, status: NDArray[np.int8], offset: int) -> None:
         """The first module of each unassembled position that does not close, and by how much."""
@@ -104,13 +128,16 @@ def findings(
     status: NDArray[Any],
     condition: NDArray[np.float64],
     efforts: dict[str, tuple[NDArray[np.float64], NDArray[np.float64], str]],
+    near: Locking | None = None,
 ) -> list[Finding]:
     """One finding for each cause. efforts: least and largest effort and unit of every driver."""
     found = [_not_assembled(causes, dial, part) for part in causes.open_modules().values()]
-    singular = np.flatnonzero(status == Status.SINGULAR)
-    if len(singular):
-        what = f"dead centre (singular position) {dial.intervals(singular)}: condition {_most(condition[singular])}"
-        found.append(Finding(what, "links", "speeds and forces have no finite value there; keep out of it"))
+    for number, singular in causes.singular().items():
+        module = causes.system.plan.modules[number]
+        kind = "dead centre (singular position)" if module.rank == CLASS_TWO else "singular position"
+        what = f"{kind} {dial.intervals(singular)}: condition {_most(condition[singular])}"
+        remedy = "speeds and forces have no finite value there; keep out of it"
+        found.append(Finding(what, f"links {', '.join(module.links)}", remedy))
     for path, positions in causes.undefined().items():
         what = f"has no value {dial.intervals(positions)}"
         remedy = "its line has no direction where its ends meet: move one"
@@ -118,14 +145,14 @@ def findings(
             remedy = "let its tables reach over the whole cycle, or be periodic; check divisions and roots"
         found.append(Finding(what, path, remedy))
     for number, (positions, share) in causes.locked().items():
-        found.append(_locked(causes.system, dial, number, positions, share))
+        found.append(_locked(causes.system, dial, number, positions, share, near))
     late = np.flatnonzero(status == Status.NOT_CONVERGED)
     if len(late):
         what = f"the friction iteration did not converge {dial.intervals(late)}"
         found.append(Finding(what, "joints", "use the Newton method, a larger criterion or more iterations"))
-    near = np.flatnonzero(status == Status.NEAR_SINGULAR)
-    if len(near):
-        what = f"close to a dead centre {dial.intervals(near)}: condition up to {_most(condition[near])}"
+    close = np.flatnonzero(status == Status.NEAR_SINGULAR)
+    if len(close):
+        what = f"close to a dead centre {dial.intervals(close)}: condition up to {_most(condition[close])}"
         found.append(Finding(what, "links", "forces there are very sensitive to the dimensions", Severity.WARNING))
     for joints, positions in _together(causes.zero_slip()):
         widths = [upper[positions] - lower[positions] for lower, upper, _ in efforts.values()]
@@ -180,7 +207,15 @@ def _shortfalls(walk: Forward, number: int) -> dict[str, Number]:
     return {}
 
 
-def _locked(system: System, dial: Dial, number: int, positions: Positions, share: NDArray[np.float64]) -> Finding:
+def _locked(
+    system: System,
+    dial: Dial,
+    number: int,
+    positions: Positions,
+    share: NDArray[np.float64],
+    near: Locking | None,
+) -> Finding:
+    """How far it is from running, the joint that decides, and whether it locks the other way too."""
     module = system.plan.modules[number]
     joints = ", ".join(name for name in module.joints if name in rubbing(system))
     worst = float(np.min(share))
@@ -189,6 +224,14 @@ def _locked(system: System, dial: Dial, number: int, positions: Positions, share
         f"in joints {joints}"
     )
     remedy = f"lower these coefficients below {worst:.3g} of their values, shorten the arms or lengthen the guides"
+    if near is not None:
+        both = near.locked & near.back.locked
+        if np.any(both):
+            everywhere = np.array_equal(both, near.locked)
+            what += "; it locks in reverse too: jammed" + ("" if everywhere else " at some of them")
+        decides = near.responsible()
+        if decides and decides[0] in module.joints:
+            remedy = f"{decides[0]} decides: below {decides[1]:.3g} of its coefficient alone it runs; or {remedy}"
     return Finding(what, f"links {', '.join(module.links)}", remedy)
 
 

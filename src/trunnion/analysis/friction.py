@@ -32,7 +32,17 @@ from trunnion.groups.protocol import Group
 from trunnion.joints.friction import FrictionLaw
 from trunnion.joints.pairs import Load, Reaction
 
-__all__ = ["Contact", "FrictionMethod", "Settled", "method_named", "settle"]
+__all__ = [
+    "Contact",
+    "FrictionMethod",
+    "Problem",
+    "Settled",
+    "frictionless",
+    "identity_minus",
+    "method_named",
+    "scaled",
+    "settle",
+]
 
 Method = Literal["newton", "successive-approximation"]
 
@@ -104,7 +114,8 @@ class Settled(NamedTuple):
     share: largest share of the friction for which a solution that starts frictionless was found, 1 unless the
     module locks; margin: multiple of the friction at which it would lock, ∞ beyond what was asked for;
     contraction: ∞-norm of the derivative of φ → law(N(R(φ))) (Newton), or the ratio of the last two
-    changes (successive approximation).
+    changes (successive approximation). certain: whether it is proved that there is no other solution; problem: the
+    equations themselves.
     """
 
     reactions: list[Wrench]
@@ -115,6 +126,8 @@ class Settled(NamedTuple):
     converged: Number
     share: Number
     margin: Number = np.inf
+    certain: Number = True
+    problem: Problem | None = None
 
 
 def settle(
@@ -125,13 +138,13 @@ def settle(
     if not contacts:
         return Settled(start, [], 0, 0.0, 0.0, True, 1.0)
     influence = [group.reactions(pose, contact.unit_loads) for contact in contacts]
-    problem = _Problem(contacts, start, influence)
+    problem = Problem(contacts, start, influence)
     if method.name == "successive-approximation":
         return _successive(problem, method)
     return _at_once(problem) if problem.one_way else _newton(problem, method)
 
 
-class _State(NamedTuple):
+class State(NamedTuple):
     """Reaction and normal load at every contact."""
 
     reactions: list[Wrench]
@@ -139,21 +152,21 @@ class _State(NamedTuple):
 
 
 @dataclass(frozen=True)
-class _Problem:
-    """φ = law(N(R₀ + G φ))."""
+class Problem:
+    """φ = law(N(R₀ + G φ)): the friction forces of one module, φ, with its reactions R."""
 
     contacts: Sequence[Contact]
     start: Sequence[Wrench]
     influence: Sequence[Sequence[Wrench]]
 
-    def mapped(self, change: Callable[[Number], Number]) -> _Problem:
+    def mapped(self, change: Callable[[Number], Number]) -> Problem:
         """The same with `change` applied to every number."""
 
         def each(wrenches: Sequence[Wrench]) -> list[Wrench]:
             return [Wrench(*(change(n) for n in wrench)) for wrench in wrenches]
 
         contacts = [contact.mapped(change) for contact in self.contacts]
-        return _Problem(contacts, each(self.start), [each(column) for column in self.influence])
+        return Problem(contacts, each(self.start), [each(column) for column in self.influence])
 
     def numbers(self) -> list[Number]:
         """All numbers of the problem."""
@@ -166,7 +179,7 @@ class _Problem:
         self.mapped(note)
         return found
 
-    def picked(self, lanes: Number) -> tuple[_Problem, NDArray[np.bool_]]:
+    def picked(self, lanes: Number) -> tuple[Problem, NDArray[np.bool_]]:
         """The problem of the chosen lanes alone, each number a flat array, and the choice in full shape."""
         shape = np.broadcast_shapes(np.shape(lanes), *(np.shape(number) for number in self.numbers()))
         chosen = np.broadcast_to(lanes, shape)
@@ -205,17 +218,17 @@ class _Problem:
         changes = {lead: self._changes(lead, forces) for lead in {self._alike[joint] for joint in joints}}
         return [added(self.start[joint], changes[self._alike[joint]], 1.0) for joint in joints]
 
-    def reactions(self, forces: Sequence[Number], known: _State) -> list[Wrench]:
+    def reactions(self, forces: Sequence[Number], known: State) -> list[Wrench]:
         """Reactions of all joints; those of the contacts are in the state that belongs to the forces."""
         found = {c.joint: reaction for c, reaction in zip(self.contacts, known.reactions, strict=True)}
         others = [joint for joint in range(len(self.start)) if joint not in found]
         found.update(zip(others, self.at(others, forces), strict=True))
         return [found[joint] for joint in range(len(self.start))]
 
-    def state(self, forces: Sequence[Number]) -> _State:
+    def state(self, forces: Sequence[Number]) -> State:
         """Reactions and normal loads at the contacts under friction forces."""
         at = self.at([contact.joint for contact in self.contacts], forces)
-        return _State(at, [c.load.normal(reaction) for c, reaction in zip(self.contacts, at, strict=True)])
+        return State(at, [c.load.normal(reaction) for c, reaction in zip(self.contacts, at, strict=True)])
 
     @cached_property
     def slopes(self) -> list[Number]:
@@ -226,7 +239,7 @@ class _Problem:
         """What the laws say for these normal loads."""
         return [slope * normal for slope, normal in zip(self.slopes, normals, strict=True)]
 
-    def map_derivative(self, state: _State) -> list[list[Number]]:
+    def map_derivative(self, state: State) -> list[list[Number]]:
         """A with A_kl = ∂ law_k / ∂ φ_l."""
         rows = []
         for contact, reaction, normal, slope in zip(self.contacts, *state, self.slopes, strict=True):
@@ -235,16 +248,20 @@ class _Problem:
             rows.append([_along(scaled, column[contact.joint]) for column in self.influence])
         return rows
 
-    def bound(self) -> Number:
-        """Largest row sum of |A| over all reactions: below 1 the solution exists, alone, for any share of friction."""
+    def bound(self, multiples: Sequence[float] | None = None) -> Number:
+        """Largest row sum of |A| over all reactions: below 1 the solution exists, alone, for any share of friction.
+
+        multiples: of the friction of each contact, 1 if not given.
+        """
+        factors = multiples or [1.0] * len(self.contacts)
         rows = [
-            np.abs(slope) * _total([contact.load.bound(column[contact.joint]) for column in self.influence])
-            for contact, slope in zip(self.contacts, self.slopes, strict=True)
+            np.abs(factor * slope) * _total([contact.load.bound(column[contact.joint]) for column in self.influence])
+            for contact, slope, factor in zip(self.contacts, self.slopes, factors, strict=True)
         ]
         return _largest(rows)
 
 
-def _newton(problem: _Problem, method: FrictionMethod) -> Settled:
+def _newton(problem: Problem, method: FrictionMethod) -> Settled:
     """Newton from no friction; lanes without the certificate of `bound` are followed by continuation.
 
     The matrix is kept while a round reduces the change a hundredfold, which in all but the worst cases is always.
@@ -265,7 +282,7 @@ def _newton(problem: _Problem, method: FrictionMethod) -> Settled:
         rounds = rounds + ~np.asarray(done)
         if renew:
             rows = real.map_derivative(state)
-            inverse = linalg.inverse(_identity_minus(rows))
+            inverse = linalg.inverse(identity_minus(rows))
         forces = _corrected(real, state, forces, inverse)
         before, state = state, real.state(forces)
         previous, change = change, _changed(state, before)
@@ -279,27 +296,28 @@ def _newton(problem: _Problem, method: FrictionMethod) -> Settled:
         state = real.state(forces)
         done = np.where(certain, done, shares >= 1.0)
         rows = real.map_derivative(state)
-        inverse = linalg.inverse(_identity_minus(rows))
+        inverse = linalg.inverse(identity_minus(rows))
     depth = _depth(problem)
     if depth:  # the ε parts need the matrix of the solution, not that of the way there
         rows = real.map_derivative(state)
-        inverse = linalg.inverse(_identity_minus(rows))
+        inverse = linalg.inverse(identity_minus(rows))
     for _ in range(depth):
         forces = _corrected(problem, problem.state(forces), forces, inverse)
         state = problem.state(forces)
     contraction = _largest([_total([np.abs(entry) for entry in row]) for row in rows])
     margin = _margin(real, bound, method.margin_up_to)
-    return Settled(problem.reactions(forces, state), forces, rounds, change, contraction, done, shares, margin)
+    reactions = problem.reactions(forces, state)
+    return Settled(reactions, forces, rounds, change, contraction, done, shares, margin, certain, real)
 
 
-def _at_once(problem: _Problem) -> Settled:
+def _at_once(problem: Problem) -> Settled:
     """Friction from the frictionless reactions, which it does not change but in what no law looks at."""
     forces = problem.target(problem.state([0.0] * len(problem.contacts)).normals)
     return Settled(problem.at(range(len(problem.start)), forces), forces, 1, 0.0, 0.0, True, 1.0)
 
 
 def _corrected(
-    problem: _Problem, state: _State, forces: Sequence[Number], inverse: Sequence[Sequence[Number]]
+    problem: Problem, state: State, forces: Sequence[Number], inverse: Sequence[Sequence[Number]]
 ) -> list[Number]:
     """φ + (1 − A)⁻¹ (law − φ)."""
     residual = [less(a, b) for a, b in zip(problem.target(state.normals), forces, strict=True)]
@@ -307,12 +325,12 @@ def _corrected(
     return [move if is_zero(force) else force + move for force, move in zip(forces, moves, strict=True)]
 
 
-def _changed(state: _State, before: _State) -> Number:
+def _changed(state: State, before: State) -> Number:
     """Largest change of a normal load, N."""
     return _largest([a - b for a, b in zip(state.normals, before.normals, strict=True)])
 
 
-def _successive(problem: _Problem, method: FrictionMethod) -> Settled:
+def _successive(problem: Problem, method: FrictionMethod) -> Settled:
     """[D] steps 1-5: friction from the last reactions, reactions from the last friction, until they rest."""
     forces: list[Number] = [0.0] * len(problem.contacts)
     state = problem.state(forces)
@@ -334,23 +352,23 @@ def _successive(problem: _Problem, method: FrictionMethod) -> Settled:
     return Settled(problem.reactions(forces, state), forces, rounds, change, ratio, done, 1.0)
 
 
-def _margin(problem: _Problem, bound: Number, most: float) -> Number:
+def _margin(problem: Problem, bound: Number, most: float) -> Number:
     """Multiple of the friction at which the module locks; ∞ where it does not up to `most`."""
     doubtful = bound * most >= 1.0
     if most <= 0 or not np.any(doubtful):
         return np.inf
     part, chosen = problem.picked(doubtful)
-    _, reached = continuation.follow(_scaled(part), _frictionless(part, chosen), most)
+    _, reached = continuation.follow(scaled(part), frictionless(part, chosen), most)
     margin = np.full(chosen.shape, np.inf)
     margin[chosen] = np.where(reached >= most, np.inf, reached)
     return margin
 
 
-def _follow(problem: _Problem, forces: Sequence[Number], lanes: Number) -> tuple[list[Number], NDArray[np.float64]]:
+def _follow(problem: Problem, forces: Sequence[Number], lanes: Number) -> tuple[list[Number], NDArray[np.float64]]:
     """Forces with the chosen lanes followed from no friction; NaN where they lock, and the share reached."""
     part, chosen = problem.picked(lanes)
     shape = chosen.shape
-    found, reached = continuation.follow(_scaled(part), _frictionless(part, chosen))
+    found, reached = continuation.follow(scaled(part), frictionless(part, chosen))
     result = []
     for force, value in zip(forces, found, strict=True):
         whole = np.array(np.broadcast_to(force, shape), float)
@@ -364,7 +382,7 @@ def _follow(problem: _Problem, forces: Sequence[Number], lanes: Number) -> tuple
 Weights = Callable[[NDArray[np.float64]], Sequence[Number]]
 
 
-def _scaled(problem: _Problem, weights: Weights | None = None) -> continuation.Family:
+def scaled(problem: Problem, weights: Weights | None = None) -> continuation.Family:
     """Residual φ − w(s) law(N(φ)) and its Jacobian; w(s): multiple of each contact's friction, s if not given."""
 
     def family(lanes: NDArray[np.intp]) -> continuation.System:
@@ -379,21 +397,21 @@ def _scaled(problem: _Problem, weights: Weights | None = None) -> continuation.F
             residual = [f - s * t for f, s, t in zip(forces, shares, part.target(state.normals), strict=True)]
             slopes = part.map_derivative(state)
             rows = [[s * entry for entry in row] for s, row in zip(shares, slopes, strict=True)]
-            return residual, _identity_minus(rows)
+            return residual, identity_minus(rows)
 
         return system
 
     return family
 
 
-def _frictionless(problem: _Problem, chosen: NDArray[np.bool_]) -> list[NDArray[np.float64]]:
+def frictionless(problem: Problem, chosen: NDArray[np.bool_]) -> list[NDArray[np.float64]]:
     """Forces without friction, lane by lane: none but those that push gears apart."""
     none = [np.zeros(int(np.count_nonzero(chosen))) for _ in problem.contacts]
     target = problem.target(problem.state(none).normals)
     return [zero if c.rubs else zero + t for zero, c, t in zip(none, problem.contacts, target, strict=True)]
 
 
-def _identity_minus(rows: Sequence[Sequence[Number]]) -> list[list[Number]]:
+def identity_minus(rows: Sequence[Sequence[Number]]) -> list[list[Number]]:
     return [[(1.0 if k == j else 0.0) - entry for j, entry in enumerate(row)] for k, row in enumerate(rows)]
 
 
@@ -423,11 +441,11 @@ def _largest(values: Sequence[Number]) -> Number:
     return largest
 
 
-def _depth(problem: _Problem) -> int:
+def _depth(problem: Problem) -> int:
     """Levels of ε among the inputs: each costs one Newton step at the solution."""
     return max((n.depth for n in problem.numbers() if isinstance(n, Dual)), default=0)
 
 
-def _primal(problem: _Problem) -> _Problem:
+def _primal(problem: Problem) -> Problem:
     """The problem without its dual parts."""
     return problem.mapped(primal) if _depth(problem) else problem

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -46,6 +46,7 @@ class Forward:
     local: dict[tuple[str, str], Frame]
     motions: dict[str, Motion]
     time: Number = 0.0
+    direction: float = 1.0  # −1: the same way run backward
     poses: list[Any] = field(default_factory=list)
     assembly: list[Any] = field(default_factory=list)
     _elements: dict[tuple[str, str], Frame] = field(default_factory=dict)
@@ -60,6 +61,18 @@ class Forward:
             else:
                 self._elements[key] = compose(frame, local)
         return self._elements[key]
+
+    def backward(self) -> Forward:
+        """The same positions passed the other way: velocities turned round, accelerations as they are."""
+        turned = {
+            link: motion._replace(twist=Twist(*(-1.0 * n for n in motion.twist)))
+            for link, motion in self.motions.items()
+        }
+        return replace(self, motions=turned, direction=-self.direction)
+
+    def rate(self, driver: str) -> Number:
+        """Rate of a driver, rad/s or m/s."""
+        return self.direction * self.system.drive(self.values, driver, self.time)[1]
 
     def arm(self, link: str, joint: str) -> tuple[Number, Number]:
         """From the link's origin to its element of a joint, global axes."""

@@ -77,7 +77,7 @@ class Stated:
         if name == "time":
             return self.walk.time
         if name in ("drive", "speed"):
-            return self._drive[0 if name == "drive" else 1]
+            return self._drive[0] if name == "drive" else self.walk.direction * self._drive[1]
         return self.walk.values[f"dimensions.{name}"]
 
     @functools.cached_property

@@ -1,0 +1,236 @@
+"""What is to know of locking beside the margin: which joint does it, other solutions, and the way back.
+
+All of it is read from the equations φ = law(N(R₀ + G φ)) that `friction.settle` has solved, one set for each module.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.algebra import linalg
+from trunnion.analysis import continuation
+from trunnion.analysis.bristles import histories
+from trunnion.analysis.friction import FrictionMethod, Problem, frictionless, identity_minus, scaled
+from trunnion.analysis.kinetostatics import Backward, Given, backward
+from trunnion.analysis.system import Cycle, Dial
+from trunnion.errors import Finding, Severity
+
+if TYPE_CHECKING:
+    from trunnion.analysis.analyse import Run
+
+__all__ = ["Locking", "Reverse", "critical_multiples", "findings", "look", "others", "reverse"]
+
+Array = NDArray[np.float64]
+STARTS = 48
+ROUNDS = 40
+SEED = 1785  # of the starts
+LOOKED = 120  # positions
+SAME = 1e-6  # of the largest force: two solutions nearer than this are one
+
+
+def critical_multiples(back: Backward, most: float) -> dict[str, Array]:
+    """For each joint the multiple of its own friction at which it locks its module, the others' being as they are.
+
+    ∞ where it does not up to `most`, 0 where the module locks even without friction in this joint.
+    """
+    system, positions = back.walk.system, np.shape(back.walk.time)
+    found: dict[str, Array] = {}
+    for number, settled in zip(reversed(range(len(system.plan.modules))), back.settled, strict=True):
+        for k, contact in enumerate(settled.problem.contacts if settled.problem else ()):
+            if contact.rubs and settled.problem:
+                joint = system.places[number][contact.joint].joint
+                found[joint] = np.broadcast_to(_alone(settled.problem, k, most), positions)
+    return {joint: found[joint] for joint in system.joints if joint in found}
+
+
+def _alone(problem: Problem, k: int, most: float) -> Array:
+    """The multiple for one contact: the others' friction is raised to full first, then its own."""
+    multiples = [most if i == k else 1.0 for i in range(len(problem.contacts))]
+    bound = problem.bound(multiples)
+    doubtful = np.isfinite(bound) & (bound >= 1.0)
+    part, chosen = problem.picked(doubtful)
+    result = np.full(chosen.shape, np.inf)
+    if not np.any(chosen):
+        return result
+
+    def weights(share: Array) -> Sequence[Array]:
+        others_, own = np.minimum(share, 1.0), np.maximum(share - 1.0, 0.0)
+        return [own if i == k else others_ for i in range(len(part.contacts))]
+
+    _, reached = continuation.follow(scaled(part, weights), frictionless(part, chosen), 1.0 + most)
+    result[chosen] = np.where(reached >= 1.0 + most, np.inf, np.maximum(reached - 1.0, 0.0))
+    return result
+
+
+# ---- other solutions ------------------------------------------------------------------------------------------
+
+
+def others(back: Backward) -> Array:
+    """How many solutions at full friction were found beside the one that grows from no friction, by position.
+
+    Only where the certificate of uniqueness fails is there anything to look for: there by Newton's method from many
+    starts, so it is a count of those found, not a proof that there are no more.
+    """
+    total: Array = np.zeros(np.shape(back.walk.time))
+    for settled in back.settled:
+        if settled.problem is None or np.all(settled.certain):
+            continue
+        part, chosen = settled.problem.picked(~np.asarray(settled.certain))
+        known = [np.broadcast_to(np.asarray(force, float), chosen.shape)[chosen] for force in settled.forces]
+        count = np.zeros(chosen.shape)
+        count[chosen] = _count(part, np.array(known))
+        total = total + count
+    return total
+
+
+def _count(problem: Problem, known: Array) -> Array:
+    """Solutions other than the known ones (contact, lane), NaN where there is none, lane by lane."""
+    contacts, lanes = known.shape
+    many = problem.mapped(lambda number: np.repeat(number, STARTS))
+    scale = np.repeat(_size(problem, lanes), STARTS)
+    rng = np.random.default_rng(SEED)
+    factors = rng.choice([-1.0, 1.0], (contacts, lanes * STARTS)) * 10 ** rng.uniform(-1.5, 2.0, lanes * STARTS)
+    forces = list(factors * scale)
+    with np.errstate(all="ignore"):
+        for _ in range(ROUNDS):
+            state = many.state(forces)
+            residual = [f - t for f, t in zip(forces, many.target(state.normals), strict=True)]
+            (move,) = linalg.solve(identity_minus(many.map_derivative(state)), residual)
+            forces = [f - m for f, m in zip(forces, move, strict=True)]
+        target = many.target(many.state(forces).normals)
+        error = np.max(np.abs(np.array(forces) - np.array(target)), axis=0)
+        found = np.array(forces).reshape(contacts, lanes, STARTS)
+        closed = (error <= 1e-9 * np.maximum(scale, np.max(np.abs(forces), axis=0))).reshape(lanes, STARTS)
+    counted = np.zeros(lanes)
+    for i in range(lanes):
+        counted[i] = _distinct(found[:, i, closed[i]], known[:, i], scale[i * STARTS])
+    return counted
+
+
+def _size(problem: Problem, lanes: int) -> Array:
+    """The largest load without friction, N."""
+    normals = problem.state([np.zeros(lanes) for _ in problem.contacts]).normals
+    largest: Array = np.max([np.abs(np.broadcast_to(normal, lanes)) for normal in normals], axis=0)
+    return largest + 1e-300
+
+
+def _distinct(found: Array, known: Array, scale: float) -> float:
+    """How many of the columns are neither alike nor the known one."""
+    kept = [known] if np.all(np.isfinite(known)) else []
+    before = len(kept)
+    for column in found.T:
+        near = SAME * max(scale, float(np.max(np.abs(column))))
+        if all(np.max(np.abs(column - other)) > near for other in kept):
+            kept.append(column)
+    return float(len(kept) - before)
+
+
+# ---- the way back ---------------------------------------------------------------------------------------------
+
+
+class Reverse(NamedTuple):
+    """The same positions passed backward: effort of every driver, where it locks, and what flows where.
+
+    delivered: power that the drivers take out, W; given: power that the useful loads put in, W.
+    """
+
+    efforts: dict[str, Array]
+    locked: NDArray[np.bool_]
+    delivered: Array
+    given: Array
+
+
+def reverse(run: Run, back: Backward, method: FrictionMethod, useful: Sequence[str]) -> Reverse:
+    """Drive the mechanism backward through the positions of a walk: speeds turned round, friction and all that resists
+    with them; inertia stays, for accelerations do."""
+    walk = back.walk.backward()
+    time = np.asarray(walk.time, float)
+    past = histories(run.system, run.values, run.chosen.assembly, run.cycle, reverse=True)
+    deflections = {joint: history.at(run.cycle.duration - time) for joint, history in past.items()}
+    with np.errstate(all="ignore"):
+        other = backward(walk, method, Given({}, deflections))
+    shape = time.shape
+    efforts = {name: np.broadcast_to(effort, shape) for name, effort in other.efforts.items()}
+    delivered = -sum((effort * walk.rate(name) for name, effort in efforts.items()), np.zeros(shape))
+    given = sum((np.broadcast_to(other.load_powers[name], shape) for name in useful), np.zeros(shape))
+    return Reverse(efforts, _locks(other), delivered, given)
+
+
+# ---- over a cycle ---------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Locking:
+    """What one cycle shows, looked at some times (s).
+
+    locked: whether it is; first: number of the analysed position with the least margin, None if all are beyond what was
+    looked for; critical: for each joint, the multiple of its own friction at which it locks there; others: solutions
+    at full friction beside the one that grows from none; back: the same positions run backward.
+    """
+
+    times: Array
+    locked: NDArray[np.bool_]
+    first: int | None
+    critical: dict[str, float]
+    others: Array
+    back: Reverse
+
+    def responsible(self) -> tuple[str, float] | None:
+        """The joint whose friction, changed alone, decides, and the multiple of it at which it does.
+
+        Of a mechanism that runs, the first to lock it; of one that is locked, the one that need be lowered the least.
+        """
+        sound = {joint: multiple for joint, multiple in self.critical.items() if np.isfinite(multiple)}
+        locked = [joint for joint, multiple in sound.items() if multiple < 1.0]
+        if locked:
+            joint = max(locked, key=sound.__getitem__)
+            return (joint, sound[joint]) if sound[joint] > 0 else None
+        joint = min(sound, key=sound.__getitem__, default="")
+        return (joint, sound[joint]) if joint else None
+
+    def efficiency(self, cycle: Cycle) -> float | None:
+        """Power that reaches the drivers over that which the useful loads give, with the mechanism run backward.
+
+        None where the useful loads do not drive it over the cycle, NaN where it locks; 0 or less: it holds itself.
+        """
+        given = cycle.mean(self.back.given)
+        if not given > 1e-9 * cycle.mean(np.abs(self.back.given)):
+            return None
+        return float("nan") if np.any(self.back.locked) else cycle.mean(self.back.delivered) / given
+
+
+def look(run: Run, time: Array, margin: Array, method: FrictionMethod, useful: Sequence[str]) -> Locking:
+    """Look at no more than LOOKED times of a cycle. margin: of every position analysed, NaN where unknown."""
+    times = run.cycle.times(min(len(time), LOOKED))
+    plain = replace(method, name="newton", margin_up_to=0.0)
+    walk = run.solve(times, method=plain)
+    first = int(np.nanargmin(margin)) if np.any(np.isfinite(margin)) else None
+    critical: dict[str, float] = {}
+    if first is not None:
+        at = critical_multiples(run.solve(time[[first]], method=plain), method.margin_up_to)
+        critical = {joint: float(multiple[0]) for joint, multiple in at.items()}
+    return Locking(times, _locks(walk), first, critical, others(walk), reverse(run, walk, plain, useful))
+
+
+def findings(near: Locking, dial: Dial) -> Iterator[Finding]:
+    """What to say of other solutions."""
+    more = np.flatnonzero((near.others > 0) & ~near.locked)
+    if len(more):
+        count = int(np.max(near.others[more]))
+        what = f"friction allows up to {count} other solution{'s' if count > 1 else ''} {dial.intervals(more)}"
+        remedy = "the one that grows from no friction is given; started otherwise it may wedge"
+        yield Finding(what, "joints", remedy, Severity.NOTE)
+
+
+def _locks(back: Backward) -> NDArray[np.bool_]:
+    """Where a module locks."""
+    shape = np.shape(back.walk.time)
+    locked = np.zeros(shape, bool)
+    for settled in back.settled:
+        locked |= np.broadcast_to(np.asarray(settled.share) < 1.0, shape)
+    return locked

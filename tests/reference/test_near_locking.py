@@ -1,0 +1,135 @@
+"""Which joint locks a mechanism, other solutions of friction, and driving backward: closed forms and consistency."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import trunnion
+from mechanisms import Data, analyse, build, findings, five_bar, four_bar, model, slider_crank
+from trunnion import Mechanism, Status, locking
+from trunnion.analysis.friction import Contact, Problem
+from trunnion.analysis.near_locking import _count
+from trunnion.groups.planar import Wrench
+from trunnion.joints.friction import FRICTION_LAWS
+from trunnion.joints.pairs import Load
+
+
+def drawer(arm: float, coefficient: float, length: float = 0.3) -> Data:
+    """A slide driven along its middle against a useful load beside it."""
+    return {
+        "links": {
+            "ground": {"points": {"S": {"at": [0, 0], "axis": [1, 0]}}},
+            "block": {"points": {"S": {"at": [0, 0], "axis": [1, 0]}, "P": [0, arm]}},
+        },
+        "joints": {
+            "S": {
+                "type": "prismatic",
+                "links": ["ground", "block"],
+                "guide": {"length": length},
+                "friction": coefficient,
+            }
+        },
+        "drivers": {"S": {"speed": 0.1, "range": [0, 0.2]}},
+        "loads": {"weight": {"link": "block", "at": "P", "force": [-50.0, 0], "useful": True}},
+    }
+
+
+@pytest.mark.parametrize(("arm", "coefficient"), [(0.1, 0.2), (0.3, 0.2), (0.3, 0.5), (0.45, 0.6)])
+def test_drawer_driven_backward(arm: float, coefficient: float) -> None:
+    """N₁ + N₂ = 2 F a/L, so η = 1/(1 + 2 f a/L) forward and 1 − 2 f a/L backward: it holds itself from f = L/2a."""
+    mechanism = Mechanism(**drawer(arm, coefficient))
+    result = trunnion.analyse(mechanism, 20)
+    loss = 2 * coefficient * arm / 0.3
+    assert float(result["efficiency"]) == pytest.approx(1 / (1 + loss), rel=1e-12)
+    found = locking(mechanism, 20)
+    np.testing.assert_allclose(found["drive_effort_reverse"], 50.0 * (1 - loss), rtol=1e-12, atol=1e-12)
+    (row,) = [row for row in summary(result) if row["label"].startswith("efficiency driven backward")]
+    assert row["value"] == pytest.approx(1 - loss, rel=1e-12)
+    assert ("holds itself" in row["label"]) == (loss >= 1)
+
+
+def summary(result: Any) -> list[dict[str, Any]]:
+    import json
+
+    return list(json.loads(result.attrs["summary"]))
+
+
+CASES = {
+    "slider-crank": (lambda: slider_crank(0.3, 0.5, 0.1), {"friction": 0.35, "guide": 0.06, "radius": 0.05}),
+    "five-bar": (five_bar, {"friction": 0.5, "radius": 0.15}),
+    "four-bar": (four_bar, {"friction": 0.5, "radius": 0.12}),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_critical_multiples_are_where_it_locks(name: str) -> None:
+    """Just below it runs, just above it is locked: one joint's coefficient changed in the model, at every position."""
+    data, options = CASES[name]
+    steps, coefficient = 24, options["friction"]
+    found = locking(build(data(), **options), steps)
+    checked = 0
+    for joint in found["joint"].values:
+        multiple = found["critical_multiple"].sel(joint=joint).values
+        for position in np.flatnonzero(np.isfinite(multiple) & (multiple > 0))[::5]:
+            for factor, locked in ((1 - 1e-6, False), (1 + 1e-6, True)):
+                whole = model(data(), **options)
+                whole["joints"][str(joint)]["friction"] = float(coefficient * multiple[position] * factor)
+                status = trunnion.analyse(Mechanism(**whole), steps)["status"].values[position]
+                assert (status == Status.LOCKED) == locked, (joint, position, multiple[position], status)
+                checked += 1
+    assert checked >= 6
+
+
+def test_joint_without_which_it_still_locks() -> None:
+    """Where all friction together locks early, no single joint need be able to free it: then its multiple is 0."""
+    data, options = CASES["slider-crank"]
+    found = locking(build(data(), **{**options, "friction": 0.9}), 24)
+    margin, multiple = found["locking_margin"].values, found["critical_multiple"].values
+    assert np.any(margin < 1)
+    assert np.all(multiple[:, margin < 1] < 1)
+    assert np.any(multiple == 0)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.floats(0.2, 3.0), st.floats(-2, 2), st.floats(-2, 2), st.floats(0.1, 3.0), st.sampled_from([-1.0, 1.0]))
+def test_all_solutions_of_one_pin(coefficient: float, x: float, y: float, gain: float, sense: float) -> None:
+    """φ = ∓f |R + g φ e|: a quadratic, whose roots of the right sign are all there are."""
+    if np.hypot(x, y) < 0.1:
+        return
+    law = FRICTION_LAWS["coulomb"]
+    contact = Contact(0, [], Load(), law, {"coefficient": coefficient, "pair_factor": 1.0}, np.array([sense]))
+    lane = np.ones(1)
+    problem = Problem([contact], [Wrench(x * lane, y * lane, 0.0)], [[Wrench(gain * lane, 0.0 * lane, 0.0)]])
+    # φ² = f² (R² + 2 g x φ + g² φ²), φ against the slip
+    roots = np.roots(
+        [1 - (coefficient * gain) ** 2, -2 * coefficient**2 * gain * x, -(coefficient**2) * (x * x + y * y)]
+    )
+    real = roots[np.abs(roots.imag) < 1e-9].real
+    right = real[(real * sense < 0) & (np.abs(real) < 1e6)]
+    if len(right) == 2 and abs(right[0] - right[1]) < 1e-3 * np.abs(right).max():
+        return
+    if abs(abs(coefficient * gain) - 1) < 1e-3 or (len(roots) == 2 and abs(roots[0] - roots[1]) < 1e-3):
+        return
+    assert _count(problem, np.full((1, 1), np.nan)) == len(right)
+    for known in right:
+        assert _count(problem, np.array([[known]])) == len(right) - 1
+
+
+def test_locked_findings_name_the_joint_that_decides() -> None:
+    data, options = CASES["slider-crank"]
+    result = analyse(data(), 36, **{**options, "friction": 0.9})
+    assert np.any(result["status"] == Status.LOCKED)
+    (finding,) = [one for one in findings(result) if "locked by friction" in one["what"]]
+    assert "decides" in finding["remedy"] or "lower these" in finding["remedy"]
+    assert "jammed" in finding["what"] or "reverse" not in finding["what"]
+
+
+def test_there_is_nothing_to_lock_without_friction() -> None:
+    found = locking(build(four_bar(), friction=None), 12)
+    assert found.sizes["joint"] == 0
+    assert np.all(np.isinf(found["locking_margin"]))

@@ -285,7 +285,7 @@ MOTION_EXAMPLES = {
     "period": "0.5 s",
     "range": "[0 deg, 90 deg]",
     "duration": "0.2 s",
-    "points": "[[0 s, 0 deg], [0.1 s, 20 deg]]",
+    "points": "[[0 s, 0 deg], [0.1 s, 20 deg]], or take them from a file by --table",
 }
 
 

@@ -39,6 +39,10 @@ Set = Annotated[
     list[str] | None,
     typer.Option("--set", help="Replace a value: AB=2.1m, crank.mass=5kg, B.friction.coefficient=0.3. Repeatable."),
 ]
+TableFile = Annotated[
+    list[str] | None,
+    typer.Option("--table", help="NAME=FILE.csv: points of a driver or table, two columns. Repeatable."),
+]
 FrictionLaw = Annotated[
     str | None, typer.Option("--friction", help="off, or a friction law for all joints with friction.")
 ]
@@ -56,11 +60,11 @@ Report = Annotated[
 
 
 @app.command()
-def check(file: File, set_: Set = None, friction: FrictionLaw = None) -> None:
+def check(file: File, set_: Set = None, table: TableFile = None, friction: FrictionLaw = None) -> None:
     """Findings, mobility, structural formula and plan of a mechanism."""
     from trunnion.analysis.inspect import check as inspect
 
-    mechanism = _mechanism(file, set_, friction)
+    mechanism = _mechanism(file, set_, table, friction)
     found = inspect(mechanism)
     rank = "not known: no position can be assembled" if found.rank_mobility is None else str(found.rank_mobility)
     out = _console()
@@ -83,6 +87,7 @@ def analyse(
     file: File,
     steps: Steps = 360,
     set_: Set = None,
+    table: TableFile = None,
     friction: FrictionLaw = None,
     method: Method = "newton",
     criterion: Criterion = None,
@@ -98,7 +103,7 @@ def analyse(
 
     for path in out or []:
         check_format(path)
-    mechanism = _mechanism(file, set_, friction)
+    mechanism = _mechanism(file, set_, table, friction)
     result = _run(mechanism, steps, _method(method, criterion, iterations))
     for path in out or []:
         save(result, path, units_row)
@@ -115,13 +120,14 @@ def design(
     file: File,
     steps: Steps = 720,
     set_: Set = None,
+    table: TableFile = None,
     friction: FrictionLaw = None,
     fluctuation: Annotated[float, typer.Option("--fluctuation", help="Of the drive speed, for the flywheel.")] = 0.05,
 ) -> None:
     """Transmission angles, dead centres, range, Grashof type, shaking force, balance, flywheel, motor."""
     from trunnion.analysis.design import report_rows
 
-    mechanism = _mechanism(file, set_, friction)
+    mechanism = _mechanism(file, set_, table, friction)
     _table(mechanism.name or str(file), report_rows(mechanism, steps, fluctuation))
 
 
@@ -144,6 +150,7 @@ def plot(
     ] = None,
     steps: Steps = 360,
     set_: Set = None,
+    table: TableFile = None,
     friction: FrictionLaw = None,
     image: Annotated[str, typer.Option("--format", help="png, svg or pdf, for a folder of plots.")] = "png",
 ) -> None:
@@ -159,7 +166,7 @@ def plot(
         raise MechanismError(
             Finding(f"{len(kinds)} plots do not fit one file", str(out), "name a folder, or one --kind")
         )
-    mechanism = _mechanism(file, set_, friction)
+    mechanism = _mechanism(file, set_, table, friction)
     result = _run(mechanism, steps, None)
     ideal = _ideal(mechanism, steps, None)
     if not single:
@@ -178,13 +185,14 @@ def report(
     out: Annotated[Path, typer.Option("--out", help="The HTML file to write.")],
     steps: Steps = 360,
     set_: Set = None,
+    table: TableFile = None,
     friction: FrictionLaw = None,
     method: Method = "newton",
     criterion: Criterion = None,
     iterations: Rounds = 200,
 ) -> None:
     """One self-contained HTML file: animation, plots, findings, balance, input data."""
-    mechanism = _mechanism(file, set_, friction)
+    mechanism = _mechanism(file, set_, table, friction)
     result = _run(mechanism, steps, _method(method, criterion, iterations))
     _write_report(mechanism, result, out)
     _console().print(f"wrote {out}", markup=False, highlight=False, soft_wrap=True)
@@ -294,11 +302,11 @@ def _console() -> Any:
     return Console()
 
 
-def _mechanism(file: Path, settings: list[str] | None, friction: str | None) -> Mechanism:
-    """The model with the options `--set` and `--friction` applied."""
+def _mechanism(file: Path, settings: list[str] | None, tables: list[str] | None, friction: str | None) -> Mechanism:
+    """The model with the options `--table`, `--set` and `--friction` applied, in this order."""
     from trunnion.model.file import read_mechanism
 
-    mechanism = read_mechanism(file)
+    mechanism = read_mechanism(file, dict(_table_file(text) for text in tables or ()))
     if settings:
         mechanism = mechanism.with_values(dict(_setting(text) for text in settings))
     return mechanism.with_friction(friction) if friction else mechanism
@@ -313,6 +321,14 @@ def _setting(text: str) -> tuple[str, float | str]:
         return name.strip(), float(value)
     except ValueError:
         return name.strip(), value.strip()
+
+
+def _table_file(text: str) -> tuple[str, str]:
+    """A name and its file from `name=file`."""
+    name, _, path = (part.strip() for part in text.partition("="))
+    if not name or not path:
+        raise MechanismError(Finding(f"'{text}' names no file", "--table", "write NAME=FILE, e.g. A=motion.csv"))
+    return name, path
 
 
 def _method(name: str, criterion: float | None, iterations: int) -> FrictionMethod:

@@ -27,6 +27,8 @@ DRIVERS: dict[str, Data] = {
     **{
         name: {"law": name, "range": [0.2, 1.9], "duration": 0.2, "dwell": 0.1, "delay": 0.05} for name in PROFILES
     },
+    "slow return": {"law": "modified-sine", "range": [0.2, 1.9], "duration": 0.2, "return_duration": 0.5,
+                    "dwell": 0.1, "delay": 0.05},
     "one rise": {"law": "cycloidal", "range": [1.9, 0.2], "duration": 0.2, "returns": False},
     "late rise": {"law": "cycloidal", "range": [0.2, 1.9], "duration": 0.2, "dwell": 0.1, "delay": 0.05,
                   "returns": False},
@@ -136,6 +138,24 @@ def test_rise_dwell_return_dwell() -> None:
     np.testing.assert_allclose(rate[[1, 5, 8]], np.array([1, -1, 1]) * 1.875 / 0.2, rtol=1e-12)
 
 
+@pytest.mark.parametrize("name", PROFILES)
+def test_a_return_of_its_own_duration(name: str) -> None:
+    """Rise, dwell, return, dwell one after the other; the largest rate is that of the quicker of the two."""
+    stated = {"law": name, "range": [0.5, 1.5], "duration": 0.4, "return_duration": 0.1, "dwell": 0.05}
+    run = trunnion.prepare(driven(stated))
+    assert run.cycle.duration == pytest.approx(0.6)
+    times = np.array([0.0, 0.2, 0.42, 0.45, 0.5, 0.55, 0.58, 0.6, 0.8])
+    q, rate, _ = run.system.drive(run.values, "A", times)
+    np.testing.assert_allclose(q, [0.5, 1.0, 1.5, 1.5, 1.0, 0.5, 0.5, 0.5, 1.0], atol=1e-12)
+    peak = PROFILES[name].peak_rate
+    np.testing.assert_allclose(rate[[1, 4, 8]], [peak / 0.4, -peak / 0.1, peak / 0.4], rtol=1e-12)
+    assert run.system.span(run.values, "A").peak == pytest.approx(peak / 0.1)
+    alike = trunnion.prepare(driven({**stated, "return_duration": 0.4}))
+    plain = trunnion.prepare(driven({key: value for key, value in stated.items() if key != "return_duration"}))
+    for one, other in zip(*(r.system.drive(r.values, "A", times) for r in (alike, plain)), strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
 def test_a_single_rise_stays_and_a_delay_shifts_it() -> None:
     run = trunnion.prepare(driven(DRIVERS["late rise"]))
     assert (run.cycle.duration, run.cycle.periodic) == (pytest.approx(0.35), False)
@@ -157,7 +177,8 @@ def test_a_periodic_table_may_gain_whole_turns() -> None:
 
 NUMBERS = [
     ("harmonic", "amplitude"), ("harmonic", "period"), ("harmonic", "phase"), ("harmonic", "mean"),
-    ("cycloidal", "duration"), ("modified-sine", "dwell"), ("polynomial-345", "range.to"), ("cycloidal", "delay"),
+    ("cycloidal", "duration"), ("modified-sine", "dwell"), ("slow return", "return_duration"),
+    ("slow return", "duration"), ("polynomial-345", "range.to"), ("cycloidal", "delay"),
     ("periodic table", "points.2.coordinate"), ("clamped table", "points.1.time"), ("natural table", "points.4.time"),
     ("constant", "speed"),
 ]  # fmt: skip
@@ -312,7 +333,7 @@ def test_a_general_group_follows_any_law(name: str) -> None:
             np.testing.assert_allclose(np.broadcast_to(other, 50), np.broadcast_to(one, 50), atol=1e-9)
 
 
-TIMES = {f"drivers.A.{key}" for key in ("period", "duration", "dwell", "delay")}
+TIMES = {f"drivers.A.{key}" for key in ("period", "duration", "return_duration", "dwell", "delay")}
 
 
 def test_a_fast_rise_between_long_dwells_is_followed() -> None:
@@ -341,6 +362,9 @@ BAD: list[tuple[Data, str, str]] = [
     ({**RISE, "speed": 3.0}, "drivers.A.speed", "'speed' means nothing to the motion law cycloidal"),
     ({"speed": 3.0, "duration": 0.2}, "drivers.A.duration", "means nothing to the motion law constant"),
     ({**RISE, "dwell": -0.1}, "drivers.A.dwell", "is -0.1 s, which is negative"),
+    ({**RISE, "return_duration": 0}, "drivers.A.return_duration", "is 0 s, which is not above 0"),
+    ({**RISE, "return_duration": 1, "returns": False}, "drivers.A.return_duration", "does not return"),
+    ({"speed": 3.0, "return_duration": 0.2}, "drivers.A.return_duration", "means nothing to the motion law constant"),
     ({**RISE, "range": [1, 1]}, "drivers.A.range", "begins and ends at 1"),
     ({**RISE, "law": "cycloid"}, "drivers.A.law", "'cycloid' is not a motion law"),
     ({**RISE, "return": True}, "drivers.A.return", "the key 'return' is unknown"),

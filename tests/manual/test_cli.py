@@ -102,6 +102,23 @@ def test_set_replaces_dimensions_and_paths(run: Run) -> None:
     assert run("analyse", FOUR_BAR, "--set", "B.friction.coefficient=0.1").out != plain
 
 
+def test_points_come_from_a_csv_file(run: Run, tmp_path: Path) -> None:
+    """Every verb that reads a model takes them; what is wrong with the file has its line."""
+    (tmp_path / "motion.csv").write_text("time [s];angle [deg]\n0;0\n0,5;60\n1;90\n", encoding="utf-8")
+    option = ("--table", "A=motion.csv")
+    assert run("analyse", FOUR_BAR, *option, "--steps", "11", "--out", "r.csv").code == 0
+    rotation = [float(row["A.rotation"]) for row in table(tmp_path / "r.csv")]
+    assert rotation[0] == 0
+    assert rotation[5] == pytest.approx(1.0471975511965976)
+    for verb in (["check"], ["design"], ["plot", "--out", "p.svg", "--kind", "torque"], ["report", "--out", "r.html"]):
+        assert run(verb[0], FOUR_BAR, *verb[1:], *option).code == 0
+    assert run("analyse", FOUR_BAR, *option, "--set", "A.points.2.coordinate=80deg", "--steps", "5").code == 0
+    (tmp_path / "motion.csv").write_text("0;0\n0,5;60 deg\n", encoding="utf-8")
+    outcome = run("check", FOUR_BAR, *option)
+    assert outcome.code == 2
+    assert "motion.csv:2: error: '60 deg' is not a finite number — " in outcome.err
+
+
 def test_methods_agree(run: Run, tmp_path: Path) -> None:
     assert run("analyse", FOUR_BAR, "--out", "newton.csv").code == 0
     named = ("--method", "successive-approximation", "--criterion", "1e-9", "--out", "named.csv")
@@ -320,6 +337,13 @@ def test_bad_options_are_refused_with_a_message(run: Run, tmp_path: Path, option
     assert done.code == 2
     assert word in done.err
     assert not files(tmp_path)
+
+
+@pytest.mark.parametrize("text", ["A", "A=", "=x.csv", "B=x.csv"])
+def test_bad_tables_are_refused(run: Run, text: str) -> None:
+    outcome = run("check", FOUR_BAR, "--table", text)
+    assert outcome.code == 2
+    assert " — " in outcome.err
 
 
 def test_bad_plot_options(run: Run) -> None:

@@ -27,7 +27,7 @@ CASES = [
     ("[ground, crank]", "[ground]", 18, "joints.A.links", "'", "add"),
     ("[ground, crank]", "ground", 18, "joints.A.links", "not a list", "[..., ...]"),
     ("[ground, crank]", "[ground, crank, rocker]", 18, "joints.A.links", "more than the 2", "remove"),
-    ("[ground, crank]", "[ground, 3]", 18, "joints.A.links", "not a text", "quotes"),
+    ("[ground, crank]", "[ground, 3]", 18, "joints.A.links.1", "not a text", "quotes"),
     ("B: [AB, 0]", "B: [AB]", 10, "links.crank.points.B", "has 1 entries, at least 2", "give"),
     ("B: [AB, 0]", "B: AB", 10, "links.crank.points.B", "not a group", ""),
     ("B: [AB, 0]", "B: [AB, 0, 0]", 10, "links.crank.points.B", "has 3 coordinates", "give 2"),
@@ -61,6 +61,7 @@ CASES = [
     ("radius: 7.5 mm", "radius: 7.5 kg", 23, "joint_defaults.pin.radius", "a mass where a length", "60 mm"),
     ("friction: 0.1", "friction: 3 mm", 24, "joint_defaults.friction", "a length where a number", "0.1"),
     ("C: [3.9, 2.5]", "C: 30 mm", 30, "assembly.C", "a length where an angle", "30 deg"),
+    ("trunnion: 1", "trunnion: 1\nreferences: [A book, 3]", 2, "references.1", "is not a text", "in quotes"),
     # names
     ("  crank:\n", "  cr.ank:\n", 9, "links.cr.ank", "has a dot", "- or _"),
     ("  crank:\n", '  "cr\\u0007ank":\n', 9, "links", "control characters", "printable"),

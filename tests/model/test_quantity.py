@@ -111,6 +111,8 @@ def test_tolerances(text: str, value: float, tolerance: tuple[float, float]) -> 
         ("1500 1/min", KINDS["angular speed"], "'1/min' may count turns", "rpm or rad/s"),
         ("10 N", KINDS["moment"], "a force where a moment", "10 N m"),
         ("60 furlongz", LENGTH, "'furlongz' is not known", "2 * AB"),
+        ("60 mmm", LENGTH, "'mmm' is not known", "did you mean 'mm'?"),
+        ("60 N/mmm", KINDS["stiffness"], "'N/mmm' is not known", "did you mean 'mm'?"),
         ("20 degC", LENGTH, "not one of mechanics", "length, mass, time and angle"),
         ("3 A", LENGTH, "not one of mechanics", ""),
         ("2 dB", NUMBER, "not one of mechanics", ""),

@@ -69,6 +69,12 @@ console.log(
     loads: seen("stage", "load"),
     moments: seen("stage", "arc"),
     springs: places.stage.find(classes("spring")).map((element) => element.attributes.d),
+    slits: places.stage.find(classes("slit")).map((element) => element.attributes.d),
+    labels: places.stage.find(classes("load")).map((element) => {
+      const text = element.find((part) => part.name === "text")[0];
+      const shift = Number(/translate\(([-\d.]+),/.exec(element.attributes.transform)[1]);
+      return [shift + Number(text.attributes.x), text.attributes.class ?? "", text.textContent];
+    }),
     circles: places.stage.find(classes("pitch-circle")).map((element) => element.attributes.r),
     remarks: places.polars.find(classes("remark")).map((element) => element.textContent),
     silent: places.charts.find((element) => element.textContent === "no values" && element.name === "text").length,

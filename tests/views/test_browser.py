@@ -13,10 +13,13 @@ import pytest
 from stand_in import four_bar
 
 from geared import geared_five_bar
-from mechanisms import analyse
+from mechanisms import MODELS, analyse, slider_crank
+from trunnion import analyse as analysed
+from trunnion import read
 from trunnion.errors import Status
 from trunnion.views.scene import scene
 
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 NODE = shutil.which("node")
 
 if NODE:  # not a skip: what must hold everywhere is tested in Python; this is the browser's own part
@@ -62,6 +65,23 @@ if NODE:  # not a skip: what must hold everywhere is tested in Python; this is t
     def test_pitch_circles_are_drawn(tmp_path):
         result = analyse(geared_five_bar(), 24)
         assert len(page(result, tmp_path)["circles"]) == 2
+
+    def test_slots_on_moving_links_are_drawn(tmp_path):
+        """The slit is as long as the slide travels and the block needs; a guide on the ground has none."""
+        result = analyse(MODELS["inverted slider-crank"](), 24)
+        (path,) = page(result, tmp_path)["slits"]
+        ends = [[float(text) for text in end.split(",")] for end in path[1:].split("L")]
+        assert np.hypot(*np.subtract(*ends)) > 2 * 26
+        assert page(analyse(slider_crank(), 24), tmp_path)["slits"] == []
+
+    def test_labels_of_loads_stay_in_the_picture(tmp_path):
+        """A force at the right edge of a picture that is printed 490 px wide."""
+        result = analysed(read(EXAMPLES / "elliptic-trammel.yaml"), 24)
+        for turn in range(6):
+            turned = result.roll(position=-4 * turn, roll_coords=False)
+            for x, side, text in page(turned, tmp_path)["labels"]:
+                width = 7.6 * len(text)
+                assert 0 <= (x - width if side == "end" else x) <= 490 - width
 
     def test_locked_everywhere_is_said_in_the_charts(tmp_path):
         assert page(four_bar(36, gap=(0, 36, Status.LOCKED)), tmp_path)["silent"] >= 3

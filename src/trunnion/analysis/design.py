@@ -8,21 +8,23 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.algebra.linalg import cross, dot
 from trunnion.analysis.analyse import Run, prepare
 from trunnion.analysis.kinematics import Forward, forward
 from trunnion.analysis.kinetostatics import Backward
 from trunnion.errors import Finding, MechanismError
-from trunnion.groups import rpr, rrp, rrr
+from trunnion.groups import prp, rpp, rpr, rrp, rrr
 from trunnion.model.mechanism import Mechanism
 
 __all__ = [
     "Counterweight",
     "Design",
+    "Extremes",
     "all_instant_centres",
     "counterweights",
     "curvature",
@@ -31,6 +33,7 @@ __all__ = [
     "grashof",
     "instant_centre",
     "limits",
+    "pressure_angles",
     "report_rows",
     "shaking",
     "transmission_angles",
@@ -50,19 +53,30 @@ class Counterweight:
     y: float
 
 
+class Extremes(NamedTuple):
+    """Least and largest value over the positions of a cycle, and the drive coordinates (rad, m; s) where they are."""
+
+    least: float
+    at_least: float
+    largest: float
+    at_largest: float
+
+
 @dataclass(frozen=True)
 class Design:
     """Figures of a linkage over its cycle; angles in rad, SI.
 
-    transmission_angle: least of each dyad, folded into 0 … π/2 (π/2 is best); dead_centres: of each link that
-    turns about the ground or slides on it, the drive coordinates where it turns back; limits: drive coordinates
-    between which the linkage can be assembled; shaking_force, shaking_moment (about the ground's origin): largest
+    transmission_angle: least of each dyad, folded into 0 … π/2 (π/2 is best); pressure_angle: extremes of each
+    dyad in −π/2 … π/2 (0 is best); dead_centres: of each link that turns about the ground or slides on it, the
+    drive coordinates where it turns back; limits: drive coordinates between which the linkage can be assembled;
+    shaking_force, shaking_moment (about the ground's origin): largest
     that inertia puts on the frame; rms_effort, peak_power: of the first driver; energy_swing: largest change of
     its energy about the mean, J; grashof: type of a four-bar, empty if it is none.
     """
 
     grashof: str
     transmission_angle: dict[str, float]
+    pressure_angle: dict[str, Extremes]
     dead_centres: dict[str, tuple[float, ...]]
     limits: tuple[tuple[float, float], ...]
     shaking_force: float
@@ -99,6 +113,7 @@ def design(mechanism: Mechanism, steps: int = 720) -> Design:
     return Design(
         grashof(mechanism, run),
         {name: _least(np.broadcast_to(angle, time.shape)) for name, angle in transmission_angles(walk).items()},
+        {name: _extremes(run, np.broadcast_to(angle, time.shape)) for name, angle in pressure_angles(walk).items()},
         dead_centres(run, steps),
         limits(run, steps),
         _largest(np.hypot(*force)),
@@ -120,27 +135,54 @@ def _largest(values: Array) -> float:
 
 
 def transmission_angles(walk: Forward) -> dict[str, Array]:
-    """Transmission angle of every dyad along the walk, rad in 0 … π/2, by its joints' names.
+    """Transmission angle of every dyad along the walk, rad in 0 … π/2, by its joints' names: π/2 less |φ|.
 
-    RRR: between the two links at their common pin; RRP: between the rod and the normal of the guide's path, so
-    that π/2 less the pressure angle; RPR: between the line of the outer pins and the normal of the slide.
+    φ is the pressure angle. RRR: between the two links at their common pin, folded to be acute; RRP: between the rod
+    and the normal of the guide's path; RPR: between the line of the outer pins and the normal of the slide; PRP and
+    RPP: between the two guides.
+    """
+    return {name: np.pi / 2 - np.abs(angle) for name, angle in pressure_angles(walk).items()}
+
+
+def pressure_angles(walk: Forward) -> dict[str, Array]:
+    """Pressure angle φ of every dyad along the walk, rad in −π/2 … π/2, by its joints' names.
+
+    The angle between the force that the first link puts on the second, had the first neither friction nor loads,
+    and the velocity of the point of the second that it acts on, against the link that holds the second. But for RPP
+    it is the same the other way round. cos φ is 2 over the condition number of the dyad. With its joints B, C, D:
+
+    RRR   force along BC, velocity of C across DC: sin φ = cos(BC, DC), positive where the angle at C is acute
+    RRP   force along BC, velocity along the guide u: sin φ = p/|BC|, C being p to the left of the line along u by B
+    RPR   force across the slide, through B, velocity across BD: sin φ = e/|BD|, D being e to the left of that line
+    PRP, RPP   force across the one guide u, velocity along the other v: sin φ = cos(u, v)
+
+    Source: R. L. Norton, Design of Machinery, "Transmission angle" (π/2 less |φ|) and "Pressure angle".
     """
     found: dict[str, Array] = {}
     with np.errstate(all="ignore"):
         for module, pose in zip(walk.system.plan.modules, walk.poses, strict=True):
-            name = "-".join(module.joints)
-            if isinstance(pose, rrr.Pose):
-                sine = np.abs(1 / (pose.area * pose.lengths[0] * pose.lengths[1]))
-                found[name] = np.arctan2(sine, np.abs(_dot(pose.bc, pose.dc)) / (pose.lengths[0] * pose.lengths[1]))
-            elif isinstance(pose, rrp.Pose):
-                found[name] = np.arctan2(np.abs(pose.r), np.abs(pose.p))
-            elif isinstance(pose, rpr.Pose):
-                found[name] = np.arctan2(np.abs(pose.along), np.abs(pose.offset))
+            match pose:  # what is lost of the force, and what moves
+                case rrr.Pose():
+                    lost, moves = dot(pose.bc, pose.dc), 1 / pose.area
+                case rrp.Pose():
+                    lost, moves = pose.p, pose.r
+                case rpr.Pose():
+                    lost, moves = pose.offset, pose.along
+                case prp.Pose() | rpp.Pose():
+                    lost, moves = dot(pose.u, pose.v), cross(pose.u, pose.v)
+                case _:
+                    continue
+            found["-".join(module.joints)] = np.arctan2(lost, np.abs(moves))
     return found
 
 
-def _dot(a: tuple[Array, Array], b: tuple[Array, Array]) -> Array:
-    return a[0] * b[0] + a[1] * b[1]
+def _extremes(run: Run, values: Array) -> Extremes:
+    """Extremes over the positions of a cycle; NaN where there is no number at all."""
+    if not np.any(np.isfinite(values)):
+        return Extremes(*([float("nan")] * 4))
+    time = run.cycle.times(len(values))
+    low, high = int(np.nanargmin(values)), int(np.nanargmax(values))
+    return Extremes(float(values[low]), _coordinate(run, time[low]), float(values[high]), _coordinate(run, time[high]))
 
 
 def shaking(back: Backward) -> tuple[tuple[Array, Array], Array]:
@@ -351,6 +393,16 @@ def all_instant_centres(walk: Forward) -> dict[tuple[str, str], tuple[Array, Arr
     return {(a, b): instant_centre(walk, a, b) for a, b in combinations(walk.system.mechanism.links, 2)}
 
 
+def _told(label: str, extremes: Extremes, scale: float, unit: str) -> tuple[str, float | str]:
+    """Label with the places and value with the extremes of an angle, in degrees; scale, unit: of the places."""
+    low, high = np.degrees(extremes.least), np.degrees(extremes.largest)
+    if not high - low > 1e-9:
+        return f"{label}, everywhere", low
+    gap = "" if unit == "°" else " "
+    places = " and ".join(f"{place * scale:.5g}{gap}{unit}" for place in (extremes.at_least, extremes.at_largest))
+    return f"{label}, at {places}", f"{low:.6g} … {high:.6g}"
+
+
 def report_rows(mechanism: Mechanism, steps: int = 720, fluctuation: float = 0.05) -> list[dict[str, Any]]:
     """The figures as rows with label, value (number, text or None) and unit, as a table shows them."""
     run = prepare(mechanism)
@@ -368,6 +420,8 @@ def report_rows(mechanism: Mechanism, steps: int = 720, fluctuation: float = 0.0
         row("four-bar type (Grashof)", found.grashof)
     for name, angle in found.transmission_angle.items():
         row(f"transmission angle of {name}, least", angle * 180 / np.pi, "°")
+    for name, extremes in found.pressure_angle.items():
+        row(*_told(f"pressure angle of {name}", extremes, scale, unit), "°")
     for name, places in found.dead_centres.items():
         if places:
             row(f"{name} turns back at", ", ".join(f"{place * scale:.8g}" for place in places), f"{unit} of {driver}")

@@ -161,25 +161,28 @@ def springs(walk: Forward, slips: Mapping[str, Slip]) -> Iterator[tuple[str, Act
     for name, spring in walk.system.mechanism.springs.items():
         path = f"springs.{name}"
         if spring.between is not None:
-            yield name, *_line(walk, path, spring.between)
+            yield name, *_line(walk, path, spring.between, spring.only)
             continue
         joint = spring.joint or ""
         slip = slips[joint]
         turns = walk.system.joints[joint][0] == "revolute"
-        state = _state(walk, path, _turned_by(walk, path, joint) if turns else _slid_by(walk, path, joint), slip.speed)
+        elongation = _turned_by(walk, path, joint) if turns else _slid_by(walk, path, joint)
+        state = _state(walk, path, elongation, slip.speed, spring.only)
         yield name, _in_joint(walk, joint, -state.force, slip), state
 
 
-def _line(walk: Forward, path: str, ends: tuple[str, str]) -> tuple[Action, SpringState]:
+def _line(walk: Forward, path: str, ends: tuple[str, str], only: str | None) -> tuple[Action, SpringState]:
     """A spring along the line between two points; no value where they meet, for the line has no direction there."""
     (one, a), (other, b) = ((end.partition(".")[0], _end(walk, end)) for end in ends)
     dx, dy = b.place[0] - a.place[0], b.place[1] - a.place[1]
     square = dx * dx + dy * dy
     xp = namespace(square)
-    length = xp.sqrt(xp.where(primal(square) > 0, square, np.nan))
+    apart, meeting = primal(square) > 0, 1.0 if only == "pull" else np.nan  # a slack rope needs no direction
+    length = xp.sqrt(xp.where(apart, square, meeting))
     ux, uy = dx / length, dy / length
     rate = (b.velocity[0] - a.velocity[0]) * ux + (b.velocity[1] - a.velocity[1]) * uy
-    state = _state(walk, path, length - walk.values.get(f"{path}.free_length", 0.0), rate)
+    elongation = xp.where(apart, length, 0.0 * length) - walk.values.get(f"{path}.free_length", 0.0)
+    state = _state(walk, path, elongation, rate, only)
     x, y = state.force * ux, state.force * uy
     return Action([(one, Wrench(x, y, 0.0), a.place), (other, Wrench(-x, -y, 0.0), b.place)], state.power), state
 
@@ -209,7 +212,13 @@ def _slid_by(walk: Forward, path: str, joint: str) -> Number:
     return slide - walk.values.get(f"{path}.free_length", 0.0)
 
 
-def _state(walk: Forward, path: str, elongation: Number, rate: Number) -> SpringState:
+def _state(walk: Forward, path: str, elongation: Number, rate: Number, only: str | None) -> SpringState:
+    """The spring at an elongation. only: it acts where that is positive (pull) or negative (push), its damper too."""
     stiffness, damping, preload = (walk.values.get(f"{path}.{key}", 0.0) for key in ("stiffness", "damping", "preload"))
     force = preload + stiffness * elongation + damping * rate
-    return SpringState(force, elongation, -force * rate, damping * rate * rate)
+    loss = damping * rate * rate
+    if only is not None:
+        beyond = primal(elongation)
+        idle = beyond <= 0 if only == "pull" else beyond >= 0  # not so where there is no elongation: NaN is kept
+        force, loss = (namespace(number).where(idle, 0.0, number) for number in (force, loss))
+    return SpringState(force, elongation, -force * rate, loss)

@@ -159,18 +159,25 @@ def _risen(profile: Profile, time: Number, duration: Number) -> Drive:
     return Drive(s, xp.where(moving, rate / duration, 0.0), xp.where(moving, second / (duration * duration), 0.0))
 
 
+def _return_duration(parameters: Parameters) -> Number:
+    """Time of the return, s: that of the rise if it is not stated."""
+    return parameters["return_duration"] if "return_duration" in parameters else parameters["duration"]
+
+
 def _between(profile: Profile) -> Callable[[Number, Parameters], Drive]:
     """The law that rises and returns along a profile."""
 
     def motion(time: Number, parameters: Parameters) -> Drive:
         """Rise from the first to the second end of the range, dwell, return, dwell; or rise and stay."""
         duration, step = parameters["duration"], parameters["duration"] + parameters["dwell"]
+        back = _return_duration(parameters)
         moment = time - parameters["delay"]
         if not parameters["returns"]:
             parts = _risen(profile, moment, duration)
         else:
-            moment = moment - np.floor(primal(moment) / primal(2 * step)) * (2 * step)
-            up, down = _risen(profile, moment, duration), _risen(profile, moment - step, duration)
+            period = step + back + parameters["dwell"]
+            moment = moment - np.floor(primal(moment) / primal(period)) * period
+            up, down = _risen(profile, moment, duration), _risen(profile, moment - step, back)
             parts = Drive(*(a - b for a, b in zip(up, down, strict=True)))
         extent = parameters["range.to"] - parameters["range.from"]
         return Drive(parameters["range.from"] + extent * parts.value, extent * parts.rate, extent * parts.second)
@@ -184,9 +191,11 @@ def _profile(profile: Profile, peak_rate: float, peak_second: float, source: str
     def span(parameters: Parameters) -> Span:
         duration, dwell, delay = (primal(parameters[key]) for key in ("duration", "dwell", "delay"))
         travel = np.abs(primal(parameters["range.to"] - parameters["range.from"]))
-        peak = peak_rate * travel / duration
         if parameters["returns"]:
-            return Span(2 * (duration + dwell), True, False, False, peak, travel)
+            back = primal(_return_duration(parameters))
+            peak = peak_rate * travel / np.minimum(duration, back)
+            return Span(duration + back + 2 * dwell, True, False, False, peak, travel)
+        peak = peak_rate * travel / duration
         one_way = bool(np.all(dwell == 0) and np.all(delay == 0))
         return Span(delay + duration + dwell, False, True, one_way, peak, travel)
 
@@ -194,7 +203,7 @@ def _profile(profile: Profile, peak_rate: float, peak_second: float, source: str
         _between(profile),
         span,
         needs=("range", "duration"),
-        takes=("dwell", "returns", "delay"),
+        takes=("return_duration", "dwell", "returns", "delay"),
         source=source,
         validity=validity,
         profile=profile,

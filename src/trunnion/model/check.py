@@ -268,6 +268,9 @@ def _motion(driver: Driver, where: str) -> Iterator[Finding]:
         if getattr(driver, key) is None:
             law_too = "" if "law" in driver.model_fields_set else f", or a law: {', '.join(MOTION_LAWS)}"
             yield Finding(f"'{key}' is missing", where, f"add {key}: {MOTION_EXAMPLES[key]}{law_too}")
+    if driver.return_duration is not None and not driver.returns:
+        what = "'return_duration' means nothing to a driver that does not return"
+        yield Finding(what, f"{where}.return_duration", "remove it, or returns: false")
     if driver.points is not None and driver.periodic and len(driver.points) < 3:
         yield Finding("a periodic table needs three points", f"{where}.points", "add points")
     if driver.points is not None and driver.ends == "natural":
@@ -282,7 +285,7 @@ MOTION_EXAMPLES = {
     "period": "0.5 s",
     "range": "[0 deg, 90 deg]",
     "duration": "0.2 s",
-    "points": "[[0 s, 0 deg], [0.1 s, 20 deg]]",
+    "points": "[[0 s, 0 deg], [0.1 s, 20 deg]], or take them from a file by --table",
 }
 
 

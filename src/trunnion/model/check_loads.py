@@ -145,10 +145,15 @@ def _free(spring: Spring, turns: bool, where: str) -> Iterator[Finding]:
         yield Finding(f"a stiffness without a {own}", where, f"add {own}: {example}; its force there is the preload")
     elif spring.stiffness is None and getattr(spring, own) is not None:
         yield Finding(f"a {own} means nothing without a stiffness", f"{where}.{own}", "add stiffness: … or remove it")
+    if spring.only is not None and turns:
+        yield Finding(f"a spring in a joint that turns cannot only {spring.only}", f"{where}.only", "remove it")
+    elif spring.only is not None and spring.stiffness is None:
+        remedy = "add stiffness: … and free_length: …, which tells where it begins to act"
+        yield Finding(f"a spring that can only {spring.only} needs a stiffness", where, remedy)
 
 
 def spring_values(mechanism: Mechanism, values: Values) -> Iterator[Finding]:
-    """Signs, and a free angle that would count whole turns where nothing counts them."""
+    """Signs, the sense of a preload, and a free angle that would count whole turns where nothing counts them."""
     for name, spring in mechanism.springs.items():
         where = f"springs.{name}"
         for key in ("stiffness", "damping", *(["free_length"] if spring.between else [])):
@@ -157,6 +162,10 @@ def spring_values(mechanism: Mechanism, values: Values) -> Iterator[Finding]:
                 yield Finding(f"is {number:g}, which is negative", f"{where}.{key}", "give a value of at least 0")
         if values.get(f"{where}.stiffness", np.nan) == 0:
             yield Finding("is 0: the spring does not pull", f"{where}.stiffness", "remove it", Severity.WARNING)
+        preload = values.get(f"{where}.preload", np.nan)
+        if spring.only is not None and preload * (1 if spring.only == "pull" else -1) < 0:
+            what = f"is {preload:g} N, which {'pushes' if preload < 0 else 'pulls'}; the spring can only {spring.only}"
+            yield Finding(what, f"{where}.preload", "change its sign, or remove it")
         turns = np.abs(values.get(f"{where}.free_angle", np.nan)) / (2 * np.pi)
         if spring.joint not in mechanism.drivers and turns > 1:
             what = f"is {turns:.3g} turns, but the rotation of '{spring.joint}', which is not driven, counts none"

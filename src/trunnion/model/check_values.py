@@ -99,7 +99,7 @@ def _law_value(declared: LawParameter, parameter: str, number: Number, where: st
 
 def _driver(mechanism: Mechanism, name: str, values: Values) -> Iterator[Finding]:
     where, driver = f"drivers.{name}", mechanism.drivers[name]
-    for key in ("period", "duration"):
+    for key in ("period", "duration", "return_duration"):
         if values.get(f"{where}.{key}", np.nan) <= 0:
             number = values[f"{where}.{key}"]
             yield Finding(f"is {number:g} s, which is not above 0", f"{where}.{key}", "give a time above 0")

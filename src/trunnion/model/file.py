@@ -20,7 +20,9 @@ from ruamel.yaml.events import AliasEvent, CollectionEndEvent, CollectionStartEv
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
 from trunnion.errors import Finding, MechanismError
+from trunnion.model.csv_table import TableFiles, place_findings, with_points
 from trunnion.model.mechanism import Mechanism
+from trunnion.model.text import read_text
 from trunnion.output import whole
 
 __all__ = ["read_mechanism", "write_mechanism"]
@@ -34,22 +36,24 @@ _PLAIN_TAGS = frozenset(_TAG + name for name in ("str", "int", "float", "bool", 
 Lines = dict[str, int]
 
 
-def read_mechanism(path: str | os.PathLike[str]) -> Mechanism:
+def read_mechanism(path: str | os.PathLike[str], tables: TableFiles | None = None) -> Mechanism:
     """The mechanism of a file, by its extension .yaml, .yml, .json or .toml.
 
+    tables: CSV files with the points of drivers and tables, by name, see `Mechanism.with_table`.
     MechanismError with every finding of severity error, each with file, line, what and remedy.
     """
     path = Path(path)
     try:
         kind = _file_type(path)
-        data, lines = _parse(_text(path), kind)
+        data, lines = _parse(read_text(path, "a model file", MAX_BYTES, "start from one of the examples"), kind)
         findings = [] if "trunnion" in data else [_unversioned()]
     except MechanismError as error:
         raise MechanismError(finding.at(str(path), finding.line) for finding in error.findings) from None
+    data, read = with_points(data, tables or {})
     try:
         mechanism = Mechanism(**data)
     except MechanismError as error:
-        findings += error.findings
+        findings += place_findings(error.findings, read)
     if findings:
         raise MechanismError(_placed(findings, str(path), lines, data)) from None
     return mechanism
@@ -91,35 +95,6 @@ def _file_type(path: Path) -> str:
             )
         )
     return _TYPES[suffix]
-
-
-def _text(path: Path) -> str:
-    """The content of a file of bounded size, as text."""
-    try:
-        if path.exists() and not path.is_file():
-            raise MechanismError(Finding("is not a file", remedy="name a model file"))
-        size = path.stat().st_size
-        if size > MAX_BYTES:
-            raise MechanismError(
-                Finding(
-                    f"has {size / 1e6:.1f} MB, a model file at most {MAX_BYTES / 1e6:.1f} MB",
-                    remedy="check that it is a model file",
-                )
-            )
-        raw = path.read_bytes()
-    except (OSError, ValueError) as error:
-        reason = str(getattr(error, "strerror", None) or error)
-        raise MechanismError(Finding(f"cannot be read: {reason}", remedy="check the path")) from error
-    try:
-        text = raw.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = raw.count(b"\n", 0, error.start) + 1
-        raise MechanismError(
-            Finding(f"is not UTF-8 text (byte {error.start})", remedy="save it as UTF-8", line=line)
-        ) from error
-    if not text.strip():
-        raise MechanismError(Finding("is empty", remedy="start from one of the examples", line=1))
-    return text
 
 
 def _parse(text: str, kind: str) -> tuple[dict[str, Any], Lines]:
@@ -259,8 +234,11 @@ def _placed(findings: Iterable[Finding], file: str, lines: Lines, data: Mapping[
     loop = data.get("loop")
     rows = {f"loop.{row.get('joint')}": f"loop.{index}" for index, row in _groups(loop)}
     rows |= {f"joints.{name.partition('.')[2]}": row for name, row in rows.items()}
-    placed = [finding.at(file, finding.line or _line(finding.where, lines, rows)) for finding in findings]
-    return sorted(placed, key=lambda finding: finding.line or 0)
+    placed = [
+        finding if finding.file else finding.at(file, finding.line or _line(finding.where, lines, rows))
+        for finding in findings
+    ]
+    return sorted(placed, key=lambda finding: (finding.file != file, finding.file, finding.line or 0))
 
 
 def _groups(items: Any) -> list[tuple[int, dict[str, Any]]]:

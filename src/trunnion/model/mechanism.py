@@ -179,6 +179,20 @@ class Mechanism(Part):
             )
         return Mechanism(**data)
 
+    def with_table(self, name: str, path: str | os.PathLike[str]) -> Mechanism:
+        """The mechanism with the points of a driver or table replaced by the two columns of a CSV file.
+
+        Time and coordinate of a driver, which gets the motion law `table` if it has another; place and value of a
+        table. MechanismError with file and line of what cannot be read or makes no table.
+        """
+        from trunnion.model.csv_table import place_findings, with_points
+
+        data, read = with_points(self.data(), {name: path})
+        try:
+            return Mechanism(**data)
+        except MechanismError as error:
+            raise MechanismError(place_findings(error.findings, read)) from None
+
     def with_friction(self, law: str) -> Mechanism:
         """The mechanism without friction ("off"), or with another law wherever there is friction.
 

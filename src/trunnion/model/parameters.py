@@ -115,9 +115,12 @@ def _walk(value: object, path: str, location: Location) -> Iterator[Entry]:
                 yield from _walk(item, f"{path}.{item_name(location, index)}", (*location, index))
 
 
+_LISTS = ("points", "references", "links", "joints", "between", "loop")  # of anything but coordinates
+
+
 def item_name(location: Location, index: int) -> str:
     """What an item of the list at a location is called in a path: a coordinate, an end, or its number."""
-    if location[-1] == "points":
+    if location[-1] in _LISTS:
         return str(index)
     row = len(location) > 1 and location[-2] == "points" and isinstance(location[-1], int)
     if row and location[0] == "tables":

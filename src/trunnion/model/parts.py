@@ -357,6 +357,7 @@ class Driver(Part):
     period: Time | None = None
     phase: Angle | None = None
     duration: Time | None = None
+    return_duration: Time | None = None
     dwell: Time | None = None
     returns: bool = True
     points: Annotated[tuple[tuple[Time, AngleOrLength], ...], Field(min_length=2)] | None = None
@@ -428,6 +429,7 @@ class Spring(Part):
     """A spring, a damper or both: along the line between two points of two links, or in the freedom of a joint.
 
     It pulls with preload + stiffness · (length − free length) + damping · rate; so does a torsional one, by angles.
+    One that only pulls does so while it is longer than its free length, one that only pushes while it is shorter.
     """
 
     between: tuple[str, str] | None = None
@@ -437,6 +439,7 @@ class Spring(Part):
     free_angle: Angle | None = None
     damping: Damping | None = None
     preload: ForceOrMoment | None = None
+    only: Literal["pull", "push"] | None = None
 
 
 class Gear(Part):

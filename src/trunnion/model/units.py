@@ -7,10 +7,13 @@ number, so that 30 deg is not taken for a length nor 30 mm for an angle; beside 
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cache
 from typing import TYPE_CHECKING
+
+from trunnion.model.names import nearest
 
 if TYPE_CHECKING:
     import pint
@@ -133,6 +136,23 @@ def _registry() -> pint.UnitRegistry[Fraction]:
     return pint.UnitRegistry(non_int_type=Fraction)
 
 
+# Those that a misspelt one is compared with; pint knows many more.
+_USUAL = "mm cm m µm km in ft deg rad mrad kg g mg t lb s ms min N mN kN MN lbf Pa kPa MPa GPa bar psi J kJ W kW rpm"
+
+
+def _meant(text: str) -> str:
+    """Remedy for a unit that is not known."""
+    product = "write a product of a number and a dimension as 2 * AB"
+    for word in re.findall(r"[^\W\d_]+", text):
+        try:
+            _registry().parse_units(word)
+        except Exception:  # see `unit`
+            remedy = nearest(word, _USUAL.split())
+            if remedy.startswith("did you mean"):
+                return f"{remedy} ({product})"
+    return product
+
+
 @cache
 def unit(text: str) -> tuple[Fraction, Dimension]:
     """Factor to SI and dimension of a unit such as `N m`, `kg m^2`, `rpm`; UnitError if it is none of mechanics."""
@@ -141,9 +161,7 @@ def unit(text: str) -> tuple[Fraction, Dimension]:
         parsed = registry.parse_units(text.replace("·", "*").replace("⋅", "*"))
         factor, root = registry.get_root_units(parsed)
     except Exception as error:  # pint raises its own, tokenizer and arithmetic errors on text that is no unit
-        raise UnitError(
-            f"the unit '{text}' is not known", "write a product of a number and a dimension as 2 * AB"
-        ) from error
+        raise UnitError(f"the unit '{text}' is not known", _meant(text)) from error
     order = ("meter", "gram", "second", "radian")
     exponents = {str(name): Fraction(str(power)) for name, power in root._units.items()}
     names = [str(name) for name in parsed._units]

@@ -5,6 +5,7 @@ import { at, bounds, guide, hull, magnitude, peak, place, quantile, say, solved,
 import { html, onWidth, set, svg } from "./dom.js";
 import { roundBelow, stated } from "./format.js";
 import { loadsOf, poseLoad } from "./load.js";
+import { poseSlot, slotsOf } from "./slot.js";
 import { coil } from "./spring.js";
 
 const MARGIN = 62; // room for labels and arrows, px
@@ -82,6 +83,7 @@ function build(view, width) {
   fit(view, width);
   view.parts = {
     bodies: scene.links.filter((link) => !link.ground).map((link) => body(link, scene)),
+    slots: slotsOf(scene, (link) => tint(link, scene)),
     joints: scene.joints.map((one) => joint(one, scene)),
     points: scene.links
       .filter((link) => !link.ground)
@@ -104,6 +106,7 @@ function build(view, width) {
     "g",
     {},
     ...view.parts.bodies.map((one) => one.node),
+    ...view.parts.slots.map((one) => one.node),
     ...view.parts.gears.map((one) => one.node),
     ...view.parts.points.map((one) => one.node),
     ...view.parts.joints.map((one) => one.node),
@@ -215,9 +218,14 @@ function trackPath(scene, frame, key) {
   return path;
 }
 
+/** The class of the colour that a moving link has. */
+function tint(name, scene) {
+  return `k${scene.links.filter((one) => !one.ground).findIndex((one) => one.name === name) % 6}`;
+}
+
 /** A link as a rounded plate: its outline drawn wide, then less wide in its tint. */
 function body(link, scene) {
-  const kind = `k${scene.links.filter((one) => !one.ground).indexOf(link) % 6}`;
+  const kind = tint(link.name, scene);
   const parts = [
     svg("path", { class: `edge ${kind}` }),
     svg("path", { class: "underlay" }),
@@ -289,11 +297,12 @@ function pose(view) {
   view.message.hidden = answered;
   view.message.textContent = answered ? "" : cause(scene, index);
   parts.bodies.forEach((one) => poseBody(view, one));
+  parts.slots.forEach((one) => poseSlot(one, scene, frame, view.posed));
   parts.points.forEach((one) => moveTo(one.node, spotOf(view, one.key)));
   parts.joints.forEach((one) => poseJoint(view, one));
   parts.loads.forEach((one) => {
     one.aim?.(at(scene.links.find((link) => link.name === one.link).angle, view.posed));
-    poseLoad(one, spotsOf(view, one.keys));
+    poseLoad(one, spotsOf(view, one.keys), frame);
   });
   parts.springs.forEach((one) => set(one.node, { d: coil(spotsOf(view, one.ends)) }));
   parts.gears.forEach((one) => {

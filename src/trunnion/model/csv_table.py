@@ -1,0 +1,255 @@
+"""Points of drivers and tables from CSV files that the user names; a model never reads another file by itself.
+
+Two columns, first time or drive coordinate, then value; separated by semicolon, tab or comma, the first of these that
+the first line has. With semicolon or tab a number may have a decimal comma. A first row of texts is a header, whose
+units stand in brackets: `time [ms], angle [deg]`; numbers without a unit are SI. Empty lines and lines with # are
+passed over.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import os
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from trunnion.errors import Finding, MechanismError
+from trunnion.joints.pairs import PAIRS
+from trunnion.model.names import nearest
+from trunnion.model.quantity import Quantity
+from trunnion.model.text import read_text
+from trunnion.model.units import ANY, KINDS, Kind, UnitError, dimension_text, unit
+
+__all__ = ["Points", "TableFiles", "place_findings", "with_points"]
+
+TableFiles = Mapping[str, str | os.PathLike[str]]  # file by name of a driver or table
+
+MAX_BYTES = 1_000_000
+MAX_ROWS = 10_000  # points of a spline; an analysis of 360 positions then takes seconds
+SHOWN = 8  # findings about one file; the rest is counted
+_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?", re.ASCII)
+_IN_BRACKETS = re.compile(r"\[([^\[\]]*)\]\s*$")
+_IN_PARENTHESES = re.compile(r"\(([^()]*)\)\s*$")
+_NO_UNIT = ("", "-", "–", "1")
+
+Row = tuple[int, list[str]]  # line and cells
+
+
+class Points(NamedTuple):
+    """Points from a file: where they belong in the model, and the line of each."""
+
+    where: str
+    file: str
+    rows: list[list[float | str]]
+    lines: list[int]
+
+
+def with_points(data: Mapping[str, Any], files: TableFiles) -> tuple[dict[str, Any], list[Points]]:
+    """Plain data of a model with the points of drivers and tables replaced by those of files.
+
+    A driver of another motion law becomes one of law `table`. MechanismError with every finding in every file.
+    """
+    changed, read = dict(data), []
+    findings: list[Finding] = []
+    for name, path in files.items():
+        try:
+            section, key = _holder(data, name)
+            points = _points(Path(path), f"{section}.{key}.points", _kinds(data, section, key))
+        except MechanismError as error:
+            findings += error.findings
+            continue
+        read.append(points)
+        entry = data[section][key]
+        kept = entry if isinstance(entry, Mapping) else {}
+        if section == "drivers":
+            kept = kept if kept.get("law") == "table" else {"law": "table"}
+        changed[section] = {**changed[section], key: {**kept, "points": points.rows}}
+    if findings:
+        raise MechanismError(findings)
+    return changed, read
+
+
+def place_findings(findings: Sequence[Finding], read: Sequence[Points]) -> list[Finding]:
+    """The findings, those about points with the file and line that these came from and a few for each file."""
+    placed = [finding for finding in findings if not any(_speaks_of(finding, points) for points in read)]
+    for points in read:
+        found = [finding for finding in findings if _speaks_of(finding, points)]
+        placed += _few([finding.at(points.file, _line(finding, points)) for finding in found])
+    return placed
+
+
+def _speaks_of(finding: Finding, points: Points) -> bool:
+    return f"{finding.where}.".startswith(f"{points.where}.")
+
+
+def _line(finding: Finding, points: Points) -> int:
+    index = finding.where[len(points.where) + 1 :].partition(".")[0]
+    return points.lines[int(index) if index.isdecimal() else 0]
+
+
+def _few(findings: list[Finding]) -> list[Finding]:
+    """The first few findings, and how many more there are."""
+    if len(findings) <= SHOWN:
+        return findings
+    more = Finding(f"and {len(findings) - SHOWN} more like these", findings[0].where, "correct those above first")
+    return [*findings[:SHOWN], more.at(findings[0].file, findings[SHOWN].line)]
+
+
+def _holder(data: Mapping[str, Any], name: str) -> tuple[str, str]:
+    """Section and name of the driver or table that a name means; `drivers.A` and `tables.A` tell two apart."""
+    known = {section: data.get(section) for section in ("drivers", "tables")}
+    names = {section: list(part) if isinstance(part, Mapping) else [] for section, part in known.items()}
+    section, dot, key = name.partition(".")
+    if dot and key in names.get(section, ()):
+        return section, key
+    found = [one for one in names if name in names[one]]
+    if len(found) == 2:
+        raise MechanismError(
+            Finding(f"'{name}' is a driver and a table", remedy=f"say drivers.{name} or tables.{name}")
+        )
+    if not found:
+        remedy = nearest(name, [*names["drivers"], *names["tables"]])
+        raise MechanismError(Finding(f"there is no driver or table '{name}'", remedy=remedy))
+    return found[0], name
+
+
+def _kinds(data: Mapping[str, Any], section: str, key: str) -> tuple[Kind, Kind]:
+    """What the two columns measure."""
+    if section == "drivers":
+        return KINDS["time"], _coordinate(data, key)
+    over = data["tables"][key].get("over", "drive") if isinstance(data["tables"][key], Mapping) else "drive"
+    drivers = data.get("drivers")
+    first = next(iter(drivers), "") if isinstance(drivers, Mapping) else ""
+    return KINDS["time"] if over == "time" else _coordinate(data, first), ANY
+
+
+def _coordinate(data: Mapping[str, Any], joint: str) -> Kind:
+    """What the coordinate of a joint measures; a model that does not tell is refused elsewhere."""
+    joints = data.get("joints")
+    stated = joints.get(joint) if isinstance(joints, Mapping) else None
+    pair = PAIRS.get(str(stated.get("type"))) if isinstance(stated, Mapping) else None
+    if pair is None:
+        return KINDS["angle"] | KINDS["length"]
+    return KINDS["angle" if "rotation" in pair.freedoms else "length"]
+
+
+# ---- the file -------------------------------------------------------------------------------------------------
+
+
+def _points(path: Path, where: str, kinds: tuple[Kind, Kind]) -> Points:
+    """The points of a file; MechanismError with file and line of every finding, a few of each file."""
+    try:
+        separator, rows = _rows(read_text(path, "a table", MAX_BYTES, "write a row for each point, such as 0; 12.5"))
+        units, numbers = ["", ""], rows
+        if not any(_number(cell, separator) for cell in rows[0][1]):
+            units, numbers = _units(rows[0], kinds), rows[1:]
+        if len(numbers) < 2:
+            what = f"has {len(numbers) or 'no'} row{'s' * (not numbers)} of numbers, a table needs two"
+            raise MechanismError(Finding(what, remedy="add rows such as 0; 12.5", line=rows[-1][0]))
+        findings = list(_unreadable(numbers, separator))
+        if findings:
+            raise MechanismError(_few(findings))
+    except MechanismError as error:
+        found = [finding.at(str(path), finding.line) for finding in error.findings]
+        raise MechanismError(found) from None
+    points = [[_value(cell, separator, one) for cell, one in zip(cells, units, strict=True)] for _, cells in numbers]
+    return Points(where, str(path), points, [line for line, _ in numbers])
+
+
+def _rows(text: str) -> tuple[str, list[Row]]:
+    """The separator, and the lines with their cells; the first has two."""
+    stated = [(number, line) for number, line in enumerate(io.StringIO(text, newline=None), start=1)
+              if line.strip() and not line.lstrip().startswith("#")]  # fmt: skip
+    if not stated:
+        raise MechanismError(Finding("has nothing but remarks", remedy="write a row for each point", line=1))
+    if len(stated) > MAX_ROWS + 1:
+        what = f"has {len(stated)} rows, a table at most {MAX_ROWS}"
+        raise MechanismError(Finding(what, remedy="thin them out: what lies between the points is interpolated"))
+    separator = next((one for one in ";\t" if one in stated[0][1]), ",")
+    try:
+        rows = [(number, _cells(line, separator)) for number, line in stated]
+    except csv.Error as error:
+        raise MechanismError(Finding(f"is not CSV: {error}", remedy="check that it is a text file")) from None
+    line, first = rows[0]
+    if len(first) == 1:
+        remedy = "write two: time or drive coordinate, then value, with a comma, semicolon or tab between them"
+        raise MechanismError(Finding("has a single column", remedy=remedy, line=line))
+    if len(first) > 2:
+        remedy = "keep two; numbers with a decimal comma need a semicolon or tab between them"
+        raise MechanismError(Finding(f"has {len(first)} columns, a table has two", remedy=remedy, line=line))
+    return separator, rows
+
+
+def _cells(line: str, separator: str) -> list[str]:
+    cells = [cell.strip() for cell in next(csv.reader([line.rstrip("\n")], delimiter=separator, skipinitialspace=True))]
+    while len(cells) > 2 and not cells[-1]:  # a separator at the end of a line
+        cells.pop()
+    return cells
+
+
+def _number(cell: str, separator: str) -> str:
+    """The cell as a plain number; empty if it is none."""
+    text = cell.replace("−", "-")
+    if separator != "," and text.count(",") == 1 and "." not in text:
+        text = text.replace(",", ".")
+    return text if _NUMBER.fullmatch(text) and abs(float(text)) < float("inf") else ""
+
+
+def _value(cell: str, separator: str, unit_text: str) -> float | str:
+    number = _number(cell, separator)
+    return f"{number} {unit_text}" if unit_text else float(number)
+
+
+def _unreadable(rows: Sequence[Row], separator: str) -> Iterator[Finding]:
+    """What is no pair of numbers."""
+    for line, cells in rows:
+        if len(cells) != 2:
+            what = f"has {len(cells)} cell{'s' * (len(cells) > 1)}, the rows before have two"
+            yield Finding(what, remedy="write two numbers", line=line)
+            continue
+        for cell in cells:
+            if not _number(cell, separator):
+                what = f"'{cell[:40]}' is not a finite number" if cell else "a number is missing"
+                yield Finding(what, remedy="write a number such as 12.5 or 1.25e1, units in the header", line=line)
+
+
+def _units(header: Row, kinds: tuple[Kind, Kind]) -> list[str]:
+    """The units of a header, empty where there is none; MechanismError if they are not those of the columns."""
+    line, cells = header
+    found, findings = [], []
+    for cell, kind in zip(cells, kinds, strict=True):
+        bracketed, rounded = _IN_BRACKETS.search(cell), _IN_PARENTHESES.search(cell)
+        text = bracketed[1].strip() if bracketed else ""
+        text = "" if text in _NO_UNIT else text
+        found.append(text)
+        if text:
+            findings += [Finding(f"{cell}: {what}", remedy=remedy, line=line) for what, remedy in _unfit(text, kind)]
+        elif rounded and not bracketed and _is_unit(rounded[1]):
+            remedy = f"write [{rounded[1]}]"
+            findings.append(Finding(f"{cell}: a unit stands in brackets", remedy=remedy, line=line))
+    if findings:
+        raise MechanismError(findings)
+    return found
+
+
+def _unfit(text: str, kind: Kind) -> Iterator[tuple[str, str]]:
+    """What is wrong with the unit of a column, and what to do."""
+    remedy = f"write a unit of {kind.name} in the brackets, or none for SI"
+    try:
+        dimension = unit(text)[1]
+        Quantity.read(f"1 {text}")
+    except UnitError as error:
+        yield error.what, remedy
+        return
+    if not kind.accepts(dimension):
+        yield f"its unit is that of {dimension_text(dimension)}, the column is of {kind.name}", remedy
+
+
+def _is_unit(text: str) -> bool:
+    try:
+        return text.strip() not in _NO_UNIT and bool(unit(text.strip()))
+    except UnitError:
+        return False

@@ -1,0 +1,128 @@
+"""Springs that act one way: ropes that pull beyond their free length, bumpers that push below it."""
+
+from __future__ import annotations
+
+import copy
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+
+import trunnion
+from mechanisms import Data, four_bar, prismatic, slide
+from trunnion import Mechanism, MechanismError
+from trunnion.algebra.dual import Dual, derivative
+from trunnion.errors import Status
+
+FREE = 0.62  # m: within the lengths that the spring goes through
+
+
+def sprung(joint: str = "", **spring: Any) -> Data:
+    """A massless four-bar with a spring between the ground and the coupler."""
+    data = copy.deepcopy(four_bar())
+    for link in data["links"].values():
+        for key in ("mass", "inertia", "centre"):
+            link.pop(key, None)
+    data["links"]["ground"]["points"]["S"] = [0.2, 1.1]
+    place = {"joint": joint} if joint else {"between": ["ground.S", "coupler.E"]}
+    return {**data, "loads": {}, "springs": {"S": {**place, **spring}}}
+
+
+def run(data: Data, steps: int = 180) -> Any:
+    return trunnion.analyse(Mechanism(**data), steps)
+
+
+@pytest.mark.parametrize("preload", [0.0, 15.0])
+@pytest.mark.parametrize("damping", [0.0, 20.0])
+def test_a_rope_and_a_bumper_are_halves_of_the_spring(damping: float, preload: float) -> None:
+    """Where one acts it is the spring of both ways, where it does not there is nothing; so with the drive torque."""
+    stated = {"stiffness": 900.0, "free_length": FREE, "damping": damping}
+    both = run(sprung(**stated, preload=preload))
+    pull = run(sprung(**stated, preload=preload, only="pull"))
+    beyond = both["spring_elongation"].values[0] > 0
+    assert 10 < np.count_nonzero(beyond) < 170
+    for name in ("spring_force", "spring_power", "damping_power", "drive_effort"):
+        np.testing.assert_allclose(pull[name][0], np.where(beyond, both[name][0], 0.0), rtol=1e-12, atol=1e-12)
+    np.testing.assert_array_equal(pull["spring_elongation"], both["spring_elongation"])
+    push = run(sprung(**stated, preload=-preload, only="push"))
+    whole = run(sprung(**stated, preload=-preload))
+    for name in ("spring_force", "spring_power", "damping_power", "drive_effort"):
+        np.testing.assert_allclose(push[name][0], np.where(beyond, 0.0, whole[name][0]), rtol=1e-12, atol=1e-12)
+    for one in (pull, push):
+        residual = np.abs(one["power_residual"].values).max()
+        assert residual < 1e-12 * np.abs(one["drive_power"].values).max()
+
+
+def test_a_rope_without_a_damper_gives_back_what_it_takes() -> None:
+    """k e²/2 is continuous with its slope at the free length, so the mean over a turn vanishes."""
+    power = run(sprung(stiffness=900.0, free_length=FREE, only="pull"), 2000)["spring_power"].values[0]
+    assert np.abs(power.mean()) < 1e-5 * np.abs(power).max()
+    assert power.max() > 0
+
+
+def test_a_slack_rope_needs_no_direction() -> None:
+    """Its ends meet at 0°, where a spring of both ways has no value."""
+    data = sprung()
+    pin = data["links"]["crank"]["points"]["B"]
+    data["links"]["ground"]["points"]["S"] = list(pin)
+    data["springs"]["S"] = {"between": ["ground.S", "crank.B"], "stiffness": 10.0, "free_length": 0.05}
+    assert int(run(data, 12).status.values[0]) == Status.LOAD_UNDEFINED
+    data["springs"]["S"]["only"] = "pull"
+    result = run(data, 12)
+    assert int(result.status.values.max()) <= Status.ZERO_SLIP
+    assert result["spring_force"].values[0, 0] == 0
+    assert result["spring_elongation"].values[0, 0] == -0.05
+
+
+def test_a_bumper_at_the_end_of_a_slide() -> None:
+    data: Data = {
+        "links": {"ground": {"points": {"X": slide(0, 0)}}, "cart": {"points": {"X": slide(0, 0)}}},
+        "joints": {"X": prismatic("ground", "cart")},
+        "drivers": {"X": {"speed": 0.1, "range": [0.0, 0.25]}},
+        "springs": {"S": {"joint": "X", "stiffness": 2000.0, "free_length": 0.05, "only": "push"}},
+    }
+    result = run(data, 6)
+    np.testing.assert_allclose(result["drive_effort"].values[0], [-100, 0, 0, 0, 0, 0], atol=1e-12)
+
+
+@pytest.mark.parametrize("only", ["pull", "push"])
+def test_duals_equal_central_differences(only: str) -> None:
+    mechanism = Mechanism(**sprung(stiffness=900.0, free_length=FREE, damping=20.0, only=only))
+    prepared = trunnion.prepare(mechanism)
+    time = prepared.cycle.times(23)[1:]
+    for path in ("springs.S.stiffness", "springs.S.free_length", "springs.S.damping", "links.ground.points.S.x"):
+        value = mechanism.parameters()[path]
+        step = 1e-5 * max(abs(value), 0.1)
+
+        def solved(number: Any, path: str = path) -> Any:
+            return prepared.solve(time, mechanism.parameters({path: number})).efforts["A"]
+
+        differences = (solved(value + step) - solved(value - step)) / (2 * step)
+        scale = np.abs(differences).max()
+        np.testing.assert_allclose(derivative(solved(Dual(value, 1.0))), differences, atol=1e-6 * scale, err_msg=path)
+
+
+@pytest.mark.parametrize(
+    ("spring", "words"),
+    [
+        ({"only": "pull", "damping": 5.0}, "a spring that can only pull needs a stiffness — add stiffness"),
+        ({"only": "twist", "stiffness": 5.0, "free_length": 0.1}, "springs.S.only: is none of 'pull' or 'push'"),
+        ({"only": "pull", "stiffness": 5.0, "free_length": 0.1, "preload": "-3 N"}, "preload: is -3 N, which pushes"),
+        ({"only": "push", "stiffness": 5.0, "free_length": 0.1, "preload": "3 N"}, "preload: is 3 N, which pulls"),
+        (
+            {"joint": "C", "only": "pull", "stiffness": 5.0, "free_angle": 0.1},
+            "a spring in a joint that turns cannot only pull",
+        ),
+    ],
+)
+def test_bad_ones_are_refused(spring: Data, words: str) -> None:
+    with pytest.raises(MechanismError) as caught:
+        Mechanism(**sprung(**spring))
+    assert words in str(caught.value)
+
+
+def test_it_is_written_and_read_again() -> None:
+    mechanism = Mechanism(**sprung(stiffness=900.0, free_length=FREE, only="pull"))
+    assert json.loads(json.dumps(mechanism.data()))["springs"]["S"]["only"] == "pull"
+    assert Mechanism(**mechanism.data()) == mechanism

@@ -132,11 +132,13 @@ def design(
 
 
 @app.command()
-def locking(file: File, steps: Steps = 360, set_: Set = None, friction: FrictionLaw = None) -> None:
+def locking(
+    file: File, steps: Steps = 360, set_: Set = None, table: TableFile = None, friction: FrictionLaw = None
+) -> None:
     """How close to locking, by all friction and by each joint's; other solutions; whether it can be driven backward."""
     from trunnion.analysis.locking import report_rows
 
-    mechanism = _mechanism(file, set_, friction)
+    mechanism = _mechanism(file, set_, table, friction)
     _table(mechanism.name or str(file), report_rows(mechanism, steps))
 
 

@@ -21,7 +21,7 @@ from trunnion.analysis import change_points
 from trunnion.analysis.follow import SLIDE_JUMP, TURN_JUMP, Follower, assemblies, at, lane_of
 from trunnion.analysis.hints import distance, first, hints, misnamed, named_way, nth, told_twice
 from trunnion.analysis.kinematics import Forward, pairs_of, pose_of, start, take
-from trunnion.analysis.system import Cycle, System, Values, driven_coordinates
+from trunnion.analysis.system import Cycle, Dial, Positions, System, Values, driven_coordinates
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.groups.gear import NUMBERS, rotation
 from trunnion.groups.general import OUTER, General, Pose
@@ -43,9 +43,9 @@ class Track:
     """Free tree coordinates of a general group along the nominal cycle, and the sign of det J on its branch.
 
     times: (grid,) s; coordinates: (free, grid), NaN where the group cannot be assembled. turns: rotations, whole
-    turns counted, that gear pairs ask for and the group does not hold, by their place in the drive. again: times, s, at
-    which it was put together anew after it had come apart. ways: frames of its links in every assembly found at the
-    time `begin`, s, in the order of their names; taken: which of them is followed.
+    turns counted, that gear pairs ask for and the group does not hold, by their place in the drive. again: places in
+    the grid where it was put together anew after it had come apart. ways: frames of its links in every assembly found
+    at the time `begin`, s, in the order of their names; taken: which of them is followed.
     """
 
     times: Array
@@ -54,7 +54,7 @@ class Track:
     periodic: bool
     clock: Clock
     turns: Mapping[int, Array]
-    again: tuple[float, ...]
+    again: Positions
     begin: float = 0.0
     ways: tuple[Frame, ...] = ()
     taken: int = 0
@@ -182,8 +182,8 @@ def choose(system: System, values: Values, cycle: Cycle) -> Chosen:
             counts.append(count)
             if isinstance(assembly, Track) and not np.any(np.isfinite(assembly.coordinates)):
                 findings.append(_never(module))
-            if isinstance(assembly, Track) and assembly.again:
-                findings.append(_anew(system, values, module, assembly.again))
+            if isinstance(assembly, Track) and len(assembly.again):
+                findings.append(_anew(module, system.dial(values, times), assembly.again))
             pose = pose_of(walk, number, assembly, times)
             take(walk, number, pose, times)
             if module.rank > 1 and group.BRANCHES:
@@ -211,9 +211,9 @@ def _unstated(module: Module, count: int) -> Finding:
     return Finding(what, "assembly", remedy, Severity.WARNING)
 
 
-def _anew(system: System, values: Values, module: Module, at: Sequence[float]) -> Finding:
-    where = ", ".join(system.dial(values, np.array([moment])).at(0) for moment in at)
-    what = f"links {', '.join(module.links)} come apart on the way and are put together anew at {where}"
+def _anew(module: Module, dial: Dial, positions: Positions) -> Finding:
+    links = ", ".join(module.links)
+    what = f"links {links} come apart on the way and are put together anew {dial.intervals(positions)}"
     remedy = "there the assembly of the same sense nearest to the one before is shown; limit the range of the driver"
     return Finding(what, "links", remedy, Severity.WARNING)
 
@@ -300,7 +300,7 @@ def _track(
         if found.q[0].size:
             break
     else:
-        return Decision(Track(times, rows, 0.0, periodic, clock, turns, ()), 0, True)
+        return Decision(Track(times, rows, 0.0, periodic, clock, turns, np.array([], np.intp)), 0, True)
     ways = len(found.orientation)
     named = named_way(walk.system, module, ways)
     every = np.broadcast_to(distance(walk, module, found.frames, lambda n: n, nth(begin)), (ways,))
@@ -310,7 +310,7 @@ def _track(
     rows[:, begin] = [found.q[i][best] for i in group.free]
     follower = Follower(group, elements, drive, orientation)
     follower.both_ways(rows, begin, periodic)
-    again = tuple(times[follower.revisit(rows, periodic)])
+    again = follower.revisit(rows, periodic)
     track = Track(times, rows, orientation, periodic, clock, turns, again, float(times[begin]), found.frames, best)
     if named is None:
         return Decision(track, ways, decided)

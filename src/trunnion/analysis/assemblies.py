@@ -60,7 +60,7 @@ class Choice:
 
 
 def choices(run: Run) -> tuple[Choice, ...]:
-    """Every group that can be assembled in several ways, with where its inner joints lie in each of them.
+    """Every group that can be assembled, and in several ways, with where its inner joints lie in each of them.
 
     That is at the start of the cycle, if the group can be assembled there and its ways are apart; else at the first
     position at which that is so, for a general group the one at which its assemblies are looked for.
@@ -78,8 +78,8 @@ def choices(run: Run) -> tuple[Choice, ...]:
                 taken = list(run.system.groups[number].BRANCHES).index(assembly)
             else:
                 continue
-        ways = _ways(rows, run.chosen.found[number], taken)
-        if len(ways) > 1:
+        if rows and run.chosen.found[number] > 1:
+            ways = _ways(rows, run.chosen.found[number], taken)
             where = _where(run, moment)
             found.append(Choice(number, module.label, module.links, _name_of(run, module), moment, where, ways))
     return tuple(found)
@@ -113,7 +113,10 @@ def _where(run: Run, moment: float) -> str:
 
 
 def _closed(walk: Forward, number: int, times: Array) -> tuple[dict[str, Array], float]:
-    """Joints (number, way) of a closed form at the first position at which all its ways exist and are apart."""
+    """Joints (number, way) of a closed form at the first position at which all its ways exist and are apart.
+
+    Nothing if it never closes.
+    """
     module, group = walk.system.plan.modules[number], walk.system.groups[number]
     rows = [_joints(walk, module, pose_of(walk, number, branch, times).frames) for branch in group.BRANCHES]
     shape = np.shape(times)
@@ -150,7 +153,7 @@ def _joints(walk: Forward, module: Module, frames: Sequence[Frame]) -> dict[str,
 
 
 def _ways(rows: Mapping[str, Array], count: int, taken: int) -> tuple[Way, ...]:
-    """The ways of joints (number, way); where a closed form never closes the joints have no place."""
+    """The ways of joints (number, way)."""
     return tuple(
         Way(way_name(i), {name: tuple(float(n[i]) for n in numbers) for name, numbers in rows.items()}, i == taken)
         for i in range(count)

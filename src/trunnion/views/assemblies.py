@@ -106,9 +106,9 @@ def _box(pictures: Sequence[Picture]) -> tuple[float, float, float, float]:
     """Around all that the pictures show, so that they have one scale, with a margin."""
     boxes = np.array([picture.box for picture in pictures])
     low, high = boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)
-    margin = 0.08 * max(float(np.max(high - low)), 1e-9)
-    (left, below), (right, above) = (low - margin).tolist(), (high + margin).tolist()
-    return left, below - 0.5 * margin, right, above  # a bearing reaches below its joint
+    size = float(np.hypot(*(high - low))) or 1.0
+    (left, below), (right, above) = (low - 0.08 * size).tolist(), (high + 0.08 * size).tolist()
+    return left, below - 0.03 * size, right, above  # a bearing reaches below its joint
 
 
 def _group(

@@ -1,8 +1,8 @@
 """What the build of the pages adds to their text, so that no table or picture can drift from the code.
 
 - `<!-- generated: NAME -->` in a page becomes the table of that name, made from the code's own tables.
-- `figures/MODEL/KIND.svg` and `figures/MODEL/report.html` are drawn when a page refers to them. MODEL is a file of
-  `examples/`, a block of a page titled `MODEL.yaml`, or an entry of `VARIANTS`.
+- `figures/MODEL/KIND.svg` and `figures/MODEL/report.html` are drawn when a page refers to them. KIND is a plot or
+  `assemblies`; MODEL is a file of `examples/`, a block of a page titled `MODEL.yaml`, or an entry of `VARIANTS`.
 - The gallery is made of the examples and of `tests/gallery/facts.py`; see `gallery_page.py`.
 - `$x$` and `$$x$$` become MathML, which browsers set without any script.
 """
@@ -98,6 +98,7 @@ def _drawn(model: str, models: dict[str, str], kinds: list[str], steps: int, rep
     """The figures of a model, and its report, by file name."""
     from trunnion import analyse, read
     from trunnion import report as page
+    from trunnion.views.assemblies import ways
     from trunnion.views.plots import PLOTS, save
 
     base, values = VARIANTS.get(model, (model, {}))
@@ -112,7 +113,7 @@ def _drawn(model: str, models: dict[str, str], kinds: list[str], steps: int, rep
         result, ideal = analyse(mechanism, steps), analyse(mechanism.with_friction("off"), steps)
         for kind in kinds:
             path = Path(folder) / f"{kind}.svg"
-            save(PLOTS[kind](result, ideal), path)
+            save(ways(mechanism) if kind == "assemblies" else PLOTS[kind](result, ideal), path)
             drawn[path.name] = path.read_bytes()
         if report:
             drawn["report.html"] = page(result, ideal).encode()

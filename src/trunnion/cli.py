@@ -6,6 +6,8 @@ Exit status: 0 fine, 1 findings (cannot be assembled somewhere, locks, dead cent
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -60,25 +62,53 @@ Report = Annotated[
 
 
 @app.command()
-def check(file: File, set_: Set = None, table: TableFile = None, friction: FrictionLaw = None) -> None:
-    """Findings, mobility, structural formula and plan of a mechanism."""
+def check(
+    file: File,
+    set_: Set = None,
+    table: TableFile = None,
+    friction: FrictionLaw = None,
+    assemblies: Annotated[
+        Path | None,
+        typer.Option(
+            "--assemblies",
+            help="Also draw the ways in which each group can be assembled: a .png, .svg or .pdf file.",
+            show_default=False,
+        ),
+    ] = None,
+) -> None:
+    """Findings, mobility, structural formula and plan of a mechanism, and the ways it can be assembled in."""
     from trunnion.analysis.inspect import check as inspect
+    from trunnion.views.ways import lines
 
+    if assemblies:
+        from trunnion.views.plots import check_figure
+
+        check_figure(assemblies)
     mechanism = _mechanism(file, set_, table, friction)
-    found = inspect(mechanism)
+    with _lines_of(file):
+        found = inspect(mechanism)
     rank = "not known: no position can be assembled" if found.rank_mobility is None else str(found.rank_mobility)
     out = _console()
     out.print(mechanism.name or file.name, style="bold", markup=False)
     out.print(f"mobility {found.mobility} by formula, {rank} by rank; drivers: {len(mechanism.drivers)}", markup=False)
     out.print(f"formula  {found.formula or '(no moving link)'}", markup=False)
-    for module, count in zip(found.plan.modules, found.assemblies, strict=True):
-        ways = "" if module.rank == 1 else f", {count} assemblies"
+    for number, (module, count) in enumerate(zip(found.plan.modules, found.assemblies, strict=True)):
+        ways = "" if module.rank == 1 else f", {count} {'assembly' if count == 1 else 'assemblies'}"
         solver = "general group" if module.kind == "general" else "closed form"
         joints = ", ".join(module.joints)
         out.print(
             f"  {module.label:<24} links {', '.join(module.links)}; joints {joints}; {solver}{ways}", markup=False
         )
-    _say(found.findings)
+        for choice in (one for one in found.choices if one.module == number):
+            for line in lines(choice):
+                out.print(f"    {line}", markup=False, highlight=False, soft_wrap=True)
+    _say(_placed(found.findings, file, ["assembly"]))
+    if assemblies:
+        from trunnion.views.assemblies import ways as drawings
+        from trunnion.views.plots import save
+
+        save(drawings(mechanism, found.choices), assemblies)
+        _wrote(assemblies)
     raise typer.Exit(_status(found.findings))
 
 
@@ -104,14 +134,15 @@ def analyse(
     for path in out or []:
         check_format(path)
     mechanism = _mechanism(file, set_, table, friction)
-    result = _run(mechanism, steps, _method(method, criterion, iterations))
+    with _lines_of(file):
+        result = _run(mechanism, steps, _method(method, criterion, iterations))
     for path in out or []:
         save(result, path, units_row)
     if report:
         _write_report(mechanism, result, report)
-    _summary(result)
+    _summary(result, file)
     for path in [*(out or []), *([report] if report else [])]:
-        _console().print(f"wrote {path}", markup=False, highlight=False, soft_wrap=True)
+        _wrote(path)
     raise typer.Exit(_status(_findings(result)))
 
 
@@ -128,7 +159,9 @@ def design(
     from trunnion.analysis.design import report_rows
 
     mechanism = _mechanism(file, set_, table, friction)
-    _table(mechanism.name or str(file), report_rows(mechanism, steps, fluctuation))
+    with _lines_of(file):
+        rows = report_rows(mechanism, steps, fluctuation)
+    _table(mechanism.name or str(file), rows)
 
 
 @app.command()
@@ -139,7 +172,9 @@ def locking(
     from trunnion.analysis.locking import report_rows
 
     mechanism = _mechanism(file, set_, table, friction)
-    _table(mechanism.name or str(file), report_rows(mechanism, steps))
+    with _lines_of(file):
+        rows = report_rows(mechanism, steps)
+    _table(mechanism.name or str(file), rows)
 
 
 @app.command()
@@ -169,15 +204,17 @@ def plot(
             Finding(f"{len(kinds)} plots do not fit one file", str(out), "name a folder, or one --kind")
         )
     mechanism = _mechanism(file, set_, table, friction)
-    result = _run(mechanism, steps, None)
+    with _lines_of(file):
+        result = _run(mechanism, steps, None)
     ideal = _ideal(mechanism, steps, None)
     if not single:
         _folder(out)
     for name in kinds:
         path = out if single else out / f"{name}.{image.lstrip('.')}"
         save(PLOTS[name](result, ideal), path)
-        _console().print(f"wrote {path}", markup=False, highlight=False, soft_wrap=True)
-    _say([finding for finding in _findings(result) if finding.severity is not Severity.NOTE])
+        _wrote(path)
+    said = [finding for finding in _findings(result) if finding.severity is not Severity.NOTE]
+    _say(_placed(said, file, ["assembly"]))
     raise typer.Exit(_status(_findings(result)))
 
 
@@ -195,9 +232,10 @@ def report(
 ) -> None:
     """One self-contained HTML file: animation, plots, findings, balance, input data."""
     mechanism = _mechanism(file, set_, table, friction)
-    result = _run(mechanism, steps, _method(method, criterion, iterations))
+    with _lines_of(file):
+        result = _run(mechanism, steps, _method(method, criterion, iterations))
     _write_report(mechanism, result, out)
-    _console().print(f"wrote {out}", markup=False, highlight=False, soft_wrap=True)
+    _wrote(out)
     raise typer.Exit(_status(_findings(result)))
 
 
@@ -227,7 +265,7 @@ def examples(
         raise MechanismError(Finding("exists already", str(target), "use --force to overwrite it"))
     with whole(target) as temporary:
         temporary.write_bytes(source.read_bytes())
-    _console().print(f"wrote {target}", markup=False, highlight=False, soft_wrap=True)
+    _wrote(target)
 
 
 @app.command()
@@ -304,6 +342,10 @@ def _console() -> Any:
     return Console()
 
 
+def _wrote(path: Path) -> None:
+    _console().print(f"wrote {path}", markup=False, highlight=False, soft_wrap=True)
+
+
 def _mechanism(file: Path, settings: list[str] | None, tables: list[str] | None, friction: str | None) -> Mechanism:
     """The model with the options `--table`, `--set` and `--friction` applied, in this order."""
     from trunnion.model.file import read_mechanism
@@ -378,12 +420,12 @@ def _findings(result: xr.Dataset) -> list[Finding]:
     ]
 
 
-def _summary(result: xr.Dataset) -> None:
+def _summary(result: xr.Dataset, file: Path) -> None:
     """The short table of an analysis, and its findings."""
     import json
 
     _table(f"{result.attrs['name']}\n{result.attrs['formula']}", json.loads(result.attrs["summary"]))
-    _say(_findings(result))
+    _say(_placed(_findings(result), file, ["assembly"]))
 
 
 def _table(title: str, rows: list[dict[str, Any]]) -> None:
@@ -406,6 +448,25 @@ def _say(findings: Any) -> None:
     """Findings on the error stream, one a paragraph, nothing in them taken for markup."""
     for finding in findings:
         print(str(finding), file=sys.stderr)
+
+
+@contextmanager
+def _lines_of(file: Path) -> Iterator[None]:
+    """Findings about the model bear the line of its file also where the analysis finds them."""
+    try:
+        yield
+    except MechanismError as error:
+        raise MechanismError(_placed(error.findings, file)) from None
+
+
+def _placed(findings: Iterable[Finding], file: Path, sections: Iterable[str] = ()) -> list[Finding]:
+    """Findings with the line of the model file, if it can be read."""
+    from trunnion.model.file import placed
+
+    try:
+        return placed(findings, file, sections)
+    except MechanismError:  # the file itself is what the findings are about
+        return list(findings)
 
 
 def _status(findings: Any) -> int:

@@ -141,6 +141,72 @@ def test_check_prints_mobility_formula_and_plan(run: Run) -> None:
         assert text in done.out
 
 
+def test_check_lists_the_ways_and_draws_them(run: Run, tmp_path: Path) -> None:
+    done = run("check", FOUR_BAR, "--assemblies", "ways.svg")
+    assert done.code == 0
+    shown = [line.strip() for line in done.out.splitlines()]
+    first = shown.index("way-1  C (7.607, 2.135) m  <- taken")
+    assert shown[first + 1 : first + 3] == [
+        "way-2  C (7.607, -2.135) m",
+        "to take another: assembly: {coupler: way-2}",
+    ]
+    assert "wrote ways.svg" in done.out
+    assert b"<!-- coupler: way-2 -->" in (tmp_path / "ways.svg").read_bytes()
+    for extension in ("png", "pdf"):
+        assert run("check", FOUR_BAR, "--assemblies", f"ways.{extension}").code == 0
+    assert files(tmp_path) == {"ways.svg", "ways.png", "ways.pdf"}
+
+
+def test_bad_pictures_of_the_ways(run: Run, tmp_path: Path) -> None:
+    assert "no kind of figure" in run("check", FOUR_BAR, "--assemblies", "ways.txt").err
+    assert "folder" in run("check", FOUR_BAR, "--assemblies", "no/such/ways.png").err
+    done = run("check", EXAMPLES / "scotch-yoke.yaml", "--assemblies", "ways.png")
+    assert done.code == 2
+    assert "1 assembly\n" in done.out
+    assert "nothing to choose" in done.err
+    assert not files(tmp_path)
+
+
+@pytest.mark.parametrize("verb", ["check", "analyse", "design", "plot", "report"])
+@pytest.mark.parametrize(
+    ("hint", "told"),
+    [
+        ("coupler: way-9", "the links coupler, rocker have no assembly 'way-9' — there are: way-1, way-2"),
+        ("crank: way-1", "the link 'crank' follows the driver A"),
+        ("coupler: way-1, rocker: way-2", "'way-2' contradicts 'way-1' of the link 'coupler'"),
+        ("ground: way-1", "'ground' is none"),
+        ("coupler: way-x", "'way-x' is no name of an assembly"),
+    ],
+)
+def test_a_wrong_name_of_an_assembly_is_found_in_its_line(
+    run: Run, tmp_path: Path, verb: str, hint: str, told: str
+) -> None:
+    path = model(tmp_path, lambda text: text.replace("C: [3.9, 2.5]", hint))
+    line = next(i for i, one in enumerate(path.read_text("utf-8").splitlines(), 1) if hint in one)
+    out = {"plot": ["--out", "plots"], "report": ["--out", "r.html"]}.get(verb, [])
+    done = run(verb, path, *out)
+    assert done.code == 2
+    assert done.err.startswith(f"{path}:{line}: error: assembly.")
+    assert told in done.err
+    assert files(tmp_path) == {"model.yaml"}
+
+
+@pytest.mark.parametrize("verb", ["check", "analyse"])
+def test_a_name_and_a_place_are_doubted_in_their_line(run: Run, tmp_path: Path, verb: str) -> None:
+    path = model(tmp_path, lambda text: text.replace("{C: [3.9, 2.5]}", "\n  C: [3.9, 2.5]\n  rocker: way-2"))
+    line = next(i for i, one in enumerate(path.read_text("utf-8").splitlines(), 1) if "way-2" in one)
+    done = run(verb, path)
+    assert done.code == 0
+    assert f"{path}:{line}: warning: assembly.rocker: " in done.err
+    assert "the name, way-2, is taken" in done.err
+
+
+def test_a_value_set_on_the_command_line_is_not_blamed_on_a_line(run: Run) -> None:
+    done = run("check", FOUR_BAR, "--set", "AB=2 kg")
+    assert done.code == 2
+    assert not done.err.startswith(str(FOUR_BAR))
+
+
 def test_plots_are_written_one_by_one_or_all(run: Run, tmp_path: Path) -> None:
     assert run("plot", FOUR_BAR, "--kind", "torque", "--out", "torque.svg", "--steps", "36").code == 0
     assert (tmp_path / "torque.svg").read_text("utf-8").lstrip().startswith("<?xml")

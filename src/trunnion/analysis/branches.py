@@ -19,10 +19,10 @@ from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
 from trunnion.analysis import change_points
 from trunnion.analysis.follow import SLIDE_JUMP, TURN_JUMP, Follower, assemblies, at, lane_of
-from trunnion.analysis.hints import distance, first, hints, named_way, nth
+from trunnion.analysis.hints import distance, first, hints, misnamed, named_way, nth, told_twice
 from trunnion.analysis.kinematics import Forward, pairs_of, pose_of, start, take
-from trunnion.analysis.system import Cycle, System, Values, driven_coordinates
-from trunnion.errors import Finding, Severity
+from trunnion.analysis.system import Cycle, Dial, Positions, System, Values, driven_coordinates
+from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.groups.gear import NUMBERS, rotation
 from trunnion.groups.general import OUTER, General, Pose
 from trunnion.groups.planar import Frame
@@ -43,8 +43,9 @@ class Track:
     """Free tree coordinates of a general group along the nominal cycle, and the sign of det J on its branch.
 
     times: (grid,) s; coordinates: (free, grid), NaN where the group cannot be assembled. turns: rotations, whole
-    turns counted, that gear pairs ask for and the group does not hold, by their place in the drive. again: times, s, at
-    which it was put together anew after it had come apart.
+    turns counted, that gear pairs ask for and the group does not hold, by their place in the drive. again: places in
+    the grid where it was put together anew after it had come apart. ways: frames of its links in every assembly found
+    at the time `begin`, s, in the order of their names; taken: which of them is followed.
     """
 
     times: Array
@@ -53,7 +54,10 @@ class Track:
     periodic: bool
     clock: Clock
     turns: Mapping[int, Array]
-    again: tuple[float, ...]
+    again: Positions
+    begin: float = 0.0
+    ways: tuple[Frame, ...] = ()
+    taken: int = 0
 
     def pose(
         self,
@@ -129,6 +133,15 @@ def _kept(frame: Frame, lanes: Number) -> Frame:
     return Frame(*(n + hole for n in frame))
 
 
+class Decision(NamedTuple):
+    """Assembly of a module, how many there were, whether a name or hint decides, and what there is to say."""
+
+    assembly: Any
+    ways: int
+    decided: bool
+    findings: Sequence[Finding] = ()
+
+
 @dataclass(frozen=True)
 class Chosen:
     """Assembly of every module (±1, Track, None for a driver), how many there were, and what there is to say."""
@@ -139,25 +152,29 @@ class Chosen:
 
 
 def choose(system: System, values: Values, cycle: Cycle) -> Chosen:
-    """The assembly of every module that lies nearest the hints, at the nominal values and the start of the cycle."""
+    """The assembly of every module that is named, or lies nearest the hints at the start, with nominal values.
+
+    Raises MechanismError where a hint names an assembly that there is not.
+    """
+    if findings := _misnamed(system):
+        raise MechanismError(findings)
     intervals = min(GRID * max(1, math.ceil(cycle.turns)), MOST_INTERVALS) if cycle.duration > 0 else 0
     times = np.linspace(0.0, cycle.duration, intervals + 1)
     walk = start(system, values)
     chosen: list[Any] = []
     counts: list[int] = []
-    findings: list[Finding] = []
     with np.errstate(all="ignore"):
         for number, module in enumerate(system.plan.modules):
             group = system.groups[number]
-            assembly: Any
             if module.rank == 1:
-                assembly, count, decided = None, 1, True
+                decision = Decision(None, 1, True)
             elif isinstance(group, General):
                 drive, _, _ = driven_coordinates(system, module, system.places[number], values, times)
-                assembly, count, decided = _track(walk, number, group, drive, times, cycle.periodic)
+                decision = _track(walk, number, group, drive, times, cycle.periodic)
             else:
-                count = len(group.BRANCHES)
-                assembly, decided = _branch(walk, number, times)
+                decision = _branch(walk, number, times)
+            assembly, count, decided, said = decision
+            findings += said
             if count > 1 and not decided:
                 findings.append(_unstated(module, count))
             chosen.append(assembly)
@@ -165,8 +182,8 @@ def choose(system: System, values: Values, cycle: Cycle) -> Chosen:
             counts.append(count)
             if isinstance(assembly, Track) and not np.any(np.isfinite(assembly.coordinates)):
                 findings.append(_never(module))
-            if isinstance(assembly, Track) and assembly.again:
-                findings.append(_anew(system, values, module, assembly.again))
+            if isinstance(assembly, Track) and len(assembly.again):
+                findings.append(_anew(module, system.dial(values, times), assembly.again))
             pose = pose_of(walk, number, assembly, times)
             take(walk, number, pose, times)
             if module.rank > 1 and group.BRANCHES:
@@ -175,17 +192,28 @@ def choose(system: System, values: Values, cycle: Cycle) -> Chosen:
     return Chosen(tuple(chosen), tuple(counts), tuple(findings))
 
 
+def _misnamed(system: System) -> list[Finding]:
+    """Wrong names of assemblies, of all modules whose number of assemblies is known before they are assembled."""
+    found: list[Finding] = []
+    for module, group in zip(system.plan.modules, system.groups, strict=True):
+        if module.rank == 1 or not isinstance(group, General):
+            found += misnamed(system, module, len(group.BRANCHES))
+    return found
+
+
 def _unstated(module: Module, count: int) -> Finding:
     links = ", ".join(module.links)
     what = f"links {links} can be assembled in {count} ways and no hint says which; one was taken"
     joint = module.joints[len(module.joints) // 2]
-    remedy = f"say roughly where a point is at the start, e.g. assembly: {{{joint}: [x, y]}}, or choose from `check`"
+    remedy = (
+        f"say roughly where a point is at the start, e.g. assembly: {{{joint}: [x, y]}}, or name one as `check` does"
+    )
     return Finding(what, "assembly", remedy, Severity.WARNING)
 
 
-def _anew(system: System, values: Values, module: Module, at: Sequence[float]) -> Finding:
-    where = ", ".join(system.dial(values, np.array([moment])).at(0) for moment in at)
-    what = f"links {', '.join(module.links)} come apart on the way and are put together anew at {where}"
+def _anew(module: Module, dial: Dial, positions: Positions) -> Finding:
+    links = ", ".join(module.links)
+    what = f"links {links} come apart on the way and are put together anew {dial.intervals(positions)}"
     remedy = "there the assembly of the same sense nearest to the one before is shown; limit the range of the driver"
     return Finding(what, "links", remedy, Severity.WARNING)
 
@@ -198,18 +226,28 @@ def _never(module: Module) -> Finding:
 # ---- closed forms ---------------------------------------------------------------------------------------------
 
 
-def _branch(walk: Forward, number: int, times: Array) -> tuple[int, bool]:
-    """+1 or −1, and whether a name or hint decides it.
+def _branch(walk: Forward, number: int, times: Array) -> Decision:
+    """+1 or −1: the one that is named, else the one that the hints by place choose."""
+    module = walk.system.plan.modules[number]
+    branches = walk.system.groups[number].BRANCHES
+    if len(branches) == 1 or not hints(walk, module):
+        named = named_way(walk.system, module, len(branches))
+        return Decision(branches[named or 0], len(branches), named is not None)
+    placed, decided = _placed(walk, number, times)
+    named = named_way(walk.system, module, len(branches))
+    if named is None:
+        return Decision(placed, len(branches), decided)
+    told = told_twice(walk, module, named, branches.index(placed) if decided else None)
+    return Decision(branches[named], len(branches), True, told)
 
-    By hints it is the nearer at the start; where it does not close there, the side the hint lies on.
+
+def _placed(walk: Forward, number: int, times: Array) -> tuple[int, bool]:
+    """+1 or −1 by the hints, and whether they decide it.
+
+    It is the nearer at the start; where it does not close there, the side the hint lies on.
     """
     module = walk.system.plan.modules[number]
     branches = walk.system.groups[number].BRANCHES
-    named = named_way(walk.system, module, len(branches))
-    if named is not None:
-        return branches[named], True
-    if len(branches) == 1 or not hints(walk, module):
-        return branches[0], False
     poses = [pose_of(walk, number, branch, times) for branch in branches]
     distances = [distance(walk, module, pose.frames, first, first) for pose in poses]
     if not np.all(np.isfinite(distances)) and module.kind == "RRR":
@@ -244,11 +282,11 @@ def _side(walk: Forward, number: int) -> int:
 
 def _track(
     walk: Forward, number: int, group: General, drive: Sequence[Number], times: Array, periodic: bool
-) -> tuple[Track, int, bool]:
+) -> Decision:
     """The assembly that is named or nearest the hints, followed both ways from the first position where there is one.
 
     Where it ends and the links can be assembled again farther on, in the same sense, the assembly nearest to what
-    was left is taken there and followed too. Also how many there are, and whether a name or hint decides.
+    was left is taken there and followed too.
     """
     module, places = walk.system.plan.modules[number], walk.system.places[number]
     elements = pairs_of(walk, places)
@@ -262,18 +300,21 @@ def _track(
         if found.q[0].size:
             break
     else:
-        return Track(times, rows, 0.0, periodic, clock, turns, ()), 0, True
+        return Decision(Track(times, rows, 0.0, periodic, clock, turns, np.array([], np.intp)), 0, True)
     ways = len(found.orientation)
     named = named_way(walk.system, module, ways)
     every = np.broadcast_to(distance(walk, module, found.frames, lambda n: n, nth(begin)), (ways,))
-    best = int(np.argmin(every)) if named is None else named
+    decided, nearest = ways > 1 and _differ(every), int(np.argmin(every))
+    best = nearest if named is None else named
     orientation = float(found.orientation[best])
     rows[:, begin] = [found.q[i][best] for i in group.free]
     follower = Follower(group, elements, drive, orientation)
     follower.both_ways(rows, begin, periodic)
     again = follower.revisit(rows, periodic)
-    decided = named is not None or (ways > 1 and _differ(every))
-    return Track(times, rows, orientation, periodic, clock, turns, tuple(times[again])), ways, decided
+    track = Track(times, rows, orientation, periodic, clock, turns, again, float(times[begin]), found.frames, best)
+    if named is None:
+        return Decision(track, ways, decided)
+    return Decision(track, ways, True, told_twice(walk, module, named, nearest if decided or ways == 1 else None))
 
 
 def _turns(walk: Forward, module: Module, group: General, elements: Elements, times: Array) -> dict[int, Array]:

@@ -154,9 +154,12 @@ class Follower:
             _wrap(rows, self.group)
             self.run(rows, _gap_backward(rows))
 
-    def revisit(self, rows: Array, periodic: bool) -> list[int]:
-        """Grid points in the gaps at which the group can be assembled again, and was; their neighbours are filled."""
-        again: list[int] = []
+    def revisit(self, rows: Array, periodic: bool) -> NDArray[np.intp]:
+        """Fill the parts of the gaps in which the group can be assembled again, as far as the probes find them.
+
+        Returns the grid points that were filled, in order.
+        """
+        gaps = ~np.isfinite(rows[0])
         for probe in _probes(rows):
             if np.isfinite(rows[0, probe]):
                 continue
@@ -170,8 +173,7 @@ class Follower:
             best = int(np.argmin(self._apart(ways, before)))
             rows[:, probe] = ways[:, best]
             self.both_ways(rows, probe, periodic)
-            again.append(probe)
-        return again
+        return np.flatnonzero(gaps & np.isfinite(rows[0]))
 
     def _apart(self, ways: Array, before: Array) -> Array:
         """How far assemblies (free, way) are from another, turns and slides counted against their sizes."""

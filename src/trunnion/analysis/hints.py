@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from trunnion.algebra.namespace import Number
 from trunnion.analysis.kinematics import Forward
 from trunnion.analysis.system import System
-from trunnion.errors import Finding, MechanismError
+from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.groups.planar import Frame, compose, point
 from trunnion.structure.decompose import Module
 
-__all__ = ["Pick", "distance", "first", "hints", "named_way", "nth", "way_name"]
+__all__ = ["Pick", "distance", "first", "hints", "misnamed", "named_way", "nth", "told_twice", "way_name"]
 
 Array = NDArray[np.float64]
 Pick = Callable[[Number], Any]
@@ -27,16 +27,57 @@ def way_name(index: int) -> str:
 
 
 def named_way(system: System, module: Module, count: int) -> int | None:
-    """Which of `count` assemblies of a module its hint names, None if none does; MechanismError if there is no such."""
-    for key, hint in system.mechanism.assembly.items():
-        if key in module.links and isinstance(hint, str):
-            index = int(hint.partition("-")[2]) - 1
-            if not 0 <= index < count:
-                names = ", ".join(way_name(i) for i in range(count)) or "none"
-                what = f"the links {', '.join(module.links)} have no assembly '{hint}' at the start"
-                raise MechanismError(Finding(what, f"assembly.{key}", f"there are: {names}"))
-            return index
-    return None
+    """Which of `count` assemblies of a module its hints name, None if none does; MechanismError if there is no such."""
+    findings = misnamed(system, module, count)
+    if findings:
+        raise MechanismError(findings)
+    return next((number_of(name) for _, name in _names(system, module)), None)
+
+
+def number_of(name: str) -> int:
+    """The place of an assembly, from 0 on, by its name."""
+    return int(name.partition("-")[2]) - 1
+
+
+def _names(system: System, module: Module) -> list[tuple[str, str]]:
+    """(link, name of an assembly) of the hints that choose by name."""
+    return [(key, hint) for key, hint in system.mechanism.assembly.items() if key in module.links and _is_name(hint)]
+
+
+def _is_name(hint: object) -> TypeGuard[str]:
+    return isinstance(hint, str)
+
+
+def misnamed(system: System, module: Module, count: int) -> list[Finding]:
+    """What is wrong with the hints that name one of `count` assemblies of a module."""
+    found: list[Finding] = []
+    named = _names(system, module)
+    links = f"the link {module.links[0]} has" if len(module.links) == 1 else f"the links {', '.join(module.links)} have"
+    ways = ", ".join(way_name(i) for i in range(count))
+    for key, name in named:
+        if module.rank == 1:
+            what = f"the link '{key}' follows the driver {module.driven[0]}: there is no assembly to choose"
+            found.append(Finding(what, f"assembly.{key}", "remove it"))
+        elif number_of(name) >= count:
+            remedy = f"there are: {ways}; without this line `check` shows them" if count else "check the lengths"
+            found.append(Finding(f"{links} no assembly '{name}'", f"assembly.{key}", remedy))
+        elif name != named[0][1]:
+            what = f"'{name}' contradicts '{named[0][1]}' of the link '{named[0][0]}', which is in the same group"
+            found.append(Finding(what, f"assembly.{key}", "choose the assembly of a group by one of its links"))
+    return found
+
+
+def told_twice(walk: Forward, module: Module, named: int, placed: int | None) -> list[Finding]:
+    """What there is to say where an assembly is chosen by name and by place. placed: the one that the place chooses."""
+    places = [name for _, name, _ in hints(walk, module)]
+    if not places:
+        return []
+    key, name = _names(walk.system, module)[0]
+    what = f"the links {', '.join(module.links)} are chosen by name and by where {', '.join(places)} is"
+    if placed is not None and placed != named:
+        what += f", which would be {way_name(placed)}; the name, {name}, is taken"
+        return [Finding(what, f"assembly.{key}", "remove one of them", Severity.WARNING)]
+    return [Finding(what, f"assembly.{key}", "one of them is enough", Severity.NOTE)]
 
 
 def hints(walk: Forward, module: Module) -> list[tuple[str, str, tuple[Number, ...]]]:

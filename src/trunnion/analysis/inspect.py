@@ -9,6 +9,7 @@ import numpy as np
 
 from trunnion.algebra.dual import primal
 from trunnion.analysis.analyse import analyse, prepare
+from trunnion.analysis.assemblies import Choice, choices
 from trunnion.analysis.kinematics import Forward, forward
 from trunnion.errors import Finding, Severity
 from trunnion.model.mechanism import Mechanism
@@ -23,12 +24,14 @@ class Check:
     """The outcome of `check`.
 
     rank_mobility: by the rank of the joints' constraints, None where no position can be assembled.
-    assemblies: number found for each module; findings: everything to know, worst first.
+    assemblies: number found for each module; choices: the groups that have several, with their ways; findings:
+    everything to know, worst first.
     """
 
     plan: Plan
     rank_mobility: int | None
     assemblies: tuple[int, ...]
+    choices: tuple[Choice, ...]
     findings: tuple[Finding, ...]
 
     @property
@@ -64,7 +67,7 @@ def check(mechanism: Mechanism, steps: int = 360) -> Check:
         )
     order = list(Severity)
     found.sort(key=lambda finding: order.index(finding.severity))
-    return Check(run.system.plan, rank, run.chosen.found, tuple(found))
+    return Check(run.system.plan, rank, run.chosen.found, choices(run), tuple(found))
 
 
 def _rank(walk: Forward) -> int | None:

@@ -25,7 +25,7 @@ from trunnion.model.mechanism import Mechanism
 from trunnion.model.text import read_text
 from trunnion.output import whole
 
-__all__ = ["read_mechanism", "write_mechanism"]
+__all__ = ["placed", "read_mechanism", "write_mechanism"]
 
 MAX_BYTES = 1_000_000  # some ten thousand links; parsing takes seconds
 MAX_DEPTH = 30
@@ -57,6 +57,25 @@ def read_mechanism(path: str | os.PathLike[str], tables: TableFiles | None = Non
     if findings:
         raise MechanismError(_placed(findings, str(path), lines, data)) from None
     return mechanism
+
+
+def placed(findings: Iterable[Finding], path: str | os.PathLike[str], sections: Iterable[str] = ()) -> list[Finding]:
+    """Findings of a later stage with the file and the line of the entry they speak of, where the file has it.
+
+    sections: those of the model to which this is limited; all if there is none.
+    """
+    path = Path(path)
+    only = set(sections)
+    text = read_text(path, "a model file", MAX_BYTES, "start from one of the examples")
+    data, lines = _parse(text, _file_type(path))
+    found: list[Finding] = []
+    for finding in findings:
+        section, *names = finding.where.split(".")
+        known = section in data and ".".join([section, *names[:1]]) in lines
+        if known and not finding.file and (not only or section in only):
+            finding = finding.at(str(path), _line(finding.where, lines, {}))
+        found.append(finding)
+    return found
 
 
 def write_mechanism(mechanism: Mechanism, path: str | os.PathLike[str]) -> None:

@@ -57,6 +57,9 @@ def _finding(error: ErrorDetails, model: type[BaseModel], data: Mapping[str, Any
         what, remedy = context["what"], context["remedy"]
     elif kind == "extra_forbidden":
         what, remedy = f"the key '{key[:80]}' is unknown", nearest(key, _fields(model, location[:-1]))
+    elif kind == "string_pattern_mismatch":  # the only texts with a pattern
+        what = f"'{error['input'][:40]}' is no name of an assembly"
+        remedy = "write way-1, way-2, … as `check` lists them"
     elif kind == "literal_error" and key == "trunnion":
         what, remedy = f"the file is of version {error['input']!r}, this program reads 1", "write trunnion: 1"
     elif kind in _MEANINGS:

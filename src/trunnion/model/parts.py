@@ -120,7 +120,7 @@ def _known(table: tuple[str, ...], noun: str) -> Any:
     return AfterValidator(check), WithJsonSchema({"type": "string", "enum": list(table)})
 
 
-FORMS = (":group", ":list", ":value")  # tags of the forms an entry may have
+FORMS = (":group", ":list", ":value", ":way")  # tags of the forms an entry may have
 
 
 def _shape(value: object) -> str:
@@ -472,10 +472,11 @@ class Measure(Part):
 
 
 _WAY = re.compile(r"^way-[1-9][0-9]{0,3}$")
+_LIKE_A_WAY = re.compile(r"(?i)^way[-_ ]\w*$")  # meant as a name, whatever is wrong with it
 
 
 def _hint_shape(value: object) -> str:
-    return ":way" if isinstance(value, str) and _WAY.match(value) else _shape(value)
+    return ":way" if isinstance(value, str) and _LIKE_A_WAY.match(value) else _shape(value)
 
 
 Hint = Annotated[

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 GHOSTS = 8
+PALE = "#b4bac1"  # of links that are not spoken of
 
 
 @dataclass(frozen=True)
@@ -27,6 +28,7 @@ class Picture:
     """What is needed to draw a result at any position: its layout, tracks of points, angles of links, a size.
 
     tracks: "link.point" → (axis, position) m; angles: link → (position,) rad; size: diagonal of all of it, m.
+    weight: of lines, 1 in a figure of its own; only: links that have a colour, all if none is named.
     """
 
     stated: dict[str, Any]
@@ -34,6 +36,13 @@ class Picture:
     angles: dict[str, Array]
     size: float
     box: tuple[float, float, float, float]
+    weight: float = 1.0
+    only: tuple[str, ...] = ()
+
+    @property
+    def letters(self) -> float:
+        """The size of letters, which must stay readable, 1 in a figure of its own."""
+        return max(self.weight, 0.75)
 
     @property
     def ground(self) -> str:
@@ -47,6 +56,8 @@ class Picture:
 
     def colour(self, link: str) -> str:
         """What a moving link is drawn in."""
+        if self.only and link not in self.only:
+            return PALE
         return PALETTE[self.moving.index(link) % len(PALETTE)]
 
     def joints(self, link: str) -> list[str]:
@@ -65,18 +76,23 @@ def picture(result: xr.Dataset) -> Picture:
     """Gather what the drawings need; raises MechanismError if no position can be drawn."""
     tracks = {key: _track(result, key) for key in names(result, "point")}
     angles = {link: column(result, "link_angle", link=link) for link in names(result, "link")}
+    known = {link: angle for link, angle in angles.items() if angle is not None}
+    return framed(layout(result), tracks, known)
+
+
+def framed(stated: dict[str, Any], tracks: dict[str, Array], angles: dict[str, Array]) -> Picture:
+    """The picture with the box around all that is known; raises MechanismError if nothing is."""
     points = np.concatenate([track.T for track in tracks.values()]) if tracks else np.empty((0, 2))
     points = points[np.isfinite(points).all(axis=1)]
     if not points.size:
         what = "no position of the mechanism can be assembled: there is nothing to draw"
         raise MechanismError(Finding(what, remedy="change the lengths or the range of the driver"))
-    stated = layout(result)
-    rims = [_rim(tracks[circle["at"]], circle["radius"]) for pair in stated["gears"].values() for circle in pair]
+    centres = [(tracks[circle["at"]], circle["radius"]) for pair in stated["gears"].values() for circle in pair]
+    rims = [_rim(track, radius) for track, radius in centres if np.isfinite(track).any()]
     points = np.concatenate([points, *rims])
     low, high = points.min(axis=0), points.max(axis=0)
     size = float(np.hypot(*(high - low))) or 1.0
-    known = {link: angle for link, angle in angles.items() if angle is not None}
-    return Picture(stated, tracks, known, size, (float(low[0]), float(low[1]), float(high[0]), float(high[1])))
+    return Picture(stated, tracks, angles, size, (float(low[0]), float(low[1]), float(high[0]), float(high[1])))
 
 
 def _rim(track: Array, radius: float) -> Array:
@@ -91,8 +107,14 @@ def _track(result: xr.Dataset, key: str) -> Array:
 def draw(axes: Axes, shown: Picture, index: int) -> None:
     """Everything at position `index`, over the ghosts and the coupler curves."""
     _ghosts(axes, shown, index)
+    sketch(axes, shown, index)
+    labels(axes, shown, index)
+
+
+def sketch(axes: Axes, shown: Picture, index: int) -> None:
+    """Links, springs, gears and joints at position `index` over the coupler curves, without a letter."""
     _curves(axes, shown)
-    for link in shown.moving:
+    for link in sorted(shown.moving, key=lambda link: link in shown.only):  # what is spoken of lies above
         _body(axes, shown, link, index, shown.colour(link))
     for spring in shown.stated["springs"].values():
         _spring(axes, shown, spring.get("between") or (), index)
@@ -101,7 +123,6 @@ def draw(axes: Axes, shown: Picture, index: int) -> None:
             _pitch_circle(axes, shown.tracks[circle["at"]][:, index], circle["radius"])
     for name, joint in shown.stated["joints"].items():
         _joint(axes, shown, name, joint, index)
-    _labels(axes, shown, index)
 
 
 def _ghosts(axes: Axes, shown: Picture, index: int) -> None:
@@ -124,7 +145,7 @@ def _curves(axes: Axes, shown: Picture) -> None:
         free = point not in shown.stated["joints"]
         x, y = np.hstack([track, track[:, :1]]) if _closes(track) else track
         if free:
-            axes.plot(x, y, color=INK, linewidth=1.3, zorder=2.5)
+            axes.plot(x, y, color=INK, linewidth=1.3 * shown.weight, zorder=2.5)
         else:
             axes.plot(x, y, color=MUTED, linewidth=0.7, linestyle=(0, (1, 2)), zorder=2.5)
 
@@ -173,6 +194,7 @@ def _body(axes: Axes, shown: Picture, link: str, index: int, colour: str) -> Non
     if corners is None or len(corners) < 2:
         return
     for width, paint in ((12.0, colour), (9.6, tint(colour))):
+        width *= shown.weight
         if len(corners) == 2:
             axes.plot(*corners.T, color=paint, linewidth=width, solid_capstyle="round", zorder=4)
         else:
@@ -212,6 +234,8 @@ def _joint(axes: Axes, shown: Picture, name: str, joint: dict[str, Any], index: 
     track = shown.tracks.get(f"{second}.{name}")
     if track is None or not np.isfinite(track[:, index]).all():
         return
+    if f"{first}.{name}" in shown.tracks and not np.isfinite(shown.tracks[f"{first}.{name}"][:, index]).all():
+        return  # its first link has no place
     place = track[:, index]
     grounded = shown.ground in (first, second)
     if joint["type"] == "prismatic":
@@ -272,11 +296,11 @@ def _slot(axes: Axes, shown: Picture, name: str, index: int, beyond: float) -> N
     colour = shown.colour(first)
     for reach, width, paint in ((body, 12.0, colour), (body, 9.6, tint(colour)), (travel, 2.4, "white")):
         ends = on[:, index, None] + along[:, index, None] * reach
-        axes.plot(*ends, color=paint, linewidth=width, solid_capstyle="round", zorder=4.2)
+        axes.plot(*ends, color=paint, linewidth=width * shown.weight, solid_capstyle="round", zorder=4.2)
 
 
-def _labels(axes: Axes, shown: Picture, index: int) -> None:
-    """Names of joints and points, pushed away from the middle of the mechanism."""
+def labels(axes: Axes, shown: Picture, index: int, only: Sequence[str] | None = None) -> None:
+    """Names of joints and points, all or only some, pushed away from the middle of the mechanism."""
     places: dict[str, Array] = {}
     for key, track in shown.tracks.items():
         link, point = key.split(".", 1)
@@ -284,10 +308,11 @@ def _labels(axes: Axes, shown: Picture, index: int) -> None:
         if np.isfinite(track[:, index]).all() and (joint is None or joint["links"][1] == link):
             places[point] = track[:, index]
             if joint is None and link != shown.ground:
-                axes.plot(*track[:, index], "o", markersize=4.5, color=INK, zorder=6)
+                axes.plot(*track[:, index], "o", markersize=4.5 * shown.weight, color=INK, zorder=6)
     if not places:
         return
     middle = np.mean(list(places.values()), axis=0)
+    places = places if only is None else {point: place for point, place in places.items() if point in only}
     for text, points in _together(places, 0.02 * shown.size):
         place = places[points[0]]
         away = place - middle
@@ -297,10 +322,10 @@ def _labels(axes: Axes, shown: Picture, index: int) -> None:
             away = np.array([0.0, 1.3])
         elif any(shown.ground in joint.get("links", ()) for joint in joints):
             away = np.array([-1.05 if away[0] < 0 else 1.05, -0.5])  # beside the bearing, not on the link
-        beside = away * (14 + 3 * len(text), 17)
+        beside = away * (14 + 3 * len(text), 17) * shown.letters
         axes.annotate(
             plain(text), (place[0], place[1]), xytext=beside, textcoords="offset points", ha="center", va="center",
-            fontsize=10, fontweight="bold", color=INK, zorder=7,
+            fontsize=10 * shown.letters, fontweight="bold", color=INK, zorder=7,
             bbox={"boxstyle": "round,pad=0.12", "facecolor": "white", "edgecolor": "none", "alpha": 0.75},
         )  # fmt: skip
 

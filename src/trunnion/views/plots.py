@@ -52,7 +52,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["PLOTS", "friction_power", "mechanism", "motion", "polar", "power", "reactions", "save", "torque"]
+__all__ = [
+    "PLOTS", "check_figure", "friction_power", "mechanism", "motion", "polar", "power", "reactions", "save", "torque",
+]  # fmt: skip
 
 FORMATS = ("png", "svg", "pdf")
 NOTE: dict[str, Any] = {"textcoords": "offset points", "fontsize": 7.5, "color": INK, "ha": "center", "va": "center"}
@@ -355,15 +357,21 @@ PLOTS: dict[str, Callable[[xr.Dataset, xr.Dataset | None], Figure]] = {
 }
 
 
+def check_figure(path: Path) -> str:
+    """The format that a figure would be written in, by the extension; MechanismError if it is none."""
+    kind = path.suffix.lower().lstrip(".")
+    if kind not in FORMATS:
+        raise MechanismError(Finding("is no kind of figure", str(path), "end the name in .png, .svg or .pdf"))
+    return kind
+
+
 def save(figure: Figure, path: str | os.PathLike[str]) -> Path:
     """Write a figure by its extension, whole or not at all; the same figure gives the same file.
 
     Raises MechanismError for another extension than .png, .svg and .pdf, and where it cannot be written.
     """
     target = Path(path)
-    kind = target.suffix.lower().lstrip(".")
-    if kind not in FORMATS:
-        raise MechanismError(Finding("is no kind of figure", str(target), "end the name in .png, .svg or .pdf"))
+    kind = check_figure(target)
     undated = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind)
     with whole(target) as draft, rc_context({"svg.hashsalt": "trunnion"}):
         figure.savefig(draft, format=kind, dpi=200, metadata=undated)

@@ -1,0 +1,160 @@
+"""The ways in which the groups of a mechanism can be put together: their names, and where they put the joints."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.algebra.dual import primal
+from trunnion.analysis.analyse import Run
+from trunnion.analysis.branches import Track
+from trunnion.analysis.hints import way_name
+from trunnion.analysis.kinematics import Forward, forward, pose_of
+from trunnion.groups.planar import Frame, compose, point
+from trunnion.model.mechanism import Mechanism
+from trunnion.structure.decompose import Module
+
+__all__ = ["Choice", "Way", "choices", "put_together"]
+
+Array = NDArray[np.float64]
+
+STEPS = 360  # positions among which one is looked for where the ways are apart
+APART = 1e-3  # of the largest coordinate: nearer ways read alike
+
+
+@dataclass(frozen=True)
+class Way:
+    """One assembly of a group.
+
+    name: what chooses it, `assembly: {LINK: NAME}`. joints: (x, y) of the pins inside the group, global, m, and
+    (slide,) of its slides, m, in the order of the file. taken: whether it is the one that is analysed.
+    """
+
+    name: str
+    joints: Mapping[str, tuple[float, ...]]
+    taken: bool
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A group with more than one assembly.
+
+    module: its place in the plan; label: in the structural formula; links: of the group; link: the one to name it by.
+    time: when the joints lie as the ways say, s; where: that position in words, empty if it is the start.
+    """
+
+    module: int
+    label: str
+    links: tuple[str, ...]
+    link: str
+    time: float
+    where: str
+    ways: tuple[Way, ...]
+
+    def line(self, way: Way) -> str:
+        """What to write into the model file to take one of its ways."""
+        return f"assembly: {{{self.link}: {way.name}}}"
+
+
+def choices(run: Run) -> tuple[Choice, ...]:
+    """Every group that can be assembled, and in several ways, with where its inner joints lie in each of them.
+
+    That is at the start of the cycle, if the group can be assembled there and its ways are apart; else at the first
+    position at which that is so, for a general group the one at which its assemblies are looked for.
+    """
+    times = run.cycle.times(STEPS)
+    walk = forward(run.system, run.values, run.chosen.assembly, times)
+    found: list[Choice] = []
+    for number, module in enumerate(run.system.plan.modules):
+        assembly = run.chosen.assembly[number]
+        with np.errstate(all="ignore"):
+            if isinstance(assembly, Track):
+                rows, moment, taken = _joints(walk, module, assembly.ways), assembly.begin, assembly.taken
+            elif run.chosen.found[number] > 1:
+                rows, moment = _closed(walk, number, times)
+                taken = list(run.system.groups[number].BRANCHES).index(assembly)
+            else:
+                continue
+        if rows and run.chosen.found[number] > 1:
+            ways = _ways(rows, run.chosen.found[number], taken)
+            where = _where(run, moment)
+            found.append(Choice(number, module.label, module.links, _name_of(run, module), moment, where, ways))
+    return tuple(found)
+
+
+def put_together(mechanism: Mechanism, choice: Choice, way: Way) -> Mechanism:
+    """The mechanism with one group assembled in another way, chosen by name; its hints by place stay."""
+    data = mechanism.data()
+    stated = data.get("assembly", {})
+    kept = {key: hint for key, hint in stated.items() if key not in choice.links or key in _by_place(mechanism)}
+    return Mechanism(**{**data, "assembly": {**kept, choice.link: way.name}})
+
+
+def _by_place(mechanism: Mechanism) -> list[str]:
+    return [key for key, hint in mechanism.assembly.items() if not isinstance(hint, str)]
+
+
+def _name_of(run: Run, module: Module) -> str:
+    """The link that names the group's assembly in the file, else its first whose name is not that of a hint."""
+    stated = run.system.mechanism.assembly
+    named = [link for link in module.links if isinstance(stated.get(link), str)]
+    free = [link for link in module.links if link not in stated]
+    return (*named, *free, *module.links)[0]
+
+
+def _where(run: Run, moment: float) -> str:
+    if moment == 0.0:
+        return ""
+    dial = run.system.dial(run.values, np.array([moment]))
+    return dial.at(0) + (f" of {dial.of}" if dial.of else "")
+
+
+def _closed(walk: Forward, number: int, times: Array) -> tuple[dict[str, Array], float]:
+    """Joints (number, way) of a closed form at the first position at which all its ways exist and are apart.
+
+    Nothing if it never closes.
+    """
+    module, group = walk.system.plan.modules[number], walk.system.groups[number]
+    rows = [_joints(walk, module, pose_of(walk, number, branch, times).frames) for branch in group.BRANCHES]
+    shape = np.shape(times)
+    table = np.array([[np.broadcast_to(n, shape) for joint in row.values() for n in joint] for row in rows])
+    known = np.isfinite(table).all(axis=(0, 1))
+    if not np.any(known):
+        return {}, 0.0
+    size = np.max(np.abs(table[:, :, known]))
+    apart = known & (np.ptp(table, axis=0).max(axis=0) > APART * size)
+    lane = int(np.argmax(apart if np.any(apart) else known))
+    at = {joint: np.array([[_at(n, lane) for n in row[joint]] for row in rows]).T for joint in rows[0]}
+    return at, float(times[lane])
+
+
+def _at(number: Array, lane: int) -> float:
+    return float(np.ravel(number)[lane if np.size(number) > 1 else 0])
+
+
+def _joints(walk: Forward, module: Module, frames: Sequence[Frame]) -> dict[str, Array]:
+    """(x, y) of every pin between two links of a module and (slide,) of every slide, from the links' frames."""
+    place = dict(zip(module.links, frames, strict=False))  # a general group that never closes has no frames
+    found: dict[str, Array] = {}
+    for name, (kind, links) in walk.system.joints.items():
+        if name not in module.joints or name in module.driven or any(link not in place for link in links):
+            continue
+        first, second = (compose(place[link], walk.local[link, name]) for link in links)
+        if kind == "prismatic":
+            slide = first.c * (second.x - first.x) + first.s * (second.y - first.y)
+            found[name] = np.array([primal(slide)])
+        else:
+            local = walk.local[links[0], name]
+            found[name] = np.array([primal(n) for n in point(place[links[0]], local.x, local.y)])
+    return found
+
+
+def _ways(rows: Mapping[str, Array], count: int, taken: int) -> tuple[Way, ...]:
+    """The ways of joints (number, way)."""
+    return tuple(
+        Way(way_name(i), {name: tuple(float(n[i]) for n in numbers) for name, numbers in rows.items()}, i == taken)
+        for i in range(count)
+    )

@@ -1,0 +1,45 @@
+"""The ways in which a group can be assembled, in lines of text as `check` prints them."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from trunnion.views.quantities import prefixed
+
+if TYPE_CHECKING:
+    from trunnion.analysis.assemblies import Choice, Way
+
+__all__ = ["lines", "places"]
+
+MOST_JOINTS = 8  # named in a line
+
+
+def lines(choice: Choice) -> list[str]:
+    """The position if it is not the start, each way with its joints, and what to write to take another."""
+    wide = max(len(way.name) for way in choice.ways)
+    found = [f"as they are at {choice.where}:"] * bool(choice.where)
+    found += [f"{way.name:<{wide}}  {places(choice, way)}{'  <- taken' * way.taken}" for way in choice.ways]
+    other = next(way for way in choice.ways if not way.taken)
+    return [*found, f"to take another: {choice.line(other)}"]
+
+
+def places(choice: Choice, way: Way) -> str:
+    """Where the inner joints of a group are in one of its ways: 'C (70, 130) mm'."""
+    numbers = [abs(n) for one in choice.ways for joint in one.joints.values() for n in joint]
+    largest = max((n for n in numbers if math.isfinite(n)), default=0.0)
+    if not largest:
+        return "at the origin" if numbers else ""
+    factor, unit = prefixed(largest, "m")
+    decimals = max(0, 3 - math.floor(math.log10(largest * factor)))
+
+    def text(value: float) -> str:
+        shown = f"{value * factor:.{decimals}f}"
+        shown = shown.rstrip("0").rstrip(".") if decimals else shown
+        return "0" if shown == "-0" else shown
+
+    told = [
+        f"{name} ({text(joint[0])}, {text(joint[1])})" if len(joint) == 2 else f"{name} at {text(joint[0])}"
+        for name, joint in list(way.joints.items())[:MOST_JOINTS]
+    ]
+    return ", ".join(told) + ", …" * (len(way.joints) > MOST_JOINTS) + f" {unit}"

@@ -1,0 +1,273 @@
+"""Assemblies chosen by name: which there are, that a name gives exactly the listed one, and what a wrong name is told.
+
+The assemblies of the class III group are counted by other means: the plate's angle is swept, P and Q are placed by two
+circles, and what remains, the length of the third rod, is looked at for changes of sign.
+"""
+
+from __future__ import annotations
+
+import copy
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import trunnion
+from geared import geared_loop
+from mechanisms import MODELS, analyse, build, class_three, excavator, findings, four_bar, stephenson_six_bar
+from mechanisms_parts import Data
+from trunnion import Mechanism, MechanismError
+from trunnion.analysis.assemblies import Choice, put_together
+from trunnion.errors import Severity
+
+Array = NDArray[np.float64]
+START = np.array([0.0])
+
+
+def named(data: Data, **assembly: str) -> Data:
+    """The data with assemblies chosen by name alone."""
+    return {**copy.deepcopy(data), "assembly": assembly}
+
+
+def at_start(mechanism: Mechanism, link: str, point: str) -> Array:
+    place = trunnion.prepare(mechanism).solve(START).walk.point(link, point).place
+    return np.array([float(np.ravel(n)[0]) for n in place])
+
+
+def choice_of(data: Data) -> Choice:
+    (choice,) = trunnion.check(build(data), 12).choices
+    return choice
+
+
+# ---- closed forms ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("link", ["coupler", "rocker"])
+@pytest.mark.parametrize(("name", "side"), [("way-1", 1.0), ("way-2", -1.0)])
+def test_the_ways_of_a_four_bar_are_those_chosen_by_place(link: str, name: str, side: float) -> None:
+    by_name, by_place = (analyse(data, 24) for data in (named(four_bar(), **{link: name}), four_bar(side=side)))
+    for variable in ("point_position", "drive_effort", "reaction_force"):
+        assert np.array_equal(by_name[variable], by_place[variable], equal_nan=True)
+    assert not [one for one in findings(by_name) if one["where"].startswith("assembly")]
+
+
+def test_the_list_of_a_four_bar_is_the_two_meets_of_two_circles() -> None:
+    """B = (0.3, 0), D = (1, 0): C at distance 0.9 from B and 0.7 from D."""
+    choice = choice_of(four_bar())
+    along = (0.9**2 - 0.7**2 + 0.7**2) / (2 * 0.7)
+    across = np.sqrt(0.9**2 - along**2)
+    assert (choice.label, choice.links, choice.link, choice.where) == (
+        "II(2,3)RRR",
+        ("coupler", "rocker"),
+        "coupler",
+        "",
+    )
+    assert [way.name for way in choice.ways] == ["way-1", "way-2"]
+    assert [way.taken for way in choice.ways] == [True, False]
+    assert [way.joints["C"] for way in choice.ways] == [
+        pytest.approx((0.3 + along, across), abs=1e-12), pytest.approx((0.3 + along, -across), abs=1e-12)
+    ]  # fmt: skip
+    assert choice.line(choice.ways[1]) == "assembly: {coupler: way-2}"
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_every_listed_way_is_what_its_name_gives(name: str) -> None:
+    """The joints lie where the list says, and nothing is left to say about the choice."""
+    mechanism = build(MODELS[name]())
+    for choice in trunnion.check(mechanism, 12).choices:
+        assert sum(way.taken for way in choice.ways) == 1
+        for way in choice.ways:
+            run = trunnion.prepare(put_together(mechanism, choice, way))
+            walk = run.solve(np.array([choice.time])).walk
+            for joint, place in way.joints.items():
+                first, second = run.system.joints[joint][1]
+                one, two = walk.element(first, joint), walk.element(second, joint)
+                slide = [one.c * (two.x - one.x) + one.s * (two.y - one.y)]
+                found = [one.x, one.y] if len(place) == 2 else slide
+                assert [float(np.ravel(n)[0]) for n in found] == pytest.approx(place, abs=1e-9)
+
+
+def test_a_start_in_line_is_listed_where_its_ways_are_apart() -> None:
+    """A parallelogram that starts in line: at the start both ways put C on one spot."""
+    data = four_bar(0.3, 1.0, 0.3, 1.0)
+    choice = choice_of(data)
+    assert choice.where == "1° of A"
+    places = [np.array(way.joints["C"]) for way in choice.ways]
+    assert np.hypot(*(places[0] - places[1])) > 1e-3
+
+
+def test_a_start_that_cannot_be_assembled_is_listed_farther_on() -> None:
+    data = four_bar(1.2, 0.9, 0.7, 1.0)
+    choice = choice_of(data)
+    assert choice.where.endswith("° of A")
+    assert all(np.isfinite(way.joints["C"]).all() for way in choice.ways)
+
+
+def test_a_linkage_that_never_closes_has_no_list() -> None:
+    assert not trunnion.check(build(four_bar(0.3, 0.1, 0.1, 1.0)), 12).choices
+    data = class_three()
+    data["links"]["rod3"]["points"]["R"] = [9.0, 0]
+    assert not trunnion.check(build(data), 12).choices
+
+
+# ---- general groups -------------------------------------------------------------------------------------------
+
+
+def plate_angles(crank: float, turn: float, steps: int = 3600) -> list[float]:
+    """Angles of the plate of `class_three` at which the third rod has its length, with the crank at an angle."""
+    b = crank * np.exp(1j * turn)
+    g, h = 1.4 - 0.15j, 0.55 + 1.9j
+    rod1, rod2, rod3, to_q, to_r = 0.8485, 0.7566, 0.8944, 0.6 + 0j, 0.25 + 0.5j
+    angle = np.linspace(-np.pi, np.pi, steps + 1)
+    with np.errstate(invalid="ignore"):
+        pull = g - to_q * np.exp(1j * angle) - b  # P lies at rod1 from B and at rod2 from the end of this
+        long = np.abs(pull)
+        along = (long**2 + rod1**2 - rod2**2) / (2 * long)
+        across = np.sqrt(rod1**2 - along**2)
+        found = []
+        for side in (1, -1):
+            p = b + pull / long * (along + side * 1j * across)
+            gap = np.abs(p + to_r * np.exp(1j * angle) - h) - rod3
+            crossed = np.flatnonzero(gap[:-1] * gap[1:] < 0)
+            share = gap[crossed] / (gap[crossed] - gap[crossed + 1])
+            found += list(angle[crossed] + share * (angle[1] - angle[0]))
+    return sorted(found)
+
+
+def test_the_ways_of_a_class_three_group_are_all_there_are() -> None:
+    choice = choice_of(class_three())
+    angles = []
+    for way in choice.ways:
+        p, q, r = (complex(*way.joints[pin]) for pin in "PQR")
+        assert abs(p - 0.1) == pytest.approx(0.8485, abs=1e-12)
+        assert abs(q - (1.4 - 0.15j)) == pytest.approx(0.7566, abs=1e-12)
+        assert abs(r - (0.55 + 1.9j)) == pytest.approx(0.8944, abs=1e-12)
+        assert (r - p) / (q - p) == pytest.approx((0.25 + 0.5j) / 0.6, abs=1e-12)
+        angles.append(float(np.angle(q - p)))
+    assert sorted(angles) == pytest.approx(plate_angles(0.1, 0.0), abs=1e-4)
+
+
+@pytest.mark.parametrize("model", [class_three, excavator, geared_loop])
+def test_the_numbering_is_the_same_on_every_run_and_whichever_is_taken(model: Any) -> None:
+    first = choice_of(model())
+    for way in first.ways:
+        again = choice_of(named(model(), **{first.links[-1]: way.name}))
+        assert [one.name for one in again.ways if one.taken] == [way.name]
+        assert [one.joints for one in again.ways] == [one.joints for one in first.ways]
+
+
+def test_a_general_group_is_followed_in_the_way_that_is_named() -> None:
+    data = class_three()
+    choice = choice_of(data)
+    taken = next(way for way in choice.ways if way.taken)
+    by_name, by_place = analyse(named(data, plate=taken.name), 24), analyse(data, 24)
+    assert np.allclose(by_name.point_position, by_place.point_position, atol=1e-12)
+    other = next(way for way in choice.ways if not way.taken)
+    result = analyse(named(data, plate=other.name), 24)
+    assert float(result.closure_residual.max()) < 1e-12
+    assert result.point_position.sel(point="plate.P")[:, 0].values == pytest.approx(other.joints["P"], abs=1e-12)
+
+
+# ---- hints ----------------------------------------------------------------------------------------------------
+
+
+def refusal(data: Data) -> list[Any]:
+    with pytest.raises(MechanismError) as error:
+        trunnion.prepare(build(data))
+    return list(error.value.findings)
+
+
+@pytest.mark.parametrize(("model", "link"), [(four_bar, "rocker"), (class_three, "plate")])
+def test_a_name_that_does_not_exist_lists_those_that_do(model: Any, link: str) -> None:
+    (found,) = refusal(named(model(), **{link: "way-9"}))
+    assert found.where == f"assembly.{link}"
+    assert "no assembly 'way-9'" in found.what
+    assert "there are: way-1, way-2;" in found.remedy
+
+
+def test_wrong_names_come_in_one_go() -> None:
+    found = refusal(named(stephenson_six_bar(), crank="way-1", coupler="way-3", output="way-4"))
+    assert [one.where for one in found] == ["assembly.crank", "assembly.coupler", "assembly.output"]
+    assert "follows the driver A" in found[0].what
+
+
+def test_one_group_cannot_be_in_two_ways() -> None:
+    (found,) = refusal(named(four_bar(), coupler="way-1", rocker="way-2"))
+    assert found.where == "assembly.rocker"
+    assert "contradicts 'way-1' of the link 'coupler'" in found.what
+    trunnion.prepare(build(named(four_bar(), coupler="way-2", rocker="way-2")))
+
+
+@pytest.mark.parametrize(("model", "link", "pin"), [(four_bar, "rocker", "C"), (class_three, "plate", "P")])
+def test_a_name_beats_a_place_and_says_so(model: Any, link: str, pin: str) -> None:
+    data = model()
+    by_place = next(way for way in choice_of(data).ways if way.taken)
+    for way in choice_of(data).ways:
+        both = {**data, "assembly": {pin: data["assembly"][pin], link: way.name}}
+        assert [one.name for one in choice_of(both).ways if one.taken] == [way.name]
+        (said,) = [one for one in trunnion.check(build(both), 12).findings if one.where == f"assembly.{link}"]
+        assert said.severity is (Severity.NOTE if way.name == by_place.name else Severity.WARNING)
+        assert "chosen by name and by where" in said.what
+        assert f"would be {by_place.name}; the name, {way.name}, is taken" in said.what or way.name == by_place.name
+
+
+@pytest.mark.parametrize("extension", ["yaml", "json"])
+def test_a_name_survives_writing_and_new_values(tmp_path: Any, extension: str) -> None:
+    data = named(four_bar(), rocker="way-2")
+    data["assembly"]["coupler.E"] = [0.4, "-200 mm"]
+    mechanism = build(data)
+    mechanism.write(tmp_path / f"model.{extension}")
+    again = trunnion.read(tmp_path / f"model.{extension}")
+    assert again == mechanism
+    assert again.digest == mechanism.digest
+    assert again.assembly["rocker"] == "way-2"
+    longer = again.with_values({"links.rocker.points.C.x": "0.72 m"})
+    assert longer.assembly["rocker"] == "way-2"
+    assert at_start(longer, "rocker", "C")[1] < 0
+    assert not [path for path in mechanism.parameters() if path.startswith("assembly.rocker")]
+
+
+# ---- a group that comes apart and is put together again ----------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def islands() -> Any:
+    """`class_three` with a crank that cannot turn fully; chosen by place."""
+    data = class_three()
+    data["links"]["crank"]["points"]["B"] = [0.3, 0]
+    return analyse(named(data, plate="way-2"), 360)
+
+
+def test_a_group_is_found_again_on_both_ranges_of_the_crank(islands: Any) -> None:
+    """Everywhere that the sweep finds an assembly the analysis has one, and nowhere else, to a degree."""
+    exists = np.array([bool(plate_angles(0.3, turn, 1440)) for turn in np.radians(np.arange(360))])
+    solved = np.isfinite(islands.closure_residual.values)
+    edge = np.flatnonzero(exists != np.roll(exists, 1))
+    assert len(edge) == 4  # two ranges
+    unequal = np.flatnonzero(solved != exists)
+    assert all(min(abs(position - edge)) <= 1 for position in unequal)
+    assert len(unequal) <= 4
+
+
+def test_both_ranges_are_closed_and_of_one_sense(islands: Any) -> None:
+    solved = np.isfinite(islands.closure_residual.values)
+    assert float(islands.closure_residual.max()) < 1e-12
+    place = {
+        name: islands.point_position.sel(point=name).values[:, solved] for name in ("crank.B", "plate.P", "plate.Q")
+    }
+    b, p, q = (place[name][0] + 1j * place[name][1] for name in ("crank.B", "plate.P", "plate.Q"))
+    assert np.abs(p - b) == pytest.approx(np.full(p.shape, 0.8485), abs=1e-12)
+    assert np.abs(q - (1.4 - 0.15j)) == pytest.approx(np.full(p.shape, 0.7566), abs=1e-12)
+    for position, turn in zip(np.flatnonzero(solved), np.angle(q - p), strict=True):
+        known = plate_angles(0.3, np.radians(position))
+        assert not known or min(abs(np.angle(np.exp(1j * (np.array(known) - turn))))) < 1e-4
+
+
+def test_the_finding_tells_the_range_that_was_found_again(islands: Any) -> None:
+    (found,) = [one for one in findings(islands) if "put together anew" in one["what"]]
+    assert found["severity"] == "warning"
+    low, high = (float(text.split("°")[0]) for text in found["what"].split("between ")[1].split(" and "))
+    solved = np.flatnonzero(np.isfinite(islands.closure_residual.values))
+    second = solved[(solved > 60) & (solved < 240)]
+    assert (low, high) == pytest.approx((second[0], second[-1]), abs=1.0)

@@ -18,8 +18,9 @@ __all__ = ["GUESSES", "SLIDE_JUMP", "TURN_JUMP", "Follower", "assemblies", "at",
 Array = NDArray[np.float64]
 
 GUESSES = 512
-FEW = 128  # guesses where an assembly is looked for again
-PROBES = 12  # of the gaps of a track
+FEW = 16  # guesses at each place where an assembly is looked for again
+PROBES = 96  # such places in the gaps of a track
+MOST_CONDITION = 1e8  # of an assembly that counts
 SEED = 20060704  # of the guesses: the same assemblies every time
 TURN_JUMP = 0.35  # rad between neighbours of the grid: more is another branch
 SLIDE_JUMP = 0.25  # of the group's size, likewise
@@ -41,14 +42,12 @@ def _gap_backward(rows: Array) -> list[int]:
     return list(range(rows.shape[1] - 1, -1, -1))
 
 
-def _probes(rows: Array) -> list[int]:
-    """Some grid points in every gap of a track, in all no more than PROBES."""
-    gaps = np.flatnonzero(~np.isfinite(rows[0]))
-    if not len(gaps) or len(gaps) == rows.shape[1]:
-        return []
-    parts = np.split(gaps, np.flatnonzero(np.diff(gaps) > 1) + 1)
-    each = max(1, PROBES // len(parts))
-    return [int(part[i]) for part in parts[:PROBES] for i in np.linspace(0, len(part) - 1, each + 2, dtype=int)[1:-1]]
+def _probes(gaps: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Some grid points spread over the gaps of a track, at most PROBES; none if it is a gap as a whole."""
+    places = np.flatnonzero(gaps)
+    if len(places) == len(gaps):
+        return places[:0]
+    return places[np.unique(np.linspace(0, len(places) - 1, min(len(places), PROBES)).astype(np.intp))]
 
 
 def assemblies(
@@ -72,7 +71,7 @@ def assemblies(
             for n in (frame.x / spread, frame.y / spread, frame.c, frame.s)
         ]
     )
-    sound = np.isfinite(key).all(axis=0) & (np.broadcast_to(pose.condition, shape) < 1e8)
+    sound = np.isfinite(key).all(axis=0) & (np.broadcast_to(pose.condition, shape) < MOST_CONDITION)
     geared = {gear.first for gear in group.gears}
     for value, step in zip(pose.q, group.steps, strict=True):
         if step.joint in geared and step.joint not in group.driven:  # whole turns more would be another tooth
@@ -157,23 +156,42 @@ class Follower:
     def revisit(self, rows: Array, periodic: bool) -> NDArray[np.intp]:
         """Fill the parts of the gaps in which the group can be assembled again, as far as the probes find them.
 
+        A range that reaches into what is known belongs to another assembly of the same sense and is left out.
         Returns the grid points that were filled, in order.
         """
         gaps = ~np.isfinite(rows[0])
-        for probe in _probes(rows):
-            if np.isfinite(rows[0, probe]):
-                continue
-            found = assemblies(self.group, at(self.elements, probe), [lane_of(q, probe) for q in self.drive], FEW)
-            alike = np.flatnonzero(found.orientation == self.orientation)
-            if not len(alike):
+        probes = _probes(gaps)
+        if not len(probes):
+            return probes
+        found = self._found_at(probes)
+        for probe, ways in zip(probes, found, strict=True):
+            if np.isfinite(rows[0, probe]) or not ways.size:
                 continue
             known = np.flatnonzero(np.isfinite(rows[0]))
             before = rows[:, known[np.argmin(np.abs(known - probe))]]
-            ways = np.array([found.q[i][alike] for i in self.group.free])
-            best = int(np.argmin(self._apart(ways, before)))
-            rows[:, probe] = ways[:, best]
-            self.both_ways(rows, probe, periodic)
+            fresh = np.full_like(rows, np.nan)
+            fresh[:, probe] = ways[:, int(np.argmin(self._apart(ways, before)))]
+            self.both_ways(fresh, int(probe), periodic)
+            filled = np.isfinite(fresh[0])
+            if not np.any(filled & np.isfinite(rows[0])):
+                rows[:, filled] = fresh[:, filled]
         return np.flatnonzero(gaps & np.isfinite(rows[0]))
+
+    def _found_at(self, probes: NDArray[np.intp]) -> list[Array]:
+        """Coordinates (free, way) of assemblies of the right sense at each grid point, found from FEW guesses each."""
+        rng = np.random.default_rng(SEED)
+        spread = extent(self.group, self.elements)
+        lanes = np.repeat(probes, FEW)
+        revolute = self._limits(1.0) == TURN_JUMP
+        reach = np.where(revolute, np.pi, 2 * spread)
+        guesses = [far * rng.uniform(-1, 1, len(lanes)) for far in reach]
+        elements = [(_frame_at(a, lanes), _frame_at(b, lanes)) for a, b in self.elements]
+        pose = self.group.position(elements, guesses, [lane_of(n, lanes) for n in self.drive])
+        sound = np.broadcast_to(pose.orientation, lanes.shape) == self.orientation
+        sound &= np.broadcast_to(pose.condition, lanes.shape) < MOST_CONDITION
+        q = np.array([np.broadcast_to(pose.q[i], lanes.shape) for i in self.group.free])
+        sound &= np.isfinite(q).all(axis=0)
+        return [q[:, k * FEW : (k + 1) * FEW][:, sound[k * FEW : (k + 1) * FEW]] for k in range(len(probes))]
 
     def _apart(self, ways: Array, before: Array) -> Array:
         """How far assemblies (free, way) are from another, turns and slides counted against their sizes."""

@@ -282,7 +282,7 @@ def _newton(problem: Problem, method: FrictionMethod) -> Settled:
         rounds = rounds + ~np.asarray(done)
         if renew:
             rows = real.map_derivative(state)
-            inverse = linalg.inverse(identity_minus(rows))
+            inverse = linalg.quick_inverse(identity_minus(rows))
         forces = _corrected(real, state, forces, inverse)
         before, state = state, real.state(forces)
         previous, change = change, _changed(state, before)
@@ -296,11 +296,11 @@ def _newton(problem: Problem, method: FrictionMethod) -> Settled:
         state = real.state(forces)
         done = np.where(certain, done, shares >= 1.0)
         rows = real.map_derivative(state)
-        inverse = linalg.inverse(identity_minus(rows))
+        inverse = linalg.quick_inverse(identity_minus(rows))
     depth = _depth(problem)
     if depth:  # the ε parts need the matrix of the solution, not that of the way there
         rows = real.map_derivative(state)
-        inverse = linalg.inverse(identity_minus(rows))
+        inverse = linalg.quick_inverse(identity_minus(rows))
     for _ in range(depth):
         forces = _corrected(problem, problem.state(forces), forces, inverse)
         state = problem.state(forces)

@@ -211,16 +211,18 @@ def _contact(back: Backward, links: tuple[str, ...], k: int, place: Place, given
         at = walk.element(place.links[1], place.joint)
         # the guide has its middle at the point of the link that the file names second
         middle = walk.element(walk.system.joints[place.joint][1][1], place.joint)
-        arm = (middle.x - at.x, middle.y - at.y) if place.reversed_ else (0.0, 0.0)
+        arm = (middle.x - at.x, middle.y - at.y) if place.reversed_ else None
         load = Load((-axis.s, axis.c), values[f"joints.{place.joint}.guide.length"], arm)
         units = []
         for link in links:
             frame = walk.motions[link].frame
             push = about(Wrench(axis.c, axis.s, 0.0), frame.x - at.x, frame.y - at.y)
             units.append(_signed(link, place.links, push))
-    xp = namespace(slip.speed, lever)
-    forced = given.zero_slip.get(place.joint, 0.0) * np.maximum(np.abs(primal(slip.speed)), 1e-300)
-    speed = sign * lever * xp.where(slip.zero, forced, slip.speed)
+    speed = slip.speed
+    if np.any(slip.zero):
+        forced = given.zero_slip.get(place.joint, 0.0) * np.maximum(np.abs(primal(speed)), 1e-300)
+        speed = namespace(speed).where(slip.zero, forced, speed)
+    speed = sign * lever * speed
     if place.joint in given.deflections:
         parameters["deflection"] = sign * given.deflections[place.joint]
     return Contact(k, units, load, law, parameters, speed), sign * lever

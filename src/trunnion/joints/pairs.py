@@ -39,13 +39,14 @@ class Load(NamedTuple):
 
     A pin (across is None) presses with N = |F|.  [D 8]
     A guide of the given length (m), loaded off its middle, carries on its two ends:
-    N = |F_n/2 + M/length| + |F_n/2 − M/length|, F_n along the unit vector `across`: the planar twin of a bearing
-    that carries its load at its two ends. arm: from the point that the moment is about to the middle of the guide, m.
+    N = |F_n/2 + M/length| + |F_n/2 − M/length| = max(|F_n|, 2 |M|/length), F_n along the unit vector `across`: the
+    planar twin of a bearing that carries its load at its two ends. arm: from the point that the moment is about to the
+    middle of the guide, m; None if that is the point.
     """
 
     across: tuple[Number, Number] | None = None
     length: Number = 0.0
-    arm: tuple[Number, Number] = (0.0, 0.0)
+    arm: tuple[Number, Number] | None = None
 
     def normal(self, reaction: Reaction) -> Number:
         """Normal load N ≥ 0, N."""
@@ -57,9 +58,9 @@ class Load(NamedTuple):
                 return np.sqrt(square)
             loaded = primal(square) > 0  # |F| has no derivative at 0; an unloaded pin stays unloaded
             return xp.where(loaded, xp.sqrt(xp.where(loaded, square, 1.0)), 0.0)
-        one, other = self._ends(reaction)
-        xp = namespace(one, other)
-        return xp.abs(one) + xp.abs(other)
+        across, couple = self._across(reaction), self._couple(reaction)
+        xp = namespace(across, couple)
+        return xp.maximum(xp.abs(across), xp.abs(couple))
 
     def gradient(self, reaction: Reaction, normal: Number) -> Reaction:
         """∂N/∂(F_x, F_y, M); zero where the load is. normal: N of this reaction, to save computing it again."""
@@ -68,9 +69,16 @@ class Load(NamedTuple):
         if self.across is None:
             share = 1 / xp.where(normal > 0, normal, np.inf)
             return x * share, y * share, 0.0
-        one, other = (xp.sign(end) for end in self._ends(reaction))
-        half, turn = (one + other) / 2, (one - other) / self.length
-        return half * self.across[0] + turn * self.arm[1], half * self.across[1] - turn * self.arm[0], turn
+        across, couple = self._across(reaction), self._couple(reaction)
+        shifted = xp.abs(across) >= xp.abs(couple)
+        push, turn = (
+            xp.where(shifted, xp.sign(across), 0.0),
+            xp.where(shifted, 0.0, xp.sign(couple)) * (2 / self.length),
+        )
+        gx, gy = push * self.across[0], push * self.across[1]
+        if self.arm is None:
+            return gx, gy, turn
+        return gx + turn * self.arm[1], gy - turn * self.arm[0], turn
 
     def bound(self, reaction: Reaction) -> Number:
         """At least the most by which this reaction, added to any other, can change N."""
@@ -81,15 +89,20 @@ class Load(NamedTuple):
     def mapped(self, change: Callable[[Number], Number]) -> Load:
         """The same with `change` applied to every number."""
         across = None if self.across is None else (change(self.across[0]), change(self.across[1]))
-        return Load(across, change(self.length), (change(self.arm[0]), change(self.arm[1])))
+        arm = None if self.arm is None else (change(self.arm[0]), change(self.arm[1]))
+        return Load(across, change(self.length), arm)
 
-    def _ends(self, reaction: Reaction) -> tuple[Number, Number]:
-        x, y, m = reaction
+    def _across(self, reaction: Reaction) -> Number:
+        """F_n."""
         if self.across is None:
             raise ValueError("a pin has no ends")
-        half = (x * self.across[0] + y * self.across[1]) / 2
-        turn = (m - (self.arm[0] * y - self.arm[1] * x)) / self.length
-        return half + turn, half - turn
+        return reaction[0] * self.across[0] + reaction[1] * self.across[1]
+
+    def _couple(self, reaction: Reaction) -> Number:
+        """2 M/length."""
+        x, y, m = reaction
+        moment = m if self.arm is None else m - (self.arm[0] * y - self.arm[1] * x)
+        return moment * (2 / self.length)
 
 
 PAIRS: dict[str, Pair] = {

@@ -255,11 +255,12 @@ class General:
     def _jacobian(self, placed: Sequence[tuple[Frame, Frame]], drive: Sequence[Number]) -> list[list[Number]]:
         """Rate of every gap for a unit rate of every free coordinate; square for an Assur group."""
         matrix: list[list[Number]] = []
+        cut = {joint for row in self._rows for joint, _ in row.terms(drive)}
+        seen = {joint: self._screws(placed, placed[joint][1]) for joint in cut}
         for row in self._rows:
             entries: list[Number] = [0.0] * len(self.free)
             for joint, factor in row.terms(drive):
-                first, second = placed[joint]
-                screws = self._screws(placed, second)
+                first, screws = placed[joint][0], seen[joint]
                 to_first, to_second = (self._paths[link] for link in self.joints[joint].sides)
                 for place, i in enumerate(self.free):
                     weight = (i in to_second) - (i in to_first)
@@ -443,12 +444,13 @@ class General:
     def _multipliers(self, pose: Pose, carried: dict[int, Wrench]) -> list[Number]:
         """λ of every constraint."""
         powers: list[Number] = []
+        screws = self._screws(pose.elements, _reference(pose))
         for i in self.free:
             outboard = ZERO_LOAD
             for link, path in self._paths.items():
                 if i in path:
                     outboard = added(outboard, carried[link], 1.0)
-            screw = self._screws(pose.elements, _reference(pose))[i]
+            screw = screws[i]
             powers.append(screw.x * outboard.x + screw.y * outboard.y + screw.w * outboard.m)
         return [-_weighted([line[j] for line in pose.inverse], powers) for j in range(len(self._rows))]
 

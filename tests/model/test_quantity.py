@@ -37,6 +37,7 @@ LENGTH, ANGLE, NUMBER = KINDS["length"], KINDS["angle"], KINDS["number"]
         ("pi / 2", "angle", math.pi / 2),
         ("90 deg - 0.1 deg", "angle", math.radians(89.9)),
         ("1500 rpm", "angular speed", 1500 * 2 * math.pi / 60),
+        ("2 rev/s", "angular speed", 4 * math.pi),
         ("10 rad/s", "angular speed", 10.0),
         ("10 1/s", "angular speed", 10.0),
         ("10 s^-1", "angular speed", 10.0),

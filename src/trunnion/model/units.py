@@ -133,7 +133,9 @@ def _registry() -> pint.UnitRegistry[Fraction]:
     """pint with exact rational factors: 93.782 mm is the float nearest 0.093782."""
     import pint
 
-    return pint.UnitRegistry(non_int_type=Fraction)
+    registry: pint.UnitRegistry[Fraction] = pint.UnitRegistry(non_int_type=Fraction)
+    registry.define("@alias turn = rev")
+    return registry
 
 
 # Those that a misspelt one is compared with; pint knows many more.

@@ -78,7 +78,7 @@ def check(
 ) -> None:
     """Findings, mobility, structural formula and plan of a mechanism, and the ways it can be assembled in."""
     from trunnion.analysis.inspect import check as inspect
-    from trunnion.views.ways import lines
+    from trunnion.views.ways import gear_line, lines
 
     if assemblies:
         from trunnion.views.plots import check_figure
@@ -102,6 +102,8 @@ def check(
         for choice in (one for one in found.choices if one.module == number):
             for line in lines(choice):
                 out.print(f"    {line}", markup=False, highlight=False, soft_wrap=True)
+    for pair in found.gears:
+        out.print(f"gears    {gear_line(pair)}", markup=False, highlight=False, soft_wrap=True)
     _say(_placed(found.findings, file, ["assembly"]))
     if assemblies:
         from trunnion.views.assemblies import ways as drawings
@@ -169,12 +171,15 @@ def locking(
     file: File, steps: Steps = 360, set_: Set = None, table: TableFile = None, friction: FrictionLaw = None
 ) -> None:
     """How close to locking, by all friction and by each joint's; other solutions; whether it can be driven backward."""
+    from trunnion.analysis.locking import locking as look
     from trunnion.analysis.locking import report_rows
 
     mechanism = _mechanism(file, set_, table, friction)
     with _lines_of(file):
-        rows = report_rows(mechanism, steps)
-    _table(mechanism.name or str(file), rows)
+        found = look(mechanism, steps)
+    _table(mechanism.name or str(file), report_rows(mechanism, found))
+    _say(_placed(_findings(found), file, ["assembly"]))
+    raise typer.Exit(_status(_findings(found)))
 
 
 @app.command()

@@ -10,6 +10,8 @@ from scipy.integrate import solve_ivp
 
 import trunnion
 from mechanisms import Array, analyse, build, four_bar, slider_crank
+from trunnion.algebra.dual import Dual, derivative
+from trunnion.errors import Status
 from trunnion.joints.friction import FRICTION_LAWS
 
 DAHL = {"law": "dahl", "coefficient": 0.12, "stiffness": 4e3}
@@ -115,3 +117,45 @@ def test_power_balance_and_loss_over_the_cycle(law: dict[str, Any]) -> None:
     result = analyse(slider_crank(), 720, friction=law)
     assert float(np.abs(result["power_residual"]).max()) < 1e-9
     assert float(result["friction_power"].mean("position").min()) > 0
+
+
+@pytest.mark.parametrize("law", [DAHL, LUGRE], ids=["dahl", "lugre"])
+def test_bristles_in_a_linkage_with_gaps(law: dict[str, Any]) -> None:
+    """Where it cannot be assembled there is no state; after the gap the bristles start at rest."""
+    result = analyse(four_bar(2.0, 1.5, 1.5, 4.0), 72, friction=law)
+    solved = result["status"].values < Status.NOT_CONVERGED
+    assert 0 < np.count_nonzero(solved) < 72
+    assert np.all(np.isfinite(result["drive_effort"].values[:, solved]))
+
+
+def test_stiff_bristles_slide_steadily() -> None:
+    """κ → ∞ leaves Stribeck's curve at every position, beside reversals too."""
+    law = {**LUGRE, "stiffness": 1e9, "damping": 0.0, "stribeck_speed": 0.05}
+    steady = {key: value for key, value in law.items() if key not in ("stiffness", "damping")} | {"law": "stribeck"}
+    bristles, curve = (analyse(slider_crank(), 360, friction=one) for one in (law, steady))
+    same = bristles["status"].values == curve["status"].values
+    np.testing.assert_allclose(
+        bristles["friction_force"].sel(joint="P").values[same],
+        curve["friction_force"].sel(joint="P").values[same],
+        rtol=2e-4,
+        atol=1e-6,
+    )
+
+
+def test_samples_of_speed_and_duals_of_the_law() -> None:
+    run = trunnion.prepare(build(four_bar(), friction=LUGRE))
+    time = np.linspace(0.1, 0.9, 7) * run.cycle.duration
+    plain = np.broadcast_to(run.solve(time).efforts["A"], time.shape)
+    values = run.system.mechanism.parameters({"drivers.A.speed": np.full((5, 1), run.values["drivers.A.speed"])})
+    many = np.broadcast_to(run.solve(time, values).efforts["A"], (5, 7))
+    np.testing.assert_allclose(many, np.broadcast_to(plain, (5, 7)), rtol=1e-9)
+    for key in ("coefficient", "static", "stiffness", "stribeck_speed"):
+        path = f"joints.B.friction.{key}"
+        value, h = run.values[path], 1e-5 * run.values[path]
+        found = derivative(run.solve(time, run.system.mechanism.parameters({path: Dual(value, 1.0)})).efforts["A"])
+        ends = [
+            run.solve(time, run.system.mechanism.parameters({path: value + sign * h})).efforts["A"] for sign in (1, -1)
+        ]
+        expected = (ends[0] - ends[1]) / (2 * h)
+        scale = np.abs(expected).max() + np.abs(plain).max() / value * 1e-3
+        np.testing.assert_allclose(np.broadcast_to(found, time.shape), expected, rtol=0, atol=1e-4 * scale)

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import trunnion
-from mechanisms import MODELS, build, five_bar, four_bar, slider_crank
+from mechanisms import MODELS, build, five_bar, four_bar, model, slider_crank
+from trunnion import Mechanism
 from trunnion.analysis import design as figures
 from trunnion.analysis.kinematics import forward
 
@@ -145,3 +146,30 @@ def test_flywheel_of_a_sinusoidal_torque() -> None:
 
 def test_two_drivers_and_no_driver() -> None:
     assert figures.design(build(five_bar()), 36).grashof == ""
+
+
+def test_design_with_gaps_returns_and_no_mass() -> None:
+    """What has no answer is left out: a drive that turns back has no flywheel, a link without mass no balance."""
+    gaps = Mechanism(**model(four_bar(2.0, 1.5, 1.5, 4.0)))
+    labels = [row["label"] for row in figures.report_rows(gaps, 90)]
+    assert any(label.startswith("counterweight") for label in labels)
+    data = model(four_bar())
+    data["drivers"] = {"A": {"law": "harmonic", "mean": 1.0, "amplitude": 0.7, "period": 0.5}}
+    swinging = Mechanism(**data)
+    found = figures.design(swinging, 90)
+    np.testing.assert_allclose(found.limits, [(0.3, 1.7)], rtol=1e-9)
+    assert np.isnan(found.flywheel(0.05))
+    assert not any("flywheel" in row["label"] for row in figures.report_rows(swinging, 90))
+    bare = model(four_bar(), friction=None)
+    for link in bare["links"].values():
+        for key in ("mass", "centre", "inertia"):
+            link.pop(key, None)
+    assert not any("counterweight" in row["label"] for row in figures.report_rows(Mechanism(**bare), 90))
+
+
+def test_work_that_cancels_gives_no_efficiency() -> None:
+    """A constant force over a closed path does no net work, whatever the sampling leaves of it."""
+    data = model(four_bar(), friction=None)
+    data["drivers"] = {"A": {"law": "polynomial-345", "range": [0.0, 1.5], "duration": 0.5, "dwell": 0.1}}
+    result = trunnion.analyse(Mechanism(**data), 360)
+    assert np.isnan(result["efficiency"])

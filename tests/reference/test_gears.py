@@ -153,3 +153,59 @@ def test_turns_that_never_come_back() -> None:
     result = analyse(data, 36)
     assert not result.attrs["periodic"]
     assert any("do not come back" in finding["what"] for finding in findings(result))
+
+
+def cycle_of(data: Data) -> float:
+    return float(trunnion.prepare(build(data)).cycle.duration)
+
+
+def test_cycle_whichever_way_a_gear_pair_is_stated() -> None:
+    """φ_E = ½ φ_A + 0.4 and φ_A = 2 φ_E − 0.8 are one gear pair: two turns of the crank."""
+    one, other = geared_five_bar(), geared_five_bar()
+    other["gears"]["mesh"] = {"joints": ["E", "A"], "ratio": 2.0, "phase": -0.8}
+    assert cycle_of(one) == pytest.approx(2 * 2 * np.pi / 3)
+    assert cycle_of(other) == pytest.approx(cycle_of(one))
+    plain, turned = analyse(one, 60), analyse(other, 60)
+    np.testing.assert_allclose(turned["drive_effort"], plain["drive_effort"], rtol=1e-9)
+
+
+def test_cycle_of_a_chain_of_gear_pairs() -> None:
+    """½ · ½ · ½ of a turn: eight turns of the driver, with the pairs stated in any direction."""
+    names = "ABCD"
+    data: Data = {
+        "links": {
+            "ground": {"points": {name: [0.3 * i, 0.0] for i, name in enumerate(names)}},
+            **{f"g{i}": {"points": {name: [0, 0]}, "mass": 1.0} for i, name in enumerate(names)},
+        },
+        "joints": {name: {"type": "revolute", "links": ["ground", f"g{i}"]} for i, name in enumerate(names)},
+        "gears": {
+            "o": {"joints": ["C", "D"], "ratio": -0.5},
+            "n": {"joints": ["C", "B"], "ratio": -2.0},
+            "m": {"joints": ["A", "B"], "ratio": -0.5},
+        },
+        "drivers": {"A": {"speed": 2 * np.pi}},
+    }
+    mechanism = Mechanism(**data)
+    run = trunnion.prepare(mechanism)
+    assert run.cycle.duration == pytest.approx(8.0)
+    assert run.cycle.periodic
+    result = trunnion.analyse(mechanism, 80)
+    turned = result["joint_rotation"].sel(joint="D").values / (2 * np.pi)
+    np.testing.assert_allclose(turned, -result["time"].values / 8, atol=1e-9)
+
+
+def test_gears_without_room() -> None:
+    data = geared_five_bar()
+    data["links"]["ground"]["points"]["E"] = [0, 0]
+    with pytest.raises(MechanismError) as error:
+        build(data)
+    assert any("no room for gears" in finding.what for finding in error.value.findings)
+
+
+def test_check_tells_internal_from_external() -> None:
+    (mesh,) = trunnion.check(build(geared_five_bar()), 12).gears
+    assert not mesh.internal
+    assert sum(radius for _, radius in mesh.radii) == pytest.approx(np.hypot(1.2, 0.1))
+    (ring,) = trunnion.check(build(planet_drive()), 12).gears
+    assert ring.internal
+    assert dict(ring.radii) == pytest.approx({"ground": 0.6, "planet": 0.2})

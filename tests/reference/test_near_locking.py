@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import trunnion
 from mechanisms import Data, analyse, build, findings, five_bar, four_bar, model, slider_crank
 from trunnion import Mechanism, Status, locking
-from trunnion.analysis.friction import Contact, Problem
+from trunnion.analysis.friction import Contact, FrictionMethod, Problem
 from trunnion.analysis.near_locking import _count
 from trunnion.groups.planar import Wrench
 from trunnion.joints.friction import FRICTION_LAWS
@@ -91,7 +91,7 @@ def test_joint_without_which_it_still_locks() -> None:
     found = locking(build(data(), **{**options, "friction": 0.9}), 24)
     margin, multiple = found["locking_margin"].values, found["critical_multiple"].values
     assert np.any(margin < 1)
-    assert np.all(multiple[:, margin < 1] < 1)
+    assert np.all(np.nanmin(multiple, axis=0)[margin < 1] < 1)
     assert np.any(multiple == 0)
 
 
@@ -131,5 +131,39 @@ def test_locked_findings_name_the_joint_that_decides() -> None:
 
 def test_there_is_nothing_to_lock_without_friction() -> None:
     found = locking(build(four_bar(), friction=None), 12)
-    assert found.sizes["joint"] == 0
+    assert np.all(np.isnan(found["critical_multiple"]))
     assert np.all(np.isinf(found["locking_margin"]))
+
+
+def test_coefficient_only_where_the_law_is_proportional_to_it() -> None:
+    data, options = CASES["slider-crank"]
+    stribeck = {"law": "stribeck", "coefficient": 0.2, "static": 0.35, "stribeck_speed": 0.5}
+    rows = summary(analyse(data(), 24, **{**options, "friction": stribeck}))
+    labels = " / ".join(row["label"] for row in rows)
+    assert "critical multiple of the friction of" in labels
+    assert "critical friction coefficient" not in labels
+    assert "critical friction coefficient of" in " / ".join(
+        row["label"] for row in summary(analyse(data(), 24, **options))
+    )
+
+
+def test_successive_approximation_has_the_same_margin() -> None:
+    data, options = CASES["slider-crank"]
+    plain = analyse(data(), 24, **{**options, "friction": 0.2})
+    named = analyse(data(), 24, FrictionMethod("successive-approximation", 1e-10), **{**options, "friction": 0.2})
+    assert np.isfinite(plain["locking_margin"]).any()
+    solved = named["status"].values < Status.NOT_CONVERGED
+    np.testing.assert_allclose(
+        named["locking_margin"].values[solved], plain["locking_margin"].values[solved], rtol=1e-6
+    )
+
+
+def test_locking_says_nothing_where_there_is_no_answer() -> None:
+    """Positions that cannot be assembled have no margin, no multiple, no count."""
+    found = locking(build(four_bar(2.0, 1.5, 1.5, 4.0)), 36)
+    gone = found["status"].values == Status.NOT_ASSEMBLED
+    assert np.any(gone)
+    assert np.any(~gone)
+    for name in ("locking_margin", "other_solutions", "critical_multiple"):
+        assert np.all(np.isnan(found[name].values[..., gone]))
+        assert not np.any(np.isnan(found[name].values[..., found["status"].values < Status.NOT_CONVERGED]))

@@ -16,7 +16,7 @@ from trunnion.analysis.friction import FrictionMethod
 from trunnion.analysis.kinematics import start
 from trunnion.analysis.kinetostatics import Backward
 from trunnion.analysis.loads import Stated
-from trunnion.analysis.system import Cycle, Dial, System, law_of, rubbing
+from trunnion.analysis.system import Cycle, Dial, System, Values, rubbing
 from trunnion.errors import Finding, Severity, Status
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.model.check import check_model
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from trunnion.analysis.analyse import Run
 
-__all__ = ["MARGIN", "fill_power", "finish"]
+__all__ = ["MARGIN", "fill_power", "finish", "pitch_circles"]
 
 DRAWN = 360  # positions at which a load that varies is looked at for the drawing
 MARGIN = 10.0  # multiple of the friction up to which the locking margin is looked for
@@ -90,12 +90,9 @@ def _worst(system: System, poses: Sequence[Any], figure: str) -> Number:
 def efficiency(arrays: Arrays, cycle: Cycle) -> float:
     """Useful work over drive work of the cycle [D 1]; NaN where the loads drive or a position has no answer."""
     drive = np.sum(arrays["drive_power"], axis=0)
-    work, size = cycle.mean(drive), cycle.mean(np.abs(drive))
-    if not work > 1e-9 * size:
-        return float("nan")
-    useful = cycle.mean(arrays["useful_power"])
+    work = cycle.net(drive)
     # what a load gives and takes back over a turn cancels but for rounding
-    return useful / work if abs(useful) > 1e-12 * size else 0.0
+    return cycle.net(arrays["useful_power"]) / work if work > 0 else float("nan")
 
 
 def finish(
@@ -259,20 +256,25 @@ def _summary(
         lost = np.sum(arrays["friction_power"], axis=0)
         if rubbing(run.system):
             rows.append(_margin(arrays["locking_margin"], dial))
-            rows += _critical(run, near)
+            rows += near.rows(run, dial) if near else []
             rows.append({"label": "friction power, mean", "value": run.cycle.mean(lost), "unit": "W"})
             if len(sound):
                 top = int(sound[np.argmax(lost[sound])])
                 rows.append({"label": f"friction power, largest, at {dial.at(top)}", "value": lost[top], "unit": "W"})
-        rows.append({"label": f"efficiency of the cycle{_why(value, arrays)}", "value": value, "unit": "1"})
-        rows += _driven_back(run, near)
+        rows.append({"label": f"efficiency of the cycle{_why(value, arrays, run.cycle)}", "value": value, "unit": "1"})
+        back = near_locking.reverse_row(near.back, run.cycle) if near else None
+        rows += [back] if back else []
         rows.append({"label": "power residual, largest, of peak drive power", "value": balance(arrays), "unit": "1"})
     solved = int(np.count_nonzero(arrays["status"] < Status.NOT_CONVERGED))
     rows.append(
         {"label": "friction iterations, most", "value": int(np.max(arrays["friction_iterations"])), "unit": "1"}
     )
     rows.append({"label": f"positions solved, of {len(time)}", "value": solved, "unit": "1"})
-    return [{**row, "value": None if not np.isfinite(row["value"]) else float(row["value"])} for row in rows]
+    return [{**row, "value": _finite(row["value"])} for row in rows]
+
+
+def _finite(value: float | None) -> float | None:
+    return None if value is None or not np.isfinite(value) else float(value)
 
 
 def _sound(status: NDArray[Any]) -> NDArray[np.intp]:
@@ -315,33 +317,7 @@ def _near_locking(
         return near_locking.look(run, time, arrays["locking_margin"], method, useful_loads(run.system.mechanism))
 
 
-def _critical(run: Run, near: near_locking.Locking | None) -> list[dict[str, Any]]:
-    """The joint that decides where the margin is least, with its critical coefficient if its law has one."""
-    decides = near.responsible() if near else None
-    if decides is None:
-        return []
-    joint, multiple = decides
-    path = f"joints.{joint}.friction.coefficient"
-    if law_of(run.system, joint).interval_at_rest and path in run.values:
-        value = float(np.ravel(run.values[path])[0]) * multiple
-        return [{"label": f"critical friction coefficient, of {joint} alone", "value": value, "unit": "1"}]
-    return [{"label": f"critical multiple of the friction, of {joint} alone", "value": multiple, "unit": "1"}]
-
-
-def _driven_back(run: Run, near: near_locking.Locking | None) -> list[dict[str, Any]]:
-    """Efficiency with the useful loads driving and the motion turned round."""
-    value = near.efficiency(run.cycle) if near else None
-    if value is None:
-        return []
-    text = "efficiency driven backward by the useful loads"
-    if np.isnan(value):
-        text += " (it locks)"
-    elif value <= 0:
-        text += " (it holds itself)"
-    return [{"label": text, "value": value, "unit": "1"}]
-
-
-def _why(value: float, arrays: Arrays) -> str:
+def _why(value: float, arrays: Arrays, cycle: Cycle) -> str:
     """What an efficiency of 0, or none, means."""
     if value == 0:
         return " (the useful loads do no net work)"
@@ -349,6 +325,8 @@ def _why(value: float, arrays: Arrays) -> str:
         return ""
     if np.any(arrays["status"] >= Status.NOT_CONVERGED):
         return " (not every position has an answer)"
+    if cycle.net(np.sum(arrays["drive_power"], axis=0)) < 0:
+        return " (the loads drive: the driver takes work)"
     return " (the driver does no net work)"
 
 
@@ -399,7 +377,9 @@ def _scene(run: Run) -> dict[str, Any]:
         "joints": joints,
         "drivers": list(mechanism.drivers),
         "loads": _loads_drawn(run),
-        "gears": {name: _circles(run, name) for name, gear in mechanism.gears.items() if gear.teeth},
+        "gears": {
+            name: pitch_circles(run.system, run.values, name) for name, gear in mechanism.gears.items() if gear.teeth
+        },
         "springs": {
             name: {"between": spring.between and list(spring.between), "joint": spring.joint}
             for name, spring in mechanism.springs.items()
@@ -407,16 +387,16 @@ def _scene(run: Run) -> dict[str, Any]:
     }
 
 
-def _circles(run: Run, name: str) -> list[dict[str, Any]]:
-    """Pitch circles of a gear pair: the point each turns about, and its radius, m."""
-    system, gear = run.system, run.system.mechanism.gears[name]
+def pitch_circles(system: System, values: Values, name: str) -> list[dict[str, Any]]:
+    """Pitch circles of a gear pair with teeth: the point each turns about, and its radius, m."""
+    gear = system.mechanism.gears[name]
     carriers = system.mechanism.carriers(name) or (0, 0)
     links = [system.joints[joint][1] for joint in gear.joints]
     carrier = links[0][carriers[0]]
-    elements = system.elements(run.values)
+    elements = system.elements(values)
     one, two = (elements[carrier, joint] for joint in gear.joints)
     sign = 1.0 if carriers[0] == carriers[1] else -1.0
-    ratio = sign * float(run.values[f"gears.{name}.ratio"])
+    ratio = sign * float(values[f"gears.{name}.ratio"])
     centres = float(np.hypot(two.x - one.x, two.y - one.y))
     radii = abs(ratio / (ratio - 1)) * centres, abs(1 / (ratio - 1)) * centres
     return [

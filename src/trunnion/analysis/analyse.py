@@ -18,7 +18,7 @@ from trunnion.analysis.bristles import History, histories
 from trunnion.analysis.friction import FrictionMethod
 from trunnion.analysis.kinematics import forward
 from trunnion.analysis.kinetostatics import Backward, Given, solve
-from trunnion.analysis.system import Cycle, System, Values, build, sticking
+from trunnion.analysis.system import COMMON_TURNS, Cycle, System, Values, build, sticking
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.groups.gear import rotation
 from trunnion.groups.planar import accelerated
@@ -78,26 +78,32 @@ def prepare(mechanism: Mechanism) -> Run:
     values = mechanism.parameters()
     cycle = system.cycle(values)
     run = Run(system, values, cycle, choose(system, values, cycle))
-    turns = _whole_turns(run)
+    turns = _unknown_turns(run)
     if any(turns.values()):
         cycle = system.cycle(values, turns)
         run = Run(system, values, cycle, choose(system, values, cycle))
     return run
 
 
-def _whole_turns(run: Run) -> dict[str, float]:
-    """Whole turns that a cycle adds to joints that a gear pair starts from and that are neither driven nor geared."""
+def _unknown_turns(run: Run) -> dict[str, float]:
+    """Turns in the cycle of a joint of every chain of gear pairs that no driver turns, from a first walk."""
     mechanism = run.system.mechanism
-    geared = {gear.joints[1] for gear in mechanism.gears.values()}
-    asked = {gear.joints[0] for gear in mechanism.gears.values()} - geared - mechanism.drivers.keys()
-    if not asked or not run.cycle.periodic:
-        return {}
-    walk = forward(run.system, run.values, run.chosen.assembly, run.cycle.times(TURN_STEPS))
-    found = {}
-    for joint in sorted(asked):
+    found: dict[str, float] = {}
+    if not mechanism.gears or not run.cycle.periodic:
+        return found
+    duration = run.cycle.duration
+    for gear in mechanism.gears.values():
+        joint = gear.joints[0]
+        if joint in run.system.geared_turns(run.values, duration, found):
+            continue
+        # up to just before the end: there a track begins again
+        time = np.linspace(0.0, duration * (1 - 1e-9), TURN_STEPS)
+        walk = forward(run.system, run.values, run.chosen.assembly, time)
         first, second = (walk.motions[link].frame for link in run.system.joints[joint][1])
         angle = np.unwrap(np.ravel(rotation((first, second))))
-        found[joint] = float(np.rint((angle[-1] - angle[0]) / (2 * np.pi))) if np.all(np.isfinite(angle)) else 0.0
+        turns = (angle[-1] - angle[0]) / (2 * np.pi)
+        whole = np.rint(COMMON_TURNS * turns) / COMMON_TURNS
+        found[joint] = float(whole if abs(whole - turns) < 1e-6 else turns) if np.isfinite(turns) else 0.0
     return found
 
 
@@ -196,11 +202,22 @@ def _status(back: Backward, shape: tuple[int, ...]) -> NDArray[np.int8]:
     for settled in back.settled:
         raise_to(Status.NOT_CONVERGED, ~np.asarray(settled.converged, bool))
         raise_to(Status.LOCKED, np.asarray(settled.share) < 1.0)
+    raise_to(Status.NOT_CONVERGED, ~np.isfinite(_sum_of_forces(back)))
     for undefined in back.undefined.values():
         raise_to(Status.LOAD_UNDEFINED, undefined)
     raise_to(Status.SINGULAR, ~(condition <= SINGULAR))
     raise_to(Status.NOT_ASSEMBLED, ~np.asarray(placed))
     return status
+
+
+def _sum_of_forces(back: Backward) -> Number:
+    """Finite where every reaction and effort is."""
+    total: Number = 0.0
+    for effort in (*back.efforts.values(), *back.friction.values()):
+        total = total + effort
+    for reaction in back.reactions.values():
+        total = total + reaction.x + reaction.y
+    return total
 
 
 def _fill_motion(arrays: Arrays, back: Backward, time: NDArray[np.float64], window: slice) -> None:
@@ -295,7 +312,8 @@ def _blank(arrays: Arrays, status: NDArray[np.int8], window: slice) -> None:
         return
     for names, where in (
         (FORCES, status >= Status.NOT_CONVERGED),
-        ([*RATES, "locking_margin"], status >= Status.SINGULAR),
+        (RATES, status >= Status.SINGULAR),
+        (["locking_margin"], status >= Status.LOAD_UNDEFINED),
         (["useful_power", "efficiency_instant"], status >= Status.NOT_CONVERGED),
     ):
         for name in names:

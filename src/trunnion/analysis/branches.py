@@ -321,7 +321,7 @@ def _turns(walk: Forward, module: Module, group: General, elements: Elements, ti
     """Rotations of the known joints that gear pairs speak of and nothing drives, followed from that nearest to 0."""
     found = {}
     for i, (name, gear) in enumerate(zip(module.gears, group.gears, strict=True)):
-        driven = walk.system.mechanism.gears[name].joints[0] in walk.system.mechanism.drivers
+        driven = walk.system.gear_joints(name)[0] in walk.system.mechanism.drivers
         if not driven and group.joints[gear.first].sides == (OUTER, OUTER):
             angle = np.broadcast_to(primal(rotation(elements[gear.first])), times.shape)
             solved = np.isfinite(angle)

@@ -6,8 +6,9 @@ z ↦ A z + B; the maps are found for all intervals at once, chained, and closed
 z₀ = B/(1 − A). Over a range the bristles start at rest, z₀ = 0.
 
 Inside an interval v is the cubic through the speeds and accelerations at its ends. It is cut at the reversal of v, if
-there is one, and into steps that grow with the distance from it; in each the way is integrated exactly and d per way
-is taken at its middle, so that Dahl's law, whose d per way is constant, is solved without error.
+there is one, and into steps that grow with the distance from it; in each the way is integrated exactly, d per way is
+taken at its middle and the steady deflection v/d as changing evenly, so that Dahl's law, where both are constant, is
+solved without error, and stiff bristles follow the steady deflection.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ __all__ = ["History", "histories"]
 
 INTERVALS = 720  # of one turn of the fastest driver
 GROWN = np.linspace(0.0, 1.0, 13) ** 2  # steps on either side of a reversal, by the distance from it
+SLOWEST = 1e-30  # m/s, so that d/|v| has a value at rest
 REFINEMENTS = 6  # of the place of a reversal
 Array = NDArray[np.float64]
 
@@ -174,25 +176,39 @@ def _stepped(
     step: tuple[Number, Number],
     known: tuple[Number, Number],
 ) -> tuple[Number, Number]:
-    """One step: z ↦ e z + (1 − e) z_s with e = exp(−d Δt), z_s = v/d, where d/|v| is that of the middle."""
+    """One step of z′ = z_s − z by x = ∫ d dt, where z_s = v/d changes evenly from z₀ to z₁:
+    z ↦ e z + z₁ − e z₀ − (z₁ − z₀) (1 − e)/x, e = exp(−x). d/|v| is that of the middle."""
     if law.relaxation is None:
         raise ValueError("the law has no bristles")
     (left, right), (keep, gain) = step, known
-    middle = slip.speed((left + right) / 2)
-    way = slip.length * (right - left) * (slip.speed(left) + 4 * middle + slip.speed(right)) / 6
-    xp = namespace(way, middle)
-    moving = primal(middle) != 0
-    per_way = law.relaxation(middle, **parameters) / xp.where(moving, xp.abs(middle), 1.0)
-    per_way = xp.where(moving & (primal(way) != 0), per_way, 1.0)
-    left_over = namespace(way, per_way).exp(-per_way * xp.abs(way))
-    steady = xp.sign(way) / per_way
-    return left_over * keep, left_over * gain + (1 - left_over) * steady
+    v0, middle, v1 = slip.speed(left), slip.speed((left + right) / 2), slip.speed(right)
+    way = slip.length * (right - left) * (v0 + 4 * middle + v1) / 6
+    xp = namespace(way)
+    sense = xp.sign(way)
+    x = _per_way(law, parameters, middle) * xp.abs(way)
+    z0, z1 = (sense / _per_way(law, parameters, speed) for speed in (v0, v1))
+    xp = namespace(x)
+    left_over = xp.exp(-x)
+    tiny = primal(x) < 1e-12
+    share = xp.where(tiny, 1.0, (1 - left_over) / xp.where(tiny, 1.0, x))
+    return left_over * keep, left_over * gain + z1 - left_over * z0 - (z1 - z0) * share
+
+
+def _per_way(law: FrictionLaw, parameters: dict[str, Number], speed: Number) -> Number:
+    """d/|v|, 1/m, also where v is 0."""
+    if law.relaxation is None:
+        raise ValueError("the law has no bristles")
+    xp = namespace(speed)
+    size = xp.maximum(xp.abs(speed), SLOWEST)
+    return law.relaxation(size, **parameters) / size
 
 
 def _chained(keep: Number, gain: Number, periodic: bool) -> Number:
     """Deflections at all ends of intervals from their maps, periodic or from rest: by doubling the span of the maps."""
     xp = namespace(keep, gain)
     count = np.shape(primal(gain))[-1]
+    known = np.isfinite(primal(keep) + primal(gain))  # where there is no motion the bristles come to rest
+    keep, gain = xp.where(known, keep, 0.0), xp.where(known, gain, 0.0)
     whole_keep, whole_gain = keep, gain
     index = np.arange(count)
     reach = 1
@@ -223,5 +239,7 @@ def _picked(number: Number, index: NDArray[np.intp]) -> Number:
     """Entries along the last axis: the same for all samples, or a row of indices for each."""
     if np.ndim(index) <= 1:
         return number[..., index]
+    if len(np.shape(primal(number))) == 1:
+        return number[index]
     rows = np.arange(np.shape(index)[0])[:, None]
     return number[rows if np.shape(primal(number))[0] > 1 else 0 * rows, index]

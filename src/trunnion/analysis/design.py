@@ -71,7 +71,8 @@ class Design:
     drive coordinates where it turns back; limits: drive coordinates between which the linkage can be assembled;
     shaking_force, shaking_moment (about the ground's origin): largest
     that inertia puts on the frame; rms_effort, peak_power: of the first driver; energy_swing: largest change of
-    its energy about the mean, J; grashof: type of a four-bar, empty if it is none.
+    its energy about the mean, J; mean_speed: of that driver, 0 if it turns back; grashof: type of a four-bar, empty
+    if it is none.
     """
 
     grashof: str
@@ -90,12 +91,13 @@ class Design:
     def flywheel(self, fluctuation: float) -> float:
         """Inertia on the drive shaft, kg m², that keeps its speed within mean · (1 ± fluctuation/2).
 
-        J = ΔE / (δ ω²): the energy swing over the coefficient of fluctuation and the mean speed squared.
+        J = ΔE / (δ ω²): the energy swing over the coefficient of fluctuation and the mean speed squared. NaN for a
+        drive that turns back, which has no speed to keep.
         Source: any textbook of machine theory, e.g. R. L. Norton, Design of Machinery, "Flywheels".
         """
         if not fluctuation > 0:
             raise MechanismError(Finding(f"a fluctuation of {fluctuation:g} needs no end of inertia", "fluctuation"))
-        return self.energy_swing / (fluctuation * self.mean_speed**2)
+        return self.energy_swing / (fluctuation * self.mean_speed**2) if self.mean_speed else float("nan")
 
 
 def design(mechanism: Mechanism, steps: int = 720) -> Design:
@@ -105,6 +107,7 @@ def design(mechanism: Mechanism, steps: int = 720) -> Design:
     back = run.solve(time)
     walk = back.walk
     force, moment = shaking(back)
+    steps = len(time)
     driver = next(iter(mechanism.drivers), "")
     effort = np.broadcast_to(back.efforts[driver], time.shape) if driver else np.zeros(steps)
     rate = np.broadcast_to(run.system.drive(run.values, driver, time)[1], time.shape) if driver else np.zeros(steps)
@@ -122,7 +125,7 @@ def design(mechanism: Mechanism, steps: int = 720) -> Design:
         _largest(power),
         float(np.mean(power)),
         float(np.max(swing) - np.min(swing)),
-        float(np.mean(rate)),
+        0.0 if np.any(rate * np.sum(rate) <= 0) else float(np.mean(rate)),
     )
 
 
@@ -294,7 +297,8 @@ def dead_centres(run: Run, steps: int = 720) -> dict[str, tuple[float, ...]]:
 
         values = np.broadcast_to(speed(time), time.shape)
         turning = np.flatnonzero(values[:-1] * values[1:] < 0)
-        exact = time[:-1][values[:-1] == 0] if np.any(np.abs(values) > 0) else []  # a link at rest never turns back
+        around = np.concatenate([values[-2:-1] if run.cycle.periodic else [0.0], values])
+        exact = time[:-1][(values[:-1] == 0) & (around[:-2] * values[1:] < 0)]  # a link at rest does not turn back
         roots = [_root(speed, time[k], time[k + 1]) for k in turning]
         found[name] = tuple(sorted({round(_coordinate(run, moment), 14) for moment in [*roots, *exact]}))
     return found
@@ -327,13 +331,34 @@ def limits(run: Run, steps: int = 720) -> tuple[tuple[float, float], ...]:
         return good
 
     good = closed(time)
-    found = []
+    found: list[tuple[float, float]] = []
     edges = np.flatnonzero(np.diff(np.concatenate([[False], good, [False]]).astype(int)))
     for first, after in zip(edges[::2], edges[1::2], strict=True):
         low = time[first] if first == 0 else _edge(closed, time[first], time[first - 1])
         high = time[after - 1] if after == len(time) else _edge(closed, time[after - 1], time[after])
-        found.append((_coordinate(run, low), _coordinate(run, high)))
+        reached = _reached(run, low, high)
+        if not any(np.allclose(reached, other, rtol=1e-9, atol=0) for other in found):  # there and back again
+            found.append(reached)
     return tuple(found)
+
+
+def _reached(run: Run, low: float, high: float) -> tuple[float, float]:
+    """Coordinates of the first driver between which it moves from one time to another; of one way in its sense."""
+    ends = _coordinate(run, low), _coordinate(run, high)
+    driver = next(iter(run.system.mechanism.drivers), "")
+    if not driver:
+        return ends
+
+    def rate(moment: Array) -> Array:
+        return np.broadcast_to(run.system.drive(run.values, driver, moment)[1], np.shape(moment))
+
+    time = np.linspace(low, high, 720)
+    rates = rate(time)
+    if not (np.any(rates > 0) and np.any(rates < 0)):
+        return ends
+    turns = [_root(rate, time[k], time[k + 1]) for k in np.flatnonzero(rates[:-1] * rates[1:] < 0)]
+    places = [*ends, *(_coordinate(run, float(moment)) for moment in [*time, *turns])]
+    return min(places), max(places)
 
 
 def _edge(closed: Callable[[Array], NDArray[np.bool_]], inside: float, outside: float) -> float:
@@ -376,8 +401,11 @@ def counterweights(run: Run, steps: int = 90) -> tuple[tuple[Counterweight, ...]
             columns.append(np.concatenate([_full(-alpha * s - w * w * c, time), _full(alpha * c - w * w * s, time)]))
     force = np.concatenate([_full(part, time) for part in shaking(back)[0]])
     matrix = np.array(columns).T
-    solution, *_ = np.linalg.lstsq(matrix, force, rcond=None)
-    left = np.linalg.norm(force - matrix @ solution) / max(float(np.linalg.norm(force)), 1e-300)
+    solved = np.isfinite(force) & np.isfinite(matrix).all(axis=1)
+    matrix, force = matrix[solved], force[solved]
+    solution = np.linalg.lstsq(matrix, force, rcond=None)[0] if len(force) else np.full(matrix.shape[1], np.nan)
+    size = float(np.linalg.norm(force))
+    left = np.linalg.norm(force - matrix @ solution) / size if size > 0 else float("nan")
     weights = tuple(
         Counterweight(link, float(solution[2 * i]), float(solution[2 * i + 1])) for i, link in enumerate(turning)
     )
@@ -433,12 +461,13 @@ def report_rows(mechanism: Mechanism, steps: int = 720, fluctuation: float = 0.0
     row("drive power, largest", found.peak_power, "W")
     row("drive power, mean", found.mean_power, "W")
     row("energy swing about the mean", found.energy_swing, "J")
-    if turns and driver and run.cycle.periodic:
+    if turns and driver and run.cycle.periodic and found.mean_speed:
         row(f"flywheel for a fluctuation of {fluctuation:g}", found.flywheel(fluctuation), "kg m^2")
     if any(kind == "revolute" and mechanism.fixed_link in links for kind, links in run.system.joints.values()):
         weights, left = counterweights(run)
-        for weight in weights:
+        for weight in weights if np.isfinite(left) else ():  # without mass there is nothing to balance
             place = f"({weight.x:.5g}, {weight.y:.5g})"
             row(f"counterweight on {weight.link}, mass × place in its frame", place, "kg m")
-        row("shaking force left with these", left if left > 1e-12 else 0.0, "of its RMS")
+        if np.isfinite(left):
+            row("shaking force left with these", left if left > 1e-12 else 0.0, "of its RMS")
     return rows

@@ -313,7 +313,8 @@ def _newton(problem: Problem, method: FrictionMethod) -> Settled:
 def _at_once(problem: Problem) -> Settled:
     """Friction from the frictionless reactions, which it does not change but in what no law looks at."""
     forces = problem.target(problem.state([0.0] * len(problem.contacts)).normals)
-    return Settled(problem.at(range(len(problem.start)), forces), forces, 1, 0.0, 0.0, True, 1.0)
+    reactions = problem.at(range(len(problem.start)), forces)
+    return Settled(reactions, forces, 1, 0.0, 0.0, True, 1.0, problem=_primal(problem))
 
 
 def _corrected(
@@ -349,7 +350,11 @@ def _successive(problem: Problem, method: FrictionMethod) -> Settled:
     done = change <= method.tolerance(state.normals)  # not so where it ran off to infinity
     measurable = np.isfinite(previous) & (previous > 0)
     ratio = np.where(measurable, change / np.where(measurable, previous, 1.0), 0.0)
-    return Settled(problem.reactions(forces, state), forces, rounds, change, ratio, done, 1.0)
+    real = _primal(problem)
+    bound = np.where(np.isfinite(_peak(real.state([0.0] * len(real.contacts)).normals)), real.bound(), 0.0)
+    margin = _margin(real, bound, method.margin_up_to)
+    reactions = problem.reactions(forces, state)
+    return Settled(reactions, forces, rounds, change, ratio, done, 1.0, margin, ~(bound >= 1.0), real)
 
 
 def _margin(problem: Problem, bound: Number, most: float) -> Number:

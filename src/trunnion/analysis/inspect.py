@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from trunnion.algebra.dual import primal
-from trunnion.analysis.analyse import analyse, prepare
+from trunnion.analysis.account import pitch_circles
+from trunnion.analysis.analyse import Run, analyse, prepare
 from trunnion.analysis.assemblies import Choice, choices
 from trunnion.analysis.kinematics import Forward, forward
 from trunnion.errors import Finding, Severity
@@ -16,7 +18,15 @@ from trunnion.model.mechanism import Mechanism
 from trunnion.structure.decompose import Plan
 from trunnion.structure.mobility import mobility_by_rank
 
-__all__ = ["Check", "check"]
+__all__ = ["Check", "GearPair", "check"]
+
+
+class GearPair(NamedTuple):
+    """A gear pair with teeth: whether one gear turns inside the other, and the pitch radii by link, m."""
+
+    name: str
+    internal: bool
+    radii: tuple[tuple[str, float], ...]
 
 
 @dataclass(frozen=True)
@@ -25,7 +35,7 @@ class Check:
 
     rank_mobility: by the rank of the joints' constraints, None where no position can be assembled.
     assemblies: number found for each module; choices: the groups that have several, with their ways; findings:
-    everything to know, worst first.
+    everything to know, worst first; gears: the gear pairs with teeth.
     """
 
     plan: Plan
@@ -33,6 +43,7 @@ class Check:
     assemblies: tuple[int, ...]
     choices: tuple[Choice, ...]
     findings: tuple[Finding, ...]
+    gears: tuple[GearPair, ...] = ()
 
     @property
     def formula(self) -> str:
@@ -67,7 +78,20 @@ def check(mechanism: Mechanism, steps: int = 360) -> Check:
         )
     order = list(Severity)
     found.sort(key=lambda finding: order.index(finding.severity))
-    return Check(run.system.plan, rank, run.chosen.found, choices(run), tuple(found))
+    return Check(run.system.plan, rank, run.chosen.found, choices(run), tuple(found), _gears(run))
+
+
+def _gears(run: Run) -> tuple[GearPair, ...]:
+    found = []
+    for name, gear in run.system.mechanism.gears.items():
+        if not gear.teeth:
+            continue
+        circles = pitch_circles(run.system, run.values, name)
+        carriers = run.system.mechanism.carriers(name) or (0, 0)
+        sign = 1.0 if carriers[0] == carriers[1] else -1.0
+        radii = tuple((str(circle["at"]).rpartition(".")[0], float(circle["radius"])) for circle in circles)
+        found.append(GearPair(name, sign * float(run.values[f"gears.{name}.ratio"]) > 0, radii))
+    return tuple(found)
 
 
 def _rank(walk: Forward) -> int | None:

@@ -313,7 +313,10 @@ def _record_gear(back: Backward, number: int, i: int, name: str, torque: Number,
         pushes = apart(gear, _mesh(back, number, i)[1], separation)
         force = done[0].wrench.x + pushes[0].wrench.x, done[0].wrench.y + pushes[0].wrench.y
         done += pushes
-    back.gears[name] = GearLoad(torque, force)
+    if name in walk.system.turned_round:  # found in the joint and on the gear that the file names first
+        back.gears[name] = GearLoad(-torque * pose.ratios[i], (-force[0], -force[1]))
+    else:
+        back.gears[name] = GearLoad(torque, force)
     for joint, side, wrench, at in done:
         place = places[joint]
         if place.outer[side] and place.links[side] != walk.system.mechanism.fixed_link:

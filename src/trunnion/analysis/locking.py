@@ -5,13 +5,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from trunnion.analysis.account import MARGIN, effort_units, useful_loads
-from trunnion.analysis.analyse import Run, prepare
+from trunnion.analysis.account import MARGIN, useful_loads
+from trunnion.analysis.analyse import Run, analyse, prepare
 from trunnion.analysis.friction import FrictionMethod
-from trunnion.analysis.near_locking import critical_multiples, others, reverse
-from trunnion.analysis.system import law_of, rubbing
-from trunnion.errors import Finding, MechanismError
+from trunnion.analysis.near_locking import Reverse, critical_multiples, critical_row, others, reverse, reverse_row
+from trunnion.analysis.system import Dial, rubbing
+from trunnion.errors import Finding, MechanismError, Status
 from trunnion.model.mechanism import Mechanism
 
 if TYPE_CHECKING:
@@ -22,110 +23,94 @@ __all__ = ["MOST_STEPS", "locking", "report_rows"]
 MOST_STEPS = 8192
 
 _NAMES = {
-    "locking_margin": ("1", "multiple of all friction at which the position locks"),
     "critical_multiple": ("1", "multiple of the joint's own friction at which the position locks"),
     "other_solutions": ("1", "solutions found at full friction beside the one given"),
-    "drive_effort": ("N m", "drive effort on the second link by the first"),
     "drive_effort_reverse": ("N m", "drive effort with the motion run backward; NaN where that locks"),
     "power_delivered_reverse": ("W", "power that the drivers take out with the motion run backward"),
     "power_given_reverse": ("W", "power that the useful loads put in with the motion run backward"),
 }
 
 
-def locking(mechanism: Mechanism, steps: int = 360, most: float = MARGIN) -> xr.Dataset:
-    """Locking over the cycle, by dims joint, driver and position; the names, units and meanings are in the Dataset.
+def locking(mechanism: Mechanism, steps: int = 360) -> xr.Dataset:
+    """The result of `analyse` with what is to know of locking at every position, by dims joint, driver and position.
 
-    Margins and multiples are found by continuation from no friction up to `most`, ∞ beyond; 0 for a joint without
-    whose friction its group still locks. Units of the efforts are N for a slide (attribute driver_units).
-    Raises MechanismError if the structure does not determine the motion, or for no steps or more than MOST_STEPS.
+    critical_multiple: by continuation from no friction, ∞ beyond 10; 0 for a joint without whose friction its group
+    still locks; NaN for joints without friction and positions without forces for another cause. The names, units and
+    meanings are in the Dataset. Raises MechanismError if the structure does not determine the motion, or for no steps
+    or more than MOST_STEPS.
     """
     import xarray as xr
 
     if not 1 <= steps <= MOST_STEPS:
         raise MechanismError(Finding(f"cannot look at {steps} positions", "steps", f"give 1 to {MOST_STEPS:,}"))
-    run = prepare(mechanism)
-    time = run.cycle.times(steps if run.cycle.duration > 0 else 1)
-    method = FrictionMethod(margin_up_to=most)
-    back = run.solve(time, method=method)
+    result = analyse(mechanism, steps)
+    run, time, status = prepare(mechanism), result["time"].values, result["status"].values
+    back = run.solve(time, method=FrictionMethod())
     with np.errstate(all="ignore"):
-        multiples = critical_multiples(back, most)
+        multiples = critical_multiples(back, MARGIN)
+        more = np.where(status <= Status.LOCKED, others(back), np.nan)
         other = reverse(run, back, FrictionMethod(), useful_loads(mechanism))
-        margin = np.minimum.reduce([np.broadcast_to(one.margin, time.shape) for one in back.settled])
-        more = others(back)
-    drivers = list(mechanism.drivers)
-    efforts = [np.broadcast_to(back.efforts[name], time.shape) for name in drivers]
+    known = (status < Status.NOT_CONVERGED) | (status == Status.LOCKED)
+    nothing = np.full(len(time), np.nan)
     arrays: dict[str, tuple[tuple[str, ...], Any]] = {
-        "locking_margin": ((), margin),
-        "critical_multiple": (("joint",), np.array(list(multiples.values())).reshape(len(multiples), len(time))),
+        "critical_multiple": (
+            ("joint",),
+            [np.where(known, multiples.get(str(name), nothing), np.nan) for name in result["joint"].values],
+        ),
         "other_solutions": ((), more),
-        "drive_effort": (("driver",), np.array(efforts).reshape(len(drivers), len(time))),
         "drive_effort_reverse": (
             ("driver",),
-            np.array([np.where(other.locked, np.nan, other.efforts[name]) for name in drivers]).reshape(-1, len(time)),
+            np.array([np.where(other.locked, np.nan, other.efforts[name]) for name in mechanism.drivers]).reshape(
+                len(mechanism.drivers), len(time)
+            ),
         ),
         "power_delivered_reverse": ((), np.where(other.locked, np.nan, other.delivered)),
         "power_given_reverse": ((), other.given),
     }
-    variables = {
+    added = {
         name: xr.Variable((*dims, "position"), values, dict(zip(("units", "long_name"), _NAMES[name], strict=True)))
         for name, (dims, values) in arrays.items()
     }
-    times = xr.Variable("position", time, {"units": "s", "long_name": "time from the start of the cycle"})
-    coordinates = {"joint": list(multiples), "driver": drivers, "time": times}
-    return xr.Dataset(variables, coordinates, {"driver_units": " ".join(effort_units(run.system)), "most": most})
+    return result.assign(added)
 
 
-def report_rows(mechanism: Mechanism, steps: int) -> list[dict[str, Any]]:
-    """The figures of `locking` that one looks at first, as label, value and unit."""
+def report_rows(mechanism: Mechanism, found: xr.Dataset) -> list[dict[str, Any]]:
+    """The figures of a result of `locking` that one looks at first, as label, value and unit."""
     run = prepare(mechanism)
-    found = locking(mechanism, steps)
     dial = run.system.dial(run.values, found["time"].values)
-    most = found.attrs["most"]
     if not rubbing(run.system):
         return [{"label": "there is no friction: nothing locks", "value": None, "unit": "1"}]
-    rows = [_least("locking margin, all friction together", found["locking_margin"].values, dial, most)]
-    for joint in found["joint"].values:
-        multiple = found["critical_multiple"].sel(joint=joint).values
-        rows.append(_least(f"critical multiple of {joint} alone", multiple, dial, most))
-        coefficient = _coefficient(run, str(joint))
-        least = float(np.min(multiple, initial=np.inf))
-        if coefficient is not None and np.isfinite(least):
-            label = f"critical friction coefficient of {joint} alone"
-            rows.append({"label": label, "value": least * coefficient, "unit": "1"})
+    rows = [_least("locking margin, all friction together", found["locking_margin"].values, dial)]
+    for joint in rubbing(run.system):
+        rows += _joint(run, joint, found["critical_multiple"].sel(joint=joint).values, dial)
     more = found["other_solutions"].values
     if np.any(more > 0):
-        where = dial.intervals(np.flatnonzero(more > 0))
-        rows.append(
-            {"label": f"other solutions at full friction, {where}, most", "value": float(more.max()), "unit": "1"}
-        )
-    return rows + _backward(run, found)
+        label = f"other solutions at full friction, {dial.intervals(np.flatnonzero(more > 0))}, most"
+        rows.append({"label": label, "value": float(np.nanmax(more)), "unit": "1"})
+    backward = reverse_row(_reverse(found), run.cycle)
+    stays = {"label": "the useful loads do not drive it backward over the cycle", "value": None, "unit": "1"}
+    return [*rows, backward or stays]
 
 
-def _least(label: str, values: Any, dial: Any, most: float) -> dict[str, Any]:
-    known = np.isfinite(values)
-    if not np.any(known):
-        return {"label": f"{label}, more than", "value": most, "unit": "1"}
-    at = int(np.flatnonzero(known)[np.argmin(values[known])])
+def _least(label: str, values: NDArray[np.float64], dial: Dial) -> dict[str, Any]:
+    if not np.any(np.isfinite(values)):
+        nowhere = np.all(np.isnan(values))
+        return {"label": label if nowhere else f"{label}, more than", "value": None if nowhere else MARGIN, "unit": "1"}
+    at = int(np.nanargmin(values))
     return {"label": f"{label}, least, at {dial.at(at)}", "value": float(values[at]), "unit": "1"}
 
 
-def _coefficient(run: Run, joint: str) -> float | None:
-    """The friction coefficient of a joint, if its friction is proportional to it."""
-    path = f"joints.{joint}.friction.coefficient"
-    if not law_of(run.system, joint).interval_at_rest or path not in run.values:
-        return None
-    return float(np.ravel(run.values[path])[0])
+def _joint(run: Run, joint: str, multiple: NDArray[np.float64], dial: Dial) -> list[dict[str, Any]]:
+    """The least critical multiple of a joint, and its friction there."""
+    rows = [_least(f"critical multiple of {joint} alone", multiple, dial)]
+    if np.any(np.isfinite(multiple)):
+        at = int(np.nanargmin(multiple))
+        row = critical_row(run, joint, float(multiple[at]), f"at {dial.at(at)}")
+        rows = rows if "multiple" in row["label"] else [row] if multiple[at] == 0 else [*rows, row]
+    return rows
 
 
-def _backward(run: Run, found: Any) -> list[dict[str, Any]]:
-    """Whether the useful loads can drive it backward."""
-    given, delivered = found["power_given_reverse"].values, found["power_delivered_reverse"].values
-    work, size = run.cycle.mean(given), run.cycle.mean(np.abs(given))
-    if not work > 1e-9 * size:
-        return [{"label": "the useful loads do not drive it backward over the cycle", "value": None, "unit": "1"}]
-    locked = int(np.count_nonzero(np.isnan(delivered)))
-    if locked:
-        return [{"label": "positions that lock when driven backward", "value": locked, "unit": "1"}]
-    value = run.cycle.mean(delivered) / work
-    text = "" if value > 0 else " (it holds itself)"
-    return [{"label": f"efficiency driven backward by the useful loads{text}", "value": value, "unit": "1"}]
+def _reverse(found: xr.Dataset) -> Reverse:
+    """The way back as the Dataset has it."""
+    delivered, given = found["power_delivered_reverse"].values, found["power_given_reverse"].values
+    return Reverse({}, np.isnan(delivered) & np.isfinite(given), delivered, given)

@@ -7,29 +7,40 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra import linalg
+from trunnion.algebra.dual import primal
 from trunnion.analysis import continuation
 from trunnion.analysis.bristles import histories
 from trunnion.analysis.friction import FrictionMethod, Problem, frictionless, identity_minus, scaled
 from trunnion.analysis.kinetostatics import Backward, Given, backward
-from trunnion.analysis.system import Cycle, Dial
+from trunnion.analysis.system import Cycle, Dial, law_of
 from trunnion.errors import Finding, Severity
 
 if TYPE_CHECKING:
     from trunnion.analysis.analyse import Run
 
-__all__ = ["Locking", "Reverse", "critical_multiples", "findings", "look", "others", "reverse"]
+__all__ = [
+    "Locking",
+    "Reverse",
+    "critical_multiples",
+    "critical_row",
+    "findings",
+    "look",
+    "others",
+    "reverse",
+    "reverse_row",
+]
 
 Array = NDArray[np.float64]
 STARTS = 48
 ROUNDS = 40
 SEED = 1785  # of the starts
-LOOKED = 120  # positions
+LOOKED = 360  # positions
 SAME = 1e-6  # of the largest force: two solutions nearer than this are one
 
 
@@ -133,6 +144,35 @@ def _distinct(found: Array, known: Array, scale: float) -> float:
 # ---- the way back ---------------------------------------------------------------------------------------------
 
 
+def critical_row(run: Run, joint: str, multiple: float, where: str) -> dict[str, Any]:
+    """The critical friction of a joint alone: its coefficient if its law is proportional to one, else the multiple."""
+    parameter = law_of(run.system, joint).scale
+    if not multiple > 0:
+        return {"label": f"it locks even without friction in {joint}, {where}", "value": 0.0, "unit": "1"}
+    if not parameter:
+        return {"label": f"critical multiple of the friction of {joint} alone, {where}", "value": multiple, "unit": "1"}
+    value = float(np.ravel(primal(run.values[f"joints.{joint}.friction.{parameter}"]))[0])
+    return {"label": f"critical friction {parameter} of {joint} alone, {where}", "value": multiple * value, "unit": "1"}
+
+
+def reverse_row(back: Reverse, cycle: Cycle) -> dict[str, Any] | None:
+    """Power that reaches the drivers over that which the useful loads give, backward; None if these do not drive.
+
+    It locks, or is 0 or less: then it holds itself.
+    """
+    text, value = "efficiency driven backward by the useful loads", float("nan")
+    if np.all(np.isfinite(back.given)) and not cycle.net(back.given) > 0:
+        return None
+    if np.any(back.locked):
+        text = f"driven backward by the useful loads it locks, at {np.count_nonzero(back.locked)} positions"
+    elif not np.all(np.isfinite(back.given + back.delivered)):
+        text += " (not every position has an answer)"
+    else:
+        value = cycle.net(back.delivered) / cycle.net(back.given)
+        text += "" if value > 0 else " (it holds itself)"
+    return {"label": text, "value": value if np.isfinite(value) else None, "unit": "1"}
+
+
 class Reverse(NamedTuple):
     """The same positions passed backward: effort of every driver, where it locks, and what flows where.
 
@@ -193,15 +233,12 @@ class Locking:
         joint = min(sound, key=sound.__getitem__, default="")
         return (joint, sound[joint]) if joint else None
 
-    def efficiency(self, cycle: Cycle) -> float | None:
-        """Power that reaches the drivers over that which the useful loads give, with the mechanism run backward.
-
-        None where the useful loads do not drive it over the cycle, NaN where it locks; 0 or less: it holds itself.
-        """
-        given = cycle.mean(self.back.given)
-        if not given > 1e-9 * cycle.mean(np.abs(self.back.given)):
-            return None
-        return float("nan") if np.any(self.back.locked) else cycle.mean(self.back.delivered) / given
+    def rows(self, run: Run, dial: Dial) -> list[dict[str, Any]]:
+        """The joint that decides, as a row of a summary. dial: names the position of `first`."""
+        decides = self.responsible()
+        if decides is None or self.first is None:
+            return []
+        return [critical_row(run, *decides, f"at {dial.at(self.first)}")]
 
 
 def look(run: Run, time: Array, margin: Array, method: FrictionMethod, useful: Sequence[str]) -> Locking:

@@ -26,6 +26,7 @@ from trunnion.structure.decompose import Module, Plan, decompose
 
 __all__ = ["Cycle", "Dial", "Place", "Positions", "System", "Values", "build"]
 
+FEWEST = 64  # positions from which half of them tell how good a mean is
 COMMON_TURNS = 60  # of the slowest driver, within which the others must come back too
 Values = Mapping[str, Number]  # every number of a mechanism by its path, SI
 
@@ -97,6 +98,12 @@ class Cycle:
             return float(np.mean(values))
         return float(np.trapezoid(values) / (len(values) - 1))
 
+    def net(self, values: NDArray[np.float64]) -> float:
+        """The mean, 0 where it is no more than rounding or what half the samples would miss: work that cancels."""
+        value, size = self.mean(values), self.mean(np.abs(values))
+        halved = self.mean(values[::2]) if len(values) >= FEWEST else value
+        return 0.0 if abs(value) <= max(1e-9 * size, 4 * abs(value - halved)) else value
+
 
 @dataclass(frozen=True)
 class System:
@@ -148,9 +155,37 @@ class System:
         return General(len(module.links), joints, driven, tuple(self._gear(name, names) for name in module.gears))
 
     def _gear(self, name: str, names: Sequence[str]) -> Gear:
-        gear = self.mechanism.gears[name]
-        first, second = (names.index(joint) for joint in gear.joints)
-        return Gear(first, second, self.mechanism.carriers(name) if gear.teeth else None)
+        first, second = (names.index(joint) for joint in self.gear_joints(name))
+        carriers = self.mechanism.carriers(name) if self.mechanism.gears[name].teeth else None
+        if carriers and name in self.turned_round:
+            carriers = carriers[1], carriers[0]
+        return Gear(first, second, carriers)
+
+    @cached_property
+    def turned_round(self) -> frozenset[str]:
+        """Gear pairs whose second joint is the one whose turns are known: driven, or geared to such a joint.
+
+        φ₁ = (φ₂ − φ₀)/i then says what φ₂ = i φ₁ + φ₀ leaves open by whole turns of φ₂.
+        """
+        known, found = set(self.mechanism.drivers), set()
+        for _ in self.mechanism.gears:
+            for name, gear in self.mechanism.gears.items():
+                first, second = gear.joints
+                if second in known and first not in known:
+                    found.add(name)
+                if first in known or second in known:
+                    known |= {first, second}
+        return frozenset(found)
+
+    def gear_joints(self, name: str) -> tuple[str, str]:
+        """Joints of a gear pair, that whose turns are known first."""
+        first, second = self.mechanism.gears[name].joints
+        return (second, first) if name in self.turned_round else (first, second)
+
+    def gear_numbers(self, values: Values, name: str) -> tuple[Number, Number]:
+        """Ratio and phase of a gear pair in the order of `gear_joints`."""
+        ratio, phase = values[f"gears.{name}.ratio"], values[f"gears.{name}.phase"]
+        return (1 / ratio, -phase / ratio) if name in self.turned_round else (ratio, phase)
 
     def elements(self, values: Values) -> dict[tuple[str, str], Frame]:
         """Local frame of every joint's element, by (link, joint); c, s is the direction of a slide."""
@@ -258,31 +293,31 @@ class System:
         if findings:
             raise MechanismError(findings)
         periods = [longest / span.duration for span in spans.values()]
-        periods += self._geared_turns(nominal, values, longest, turns or {})
+        if self.mechanism.gears:
+            periods += self.geared_turns(values, longest, turns).values()
         whole = next((n for n in range(1, COMMON_TURNS + 1) if all(_is_whole(n * period) for period in periods)), 0)
         periodic = bool(whole and not ending)
         duration = whole * longest if periodic else longest
         return Cycle(duration, periodic, max(self._turns(name, span, duration) for name, span in spans.items()))
 
-    def _geared_turns(
-        self, nominal: Values, values: Values, duration: float, known: Mapping[str, float]
-    ) -> list[float]:
-        """Turns of every joint behind a gear pair in a time."""
-        turns = dict(known)
+    def geared_turns(
+        self, values: Values, duration: float, known: Mapping[str, float] | None = None
+    ) -> dict[str, float]:
+        """Turns that driven joints and those geared to them make in a time; known: of others, to start from."""
+        turns = dict(known or {})
         for name in self.mechanism.drivers:
             if self.joints[name][0] == "revolute":
-                ends = [float(np.ravel(self.drive(nominal, name, time)[0])[0]) for time in (0.0, duration)]
-                turns[name] = (ends[1] - ends[0]) / (2 * np.pi)
-        found: list[float] = []
-        waiting = list(self.mechanism.gears.items())
-        while waiting:
-            ready = next((one for one in waiting if one[1].joints[0] in turns), waiting[0])
-            waiting.remove(ready)
-            first, second = ready[1].joints
-            ratio = float(np.ravel(primal(values[f"gears.{ready[0]}.ratio"]))[0])
-            found.append(ratio * turns.get(first, 0.0))
-            turns.setdefault(second, found[-1])
-        return found
+                ends = [float(np.ravel(primal(self.drive(values, name, time)[0]))[0]) for time in (0.0, duration)]
+                turns.setdefault(name, (ends[1] - ends[0]) / (2 * np.pi))
+        for _ in self.mechanism.gears:  # each round reaches one gear pair farther, whichever way it is stated
+            for name, gear in self.mechanism.gears.items():
+                first, second = gear.joints
+                ratio = float(np.ravel(primal(values[f"gears.{name}.ratio"]))[0])
+                if first in turns:
+                    turns.setdefault(second, ratio * turns[first])
+                elif second in turns:
+                    turns[first] = turns[second] / ratio
+        return turns
 
     def _turns(self, driver: str, span: Span, duration: float) -> float:
         """Turns that a driver would make in a time at its largest rate; of a slide, how often it would travel."""
@@ -315,10 +350,10 @@ def driven_coordinates(
         for target, value in zip((q, rate, second), system.drive(values, name, time), strict=True):
             target.append(sign * value)
     for name in module.gears:
-        first = system.mechanism.gears[name].joints[0]
+        first = system.gear_joints(name)[0]
         turned = system.drive(values, first, time)[0] if first in system.mechanism.drivers else 0.0
-        ratio = values[f"gears.{name}.ratio"]
-        q += [ratio, values[f"gears.{name}.phase"], turned]
+        ratio, phase = system.gear_numbers(values, name)
+        q += [ratio, phase, turned]
         rate += [ratio, 0.0, 0.0]
         second += [ratio, 0.0, 0.0]
     return q, rate, second

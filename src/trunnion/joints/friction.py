@@ -59,6 +59,7 @@ class FrictionLaw:
 
     function: `(normal, slip, **parameters) -> force`, odd in slip, dissipative, zero at zero load.
     interval_at_rest: whether at slip 0 the force may be anything up to its value beside 0.
+    scale: the parameter that the force is proportional to, if there is one.
     relaxation: of a law with bristles, `(slip, **parameters)` → d in ż = slip − d z, 1/s. Their deflection z, m,
     depends on the slip alone; it is integrated along the cycle (`analysis.bristles`) and given to the function as
     `deflection`. Without it the function takes that of steady sliding, slip/d.
@@ -70,6 +71,7 @@ class FrictionLaw:
     validity: str = ""
     interval_at_rest: bool = True
     relaxation: LawRelaxation | None = None
+    scale: str = ""
 
 
 def coulomb(normal: Number, slip: Number, **parameters: Number) -> Number:
@@ -194,6 +196,7 @@ FRICTION_LAWS: dict[str, FrictionLaw] = {
         },
         source="Durango, Calle, Ruiz (2010), eq. 8",
         validity="dry or boundary-lubricated sliding; speed-independent",
+        scale="coefficient",
     ),
     "viscous": FrictionLaw(
         viscous,
@@ -263,5 +266,6 @@ FRICTION_LAWS: dict[str, FrictionLaw] = {
         },
         source="SKF, Rolling bearings, estimating the frictional moment: M = 0.5 μ P d",
         validity="load about 0.1 of the dynamic rating, good lubrication, normal speed",
+        scale="coefficient",
     ),
 }

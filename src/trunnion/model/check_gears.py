@@ -60,12 +60,25 @@ def gear_values(mechanism: Mechanism, values: Mapping[str, Number]) -> Iterator[
         ratio = values.get(f"{where}.ratio", np.nan)
         if ratio == 0:
             yield Finding("is 0: the second joint would not turn at all", f"{where}.ratio", "give another ratio")
-        known = all(joint in mechanism.effective_joints for joint in gear.joints)
+        known = len({*gear.joints} & mechanism.effective_joints.keys()) == len(gear.joints)
         carriers = mechanism.carriers(name) if known else None
         if gear.teeth and carriers and abs((1 if carriers[0] == carriers[1] else -1) * ratio - 1) < 1e-9:
             what = "the gears turn alike, seen from the link that carries them: they have no pitch point"
             yield Finding(what, f"{where}.ratio", "state teeth: false, or another ratio")
+        if gear.teeth and carriers and not _apart(mechanism, name, carriers, values):
+            what = "both joints lie at one point of the link that carries them: there is no room for gears that touch"
+            yield Finding(what, where, "move one, or state teeth: false for gears inside each other or a belt")
         angle = values.get(f"{where}.pressure_angle", 0.0)
         if angle < 0 or angle >= np.pi / 2:
             what = f"is {np.degrees(angle):.4g}°"
             yield Finding(what, f"{where}.pressure_angle", "give an angle from 0 to below 90°; 20 deg is usual")
+
+
+def _apart(mechanism: Mechanism, name: str, carriers: tuple[int, int], values: Mapping[str, Number]) -> bool:
+    """Whether the centres of two gears are apart, by more than rounding of where they lie."""
+    joints = mechanism.gears[name].joints
+    carrier = mechanism.effective_joints[joints[0]].links[carriers[0]]
+    places = [[values.get(f"links.{carrier}.points.{joint}.{axis}", np.nan) for axis in "xy"] for joint in joints]
+    (ax, ay), (dx, dy) = places
+    distance = np.hypot(dx - ax, dy - ay)
+    return not distance <= 1e-12 * max(abs(ax), abs(ay), abs(dx), abs(dy))

@@ -166,6 +166,8 @@ def _sides(mechanism: Mechanism, values: Values) -> Iterator[Finding]:
         ]
         if len(joints) != 2 or any("rotation" not in freedoms(mechanism.effective_joints[key].type) for key in joints):
             continue
+        if any(key in gear.joints for gear in mechanism.gears.values() for key in joints):
+            continue  # a shaft with two gears passes on a torque
         for first, second in combinations(joints, 2):
             a, b = ([values[f"links.{name}.points.{key}.{one}"] for one in "xy"] for key in (first, second))
             if a == b:

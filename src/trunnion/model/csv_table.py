@@ -226,10 +226,12 @@ def _units(header: Row, kinds: tuple[Kind, Kind]) -> list[str]:
         text = "" if text in _NO_UNIT else text
         found.append(text)
         if text:
-            findings += [Finding(f"{cell}: {what}", remedy=remedy, line=line) for what, remedy in _unfit(text, kind)]
+            findings += [
+                Finding(f"{cell[:40]}: {what[:120]}", remedy=to_do, line=line) for what, to_do in _unfit(text, kind)
+            ]
         elif rounded and not bracketed and _is_unit(rounded[1]):
             remedy = f"write [{rounded[1]}]"
-            findings.append(Finding(f"{cell}: a unit stands in brackets", remedy=remedy, line=line))
+            findings.append(Finding(f"{cell[:40]}: a unit stands in brackets", remedy=remedy, line=line))
     if findings:
         raise MechanismError(findings)
     return found

@@ -1,4 +1,4 @@
-"""The ways in which a group can be assembled, in lines of text as `check` prints them."""
+"""The ways in which a group can be assembled, and gear pairs, in lines of text as `check` prints them."""
 
 from __future__ import annotations
 
@@ -9,10 +9,20 @@ from trunnion.views.quantities import prefixed
 
 if TYPE_CHECKING:
     from trunnion.analysis.assemblies import Choice, Way
+    from trunnion.analysis.inspect import GearPair
 
-__all__ = ["lines", "places"]
+__all__ = ["gear_line", "lines", "places"]
 
 MOST_JOINTS = 8  # named in a line
+
+
+def gear_line(pair: GearPair) -> str:
+    """'mesh: external, pitch radii 40 mm of crank, 80 mm of wheel'."""
+    told = []
+    for link, radius in pair.radii:
+        factor, unit = prefixed(radius, "m")
+        told.append(f"{radius * factor:.5g} {unit} of {link}")
+    return f"{pair.name}: {'internal' if pair.internal else 'external'}, pitch radii {', '.join(told)}"
 
 
 def lines(choice: Choice) -> list[str]:

@@ -97,8 +97,9 @@ def check(
         solver = "general group" if module.kind == "general" else "closed form"
         joints = ", ".join(module.joints)
         out.print(
-            f"  {module.label:<24} links {', '.join(module.links)}; joints {joints}; {solver}{ways}", markup=False
-        )
+            f"  {module.label:<24} links {', '.join(module.links)}; joints {joints}; {solver}{ways}",
+            markup=False, soft_wrap=True,
+        )  # fmt: skip
         for choice in (one for one in found.choices if one.module == number):
             for line in lines(choice):
                 out.print(f"    {line}", markup=False, highlight=False, soft_wrap=True)

@@ -240,3 +240,14 @@ def test_equal_values_have_no_derivative() -> None:
 def test_one_epsilon_only() -> None:
     with pytest.raises(TypeError, match="one ε"):
         dl.inverse(Dual(Dual(np.eye(2)), np.eye(2)))
+
+
+def test_public_namespace() -> None:
+    """Everything by one import; the package itself loads it when it is asked for."""
+    import trunnion
+    from trunnion import dual
+
+    assert trunnion.dual is dual
+    assert "dual" in trunnion.__all__
+    assert all(hasattr(dual, name) for name in dual.__all__)
+    assert dual.linalg is dl

@@ -36,8 +36,8 @@ PARALLEL = 1e-12  # the direction of the perpendicular then holds 4 digits: roun
 class Perpendicular(NamedTuple):
     """What two lines have in common.
 
-    line: n̂, from the first line to the second; angle: θ̂ = θ + ε s about it, θ in [0, π] rad, s in m, ≥ 0 where the
-    lines are parallel; feet: the points (x, y, z) on both lines, m.
+    line: n̂, its direction that of u × v, of parallel lines from the first to the second; angle: θ̂ = θ + ε s about it,
+    θ in [0, π] rad, s along it, m; feet: the points (x, y, z) on both lines, m.
     """
 
     line: Vector3

@@ -332,10 +332,10 @@ def _kind_of(base: Any) -> str:
 
 
 def public_names() -> str:
-    """mkdocstrings' directive for every public name."""
+    """mkdocstrings' directive for every public name; a module among them has a section of its own."""
     import trunnion
 
-    places = [getattr(trunnion, name) for name in trunnion.__all__]
+    places = [one for one in (getattr(trunnion, name) for name in trunnion.__all__) if not inspect.ismodule(one)]
     return "\n\n".join(f"::: {one.__module__}.{one.__qualname__}" for one in places)
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
+    from trunnion import dual
     from trunnion.analysis.analyse import analyse, prepare
     from trunnion.analysis.friction import FrictionMethod
     from trunnion.analysis.inspect import Check, check
@@ -37,6 +38,7 @@ _PLACES = {
     "save": "trunnion.export",
 }
 _ELSEWHERE = {"read": "read_mechanism"}
+_MODULES = {"dual": "trunnion.dual"}
 
 __all__ = [
     "Check",
@@ -47,6 +49,7 @@ __all__ = [
     "Status",
     "analyse",
     "check",
+    "dual",
     "locking",
     "prepare",
     "read",
@@ -57,6 +60,8 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     """Load a public name from where it lives."""
+    if name in _MODULES:
+        return import_module(_MODULES[name])
     if name not in _PLACES:
         raise AttributeError(f"module 'trunnion' has no attribute '{name}'")
     return getattr(import_module(_PLACES[name]), _ELSEWHERE.get(name, name))

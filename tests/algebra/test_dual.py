@@ -48,7 +48,7 @@ def test_ring_identities(x: Any, y: Any, z: Any) -> None:
     close(x - x, 0.0)
 
 
-@given(deep, deep)
+@given(deep, deep.filter(lambda y: abs(primal(y)) > 0.1))
 def test_division_undoes_multiplication(x: Any, y: Any) -> None:
     close(x * y / y, x)
     close(1 / (1 / y), y)

@@ -2,7 +2,8 @@
 
 The parts may be floats, arrays, or dual numbers again. ε is told apart by depth: numbers of equal depth share
 the ε of that depth, and a shallower number is a constant for the outermost ε of a deeper one. So a spatial
-quantity (depth 1) becomes a differentiable spatial quantity at depth 2.
+quantity (depth 1) becomes a differentiable spatial quantity at depth 2: the ε of space is the innermost one.
+`spatial` and `parts` put it there and take it out, whatever derivatives the numbers carry.
 
 Where a function has no derivative (division by a zero real part, sqrt at or below 0) both parts are NaN: never
 a silent number.
@@ -16,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["Dual", "derivative", "functions", "primal", "seed"]
+__all__ = ["Dual", "derivative", "functions", "parts", "primal", "seed", "spatial"]
 
 
 class Dual:
@@ -141,6 +142,24 @@ def seed(number: Any) -> Dual:
 def derivative(number: Any) -> Any:
     """Dual part of the outermost ε; 0 for a number that does not depend on it."""
     return number.dual if isinstance(number, Dual) else np.zeros_like(number)
+
+
+def spatial(real: Any, dual: Any) -> Dual:
+    """real + ε dual with the ε of space, below every ε that the two carry for derivatives: θ + ε s.  [P 1, 2]"""
+    if isinstance(real, Dual) or isinstance(dual, Dual):
+        real, dual = _pair(real, dual)
+        return Dual(spatial(real.real, dual.real), spatial(real.dual, dual.dual))
+    return Dual(real, dual)
+
+
+def parts(number: Any) -> tuple[Any, Any]:
+    """Real and dual part by the ε of space, each with the derivatives that the number carries; undoes `spatial`."""
+    if not isinstance(number, Dual):
+        return number, np.zeros_like(number)
+    if number.depth == 1:
+        return number.real, number.dual
+    (real, dual), (real_slope, dual_slope) = parts(number.real), parts(number.dual)
+    return Dual(real, real_slope), Dual(dual, dual_slope)
 
 
 def _shape(number: Any) -> tuple[int, ...]:

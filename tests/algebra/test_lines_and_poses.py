@@ -1,0 +1,213 @@
+"""Lines and poses against the same geometry with points, directions and 4 × 4 matrices; [P 1-7] one by one."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mechanisms import Array
+from spatial_numbers import apart, random_directions, random_rotations, rows, stacked, vector
+from trunnion.algebra import line as lines
+from trunnion.algebra import pose as poses
+from trunnion.algebra.dual import Dual, derivative, parts, primal, seed, spatial
+from trunnion.algebra.space import apply, cross, dot, skew, vector_parts
+
+COUNT = 500
+RNG = np.random.default_rng(7)
+U, V = random_directions(RNG, COUNT), random_directions(RNG, COUNT)
+P, Q = RNG.normal(size=(COUNT, 3)), RNG.normal(size=(COUNT, 3))
+FIRST, SECOND = lines.line(vector(P), vector(3 * U)), lines.line(vector(Q), vector(0.1 * V))
+
+
+def homogeneous(a: Any) -> Array:
+    """4 × 4 matrices of a pose."""
+    rotation, point = poses.rotation_and_point(a)
+    found = np.zeros((*np.broadcast_shapes(stacked(rotation).shape[:-2], stacked(point).shape[:-1]), 4, 4))
+    found[..., :3, :3], found[..., :3, 3], found[..., 3, 3] = stacked(rotation), stacked(point), 1.0
+    return found
+
+
+def same(a: Any, b: Any, tolerance: float = 1e-13) -> None:
+    np.testing.assert_allclose(a, b, rtol=0, atol=tolerance * max(1.0, float(np.nanmax(np.abs(b)))))
+
+
+# ---- equations of [P] -----------------------------------------------------------------------------------------
+
+
+def test_p1_a_line_is_a_vector_and_its_moment() -> None:
+    v, w = apart(FIRST)
+    same(v, U)
+    same(w, np.cross(P, U))
+
+
+def test_p2_dual_angle_is_angle_and_distance() -> None:
+    """E₁ turned by θ counterclockwise about E₁₂ and moved by s along it lies on E₂."""
+    theta, s = RNG.uniform(-np.pi, np.pi, COUNT), RNG.normal(size=COUNT)
+    place = poses.pose(rows(random_rotations(RNG, COUNT)), vector(P))
+    axis, first = (
+        poses.transform(place, lines.line((0.0, 0.0, 0.0), one)) for one in ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
+    )
+    moved = poses.compose(place, poses.turn_z(spatial(theta, s)))
+    second = poses.transform(moved, lines.line((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)))
+    angle = lines.angle_about(axis, first, second)
+    same(angle.real, theta)
+    same(angle.dual, s, 1e-12)
+
+
+def test_p3_to_p7_dual_frame() -> None:
+    """Columns î = i + ε [P]× i, k̂ = k + ε [P]× k, ĵ = [k̂]× î."""
+    rotation = random_rotations(RNG, COUNT)
+    i, j, k = (rotation[..., :, column] for column in range(3))
+    found = poses.frame(vector(P), vector(2 * i + 0.3 * k), vector(5 * k))
+    tilde = stacked(skew(vector(P)))
+    real, dual = apart(found)
+    for column, one in enumerate((i, j, k)):
+        same(real[..., column], one)
+        same(dual[..., column], np.einsum("nij,nj->ni", tilde, one))
+    i_hat, j_hat, k_hat = zip(*found, strict=True)
+    for part, expected in zip(apart(j_hat), apart(apply(skew(k_hat), i_hat)), strict=True):
+        same(part, expected)
+    for part, expected in zip(apart(found), apart(poses.pose(rows(rotation), vector(P))), strict=True):
+        same(part, expected)
+
+
+def test_p6_skew_matrix_is_the_cross_product() -> None:
+    same(stacked(apply(skew(vector(P)), vector(Q))), np.cross(P, Q))
+
+
+# ---- lines ----------------------------------------------------------------------------------------------------
+
+
+def test_common_perpendicular() -> None:
+    found = lines.perpendicular(FIRST, SECOND)
+    a, b = (stacked(one) for one in found.feet)
+    for foot, point, direction in ((a, P, U), (b, Q, V)):
+        same(np.cross(foot - point, direction), np.zeros_like(P), 1e-10)
+    normal = stacked(vector_parts(found.line)[0])
+    same(np.einsum("ni,ni->n", normal, U), np.zeros(COUNT))
+    theta, s = parts(found.angle)
+    assert np.all((theta >= 0) & (theta <= np.pi))
+    same(np.cos(theta), np.einsum("ni,ni->n", U, V))
+    same(b - a, s[:, None] * normal, 1e-10)
+    direction, moment = apart(found.line)
+    same(np.cross(a, direction), moment, 1e-10)
+    same(stacked(lines.foot(FIRST)), P - np.einsum("ni,ni->n", P, U)[:, None] * U)
+
+
+def test_reciprocal_product() -> None:
+    angle = lines.dual_angle(FIRST, SECOND)
+    same(lines.reciprocal(FIRST, SECOND), -angle.dual * np.sin(angle.real), 1e-12)
+    same(lines.reciprocal(FIRST, FIRST), np.zeros(COUNT))
+
+
+@pytest.mark.parametrize("sense", [1, -1])
+def test_parallel_lines(sense: int) -> None:
+    second = lines.line(vector(Q), vector(sense * U))
+    found = lines.perpendicular(FIRST, second)
+    step = Q - P - np.einsum("ni,ni->n", Q - P, U)[:, None] * U
+    same(found.angle.real, np.full(COUNT, 0.0 if sense > 0 else np.pi))
+    same(found.angle.dual, np.linalg.norm(step, axis=-1))
+    same(stacked(found.feet[1]) - stacked(found.feet[0]), step)
+    same(apart(found.line)[0], step / np.linalg.norm(step, axis=-1, keepdims=True), 1e-10)
+
+
+def test_parallel_and_crossed_lines_in_one_batch() -> None:
+    mixed = np.where((np.arange(COUNT) % 2 == 0)[:, None], U, V)
+    found = lines.perpendicular(FIRST, lines.line(vector(Q), vector(mixed)))
+    crossed = lines.perpendicular(FIRST, SECOND)
+    same(found.angle.real[::2], np.zeros(COUNT // 2))
+    same(found.angle.dual[1::2], crossed.angle.dual[1::2])
+    same(stacked(found.feet[1])[1::2], stacked(crossed.feet[1])[1::2])
+
+
+def test_a_line_with_itself() -> None:
+    x_axis = lines.line((0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+    found = lines.perpendicular(x_axis, x_axis)
+    assert (found.angle.real, found.angle.dual) == (0.0, 0.0)
+    assert all(np.isnan(primal(entry)) for entry in found.line)
+    assert all(np.isnan(primal(entry)) for entry in lines.line((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
+
+
+def test_directions_alone_have_a_plain_angle() -> None:
+    same(lines.dual_angle(vector(U), vector(V)), lines.dual_angle(FIRST, SECOND).real)
+    same(lines.dual_angle((1.0, 0.0, 0.0), (-1.0, 0.0, 0.0)), np.pi)
+
+
+def test_derivatives_of_angle_and_distance() -> None:
+    """By a shift of the second line; NaN where the lines are parallel, the value itself being there."""
+
+    def found(x: Any, direction: Array) -> Any:
+        return lines.perpendicular(FIRST, lines.line((Q[:, 0] + x, Q[:, 1], Q[:, 2]), vector(direction)))
+
+    h = 1e-5
+    exact, near, far = found(seed(0.0), V), found(-h, V), found(h, V)
+    slope = derivative(exact.angle).dual
+    difference = (far.angle.dual - near.angle.dual) / (2 * h)
+    same(slope, difference, 1e-8)
+    same(derivative(exact.feet[0][1]), (far.feet[0][1] - near.feet[0][1]) / (2 * h), 1e-6)
+    beside = found(seed(0.0), U)
+    same(beside.angle.real.dual, found(0.0, U).angle.dual)
+    assert np.isnan(primal(derivative(beside.angle))).all()
+    assert np.isnan(primal(derivative(beside.feet[0][0]))).all()
+
+
+# ---- poses ----------------------------------------------------------------------------------------------------
+
+
+def random_poses(seed_number: int) -> Any:
+    rng = np.random.default_rng(seed_number)
+    return poses.pose(rows(random_rotations(rng, COUNT)), vector(rng.normal(size=(COUNT, 3))))
+
+
+def test_product_and_inverse_are_those_of_homogeneous_matrices() -> None:
+    a, b = random_poses(1), random_poses(2)
+    same(homogeneous(poses.compose(a, b)), homogeneous(a) @ homogeneous(b))
+    same(homogeneous(poses.inverse(a)), np.linalg.inv(homogeneous(a)))
+    same(homogeneous(poses.compose()), np.eye(4))
+
+
+def test_denavit_hartenberg() -> None:
+    theta, s, alpha, a = RNG.normal(size=(4, COUNT))
+    found = homogeneous(poses.link(spatial(theta, s), spatial(alpha, a)))
+    c, n, ca, na, zero, one = np.cos(theta), np.sin(theta), np.cos(alpha), np.sin(alpha), 0 * s, 0 * s + 1
+    expected = [
+        [c, -n * ca, n * na, a * c],
+        [n, c * ca, -c * na, a * n],
+        [zero, na, ca, s],
+        [zero, zero, zero, one],
+    ]
+    same(found, np.moveaxis(np.array(expected), (0, 1), (-2, -1)))
+
+
+def test_lines_and_points_move_together() -> None:
+    a = random_poses(3)
+    moved = lines.line(poses.moved_point(a, vector(P)), apply(poses.rotation_and_point(a)[0], vector(U)))
+    for part, expected in zip(apart(poses.transform(a, FIRST)), apart(moved), strict=True):
+        same(part, expected)
+    same(stacked(poses.moved_point(a, vector(P))), (homogeneous(a) @ np.c_[P, np.ones(COUNT)][..., None])[:, :3, 0])
+
+
+def test_adjoint() -> None:
+    a = random_poses(4)
+    six = np.stack([stacked(row) for row in poses.adjoint(a)], axis=-2)
+    screw = np.concatenate(apart(FIRST), axis=-1)
+    same((six @ screw[..., None])[..., 0], np.concatenate(apart(poses.transform(a, FIRST)), axis=-1))
+
+
+def test_what_two_lines_have_in_common_does_not_depend_on_the_frame() -> None:
+    a = random_poses(5)
+    moved = [poses.transform(a, one) for one in (FIRST, SECOND)]
+    one, other = lines.dual_angle(FIRST, SECOND), lines.dual_angle(*moved)
+    same(other.real, one.real)
+    same(other.dual, one.dual, 1e-11)
+
+
+def test_the_space_epsilon_lies_below_those_of_derivatives() -> None:
+    number = spatial(Dual(1.0, 2.0), 3.0)
+    assert (number.depth, number.real.real, number.real.dual) == (2, 1.0, 3.0)
+    real, dual = parts(number)
+    assert (real.real, real.dual, dual.real, dual.dual) == (1.0, 2.0, 3.0, 0.0)
+    assert parts(2.5) == (2.5, 0.0)
+    same(dot(cross(vector(U), vector(V)), vector(U)), np.zeros(COUNT))

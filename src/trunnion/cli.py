@@ -172,13 +172,14 @@ def locking(
     file: File, steps: Steps = 360, set_: Set = None, table: TableFile = None, friction: FrictionLaw = None
 ) -> None:
     """How close to locking, by all friction and by each joint's; other solutions; whether it can be driven backward."""
-    from trunnion.analysis.locking import locking as look
-    from trunnion.analysis.locking import report_rows
+    from trunnion.analysis.analyse import prepare
+    from trunnion.analysis.locking import look, report_rows
 
     mechanism = _mechanism(file, set_, table, friction)
     with _lines_of(file):
-        found = look(mechanism, steps)
-    _table(mechanism.name or str(file), report_rows(mechanism, found))
+        run = prepare(mechanism)
+        found = look(run, steps)
+    _table(mechanism.name or str(file), report_rows(run, found))
     _say(_placed(_findings(found), file, ["assembly"]))
     raise typer.Exit(_status(_findings(found)))
 

@@ -48,11 +48,14 @@ def test_ring_identities(x: Any, y: Any, z: Any) -> None:
     close(x - x, 0.0)
 
 
-@given(deep, deep.filter(lambda y: abs(primal(y)) > 0.1))
+@given(deep, deep)
 def test_division_undoes_multiplication(x: Any, y: Any) -> None:
-    close(x * y / y, x)
-    close(1 / (1 / y), y)
-    close(x / y, x * y**-1)
+    """Each ε part divides by y once more, so rounding grows with the cube of its ε parts over itself."""
+    growth = max(map(abs, flat(y))) / abs(primal(y))
+    tolerance = max(1e-9, 1e-15 * growth**3)
+    close(x * y / y, x, tolerance)
+    close(1 / (1 / y), y, tolerance)
+    close(x / y, x * y**-1, tolerance)
 
 
 @given(parts, parts, parts, parts)

@@ -27,7 +27,7 @@ from trunnion.model.mechanism import Mechanism
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Run", "analyse", "prepare"]
+__all__ = ["Run", "analyse", "analyse_run", "prepare"]
 
 CHUNK = 8192  # positions at a time: the arrays of a walk stay in cache
 MOST_STEPS = 100_000_000
@@ -121,11 +121,25 @@ def analyse(
     Method: the modules' closed forms or the general group, friction settled per module (`friction.settle`).
     Raises MechanismError if the structure does not determine the motion or `steps` is out of range.
     """
+    _check_steps(steps)
+    return analyse_run(prepare(mechanism), steps, method, progress)
+
+
+def _check_steps(steps: int) -> None:
     if not 1 <= steps <= MOST_STEPS:
         remedy = f"give a number from 1 to {MOST_STEPS:,}"
         raise MechanismError(Finding(f"cannot analyse {steps} positions", "steps", remedy))
+
+
+def analyse_run(
+    run: Run,
+    steps: int = 360,
+    method: FrictionMethod | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> xr.Dataset:
+    """What `analyse` does, for a mechanism that is prepared."""
+    _check_steps(steps)
     method = replace(method or FrictionMethod(), margin_up_to=account.MARGIN)
-    run = prepare(mechanism)
     steps = steps if run.cycle.duration > 0 else 1
     time = run.cycle.times(steps)
     labels = _labels(run.system)

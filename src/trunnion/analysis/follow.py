@@ -50,20 +50,18 @@ def _probes(gaps: NDArray[np.bool_]) -> NDArray[np.intp]:
     return places[np.unique(np.linspace(0, len(places) - 1, min(len(places), PROBES)).astype(np.intp))]
 
 
-def assemblies(
-    group: General, elements: Sequence[tuple[Frame, Frame]], drive: Sequence[Number], count: int = GUESSES
-) -> Pose:
+def assemblies(group: General, elements: Sequence[tuple[Frame, Frame]], drive: Sequence[Number]) -> Pose:
     """All assemblies found at one position from many guesses, each once, along the last axis."""
     rng = np.random.default_rng(SEED)
     spread = extent(group, elements)
     guesses = [
-        rng.uniform(-np.pi, np.pi, count)
+        rng.uniform(-np.pi, np.pi, GUESSES)
         if group.joints[group.steps[i].joint].kind == "revolute"
-        else rng.uniform(-2 * spread, 2 * spread, count)
+        else rng.uniform(-2 * spread, 2 * spread, GUESSES)
         for i in group.free
     ]
     pose = group.position(elements, guesses, drive)
-    shape = (count,)
+    shape = (GUESSES,)
     key = np.array(
         [
             np.broadcast_to(n, shape)

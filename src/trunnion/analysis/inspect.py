@@ -10,7 +10,7 @@ import numpy as np
 
 from trunnion.algebra.dual import primal
 from trunnion.analysis.account import pitch_circles
-from trunnion.analysis.analyse import Run, analyse, prepare
+from trunnion.analysis.analyse import Run, analyse_run, prepare
 from trunnion.analysis.assemblies import Choice, choices
 from trunnion.analysis.kinematics import Forward, forward
 from trunnion.errors import Finding, Severity
@@ -62,7 +62,7 @@ def check(mechanism: Mechanism, steps: int = 360) -> Check:
     Raises MechanismError if the structure does not determine the motion.
     """
     run = prepare(mechanism)
-    result = analyse(mechanism, steps)
+    result = analyse_run(run, steps)
     found = [
         Finding(row["what"], row["where"], row["remedy"], Severity(row["severity"]))
         for row in json.loads(result.attrs["findings"])

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.analysis.account import MARGIN, useful_loads
-from trunnion.analysis.analyse import Run, analyse, prepare
+from trunnion.analysis.analyse import Run, analyse_run, prepare
 from trunnion.analysis.friction import FrictionMethod
 from trunnion.analysis.near_locking import Reverse, critical_multiples, critical_row, others, reverse, reverse_row
 from trunnion.analysis.system import Dial, rubbing
@@ -18,7 +18,7 @@ from trunnion.model.mechanism import Mechanism
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["MOST_STEPS", "locking", "report_rows"]
+__all__ = ["MOST_STEPS", "locking", "look", "report_rows"]
 
 MOST_STEPS = 8192
 
@@ -39,12 +39,18 @@ def locking(mechanism: Mechanism, steps: int = 360) -> xr.Dataset:
     meanings are in the Dataset. Raises MechanismError if the structure does not determine the motion, or for no steps
     or more than MOST_STEPS.
     """
+    return look(prepare(mechanism), steps)
+
+
+def look(run: Run, steps: int = 360) -> xr.Dataset:
+    """What `locking` does, for a mechanism that is prepared."""
     import xarray as xr
 
+    mechanism = run.system.mechanism
     if not 1 <= steps <= MOST_STEPS:
         raise MechanismError(Finding(f"cannot look at {steps} positions", "steps", f"give 1 to {MOST_STEPS:,}"))
-    result = analyse(mechanism, steps)
-    run, time, status = prepare(mechanism), result["time"].values, result["status"].values
+    result = analyse_run(run, steps)
+    time, status = result["time"].values, result["status"].values
     back = run.solve(time, method=FrictionMethod())
     with np.errstate(all="ignore"):
         multiples = critical_multiples(back, MARGIN)
@@ -74,9 +80,8 @@ def locking(mechanism: Mechanism, steps: int = 360) -> xr.Dataset:
     return result.assign(added)
 
 
-def report_rows(mechanism: Mechanism, found: xr.Dataset) -> list[dict[str, Any]]:
-    """The figures of a result of `locking` that one looks at first, as label, value and unit."""
-    run = prepare(mechanism)
+def report_rows(run: Run, found: xr.Dataset) -> list[dict[str, Any]]:
+    """The figures of a result of `look` that one looks at first, as label, value and unit."""
     dial = run.system.dial(run.values, found["time"].values)
     if not rubbing(run.system):
         return [{"label": "there is no friction: nothing locks", "value": None, "unit": "1"}]

@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.groups.planar import ZERO_LOAD, Acceleration, Frame, Twist, Wrench
+from trunnion.groups.planar import Acceleration, Frame, Twist, Wrench, scaled
 
 __all__ = ["NUMBERS", "ONE", "Action", "Gear", "GearRow", "Mesh", "actions", "apart", "mesh", "rotation"]
 
@@ -160,5 +160,4 @@ def apart(gear: Gear, touch: Mesh, size: Number) -> list[Action]:
 def _on_gears(gear: Gear, push: Wrench, at: Frame) -> list[Action]:
     """A force on the second gear at the pitch point, and its opposite on the first."""
     one, two = (1 - side for side in gear.carriers or (0, 0))
-    back = Wrench(-push.x, -push.y, -push.m) if push is not ZERO_LOAD else push
-    return [Action(gear.second, two, push, at), Action(gear.first, one, back, at)]
+    return [Action(gear.second, two, push, at), Action(gear.first, one, scaled(push, -1.0), at)]

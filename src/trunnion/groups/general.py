@@ -71,8 +71,8 @@ class Pose(NamedTuple):
 class General:
     """The module with the given joints; `driven` lists the indices of joints whose coordinate is prescribed.
 
-    A gear pair may speak of a joint between two known links: it is listed too, at the end, with both sides OUTER.
-    After the driven coordinates `drive` holds three numbers for each gear pair (see `gear.NUMBERS`).
+    A joint between known links that a gear pair speaks of is listed too, at the end, with both sides OUTER. After the
+    driven coordinates `drive` holds three numbers for each gear pair (see `gear.NUMBERS`).
     """
 
     links: int
@@ -123,8 +123,8 @@ class General:
                 [primal(value) for value in assembly],
                 [primal(value) for value in drive],
             )
-            depth = max((_depth(n) for pair in elements for frame in pair for n in frame), default=0)
-            depth = max([depth, *(_depth(value) for value in drive)])
+            numbers = [*drive, *(n for pair in elements for frame in pair for n in frame)]
+            depth = max((_depth(number) for number in numbers), default=0)
             q = self.coordinates(elements, [q[i] for i in self.free], drive)
             for _ in range(depth):
                 q = self._step(elements, q, drive)
@@ -260,12 +260,11 @@ class General:
         for row in self._rows:
             entries: list[Number] = [0.0] * len(self.free)
             for joint, factor in row.terms(drive):
-                first, screws = placed[joint][0], seen[joint]
                 to_first, to_second = (self._paths[link] for link in self.joints[joint].sides)
                 for place, i in enumerate(self.free):
                     weight = (i in to_second) - (i in to_first)
                     if weight:
-                        entry = weight * row.entry(first, screws[i])
+                        entry = weight * row.entry(placed[joint][0], seen[joint][i])
                         entries[place] = entries[place] + (entry if factor is ONE else factor * entry)
             matrix.append(entries)
         return matrix
@@ -450,8 +449,7 @@ class General:
             for link, path in self._paths.items():
                 if i in path:
                     outboard = added(outboard, carried[link], 1.0)
-            screw = screws[i]
-            powers.append(screw.x * outboard.x + screw.y * outboard.y + screw.w * outboard.m)
+            powers.append(screws[i].x * outboard.x + screws[i].y * outboard.y + screws[i].w * outboard.m)
         return [-_weighted([line[j] for line in pose.inverse], powers) for j in range(len(self._rows))]
 
     def closure(self, pose: Pose) -> Number:

@@ -194,7 +194,7 @@ class System:
             for link in links:
                 path = f"links.{link}.points.{name}"
                 x, y = values[f"{path}.x"], values[f"{path}.y"]
-                if PAIRS[kind].needs_axis:
+                if "planar" in PAIRS[kind].needs_axis:
                     ax, ay = values[f"{path}.axis.x"], values[f"{path}.axis.y"]
                     length = namespace(ax, ay).hypot(ax, ay)
                     found[link, name] = Frame(x, y, ax / length, ay / length)

@@ -21,14 +21,22 @@ __all__ = ["PAIRS", "Load", "Pair", "Reaction"]
 class Pair:
     """A kind of lower pair.
 
-    symbol: its letter in a structural formula. freedoms: of the relative motion, a sub-sequence of
-    ("rotation", "slide"). needs_axis: whether the points on both links must state an axis.
+    symbol: its letter in a structural formula. freedoms: which of ("rotation", "slide") it frees: a rotation has a pin,
+    a slide alone a guide, and a driver prescribes the first. count: freedoms of the relative motion in space.
+    planar: whether it exists in the plane. needs_axis: the spaces in which the points on both links must state an axis.
     """
 
     name: str
     symbol: str
     freedoms: tuple[str, ...]
-    needs_axis: bool = False
+    count: int
+    planar: bool = False
+    needs_axis: tuple[str, ...] = ("spatial",)
+
+    @property
+    def drivable(self) -> bool:
+        """Whether one number says how far it has moved, slides of a cylindrical pair apart."""
+        return self.count == 1 or self.name == "cylindrical"
 
 
 Reaction = tuple[Number, Number, Number]  # force x, y (N) and moment (N m) about the joint's point
@@ -106,6 +114,12 @@ class Load(NamedTuple):
 
 
 PAIRS: dict[str, Pair] = {
-    "revolute": Pair("revolute", "R", ("rotation",)),
-    "prismatic": Pair("prismatic", "P", ("slide",), needs_axis=True),
+    "revolute": Pair("revolute", "R", ("rotation",), 1, planar=True),
+    "prismatic": Pair("prismatic", "P", ("slide",), 1, planar=True, needs_axis=("planar", "spatial")),
+    "cylindrical": Pair("cylindrical", "C", ("rotation", "slide"), 2),
+    "spherical": Pair("spherical", "S", ("rotation",), 3, needs_axis=()),
+    "universal": Pair("universal", "U", ("rotation",), 2),
+    "helical": Pair("helical", "H", ("rotation",), 1),
+    "planar": Pair("planar", "E", ("slide",), 3),
+    "fixed": Pair("fixed", "F", (), 0, needs_axis=()),
 }

@@ -162,8 +162,9 @@ def _length(found: int, size: int, where: str) -> Iterator[Finding]:
 def _joints(mechanism: Mechanism) -> Iterator[Finding]:
     for name, joint in mechanism.effective_joints.items():
         where = f"joints.{name}"
-        if mechanism.space == "planar" and joint.type not in PAIRS:
-            yield Finding(f"a {joint.type} joint does not exist in the plane", where, f"use one of {', '.join(PAIRS)}")
+        if mechanism.space == "planar" and not PAIRS[joint.type].planar:
+            flat = ", ".join(pair for pair in PAIRS if PAIRS[pair].planar)
+            yield Finding(f"a {joint.type} joint does not exist in the plane", where, f"use one of {flat}")
         if name in mechanism.joints:
             yield from _ends(mechanism, name, joint)
         own = mechanism.stated_joints[name].friction
@@ -183,7 +184,7 @@ def _ends(mechanism: Mechanism, name: str, joint: Joint) -> Iterator[Finding]:
         if name not in points:
             remedy = f"add {name}: [x, y] to the points of '{link}'"
             yield Finding(f"the link '{link}' has no point '{name}'", where, f"{remedy} ({nearest(name, points)})")
-        elif joint.type in PAIRS and PAIRS[joint.type].needs_axis and points[name].axis is None:
+        elif mechanism.space in PAIRS[joint.type].needs_axis and points[name].axis is None:
             yield Finding(
                 f"the point '{name}' of the link '{link}' has no axis, a {joint.type} joint needs one",
                 f"links.{link}.points.{name}",

@@ -52,6 +52,7 @@ class Mechanism(Part):
     trunnion: Literal[1] = 1
     name: str = ""
     space: Literal["planar", "spatial"] = "planar"
+    over_constraint: Literal["refuse", "minimum-norm"] = "refuse"
     gravity: Annotated[tuple[Acceleration, ...], Field(min_length=2, max_length=3)] | None = None
     ground: str | None = None
     dimensions: Mapping[Name, AnyQuantity] = {}
@@ -119,12 +120,22 @@ class Mechanism(Part):
         return self.ground or next((name for name in FIXED_NAMES if name in names), "")
 
     @cached_property
+    def effective_links(self) -> Mapping[str, Link]:
+        """Every link; one that only the loop names is massless."""
+        return {**self.links, **{row.link: Link() for row in self.loop if row.link not in self.links}}
+
+    @cached_property
     def stated_joints(self) -> Mapping[str, Joint]:
         """Every joint as it was stated; a row of the loop joins the link before it to its own."""
         stated = dict(self.joints)
         for before, row in zip((*self.loop[-1:], *self.loop[:-1]), self.loop, strict=True):
             stated[row.joint] = Joint(
-                type=row.type, links=(before.link, row.link), pin=row.pin, guide=row.guide, friction=row.friction
+                type=row.type,
+                links=(before.link, row.link),
+                pitch=row.pitch,
+                pin=row.pin,
+                guide=row.guide,
+                friction=row.friction,
             )
         return stated
 

@@ -78,7 +78,7 @@ def entries(mechanism: Mechanism) -> Iterator[Entry]:
     zero = Quantity(0, KINDS["acceleration"])
     size = mechanism.coordinates
     yield from _walk(mechanism.gravity or (zero,) * size, "gravity", ("gravity",))
-    for name, link in mechanism.links.items():
+    for name, link in mechanism.effective_links.items():
         yield from _walk(link, f"links.{name}", ("links", name))
         if link.centre is None:
             origin = (Quantity(0, KINDS["length"]),) * size
@@ -133,6 +133,7 @@ def _joint_entries(mechanism: Mechanism, name: str, joint: Joint) -> Iterator[En
     """Numbers of a joint with its defaults: what is not its own follows `joint_defaults`."""
     rows = [row.joint for row in mechanism.loop]
     location: Location = ("loop", rows.index(name)) if name in rows else ("joints", name)
+    yield from _walk(joint.pitch, f"joints.{name}.pitch", (*location, "pitch"))
     for key in ("pin", "guide", "friction"):
         part, default = getattr(joint, key), getattr(mechanism.joint_defaults, key)
         for entry in _walk(part, f"joints.{name}.{key}", (*location, key)):

@@ -77,21 +77,13 @@ __all__ = [
     "freedoms",
 ]
 
-# Spatial pairs that a file may name already; each moves to `PAIRS` with the analysis that knows it.
-SPATIAL_FREEDOMS: Mapping[str, tuple[str, ...]] = {
-    "cylindrical": ("rotation", "slide"),
-    "spherical": ("rotation",),
-    "universal": ("rotation",),
-    "helical": ("rotation",),
-    "planar": ("slide",),
-}
-JOINT_TYPES = (*PAIRS, *(name for name in SPATIAL_FREEDOMS if name not in PAIRS))
+JOINT_TYPES = tuple(PAIRS)
 FRICTION_MODELS = ("two-contact", "pezzuti")
 
 
 def freedoms(joint_type: str) -> tuple[str, ...]:
     """The motions a joint of this type frees, of ("rotation", "slide"): a rotation has a pin, a slide alone a guide."""
-    return PAIRS[joint_type].freedoms if joint_type in PAIRS else SPATIAL_FREEDOMS[joint_type]
+    return PAIRS[joint_type].freedoms
 
 
 def _name(name: str) -> str:
@@ -269,9 +261,10 @@ class Pin(Part):
 
 
 class Guide(Part):
-    """Slider and guide of a joint that slides: length in contact, play across."""
+    """Slider and guide of a joint that slides: length in contact, width over which it carries torsion, play across."""
 
     length: Length | None = None
+    width: Length | None = None
     clearance: Length | None = None
 
 
@@ -321,10 +314,14 @@ class JointDefaults(Part):
 
 
 class Joint(Part):
-    """A kinematic pair between two links, at the point of its own name on both."""
+    """A kinematic pair between two links, at the point of its own name on both.
+
+    pitch: slide of a helical pair for one turn, positive for a right-hand thread.
+    """
 
     type: JointType
     links: tuple[str, str]
+    pitch: Length | None = None
     pin: Pin | None = None
     guide: Guide | None = None
     friction: Friction | None = None
@@ -340,6 +337,7 @@ class LoopJoint(Part):
     distance: Length = Quantity(0, KINDS["length"])
     slide: Length | None = None
     rotation: Angle | None = None
+    pitch: Length | None = None
     pin: Pin | None = None
     guide: Guide | None = None
     friction: Friction | None = None

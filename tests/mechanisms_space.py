@@ -10,10 +10,11 @@ from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy import optimize
 
-from reference.maximal_space import Array, Data, Drive, Frame, Linkage, point, rotation
+from reference.maximal_space import Array, Data, Drive, Frame, Linkage, element, point, rotation, unrolled
 
-__all__ = ["MODELS", "Drawn", "cardan", "chain", "draw", "frame_of", "random_rotation", "rssr"]
+__all__ = ["MODELS", "Drawn", "cardan", "chain", "closed", "draw", "frame_of", "random_rotation", "rssr"]
 
 REACH = 0.15  # of the drawn drivers on both sides of the drawn pose, rad or m/10
 SPEED = 3.0
@@ -272,6 +273,38 @@ def cardan(
     }  # fmt: skip
 
 
+def closed(data: Data, first: float, seed: int = 0) -> Drawn:
+    """A loop of one driven and three cylindrical joints as links and points, assembled at a coordinate of the first."""
+    rows, rng = data["loop"], np.random.default_rng(seed)
+    shifts = [frame_of([row["distance"], 0, 0], rotation([1, 0, 0], row["twist"])) for row in rows]
+
+    def frames(rest: Array) -> list[Frame]:
+        turns, slides = [first, *rest[:3]], [rows[0].get("slide", 0.0), *rest[3:]]
+        found = [frame_of(np.zeros(3))]
+        for turn, slide, shift in zip(turns, slides, shifts, strict=True):
+            found.append(found[-1] @ frame_of([0, 0, slide], rotation([0, 0, 1], turn)) @ shift)
+        return found
+
+    def missing(rest: Array) -> Array:
+        gap = frames(rest)[-1]
+        return np.array([*gap.place, gap.axes[2, 1], gap.axes[0, 2], gap.axes[1, 0]])
+
+    for _ in range(200):
+        start = np.concatenate([rng.uniform(-np.pi, np.pi, 3), np.zeros(3)])
+        found = optimize.root(missing, start, tol=1e-10)
+        chain_frames = frames(found.x)
+        if np.max(np.abs(chain_frames[-1].axes - np.eye(3))) < 1e-6:
+            break
+    else:
+        raise AssertionError("not assembled")
+    plain = unrolled(data)
+    home = {}
+    for row, after, shift in zip(rows[:-1], chain_frames[1:], shifts, strict=False):
+        own = after @ shift.inverse()  # the element of the row's joint
+        home[row["link"]] = own @ element(plain["links"][row["link"]], row["joint"]).inverse()
+    return Drawn(plain, home)
+
+
 TWO_LOOPS = {
     "A": ("revolute", "ground", "crank"),
     "B": ("spherical", "crank", "triangle"),
@@ -297,17 +330,17 @@ PLATFORM = {
 
 # name: a mechanism; seeds at which the whole range is well conditioned
 MODELS: dict[str, Callable[[], Drawn]] = {
-    "RSSR": lambda: chain("RSSR", 2),
-    "RSSP": lambda: chain("RSSP", 3),
+    "RSSR": lambda: chain("RSSR", 24),
+    "RSSP": lambda: chain("RSSP", 24),
     "RCCC": lambda: chain("RCCC", 7),
-    "RRRSR": lambda: chain("RRRSR", 23),
-    "RSUR": lambda: chain("RSUR", 20),
+    "RRRSR": lambda: chain("RRRSR", 6),
+    "RSUR": lambda: chain("RSUR", 4),
     "RSSH": lambda: chain("RSSH", 12),
-    "HUSR": lambda: chain("HUSR", 20),
+    "HUSR": lambda: chain("HUSR", 16),
     "PSUR": lambda: chain("PSUR", 20),
-    "RUSP": lambda: chain("RUSP", 14),
-    "CRSR": lambda: chain("CRSR", 11),
-    "RECR": lambda: chain("RECR", 25),
+    "RUSP": lambda: chain("RUSP", 9),
+    "CRSR": lambda: chain("CRSR", 8),
+    "RECR": lambda: chain("RECR", 3),
     "RSFRC": lambda: chain("RSFRC", 14),
     "RCSC, two drivers": lambda: chain("RCSC", 13, ("A", "D")),
     "RRRRRRR": lambda: chain("RRRRRRR", 4),

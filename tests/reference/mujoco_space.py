@@ -24,7 +24,7 @@ Z = np.array([0.0, 0.0, 1.0])
 
 
 class Forces(NamedTuple):
-    """On the second link by the first: reactions (force and moment about the bearing's middle), efforts, spin moments."""
+    """On the second link by the first: reactions (force, moment about the bearing's middle), efforts; spin moments."""
 
     reactions: dict[str, tuple[Array, Array]]
     efforts: dict[str, float]
@@ -97,8 +97,7 @@ class Engine:
     def equations(self, motions: Mapping[str, Motion], drive: Mapping[str, Drive]) -> Array:
         """What must be zero at the cut joints, drives and free spins, with its derivatives."""
         rows = [row for name in self.cuts for row in self.oracle.rows(name, motions, {})]
-        for name in self.drivers:
-            rows.append(self.oracle.rows(name, motions, drive)[-1])
+        rows += [self.oracle.rows(name, motions, drive)[-1] for name in self.drivers]
         for link in self.oracle.free:
             u, motion = self.oracle.line(motions, link), motions[link]
             rows.append((0.0, float(u @ motion.spin), float(u @ motion.spin_rate)))
@@ -202,7 +201,7 @@ class Engine:
     def _reaction(
         self, motions: Mapping[str, Motion], name: str, cuts: Mapping[str, Array], drives: Mapping[str, float]
     ) -> tuple[Array, Array]:
-        """Force and moment about the middle of the bearing, without effort and what resists."""
+        """Force and moment about the middle of the bearing, without effort; what resists is an applied load to the engine."""
         first, second = self.joints[name]["links"]
         end = self._end(motions, name)
         z = end.axes[:, 2]
@@ -213,10 +212,9 @@ class Engine:
             child = self.body(second if self.sense[name] > 0 else first)
             wrench = self.sense[name] * self.state.cfrc_int[child]
             force, moment, at = wrench[3:], wrench[:3], self.state.subtree_com[self.model.body_rootid[child]]
-            known = np.asarray(self.oracle.joints_at(motions, {})[name].friction)
             turned = drives.get(name, 0.0) * z * (self.joints[name]["type"] != "prismatic")
             pushed = drives.get(name, 0.0) * z * (self.joints[name]["type"] == "prismatic")
-            force = force - known[:3] - pushed
-            moment = moment + np.cross(at - middle, wrench[3:]) - known[3:] - turned
+            force = force - pushed
+            moment = moment + np.cross(at - middle, wrench[3:]) - turned
             return force, moment
         return force, moment + np.cross(at - middle, force)

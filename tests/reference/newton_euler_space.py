@@ -205,7 +205,7 @@ def solve_with_friction(
 ) -> tuple[Solution, dict[str, Vector]]:
     """The same with friction that obeys its law: sizes n with n = size(reactions(n)), by Newton.
 
-    Reactions are linear in n, so unit sizes give them all; the Jacobian is by central differences. Returns friction
+    What the joints state as friction stays as a given load beside it. Reactions are linear in n, so unit sizes give them all; the Jacobian is by central differences. Returns friction
     (6) by joint too. AssertionError if it does not settle, as where the mechanism is locked.
     """
 
@@ -213,7 +213,9 @@ def solve_with_friction(
         friction = {name: np.zeros(6) for name in joints}
         for one, size in zip(rubbing, sizes, strict=True):
             friction[one.joint] = friction[one.joint] + size * one.wrench
-        loaded = {name: replace(joint, friction=friction[name]) for name, joint in joints.items()}
+        loaded = {
+            name: replace(joint, friction=_vector(joint.friction) + friction[name]) for name, joint in joints.items()
+        }
         return solve(bodies, loaded, gravity), friction
 
     def asked(sizes: Vector) -> Vector:

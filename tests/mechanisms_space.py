@@ -343,8 +343,8 @@ MODELS: dict[str, Callable[[], Drawn]] = {
     "RECR": lambda: chain("RECR", 3),
     "RSFRC": lambda: chain("RSFRC", 14),
     "RCSC, two drivers": lambda: chain("RCSC", 13, ("A", "D")),
-    "RRRRRRR": lambda: chain("RRRRRRR", 4),
-    "two loops in one group": lambda: draw(16, TWO_LOOPS),
-    "two RSSR in series": lambda: draw(16, TWO_RSSR),
+    "RRRRRRR": lambda: chain("RRRRRRR", 23),
+    "two loops in one group": lambda: draw(21, TWO_LOOPS),
+    "two RSSR in series": lambda: draw(14, TWO_RSSR),
     "platform on six legs": lambda: draw(3, PLATFORM),
 }

@@ -201,7 +201,7 @@ class Engine:
     def _reaction(
         self, motions: Mapping[str, Motion], name: str, cuts: Mapping[str, Array], drives: Mapping[str, float]
     ) -> tuple[Array, Array]:
-        """Force and moment about the middle of the bearing, without effort; what resists is an applied load to the engine."""
+        """Force and moment about the middle of the bearing, without effort; what resists is an applied load here."""
         first, second = self.joints[name]["links"]
         end = self._end(motions, name)
         z = end.axes[:, 2]

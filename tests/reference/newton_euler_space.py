@@ -188,12 +188,13 @@ class Rubbing:
     """Friction of one bearing of a joint: its size is a function of the reaction, its direction is given.
 
     size: of (reaction force, moment) on the second body, N; wrench: friction (6) on the second body for
-    size 1, against the slip.
+    size 1, against the slip. felt: the reaction it is a function of has the joint's own friction in it.
     """
 
     joint: str
     size: Callable[[Vector, Vector], float]
     wrench: Vector
+    felt: bool = False
 
 
 def solve_with_friction(
@@ -205,22 +206,22 @@ def solve_with_friction(
 ) -> tuple[Solution, dict[str, Vector]]:
     """The same with friction that obeys its law: sizes n with n = size(reactions(n)), by Newton.
 
-    What the joints state as friction stays as a given load beside it. Reactions are linear in n, so unit sizes give them all; the Jacobian is by central differences. Returns friction
-    (6) by joint too. AssertionError if it does not settle, as where the mechanism is locked.
+    What the joints state as friction stays as a given load beside it. The Jacobian is by central differences. Returns
+    friction (6) by joint too. AssertionError if it does not settle, as where the mechanism is locked.
     """
 
     def at(sizes: Vector) -> tuple[Solution, dict[str, Vector]]:
         friction = {name: np.zeros(6) for name in joints}
         for one, size in zip(rubbing, sizes, strict=True):
             friction[one.joint] = friction[one.joint] + size * one.wrench
-        loaded = {
-            name: replace(joint, friction=_vector(joint.friction) + friction[name]) for name, joint in joints.items()
-        }
+        whole = {name: _vector(joint.friction) + friction[name] for name, joint in joints.items()}
+        loaded = {name: replace(joint, friction=whole[name]) for name, joint in joints.items()}
         return solve(bodies, loaded, gravity), friction
 
     def asked(sizes: Vector) -> Vector:
-        found, _ = at(sizes)
-        return np.array([one.size(found.force[one.joint], found.moment[one.joint]) for one in rubbing])
+        found, friction = at(sizes)
+        loads = {name: np.concatenate([found.force[name], found.moment[name]]) for name in joints}
+        return np.array([one.size(*np.split(loads[one.joint] + one.felt * friction[one.joint], 2)) for one in rubbing])
 
     n = asked(np.zeros(len(rubbing)))
     for _ in range(60):

@@ -16,6 +16,7 @@ from reference.newton_euler_space import Body, Joint, Load, Rubbing, Solution, s
 
 __all__ = ["Oracle", "Slip", "merged"]
 
+NONE = np.zeros(3)
 MATRIX = (("xx", "xy", "xz"), ("xy", "yy", "yz"), ("xz", "yz", "zz"))
 
 
@@ -162,13 +163,15 @@ class Oracle(Linkage):
     def _rubbing_cross(
         self, motions: Mapping[str, Motion], name: str, f: float, r: float, length: float
     ) -> list[Rubbing]:
-        """A universal joint: the pins of its massless cross, one in each link, both with the reaction of the joint."""
+        """A universal joint: the pins of its massless cross, each across itself loaded by the friction of the other."""
         one, two = self.elements(motions, name)
-        pins = one.frame.axes[:, 2], two.frame.axes[:, 2]
-        relative = two.spin - one.spin
-        return [
-            against(name, lambda F, M, u=u: f * ends(F, M, u, length), spin=np.sign(relative @ u) * r * u) for u in pins
-        ]
+        pins, relative = (one.frame.axes[:, 2], two.frame.axes[:, 2]), two.spin - one.spin
+
+        def pin(u: Array) -> Rubbing:
+            spin = np.sign(relative @ u) * r * u
+            return against(name, lambda F, M: f * ends(F, M, u, length), spin=spin, felt=True)
+
+        return [pin(u) for u in pins]
 
     def power(
         self, motions: Mapping[str, Motion], found: Solution, friction: Mapping[str, Array]
@@ -199,8 +202,9 @@ class Oracle(Linkage):
         return float(np.sum(parts)), float(np.max(np.abs(parts)))
 
 
-def against(name: str, size: Any, slide: Any = (0.0, 0.0, 0.0), spin: Any = (0.0, 0.0, 0.0)) -> Rubbing:
-    return Rubbing(name, size, -np.concatenate([np.asarray(slide, float), np.asarray(spin, float)]))
+def against(name: str, size: Any, slide: Any = NONE, spin: Any = NONE, felt: bool = False) -> Rubbing:
+    """Friction of one bearing against the slip: force `slide` and moment `spin` for size 1, turned round."""
+    return Rubbing(name, size, -np.concatenate([np.asarray(slide, float), np.asarray(spin, float)]), felt)
 
 
 def unit(a: Array) -> Array:

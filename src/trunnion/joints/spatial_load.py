@@ -82,7 +82,8 @@ class BearingLoad:
 
     axis: unit vector u; place: middle of the bearing, m; length: L, m. summed: [P]'s sum instead of the two contacts.
     width: of a guide, over which a pair of forces carries the torsion about it, N + 2 |M_u|/width; None of others.
-    radius: mean radius of a thread, whose flanks also carry N + √(F_u² + (M_u/r)²); None of others.
+    flank: of a thread, whose flanks also carry N + flank |F_u|, the secant of its angle of lead; None of others. By F_u
+    alone: the torque about the axis may hold that of a drive, which the flanks do not feel twice.
     """
 
     axis: Vector3
@@ -90,7 +91,7 @@ class BearingLoad:
     length: Number
     summed: bool = False
     width: Number | None = None
-    radius: Number | None = None
+    flank: Number | None = None
 
     def _across(self, reaction: Reaction) -> tuple[Vector3, Vector3, Number, Number]:
         """F⊥ and g, and the components F_u and M_u along the axis."""
@@ -110,8 +111,8 @@ class BearingLoad:
             found = _length(vector_minus(half, couple)) + _length(plus(half, couple))
         if self.width is not None:
             found = found + 2 * namespace(torsion).abs(torsion) / self.width
-        if self.radius is not None:
-            found = found + _length((along, torsion / self.radius, 0.0))
+        if self.flank is not None:
+            found = found + self.flank * namespace(along).abs(along)
         return found
 
     def gradient(self, reaction: Reaction, normal: Number) -> Reaction:
@@ -127,11 +128,8 @@ class BearingLoad:
         moment = scaled(1 / self.length, cross(self.axis, turn))  # g = M × u/L, so t · dg = dM · (u × t)/L
         if self.width is not None:
             moment = plus(moment, scaled(2 * namespace(torsion).sign(torsion) / self.width, self.axis))
-        if self.radius is not None:
-            flank = _length((along, torsion / self.radius, 0.0))
-            share = _along((along, torsion / self.radius, 0.0), flank)
-            push = plus(push, scaled(share[0], self.axis))
-            moment = plus(moment, scaled(share[1] / self.radius, self.axis))
+        if self.flank is not None:
+            push = plus(push, scaled(self.flank * namespace(along).sign(along), self.axis))
         return (*vector_minus(push, cross(moment, self.place)), *moment)
 
     def bound(self, reaction: Reaction) -> Number:
@@ -154,5 +152,5 @@ class BearingLoad:
             place=each(self.place),
             length=change(self.length),
             width=None if self.width is None else change(self.width),
-            radius=None if self.radius is None else change(self.radius),
+            flank=None if self.flank is None else change(self.flank),
         )

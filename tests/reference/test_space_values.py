@@ -188,7 +188,7 @@ def test_imperfect_cardan_closes(twist: float, offset: float, general: bool) -> 
 def double_cardan(bend: float, turn: float, parallel: bool) -> Data:
     """Two universal joints with a shaft between, which bends by `bend` at both; the far fork turned by `turn`.
 
-    z of the input is global z; the shafts lie in the plane x, z. The output is parallel to the input or goes on bending.
+    The input lies along z, all shafts in the plane x, z. The output is parallel to the input or goes on bending.
     """
     along = np.array([np.sin(bend), 0, np.cos(bend)])
     out = np.array([0.0, 0, 1]) if parallel else np.array([np.sin(2 * bend), 0, np.cos(2 * bend)])

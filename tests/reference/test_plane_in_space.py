@@ -1,6 +1,6 @@
 """Planar mechanisms drawn in space, held three times more than needed in every loop: the planar answer is theirs.
 
-With loads in the plane the smallest reactions that hold the balance have nothing across it: both ends of a bearing carry
+With loads in the plane the smallest reactions that balance have nothing across it: both ends of a bearing carry
 half the force each and its friction is the planar f r |F|; a guide's ends are those of the planar guide.
 """
 

@@ -201,3 +201,26 @@ def test_points_are_those_of_the_model() -> None:
     result = analyse(mechanism, 3)
     named = {f"{link}.{point}" for link, points in mechanism.points.items() for point in points}
     assert set(result["point"].values) == named
+
+
+# ---- the plane in space ---------------------------------------------------------------------------------------
+
+
+def test_a_planar_linkage_in_space_is_the_planar_one() -> None:
+    """With the smallest reactions: the forces of the plane, and nothing across it without a load there."""
+    data = trunnion.read(EXAMPLES / "fourbar-in-space.yaml").data()
+    data |= {"over_constraint": "minimum-norm", "gravity": [0, -9.81, 0]}
+    flat = copy.deepcopy(data)
+    del flat["over_constraint"]
+    flat |= {"space": "planar", "gravity": [0, -9.81]}
+    for link in flat["links"].values():
+        link["points"] = {name: point["at"][:2] for name, point in link["points"].items()}
+        if "centre" in link:
+            link |= {"centre": link["centre"][:2], "inertia": link["inertia"]["zz"]}
+    space, plane = (analyse(Mechanism(**each), STEPS) for each in (data, flat))
+    np.testing.assert_allclose(space["drive_effort"], plane["drive_effort"], rtol=0, atol=1e-11)
+    np.testing.assert_allclose(space["joint_rotation"], plane["joint_rotation"], rtol=0, atol=1e-11)
+    forces = space["reaction_force"]
+    np.testing.assert_allclose(forces.sel(axis=["x", "y"]), plane["reaction_force"], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(forces.sel(axis="z"), 0, atol=1e-11)
+    np.testing.assert_allclose(space["reaction_moment"], 0, atol=1e-11)

@@ -19,7 +19,7 @@ from trunnion.views.cycle import Array, attribute, layout, names
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Pose", "Space", "is_spatial", "rotation_matrix", "space"]
+__all__ = ["Pose", "Space", "gathered", "is_spatial", "rotation_matrix", "space"]
 
 PIN = 14.0  # a mechanism is drawn at least as large as so many radii of its thickest pin
 NEAR = 0.1  # joints whose points lie closer than this share of the size are drawn apart
@@ -93,6 +93,12 @@ class Space:
         """How far the point on the second link is along the axis of the first, (position,) m."""
         apart = self.at(joint, 1) - self.at(joint, 0)
         return np.asarray((apart * self.axis(joint, 0)).sum(axis=0), dtype=float)
+
+    @cached_property
+    def middle(self) -> Array:
+        """Middle of the box around all places, (3,) m."""
+        low, high = self.spots.min(axis=0), self.spots.max(axis=0)
+        return np.asarray((low + high) / 2, dtype=float)
 
     def track(self, key: str) -> Array:
         """Track of a free point, (3, position)."""
@@ -191,14 +197,15 @@ def rotation_matrix(quaternion: Array) -> Array:
 
 def space(result: xr.Dataset) -> Space:
     """Gather what the drawings need; raises MechanismError if no position can be drawn."""
-    shown = _gathered(result)
+    shown = gathered(result)
     if not shown.drawable.any():
         what = "no position of the mechanism can be assembled: there is nothing to draw"
         raise MechanismError(Finding(what, remedy="change the lengths or the range of the driver"))
     return shown
 
 
-def _gathered(result: xr.Dataset) -> Space:
+def gathered(result: xr.Dataset) -> Space:
+    """The same, whether or not a position can be drawn."""
     stated = layout(result)
     count = result.sizes["position"]
     poses = {link: _pose(result, link) for link in names(result, "link")}

@@ -118,8 +118,8 @@ def screw_axis(spin: Array, place: Array, velocity: Array, near: Array) -> tuple
     turn, and the axis is at infinity.
     """
     speed = np.linalg.norm(spin, axis=0)
-    fastest = np.nanmax(speed, initial=0.0)
-    turning = np.where(speed > STILL * fastest, speed, np.nan) if fastest > 0 else np.full_like(speed, np.nan)
+    fastest = speed[np.isfinite(speed)].max(initial=0.0)
+    turning = np.where(speed > STILL * fastest, speed, np.nan)
     along = spin / turning
     point = place + np.cross(along, velocity, axis=0) / turning
     point = point + along * ((near[:, None] - point) * along).sum(axis=0)

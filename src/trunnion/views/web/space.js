@@ -114,7 +114,7 @@ function recolour(view, paper) {
     if (!link.ground) order += 1;
   }
   view.colours = colours;
-  if (view.frame) paintBodies(view);
+  if (view.project) paintBodies(view);
 }
 
 function build(view, width) {
@@ -287,20 +287,33 @@ function axes(view) {
 function screws(view) {
   const { scene, posed } = view;
   const moving = scene.links.filter((link) => !link.ground);
-  return moving.flatMap(({ name, screw }, order) => {
+  const lines = [];
+  const labels = [];
+  const used = [];
+  moving.forEach(({ name, screw }, order) => {
     const place = screw && valueAt(screw, posed);
     const along = screw && valueAt({ x: screw.u, y: screw.v, z: screw.w }, posed);
-    if (!place || !along || Math.hypot(...plus(place, scene.middle, -1)) > FAR * scene.size) return [];
+    if (!place || !along || Math.hypot(...plus(place, scene.middle, -1)) > FAR * scene.size) return;
     const pitch = 2 * Math.PI * at(screw.pitch, posed);
-    const slides = Math.abs(pitch) > 1e-6 * scene.size;
-    const text = slides && scene.scaled ? `${short(name)}, ${stated(Number(pitch.toPrecision(3)), "m")} a turn` : short(name);
-    const [x, y] = spot(view, plus(place, along, LINE * scene.size));
-    const inside = [Math.min(Math.max(x, 60), view.frame.width - 60), Math.min(Math.max(y, 14), view.frame.height - KEY - 8)];
-    return [
+    const slides = scene.scaled && Math.abs(pitch) > 1e-6 * scene.size;
+    const text = slides ? `${short(name)}, ${stated(Number(pitch.toPrecision(3)), "m")} a turn` : short(name);
+    lines.push(
       svg("path", { class: `screw k${order % 6}`, d: straight(view, place, along, LINE * scene.size) }),
-      svg("text", { class: `screw-name k${order % 6}`, x: inside[0].toFixed(1), y: inside[1].toFixed(1) }, text),
-    ];
+    );
+    const [x, y] = roomFor(view, spot(view, plus(place, along, 0.9 * LINE * scene.size)), text, used);
+    labels.push(svg("text", { class: `screw-name k${order % 6}`, x: x.toFixed(1), y: y.toFixed(1) }, text));
   });
+  return [...lines, ...labels];
+}
+
+/** A place for a text inside the picture, below those that are `used`. */
+function roomFor({ frame }, [x, y], text, used) {
+  const half = 3.4 * text.length + 6;
+  const place = [Math.min(Math.max(x, half), frame.width - half), Math.min(Math.max(y, 14), frame.height - KEY - 12)];
+  while (used.some((other) => Math.abs(other[0] - place[0]) < half + other[2] && Math.abs(other[1] - place[1]) < 15))
+    place[1] += 15;
+  used.push([...place, half]);
+  return place;
 }
 
 /** Reaction forces, and moments with two heads, of the joints that are chosen. */
@@ -380,18 +393,19 @@ function names(view) {
 /** Triad, length bar and reference arrows, with round numbers. */
 function key(view) {
   const { scene, frame, project } = view;
-  const [ox, oy] = [30, frame.height - 30];
-  const parts = [];
+  const [ox, oy] = [34, frame.height - 34];
+  const strip = { x: 0, y: frame.height - KEY + 6, width: frame.width, height: KEY - 6 };
+  const parts = [svg("rect", { class: "strip", ...strip })];
   ["x", "y", "z"].forEach((name, axis) => {
-    const [dx, dy] = project.matrix.slice(0, 2).map((row) => 22 * row[axis]);
+    const [dx, dy] = project.matrix.slice(0, 2).map((row) => 26 * row[axis]);
     parts.push(svg("path", { class: "triad", d: arrow(ox, oy, dx, -dy) }));
     if (Math.hypot(dx, dy) > 6) parts.push(svg("text", { class: "axis middle", dy: "0.34em", x: (ox + 1.4 * dx).toFixed(1), y: (oy - 1.4 * dy).toFixed(1) }, name)); // prettier-ignore
   });
   const y = frame.height - 14;
-  let x = 72;
+  let x = 80;
   const say = (text) => {
     parts.push(svg("text", { x, y, dy: "0.32em" }, text));
-    x += 7 * text.length + 22;
+    x += 6.2 * text.length + 18;
   };
   if (scene.scaled) {
     const length = roundBelow((frame.width * 0.16) / project.scale);
@@ -402,8 +416,8 @@ function key(view) {
   } else say("all axes meet in one point");
   const reference = (perUnit, unit, text, second) => {
     const scale = perUnit * view.factor;
-    if (!(scale > 0) || !view.shown.size || x > frame.width - 150) return;
-    const size = roundBelow((frame.width * 0.12) / scale);
+    if (!(scale > 0) || !view.shown.size || x > frame.width - 130) return;
+    const size = roundBelow((frame.width * 0.1) / scale);
     const d = arrow(x, y, size * scale, 0) + (second ? head(x, y, size * scale, 0) : "");
     parts.push(svg("path", { class: "reaction reference", d }));
     x += size * scale + 8;

@@ -88,7 +88,9 @@ def _spatial_joint(result: xr.Dataset, i: int, joint: str, kind: str) -> list[Co
     found += _vector(result, "reaction_force", f"{joint}.reaction_", i)
     found += _vector(result, "reaction_moment", f"{joint}.reaction_moment_", i)
     freedoms = {"torque": moves["rotation"], "force": moves["slide"]}
-    found += [_column(result, f"friction_{what}", f"{joint}.friction_{what}", (i,)) for what, is_ in freedoms.items() if is_]
+    found += [
+        _column(result, f"friction_{what}", f"{joint}.friction_{what}", (i,)) for what, is_ in freedoms.items() if is_
+    ]
     return found
 
 

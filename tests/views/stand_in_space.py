@@ -88,7 +88,8 @@ def made(name, formula, links, joints, free, drivers, time, forces, moments, rot
         "reaction_force": (("joint", "axis"), forces), "reaction_moment": (("joint", "axis"), moments),
         "friction_moment": (("joint", "axis"), -0.02 * moments), "friction_force": (("joint",), np.zeros((n, count))),
         "friction_torque": (("joint",), -0.01 * np.linalg.norm(moments, axis=1)),
-        "friction_power": (("joint",), loss), "joint_rotation": (("joint",), rotation), "joint_slide": (("joint",), slide),
+        "friction_power": (("joint",), loss),
+        "joint_rotation": (("joint",), rotation), "joint_slide": (("joint",), slide),
         "drive_effort": (("driver",), effort), "drive_effort_lower": (("driver",), effort),
         "drive_effort_upper": (("driver",), effort), "drive_power": (("driver",), 10 * effort),
         "useful_power": ((), 8 * effort.sum(axis=0)), "efficiency_instant": ((), zero + 0.8),
@@ -107,7 +108,8 @@ def made(name, formula, links, joints, free, drivers, time, forces, moments, rot
     variables["efficiency"] = ((), 0.8, {"units": "1", "long_name": "efficiency"})
     scene = {
         "space": "spatial", "ground": next(iter(links)),
-        "links": {link: {"points": [key.split(".", 1)[1] for key in points if key.split(".")[0] == link]} for link in links},
+        "links": {link: {"points": [key.split(".", 1)[1] for key in points if key.split(".")[0] == link]}
+                  for link in links},
         "joints": {joint: {"type": kind, "links": list(two), "friction": True, "frames": frames}
                    for joint, (kind, two, frames) in joints.items()},
         "drivers": drivers, "gears": {}, "springs": {}, "passive": [],
@@ -120,7 +122,8 @@ def made(name, formula, links, joints, free, drivers, time, forces, moments, rot
                 "component": ["w", "x", "y", "z"]},
         attrs={"name": name, "formula": formula, "model_hash": "9f2c41d07ab35e68", "trunnion_version": "0.1.0",
                "method": "newton", "references": "", "findings": "[]", "inputs": "[]", "summary": "[]",
-               "driver_units": json.dumps(["N m"] * len(drivers)), "scene": json.dumps(scene), "passive": "[]", **attrs},
+               "driver_units": json.dumps(["N m"] * len(drivers)), "scene": json.dumps(scene),
+               "passive": "[]", **attrs},
     )  # fmt: skip
 
 
@@ -172,7 +175,8 @@ def rssr(count=120, gap=None):
     moments = np.array([np.cross(ball.T, push.T).T * [[1], [1], [0]], 0 * push, 0 * push, 0.02 * push])
     rotation = np.array([theta, 0.5 + 0.2 * np.sin(theta), 0.7 + 0.2 * np.cos(theta), psi])
     result = made(
-        "RSSR linkage", "I(0,1)R → IV(2,3)SSR", links, joints, {"coupler.E": (0.06, 0.03, 0), "rocker.tip": (0.11, 0, s4)},
+        "RSSR linkage", "I(0,1)R → IV(2,3)SSR", links, joints,
+        {"coupler.E": (0.06, 0.03, 0), "rocker.tip": (0.11, 0, s4)},
         ["O"], theta / 10, forces, moments, rotation, np.zeros((4, count)),
         loads={"work": {"link": "rocker", "joint": None, "at": "tip", "force": [0, -150.0, 60.0], "moment": None,
                         "frame": "global", "varies": False, "useful": True},
@@ -195,7 +199,7 @@ def hidden(result, start, stop, status):
     return out
 
 
-def cardan(count=120, delta=np.radians(35), inputs=()):
+def cardan(count=120, delta=0.6, inputs=()):
     """An ideal Cardan joint as a Denavit–Hartenberg loop: all axes meet in one point."""
     theta = np.arange(count) * 2 * np.pi / count
     z1, z4 = Z[:, None] + 0 * theta, np.array([0, np.sin(delta), -np.cos(delta)])[:, None] + 0 * theta
@@ -245,13 +249,15 @@ def every_kind(count=60):
         return rotation, o + place - np.einsum("ijn,j->in", rotation, np.array(q))
 
     tilt = np.einsum("ijn,jk,kln->iln", _turned(swing), matrices(X, Z, -Y), _turned(swing))
+    wave, third = np.sin(turn), np.array([flat, flat, flat + 1])
+    around = np.array([np.sin(turn), np.cos(turn), flat])
     chain = [
         ("R", "revolute", frame((0, 0, 0)), _turned(turn * 0.1), np.zeros((3, count)), frame()),
         ("U", "universal", frame((0.2, 0, 0), X), tilt, np.zeros((3, count)), frame(z=Y)),
-        ("C", "cylindrical", frame((0.2, 0, 0), Y), _turned(swing), np.array([flat, flat, 0.03 * np.sin(turn)]), frame(z=Y)),
-        ("H", "helical", frame((0.2, 0, 0), Z), _turned(swing), np.array([flat, flat, 0.02 * np.sin(turn)]), frame(z=Z)),
-        ("P", "prismatic", frame((0.2, 0, 0), X, Z), stay, np.array([flat, flat, 0.06 + 0.05 * np.sin(turn)]), frame(z=X, x=Z)),
-        ("E", "planar", frame((0, 0.2, 0), Z), _turned(swing), 0.02 * np.array([np.sin(turn), np.cos(turn), flat]), frame()),
+        ("C", "cylindrical", frame((0.2, 0, 0), Y), _turned(swing), 0.03 * wave * third, frame(z=Y)),
+        ("H", "helical", frame((0.2, 0, 0), Z), _turned(swing), 0.02 * wave * third, frame(z=Z)),
+        ("P", "prismatic", frame((0.2, 0, 0), X, Z), stay, (0.06 + 0.05 * wave) * third, frame(z=X, x=Z)),
+        ("E", "planar", frame((0, 0.2, 0), Z), _turned(swing), 0.02 * around, frame()),
         ("S", "spherical", frame((0, 0.2, 0)), _turned(swing), np.zeros((3, count)), frame()),
         ("F", "fixed", frame((-0.2, 0, 0)), stay, np.zeros((3, count)), frame()),
     ]  # fmt: skip

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.views.cycle import Array, abscissa, attribute, column, intervals, layout, names, numbers, series
+from trunnion.views.cycle import abscissa, attribute, column, intervals, layout, names, numbers, series
 from trunnion.views.space import is_spatial
 from trunnion.views.space_scene import space_scene
 

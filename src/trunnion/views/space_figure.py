@@ -128,14 +128,13 @@ def sketch(axes: Axes, look: Scenery, index: int, only: tuple[str, ...] = (), cu
          _colour(shown, solid.paint, only))
         for solid in look.solids
     ]  # fmt: skip
-    strokes = []
+    strokes: list[Strokes] = []
     if curves:
-        for key in shown.free:
-            if key.split(".", 1)[0] != shown.ground:
-                strokes.append(Strokes(_pieces(shown.track(key)), INK, 1.2))
-        for name, joint in shown.joints.items():
-            if shown.ground not in joint["links"] and not shown.shifts[name]:
-                strokes.append(Strokes(_dashed(shown.seated(name), 0.013 * shown.size), MUTED, 0.7))
+        free = [key for key in shown.free if key.split(".", 1)[0] != shown.ground]
+        inner = [name for name, joint in shown.joints.items()
+                 if shown.ground not in joint["links"] and not shown.shifts[name]]  # fmt: skip
+        strokes += [Strokes(_pieces(shown.track(key)), INK, 1.2) for key in free]
+        strokes += [Strokes(_dashed(shown.seated(name), 0.013 * shown.size), MUTED, 0.7) for name in inner]
     paint(axes, look.camera, bodies, strokes, shown.size)
 
 
@@ -202,7 +201,7 @@ def _reactions(axes: Axes, look: Scenery, result: xr.Dataset, index: int) -> lis
     x, y = axes.get_xlim()[1], axes.get_ylim()[0] + 0.025 * look.diagonal
     text = f"reaction {size * factor:g} {unit}"
     start = np.array([x - size * scale - 0.01 * look.diagonal, y])
-    _arrow(axes, start, start + [size * scale, 0.0], REACTION)
+    _arrow(axes, start, start + np.array([size * scale, 0.0]), REACTION)
     axes.annotate(text, (start[0], y), xytext=(-5, 0), textcoords="offset points", ha="right", va="center",
                   fontsize=8, color=MUTED)  # fmt: skip
     return found
@@ -267,8 +266,10 @@ def labels(
         blocked = [sum(bool((np.abs(other - place) < half * 1.15).all()) for other in taken) for place in options]
         place = options[int(np.argmin(blocked))]
         taken += [place + half * [share, 0.0] for share in (-0.9, -0.45, 0, 0.45, 0.9)]
-        axes.text(place[0], place[1], text, ha="center", va="center", fontsize=size, fontweight="bold", color=INK, zorder=8,
-                  bbox={"boxstyle": "round,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.7})  # fmt: skip
+        axes.text(
+            place[0], place[1], text, ha="center", va="center", fontsize=size, fontweight="bold", color=INK, zorder=8,
+            bbox={"boxstyle": "round,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.7},
+        )  # fmt: skip
 
 
 def _covered(look: Scenery, index: int) -> Array:

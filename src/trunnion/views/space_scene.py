@@ -70,7 +70,9 @@ def _seat(shown: Space, name: str) -> dict[str, Any]:
     turning = joint["type"] not in ("spherical", "universal", "fixed")
     axes = [{"link": joint["links"][1], "along": _vector(shown.element(name, 1)[1])}] if turning else []
     if joint["type"] == "universal":
-        axes = [{"link": link, "along": _vector(shown.element(name, side)[1])} for side, link in enumerate(joint["links"])]
+        axes = [
+            {"link": link, "along": _vector(shown.element(name, side)[1])} for side, link in enumerate(joint["links"])
+        ]
     return {"link": joint["links"][1], "at": _vector(shown.seat(name)), "axes": axes}
 
 

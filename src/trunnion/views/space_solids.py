@@ -31,8 +31,9 @@ UP = np.array([0.0, 0.0, 1.0])
 class Solid:
     """One body fixed in a link, lengths in m in the link's frame.
 
-    kind: "rod" (along the line through the points, with a radius), "ball" (at points[0]), "box" (points[0] its middle, the other
-    three its half edges), "wire" (a line through the points); paint: the link whose colour it has, "" for a joint's.
+    kind: "rod" (along the line through the points, with a radius), "ball" (at points[0]), "box" (points[0] its middle,
+    the other three its half edges), "wire" (a line through the points); paint: the link whose colour it has, "" for the
+    colour of joints.
     """
 
     kind: str
@@ -153,7 +154,7 @@ def _arc(start: Array, end: Array, first: Array, second: Array) -> list[Array]:
 
 
 def _outer(shown: Space, name: str) -> int:
-    """Side of the link that holds sleeve, rail or plate: the ground's, else the second of a turning pair, else the first."""
+    """Side of the link that holds sleeve, rail or plate: the ground's, else the second of a pair that turns."""
     joint = shown.joints[name]
     if shown.ground in joint["links"]:
         return int(joint["links"].index(shown.ground))
@@ -243,8 +244,8 @@ def _cross(shown: Space, name: str) -> list[Solid]:
         middle, z, _ = shown.element(name, side)
         arm = (HALF + 0.016) * size * z
         found.append(_rod(link, middle - arm, middle + arm, 0.012 * size))
-        for end in (-1, 1):  # the eye of the link's fork
-            found.append(_rod(link, middle + end * 0.72 * arm, middle + end * 1.0 * arm, 0.019 * size, link))
+        eyes = [(middle + end * 0.72 * arm, middle + end * arm) for end in (-1, 1)]  # of the link's fork
+        found += [_rod(link, *eye, 0.019 * size, link) for eye in eyes]
     return [*found, Solid("ball", shown.joints[name]["links"][1], shown.seat(name)[None], 0.019 * size)]
 
 
@@ -302,12 +303,11 @@ def _foot(shown: Space, name: str) -> list[Solid]:
         _rod(ground, seat, plate, 0.011 * size, ground),
         _box(ground, plate, np.array([half * x, half * y, 0.0035 * size * down]), ground),
     ]
-    for share in np.linspace(-1, 1, 6)[:-1]:  # strokes away from two edges of the plate
-        for along, across in ((x, y), (y, x)):
-            for edge in (-1, 1):
-                start = plate + half * ((share + 0.4) * along + edge * across) + 0.0035 * size * down
-                stroke = np.array([start, start + 0.45 * half * (down - 0.7 * along)])
-                found.append(Solid("wire", ground, stroke, 0.0, ground))
+    rim = plate + 0.0035 * size * down
+    for along, across in ((x, y), (y, x), (x, -y), (y, -x)):  # strokes away from the edges of the plate
+        starts = [rim + half * ((share + 0.4) * along + across) for share in np.linspace(-1, 1, 6)[:-1]]
+        stroke = 0.45 * half * (down - 0.7 * along)
+        found += [Solid("wire", ground, np.array([start, start + stroke]), 0.0, ground) for start in starts]
     return found
 
 

@@ -49,7 +49,7 @@ def places(choice: Choice, way: Way) -> str:
         return "0" if shown == "-0" else shown
 
     told = [
-        f"{name} ({text(joint[0])}, {text(joint[1])})" if len(joint) == 2 else f"{name} at {text(joint[0])}"
+        f"{name} ({', '.join(map(text, joint))})" if len(joint) > 1 else f"{name} at {text(joint[0])}"
         for name, joint in list(way.joints.items())[:MOST_JOINTS]
     ]
     return ", ".join(told) + ", …" * (len(way.joints) > MOST_JOINTS) + f" {unit}"

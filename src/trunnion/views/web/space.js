@@ -306,12 +306,13 @@ function screws(view) {
   return [...lines, ...labels];
 }
 
-/** A place for a text inside the picture, below those that are `used`. */
+/** A place for a text inside the picture, clear of those that are `used`. */
 function roomFor({ frame }, [x, y], text, used) {
   const half = 3.4 * text.length + 6;
   const place = [Math.min(Math.max(x, half), frame.width - half), Math.min(Math.max(y, 14), frame.height - KEY - 12)];
+  const step = place[1] > frame.height / 2 ? -15 : 15;
   while (used.some((other) => Math.abs(other[0] - place[0]) < half + other[2] && Math.abs(other[1] - place[1]) < 15))
-    place[1] += 15;
+    place[1] += step;
   used.push([...place, half]);
   return place;
 }

@@ -40,7 +40,7 @@ def space_ways(mechanism: Mechanism, found: Sequence[Choice]) -> Figure:
     known = [shown for row in rows for _, shown, _ in row if shown is not None]
     camera = looking(*best(known[0])) if known else looking(-1.0, 0.5)
     looks = [scenery(shown, camera) for shown in known]
-    box = np.array([look.box for look in looks] or [[0.0, 0.0, 1.0, 1.0]])
+    box = np.array([look.box for look in looks] or [(0.0, 0.0, 1.0, 1.0)])
     low, high = box[:, :2].min(axis=0), box[:, 2:].max(axis=0)
     margin = 0.08 * float(np.hypot(*(high - low)))
     frame = (*(low - margin), *(high + margin))

@@ -236,14 +236,32 @@ def motion_table() -> str:
 
 
 def pairs_table() -> str:
-    """Every pair that the analysis knows."""
+    """Every pair of the model file: where it exists and what it needs."""
     from trunnion.joints.pairs import PAIRS
+    from trunnion.model.contact import contact_lacks, has_guide, has_pin, motions
+    from trunnion.model.parts import Joint
 
-    rows = [
-        (_code(name), one.symbol, ", ".join(one.freedoms), "yes" if one.needs_axis else "no")
-        for name, one in PAIRS.items()
-    ]
-    return _rows(("`type`", "letter", "freedoms", "needs an `axis` on both links"), rows)
+    where = {("planar", "spatial"): "always", ("spatial",): "in space", (): "no"}
+    rows = []
+    for name, one in PAIRS.items():
+        part = "pin" if has_pin(name) else "guide" if has_guide(name) else ""
+        lacks = contact_lacks(Joint(type=name, links=("first", "second")), spatial=True) if part else ()
+        rubs = ", ".join(_code(f"{part}.{size}") for size in lacks) if part else "" if not one.count else "not modelled"
+        moves = MOVES.get(name) or " and ".join(motions(name))
+        driven = motions(name)[0] if one.drivable else "no"
+        plane = "yes" if one.planar else "no"
+        rows.append((_code(name), one.symbol, one.count, moves, plane, where[one.needs_axis], driven, rubs))
+    head = ("`type`", "letter", "freedoms", "motion", "in the plane", "needs an `axis`", "driven", "friction needs")
+    return _rows(head, rows)
+
+
+MOVES = {
+    "helical": "rotation, and with it the slide by its `pitch`",
+    "spherical": "any rotation",
+    "universal": "rotation about a pin in each link, at right angles",
+    "planar": "two slides across its axis, rotation about it",
+    "fixed": "none",
+}
 
 
 def groups_table() -> str:

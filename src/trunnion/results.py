@@ -1,7 +1,7 @@
 """Results with names, units, long names and provenance, put on once.
 
-`VARIABLES` is the whole vocabulary. Dims: position last; joint, link, point ("link.point"), axis (x, y), driver,
-spring (only of a mechanism that has any).
+`VARIABLES` is the whole vocabulary. Dims: position last; joint, link, point ("link.point"), axis (x, y, in space z),
+component (of a quaternion: w, x, y, z), driver, spring (only of a mechanism that has any).
 """
 
 from __future__ import annotations
@@ -16,31 +16,36 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["VARIABLES", "Variable", "allocate", "dataset"]
+__all__ = ["VARIABLES", "Variable", "allocate", "dataset", "variables"]
 
 
 @dataclass(frozen=True)
 class Variable:
-    """Dimensions before `position`, unit and long name of a result."""
+    """Dimensions before `position`, unit and long name of a result; the only space that has it, empty if both."""
 
     dims: tuple[str, ...]
     units: str
     long_name: str
+    space: str = ""
 
 
-def _rates(name: str, dims: tuple[str, ...], unit: str, long_name: str) -> dict[str, Variable]:
+def _rates(name: str, dims: tuple[str, ...], unit: str, long_name: str, space: str = "") -> dict[str, Variable]:
     """A quantity with its first and second derivative by time."""
     return {
-        name: Variable(dims, unit, long_name),
-        f"{name}_velocity": Variable(dims, f"{unit}/s", f"rate of the {long_name}"),
-        f"{name}_acceleration": Variable(dims, f"{unit}/s^2", f"second derivative of the {long_name}"),
+        name: Variable(dims, unit, long_name, space),
+        f"{name}_velocity": Variable(dims, f"{unit}/s", f"rate of the {long_name}", space),
+        f"{name}_acceleration": Variable(dims, f"{unit}/s^2", f"second derivative of the {long_name}", space),
     }
 
 
 VARIABLES: dict[str, Variable] = {
     **_rates("joint_rotation", ("joint",), "rad", "rotation of the joint, second link against first"),
     **_rates("joint_slide", ("joint",), "m", "slide of the joint, second link against first"),
-    **_rates("link_angle", ("link",), "rad", "angle of the link's x axis"),
+    **_rates("link_angle", ("link",), "rad", "angle of the link's x axis", "planar"),
+    "link_position": Variable(("link", "axis"), "m", "place of the link's origin", "spatial"),
+    "link_rotation": Variable(("link", "component"), "1", "unit quaternion of the link's axes", "spatial"),
+    "link_angular_velocity": Variable(("link", "axis"), "rad/s", "angular velocity of the link", "spatial"),
+    "link_angular_acceleration": Variable(("link", "axis"), "rad/s^2", "angular acceleration of the link", "spatial"),
     "point_position": Variable(("point", "axis"), "m", "place of the point"),
     "point_velocity": Variable(("point", "axis"), "m/s", "velocity of the point"),
     "point_acceleration": Variable(("point", "axis"), "m/s^2", "acceleration of the point"),
@@ -48,6 +53,9 @@ VARIABLES: dict[str, Variable] = {
     "reaction_moment": Variable(("joint",), "N m", "reaction moment on the second link, about the joint's point"),
     "friction_torque": Variable(("joint",), "N m", "friction torque on the second link by the first"),
     "friction_force": Variable(("joint",), "N", "friction force along the slide on the second link by the first"),
+    "friction_moment": Variable(
+        ("joint", "axis"), "N m", "friction moment on the second link, about the middle of the bearing", "spatial"
+    ),
     "friction_power": Variable(("joint",), "W", "power lost to friction"),
     "drive_effort": Variable(("driver",), "N m", "drive effort on the second link by the first"),
     "drive_effort_lower": Variable(("driver",), "N m", "least drive effort where a friction is an interval"),
@@ -70,6 +78,15 @@ VARIABLES: dict[str, Variable] = {
     "locking_margin": Variable((), "1", "multiple of the friction at which the position locks, ∞ if beyond 10"),
     "status": Variable((), "1", "code of the position's status; see the attribute flag_meanings"),
 }
+# what is a vector in space
+IN_SPACE = {
+    "reaction_moment": Variable(
+        ("joint", "axis"), "N m", "reaction moment on the second link, about the middle of the bearing"
+    ),
+    "friction_torque": Variable(
+        ("joint",), "N m", "friction torque on the second link about its axis, or against its turn"
+    ),
+}
 INTEGERS = {"status": np.int8, "friction_iterations": np.int32}
 # the same array until something sets them apart
 SAME_AS = {"drive_effort_lower": "drive_effort", "drive_effort_upper": "drive_effort"}
@@ -77,10 +94,20 @@ SAME_AS = {"drive_effort_lower": "drive_effort", "drive_effort_upper": "drive_ef
 Labels = Mapping[str, Sequence[str]]
 
 
+def variables(space: str) -> dict[str, Variable]:
+    """The vocabulary of the results of planar or of spatial mechanisms."""
+    both = {name: one for name, one in VARIABLES.items() if one.space in ("", space)}
+    return {**both, **IN_SPACE} if space == "spatial" else both
+
+
+def _space(labels: Labels) -> str:
+    return "spatial" if "component" in labels else "planar"
+
+
 def allocate(labels: Labels, positions: int, absent: Sequence[str] = ()) -> dict[str, NDArray[np.float64]]:
     """Arrays for every variable, to be filled, position last; those in `absent` are zero and take no memory."""
     arrays: dict[str, NDArray[np.float64]] = {}
-    for name, variable in VARIABLES.items():
+    for name, variable in variables(_space(labels)).items():
         if name in SAME_AS or not labels.keys() >= set(variable.dims):  # no springs, no spring_force
             continue
         shape = (*(len(labels[dim]) for dim in variable.dims), positions)
@@ -104,17 +131,18 @@ def dataset(
     """The arrays as an xarray Dataset with coordinates, units and long names."""
     import xarray as xr
 
-    variables = {
+    known = variables(_space(labels))
+    found = {
         name: xr.Variable(
-            (*VARIABLES[name].dims, "position"),
+            (*known[name].dims, "position"),
             array,
-            {"units": VARIABLES[name].units, "long_name": VARIABLES[name].long_name},
+            {"units": known[name].units, "long_name": known[name].long_name},
         )
         for name, array in arrays.items()
     }
-    variables["efficiency"] = xr.Variable(
+    found["efficiency"] = xr.Variable(
         (), efficiency, {"units": "1", "long_name": "useful work over drive work of the cycle"}
     )
     coordinates = {dim: (dim, np.asarray(names, dtype=str)) for dim, names in labels.items()}
     times = xr.Variable("position", time, {"units": "s", "long_name": "time from the start of the cycle"})
-    return xr.Dataset(variables, {**coordinates, "time": times}, dict(attributes))
+    return xr.Dataset(found, {**coordinates, "time": times}, dict(attributes))

@@ -15,6 +15,7 @@ from trunnion.errors import Status
 from trunnion.groups import GROUPS
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.joints.pairs import PAIRS, Load
+from trunnion.model.contact import has_guide, has_pin, motions
 
 loads = st.floats(0, 1e6)
 slips = st.floats(-1e3, 1e3).filter(lambda v: abs(v) > 1e-9)
@@ -101,8 +102,24 @@ def test_pair(name: str) -> None:
     assert pair.name == name
     assert len(pair.symbol) == 1
     assert set(pair.freedoms) <= {"rotation", "slide"}
-    assert len(pair.freedoms) == 1
-    assert KIND[pair.symbol] == name
+    assert len(set(pair.freedoms)) == len(pair.freedoms) <= 2
+    assert bool(pair.freedoms) == (pair.count > 0)
+    assert 0 <= pair.count <= 3
+    assert set(pair.needs_axis) <= {"planar", "spatial"}
+    assert not pair.planar or (KIND[pair.symbol] == name and pair.count == 1)
+
+
+def test_pairs_have_letters_of_their_own() -> None:
+    assert len({pair.symbol for pair in PAIRS.values()}) == len(PAIRS)
+
+
+@pytest.mark.parametrize("name", PAIRS)
+def test_a_pair_about_one_axis_can_be_driven(name: str) -> None:
+    """What can be driven, resisted and sprung is what moves about or along one axis; its first motion is driven."""
+    pair = PAIRS[name]
+    assert pair.drivable == bool(motions(name))
+    assert motions(name)[:1] == (pair.freedoms[:1] if pair.drivable else ())
+    assert not (has_pin(name) and has_guide(name))
 
 
 def load_of(turn: float | None) -> Load:

@@ -16,7 +16,8 @@ from trunnion.analysis.friction import FrictionMethod
 from trunnion.analysis.kinematics import start
 from trunnion.analysis.kinetostatics import Backward
 from trunnion.analysis.loads import Stated
-from trunnion.analysis.system import Cycle, Dial, System, Values, rubbing
+from trunnion.analysis.scene import DRAWN
+from trunnion.analysis.system import Cycle, Dial, System, rubbing
 from trunnion.errors import Finding, Severity, Status
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.model.check import check_model
@@ -29,9 +30,8 @@ if TYPE_CHECKING:
 
     from trunnion.analysis.analyse import Run
 
-__all__ = ["MARGIN", "fill_power", "finish", "pitch_circles"]
+__all__ = ["MARGIN", "fill_power", "finish"]
 
-DRAWN = 360  # positions at which a load that varies is looked at for the drawing
 MARGIN = 10.0  # multiple of the friction up to which the locking margin is looked for
 
 Arrays = Mapping[str, NDArray[np.float64]]
@@ -58,7 +58,7 @@ def fill_power(
     for power in back.load_powers.values():
         total = total + power
     for i, name in enumerate(walk.system.joints):
-        lost = -(back.friction[name] * back.slips[name].speed)
+        lost = back.friction_power(name)
         arrays["friction_power"][i, window] = lost
         total = total - lost
     for i, state in enumerate(back.springs.values()):
@@ -131,15 +131,12 @@ def finish(
 
 def effort_units(system: System) -> list[str]:
     """Unit of every driver's effort."""
-    return ["N m" if system.joints[name][0] == "revolute" else "N" for name in system.mechanism.drivers]
+    return ["N m" if system.turns(name) else "N" for name in system.mechanism.drivers]
 
 
 def spring_units(system: System) -> list[list[str]]:
     """Units of every spring's force and elongation."""
-    turns = [
-        spring.joint is not None and system.joints[spring.joint][0] == "revolute"
-        for spring in system.mechanism.springs.values()
-    ]
+    turns = [spring.joint is not None and system.turns(spring.joint) for spring in system.mechanism.springs.values()]
     return [["N m", "rad"] if turn else ["N", "m"] for turn in turns]
 
 
@@ -160,7 +157,7 @@ def _model_notes(mechanism: Mechanism) -> list[Finding]:
         for name, joint in mechanism.effective_joints.items()
         if (joint.pin and (joint.pin.clearance or joint.pin.fit)) or (joint.guide and joint.guide.clearance)
     ]
-    bodies = {name: link for name, link in mechanism.links.items() if name != mechanism.fixed_link}
+    bodies = {name: link for name, link in mechanism.effective_links.items() if name != mechanism.fixed_link}
     heavy = [name for name, link in bodies.items() if link.mass.source != 0]
     if heavy and mechanism.gravity is None:
         what = f"gravity is not stated and taken as none, though {', '.join(heavy)} have mass"
@@ -288,7 +285,7 @@ def _reaction_rows(system: System, arrays: Arrays, dial: Dial, sound: NDArray[np
     rows: list[dict[str, Any]] = []
     for i, (name, (kind, _)) in enumerate(system.joints.items()):
         if len(sound):
-            size = np.hypot(*arrays["reaction_force"][i])
+            size = np.sqrt(np.sum(arrays["reaction_force"][i] ** 2, axis=0))
             top = int(sound[np.argmax(size[sound])])
             rows.append({"label": f"reaction of {name}, largest, at {dial.at(top)}", "value": size[top], "unit": "N"})
         slide = arrays["joint_slide"][i]
@@ -363,72 +360,8 @@ def _inputs(mechanism: Mechanism) -> list[dict[str, Any]]:
 
 def _scene(run: Run) -> dict[str, Any]:
     """What a drawing needs to know beside the positions of the points."""
-    system, values = run.system, run.values
-    mechanism = system.mechanism
-    joints: dict[str, Any] = {}
-    for name, (kind, links) in system.joints.items():
-        joints[name] = {"type": kind, "links": list(links), "friction": name in rubbing(system)}
-        if kind == "prismatic":
-            axis = system.elements(values)[links[0], name]
-            joints[name]["axis"] = [float(axis.c), float(axis.s)]
-    return {
-        "ground": mechanism.fixed_link,
-        "links": {name: {"points": list(link.points)} for name, link in mechanism.links.items()},
-        "joints": joints,
-        "drivers": list(mechanism.drivers),
-        "loads": _loads_drawn(run),
-        "gears": {
-            name: pitch_circles(run.system, run.values, name) for name, gear in mechanism.gears.items() if gear.teeth
-        },
-        "springs": {
-            name: {"between": spring.between and list(spring.between), "joint": spring.joint}
-            for name, spring in mechanism.springs.items()
-        },
-    }
-
-
-def pitch_circles(system: System, values: Values, name: str) -> list[dict[str, Any]]:
-    """Pitch circles of a gear pair with teeth: the point each turns about, and its radius, m."""
-    gear = system.mechanism.gears[name]
-    carriers = system.mechanism.carriers(name) or (0, 0)
-    links = [system.joints[joint][1] for joint in gear.joints]
-    carrier = links[0][carriers[0]]
-    elements = system.elements(values)
-    one, two = (elements[carrier, joint] for joint in gear.joints)
-    sign = 1.0 if carriers[0] == carriers[1] else -1.0
-    ratio = sign * float(values[f"gears.{name}.ratio"])
-    centres = float(np.hypot(two.x - one.x, two.y - one.y))
-    radii = abs(ratio / (ratio - 1)) * centres, abs(1 / (ratio - 1)) * centres
-    return [
-        {"at": f"{pair[1 - side]}.{joint}", "radius": radius}
-        for pair, side, joint, radius in zip(links, carriers, gear.joints, radii, strict=True)
-    ]
-
-
-def _loads_drawn(run: Run) -> dict[str, Any]:
-    """The loads as a drawing shows them; of one that varies, its largest value among DRAWN over the cycle."""
-    mechanism, walk = run.system.mechanism, start(run.system, run.values)
-    walk.time = run.cycle.times(DRAWN)
-    stated, useful = Stated(walk), useful_loads(mechanism)
-    found: dict[str, Any] = {}
-    for name, load in mechanism.loads.items():
-        path = f"loads.{name}"
-        force, moment = stated.vector(f"{path}.force"), stated.get(f"{path}.moment")
-        found[name] = {
-            "link": load.link,
-            "joint": load.joint,
-            "at": load.at,
-            "force": None if force is None else _largest(*force),
-            "moment": None if moment is None else _largest(moment)[0],
-            "frame": load.frame,
-            "varies": not run.values.keys() >= {p for p in mechanism.parameter_set.entries if p.startswith(f"{path}.")},
-            "useful": name in useful,
-        }
+    system = run.system
+    found: dict[str, Any] = system.engine.scene(
+        system, run.values, run.cycle.times(DRAWN), useful_loads(system.mechanism)
+    )
     return found
-
-
-def _largest(*components: Number) -> list[float]:
-    """The components where the vector is longest; zeros if it never has a value."""
-    columns = np.broadcast_arrays(*(np.atleast_1d(one) for one in components))
-    size = np.nan_to_num(np.hypot.reduce(np.array(columns)) if len(columns) > 1 else np.abs(columns[0]))
-    return [float(np.nan_to_num(one[np.argmax(size)])) for one in columns]

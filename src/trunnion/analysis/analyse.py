@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Mapping
+import operator
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -12,16 +13,17 @@ from numpy.typing import NDArray
 
 from trunnion import results
 from trunnion.algebra.namespace import Number
+from trunnion.algebra.nested import flat
 from trunnion.analysis import account, diagnosis
 from trunnion.analysis.branches import Chosen, choose
 from trunnion.analysis.bristles import History, histories
+from trunnion.analysis.engine import build
 from trunnion.analysis.friction import FrictionMethod
 from trunnion.analysis.kinematics import forward
 from trunnion.analysis.kinetostatics import Backward, Given, solve
-from trunnion.analysis.system import COMMON_TURNS, Cycle, System, Values, build, sticking
+from trunnion.analysis.system import COMMON_TURNS, Cycle, System, Values, sticking
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.groups.gear import rotation
-from trunnion.groups.planar import accelerated
 from trunnion.model.mechanism import Mechanism
 
 if TYPE_CHECKING:
@@ -142,8 +144,8 @@ def analyse_run(
     method = replace(method or FrictionMethod(), margin_up_to=account.MARGIN)
     steps = steps if run.cycle.duration > 0 else 1
     time = run.cycle.times(steps)
-    labels = _labels(run.system)
-    arrays = results.allocate(labels, steps, _absent(run.system))
+    labels = run.system.engine.labels(run.system)
+    arrays = results.allocate(labels, steps, run.system.engine.absent(run.system))
     causes = diagnosis.Causes(run.system)
     for low in range(0, steps, CHUNK):
         window = slice(low, min(low + CHUNK, steps))
@@ -152,33 +154,8 @@ def analyse_run(
         if progress:
             progress(window.stop)
     _bracket(arrays, run, time, replace(method, margin_up_to=0.0), causes)  # the margin is known by now
-    _unwrap(arrays, run, time)
+    run.system.engine.unwrap(arrays, run.system, run.values, time)
     return account.finish(run, arrays, labels, time, method, causes)
-
-
-def _labels(system: System) -> dict[str, list[str]]:
-    mechanism = system.mechanism
-    springs = {"spring": list(mechanism.springs)} if mechanism.springs else {}
-    gears = {"gear": list(mechanism.gears)} if mechanism.gears else {}
-    return (
-        springs
-        | gears
-        | {
-            "joint": list(system.joints),
-            "link": list(mechanism.links),
-            "point": [f"{link}.{point}" for link, point in system.points],
-            "axis": ["x", "y"],
-            "driver": list(mechanism.drivers),
-        }
-    )
-
-
-def _absent(system: System) -> list[str]:
-    """Variables that this mechanism cannot have: zero without taking memory."""
-    if any(kind == "prismatic" for kind, _ in system.joints.values()):
-        return []
-    slides = ["joint_slide", "joint_slide_velocity", "joint_slide_acceleration", "friction_force"]
-    return [*slides, "reaction_moment"]
 
 
 Arrays = dict[str, NDArray[np.float64]]
@@ -190,8 +167,10 @@ def _fill(arrays: Arrays, back: Backward, time: NDArray[np.float64], window: sli
     arrays["status"][window] = status
     causes.note(back, status, window.start)
     with np.errstate(all="ignore"):
-        _fill_motion(arrays, back, time, window)
-        _fill_forces(arrays, back, window)
+        engine = back.walk.system.engine
+        engine.fill_motion(arrays, back, window)
+        engine.fill_forces(arrays, back, window)
+        _fill_settled(arrays, back, window)
         account.fill_power(arrays, back, time, window)
     _blank(arrays, status, window)
 
@@ -208,7 +187,7 @@ def _status(back: Backward, shape: tuple[int, ...]) -> NDArray[np.int8]:
     condition: Number = 1.0
     for group, pose in zip(walk.system.groups, walk.poses, strict=True):
         for frame in pose.frames:
-            placed = placed & np.isfinite(frame.x + frame.y + frame.c + frame.s)
+            placed = placed & np.isfinite(_sum(flat(frame)))
         condition = np.maximum(condition, group.condition(pose))
     for name in sticking(walk.system):
         raise_to(Status.ZERO_SLIP, back.slips[name].zero)
@@ -226,81 +205,16 @@ def _status(back: Backward, shape: tuple[int, ...]) -> NDArray[np.int8]:
 
 def _sum_of_forces(back: Backward) -> Number:
     """Finite where every reaction and effort is."""
-    total: Number = 0.0
-    for effort in (*back.efforts.values(), *back.friction.values()):
-        total = total + effort
-    for reaction in back.reactions.values():
-        total = total + reaction.x + reaction.y
-    return total
+    reactions = (number for reaction in back.reactions.values() for number in flat(tuple(reaction)[:2]))
+    return _sum((*back.efforts.values(), *back.friction.values(), *reactions))
 
 
-def _fill_motion(arrays: Arrays, back: Backward, time: NDArray[np.float64], window: slice) -> None:
-    walk = back.walk
-    ground = walk.system.mechanism.fixed_link
-    for i, link in enumerate(walk.system.mechanism.links):
-        if link == ground:
-            continue
-        motion = walk.motions[link]
-        arrays["link_angle"][i, window] = np.arctan2(motion.frame.s, motion.frame.c)
-        arrays["link_angle_velocity"][i, window] = motion.twist.w
-        arrays["link_angle_acceleration"][i, window] = motion.acceleration.w
-    for i, (link, name) in enumerate(walk.system.points):
-        moved = walk.point(link, name)
-        for axis in (0, 1):
-            arrays["point_position"][i, axis, window] = moved.place[axis]
-            if link == ground:
-                continue
-            arrays["point_velocity"][i, axis, window] = moved.velocity[axis]
-            arrays["point_acceleration"][i, axis, window] = moved.acceleration[axis]
-    for i, (kind, links) in enumerate(walk.system.joints.values()):
-        first, second = (walk.motions[link] for link in links)
-        arrays["joint_rotation_velocity"][i, window] = second.twist.w - first.twist.w
-        arrays["joint_rotation_acceleration"][i, window] = second.acceleration.w - first.acceleration.w
-        if kind == "prismatic":
-            _fill_slide(arrays, back, i, window)
-        elif arrays["joint_slide"].flags.writeable:
-            for name in ("joint_slide", "joint_slide_velocity", "joint_slide_acceleration"):
-                arrays[name][i, window] = 0.0
+def _sum(numbers: Iterable[Number]) -> Number:
+    return functools.reduce(operator.add, numbers, 0.0)
 
 
-def _fill_slide(arrays: Arrays, back: Backward, i: int, window: slice) -> None:
-    """Slide of one joint with its derivatives, along the axis on its first link."""
-    walk = back.walk
-    name = list(walk.system.joints)[i]
-    first, second = walk.system.joints[name][1]
-    one, two = walk.element(first, name), walk.element(second, name)
-    dx, dy = two.x - one.x, two.y - one.y
-    w, base, end = walk.motions[first].twist.w, walk.acceleration(first, name), walk.acceleration(second, name)
-    carried = accelerated(base, w, dx, dy)
-    arrays["joint_slide"][i, window] = one.c * dx + one.s * dy
-    arrays["joint_slide_velocity"][i, window] = back.slips[name].speed
-    # the Coriolis part 2 ω × ṡ lies across the slide
-    arrays["joint_slide_acceleration"][i, window] = one.c * (end.x - carried.x) + one.s * (end.y - carried.y)
-
-
-def _fill_forces(arrays: Arrays, back: Backward, window: slice) -> None:
-    system = back.walk.system
-    for i, (name, (kind, _)) in enumerate(system.joints.items()):
-        reaction, friction = back.reactions[name], back.friction[name]
-        arrays["reaction_force"][i, 0, window] = reaction.x
-        arrays["reaction_force"][i, 1, window] = reaction.y
-        if arrays["reaction_moment"].flags.writeable:
-            arrays["reaction_moment"][i, window] = reaction.m
-        rotates = kind == "revolute"
-        arrays["friction_torque"][i, window] = friction if rotates else 0.0
-        if arrays["friction_force"].flags.writeable:
-            arrays["friction_force"][i, window] = 0.0 if rotates else friction
-    for i, name in enumerate(system.mechanism.drivers):
-        arrays["drive_effort"][i, window] = back.efforts[name]
-    for i, name in enumerate(system.mechanism.springs):
-        state = back.springs[name]
-        for key, number in zip(("spring_force", "spring_elongation"), state[:2], strict=True):
-            arrays[key][i, window] = number
-    for i, name in enumerate(system.mechanism.gears):
-        gear = back.gears[name]
-        arrays["gear_torque"][i, window] = gear.torque
-        for axis in (0, 1):
-            arrays["gear_force"][i, axis, window] = gear.force[axis]
+def _fill_settled(arrays: Arrays, back: Backward, window: slice) -> None:
+    """Figures of the friction iteration."""
     settled = back.settled
     for key, field in (
         ("friction_iterations", "iterations"),
@@ -313,11 +227,15 @@ def _fill_forces(arrays: Arrays, back: Backward, window: slice) -> None:
 
 
 FORCES = [
-    *("reaction_force", "reaction_moment", "friction_torque", "friction_force", "friction_power"),
+    *("reaction_force", "reaction_moment", "friction_torque", "friction_force", "friction_moment", "friction_power"),
     *("drive_effort", "drive_power", "power_residual", "friction_change", "friction_contraction"),
     *("spring_force", "spring_power", "damping_power", "gear_torque", "gear_force"),
 ]
-RATES = [name for name in results.VARIABLES if name.endswith(("_velocity", "_acceleration"))]
+POSES = [
+    *("point_position", "link_angle", "link_position", "link_rotation", "joint_rotation", "joint_slide"),
+    *("spring_elongation", "closure_residual", "condition"),
+]
+RATES = [name for name in results.VARIABLES if name.endswith(("velocity", "acceleration"))]
 
 
 def _blank(arrays: Arrays, status: NDArray[np.int8], window: slice) -> None:
@@ -334,7 +252,7 @@ def _blank(arrays: Arrays, status: NDArray[np.int8], window: slice) -> None:
             if name in arrays and arrays[name].flags.writeable:
                 arrays[name][..., window][..., where] = np.nan
     # a driver's own link is known where the rest is not; a whole position is either assembled or not
-    for name in ("point_position", "link_angle", "joint_slide", "spring_elongation", "closure_residual", "condition"):
+    for name in POSES:
         if name in arrays and arrays[name].flags.writeable:
             arrays[name][..., window][..., status == Status.NOT_ASSEMBLED] = np.nan
 
@@ -372,44 +290,3 @@ def _widen(
         changes = [np.broadcast_to(end[name], time.shape) - effort[i, positions] for end in ends]
         lower[i, positions] += np.minimum(0.0, np.minimum(*changes))
         upper[i, positions] += np.maximum(0.0, np.maximum(*changes))
-
-
-def _unwrap(arrays: Arrays, run: Run, time: NDArray[np.float64]) -> None:
-    """Angles without jumps of a whole turn along each run of solved positions, and the joints' rotations.
-
-    A driven rotation is the prescribed coordinate itself, whole turns included.
-    """
-    system, angles = run.system, arrays["link_angle"]
-    order = list(system.mechanism.links)
-    step = float(time[1] - time[0]) if len(time) > 1 else 0.0
-    for link, angle, rate in zip(order, angles, arrays["link_angle_velocity"], strict=True):
-        if link != system.mechanism.fixed_link:
-            _unwrap_row(angle, rate, step)
-    for i, (name, (kind, (first, second))) in enumerate(system.joints.items()):
-        rotation = arrays["joint_rotation"][i]
-        np.subtract(angles[order.index(second)], angles[order.index(first)], out=rotation)
-        if name in system.mechanism.drivers and kind == "revolute":
-            rotation[:] = np.where(np.isfinite(rotation), system.drive(run.values, name, time)[0], np.nan)
-
-
-def _unwrap_row(angle: NDArray[np.float64], rate: NDArray[np.float64], step: float) -> None:
-    """Add whole turns in place so that the angle follows its rate from position to position (`step` s apart).
-
-    A gap of NaN is bridged to the nearest turn. Some positions at a time, to save memory.
-    """
-    turns, last, last_rate, last_at = 0, np.nan, 0.0, -1
-    for low in range(0, len(angle), CHUNK):
-        part = angle[low : low + CHUNK]
-        solved = np.flatnonzero(np.isfinite(part))
-        if not len(solved):
-            continue
-        values, rates = part[solved], np.nan_to_num(rate[low : low + CHUNK][solved])
-        before = np.concatenate([[last if np.isfinite(last) else values[0]], values[:-1]])
-        mean_rate = (np.concatenate([[last_rate], rates[:-1]]) + rates) / 2
-        next_to = np.diff(np.concatenate([[last_at], solved + low])) == 1
-        expected = np.where(next_to & np.isfinite(before), mean_rate * step, 0.0)
-        if not np.isfinite(last):
-            expected[0] = 0.0
-        added = np.cumsum(np.rint((expected - (values - before)) / (2 * np.pi)))
-        part[solved] = values + 2 * np.pi * (turns + added)
-        turns, last, last_rate, last_at = turns + added[-1], values[-1], rates[-1], int(solved[-1]) + low

@@ -17,17 +17,16 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
+from trunnion.algebra.nested import each
 from trunnion.analysis import change_points
-from trunnion.analysis.follow import SLIDE_JUMP, TURN_JUMP, Follower, assemblies, at, lane_of
+from trunnion.analysis.follow import Follower, assemblies, at, lane_of, limits
 from trunnion.analysis.hints import distance, first, hints, misnamed, named_way, nth, told_twice
-from trunnion.analysis.kinematics import Forward, pairs_of, pose_of, start, take
+from trunnion.analysis.kinematics import Forward, pose_of, start
 from trunnion.analysis.system import Cycle, Dial, Positions, System, Values, driven_coordinates
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.groups.gear import NUMBERS, rotation
-from trunnion.groups.general import OUTER, General, Pose
-from trunnion.groups.planar import Frame
+from trunnion.groups.general import OUTER
 from trunnion.groups.protocol import Elements
-from trunnion.groups.tree import size_of
 from trunnion.structure.decompose import Module
 
 __all__ = ["Chosen", "Track", "choose"]
@@ -56,17 +55,17 @@ class Track:
     turns: Mapping[int, Array]
     again: Positions
     begin: float = 0.0
-    ways: tuple[Frame, ...] = ()
+    ways: tuple[Any, ...] = ()
     taken: int = 0
 
     def pose(
         self,
-        group: General,
-        elements: Sequence[tuple[Frame, Frame]],
+        group: Any,
+        elements: Sequence[Any],
         drive: Sequence[Number],
         walk: Forward,
         time: Number,
-    ) -> Pose:
+    ) -> Any:
         """Pose by Newton from the track; NaN in the lanes that left its branch."""
         moment = primal(self.clock.nominal(walk, time))
         moment = np.mod(moment, self.times[-1]) if self.periodic else moment
@@ -77,12 +76,11 @@ class Track:
             drive[slot] = _interpolated(self.times, row, moment, near)
         pose = group.position(elements, guess, drive)
         stays = pose.orientation == self.orientation
-        size = size_of(group.joints, elements)
-        for i, from_ in zip(group.free, guess, strict=True):
-            revolute = group.joints[group.steps[i].joint].kind == "revolute"
-            reach = 4 * TURN_JUMP if revolute else 4 * SLIDE_JUMP * size
-            stays = stays & (np.abs(primal(pose.q[i]) - from_) < reach)
-        return pose._replace(frames=tuple(_kept(frame, stays) for frame in pose.frames))
+        size = group.size(elements)
+        reach = 4 * limits(group, 1.0)
+        for i, kind, most, from_ in zip(group.kept, group.kept_kinds, reach, guess, strict=True):
+            stays = stays & (np.abs(primal(pose.q[i]) - from_) < (most * size if kind == "slide" else most))
+        return pose._replace(frames=_kept(pose.frames, stays))
 
 
 class Clock(NamedTuple):
@@ -126,11 +124,11 @@ def _interpolated(times: Array, row: Array, moment: Array, near: NDArray[np.intp
     return np.where(np.isfinite(mixed), mixed, np.where(np.isfinite(before), before, after))
 
 
-def _kept(frame: Frame, lanes: Number) -> Frame:
+def _kept(frames: tuple[Any, ...], lanes: Number) -> tuple[Any, ...]:
     if np.all(lanes):
-        return frame
+        return frames
     hole = np.where(lanes, 0.0, np.nan)
-    return Frame(*(n + hole for n in frame))
+    return each(frames, lambda n: n + hole)
 
 
 class Decision(NamedTuple):
@@ -168,7 +166,7 @@ def choose(system: System, values: Values, cycle: Cycle) -> Chosen:
             group = system.groups[number]
             if module.rank == 1:
                 decision = Decision(None, 1, True)
-            elif isinstance(group, General):
+            elif not group.BRANCHES:
                 drive, _, _ = driven_coordinates(system, module, system.places[number], values, times)
                 decision = _track(walk, number, group, drive, times, cycle.periodic)
             else:
@@ -185,7 +183,7 @@ def choose(system: System, values: Values, cycle: Cycle) -> Chosen:
             if isinstance(assembly, Track) and len(assembly.again):
                 findings.append(_anew(module, system.dial(values, times), assembly.again))
             pose = pose_of(walk, number, assembly, times)
-            take(walk, number, pose, times)
+            walk.take(number, pose, times)
             if module.rank > 1 and group.BRANCHES:
                 meeting = change_points.find(walk, number, assembly, times, pose)
                 findings += [change_points.finding(system, values, module, meeting)] if meeting else []
@@ -196,7 +194,7 @@ def _misnamed(system: System) -> list[Finding]:
     """Wrong names of assemblies, of all modules whose number of assemblies is known before they are assembled."""
     found: list[Finding] = []
     for module, group in zip(system.plan.modules, system.groups, strict=True):
-        if module.rank == 1 or not isinstance(group, General):
+        if module.rank == 1 or group.BRANCHES:
             found += misnamed(system, module, len(group.BRANCHES))
     return found
 
@@ -268,7 +266,7 @@ def _differ(distances: Sequence[Any] | Array) -> bool:
 def _side(walk: Forward, number: int) -> int:
     """Side of the line between the outer pins on which the hinted inner pin lies."""
     module, places = walk.system.plan.modules[number], walk.system.places[number]
-    (b, _), _, (d, _) = pairs_of(walk, places)
+    (b, _), _, (d, _) = walk.pairs(places)
     for _, name, place in hints(walk, module):
         if name == module.joints[1] and len(place) == 2:
             x, y = first(b.x), first(b.y)
@@ -280,20 +278,18 @@ def _side(walk: Forward, number: int) -> int:
 # ---- general groups -------------------------------------------------------------------------------------------
 
 
-def _track(
-    walk: Forward, number: int, group: General, drive: Sequence[Number], times: Array, periodic: bool
-) -> Decision:
+def _track(walk: Forward, number: int, group: Any, drive: Sequence[Number], times: Array, periodic: bool) -> Decision:
     """The assembly that is named or nearest the hints, followed both ways from the first position where there is one.
 
     Where it ends and the links can be assembled again farther on, in the same sense, the assembly nearest to what
     was left is taken there and followed too.
     """
     module, places = walk.system.plan.modules[number], walk.system.places[number]
-    elements = pairs_of(walk, places)
+    elements = walk.pairs(places)
     turns = _turns(walk, module, group, elements, times)
     drive = [turns.get(slot, number) for slot, number in enumerate(drive)]
     grid = len(times)
-    rows = np.full((len(group.free), grid), np.nan)
+    rows = np.full((len(group.kept), grid), np.nan)
     clock = Clock.of(walk.system, walk.values)
     for begin in _starts(grid):
         found = assemblies(group, at(elements, begin), [lane_of(q, begin) for q in drive])
@@ -307,7 +303,7 @@ def _track(
     decided, nearest = ways > 1 and _differ(every), int(np.argmin(every))
     best = nearest if named is None else named
     orientation = float(found.orientation[best])
-    rows[:, begin] = [found.q[i][best] for i in group.free]
+    rows[:, begin] = [found.q[i][best] for i in group.kept]
     follower = Follower(group, elements, drive, orientation)
     follower.both_ways(rows, begin, periodic)
     again = follower.revisit(rows, periodic)
@@ -317,10 +313,10 @@ def _track(
     return Decision(track, ways, True, told_twice(walk, module, named, nearest if decided or ways == 1 else None))
 
 
-def _turns(walk: Forward, module: Module, group: General, elements: Elements, times: Array) -> dict[int, Array]:
+def _turns(walk: Forward, module: Module, group: Any, elements: Elements, times: Array) -> dict[int, Array]:
     """Rotations of the known joints that gear pairs speak of and nothing drives, followed from that nearest to 0."""
     found = {}
-    for i, (name, gear) in enumerate(zip(module.gears, group.gears, strict=True)):
+    for i, (name, gear) in enumerate(zip(module.gears, getattr(group, "gears", ()), strict=True)):
         driven = walk.system.gear_joints(name)[0] in walk.system.mechanism.drivers
         if not driven and group.joints[gear.first].sides == (OUTER, OUTER):
             angle = np.broadcast_to(primal(rotation(elements[gear.first])), times.shape)

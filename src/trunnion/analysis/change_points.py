@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.analysis.kinematics import GROUND, Forward, pose_of, take
+from trunnion.analysis.kinematics import Forward, pose_of, start
 from trunnion.analysis.system import System, Values
 from trunnion.errors import Finding
 from trunnion.structure.decompose import Module
@@ -45,9 +45,9 @@ def find(walk: Forward, number: int, assembly: Any, times: Array, pose: Any) -> 
     suspects = np.flatnonzero((here <= before) & (here <= after) & (here <= 1.1 * steep)) + 1
 
     def margin_at(moment: float) -> float:
-        trial = Forward(walk.system, walk.values, walk.local, {walk.system.mechanism.fixed_link: GROUND})
+        trial = start(walk.system, walk.values)
         for earlier in range(number):
-            take(trial, earlier, pose_of(trial, earlier, walk.assembly[earlier], moment), moment)
+            trial.take(earlier, pose_of(trial, earlier, walk.assembly[earlier], moment), moment)
         found = 1 / walk.system.groups[number].condition(pose_of(trial, number, assembly, moment))
         return float(np.nan_to_num(np.ravel(found)[0], nan=1.0))
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.namespace import Number
-from trunnion.analysis.kinematics import Forward, pairs_of
+from trunnion.analysis.kinematics import Forward
 from trunnion.analysis.kinetostatics import Backward
 from trunnion.analysis.system import Dial, Positions, System, rubbing, sticking
 from trunnion.errors import Finding, Severity, Status
@@ -191,7 +191,7 @@ def _shortfalls(walk: Forward, number: int) -> dict[str, Number]:
     module, pose = walk.system.plan.modules[number], walk.poses[number]
     if isinstance(pose, rrr.Pose):
         b, c, d = module.joints
-        (pin_b, _), _, (pin_d, _) = pairs_of(walk, walk.system.places[number])
+        (pin_b, _), _, (pin_d, _) = walk.pairs(walk.system.places[number])
         gap = np.hypot(pin_d.x - pin_b.x, pin_d.y - pin_b.y)
         bc, cd = pose.lengths
         return {

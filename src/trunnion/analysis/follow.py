@@ -4,18 +4,39 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.namespace import Number
-from trunnion.groups.general import General, Pose
-from trunnion.groups.planar import Frame
-from trunnion.groups.tree import size_of
+from trunnion.algebra.nested import each
 
-__all__ = ["GUESSES", "SLIDE_JUMP", "TURN_JUMP", "Follower", "assemblies", "at", "lane_of"]
+__all__ = ["GUESSES", "Follower", "assemblies", "at", "lane_of", "limits"]
 
 Array = NDArray[np.float64]
+Elements = Sequence[Any]  # per joint: both its elements, as nested tuples of numbers
+
+
+class Followed(Protocol):
+    """A group that is solved by Newton's method, in the plane or in space.
+
+    kept: the coordinates (entries of a pose's q) that an assembly states; kept_kinds: "turn", "slide", or "part" of a
+    quaternion.
+    """
+
+    @property
+    def kept(self) -> tuple[int, ...]: ...
+
+    @property
+    def kept_kinds(self) -> tuple[str, ...]: ...
+
+    def position(self, elements: Any, assembly: Any, drive: Sequence[Number] = ()) -> Any: ...
+
+    def size(self, elements: Any) -> Number: ...
+
+    def signature(self, pose: Any, spread: float) -> list[Number]: ...
+
 
 GUESSES = 512
 FEW = 16  # guesses at each place where an assembly is looked for again
@@ -27,7 +48,7 @@ SLIDE_JUMP = 0.25  # of the group's size, likewise
 BLOCK = 32  # grid points tried at a time
 
 
-def _wrap(rows: Array, group: General) -> None:
+def _wrap(rows: Array) -> None:
     """Carry the start over to the end of a periodic cycle: the same position, turned by whole turns."""
     if np.isfinite(rows[0, 0]) and not np.isfinite(rows[0, -1]):
         rows[:, -1] = rows[:, 0]
@@ -50,47 +71,44 @@ def _probes(gaps: NDArray[np.bool_]) -> NDArray[np.intp]:
     return places[np.unique(np.linspace(0, len(places) - 1, min(len(places), PROBES)).astype(np.intp))]
 
 
-def assemblies(group: General, elements: Sequence[tuple[Frame, Frame]], drive: Sequence[Number]) -> Pose:
-    """All assemblies found at one position from many guesses, each once, along the last axis."""
+def assemblies(group: Followed, elements: Elements, drive: Sequence[Number]) -> Any:
+    """All assemblies found at one position from many guesses, each once, along the last axis of a pose."""
     rng = np.random.default_rng(SEED)
     spread = extent(group, elements)
-    guesses = [
-        rng.uniform(-np.pi, np.pi, GUESSES)
-        if group.joints[group.steps[i].joint].kind == "revolute"
-        else rng.uniform(-2 * spread, 2 * spread, GUESSES)
-        for i in group.free
-    ]
+    guesses = [rng.uniform(-reach, reach, GUESSES) for reach in _reaches(group, spread)]
     pose = group.position(elements, guesses, drive)
     shape = (GUESSES,)
-    key = np.array(
-        [
-            np.broadcast_to(n, shape)
-            for frame in pose.frames
-            for n in (frame.x / spread, frame.y / spread, frame.c, frame.s)
-        ]
-    )
+    key = np.array([np.broadcast_to(n, shape) for n in group.signature(pose, spread)])
     sound = np.isfinite(key).all(axis=0) & (np.broadcast_to(pose.condition, shape) < MOST_CONDITION)
-    geared = {gear.first for gear in group.gears}
-    for value, step in zip(pose.q, group.steps, strict=True):
-        if step.joint in geared and step.joint not in group.driven:  # whole turns more would be another tooth
-            sound = sound & (np.abs(np.broadcast_to(value, shape)) <= np.pi)
+    for i in _geared(group):  # whole turns more would be another tooth
+        sound = sound & (np.abs(np.broadcast_to(pose.q[i], shape)) <= np.pi)
     good = np.flatnonzero(sound)
     kept: list[int] = []
     for lane in good:
         if all(np.max(np.abs(key[:, lane] - key[:, other])) > 1e-6 for other in kept):
             kept.append(int(lane))
     kept.sort(key=lambda lane: tuple(np.round(key[:, lane], 6)))  # a numbering that does not depend on the guesses
-    frames = tuple(Frame(*(np.broadcast_to(n, shape)[kept] for n in frame)) for frame in pose.frames)
     return pose._replace(
-        frames=frames,
+        frames=each(pose.frames, lambda n: np.broadcast_to(n, shape)[kept]),
         q=tuple(np.broadcast_to(q, shape)[kept] for q in pose.q),
         orientation=np.broadcast_to(pose.orientation, shape)[kept],
     )
 
 
-def extent(group: General, elements: Sequence[tuple[Frame, Frame]]) -> float:
+def _reaches(group: Followed, spread: float) -> list[float]:
+    """How far a guess of each coordinate may lie from 0."""
+    return [{"turn": np.pi, "slide": 2 * spread, "part": 1.0}[kind] for kind in group.kept_kinds]
+
+
+def _geared(group: Any) -> list[int]:
+    """Entries of q that a gear pair multiplies."""
+    geared = {gear.first for gear in getattr(group, "gears", ())}
+    return [i for i, step in enumerate(group.steps) if step.joint in geared - set(group.driven)] if geared else []
+
+
+def extent(group: Followed, elements: Elements) -> float:
     """How far a slide may reach: the largest size of the group over the lanes, m."""
-    sizes = size_of(group.joints, elements)
+    sizes = group.size(elements)
     return float(np.max(sizes[np.isfinite(sizes)], initial=0.0)) or 1.0
 
 
@@ -98,20 +116,17 @@ def lane_of(number: Number, index: int | NDArray[np.intp]) -> Number:
     return number[index] if np.ndim(number) else number
 
 
-def at(elements: Sequence[tuple[Frame, Frame]], index: int) -> list[tuple[Frame, Frame]]:
-    return [(_frame_at(a, index), _frame_at(b, index)) for a, b in elements]
-
-
-def _frame_at(frame: Frame, index: int | NDArray[np.intp]) -> Frame:
-    return Frame(*(lane_of(n, index) for n in frame))
+def at(elements: Elements, index: int | NDArray[np.intp]) -> list[Any]:
+    """The elements at some grid points."""
+    return [each(one, lambda n: lane_of(n, index)) for one in elements]
 
 
 @dataclass(frozen=True)
 class Follower:
     """Follows one assembly of a general group from grid point to grid point."""
 
-    group: General
-    elements: Sequence[tuple[Frame, Frame]]
+    group: Followed
+    elements: Elements
     drive: Sequence[Number]
     orientation: float
 
@@ -148,7 +163,7 @@ class Follower:
         self.run(rows, list(run))
         self.run(rows, list(range(begin, -1, -1)))
         if periodic:
-            _wrap(rows, self.group)
+            _wrap(rows)
             self.run(rows, _gap_backward(rows))
 
     def revisit(self, rows: Array, periodic: bool) -> NDArray[np.intp]:
@@ -180,32 +195,29 @@ class Follower:
         rng = np.random.default_rng(SEED)
         spread = extent(self.group, self.elements)
         lanes = np.repeat(probes, FEW)
-        revolute = self._limits(1.0) == TURN_JUMP
-        reach = np.where(revolute, np.pi, 2 * spread)
-        guesses = [far * rng.uniform(-1, 1, len(lanes)) for far in reach]
-        elements = [(_frame_at(a, lanes), _frame_at(b, lanes)) for a, b in self.elements]
-        pose = self.group.position(elements, guesses, [lane_of(n, lanes) for n in self.drive])
+        guesses = [far * rng.uniform(-1, 1, len(lanes)) for far in _reaches(self.group, spread)]
+        pose = self.group.position(at(self.elements, lanes), guesses, [lane_of(n, lanes) for n in self.drive])
         sound = np.broadcast_to(pose.orientation, lanes.shape) == self.orientation
         sound &= np.broadcast_to(pose.condition, lanes.shape) < MOST_CONDITION
-        q = np.array([np.broadcast_to(pose.q[i], lanes.shape) for i in self.group.free])
+        q = np.array([np.broadcast_to(pose.q[i], lanes.shape) for i in self.group.kept])
         sound &= np.isfinite(q).all(axis=0)
         return [q[:, k * FEW : (k + 1) * FEW][:, sound[k * FEW : (k + 1) * FEW]] for k in range(len(probes))]
 
     def _apart(self, ways: Array, before: Array) -> Array:
         """How far assemblies (free, way) are from another, turns and slides counted against their sizes."""
-        revolute = self._limits(1.0) == TURN_JUMP
+        kinds = np.array(self.group.kept_kinds)[:, None]
         change = ways - before[:, None]
         turned = np.arctan2(np.sin(change), np.cos(change))
-        size = extent(self.group, self.elements)
-        return np.asarray(np.sum(np.where(revolute[:, None], turned, change / size) ** 2, axis=0))
+        size = np.where(kinds == "slide", extent(self.group, self.elements), 1.0)
+        return np.asarray(np.sum(np.where(kinds == "turn", turned, change / size) ** 2, axis=0))
 
     def _block(self, q: Array, slope: Array, ahead: Sequence[int]) -> Array:
         """Coordinates (free, k) at the first k points of `ahead`, k as far as they follow q smoothly."""
         guess = q[:, None] + slope[:, None] * np.arange(1, len(ahead) + 1)
         indices = np.asarray(ahead)
-        elements = [(_frame_at(a, indices), _frame_at(b, indices)) for a, b in self.elements]
+        elements = at(self.elements, indices)
         pose = self.group.position(elements, list(guess), [lane_of(n, indices) for n in self.drive])
-        found = np.array([np.broadcast_to(pose.q[i], indices.shape) for i in self.group.free])
+        found = np.array([np.broadcast_to(pose.q[i], indices.shape) for i in self.group.kept])
         change = np.diff(found, axis=1, prepend=q[:, None])
         bend = np.abs(np.diff(change, axis=1, prepend=change[:, :1]))
         limits = self._limits(extent(self.group, elements))[:, None]
@@ -215,8 +227,7 @@ class Follower:
 
     def _limits(self, size: float) -> Array:
         """Largest change of each free coordinate between neighbours of the grid, rad or m."""
-        kinds = [self.group.joints[self.group.steps[i].joint].kind for i in self.group.free]
-        return np.array([TURN_JUMP if kind == "revolute" else SLIDE_JUMP * size for kind in kinds])
+        return limits(self.group, size)
 
     def _advance(self, q: Array, slope: Array, here: int, there: int, low: float, high: float) -> Array | None:
         """From share `low` to `high` of the way between two grid points, halving the step where Newton strays."""
@@ -230,10 +241,10 @@ class Follower:
         return None if half is None else self._advance(half, slope, here, there, middle, high)
 
     def _solve(self, guess: Array, before: Array, here: int, there: int, share: float) -> Array | None:
-        elements = [(_mixed(a, here, there, share), _mixed(b, here, there, share)) for a, b in self.elements]
+        elements = [_mixed(one, here, there, share) for one in self.elements]
         drive = [_between(q, here, there, share) for q in self.drive]
         pose = self.group.position(elements, list(guess), drive)
-        found = np.array([float(pose.q[i]) for i in self.group.free])
+        found = np.array([float(pose.q[i]) for i in self.group.kept])
         if not np.all(np.isfinite(found)) or pose.orientation != self.orientation:
             return None
         limits = self._limits(extent(self.group, elements))
@@ -244,8 +255,14 @@ def _between(number: Number, here: int, there: int, share: float) -> Number:
     return number[here] + share * (number[there] - number[here]) if np.ndim(number) else number
 
 
-def _mixed(frame: Frame, here: int, there: int, share: float) -> Frame:
-    """A frame part of the way between two grid points; directions stay unit vectors."""
-    x, y, c, s = (_between(n, here, there, share) for n in frame)
-    length = np.hypot(c, s)
-    return Frame(x, y, c / length, s / length)
+def _mixed(pair: Any, here: int, there: int, share: float) -> Any:
+    """Both elements of a joint part of the way between two grid points; axes stay of length one."""
+    mixed = each(pair, lambda n: _between(n, here, there, share))
+    parts = [one.normalised() if isinstance(one, tuple) else one for one in mixed]
+    return type(pair)(*parts) if hasattr(pair, "_fields") else tuple(parts)
+
+
+def limits(group: Followed, size: float) -> Array:
+    """Largest change of each coordinate that an assembly states, between neighbours of the grid, rad or m."""
+    most = {"turn": TURN_JUMP, "slide": SLIDE_JUMP * size, "part": TURN_JUMP / 2}
+    return np.array([most[kind] for kind in group.kept_kinds])

@@ -17,7 +17,7 @@ import operator
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal, NamedTuple, get_args
+from typing import Any, Literal, NamedTuple, Protocol, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,10 +27,9 @@ from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number
 from trunnion.analysis import continuation
 from trunnion.errors import Finding, MechanismError
-from trunnion.groups.planar import Wrench, added, is_zero, less
-from trunnion.groups.protocol import Group
+from trunnion.groups.planar import is_zero, less
 from trunnion.joints.friction import FrictionLaw
-from trunnion.joints.pairs import Load, Reaction
+from trunnion.joints.pairs import ContactLoad, Reaction
 
 __all__ = [
     "Contact",
@@ -85,27 +84,36 @@ def method_named(name: str, criterion: float | None, limit: int) -> FrictionMeth
     raise MechanismError(Finding(f"there is no method '{name}'", "method", f"use {known_names}"))
 
 
+class Reacting(Protocol):
+    """A module, as far as its reactions go: flat tuples, linear in the loads on its links."""
+
+    def reactions(self, pose: Any, loads: Sequence[Any]) -> Sequence[Reaction]: ...
+
+
 class Contact(NamedTuple):
-    """A joint with friction, as its module sees it.
+    """A contact with friction in a joint, as its module sees it.
 
     joint: its number in the module; unit_loads: what a friction force of 1 N on the second side does to the
     links; load: normal load and its gradient from the joint's reaction; law with parameters; slip: m/s.
     rubs: False for the separating force of a gear pair, which follows the tooth force as friction follows the
-    normal load, but is there in full whatever the friction.
+    normal load, but is there in full whatever the friction. own: what the unit load adds to what the joint itself
+    carries, where its load depends on that.
     """
 
     joint: int
-    unit_loads: Sequence[Wrench]
-    load: Load
+    unit_loads: Sequence[Any]
+    load: ContactLoad
     law: FrictionLaw
     parameters: dict[str, Number]
     slip: Number
     rubs: bool = True
+    own: Reaction | None = None
 
     def mapped(self, change: Callable[[Number], Number]) -> Contact:
         """The same with `change` applied to every number that the laws see."""
         parameters = {name: change(value) for name, value in self.parameters.items()}
-        return self._replace(load=self.load.mapped(change), parameters=parameters, slip=change(self.slip))
+        load: ContactLoad = self.load.mapped(change)
+        return self._replace(load=load, parameters=parameters, slip=change(self.slip))
 
 
 class Settled(NamedTuple):
@@ -118,7 +126,7 @@ class Settled(NamedTuple):
     equations themselves.
     """
 
-    reactions: list[Wrench]
+    reactions: Sequence[Reaction]
     forces: list[Number]
     iterations: Number
     change: Number
@@ -131,23 +139,29 @@ class Settled(NamedTuple):
 
 
 def settle(
-    group: Group, pose: object, loads: Sequence[Wrench], contacts: Sequence[Contact], method: FrictionMethod
+    group: Reacting, pose: object, loads: Sequence[Any], contacts: Sequence[Contact], method: FrictionMethod
 ) -> Settled:
     """Reactions and friction forces of one module under `loads` (about the link origins, friction not included)."""
     start = group.reactions(pose, loads)
     if not contacts:
         return Settled(start, [], 0, 0.0, 0.0, True, 1.0)
-    influence = [group.reactions(pose, contact.unit_loads) for contact in contacts]
+    influence = [_with_own(contact, list(group.reactions(pose, contact.unit_loads))) for contact in contacts]
     problem = Problem(contacts, start, influence)
     if method.name == "successive-approximation":
         return _successive(problem, method)
     return _at_once(problem) if problem.one_way else _newton(problem, method)
 
 
+def _with_own(contact: Contact, column: list[Reaction]) -> list[Reaction]:
+    if contact.own is not None:
+        column[contact.joint] = _added(column[contact.joint], contact.own)
+    return column
+
+
 class State(NamedTuple):
     """Reaction and normal load at every contact."""
 
-    reactions: list[Wrench]
+    reactions: list[Reaction]
     normals: list[Number]
 
 
@@ -156,14 +170,14 @@ class Problem:
     """φ = law(N(R₀ + G φ)): the friction forces of one module, φ, with its reactions R."""
 
     contacts: Sequence[Contact]
-    start: Sequence[Wrench]
-    influence: Sequence[Sequence[Wrench]]
+    start: Sequence[Reaction]
+    influence: Sequence[Sequence[Reaction]]
 
     def mapped(self, change: Callable[[Number], Number]) -> Problem:
         """The same with `change` applied to every number."""
 
-        def each(wrenches: Sequence[Wrench]) -> list[Wrench]:
-            return [Wrench(*(change(n) for n in wrench)) for wrench in wrenches]
+        def each(wrenches: Sequence[Reaction]) -> list[Reaction]:
+            return [tuple(change(n) for n in wrench) for wrench in wrenches]
 
         contacts = [contact.mapped(change) for contact in self.contacts]
         return Problem(contacts, each(self.start), [each(column) for column in self.influence])
@@ -188,8 +202,9 @@ class Problem:
     @cached_property
     def one_way(self) -> bool:
         """Whether friction changes no load of a pin with friction, as in a driver on a pin: nothing to iterate then."""
-        entries = [n for column in self.influence for contact in self.contacts for n in column[contact.joint][:2]]
-        return all(contact.load.across is None for contact in self.contacts) and all(is_zero(n) for n in entries)
+        return not any(
+            contact.load.feels(column[contact.joint]) for column in self.influence for contact in self.contacts
+        )
 
     @cached_property
     def _alike(self) -> dict[int, int]:
@@ -203,22 +218,21 @@ class Problem:
                     break
         return found
 
-    def _changes(self, joint: int, forces: Sequence[Number]) -> Wrench:
+    def _changes(self, joint: int, forces: Sequence[Number]) -> Reaction:
         """What friction forces change in the reaction of one joint."""
-        x, y, m = (
+        return tuple(
             _total([entry * force for entry, force in zip(entries, forces, strict=True) if not is_zero(entry)])
             for entries in zip(*(column[joint] for column in self.influence), strict=True)
         )
-        return Wrench(x, y, m)
 
-    def at(self, joints: Sequence[int], forces: Sequence[Number]) -> list[Wrench]:
+    def at(self, joints: Sequence[int], forces: Sequence[Number]) -> list[Reaction]:
         """Reactions of some joints under friction forces; without any, the frictionless ones."""
         if all(is_zero(force) for force in forces):
             return [self.start[joint] for joint in joints]
         changes = {lead: self._changes(lead, forces) for lead in {self._alike[joint] for joint in joints}}
-        return [added(self.start[joint], changes[self._alike[joint]], 1.0) for joint in joints]
+        return [_added(self.start[joint], changes[self._alike[joint]]) for joint in joints]
 
-    def reactions(self, forces: Sequence[Number], known: State) -> list[Wrench]:
+    def reactions(self, forces: Sequence[Number], known: State) -> list[Reaction]:
         """Reactions of all joints; those of the contacts are in the state that belongs to the forces."""
         found = {c.joint: reaction for c, reaction in zip(self.contacts, known.reactions, strict=True)}
         others = [joint for joint in range(len(self.start)) if joint not in found]
@@ -243,8 +257,8 @@ class Problem:
         """A with A_kl = ∂ law_k / ∂ φ_l."""
         rows = []
         for contact, reaction, normal, slope in zip(self.contacts, *state, self.slopes, strict=True):
-            x, y, m = contact.load.gradient(reaction, normal)
-            scaled = slope * x, slope * y, m if is_zero(m) else slope * m
+            gradient = contact.load.gradient(reaction, normal)
+            scaled = tuple(entry if is_zero(entry) else slope * entry for entry in gradient)
             rows.append([_along(scaled, column[contact.joint]) for column in self.influence])
         return rows
 
@@ -422,10 +436,12 @@ def identity_minus(rows: Sequence[Sequence[Number]]) -> list[list[Number]]:
 
 def _along(gradient: Reaction, column: Reaction) -> Number:
     """Derivative of a normal load along a change of the reaction."""
-    total = gradient[0] * column[0] + gradient[1] * column[1]
-    if is_zero(gradient[2]) or is_zero(column[2]):
-        return total
-    return total + gradient[2] * column[2]
+    return _total([g * c for g, c in zip(gradient, column, strict=True) if not (is_zero(g) or is_zero(c))])
+
+
+def _added(a: Reaction, b: Reaction) -> Reaction:
+    """a + b; a literal zero costs nothing."""
+    return tuple(p if is_zero(q) else q if is_zero(p) else p + q for p, q in zip(a, b, strict=True))
 
 
 def _total(parts: Sequence[Number]) -> Number:

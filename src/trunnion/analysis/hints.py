@@ -9,16 +9,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.namespace import Number
+from trunnion.algebra.nested import each
 from trunnion.analysis.kinematics import Forward
 from trunnion.analysis.system import System
 from trunnion.errors import Finding, MechanismError, Severity
-from trunnion.groups.planar import Frame, compose, point
 from trunnion.structure.decompose import Module
 
 __all__ = ["Pick", "distance", "first", "hints", "misnamed", "named_way", "nth", "told_twice", "way_name"]
 
 Array = NDArray[np.float64]
 Pick = Callable[[Number], Any]
+
+
+MEETING = ("revolute", "spherical", "universal", "fixed")  # whose two points are one
 
 
 def way_name(index: int) -> str:
@@ -89,7 +92,8 @@ def hints(walk: Forward, module: Module) -> list[tuple[str, str, tuple[Number, .
         if f"{path}.x" in values:
             link, name = _point_of(walk.system, module, key)
             if link:
-                found.append((link, name, (values[f"{path}.x"], values[f"{path}.y"])))
+                place = tuple(values[f"{path}.{axis}"] for axis in "xyz" if f"{path}.{axis}" in values)
+                found.append((link, name, place))
         elif key in module.joints:
             found.append(("", key, (values[path],)))
     return found
@@ -100,13 +104,13 @@ def _point_of(system: System, module: Module, key: str) -> tuple[str, str]:
     if key in system.joints:
         links = system.joints[key][1]
         inside = [link for link in links if link in module.links]
-        known = key in module.joints and system.joints[key][0] == "revolute" and len(inside) == 1
+        known = key in module.joints and system.joints[key][0] in MEETING and len(inside) == 1
         return ("", "") if not inside or known else (inside[-1], key)
     link, _, name = key.partition(".")
     return (link, name) if link in module.links else ("", "")
 
 
-def distance(walk: Forward, module: Module, frames: Sequence[Frame], pick: Pick, known: Pick) -> Array:
+def distance(walk: Forward, module: Module, frames: Sequence[Any], pick: Pick, known: Pick) -> Array:
     """Sum of the squared distances of an assembly from the hints, m² and rad².
 
     pick, known: take the position looked at from the numbers of the module's links and of the known ones.
@@ -114,30 +118,23 @@ def distance(walk: Forward, module: Module, frames: Sequence[Frame], pick: Pick,
     total: Any = 0.0
     for link, name, place in hints(walk, module):
         if link:
-            path = f"links.{link}.points.{name}"
-            frame = frames[module.links.index(link)]
-            x, y = point(frame, walk.values[f"{path}.x"], walk.values[f"{path}.y"])
-            total = total + (pick(x) - place[0]) ** 2 + (pick(y) - place[1]) ** 2
+            found = walk.placed(frames[module.links.index(link)], link, name)
+            total = total + sum((pick(here) - there) ** 2 for here, there in zip(found, place, strict=True))
             continue
-        kind, links = walk.system.joints[name]
+        links = walk.system.joints[name][1]
         first, second = (_element(walk, module, frames, side, name, pick, known) for side in links)
-        if kind == "prismatic":
-            slide = first.c * (second.x - first.x) + first.s * (second.y - first.y)
-            total = total + (slide - place[0]) ** 2
-        else:
-            turn = np.arctan2(second.s, second.c) - np.arctan2(first.s, first.c) - place[0]
-            total = total + np.arctan2(np.sin(turn), np.cos(turn)) ** 2
+        away = walk.coordinate(name, first, second) - place[0]
+        total = total + (np.arctan2(np.sin(away), np.cos(away)) if walk.system.turns(name) else away) ** 2
     return np.asarray(total, float)
 
 
 def _element(
-    walk: Forward, module: Module, frames: Sequence[Frame], link: str, joint: str, pick: Pick, known: Pick
-) -> Frame:
+    walk: Forward, module: Module, frames: Sequence[Any], link: str, joint: str, pick: Pick, known: Pick
+) -> Any:
     """Global element of a joint on one of its links, in the module or known, at the position looked at."""
     if link not in module.links:
-        return Frame(*(known(n) for n in walk.element(link, joint)))
-    element = compose(frames[module.links.index(link)], walk.local[link, joint])
-    return Frame(*(pick(n) for n in element))
+        return each(walk.element(link, joint), known)
+    return each(walk.composed(frames[module.links.index(link)], link, joint), pick)
 
 
 def nth(lane: int) -> Pick:

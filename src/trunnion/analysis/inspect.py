@@ -9,10 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from trunnion.algebra.dual import primal
-from trunnion.analysis.account import pitch_circles
 from trunnion.analysis.analyse import Run, analyse_run, prepare
 from trunnion.analysis.assemblies import Choice, choices
 from trunnion.analysis.kinematics import Forward, forward
+from trunnion.analysis.scene import pitch_circles
 from trunnion.errors import Finding, Severity
 from trunnion.model.mechanism import Mechanism
 from trunnion.structure.decompose import Plan

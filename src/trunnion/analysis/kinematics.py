@@ -10,7 +10,6 @@ import numpy as np
 
 from trunnion.algebra.namespace import Number
 from trunnion.analysis.system import Place, System, Values, driven_coordinates
-from trunnion.groups.general import General
 from trunnion.groups.planar import Acceleration, Frame, Twist, accelerated, compose, moved, point
 
 __all__ = ["Assembly", "Forward", "Motion", "PointMotion", "forward", "pose_of"]
@@ -39,17 +38,20 @@ GROUND = Motion(Frame(0.0, 0.0, 1.0, 0.0), Twist(0.0, 0.0, 0.0), Acceleration(0.
 
 @dataclass
 class Forward:
-    """What one walk forward found at the times (s) it was asked for; element frames are worked out once and kept."""
+    """What one walk forward found at the times (s) it was asked for; element frames are worked out once and kept.
+
+    In the plane; `analysis.space.motion` has the same of space.
+    """
 
     system: System
     values: Values
-    local: dict[tuple[str, str], Frame]
-    motions: dict[str, Motion]
+    local: dict[tuple[str, str], Any]
+    motions: dict[str, Any]
     time: Number = 0.0
     direction: float = 1.0  # −1: the same way run backward
     poses: list[Any] = field(default_factory=list)
     assembly: list[Any] = field(default_factory=list)
-    _elements: dict[tuple[str, str], Frame] = field(default_factory=dict)
+    _elements: dict[tuple[str, str], Any] = field(default_factory=dict)
 
     def element(self, link: str, joint: str) -> Frame:
         """Global frame of a joint's element on a link."""
@@ -102,20 +104,64 @@ class Forward:
         second = accelerated(acceleration, twist.w, *arm)
         return PointMotion(place, (velocity.x, velocity.y), (second.x, second.y))
 
+    def placed(self, frame: Any, link: str, name: str) -> tuple[Number, ...]:
+        """Place of a named point of a link that lies in a frame."""
+        path = f"links.{link}.points.{name}"
+        return point(frame, self.values[f"{path}.x"], self.values[f"{path}.y"])
 
-def start(system: System, values: Values) -> Forward:
-    """A walk before its first module: only the ground is known."""
+    def composed(self, frame: Any, link: str, joint: str) -> Any:
+        """Element of a joint on a link that lies in a frame."""
+        return compose(frame, self.local[link, joint])
+
+    def coordinate(self, joint: str, first: Any, second: Any) -> Number:
+        """Slide or turn of a joint from its elements."""
+        if self.system.turns(joint):
+            return np.arctan2(second.s, second.c) - np.arctan2(first.s, first.c)
+        return first.c * (second.x - first.x) + first.s * (second.y - first.y)
+
+    def pairs(self, places: Sequence[Place]) -> list[Any]:
+        """Elements of a module's joints: global on known links, local on its own."""
+        return [self._pair(place) for place in places]
+
+    def _pair(self, place: Place) -> Any:
+        return self._side(place, 0), self._side(place, 1)
+
+    def _side(self, place: Place, i: int) -> Any:
+        link = place.links[i]
+        return self.element(link, place.joint) if place.outer[i] else self.local[link, place.joint]
+
+    def take(self, number: int, pose: Any, time: Number) -> None:
+        """Add the motion of one module, whose pose is known."""
+        system = self.system
+        module, group, places = system.plan.modules[number], system.groups[number], system.places[number]
+        drives = driven_coordinates(system, module, places, self.values, time)
+        twists_out: list[Twist | None] = []
+        accelerations_out: list[Acceleration | None] = []
+        for place in places:
+            if place.witness:  # its relative motion is what a gear pair sees
+                one, two = (self.motions[link] for link in place.links)
+                twists_out.append(Twist(0.0, 0.0, two.twist.w - one.twist.w))
+                accelerations_out.append(Acceleration(0.0, 0.0, two.acceleration.w - one.acceleration.w))
+                continue
+            outside = next((link for link, outer in zip(place.links, place.outer, strict=True) if outer), None)
+            twists_out.append(self.twist(outside, place.joint) if outside else None)
+            accelerations_out.append(self.acceleration(outside, place.joint) if outside else None)
+        twists = group.velocity(pose, twists_out, drives[1])
+        seconds = group.acceleration(pose, twists, twists_out, accelerations_out, drives[2], drives[1])
+        for link, frame, twist, second in zip(module.links, pose.frames, twists, seconds, strict=True):
+            self.motions[link] = Motion(frame, twist, second)
+        self.poses.append(pose)
+
+
+def on_the_ground(system: System, values: Values) -> Forward:
+    """A walk in the plane before its first module: only the ground is known."""
     return Forward(system, values, system.elements(values), {system.mechanism.fixed_link: GROUND})
 
 
-def pairs_of(walk: Forward, places: Sequence[Place]) -> list[tuple[Frame, Frame]]:
-    """Elements of a module's joints: global on known links, local on its own."""
-
-    def side(place: Place, i: int) -> Frame:
-        link = place.links[i]
-        return walk.element(link, place.joint) if place.outer[i] else walk.local[link, place.joint]
-
-    return [(side(place, 0), side(place, 1)) for place in places]
+def start(system: System, values: Values) -> Forward:
+    """A walk before its first module: only the ground is known."""
+    walk: Forward = system.engine.start(system, values)
+    return walk
 
 
 def pose_of(walk: Forward, number: int, assembly: Any, time: Number) -> Any:
@@ -123,9 +169,9 @@ def pose_of(walk: Forward, number: int, assembly: Any, time: Number) -> Any:
     system = walk.system
     module, group, places = system.plan.modules[number], system.groups[number], system.places[number]
     drive, _, _ = driven_coordinates(system, module, places, walk.values, time)
-    if isinstance(group, General) and hasattr(assembly, "pose"):
-        return assembly.pose(group, pairs_of(walk, places), drive, walk, time)
-    return group.position(pairs_of(walk, places), assembly, drive)
+    if hasattr(assembly, "pose"):
+        return assembly.pose(group, walk.pairs(places), drive, walk, time)
+    return group.position(walk.pairs(places), assembly, drive)
 
 
 def forward(system: System, values: Values, assembly: Assembly, time: Number) -> Forward:
@@ -137,28 +183,5 @@ def forward(system: System, values: Values, assembly: Assembly, time: Number) ->
     walk.time = time
     with np.errstate(all="ignore"):
         for number in range(len(system.plan.modules)):
-            take(walk, number, pose_of(walk, number, assembly[number], time), time)
+            walk.take(number, pose_of(walk, number, assembly[number], time), time)
     return walk
-
-
-def take(walk: Forward, number: int, pose: Any, time: Number) -> None:
-    """Add the motion of one module, whose pose is known, to the walk."""
-    system = walk.system
-    module, group, places = system.plan.modules[number], system.groups[number], system.places[number]
-    drives = driven_coordinates(system, module, places, walk.values, time)
-    twists_out: list[Twist | None] = []
-    accelerations_out: list[Acceleration | None] = []
-    for place in places:
-        if place.witness:  # its relative motion is what a gear pair sees
-            one, two = (walk.motions[link] for link in place.links)
-            twists_out.append(Twist(0.0, 0.0, two.twist.w - one.twist.w))
-            accelerations_out.append(Acceleration(0.0, 0.0, two.acceleration.w - one.acceleration.w))
-            continue
-        outside = next((link for link, outer in zip(place.links, place.outer, strict=True) if outer), None)
-        twists_out.append(walk.twist(outside, place.joint) if outside else None)
-        accelerations_out.append(walk.acceleration(outside, place.joint) if outside else None)
-    twists = group.velocity(pose, twists_out, drives[1])
-    seconds = group.acceleration(pose, twists, twists_out, accelerations_out, drives[2], drives[1])
-    for link, frame, twist, second in zip(module.links, pose.frames, twists, seconds, strict=True):
-        walk.motions[link] = Motion(frame, twist, second)
-    walk.poses.append(pose)

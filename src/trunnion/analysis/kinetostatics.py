@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -55,9 +55,9 @@ class Backward:
     """
 
     walk: Forward
-    loads: dict[str, Wrench]
+    loads: dict[str, Any]
     slips: dict[str, Slip] = field(default_factory=dict)
-    reactions: dict[str, Wrench] = field(default_factory=dict)
+    reactions: dict[str, Any] = field(default_factory=dict)
     friction: dict[str, Number] = field(default_factory=dict)
     efforts: dict[str, Number] = field(default_factory=dict)
     settled: list[Settled] = field(default_factory=list)
@@ -66,6 +66,10 @@ class Backward:
     springs: dict[str, SpringState] = field(default_factory=dict)
     gears: dict[str, GearLoad] = field(default_factory=dict)
     undefined: dict[str, Number] = field(default_factory=dict)
+
+    def friction_power(self, joint: str) -> Number:
+        """Power lost in a joint, W."""
+        return -(self.friction[joint] * self.slips[joint].speed)
 
 
 def solve(
@@ -83,7 +87,8 @@ def solve(
     """
     walk = forward(system, values, assembly, time)
     with np.errstate(all="ignore"):
-        return backward(walk, method or FrictionMethod(), given or Given())
+        found: Backward = system.engine.backward(walk, method or FrictionMethod(), given or Given())
+    return found
 
 
 def backward(walk: Forward, method: FrictionMethod, given: Given) -> Backward:
@@ -188,10 +193,10 @@ def _settle_module(back: Backward, number: int, method: FrictionMethod, given: G
     for k, place in enumerate(places):
         if not place.witness:
             friction = forces[k] * levers[k] if k in forces else 0.0
-            _record(back, place, settled.reactions[k], friction, driven=place.joint in module.driven)
+            _record(back, place, Wrench(*settled.reactions[k]), friction, driven=place.joint in module.driven)
     for i, name in enumerate(module.gears):
         k = len(places) + i
-        _record_gear(back, number, i, name, settled.reactions[k].m, forces.get(k, 0.0))
+        _record_gear(back, number, i, name, Wrench(*settled.reactions[k]).m, forces.get(k, 0.0))
 
 
 def _contact(back: Backward, links: tuple[str, ...], k: int, place: Place, given: Given) -> tuple[Contact, Number]:

@@ -15,7 +15,7 @@ from trunnion.analysis.kinematics import Forward, PointMotion
 from trunnion.groups.planar import Wrench, turned
 from trunnion.model.parts import Load
 
-__all__ = ["Action", "Slip", "SpringState", "Stated", "springs", "stated_loads"]
+__all__ = ["Action", "Slip", "SpringState", "Stated", "spring_state", "springs", "stated_loads"]
 
 
 class Slip(NamedTuple):
@@ -167,7 +167,7 @@ def springs(walk: Forward, slips: Mapping[str, Slip]) -> Iterator[tuple[str, Act
         slip = slips[joint]
         turns = walk.system.joints[joint][0] == "revolute"
         elongation = _turned_by(walk, path, joint) if turns else _slid_by(walk, path, joint)
-        state = _state(walk, path, elongation, slip.speed, spring.only)
+        state = spring_state(walk, path, elongation, slip.speed, spring.only)
         yield name, _in_joint(walk, joint, -state.force, slip), state
 
 
@@ -182,7 +182,7 @@ def _line(walk: Forward, path: str, ends: tuple[str, str], only: str | None) -> 
     ux, uy = dx / length, dy / length
     rate = (b.velocity[0] - a.velocity[0]) * ux + (b.velocity[1] - a.velocity[1]) * uy
     elongation = xp.where(apart, length, 0.0 * length) - walk.values.get(f"{path}.free_length", 0.0)
-    state = _state(walk, path, elongation, rate, only)
+    state = spring_state(walk, path, elongation, rate, only)
     x, y = state.force * ux, state.force * uy
     return Action([(one, Wrench(x, y, 0.0), a.place), (other, Wrench(-x, -y, 0.0), b.place)], state.power), state
 
@@ -212,7 +212,7 @@ def _slid_by(walk: Forward, path: str, joint: str) -> Number:
     return slide - walk.values.get(f"{path}.free_length", 0.0)
 
 
-def _state(walk: Forward, path: str, elongation: Number, rate: Number, only: str | None) -> SpringState:
+def spring_state(walk: Forward, path: str, elongation: Number, rate: Number, only: str | None) -> SpringState:
     """The spring at an elongation. only: it acts where that is positive (pull) or negative (push), its damper too."""
     stiffness, damping, preload = (walk.values.get(f"{path}.{key}", 0.0) for key in ("stiffness", "damping", "preload"))
     force = preload + stiffness * elongation + damping * rate

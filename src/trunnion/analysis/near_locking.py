@@ -17,7 +17,7 @@ from trunnion.algebra.dual import primal
 from trunnion.analysis import continuation
 from trunnion.analysis.bristles import histories
 from trunnion.analysis.friction import FrictionMethod, Problem, frictionless, identity_minus, scaled
-from trunnion.analysis.kinetostatics import Backward, Given, backward
+from trunnion.analysis.kinetostatics import Backward, Given
 from trunnion.analysis.system import Cycle, Dial, law_of
 from trunnion.errors import Finding, Severity
 
@@ -193,7 +193,7 @@ def reverse(run: Run, back: Backward, method: FrictionMethod, useful: Sequence[s
     past = histories(run.system, run.values, run.chosen.assembly, run.cycle, reverse=True)
     deflections = {joint: history.at(run.cycle.duration - time) for joint, history in past.items()}
     with np.errstate(all="ignore"):
-        other = backward(walk, method, Given({}, deflections))
+        other = walk.system.engine.backward(walk, method, Given({}, deflections))
     shape = time.shape
     efforts = {name: np.broadcast_to(effort, shape) for name, effort in other.efforts.items()}
     delivered = -sum((effort * walk.rate(name) for name, effort in efforts.items()), np.zeros(shape))

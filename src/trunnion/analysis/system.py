@@ -6,7 +6,7 @@ import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,9 +22,9 @@ from trunnion.joints.friction import FRICTION_LAWS, FrictionLaw
 from trunnion.joints.motion import Span
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.mechanism import Mechanism
-from trunnion.structure.decompose import Module, Plan, decompose
+from trunnion.structure.decompose import Module, Plan
 
-__all__ = ["Cycle", "Dial", "Place", "Positions", "System", "Values", "build"]
+__all__ = ["Cycle", "Dial", "Place", "Positions", "System", "Values"]
 
 FEWEST = 64  # positions from which half of them tell how good a mean is
 COMMON_TURNS = 60  # of the slowest driver, within which the others must come back too
@@ -107,10 +107,14 @@ class Cycle:
 
 @dataclass(frozen=True)
 class System:
-    """A mechanism, its plan and its modules. Numbers stay outside: every walk is given its `Values`."""
+    """A mechanism, its plan and its modules. Numbers stay outside: every walk is given its `Values`.
+
+    engine: what is done differently in the plane and in space.
+    """
 
     mechanism: Mechanism
     plan: Plan
+    engine: Any = None
 
     @cached_property
     def groups(self) -> tuple[Group, ...]:
@@ -128,12 +132,16 @@ class System:
     @cached_property
     def joints(self) -> dict[str, tuple[str, tuple[str, str]]]:
         """Kind and links of every joint, as the file has them."""
-        return {name: (joint.type, joint.links) for name, joint in self.mechanism.joints.items()}
+        return {name: (joint.type, joint.links) for name, joint in self.mechanism.effective_joints.items()}
+
+    def turns(self, joint: str) -> bool:
+        """Whether a joint's coordinate, as drivers and loads see it, is an angle."""
+        return "rotation" in PAIRS[self.joints[joint][0]].freedoms
 
     @cached_property
     def points(self) -> tuple[tuple[str, str], ...]:
         """(link, point) of every named point."""
-        return tuple((name, point) for name, link in self.mechanism.links.items() for point in link.points)
+        return tuple((name, point) for name, link in self.mechanism.effective_links.items() for point in link.points)
 
     def _place(self, module: Module, name: str) -> Place:
         kind, (first, second) = self.joints[name]
@@ -243,7 +251,7 @@ class System:
         if len(drivers) != 1 or not self.span(values, drivers[0]).one_way:
             return Dial(time, " s", "")
         q = np.broadcast_to(self.drive(values, drivers[0], time)[0], time.shape)
-        revolute = self.joints[drivers[0]][0] == "revolute"
+        revolute = self.turns(drivers[0])
         return Dial(np.degrees(q) if revolute else q * 1e3, "°" if revolute else " mm", drivers[0])
 
     def pace(self, values: Values) -> Number:
@@ -251,7 +259,7 @@ class System:
         rates: list[Number] = [0.0]
         for name in self.mechanism.drivers:
             speed = self.span(values, name).peak
-            rates.append(speed if self.joints[name][0] == "revolute" else speed / self.size(values))
+            rates.append(speed if self.turns(name) else speed / self.size(values))
         return functools.reduce(np.maximum, rates)
 
     def size(self, values: Values) -> Number:
@@ -306,7 +314,7 @@ class System:
         """Turns that driven joints and those geared to them make in a time; known: of others, to start from."""
         turns = dict(known or {})
         for name in self.mechanism.drivers:
-            if self.joints[name][0] == "revolute":
+            if self.turns(name):
                 ends = [float(np.ravel(primal(self.drive(values, name, time)[0]))[0]) for time in (0.0, duration)]
                 turns.setdefault(name, (ends[1] - ends[0]) / (2 * np.pi))
         for _ in self.mechanism.gears:  # each round reaches one gear pair farther, whichever way it is stated
@@ -321,16 +329,8 @@ class System:
 
     def _turns(self, driver: str, span: Span, duration: float) -> float:
         """Turns that a driver would make in a time at its largest rate; of a slide, how often it would travel."""
-        revolute = self.joints[driver][0] == "revolute"
+        revolute = self.turns(driver)
         return float(span.peak * duration / (2 * np.pi if revolute else span.travel))
-
-
-def build(mechanism: Mechanism) -> System:
-    """Decompose a mechanism and prepare its modules. Raises MechanismError if its structure does not determine it."""
-    if mechanism.space != "planar":
-        what = "spatial mechanisms are read and written by this version, not analysed"
-        raise MechanismError(Finding(what, "space", "use a planar mechanism"))
-    return System(mechanism, decompose(mechanism))
 
 
 def driven_coordinates(

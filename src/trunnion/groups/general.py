@@ -91,6 +91,25 @@ class General:
         """Positions in `steps` of the unknown coordinates."""
         return tuple(i for i, step in enumerate(self.steps) if step.joint not in self.driven)
 
+    @property
+    def kept(self) -> tuple[int, ...]:
+        """The entries of q that an assembly states: the free ones."""
+        return self.free
+
+    @cached_property
+    def kept_kinds(self) -> tuple[str, ...]:
+        """What each of them is, "turn" or "slide"."""
+        kinds = [self.joints[self.steps[i].joint].kind for i in self.free]
+        return tuple("turn" if kind == "revolute" else "slide" for kind in kinds)
+
+    def size(self, elements: Elements) -> Number:
+        """A length typical of each lane, m."""
+        return size_of(self.joints, elements)
+
+    def signature(self, pose: Pose, spread: float) -> list[Number]:
+        """Numbers that tell assemblies apart: places and directions of the links."""
+        return [n for frame in pose.frames for n in (frame.x / spread, frame.y / spread, frame.c, frame.s)]
+
     @cached_property
     def _paths(self) -> dict[int, frozenset[int]]:
         """For each link the steps between it and the known links."""
@@ -148,9 +167,8 @@ class General:
         q = [np.asarray(v, float) for v in self.coordinates(elements, start, drive)]
         if not self.free:
             return list(q)
-        size = size_of(self.joints, elements)
-        kinds = [self.joints[self.steps[i].joint].kind for i in self.free]
-        scale = [TURN_LIMIT if kind == "revolute" else 0.3 * size for kind in kinds]
+        size = self.size(elements)
+        scale = [TURN_LIMIT if kind == "turn" else 0.3 * size for kind in self.kept_kinds]
         q, moved_by = self._iterate(elements, q, drive, scale, QUICK)
         late = ~(moved_by <= NEARLY)
         if np.any(late):

@@ -49,6 +49,11 @@ class Frame(NamedTuple):
     c: Number = 1.0
     s: Number = 0.0
 
+    def normalised(self) -> Frame:
+        """With a direction of length one."""
+        length = namespace(self.c, self.s).hypot(self.c, self.s)
+        return Frame(self.x, self.y, self.c / length, self.s / length)
+
 
 class Twist(NamedTuple):
     """Velocity of a point of a body (m/s) and the body's angular velocity w (rad/s)."""

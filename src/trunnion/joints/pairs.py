@@ -7,14 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
 
-__all__ = ["PAIRS", "Load", "Pair", "Reaction"]
+__all__ = ["PAIRS", "ContactLoad", "Load", "Pair", "Reaction"]
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,26 @@ class Pair:
         return self.count == 1 or self.name == "cylindrical"
 
 
-Reaction = tuple[Number, Number, Number]  # force x, y (N) and moment (N m) about the joint's point
+Reaction = tuple[Number, ...]  # planar: force x, y (N), moment (N m) about the joint's point; in space see `loads`
+
+
+class ContactLoad(Protocol):
+    """How a joint's reaction presses on its contact."""
+
+    def normal(self, reaction: Reaction) -> Number:
+        """Normal load N ≥ 0, N: a seminorm of the reaction."""
+
+    def gradient(self, reaction: Reaction, normal: Number) -> Reaction:
+        """∂N/∂reaction; zero where the load is. normal: N of this reaction."""
+
+    def bound(self, reaction: Reaction) -> Number:
+        """At least the most by which this reaction, added to any other, can change N."""
+
+    def feels(self, reaction: Reaction) -> bool:
+        """Whether a change of the reaction by this one changes N at all."""
+
+    def mapped(self, change: Callable[[Number], Number]) -> Any:
+        """The same with `change` applied to every number."""
 
 
 class Load(NamedTuple):
@@ -93,6 +112,10 @@ class Load(NamedTuple):
         if self.across is None:
             return np.abs(reaction[0]) + np.abs(reaction[1])
         return self.normal(reaction)
+
+    def feels(self, reaction: Reaction) -> bool:
+        """A pin feels no moment."""
+        return self.across is not None or not all(isinstance(n, float) and n == 0.0 for n in reaction[:2])
 
     def mapped(self, change: Callable[[Number], Number]) -> Load:
         """The same with `change` applied to every number."""

@@ -17,7 +17,9 @@ from trunnion.joints.motion import MOTION_LAWS
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.check_gears import gears
 from trunnion.model.check_loads import motion_dimensions, springs, tables, unknown_name
+from trunnion.model.check_space import contact, coordinates, driven, loop, pitch, resisted, space
 from trunnion.model.check_values import check_values
+from trunnion.model.contact import motions
 from trunnion.model.expression import MOTION, RESERVED
 from trunnion.model.names import nearest
 from trunnion.model.parameters import ParameterSet, entries, evaluation_order
@@ -37,9 +39,9 @@ def check_model(mechanism: Mechanism, lost: Collection[str] = ()) -> list[Findin
     lost: names of entries that could not be read; what follows from their absence is not reported.
     """
     unreadable: set[str] = set()
-    findings = [*_quantities(mechanism, unreadable), *_links(mechanism), *_joints(mechanism)]
+    findings = [*_quantities(mechanism, unreadable), *space(mechanism), *_links(mechanism), *_joints(mechanism)]
     findings += [] if lost else _absent(mechanism)
-    findings += [*_loop(mechanism), *gears(mechanism), *_drivers(mechanism), *_loads(mechanism)]
+    findings += [*loop(mechanism), *gears(mechanism), *_drivers(mechanism), *_loads(mechanism)]
     findings += [*springs(mechanism), *_others(mechanism)]
     numbers = ParameterSet(mechanism, unreadable) if unreadable else mechanism.parameter_set
     with np.errstate(all="ignore"):  # absurd numbers may overflow in a check; they are still only numbers
@@ -167,8 +169,13 @@ def _joints(mechanism: Mechanism) -> Iterator[Finding]:
             yield Finding(f"a {joint.type} joint does not exist in the plane", where, f"use one of {flat}")
         if name in mechanism.joints:
             yield from _ends(mechanism, name, joint)
-        own = mechanism.stated_joints[name].friction
-        yield from _contact(joint, where, "joint_defaults.friction" if own is None else f"{where}.friction")
+        yield from pitch(joint, where)
+        yield from contact(joint, where, mechanism.space == "spatial")
+        if joint.friction is not None:
+            own = mechanism.stated_joints[name].friction
+            yield from _parameters_of_law(
+                joint.friction, "joint_defaults.friction" if own is None else f"{where}.friction"
+            )
 
 
 def _ends(mechanism: Mechanism, name: str, joint: Joint) -> Iterator[Finding]:
@@ -181,34 +188,16 @@ def _ends(mechanism: Mechanism, name: str, joint: Joint) -> Iterator[Finding]:
             yield Finding(f"there is no link '{link}'", f"{where}.links", nearest(link, mechanism.links))
             continue
         points = mechanism.links[link].points
+        axis = "[1, 0]" if mechanism.space == "planar" else "[0, 0, 1]"
         if name not in points:
-            remedy = f"add {name}: [x, y] to the points of '{link}'"
+            remedy = f"add {name}: {coordinates(mechanism)} to the points of '{link}'"
             yield Finding(f"the link '{link}' has no point '{name}'", where, f"{remedy} ({nearest(name, points)})")
         elif mechanism.space in PAIRS[joint.type].needs_axis and points[name].axis is None:
             yield Finding(
                 f"the point '{name}' of the link '{link}' has no axis, a {joint.type} joint needs one",
                 f"links.{link}.points.{name}",
-                f"write {name}: {{at: [x, y], axis: [1, 0]}}",
+                f"write {name}: {{at: {coordinates(mechanism)}, axis: {axis}}}",
             )
-
-
-def _contact(joint: Joint, where: str, friction_at: str) -> Iterator[Finding]:
-    """Whether pin, guide and friction suit the type of joint and are complete; friction_at: where it is stated."""
-    turns = "rotation" in freedoms(joint.type)
-    if turns and joint.guide:
-        yield Finding(f"a {joint.type} joint has a pin, not a guide", f"{where}.guide", "state pin instead")
-    if not turns and joint.pin:
-        yield Finding(f"a {joint.type} joint has a guide, not a pin", f"{where}.pin", "state guide instead")
-    friction = joint.friction
-    if friction is None:
-        return
-    yield from _parameters_of_law(friction, friction_at)
-    if turns and not (joint.pin and joint.pin.radius):
-        yield Finding(
-            "friction without the radius of the pin", where, "state pin: {radius: …} or a fit, or friction: 0"
-        )
-    if not turns and not (joint.guide and joint.guide.length):
-        yield Finding("friction without the length of the guide", where, "state guide: {length: …}, or friction: 0")
 
 
 def _parameters_of_law(friction: Friction, where: str) -> Iterator[Finding]:
@@ -224,34 +213,14 @@ def _parameters_of_law(friction: Friction, where: str) -> Iterator[Finding]:
             yield Finding(f"the friction law {law} needs '{parameter}'", where, remedy)
 
 
-def _loop(mechanism: Mechanism) -> Iterator[Finding]:
-    rows = mechanism.loop
-    for name, link in mechanism.links.items():
-        ends = [joint for joint, one in mechanism.effective_joints.items() if name in one.links]
-        if link.frame is not None and not rows:
-            yield Finding("frame is for the links of a loop", f"links.{name}.frame", "remove it")
-        elif link.frame is not None and ends and link.frame not in ends:
-            what = f"'{link.frame}' is not a joint of the link '{name}'"
-            yield Finding(what, f"links.{name}.frame", nearest(link.frame, ends))
-    if rows and mechanism.space == "planar":
-        yield Finding("a loop is spatial", "loop", "state space: spatial")
-    if rows and mechanism.joints:
-        yield Finding("joints and loop are both given", "joints", "keep the loop or the joints")
-    for kind, names in (("joint", [row.joint for row in rows]), ("link", [row.link for row in rows])):
-        for name in sorted({name for name in names if names.count(name) > 1}):
-            yield Finding(f"the {kind} '{name}' stands in several rows", "loop", "give each row its own")
-    for row in rows:
-        for freedom in {"slide", "rotation"} & set(freedoms(row.type)) & row.model_fields_set:
-            what = f"the {freedom} of a {row.type} joint is free, not constant"
-            yield Finding(what, f"loop.{row.joint}.{freedom}", "remove it")
-
-
 def _drivers(mechanism: Mechanism) -> Iterator[Finding]:
     joints = mechanism.effective_joints
     for name, driver in mechanism.drivers.items():
         where = f"drivers.{name}"
         if name not in joints:
             yield Finding(f"there is no joint '{name}' to drive", where, nearest(name, joints))
+        elif not PAIRS[joints[name].type].drivable:
+            yield from driven(name, joints[name], where)
         elif "rotation" not in freedoms(joints[name].type) and driver.law == "constant" and driver.range is None:
             yield Finding(f"a driven {joints[name].type} joint needs a range", where, "add range: [0 mm, 50 mm]")
         yield from _motion(driver, where)
@@ -315,10 +284,10 @@ def _link_load(mechanism: Mechanism, load: Load, link: str, where: str) -> Itera
     if load.moment is not None and isinstance(load.moment, tuple) != (mechanism.space == "spatial"):
         form = "one number" if mechanism.space == "planar" else "[x, y, z]"
         yield Finding(f"the moment of a {mechanism.space} model is {form}", f"{where}.moment", f"write {form}")
-    if link not in mechanism.links:
-        yield Finding(f"there is no link '{link}'", f"{where}.link", nearest(link, mechanism.links))
-    elif load.at is not None and load.at not in mechanism.links[link].points:
-        points = mechanism.links[link].points
+    if link not in mechanism.points:
+        yield Finding(f"there is no link '{link}'", f"{where}.link", nearest(link, mechanism.points))
+    elif load.at is not None and load.at not in mechanism.points[link]:
+        points = mechanism.points[link]
         yield Finding(f"the link '{link}' has no point '{load.at}'", f"{where}.at", nearest(load.at, points))
     if link == mechanism.fixed_link:
         yield Finding("acts on the fixed link and does nothing", where, "name a moving link", Severity.WARNING)
@@ -337,34 +306,34 @@ def _joint_load(mechanism: Mechanism, load: Load, where: str) -> Iterator[Findin
     if load.joint is None or load.joint not in joints:
         yield Finding(f"there is no joint '{load.joint}'", f"{where}.joint", nearest(str(load.joint), joints))
         return
-    free = freedoms(joints[load.joint].type)
     for key, freedom in (("resisting_torque", "rotation"), ("resisting_force", "slide")):
-        if getattr(load, key) is not None and freedom not in free:
-            yield Finding(
-                f"a {joints[load.joint].type} joint has no {freedom} to resist", f"{where}.{key}", "remove it"
-            )
+        if getattr(load, key) is not None:
+            yield from resisted(joints[load.joint], key, freedom, where)
 
 
 def _others(mechanism: Mechanism) -> Iterator[Finding]:
     """Assembly hints and measures."""
-    joints, links = mechanism.effective_joints, mechanism.links
+    joints, points = mechanism.effective_joints, mechanism.points
     for name, hint in mechanism.assembly.items():
         where = f"assembly.{name}"
         link, _, point = name.partition(".")
         if isinstance(hint, str):
-            if name not in links or name == mechanism.fixed_link:
-                moving = [one for one in links if one != mechanism.fixed_link]
+            if name not in points or name == mechanism.fixed_link:
+                moving = [one for one in points if one != mechanism.fixed_link]
                 what = f"'{hint}' chooses an assembly of a moving link, and '{name}' is none"
                 yield Finding(what, where, nearest(name, moving))
             continue
-        if point and (link not in links or point not in links[link].points):
+        if point and point not in points.get(link, ()):
             yield from _point(mechanism, name, where)
         elif not point and name not in joints:
             yield Finding(f"there is no joint '{name}'", where, nearest(name, joints))
         if isinstance(hint, tuple):
             yield from _length(len(hint), mechanism.coordinates, where)
         elif point:
-            yield Finding("a point has a position, not an angle", where, "write [x, y]")
+            yield Finding("a point has a position, not an angle", where, f"write {coordinates(mechanism)}")
+        elif name in joints and not motions(joints[name].type):
+            what = f"one number does not say how far a {joints[name].type} joint has moved"
+            yield Finding(what, where, f"say where it is: {coordinates(mechanism)}")
     for name, measure in mechanism.measures.items():
         yield from _measure(mechanism, measure, f"measures.{name}")
 
@@ -383,12 +352,13 @@ def _measure(mechanism: Mechanism, measure: Measure, where: str) -> Iterator[Fin
     if measure.effort is not None and measure.effort not in mechanism.drivers:
         what = f"there is no driver '{measure.effort}'"
         yield Finding(what, f"{where}.effort", nearest(measure.effort, mechanism.drivers))
-    if measure.angle is not None and measure.angle not in mechanism.links:
-        yield Finding(f"there is no link '{measure.angle}'", f"{where}.angle", nearest(measure.angle, mechanism.links))
+    links = mechanism.effective_links
+    if measure.angle is not None and measure.angle not in links:
+        yield Finding(f"there is no link '{measure.angle}'", f"{where}.angle", nearest(measure.angle, links))
 
 
 def _point(mechanism: Mechanism, name: str, where: str) -> Iterator[Finding]:
     """Whether `link.point` exists."""
-    known = [f"{link}.{point}" for link, part in mechanism.links.items() for point in part.points]
+    known = [f"{link}.{point}" for link, points in mechanism.points.items() for point in points]
     if name not in known:
         yield Finding(f"there is no point '{name}'", where, nearest(name, known) + " (write link.point)")

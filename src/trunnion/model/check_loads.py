@@ -9,6 +9,7 @@ import numpy as np
 
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, Severity
+from trunnion.model.contact import motions
 from trunnion.model.expression import MOTION, RESERVED
 from trunnion.model.names import nearest
 from trunnion.model.parts import Spring, freedoms
@@ -119,12 +120,17 @@ def springs(mechanism: Mechanism) -> Iterator[Finding]:
         elif joint not in joints:
             yield Finding(f"there is no joint '{joint}'", f"{where}.joint", nearest(joint, joints))
             continue
+        elif not motions(joints[joint].type):
+            what = f"a {joints[joint].type} joint has no one axis for a spring to act about or along"
+            remedy = "put it in a revolute, prismatic, cylindrical or helical joint, or between two points"
+            yield Finding(what, f"{where}.joint", remedy)
+            continue
         turns = spring.between is None and "rotation" in freedoms(joints[joint].type)
         yield from _free(spring, turns, where)
 
 
 def _ends(mechanism: Mechanism, ends: tuple[str, str], where: str) -> Iterator[Finding]:
-    known = [f"{link}.{point}" for link, part in mechanism.links.items() for point in part.points]
+    known = [f"{link}.{point}" for link, points in mechanism.points.items() for point in points]
     for end in ends:
         if end not in known:
             yield Finding(f"there is no point '{end}'", where, nearest(end, known) + " (write link.point)")

@@ -13,6 +13,7 @@ from trunnion.errors import Finding, Severity
 from trunnion.joints.friction import FRICTION_LAWS, LawParameter
 from trunnion.model.check_gears import gear_values
 from trunnion.model.check_loads import spring_values, table_values
+from trunnion.model.check_space import direction_values, pitch_values
 from trunnion.model.parameters import ParameterSet
 from trunnion.model.parts import InertiaTensor, Link, freedoms
 
@@ -48,7 +49,9 @@ def check_values(mechanism: Mechanism, numbers: ParameterSet) -> Iterator[Findin
     yield from gear_values(mechanism, values)
     yield from table_values(mechanism, values)
     yield from spring_values(mechanism, values)
+    yield from pitch_values(mechanism, values)
     yield from _directions(mechanism, values)
+    yield from direction_values(mechanism, values)
     yield from _sides(mechanism, values)
 
 
@@ -142,6 +145,7 @@ def _table(mechanism: Mechanism, name: str, values: Values) -> Iterator[Finding]
 
 
 def _directions(mechanism: Mechanism, values: Values) -> Iterator[Finding]:
+    example = "[1, 0]" if mechanism.space == "planar" else "[1, 0, 0]"
     for name, link in mechanism.links.items():
         for point, place in link.points.items():
             for key in ("axis", "x"):
@@ -149,7 +153,7 @@ def _directions(mechanism: Mechanism, values: Values) -> Iterator[Finding]:
                 if getattr(place, key) is not None and all(
                     values[f"{path}.{one}"] == 0 for one in _letters(values, path)
                 ):
-                    yield Finding("has no direction: all its components are 0", path, "write [1, 0] for along x")
+                    yield Finding("has no direction: all its components are 0", path, f"write {example} for along x")
 
 
 def _letters(values: Values, path: str) -> list[str]:
@@ -190,6 +194,8 @@ def _inertia(mechanism: Mechanism, link: Link, values: Values, where: str) -> It
         yield Finding(f"the inertia of a {mechanism.space} link is {form}", path, f"write {form}")
         return
     about_origin = link.inertia_about == "origin"
+    if path not in values and not spatial:
+        return  # a spatial link without a tensor is a point mass
     if not spatial:
         least = mass * float(centre @ centre) if about_origin else 0.0
         if values[path] < least * (1 - INERTIA_SLACK):

@@ -142,7 +142,15 @@ class Mechanism(Part):
     @cached_property
     def effective_joints(self) -> Mapping[str, Joint]:
         """Every joint with the defaults merged in and its friction complete: law, model and all parameters."""
-        return {name: merge_joint(joint, self.joint_defaults) for name, joint in self.stated_joints.items()}
+        spatial = self.space == "spatial"
+        return {name: merge_joint(joint, self.joint_defaults, spatial) for name, joint in self.stated_joints.items()}
+
+    @cached_property
+    def points(self) -> Mapping[str, tuple[str, ...]]:
+        """Names of the points of every link; a joint of the loop is a point of both its links."""
+        rows = [row.joint for row in self.loop]
+        ends = {name: [row for row in rows if name in self.stated_joints[row].links] for name in self.effective_links}
+        return {name: tuple(dict.fromkeys([*link.points, *ends[name]])) for name, link in self.effective_links.items()}
 
     def carriers(self, gear: str) -> tuple[int, int] | None:
         """On which side (0, 1) of each of its joints a gear pair has the link common to both; None without one."""

@@ -18,6 +18,8 @@ from pydantic import BaseModel
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, MechanismError
 from trunnion.joints.friction import FRICTION_LAWS
+from trunnion.joints.pairs import PAIRS
+from trunnion.model.contact import contact_lacks, has_guide, has_pin
 from trunnion.model.expression import MOTION
 from trunnion.model.names import nearest
 from trunnion.model.parts import (
@@ -79,7 +81,9 @@ def entries(mechanism: Mechanism) -> Iterator[Entry]:
     size = mechanism.coordinates
     yield from _walk(mechanism.gravity or (zero,) * size, "gravity", ("gravity",))
     for name, link in mechanism.effective_links.items():
-        yield from _walk(link, f"links.{name}", ("links", name))
+        for entry in _walk(link, f"links.{name}", ("links", name)):
+            if size == 2 or entry.location[-1] != "inertia" or "inertia" in link.model_fields_set:
+                yield entry  # a spatial link has a tensor or nothing, never one number
         if link.centre is None:
             origin = (Quantity(0, KINDS["length"]),) * size
             yield from _walk(origin, f"links.{name}.centre", ("links", name, "centre"))
@@ -208,19 +212,21 @@ def _measure_kind(mechanism: Mechanism, measure: Measure) -> Kind:
     return KINDS["force" if joint and "rotation" not in freedoms(joint.type) else "moment"]
 
 
-def merge_joint(joint: Joint, defaults: JointDefaults) -> Joint:
+def merge_joint(joint: Joint, defaults: JointDefaults, spatial: bool = False) -> Joint:
     """A joint with the defaults that apply to its type, its friction complete: law, model and every parameter."""
-    turns = "rotation" in freedoms(joint.type)
     pin, guide = joint.pin, joint.guide
-    if turns and (pin or defaults.pin):
+    if has_pin(joint.type) and (pin or defaults.pin):
         pin = Pin(**_pin(_stated(defaults.pin), _stated(pin)))
-    if not turns and (guide or defaults.guide):
+    if has_guide(joint.type) and (guide or defaults.guide):
         guide = Guide(**{**_stated(defaults.guide), **_stated(guide)})
-    friction = _friction(_stated(defaults.friction), _stated(joint.friction))
-    contact = pin.radius if turns and pin else guide.length if guide and not turns else None
-    if friction and contact is None and friction.parameters.get("coefficient") == NO_FRICTION:
-        friction = None  # friction: 0 asks for no radius or length
-    return joint.model_copy(update={"pin": pin, "guide": guide, "friction": friction})
+    rubs = PAIRS[joint.type].count > 0  # nothing slips in a fixed joint: it needs no exception from the defaults
+    friction = _friction(_stated(defaults.friction) if rubs else {}, _stated(joint.friction))
+    merged = joint.model_copy(update={"pin": pin, "guide": guide, "friction": friction})
+    if friction and friction.parameters.get("coefficient") == NO_FRICTION:
+        touches = has_pin(joint.type) or has_guide(joint.type)
+        if not touches or contact_lacks(merged, spatial):
+            return merged.model_copy(update={"friction": None})  # friction: 0 asks for no radius or length
+    return merged
 
 
 def _pin(default: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:

@@ -9,6 +9,7 @@ work.  [THEORY of the docs, "Structure"; D 17 for the formula]
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import networkx as nx
@@ -20,11 +21,12 @@ from trunnion.joints.pairs import PAIRS
 from trunnion.model.mechanism import Mechanism
 from trunnion.structure.mobility import RANK_TOLERANCE, constraints, rank
 
-__all__ = ["Module", "Plan", "decompose", "mobility_by_formula"]
+__all__ = ["FREEDOMS", "Module", "Plan", "decompose", "mobility_by_formula", "passive"]
 
-PLANAR_FREEDOMS = 3
+FREEDOMS = {"planar": 3, "spatial": 6}  # of a free link
 SEED = 1916  # of the generic dimensions
-CLOSED_FORMS = ("RRR", "RRP", "RPR", "PRP", "RPP")  # outer, inner, outer joint; those of `groups.GROUPS`
+# outer, inner, outer joint of the dyads in closed form, in the plane and in space
+CLOSED_FORMS = {"planar": ("RRR", "RRP", "RPR", "PRP", "RPP"), "spatial": ("CCC",)}
 ROMAN = {1: "I", 2: "II", 3: "III", 4: "IV", 5: "V", 6: "VI", 7: "VII", 8: "VIII", 9: "IX", 10: "X"}
 
 
@@ -35,7 +37,9 @@ class Module:
     kind: key of `groups.GROUPS`, or "general". links: in file order, for a closed form in its own order.
     joints: in the order of the group; `reversed_` tells which of them name their links in the file the other way
     round than the group does. driven: joints whose coordinate is prescribed. rank: the class (1 for a driver).
-    gears: gear pairs that it holds; witnesses: joints between known links that these speak of.
+    gears: gear pairs that it holds; witnesses: joints between known links that these speak of. spinning: links whose
+    spin about the line of their two spherical joints is free, with these; redundant: its joints constrain more than the
+    links have freedoms.
     """
 
     kind: str
@@ -47,14 +51,20 @@ class Module:
     label: str
     gears: tuple[str, ...] = ()
     witnesses: tuple[str, ...] = ()
+    spinning: tuple[tuple[str, str, str], ...] = ()
+    redundant: bool = False
 
 
 @dataclass(frozen=True)
 class Plan:
-    """Ordered modules of a mechanism, with its mobility by formula."""
+    """Ordered modules of a mechanism, with its mobility by formula.
+
+    passive: links whose spin is free and moves nothing else; the mobility counts it.
+    """
 
     modules: tuple[Module, ...]
     mobility: int
+    passive: tuple[str, ...] = ()
 
     @property
     def formula(self) -> str:
@@ -62,10 +72,31 @@ class Plan:
         return " → ".join(module.label for module in self.modules)
 
 
+def taken(mechanism: Mechanism, joint: str) -> int:
+    """Freedoms that a joint takes."""
+    pair = PAIRS[mechanism.effective_joints[joint].type]
+    freed = len(pair.freedoms) if mechanism.space == "planar" else pair.count
+    return FREEDOMS[mechanism.space] - freed
+
+
 def mobility_by_formula(mechanism: Mechanism) -> int:
-    """Grübler's count 3 (n − 1) − Σ (3 − f_j) − gear pairs of a planar mechanism with n links, ground included."""
-    taken = sum(PLANAR_FREEDOMS - len(PAIRS[joint.type].freedoms) for joint in mechanism.joints.values())
-    return PLANAR_FREEDOMS * (len(mechanism.links) - 1) - taken - len(mechanism.gears)
+    """Grübler's count d (n − 1) − Σ (d − f_j) − gear pairs of n links, ground included; d = 3 in the plane, 6 in space."""
+    moving = len(mechanism.effective_links) - 1
+    held = sum(taken(mechanism, joint) for joint in mechanism.effective_joints)
+    return FREEDOMS[mechanism.space] * moving - held - len(mechanism.gears)
+
+
+def passive(mechanism: Mechanism) -> dict[str, tuple[str, str]]:
+    """Links whose spin is free, with their two joints: both are spherical, and the link can turn about their line."""
+    found: dict[str, tuple[str, str]] = {}
+    if mechanism.space == "planar":
+        return found
+    for link in mechanism.effective_links:
+        joints = [name for name, joint in mechanism.effective_joints.items() if link in joint.links]
+        balls = all(mechanism.effective_joints[name].type == "spherical" for name in joints)
+        if link != mechanism.fixed_link and len(joints) == 2 and balls:
+            found[link] = (joints[0], joints[1])
+    return found
 
 
 def decompose(mechanism: Mechanism) -> Plan:
@@ -75,11 +106,18 @@ def decompose(mechanism: Mechanism) -> Plan:
     """
     ground = mechanism.fixed_link
     mobility = mobility_by_formula(mechanism)
-    bodies = [link for link in mechanism.links if link != ground]
-    findings = _undetermined(mechanism, mobility, bodies)
+    bodies = [link for link in mechanism.effective_links if link != ground]
+    spinning = passive(mechanism)
+    determines = _match(mechanism, bodies, ground, spinning)
+    if mechanism.space == "spatial":
+        findings = _undriven(mechanism, mobility - len(spinning), len(spinning))
+        unheld = FREEDOMS["spatial"] * len(bodies) > len(determines)
+        if not findings and (unheld or mobility - len(spinning) < len(mechanism.drivers)):
+            return Plan((_whole(mechanism, bodies, spinning),), mobility, tuple(spinning))
+    else:
+        findings = _undetermined(mechanism, mobility, bodies)
     if findings:
         raise MechanismError(findings)
-    determines = _match(mechanism, bodies, ground)
     dependence = nx.DiGraph()
     dependence.add_nodes_from(bodies)
     for constraint, body in determines.items():
@@ -96,40 +134,42 @@ def decompose(mechanism: Mechanism) -> Plan:
     for part in order:
         members = sorted(parts.nodes[part]["members"], key=place.__getitem__)
         gears = [name for (name, i), body in determines.items() if i == GEAR and body in members]
-        modules.append(_module(mechanism, members, known, gears))
+        modules.append(_module(mechanism, members, known, gears, spinning))
         known |= set(members)
-    return Plan(tuple(modules), mobility)
+    return Plan(tuple(modules), mobility, tuple(spinning))
 
 
-GEAR = -1
-Constraint = tuple[str, int]  # of a joint, the number of a freedom it takes; of a gear pair, GEAR
+GEAR, SPIN = -1, -2
+Constraint = tuple[str, int]  # of a joint, the number of a freedom it takes; of a gear pair, GEAR; of a link, SPIN
 
 
 def _constraints(mechanism: Mechanism) -> list[Constraint]:
     """Every freedom that joints, gear pairs and drivers take."""
     found: list[Constraint] = []
-    for name, joint in mechanism.joints.items():
-        found += [(name, i) for i in range(PLANAR_FREEDOMS - len(PAIRS[joint.type].freedoms))]
+    for name in mechanism.effective_joints:
+        found += [(name, i) for i in range(taken(mechanism, name))]
     found += [(name, GEAR) for name in mechanism.gears]
-    return found + [(name, PLANAR_FREEDOMS) for name in mechanism.drivers]
+    return found + [(name, FREEDOMS[mechanism.space]) for name in mechanism.drivers]
 
 
 def _links_of(mechanism: Mechanism, constraint: Constraint) -> list[str]:
     """Links whose motion a constraint relates."""
     name, number = constraint
+    if number == SPIN:
+        return [name]
     joints = mechanism.gears[name].joints if number == GEAR else (name,)
-    return list(dict.fromkeys(link for joint in joints for link in mechanism.joints[joint].links))
+    return list(dict.fromkeys(link for joint in joints for link in mechanism.effective_joints[joint].links))
 
 
-def _match(mechanism: Mechanism, bodies: list[str], ground: str) -> dict[Constraint, str]:
+def _match(mechanism: Mechanism, bodies: list[str], ground: str, spinning: Iterable[str]) -> dict[Constraint, str]:
     """Each constraint with the link it determines: a maximum matching onto the links' freedoms."""
     graph = nx.Graph()
-    constraints = _constraints(mechanism)
+    constraints = _constraints(mechanism) + [(link, SPIN) for link in spinning]
     graph.add_nodes_from(constraints)
     for constraint in constraints:
         for link in _links_of(mechanism, constraint):
             if link != ground:
-                graph.add_edges_from((constraint, ("freedom", link, i)) for i in range(PLANAR_FREEDOMS))
+                graph.add_edges_from((constraint, ("freedom", link, i)) for i in range(FREEDOMS[mechanism.space]))
     matching = nx.bipartite.maximum_matching(graph, top_nodes=constraints)
     return {c: matching[c][1] for c in constraints if c in matching}
 
@@ -138,21 +178,14 @@ def _undetermined(mechanism: Mechanism, mobility: int, bodies: list[str]) -> lis
     """What keeps the drivers from determining the motion exactly."""
     drivers = len(mechanism.drivers)
     if mobility != drivers:
-        has = "no driver" if drivers == 0 else "one driver" if drivers == 1 else f"{drivers} drivers"
-        remedy = (
-            "drive a joint for each freedom left, as A: {speed: 10 rad/s}, or add a link or joint that removes it"
-            if mobility > drivers
-            else "remove a driver, or a joint or link that constrains twice"
-        )
-        what = f"the mobility is {mobility} by Grübler's formula, but there is {has}"
-        return [Finding(what, "drivers", remedy)]
+        return _undriven(mechanism, mobility, 0, exactly=True)
     matrix, owners = _generic_constraints(mechanism)
     if rank(matrix) == matrix.shape[1]:
         return []
     left, values, right = np.linalg.svd(matrix)
     free = values <= RANK_TOLERANCE * max(values, default=0.0)
     strained = np.abs(left[:, : len(values)][:, free]).max(axis=1) > RANK_TOLERANCE
-    loose = np.abs(right[: len(values)][free]).max(axis=0).reshape(-1, PLANAR_FREEDOMS).max(axis=1) > RANK_TOLERANCE
+    loose = np.abs(right[: len(values)][free]).max(axis=0).reshape(-1, FREEDOMS["planar"]).max(axis=1) > RANK_TOLERANCE
     twice = list(dict.fromkeys(name for name, bad in zip(owners, strained, strict=True) if bad))
     links = [body for body, bad in zip(bodies, loose, strict=True) if bad]
     told = ", ".join(f"{name} (driven)" if name in mechanism.drivers else name for name in twice)
@@ -160,33 +193,59 @@ def _undetermined(mechanism: Mechanism, mobility: int, bodies: list[str]) -> lis
     return [Finding(what, "joints", "move a joint or a driver from the part that is held twice to the loose one")]
 
 
+def _undriven(mechanism: Mechanism, mobility: int, spins: int, exactly: bool = False) -> list[Finding]:
+    """Whether the drivers are fewer than the freedoms that have an effect, or not as many."""
+    drivers = len(mechanism.drivers)
+    if mobility <= drivers and not (exactly and mobility < drivers):
+        return []
+    has = "no driver" if drivers == 0 else "one driver" if drivers == 1 else f"{drivers} drivers"
+    remedy = (
+        "drive a joint for each freedom left, as A: {speed: 10 rad/s}, or add a link or joint that removes it"
+        if mobility > drivers
+        else "remove a driver, or a joint or link that constrains twice"
+    )
+    beside = f" beside {spins} that spin a link alone" if spins else ""
+    what = f"the mobility is {mobility} by Grübler's formula{beside}, but there is {has}"
+    return [Finding(what, "drivers", remedy)]
+
+
 def _generic_constraints(mechanism: Mechanism) -> tuple[NDArray[np.float64], list[str]]:
     """Constraints of joints and drivers for dimensions without any special relation."""
     rng = np.random.default_rng(SEED)
-    joints = {name: (joint.type, joint.links) for name, joint in mechanism.joints.items()}
+    joints = {name: (joint.type, joint.links) for name, joint in mechanism.effective_joints.items()}
     angles = rng.uniform(0.0, 2 * np.pi, len(joints))
     places = {
         name: (*rng.uniform(-1.0, 1.0, 2), float(np.cos(angle)), float(np.sin(angle)))
         for name, angle in zip(joints, angles, strict=True)
     }
     gears = {name: (gear.joints, float(rng.uniform(0.3, 0.9))) for name, gear in mechanism.gears.items()}
-    return constraints(list(mechanism.links), mechanism.fixed_link, joints, places, list(mechanism.drivers), gears)
+    return constraints(
+        list(mechanism.effective_links), mechanism.fixed_link, joints, places, list(mechanism.drivers), gears
+    )
 
 
-def _module(mechanism: Mechanism, links: list[str], known: set[str], gears: list[str]) -> Module:
+def _whole(mechanism: Mechanism, links: list[str], spinning: Mapping[str, tuple[str, str]]) -> Module:
+    """All links as one module, whose joints constrain more than its links have freedoms."""
+    module = _module(mechanism, links, {mechanism.fixed_link}, [], spinning)
+    return replace(module, kind="general", redundant=True)
+
+
+def _module(
+    mechanism: Mechanism, links: list[str], known: set[str], gears: list[str], spinning: Mapping[str, tuple[str, str]]
+) -> Module:
     """The module that the given links form on the links known so far, and through these gear pairs."""
-    joints = [name for name, joint in mechanism.joints.items() if _belongs(joint.links, links, known)]
+    joints = [name for name, joint in mechanism.effective_joints.items() if _belongs(joint.links, links, known)]
     driven = [name for name in joints if name in mechanism.drivers]
     numbers = _numbers(mechanism)
     letters = "".join(
-        f"[{PAIRS[mechanism.joints[name].type].symbol}]"
+        f"[{PAIRS[mechanism.effective_joints[name].type].symbol}]"
         if name in driven
-        else PAIRS[mechanism.joints[name].type].symbol
+        else PAIRS[mechanism.effective_joints[name].type].symbol
         for name in joints
     ) + "G" * len(gears)
     if len(links) == 1 and driven == joints and not gears:
-        base = next(link for link in mechanism.joints[joints[0]].links if link not in links)
-        letter = PAIRS[mechanism.joints[joints[0]].type].symbol
+        base = next(link for link in mechanism.effective_joints[joints[0]].links if link not in links)
+        letter = PAIRS[mechanism.effective_joints[joints[0]].type].symbol
         label = f"I({numbers[base]},{numbers[links[0]]}){letter}"
         return _assembled(mechanism, letter, links, joints, driven, 1, label)
     rank = _class(mechanism, links, joints)
@@ -201,7 +260,8 @@ def _module(mechanism: Mechanism, links: list[str], known: set[str], gears: list
     module = _assembled(mechanism, kind, links, joints, driven, rank, label)
     spoken = dict.fromkeys(joint for gear in gears for joint in mechanism.gears[gear].joints)
     witnesses = tuple(joint for joint in spoken if joint not in joints)
-    return replace(module, gears=tuple(gears), witnesses=witnesses)
+    spins = tuple((link, *spinning[link]) for link in links if link in spinning)
+    return replace(module, gears=tuple(gears), witnesses=witnesses, spinning=spins)
 
 
 def _belongs(pair: tuple[str, str], links: list[str], known: set[str]) -> bool:
@@ -211,7 +271,7 @@ def _belongs(pair: tuple[str, str], links: list[str], known: set[str]) -> bool:
 
 def _numbers(mechanism: Mechanism) -> dict[str, int]:
     """Link numbers of the formula: 0 for the ground, the others in file order."""
-    others = [link for link in mechanism.links if link != mechanism.fixed_link]
+    others = [link for link in mechanism.effective_links if link != mechanism.fixed_link]
     return {mechanism.fixed_link: 0, **{link: i for i, link in enumerate(others, 1)}}
 
 
@@ -219,7 +279,7 @@ def _dyad(mechanism: Mechanism, links: list[str], joints: list[str]) -> tuple[st
     """(kind, links, joints) of a class II group with a closed form: outer joint, inner joint, outer joint."""
     if len(links) != 2 or len(joints) != 3:
         return None
-    pairs = {name: mechanism.joints[name].links for name in joints}
+    pairs = {name: mechanism.effective_joints[name].links for name in joints}
     inner = [name for name in joints if all(link in links for link in pairs[name])]
     if len(inner) != 1:
         return None
@@ -229,8 +289,8 @@ def _dyad(mechanism: Mechanism, links: list[str], joints: list[str]) -> tuple[st
     if links[0] not in pairs[first]:
         first, last = last, first
     for order, sides in (([first, inner[0], last], links), ([last, inner[0], first], links[::-1])):
-        kind = "".join(PAIRS[mechanism.joints[name].type].symbol for name in order)
-        if kind in CLOSED_FORMS:
+        kind = "".join(PAIRS[mechanism.effective_joints[name].type].symbol for name in order)
+        if kind in CLOSED_FORMS[mechanism.space]:
             return kind, sides, order
     return None
 
@@ -241,9 +301,9 @@ def _class(mechanism: Mechanism, links: list[str], joints: list[str]) -> int:
     inner.add_nodes_from(links)
     most = 2
     for link in links:
-        most = max(most, sum(link in mechanism.joints[name].links for name in joints))
+        most = max(most, sum(link in mechanism.effective_joints[name].links for name in joints))
     for name in joints:
-        a, b = mechanism.joints[name].links
+        a, b = mechanism.effective_joints[name].links
         if a in links and b in links:
             inner.add_edge(a, b)
     loops = nx.minimum_cycle_basis(inner)
@@ -255,7 +315,7 @@ def _assembled(
 ) -> Module:
     def reversed_(name: str) -> bool:
         """A closed form takes the outer link first, and inside the group the link it lists first."""
-        first, second = mechanism.joints[name].links
+        first, second = mechanism.effective_joints[name].links
         if kind == "general":
             return False  # its joints are as the file has them
         return first in links and (second not in links or links.index(first) > links.index(second))

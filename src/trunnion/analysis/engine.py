@@ -1,0 +1,69 @@
+"""What the analysis does differently in the plane and in space, as one row each of a table.
+
+Everything else - the cycle, the choice of an assembly, friction, locking, power, findings - is the same code.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from trunnion.analysis import fill, kinematics, kinetostatics, scene
+from trunnion.analysis.space import fill as space_fill
+from trunnion.analysis.space import forces, motion
+from trunnion.analysis.space.system import SpatialSystem
+from trunnion.analysis.system import System
+from trunnion.model.mechanism import Mechanism
+from trunnion.structure.decompose import decompose
+
+__all__ = ["ENGINES", "Engine", "build"]
+
+
+@dataclass(frozen=True)
+class Engine:
+    """system: makes a mechanism with its plan ready; start: a walk that knows the ground alone; backward: reactions and
+    friction of a walk; labels, absent, fill_motion, fill_forces, unwrap: of the result; scene: for the drawings.
+    """
+
+    system: Callable[..., System]
+    start: Callable[..., kinematics.Forward]
+    backward: Callable[..., kinetostatics.Backward]
+    labels: Callable[..., dict[str, list[str]]]
+    absent: Callable[..., list[str]]
+    fill_motion: Callable[..., None]
+    fill_forces: Callable[..., None]
+    unwrap: Callable[..., None]
+    scene: Callable[..., dict[str, Any]]
+
+
+ENGINES = {
+    "planar": Engine(
+        System,
+        kinematics.on_the_ground,
+        kinetostatics.backward,
+        fill.labels,
+        fill.absent,
+        fill.fill_motion,
+        fill.fill_forces,
+        fill.unwrap,
+        scene.planar,
+    ),
+    "spatial": Engine(
+        SpatialSystem,
+        motion.on_the_ground,
+        forces.backward,
+        space_fill.labels,
+        space_fill.absent,
+        space_fill.fill_motion,
+        space_fill.fill_forces,
+        space_fill.unwrap,
+        scene.spatial,
+    ),
+}
+
+
+def build(mechanism: Mechanism) -> System:
+    """Decompose a mechanism and prepare its modules. Raises MechanismError if its structure does not determine it."""
+    engine = ENGINES[mechanism.space]
+    return engine.system(mechanism, decompose(mechanism), engine)

@@ -1,0 +1,1 @@
+"""The analysis in space: what differs from the plane."""

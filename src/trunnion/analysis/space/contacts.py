@@ -1,0 +1,131 @@
+"""The contacts with friction of each spatial pair: what presses on them, which way they slip, what friction does.
+
+A contact is a normal load, a slip speed and the wrench of a friction force of 1 N along the slip. A cylindrical pair
+slips along the vector (r θ̇, ṡ), so its friction is one force along that, not a full torque and a full force beside each
+other; the model `pezzuti` has both [P 17, 19]. A helical pair slips along its thread. A universal pair is two pins.
+A ball's friction moment opposes the relative angular velocity with the lever of the radius: what a ball that bears on
+its great circle across the load has, and the most for any other place of the contact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from trunnion.algebra.dual import primal
+from trunnion.algebra.namespace import Number, namespace
+from trunnion.algebra.rigid import Frame, Screw, about
+from trunnion.algebra.space import Vector3, dot, plus, scaled
+from trunnion.analysis.space.motion import SpatialWalk
+from trunnion.joints.pairs import ContactLoad
+from trunnion.joints.spatial_load import BallLoad, BearingLoad
+
+__all__ = ["Rubbing", "bearing_middle", "contacts"]
+
+NULL: Vector3 = (0.0, 0.0, 0.0)
+
+
+class Rubbing(NamedTuple):
+    """One contact: its load, its slip speed, m/s, the unit friction on the second link, whether its own joint loads it."""
+
+    load: ContactLoad
+    slip: Number
+    unit: Screw
+    felt: bool = False
+
+
+def bearing_middle(walk: SpatialWalk, joint: str) -> Vector3:
+    """Middle of a joint's bearing: its point on the second link, moved along the axis by the offset of the pin, m."""
+    second = walk.element(walk.system.joints[joint][1][1], joint)
+    offset = walk.values.get(f"joints.{joint}.pin.offset")
+    return second.place if offset is None else plus(second.place, scaled(offset, second.z))
+
+
+def contacts(walk: SpatialWalk, joint: str) -> Iterator[Rubbing]:
+    """The contacts of a joint."""
+    kind = walk.system.joints[joint][0]
+    middle = bearing_middle(walk, joint)
+    axis = walk.element(walk.system.joints[joint][1][1], joint).z
+    if kind == "spherical":
+        yield _ball(walk, joint, middle)
+        return
+    if kind == "universal":
+        yield from _two_pins(walk, joint, middle)
+        return
+    load = _bearing(walk, joint, kind, axis, middle)
+    turn, slide = walk.rates(joint)
+    if kind == "prismatic":
+        yield Rubbing(load, slide, Screw(axis, about(axis, NULL, middle).m))
+        return
+    lever = walk.values[f"joints.{joint}.pin.radius"]
+    moment = Screw(NULL, scaled(lever, axis))
+    if kind == "revolute":
+        yield Rubbing(load, lever * turn, moment)
+    elif kind == "helical":
+        lead = walk.space.lead(walk.values, joint)
+        way = namespace(lead, lever).sqrt(lever * lever + lead * lead)
+        yield Rubbing(load, way * turn, _mixed(axis, middle, lever, lever / way, lead / way))
+    elif _summed(walk, joint):
+        yield Rubbing(load, lever * turn, moment)
+        yield Rubbing(load, slide, about(axis, NULL, middle))
+    else:
+        yield _resultant(load, axis, middle, lever, (lever * turn, slide))
+
+
+def _resultant(
+    load: ContactLoad, axis: Vector3, middle: Vector3, lever: Number, slip: tuple[Number, Number]
+) -> Rubbing:
+    """Friction along the vector of the slip; where there is none, about the axis."""
+    square = slip[0] * slip[0] + slip[1] * slip[1]
+    xp = namespace(square)
+    moves = primal(square) > 0
+    speed = xp.where(moves, xp.sqrt(xp.where(moves, square, 1.0)), 0.0)
+    share = 1 / xp.where(moves, speed, 1.0)
+    cosine, sine = xp.where(moves, slip[0] * share, 1.0), xp.where(moves, slip[1] * share, 0.0)
+    return Rubbing(load, speed, _mixed(axis, middle, lever, cosine, sine))
+
+
+def _mixed(axis: Vector3, middle: Vector3, lever: Number, cosine: Number, sine: Number) -> Screw:
+    """A unit friction force, its part across the axis with a lever."""
+    return about(scaled(sine, axis), scaled(lever * cosine, axis), middle)
+
+
+def _summed(walk: SpatialWalk, joint: str) -> bool:
+    friction = walk.system.mechanism.effective_joints[joint].friction
+    return friction is not None and friction.model == "pezzuti"
+
+
+def _bearing(walk: SpatialWalk, joint: str, kind: str, axis: Vector3, middle: Vector3) -> BearingLoad:
+    values, path = walk.values, f"joints.{joint}"
+    if kind == "prismatic":
+        length = values[f"{path}.guide.length"]
+        return BearingLoad(axis, middle, length, _summed(walk, joint), values.get(f"{path}.guide.width"))
+    radius = values[f"{path}.pin.radius"] if kind == "helical" else None
+    return BearingLoad(axis, middle, values[f"{path}.pin.bearing"], _summed(walk, joint), radius=radius)
+
+
+def _ball(walk: SpatialWalk, joint: str, middle: Vector3) -> Rubbing:
+    turn = walk.against(joint).u
+    radius = walk.values[f"joints.{joint}.pin.radius"]
+    square = dot(turn, turn)
+    xp = namespace(square)
+    moves = primal(square) > 0
+    speed = xp.where(moves, xp.sqrt(xp.where(moves, square, 1.0)), 0.0)
+    direction = scaled(1 / xp.where(moves, speed, 1.0), turn)
+    return Rubbing(BallLoad(), radius * speed, Screw(NULL, scaled(radius, direction)))
+
+
+def _two_pins(walk: SpatialWalk, joint: str, middle: Vector3) -> Iterator[Rubbing]:
+    """Each pin of the cross is a revolute bearing; friction of one is carried by the other as a moment across it."""
+    values, path = walk.values, f"joints.{joint}"
+    first, second = (walk.element(link, joint) for link in walk.system.joints[joint][1])
+    lever = values[f"{path}.pin.radius"]
+    for axis, rate in zip((first.z, second.z), pin_rates(walk, joint, first, second), strict=True):
+        load = BearingLoad(axis, middle, values[f"{path}.pin.bearing"], _summed(walk, joint))
+        yield Rubbing(load, lever * rate, Screw(NULL, scaled(lever, axis)), felt=True)
+
+
+def pin_rates(walk: SpatialWalk, joint: str, first: Frame, second: Frame) -> tuple[Number, Number]:
+    """Rates about the two pins of a universal pair, at right angles, rad/s."""
+    turn = walk.against(joint).u
+    return dot(turn, first.z), dot(turn, second.z)

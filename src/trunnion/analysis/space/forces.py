@@ -1,0 +1,265 @@
+"""Forces in space, backward through the row of modules: reactions, friction, drive efforts.
+
+The load of a link's own inertia is minus the derivative of its dual momentum [P 20, 21], taken at the mass centre and
+carried to the origin: −m a_C and −(J ω̇ + ω × J ω), gyroscopic terms included.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from trunnion.algebra.dual import primal
+from trunnion.algebra.namespace import Number, namespace
+from trunnion.algebra.rigid import ZERO, Frame, Screw, about, added, minus, moment_at, power, rotated, times
+from trunnion.algebra.space import Vector3, cross, dot, plus, scaled, transpose
+from trunnion.analysis.friction import Contact, FrictionMethod, settle
+from trunnion.analysis.kinetostatics import ZERO_SLIP, Backward, Given
+from trunnion.analysis.loads import Slip
+from trunnion.analysis.space.contacts import Rubbing, bearing_middle, contacts
+from trunnion.analysis.space.loads import springs, stated_loads
+from trunnion.analysis.space.motion import SpatialWalk
+from trunnion.analysis.system import Place, law_of
+from trunnion.groups.spatial import SpatialGroup
+from trunnion.joints.pairs import Reaction
+from trunnion.joints.spatial_load import halves
+from trunnion.model.parts import InertiaTensor
+
+__all__ = ["SpatialBackward", "backward"]
+
+NULL: Vector3 = (0.0, 0.0, 0.0)
+
+
+@dataclass
+class SpatialBackward(Backward):
+    """What one walk backward found in space; wrenches F + ε M are about the origin of the global frame.
+
+    reactions: on the second link by the first, friction and drive effort not included; friction: torque about the axis,
+    N m (R, C, H), about the relative angular velocity (S), of both pins together (U), force along the slide, N (P);
+    friction_wrenches: what friction does to the second link; losses: power of friction, W; spins: torque that each link
+    with a free spin would need to keep from spinning, N m.
+    """
+
+    friction_wrenches: dict[str, Screw] = field(default_factory=dict)
+    losses: dict[str, Number] = field(default_factory=dict)
+    spins: dict[str, Number] = field(default_factory=dict)
+
+    @property
+    def space(self) -> SpatialWalk:
+        """The walk forward."""
+        assert isinstance(self.walk, SpatialWalk)
+        return self.walk
+
+    def friction_power(self, joint: str) -> Number:
+        """Power lost in a joint, W."""
+        return self.losses[joint]
+
+
+def backward(walk: SpatialWalk, method: FrictionMethod, given: Given) -> SpatialBackward:
+    """Reactions and friction of every module, last module first."""
+    system = walk.system
+    loads: dict[str, Any] = dict.fromkeys(system.mechanism.effective_links, ZERO)
+    back = SpatialBackward(walk, loads)
+    for name in system.joints:
+        back.slips[name] = _slip(walk, name)
+    _add_body_loads(back)
+    _add_stated_loads(back, given.zero_slip)
+    for number in reversed(range(len(system.plan.modules))):
+        _settle_module(back, number, method, given)
+    return back
+
+
+# ---- loads ----------------------------------------------------------------------------------------------------
+
+
+def _add_body_loads(back: SpatialBackward) -> None:
+    """Gravity and inertia of every link."""
+    walk, values = back.space, back.walk.values
+    gravity: Vector3 = (values["gravity.x"], values["gravity.y"], values["gravity.z"])
+    for link in walk.system.mechanism.effective_links:
+        mass = values[f"links.{link}.mass"]
+        tensor = _tensor(walk, link)
+        if link == walk.system.mechanism.fixed_link or (tensor is None and isinstance(mass, float | int) and mass == 0):
+            continue
+        centre = walk.at(link, walk.space.centre(values, link))
+        frame, twist, second = walk.motions[link]
+        force = scaled(mass, tuple(g - a for g, a in zip(gravity, centre.acceleration, strict=True)))  # type: ignore[arg-type]
+        moment = NULL if tensor is None else scaled(-1.0, _spin_rate(frame, tensor, twist.u, second.u))
+        load = about(force, moment, centre.place)
+        back.body_power = back.body_power + power(load, twist)
+        back.loads[link] = added(back.loads[link], load)
+
+
+def _tensor(walk: SpatialWalk, link: str) -> tuple[Vector3, Vector3, Vector3] | None:
+    """Inertia of a link about its mass centre in its own axes, kg m²; None if it has none."""
+    stated, values = walk.system.mechanism.effective_links[link], walk.values
+    path = f"links.{link}.inertia"
+    if not isinstance(stated.inertia, InertiaTensor):
+        return None
+    xx, yy, zz, xy, xz, yz = (values[f"{path}.{key}"] for key in ("xx", "yy", "zz", "xy", "xz", "yz"))
+    if stated.inertia_about == "origin":  # Steiner: J_C = J_O − m (c² 1 − c cᵀ)
+        mass, (x, y, z) = values[f"links.{link}.mass"], walk.space.centre(values, link)
+        xx, yy, zz = xx - mass * (y * y + z * z), yy - mass * (x * x + z * z), zz - mass * (x * x + y * y)
+        xy, xz, yz = xy + mass * x * y, xz + mass * x * z, yz + mass * y * z
+    return (xx, xy, xz), (xy, yy, yz), (xz, yz, zz)
+
+
+def _spin_rate(frame: Frame, tensor: tuple[Vector3, Vector3, Vector3], w: Vector3, second: Vector3) -> Vector3:
+    """J ω̇ + ω × J ω about the mass centre, global axes.  [P 21]"""
+    rows = transpose((frame.x, frame.y, frame.z))
+    back = Frame(*rows, NULL)
+    local_w, local_second = rotated(back, w), rotated(back, second)
+
+    def times_tensor(v: Vector3) -> Vector3:
+        return dot(tensor[0], v), dot(tensor[1], v), dot(tensor[2], v)
+
+    return rotated(frame, plus(times_tensor(local_second), cross(local_w, times_tensor(local_w))))
+
+
+def _add_stated_loads(back: SpatialBackward, zero_slip: Mapping[str, float]) -> None:
+    """The loads and springs of the model, with the power each gives the mechanism."""
+    walk = back.space
+    for name, action in stated_loads(walk, zero_slip):
+        back.load_powers[name] = action.power
+        back.undefined[f"loads.{name}"] = action.undefined
+        for link, wrench in action.on:
+            back.loads[link] = added(back.loads[link], wrench)
+    for name, action, state in springs(walk) if walk.system.mechanism.springs else ():
+        back.springs[name] = state
+        back.undefined[f"springs.{name}"] = action.undefined
+        for link, wrench in action.on:
+            back.loads[link] = added(back.loads[link], wrench)
+
+
+def _slip(walk: SpatialWalk, joint: str) -> Slip:
+    """Slip that decides a joint's friction or resistance, and whether it is zero but for rounding.
+
+    Of a pair on one axis its rate; of a cylindrical one its turn if it does not slide, else the resultant counts.
+    """
+    kind, (first, second) = walk.system.joints[joint]
+    if kind == "fixed":
+        return Slip(0.0, False)
+    pace, size = walk.system.pace(walk.values), walk.system.size(walk.values)
+    spins = [np.sqrt(primal(dot(walk.motions[link].twist.u, walk.motions[link].twist.u))) for link in (first, second)]
+    scale = ZERO_SLIP * (spins[0] + spins[1] + pace)
+    if kind in ("spherical", "universal", "planar"):
+        turn = walk.against(joint).u
+        speed = np.sqrt(primal(dot(turn, turn)))
+        return Slip(speed, speed <= scale)
+    turn_rate, slide_rate = walk.rates(joint)
+    still = np.abs(primal(turn_rate)) <= scale
+    if kind == "prismatic":
+        return Slip(slide_rate, np.abs(primal(slide_rate)) <= scale * size)
+    if kind == "cylindrical" and _rubs(walk, joint):
+        still = still & (np.abs(primal(slide_rate)) <= scale * size)
+    return Slip(turn_rate, still)
+
+
+def _rubs(walk: SpatialWalk, joint: str) -> bool:
+    return walk.system.mechanism.effective_joints[joint].friction is not None
+
+
+# ---- one module -----------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Flat:
+    """A module whose reactions are flat tuples, as `friction` wants them."""
+
+    group: SpatialGroup
+
+    def reactions(self, pose: Any, loads: Sequence[Screw]) -> list[Reaction]:
+        return [(*wrench.u, *wrench.m) for wrench in self.group.reactions(pose, loads)]
+
+
+def _settle_module(back: SpatialBackward, number: int, method: FrictionMethod, given: Given) -> None:
+    walk = back.space
+    module, group, places = walk.space.plan.modules[number], walk.space.groups[number], walk.system.places[number]
+    pose = walk.poses[number]
+    loads = [back.loads[link] for link in module.links]
+    found: list[Contact] = []
+    rubbing: list[Rubbing] = []
+    for k, place in enumerate(places):
+        if _rubs(walk, place.joint):
+            for one in contacts(walk, place.joint):
+                rubbing.append(one)
+                found.append(_contact(back, module.links, k, place, one, given))
+    settled = settle(_Flat(group), pose, loads, found, method)
+    back.settled.append(settled)
+    for (link, _, _), torque in zip(module.spinning, group.spin_torques(pose, loads), strict=True):
+        back.spins[link] = torque
+    for k, place in enumerate(places):
+        friction, loss, own = ZERO, _nothing(), ZERO
+        for contact, one, force in zip(found, rubbing, settled.forces, strict=True):
+            if contact.joint == k:
+                part = times(force, one.unit)
+                friction, loss = added(friction, part), loss - force * contact.slip
+                own = added(own, part) if contact.own is not None else own
+        wrench = minus(Screw(*halves(settled.reactions[k])), own)
+        driven = module.driven.index(place.joint) if place.joint in module.driven else None
+        _record(back, place, wrench, friction, loss, None if driven is None else pose.screws[k][0])
+
+
+def _nothing() -> Number:
+    return 0.0
+
+
+def _contact(
+    back: SpatialBackward, links: tuple[str, ...], k: int, place: Place, one: Rubbing, given: Given
+) -> Contact:
+    """One contact of a joint as `friction` sees it."""
+    walk, slip = back.space, back.slips[place.joint]
+    law = law_of(walk.system, place.joint)
+    parameters = {name: walk.values[f"joints.{place.joint}.friction.{name}"] for name in law.parameters}
+    speed = one.slip
+    if np.any(slip.zero):
+        forced = given.zero_slip.get(place.joint, 0.0) * np.maximum(np.abs(primal(speed)), 1e-300)
+        speed = namespace(speed).where(slip.zero, forced, speed)
+    if place.joint in given.deflections:
+        parameters["deflection"] = given.deflections[place.joint]
+    first, second = place.links
+    units = [one.unit if link == second else times(-1.0, one.unit) if link == first else ZERO for link in links]
+    own = (*one.unit.u, *one.unit.m) if one.felt else None
+    return Contact(k, units, one.load, law, parameters, speed, own=own)
+
+
+def _record(
+    back: SpatialBackward, place: Place, wrench: Screw, friction: Screw, loss: Number, driven: Screw | None
+) -> None:
+    """Keep a joint's reaction, friction and drive effort; load its known link with all three."""
+    walk, joint = back.space, place.joint
+    drive = ZERO
+    if driven is not None:
+        effort = power(wrench, driven)
+        back.efforts[joint] = effort
+        axis = walk.element(place.links[1], joint).z
+        drive = times(
+            effort, Screw(NULL, axis) if walk.system.turns(joint) else about(axis, NULL, _place_of(walk, joint))
+        )
+    back.reactions[joint] = minus(wrench, drive)
+    back.friction_wrenches[joint], back.losses[joint] = friction, loss
+    back.friction[joint] = _scalar(back, joint, friction, loss)
+    whole = added(wrench, friction)
+    for i, (link, outer) in enumerate(zip(place.links, place.outer, strict=True)):
+        if outer and link != walk.system.mechanism.fixed_link:
+            back.loads[link] = added(back.loads[link], whole if i == 1 else times(-1.0, whole))
+
+
+def _place_of(walk: SpatialWalk, joint: str) -> Vector3:
+    return walk.element(walk.system.joints[joint][1][1], joint).place
+
+
+def _scalar(back: SpatialBackward, joint: str, friction: Screw, loss: Number) -> Number:
+    """The friction of a joint as one number: about or along its axis; of balls and crosses −loss/|ω|."""
+    walk, kind = back.space, back.walk.system.joints[joint][0]
+    axis = walk.element(walk.system.joints[joint][1][1], joint).z
+    if kind == "prismatic":
+        return dot(friction.u, axis)
+    if kind in ("spherical", "universal"):
+        speed = back.slips[joint].speed
+        moves = np.asarray(speed > 0)
+        return namespace(loss).where(moves, -loss / np.where(moves, speed, 1.0), 0.0)
+    return dot(moment_at(friction, bearing_middle(walk, joint)), axis)

@@ -1,0 +1,627 @@
+"""Any module in space: links between known links, joined by any lower pairs, some perhaps driven.
+
+Every joint keeps its coordinates q. A tree of joints hangs the links on the known ones; each joint that the tree leaves
+out closes a loop: its second element must be where its coordinates, seen from the first, put it [P 8]. That is six
+equations, a twist, for each loop. J (6 L × n) has the screws of the free coordinates as columns, seen at the loops.
+
+    position      J δq = −gap             (Newton)
+    velocity      J q̇ = −gap rate with q̇ = 0
+    acceleration  J q̈ = −gap acceleration with q̈ = 0, which holds the Lie brackets of the twists with the screws
+    reactions     Jᵀ λ = −(power of the outboard loads on each screw); the rest link by link
+
+A link whose spin is free (both its joints are spherical) adds one row: it does not spin about the line of its joints.
+Where the loops ask for more than the coordinates can give (`redundant`), the equations are solved by least squares and
+the reactions are those of least size, see `groups.redundant`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from trunnion.algebra import linalg
+from trunnion.algebra.dual import Dual, primal
+from trunnion.algebra.namespace import Number, namespace
+from trunnion.algebra.nested import each, flat
+from trunnion.algebra.rigid import (
+    ZERO,
+    Frame,
+    Screw,
+    added,
+    bracket,
+    compose,
+    minus,
+    moment_at,
+    power,
+    relative,
+    times,
+    vector_minus,
+)
+from trunnion.algebra.space import Vector3, cross, dot, plus, scaled
+from trunnion.groups import redundant
+from trunnion.groups import tree as spanning
+from trunnion.groups.tree import OUTER, GroupJoint, Step
+from trunnion.joints.spatial import MOTIONS
+
+__all__ = ["Element", "Pose", "SpatialGroup"]
+
+QUICK = 8  # rounds for all lanes
+NEWTON_LIMIT = 60  # more for those that need them
+NEARLY = 1e-7  # of its largest allowed step: from here one more round reaches rounding
+TURN_LIMIT = 0.4  # rad a step: keeps Newton on the branch it starts on
+SLIDE_LIMIT = 0.3  # of the size
+CLOSED = 1e-9  # rad, or of the size: a gap that redundant equations leave at most
+
+
+class Element(NamedTuple):
+    """A joint's element on its first and on its second link, and its lead: slide for one radian of a helical pair."""
+
+    first: Frame
+    second: Frame
+    lead: Number = 0.0
+
+    def side(self, i: int) -> Frame:
+        """The element on the first (0) or second (1) link."""
+        return self.second if i else self.first
+
+
+class Pose(NamedTuple):
+    """Frames of the links; elements of the joints and the screws of their freedoms (global); coordinates q; J and J⁻¹.
+
+    size: a length typical of each lane, in which J has its lengths; orientation: sign of det J, which is the same all
+    along one branch of assembly; gap: largest opening of a loop, m, an angle counted as angle times size.
+    """
+
+    frames: tuple[Frame, ...]
+    elements: tuple[Element, ...]
+    screws: tuple[list[Screw], ...]
+    q: tuple[Number, ...]
+    jacobian: list[list[Number]]
+    inverse: list[list[Number]]
+    size: Number
+    gap: Number
+    condition: Number
+    orientation: Number
+
+
+@dataclass(frozen=True)
+class SpatialGroup:
+    """The module with the given joints.
+
+    driven: indices of joints whose first coordinate is prescribed; spinning: links whose spin is free, each with its
+    two spherical joints; redundant: whether the loops may ask for more than the coordinates can give.
+    """
+
+    links: int
+    joints: tuple[GroupJoint, ...]
+    driven: tuple[int, ...] = ()
+    spinning: tuple[tuple[int, int, int], ...] = ()
+    redundant: bool = False
+    BRANCHES: tuple[int, ...] = ()
+
+    # ---- coordinates ----------------------------------------------------------------------------------------
+
+    @cached_property
+    def steps(self) -> tuple[Step, ...]:
+        """The tree, outermost link last; driven joints are kept in it where they can be."""
+        return spanning.grow(self.links, self.joints, self.driven)
+
+    @cached_property
+    def chords(self) -> tuple[int, ...]:
+        """The joints that the tree leaves out."""
+        inside = {step.joint for step in self.steps}
+        return tuple(k for k in range(len(self.joints)) if k not in inside)
+
+    @cached_property
+    def starts(self) -> tuple[int, ...]:
+        """Where the coordinates of each joint begin in q, and where they end."""
+        counts = [len(MOTIONS[joint.kind].kinds) for joint in self.joints]
+        return tuple(sum(counts[:k]) for k in range(len(counts) + 1))
+
+    @cached_property
+    def kinds(self) -> tuple[str, ...]:
+        """What each entry of q is: "turn", "slide", or "part" of a quaternion."""
+        return tuple(kind for joint in self.joints for kind in MOTIONS[joint.kind].kinds)
+
+    @cached_property
+    def kept(self) -> tuple[int, ...]:
+        """The entries of q that an assembly states: all but the prescribed."""
+        prescribed = {self.starts[k] for k in self.driven}
+        return tuple(i for i in range(len(self.kinds)) if i not in prescribed)
+
+    @cached_property
+    def kept_kinds(self) -> tuple[str, ...]:
+        """What each of them is."""
+        return tuple(self.kinds[i] for i in self.kept)
+
+    @cached_property
+    def free(self) -> tuple[tuple[int, int], ...]:
+        """(joint, freedom) of the unknowns."""
+        return tuple(
+            (k, i)
+            for k, joint in enumerate(self.joints)
+            for i in range(len(MOTIONS[joint.kind].steps))
+            if not (k in self.driven and i == 0)
+        )
+
+    def coordinates(self, start: Sequence[Number], drive: Sequence[Number]) -> list[list[Number]]:
+        """Coordinates of each joint, from those of `kept` and the prescribed ones."""
+        values: list[Number] = [0.0] * len(self.kinds)
+        for i, value in zip(self.kept, start, strict=True):
+            values[i] = value
+        for k, value in zip(self.driven, drive, strict=True):
+            values[self.starts[k]] = value
+        return [values[a:b] for a, b in pairwise(self.starts)]
+
+    @cached_property
+    def _paths(self) -> dict[int, dict[int, int]]:
+        """For each link the joints between it and the known links, each with the sign its screws count with."""
+        paths: dict[int, dict[int, int]] = {OUTER: {}}
+        for step in self.steps:
+            paths[step.child] = {**paths[step.parent], step.joint: 1 if step.near == 0 else -1}
+        return paths
+
+    def weight(self, joint: int, row: int) -> int:
+        """Sign with which the freedoms of a joint open the loop that joint `row` closes; 0 if they do not."""
+        first, second = (self._paths[link] for link in self.joints[row].sides)
+        return second.get(joint, 0) - first.get(joint, 0) - (joint == row)
+
+    # ---- position -------------------------------------------------------------------------------------------
+
+    def position(
+        self, elements: Sequence[Element], assembly: Sequence[Number] | None, drive: Sequence[Number] = ()
+    ) -> Pose:
+        """Pose by Newton from the coordinates `assembly` of all joints but the prescribed (rad, m, quaternions).
+
+        NaN in the lanes that do not close. Dual inputs: one more step at the solution for each level of ε.
+        """
+        with np.errstate(all="ignore"):
+            real = [each(one, primal) for one in elements]
+            size = self.size(real)
+            q = self.coordinates([primal(v) for v in assembly or ()], [primal(v) for v in drive])
+            q = self._newton(real, q, size)
+            numbers = [*drive, *(n for one in elements for n in flat(one))]
+            depth = max((n.depth for n in numbers if isinstance(n, Dual)), default=0)
+            found = [value for joint in q for value in joint]
+            q = self.coordinates([found[i] for i in self.kept], drive)
+            for _ in range(depth):
+                q = self._step(elements, q, size)
+            return self._posed(elements, q, size)
+
+    def _posed(self, elements: Sequence[Element], q: list[list[Number]], size: Number) -> Pose:
+        frames, placed, screws = self._place(elements, q)
+        jacobian = self._jacobian(placed, screws, size)
+        orientation: Number = 1.0
+        if not jacobian or not self.free:
+            inverse: list[list[Number]] = []
+        elif self.redundant:
+            inverse = redundant.pseudo_inverse(jacobian)
+        else:
+            inverse = linalg.inverse(jacobian)
+            orientation = np.sign(primal(linalg.determinant(jacobian)))
+        gap = self._opening(placed, q, size)
+        condition = _condition(jacobian, inverse)
+        all_q = tuple(value for joint in q for value in joint)
+        return Pose(frames, placed, screws, all_q, jacobian, inverse, size, gap, condition, orientation)
+
+    def _newton(self, elements: Sequence[Element], q: list[list[Number]], size: Number) -> list[list[Number]]:
+        """Newton on real numbers; lanes that do not converge are NaN."""
+        q = [[np.asarray(v, float) for v in joint] for joint in q]
+        if not self.free or not self.chords:
+            return q
+        q, moved_by = self._iterate(elements, q, size, QUICK)
+        late = ~(moved_by <= NEARLY)
+        if np.any(late):
+            q, moved_by = self._finish_late(elements, q, size, late)
+        q = self._step(elements, q, size)  # quadratic: from NEARLY to rounding
+        placed = self._place(elements, q)[1]
+        closed = (moved_by <= NEARLY) & (self._opening(placed, q, size) <= CLOSED * size)
+        return [[np.where(closed, value, np.nan) for value in joint] for joint in q]
+
+    def _iterate(
+        self, elements: Sequence[Element], q: list[list[Number]], size: Number, rounds: int
+    ) -> tuple[list[list[Number]], Number]:
+        """Newton steps until no lane moves by more than NEARLY (of its limit), at most `rounds`."""
+        last: Number = np.inf
+        for _ in range(rounds):
+            steps = self._steps(elements, q, size)
+            last = self._largest(steps)
+            shrink = 1 / np.maximum(last, 1.0)
+            q = self._advanced(q, [[s * shrink for s in joint] for joint in steps], size)
+            if not np.any(last > NEARLY):
+                break
+        return q, np.broadcast_to(last, np.broadcast_shapes(np.shape(last), *(np.shape(v) for j in q for v in j)))
+
+    def _largest(self, steps: list[list[Number]]) -> Number:
+        """Largest entry of scaled steps in terms of its limit."""
+        moves = [
+            np.abs(s) / (TURN_LIMIT if kind == "turn" else SLIDE_LIMIT)
+            for joint, values in zip(self.joints, steps, strict=True)
+            for s, kind in zip(values, MOTIONS[joint.kind].steps, strict=True)
+        ]
+        return np.maximum.reduce(np.broadcast_arrays(*moves))
+
+    def _finish_late(
+        self, elements: Sequence[Element], q: list[list[Number]], size: Number, late: Number
+    ) -> tuple[list[list[Number]], Number]:
+        """Go on with the lanes that are still open, and with those alone: they are few or beyond help."""
+        shape = late.shape
+
+        def part(number: Number) -> Number:
+            return np.broadcast_to(number, shape)[late]
+
+        some = [each(one, part) for one in elements]
+        found, last = self._iterate(some, [[part(v) for v in joint] for joint in q], part(size), NEWTON_LIMIT)
+        moved_by = np.zeros(shape)
+        moved_by[late] = last
+        merged: list[list[Number]] = []
+        for joint, new in zip(q, found, strict=True):
+            merged.append([])
+            for value, better in zip(joint, new, strict=True):
+                whole = np.array(np.broadcast_to(value, shape), float)
+                whole[late] = better
+                merged[-1].append(whole)
+        return merged, moved_by
+
+    def _step(self, elements: Sequence[Element], q: list[list[Number]], size: Number) -> list[list[Number]]:
+        """One whole Newton step."""
+        return self._advanced(q, self._steps(elements, q, size), size)
+
+    def _steps(self, elements: Sequence[Element], q: list[list[Number]], size: Number) -> list[list[Number]]:
+        """Newton's step in every freedom, slides in units of the size; 0 for the driven."""
+        _, placed, screws = self._place(elements, q)
+        gaps = self._gaps(placed, q, size)
+        jacobian = self._jacobian(placed, screws, size)
+        if self.redundant:
+            found = redundant.least_squares(jacobian, gaps)
+        else:
+            (found,) = linalg.solve(jacobian, gaps)
+        steps: list[list[Number]] = [[0.0] * len(MOTIONS[joint.kind].steps) for joint in self.joints]
+        for (k, i), step in zip(self.free, found, strict=True):
+            steps[k][i] = -step
+        return steps
+
+    def _advanced(self, q: list[list[Number]], steps: list[list[Number]], size: Number) -> list[list[Number]]:
+        found = []
+        for joint, values, step in zip(self.joints, q, steps, strict=True):
+            motion = MOTIONS[joint.kind]
+            scaled_ = [s * size if kind == "slide" else s for s, kind in zip(step, motion.steps, strict=True)]
+            found.append(motion.advanced(values, scaled_))
+        return found
+
+    def _place(
+        self, elements: Sequence[Element], q: Sequence[Sequence[Number]]
+    ) -> tuple[tuple[Frame, ...], tuple[Element, ...], tuple[list[Screw], ...]]:
+        """Frames of all links, elements of all joints (global) and the screws of their freedoms."""
+        frames: dict[int, Frame] = {}
+        known: dict[tuple[int, int], Frame] = {}
+
+        def placed(k: int, side: int) -> Frame:
+            if (k, side) not in known:
+                link, local = self.joints[k].sides[side], elements[k].side(side)
+                known[k, side] = local if link == OUTER else compose(frames[link], local)
+            return known[k, side]
+
+        for step in self.steps:
+            k, motion = step.joint, MOTIONS[self.joints[step.joint].kind]
+            move = motion.place if step.near == 0 else motion.unplace
+            known[k, 1 - step.near] = far = move(placed(k, step.near), q[k], elements[k].lead)
+            frames[step.child] = relative(far, elements[k].side(1 - step.near))
+        pairs = tuple(Element(placed(k, 0), placed(k, 1), elements[k].lead) for k in range(len(self.joints)))
+        screws = tuple(MOTIONS[joint.kind].screws(*pair) for joint, pair in zip(self.joints, pairs, strict=True))
+        return tuple(frames[link] for link in range(self.links)), pairs, screws
+
+    def size(self, elements: Sequence[Element]) -> Number:
+        """A length typical of each lane, m: the widest spread of joint elements on one link, or of the known ones."""
+        places: dict[int, list[Vector3]] = {}
+        for joint, one in zip(self.joints, elements, strict=True):
+            for side, link in enumerate(joint.sides):
+                places.setdefault(link, []).append(one.side(side).place)
+        size: Number = 0.0
+        for first, *others in places.values():
+            for other in others:
+                apart = vector_minus(other, first)
+                size = np.fmax(size, np.sqrt(primal(dot(apart, apart))))
+        return np.where(size > 0, size, 1.0)
+
+    # ---- loops ----------------------------------------------------------------------------------------------
+
+    def _loops(self, placed: Sequence[Element], q: Sequence[Sequence[Number]]) -> Iterator[tuple[Vector3, Vector3]]:
+        """Turn and way from where each loop's last joint puts its second element to where that is."""
+        for k in self.chords:
+            one = placed[k]
+            aim = MOTIONS[self.joints[k].kind].place(one.first, q[k], one.lead)
+            turn = plus(plus(cross(aim.x, one.second.x), cross(aim.y, one.second.y)), cross(aim.z, one.second.z))
+            yield scaled(0.5, turn), vector_minus(one.second.place, aim.place)
+
+    def _gaps(self, placed: Sequence[Element], q: Sequence[Sequence[Number]], size: Number) -> list[Number]:
+        """By how much each row is open: rad, and lengths in units of the size; a spin is never open."""
+        rows: list[Number] = []
+        for turn, way in self._loops(placed, q):
+            rows += [*turn, *(length / size for length in way)]
+        return rows + [0.0] * len(self.spinning)
+
+    def _opening(self, placed: Sequence[Element], q: Sequence[Sequence[Number]], size: Number) -> Number:
+        """Largest opening of a loop, m; an angle, taken from the axes themselves, counts as angle times size."""
+        worst: Number = 0.0
+        for k in self.chords:
+            one = placed[k]
+            aim = MOTIONS[self.joints[k].kind].place(one.first, q[k], one.lead)
+            for found, wanted, scale in zip(one.second, aim, (size, size, size, 1.0), strict=True):
+                for a, b in zip(found, wanted, strict=True):
+                    worst = np.maximum(worst, scale * np.abs(primal(a) - primal(b)))
+        return worst
+
+    def _jacobian(self, placed: Sequence[Element], screws: Sequence[list[Screw]], size: Number) -> list[list[Number]]:
+        """Rate of every row for a unit rate of every free coordinate, slides in units of the size."""
+        matrix: list[list[Number]] = []
+        for row in self.chords:
+            place = placed[row].second.place
+            block: list[list[Number]] = [[] for _ in range(6)]
+            for k, i in self.free:
+                weight = self.weight(k, row)
+                entries = _entries(screws[k][i], place, size, self._slides(k, i)) if weight else (0.0,) * 6
+                for line, entry in zip(block, entries, strict=True):
+                    line.append(entry if weight == 1 else -entry if weight == -1 else weight * entry)
+            matrix += block
+        for link, a, b in self.spinning:
+            axis = _axis(placed, a, b)
+            path = self._paths[link]
+            matrix.append([path.get(k, 0) * dot(axis, screws[k][i].u) for k, i in self.free])
+        return matrix
+
+    def _slides(self, joint: int, freedom: int) -> bool:
+        return MOTIONS[self.joints[joint].kind].steps[freedom] == "slide"
+
+    # ---- velocity and acceleration --------------------------------------------------------------------------
+
+    def velocity(self, pose: Pose, outer: Sequence[Screw | None], drive: Sequence[Number] = ()) -> list[Screw]:
+        """Twists of the links. outer: of each joint's known link; drive: rates of the driven coordinates."""
+        return self._twists(pose, outer, self.rates(pose, outer, drive))[: self.links]
+
+    def rates(self, pose: Pose, outer: Sequence[Screw | None], drive: Sequence[Number] = ()) -> list[list[Number]]:
+        """Rate of every freedom of every joint, rad/s and m/s."""
+        rates = self._driven_only(drive)
+        twists = self._twists(pose, outer, rates)
+        known = Outside(self, pose, twists, outer)
+        rows: list[Number] = []
+        for k in self.chords:
+            relative_ = minus(known.of(k, 1), known.of(k, 0))
+            for screw, rate in zip(pose.screws[k], rates[k], strict=True):
+                relative_ = minus(relative_, times(rate, screw))
+            rows += _entries(relative_, pose.elements[k].second.place, pose.size, slides=False)
+        rows += [dot(_axis(pose.elements, a, b), twists[link].u) for link, a, b in self.spinning]
+        return self._closing(pose, rates, rows)
+
+    def _driven_only(self, drive: Sequence[Number]) -> list[list[Number]]:
+        rates: list[list[Number]] = [[0.0] * len(MOTIONS[joint.kind].steps) for joint in self.joints]
+        for k, value in zip(self.driven, drive, strict=True):
+            rates[k][0] = value
+        return rates
+
+    def _closing(self, pose: Pose, rates: list[list[Number]], rows: Sequence[Number]) -> list[list[Number]]:
+        """The rates with those of the free coordinates that close what is open."""
+        for (k, i), line in zip(self.free, pose.inverse, strict=True) if rows else ():
+            value = -_weighted(line, rows)
+            rates[k][i] = value * pose.size if self._slides(k, i) else value
+        return rates
+
+    def _twists(self, pose: Pose, outer: Sequence[Screw | None], rates: Sequence[Sequence[Number]]) -> list[Screw]:
+        twists: dict[int, Screw] = {}
+        for step in self.steps:
+            k = step.joint
+            twist = (outer[k] or ZERO) if step.parent == OUTER else twists[step.parent]
+            for screw, rate in zip(pose.screws[k], rates[k], strict=True):
+                twist = added(twist, times(rate if step.near == 0 else -rate, screw))
+            twists[step.child] = twist
+        return [twists[link] for link in range(self.links)]
+
+    def acceleration(
+        self,
+        pose: Pose,
+        twists: Sequence[Screw],
+        outer_twists: Sequence[Screw | None],
+        outer: Sequence[Screw | None],
+        drive: Sequence[Number] = (),
+        rates: Sequence[Number] = (),
+    ) -> list[Screw]:
+        """Derivatives of the twists of the links. drive: second derivatives of the driven coordinates, rates: first."""
+        speeds = self.rates(pose, outer_twists, rates)
+        known = Outside(self, pose, twists, outer_twists)
+        carried = [self._carried(pose, speeds[k], k, known.of(k, 0)) for k in range(len(self.joints))]
+        second = self._driven_only(drive)
+        found = self._accelerations(pose, outer, second, carried)
+        after = Outside(self, pose, found, outer)
+        rows: list[Number] = []
+        for k in self.chords:
+            relative_ = minus(minus(after.of(k, 1), after.of(k, 0)), carried[k])
+            for screw, value in zip(pose.screws[k], second[k], strict=True):
+                relative_ = minus(relative_, times(value, screw))
+            rows += _entries(relative_, pose.elements[k].second.place, pose.size, slides=False)
+        for link, a, b in self.spinning:
+            rows.append(dot(_axis(pose.elements, a, b), found[link].u))  # ω · u = 0 and u̇ = ω × u: no further term
+        second = self._closing(pose, second, rows)
+        return self._accelerations(pose, outer, second, carried)[: self.links]
+
+    def _carried(self, pose: Pose, speeds: Sequence[Number], k: int, base: Screw) -> Screw:
+        """Σ q̇ (V × s) of a joint: its screws are carried along by its first link and by the freedoms before them."""
+        motion = MOTIONS[self.joints[k].kind]
+        found, twist = ZERO, base
+        for screw, speed in zip(pose.screws[k], speeds, strict=True):
+            part = times(speed, screw)
+            found = added(found, bracket(twist, part))
+            if not motion.together:
+                twist = added(twist, part)
+        return found
+
+    def _accelerations(
+        self,
+        pose: Pose,
+        outer: Sequence[Screw | None],
+        second: Sequence[Sequence[Number]],
+        carried: Sequence[Screw],
+    ) -> list[Screw]:
+        found: dict[int, Screw] = {}
+        for step in self.steps:
+            k = step.joint
+            base = (outer[k] or ZERO) if step.parent == OUTER else found[step.parent]
+            part = carried[k]
+            for screw, value in zip(pose.screws[k], second[k], strict=True):
+                part = added(part, times(value, screw))
+            found[step.child] = added(base, part) if step.near == 0 else minus(base, part)
+        return [found[link] for link in range(self.links)]
+
+    # ---- reactions ------------------------------------------------------------------------------------------
+
+    def reactions(self, pose: Pose, loads: Sequence[Screw]) -> list[Screw]:
+        """Wrench on the second link of each joint by the first, about the origin.
+
+        loads: everything else that acts on each link, inertia included. The component along a driven freedom is the
+        drive effort. Cut wrenches from Jᵀ λ = −(outboard power on each screw), the others link by link.
+        """
+        multipliers = self._multipliers(pose, loads)
+        if self.redundant and multipliers:
+            multipliers = redundant.least(self, pose, loads, multipliers)
+        return self.link_by_link(pose, loads, multipliers)
+
+    def link_by_link(self, pose: Pose, loads: Sequence[Screw], multipliers: Sequence[Number]) -> list[Screw]:
+        """The wrenches of all joints from those of the loops."""
+        carried = dict(enumerate(loads))
+        found: dict[int, Screw] = {}
+        for n, k in enumerate(self.chords):
+            found[k] = wrench = self.cut_wrench(pose, k, multipliers[6 * n : 6 * n + 6])
+            first, second = self.joints[k].sides
+            if second != OUTER:
+                carried[second] = added(carried[second], wrench)
+            if first != OUTER:
+                carried[first] = minus(carried[first], wrench)
+        for (link, a, b), torque in zip(self.spinning, multipliers[6 * len(self.chords) :], strict=True):
+            spin = Screw((0.0, 0.0, 0.0), scaled(torque, _axis(pose.elements, a, b)))
+            carried[link] = added(carried[link], spin)
+        for step in reversed(self.steps):
+            total = carried[step.child]
+            found[step.joint] = times(-1.0 if step.near == 0 else 1.0, total)
+            if step.parent != OUTER:
+                carried[step.parent] = added(carried[step.parent], total)
+        return [found[k] for k in range(len(self.joints))]
+
+    def cut_wrench(self, pose: Pose, k: int, sizes: Sequence[Number]) -> Screw:
+        """The wrench of six multipliers, moment and force at the place where the loop is closed, about the origin."""
+        mx, my, mz, *force = sizes
+        x, y, z = (part / pose.size for part in force)
+        place = pose.elements[k].second.place
+        return Screw((x, y, z), plus((mx, my, mz), cross(place, (x, y, z))))
+
+    def spin_torques(self, pose: Pose, loads: Sequence[Screw]) -> list[Number]:
+        """Torque about its line that each link with a free spin would need to keep from spinning, N m."""
+        return self._multipliers(pose, loads)[6 * len(self.chords) :]
+
+    def _multipliers(self, pose: Pose, loads: Sequence[Screw]) -> list[Number]:
+        """λ of every row."""
+        if not pose.inverse:
+            return []
+        outboard = dict(enumerate(loads))
+        for step in reversed(self.steps):
+            if step.parent != OUTER:
+                outboard[step.parent] = added(outboard[step.parent], outboard[step.child])
+        child = {step.joint: step for step in self.steps}
+        powers: list[Number] = []
+        for k, i in self.free:
+            step = child.get(k)
+            if step is None:
+                powers.append(0.0)
+                continue
+            value = power(outboard[step.child], pose.screws[k][i])
+            value = value * pose.size if self._slides(k, i) else value
+            powers.append(value if step.near == 0 else -value)
+        rows = range(len(pose.inverse[0]))
+        return [-_weighted([line[j] for line in pose.inverse], powers) for j in rows]
+
+    def closure(self, pose: Pose) -> Number:
+        """Largest distance by which a loop is open, m; an angle counts as angle times size."""
+        return pose.gap
+
+    def condition(self, pose: Pose) -> Number:
+        """2/n ‖J‖·‖J⁻¹‖ (Frobenius) with lengths in units of the size: 2 at best."""
+        return pose.condition
+
+    def signature(self, pose: Pose, spread: float) -> list[Number]:
+        """Numbers that tell assemblies apart: axes and places of the links; of a spinning one its two joints."""
+        spun = {link for link, _, _ in self.spinning}
+        found: list[Number] = []
+        for link, frame in enumerate(pose.frames):
+            if link not in spun:
+                found += [*frame.x, *frame.y, *frame.z, *(n / spread for n in frame.place)]
+        for _, a, b in self.spinning:
+            found += [n / spread for k in (a, b) for n in pose.elements[k].second.place]
+        return found
+
+
+@dataclass(frozen=True)
+class Outside:
+    """Twists (or their derivatives) of the links at both sides of each joint, known links included."""
+
+    group: SpatialGroup
+    pose: Pose
+    twists: Sequence[Screw]
+    outer: Sequence[Screw | None]
+
+    def of(self, k: int, side: int) -> Screw:
+        """That of the link at one side of joint k."""
+        link = self.group.joints[k].sides[side]
+        return (self.outer[k] or ZERO) if link == OUTER else self.twists[link]
+
+
+def _entries(screw: Screw, place: Vector3, size: Number, slides: bool) -> tuple[Number, ...]:
+    """Turn and velocity at a place that a screw gives, lengths in units of the size; a slide is counted in it too."""
+    if slides:
+        return (0.0, 0.0, 0.0, *screw.m)
+    x, y, z = moment_at(screw, place)
+    return (*screw.u, x / size, y / size, z / size)
+
+
+def _axis(placed: Sequence[Element], a: int, b: int) -> Vector3:
+    """Unit vector from one joint to another; the x axis where they meet, for a link without a length has no line."""
+    apart = vector_minus(placed[b].second.place, placed[a].second.place)
+    square = dot(apart, apart)
+    xp = namespace(square)
+    there = primal(square) > 0
+    return scaled(1 / xp.sqrt(xp.where(there, square, 1.0)), apart)
+
+
+def _condition(jacobian: Sequence[Sequence[Number]], inverse: Sequence[Sequence[Number]]) -> Number:
+    if not inverse:
+        return 1.0
+    direct: Number = 0.0
+    reverse: Number = 0.0
+    for matrix in (jacobian, inverse):
+        total: Number = 0.0
+        for line in matrix:
+            for value in line:
+                real = primal(value)
+                if not (isinstance(real, float) and real == 0.0):
+                    total = total + real * real
+        direct, reverse = (total, reverse) if matrix is jacobian else (direct, total)
+    return 2 * np.sqrt(direct * reverse) / len(inverse)
+
+
+def _weighted(weights: Sequence[Number], values: Sequence[Number]) -> Number:
+    total: Number = 0.0
+    for weight, value in zip(weights, values, strict=True):
+        if (isinstance(weight, float) and weight == 0.0) or (isinstance(value, float) and value == 0.0):
+            continue
+        total = total + weight * value
+    return total
+
+
+def _mapped(frame: Frame, change: object) -> Frame:
+    return Frame(*(tuple(change(n) for n in vector) for vector in frame))  # type: ignore[operator, arg-type]
+
+
+def _real(frame: Frame) -> Frame:
+    return _mapped(frame, primal)

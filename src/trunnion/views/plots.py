@@ -47,7 +47,7 @@ from trunnion.views.figures import (
 )  # fmt: skip
 from trunnion.views.lettering import plain
 from trunnion.views.quantities import prefixed, quantity
-from trunnion.views.space import is_spatial
+from trunnion.views.space import is_spatial, without_noise
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -151,10 +151,17 @@ def _reaction(result: xr.Dataset, joint: str, plane: tuple[str, str] = ("x", "y"
     return np.asarray(picked.values, dtype=float)
 
 
+def _sound(result: xr.Dataset, ideal: xr.Dataset | None) -> tuple[xr.Dataset, xr.Dataset | None]:
+    """Both without reactions that are rounding, as some of a mechanism in space are by its shape."""
+    if not is_spatial(result):
+        return result, ideal
+    return without_noise(result), None if ideal is None else without_noise(ideal)
+
+
 def reactions(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
     """Magnitude of the reaction in each joint; without friction thin and dotted."""
     if is_spatial(result):
-        return space_plots.reactions(result, ideal, FREE)
+        return space_plots.reactions(*_sound(result, ideal), FREE)
     over, joints = abscissa(result), names(result, "joint")
     forces = [np.hypot(*_reaction(result, joint)) for joint in joints]
     scope = usual_peak(*forces)
@@ -181,6 +188,7 @@ def polar(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
     """
     over, joints = abscissa(result), names(result, "joint")
     planes = space_plots.PLANES if is_spatial(result) else (("x", "y"),)
+    result, ideal = _sound(result, ideal)
     panels = [(index, joint, plane) for index, joint in enumerate(joints) for plane in planes]
     columns = min(len(panels), 2 if len(panels) in (2, 4) else 3) or 1
     rows = -(-len(panels) // columns) or 1

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.views.cycle import abscissa, attribute, column, intervals, layout, names, numbers, series
-from trunnion.views.space import is_spatial
+from trunnion.views.space import is_spatial, without_noise
 from trunnion.views.space_scene import space_scene
 
 if TYPE_CHECKING:
@@ -33,6 +33,8 @@ def scene(result: xr.Dataset, ideal: xr.Dataset | None = None, max_positions: in
     count = result.sizes["position"]
     if ideal is not None and ideal.sizes["position"] != count:
         raise ValueError(f"`ideal` has {ideal.sizes['position']} positions, the result {count}")
+    if is_spatial(result):
+        result, ideal = without_noise(result), None if ideal is None else without_noise(ideal)
     picked = _picked(count, max_positions)
     over = abscissa(result)
     kept = result.isel(position=picked)

@@ -14,17 +14,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.views.cycle import Array, attribute, layout, names
+from trunnion.views.cycle import Array, attribute, column, layout, names
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Pose", "Space", "gathered", "is_spatial", "rotation_matrix", "space"]
+__all__ = ["Pose", "Space", "gathered", "is_spatial", "rotation_matrix", "space", "without_noise"]
 
 PIN = 14.0  # a mechanism is drawn at least as large as so many radii of its thickest pin
 NEAR = 0.1  # joints whose points lie closer than this share of the size are drawn apart
 SMALLEST = 1e-9  # m, of a mechanism that has a size
-APART = 0.34  # as far from their common point as this share of the size
+APART = 0.34  # as far from their common point as this share of the size, where all axes meet in one
+ASIDE = 0.16  # where only some do
+NOISE = 1e-9  # reactions below this share of what moments and lengths make likely are rounding
 
 
 @dataclass(frozen=True)
@@ -133,8 +135,11 @@ class Space:
     def shifts(self) -> dict[str, float]:
         """How far along its axis each joint is drawn from its point, m, so that joints on one spot are told apart."""
         found: dict[str, float] = dict.fromkeys(self.joints, 0.0)
+        places = [self.at(name)[:, self.drawable] for name in self.joints]
+        spread = float(np.linalg.norm(np.ptp(np.hstack(places), axis=1))) if places else 0.0
+        share = APART if spread < APART * self.size else ASIDE
         for name in self._crowded():
-            found[name] = APART * self.size * self._sense(name, found)
+            found[name] = share * self.size * self._sense(name, found)
         return found
 
     def _crowded(self) -> list[str]:
@@ -177,7 +182,7 @@ class Space:
         return self.poses[self.joints[joint]["links"][1]].place(self.seat(joint))
 
 
-AXIAL = ("revolute", "cylindrical", "helical", "prismatic", "planar")
+AXIAL = ("revolute", "cylindrical", "helical", "prismatic")  # whose symbol may lie anywhere on the axis
 
 
 def is_spatial(result: xr.Dataset) -> bool:
@@ -202,6 +207,19 @@ def space(result: xr.Dataset) -> Space:
         what = "no position of the mechanism can be assembled: there is nothing to draw"
         raise MechanismError(Finding(what, remedy="change the lengths or the range of the driver"))
     return shown
+
+
+def without_noise(result: xr.Dataset) -> xr.Dataset:
+    """The result with zero for reactions that are only rounding beside the moments, and the other way round."""
+    force, moment = column(result, "reaction_force"), column(result, "reaction_moment")
+    if force is None or moment is None or not force.size:
+        return result
+    size = gathered(result).size
+    most = [float(np.abs(one[np.isfinite(one)]).max(initial=0.0)) for one in (force, moment)]
+    floors = {"reaction_force": NOISE * most[1] / size, "reaction_moment": NOISE * most[0] * size}
+    return result.assign(
+        {name: result[name].where(~(np.abs(result[name]) < floor), 0.0) for name, floor in floors.items()}
+    )
 
 
 def gathered(result: xr.Dataset) -> Space:

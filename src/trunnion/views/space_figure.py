@@ -15,7 +15,7 @@ from trunnion.views.drawing import PALE
 from trunnion.views.figures import INK, MUTED, PALETTE, new
 from trunnion.views.lettering import plain
 from trunnion.views.quantities import prefixed
-from trunnion.views.space import Space, space
+from trunnion.views.space import Space, space, without_noise
 from trunnion.views.space_camera import Camera, best, looking
 from trunnion.views.space_paint import JOINT, Strokes, paint
 from trunnion.views.space_solids import Solid, solids
@@ -29,6 +29,7 @@ __all__ = ["Scenery", "mechanism", "scenery", "sketch"]
 
 GREY = "#9aa3ad"  # of the ground
 REACTION = "#c01f2e"
+HEIGHTS = 3.2, 8.0  # in, of the drawing, which is 7.2 in wide
 LENGTH = 0.3  # of the longest reaction, share of the size of the picture
 FEW = 400  # pieces of a curve
 
@@ -74,6 +75,7 @@ def _corners(points: Array) -> Array:
 
 def mechanism(result: xr.Dataset, index: int | None = None) -> Figure:
     """The mechanism at a position: that of the largest reaction that can be drawn, if not told."""
+    result = without_noise(result)
     look = scenery(space(result))
     count, told = result.sizes["position"], index is not None
     if index is None:
@@ -84,18 +86,18 @@ def mechanism(result: xr.Dataset, index: int | None = None) -> Figure:
     if not look.shown.drawable[index]:
         what = f"position {index} cannot be assembled: there is nothing to draw"
         raise MechanismError(Finding(what, "index", "name a position that has an answer"))
-    left, below, right, above = look.box
-    margin = 0.08 * look.diagonal
-    width, height = right - left + 2 * margin, above - below + 3 * margin
-    figure = new("Mechanism", result, min(max(7.0 * height / width, 3.2), 8.0) + 0.5)
+    arrows, most = _reactions(look, result, index)
+    low, high = _limits(look, arrows)
+    figure = new("Mechanism", result, float(np.clip(7.2 * (high - low)[1] / (high - low)[0], *HEIGHTS)) + 0.7)
     axes = figure.subplots()
     axes.set_aspect("equal")
-    axes.set(xlim=(left - margin, right + margin), ylim=(below - 2 * margin, above + margin))
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     axes.axis("off")
     sketch(axes, look, index)
-    arrows = _reactions(axes, look, result, index)
-    labels(axes, look, index, arrows)
-    _key(axes, look)
+    for start, end in arrows:
+        _arrow(axes, start, end, REACTION)
+    labels(axes, look, index, [start + np.linspace(0.2, 1.0, 5)[:, None] * (end - start) for start, end in arrows])
+    _key(axes, look, most)
     over = abscissa(result)
     facts = [f"{over.label} = {over.say(index)}", str(result.attrs.get("formula", ""))]
     if arrows and not told:
@@ -105,6 +107,19 @@ def mechanism(result: xr.Dataset, index: int | None = None) -> Figure:
         facts.append(status_text(status).split(":")[0])
     axes.set_title(plain("    ".join(filter(None, facts))), fontsize=8.5, color=MUTED, loc="left")
     return figure
+
+
+def _limits(look: Scenery, arrows: list[tuple[Array, Array]]) -> tuple[Array, Array]:
+    """Corners below left and above right of the figure (m): all that may be seen, the key below, no narrow strip."""
+    margin = 0.07 * look.diagonal
+    reach = np.array([look.box[:2], look.box[2:], *(end for _, end in arrows)])
+    low, high = reach.min(axis=0) - margin, reach.max(axis=0) + margin
+    low[1] -= 1.6 * margin
+    width, height = high - low
+    wider = max(0.0, height * 7.2 / HEIGHTS[1] - width) / 2
+    taller = max(0.0, width * HEIGHTS[0] / 7.2 - height) / 2
+    more = np.array([wider, taller])
+    return low - more, high + more
 
 
 def _telling(result: xr.Dataset, shown: Space) -> int:
@@ -172,39 +187,22 @@ def _dashed(track: Array, dash: float) -> Array:
     return np.stack([cut[:-1], cut[1:]], axis=1)[::2]
 
 
-def _reactions(axes: Axes, look: Scenery, result: xr.Dataset, index: int) -> list[Array]:
-    """Arrows of the joint reactions with a reference arrow; returns the places (n, 2) along each."""
+def _reactions(look: Scenery, result: xr.Dataset, index: int) -> tuple[list[tuple[Array, Array]], float]:
+    """Start and end of the arrow of each joint's reaction that can be seen, and the largest of them, N."""
     forces = column(result, "reaction_force")
     if forces is None or not np.isfinite(forces[..., index]).any():
-        return []
+        return [], 0.0
     here = {str(name): forces[row, :, index] for row, name in enumerate(result["joint"].values)}
     most = max((float(np.linalg.norm(force)) for force in here.values() if np.isfinite(force).all()), default=0.0)
-    if most <= 0:
-        return []
-    scale = LENGTH * look.diagonal / most
     found = []
     for name, force in here.items():
-        if name not in look.shown.joints or not np.isfinite(force).all() or np.linalg.norm(force) < 0.01 * most:
+        if name not in look.shown.joints or not np.isfinite(force).all() or np.linalg.norm(force) <= 0.01 * most:
             continue
         start = look.camera.seen(look.shown.seated(name)[:, index])[:2]
-        end = start + look.camera.seen(force)[:2] * scale
+        end = start + look.camera.seen(force)[:2] * LENGTH * look.diagonal / most
         if np.hypot(*(end - start)) > 0.01 * look.diagonal:
-            _arrow(axes, start, end, REACTION)
-            found.append(start + np.linspace(0.2, 1.0, 5)[:, None] * (end - start))
-    reach = np.array([track[-1] for track in found]).reshape(-1, 2)
-    if len(reach):  # the picture grows with the arrows
-        (x0, x1), (y0, y1), room = axes.get_xlim(), axes.get_ylim(), 0.05 * look.diagonal
-        low, high = reach.min(axis=0) - room, reach.max(axis=0) + room
-        axes.set(xlim=(min(x0, low[0]), max(x1, high[0])), ylim=(min(y0, low[1] - room), max(y1, high[1])))
-    size = _round(0.6 * most)
-    factor, unit = prefixed(size, "N")
-    x, y = axes.get_xlim()[1], axes.get_ylim()[0] + 0.025 * look.diagonal
-    text = f"reaction {size * factor:g} {unit}"
-    start = np.array([x - size * scale - 0.01 * look.diagonal, y])
-    _arrow(axes, start, start + np.array([size * scale, 0.0]), REACTION)
-    axes.annotate(text, (start[0], y), xytext=(-5, 0), textcoords="offset points", ha="right", va="center",
-                  fontsize=8, color=MUTED)  # fmt: skip
-    return found
+            found.append((start, end))
+    return found, most
 
 
 def _arrow(axes: Axes, start: Array, end: Array, colour: str) -> None:
@@ -219,9 +217,17 @@ def _round(value: float) -> float:
     return float(next(step * base for step in (5, 2, 1) if step * base <= value * (1 + 1e-9)))
 
 
-def _key(axes: Axes, look: Scenery) -> None:
-    """A triad of the global axes and a bar with a round length, below left."""
+def _key(axes: Axes, look: Scenery, most: float) -> None:
+    """A triad of the global axes, bars of a round length and, where reactions reach `most` N, of a round force."""
     (x0, x1), y0 = axes.get_xlim(), axes.get_ylim()[0]
+    if most > 0:
+        size = _round(0.6 * most)
+        factor, unit = prefixed(size, "N")
+        y, long = y0 + 0.025 * look.diagonal, size / most * LENGTH * look.diagonal
+        start = np.array([x1 - long - 0.01 * look.diagonal, y])
+        _arrow(axes, start, start + np.array([long, 0.0]), REACTION)
+        axes.annotate(f"reaction {size * factor:g} {unit}", (start[0], y), xytext=(-5, 0), textcoords="offset points",
+                      ha="right", va="center", fontsize=8, color=MUTED)  # fmt: skip
     arm = 0.05 * look.diagonal
     origin = np.array([x0 + 1.25 * arm, y0 + 1.1 * arm])
     for name, axis in zip("xyz", look.camera.matrix.T, strict=True):
@@ -236,7 +242,7 @@ def _key(axes: Axes, look: Scenery) -> None:
         axes.text(origin[0] + 1.8 * arm, y0 + 0.025 * look.diagonal, "all axes meet in one point: drawn on a sphere",
                   fontsize=8, color=MUTED, va="center")  # fmt: skip
         return
-    length = _round(0.2 * (x1 - x0))
+    length = _round(0.18 * (x1 - x0))
     factor, unit = prefixed(length, "m")
     left, y, tick = origin[0] + 2.1 * arm, y0 + 0.025 * look.diagonal, 0.006 * look.diagonal
     axes.plot([left, left, left, left + length, left + length, left + length],

@@ -309,7 +309,8 @@ function screws(view) {
 /** A place for a text inside the picture, clear of those that are `used`. */
 function roomFor({ frame }, [x, y], text, used) {
   const half = 3.4 * text.length + 6;
-  const place = [Math.min(Math.max(x, half), frame.width - half), Math.min(Math.max(y, 14), frame.height - KEY - 12)];
+  const foot = frame.height - KEY - (x < half + 60 ? 44 : 12); // clear of the triad
+  const place = [Math.min(Math.max(x, half), frame.width - half), Math.min(Math.max(y, 14), foot)];
   const step = place[1] > frame.height / 2 ? -15 : 15;
   while (used.some((other) => Math.abs(other[0] - place[0]) < half + other[2] && Math.abs(other[1] - place[1]) < 15))
     place[1] += step;
@@ -417,7 +418,7 @@ function key(view) {
   } else say("all axes meet in one point");
   const reference = (perUnit, unit, text, second) => {
     const scale = perUnit * view.factor;
-    if (!(scale > 0) || !view.shown.size || x > frame.width - 130) return;
+    if (!(scale > 0) || !Number.isFinite(scale) || !view.shown.size || x > frame.width - 130) return;
     const size = roundBelow((frame.width * 0.1) / scale);
     const d = arrow(x, y, size * scale, 0) + (second ? head(x, y, size * scale, 0) : "");
     parts.push(svg("path", { class: "reaction reference", d }));

@@ -94,7 +94,7 @@ def _one(axes: Axes, choice: Choice, way: Way, look: Scenery | None, index: int)
     weight = "bold" if way.taken else "normal"
     axes.set_title(plain(title), fontsize=8.5, fontweight=weight, color=INK, loc="left", pad=4)
     if look is None:
-        axes.text(0.03, 0.03, "cannot be assembled here", transform=axes.transAxes, fontsize=7, color=MUTED, zorder=8)
+        axes.text(0.03, 0.03, "cannot be assembled in this way", transform=axes.transAxes, fontsize=7, color=MUTED, zorder=8)
         return
     sketch(axes, look, index, choice.links)
     wide = axes.get_xlim()[1] - axes.get_xlim()[0]

@@ -92,7 +92,7 @@ function prepare(view) {
   view.over = svg("svg", { "aria-hidden": "true" });
   set(view.stage, {
     tabindex: 0,
-    role: "img",
+    role: "application", // so that a screen reader leaves it the arrow keys
     "aria-label":
       `Mechanism in space: ${view.scene.name}. Arrow keys turn it, with Shift they shift it, plus and minus zoom, ` +
       "0 is the first view.",

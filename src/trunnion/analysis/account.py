@@ -107,7 +107,13 @@ def finish(
     mechanism = run.system.mechanism
     value = efficiency(arrays, run.cycle)
     near = _near_locking(run, arrays, time, method)
-    found = [*_model_notes(mechanism), *run.chosen.findings, *_over_the_cycle(run, arrays, causes, time, near)]
+    left_open = run.determinacy.findings() if run.determinacy else []
+    found = [
+        *_model_notes(mechanism),
+        *run.chosen.findings,
+        *left_open,
+        *_over_the_cycle(run, arrays, causes, time, near),
+    ]
     attributes: dict[str, str | float] = {
         "name": mechanism.name,
         "formula": run.system.plan.formula,

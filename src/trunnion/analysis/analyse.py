@@ -21,6 +21,7 @@ from trunnion.analysis.engine import build
 from trunnion.analysis.friction import FrictionMethod
 from trunnion.analysis.kinematics import forward
 from trunnion.analysis.kinetostatics import Backward, Given, solve
+from trunnion.analysis.space.determinacy import Determinacy
 from trunnion.analysis.system import COMMON_TURNS, Cycle, System, Values, sticking
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.groups.gear import rotation
@@ -67,6 +68,12 @@ class Run:
     def _histories(self, values: Values) -> dict[str, History]:
         with np.errstate(all="ignore"):
             return histories(self.system, values, self.chosen.assembly, self.cycle)
+
+    @functools.cached_property
+    def determinacy(self) -> Determinacy | None:
+        """What of motion and reactions the joints leave open; None in the plane, where the structure decides it."""
+        found: Determinacy | None = self.system.engine.determinacy(self.system, self.values, self.chosen, self.cycle)
+        return found
 
     @functools.cached_property
     def _past(self) -> dict[str, History]:
@@ -124,7 +131,10 @@ def analyse(
     Raises MechanismError if the structure does not determine the motion or `steps` is out of range.
     """
     _check_steps(steps)
-    return analyse_run(prepare(mechanism), steps, method, progress)
+    run = prepare(mechanism)
+    if run.determinacy is not None:
+        run.determinacy.refuse()
+    return analyse_run(run, steps, method, progress)
 
 
 def _check_steps(steps: int) -> None:

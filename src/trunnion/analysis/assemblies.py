@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,7 @@ from trunnion.analysis.analyse import Run
 from trunnion.analysis.branches import Track
 from trunnion.analysis.hints import way_name
 from trunnion.analysis.kinematics import Forward, forward, pose_of
-from trunnion.groups.planar import Frame, compose, point
+from trunnion.analysis.system import System
 from trunnion.model.mechanism import Mechanism
 from trunnion.structure.decompose import Module
 
@@ -29,13 +30,15 @@ APART = 1e-3  # of the largest coordinate: nearer ways read alike
 class Way:
     """One assembly of a group.
 
-    name: what chooses it, `assembly: {LINK: NAME}`. joints: (x, y) of the pins inside the group, global, m, and
-    (slide,) of its slides, m, in the order of the file. taken: whether it is the one that is analysed.
+    name: what chooses it, `assembly: {LINK: NAME}`. joints: (x, y), in space (x, y, z), of pins and balls inside the
+    group, global, m, and (slide,) of its slides, m, in the order of the file. taken: whether it is the one that is
+    analysed. turns: of its joints about an axis in space, rad.
     """
 
     name: str
     joints: Mapping[str, tuple[float, ...]]
     taken: bool
+    turns: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -79,7 +82,7 @@ def choices(run: Run) -> tuple[Choice, ...]:
             else:
                 continue
         if rows and run.chosen.found[number] > 1:
-            ways = _ways(rows, run.chosen.found[number], taken)
+            ways = _ways(rows, run.chosen.found[number], taken, turning(run.system))
             where = _where(run, moment)
             found.append(Choice(number, module.label, module.links, _name_of(run, module), moment, where, ways))
     return tuple(found)
@@ -135,26 +138,34 @@ def _at(number: Array, lane: int) -> float:
     return float(np.ravel(number)[lane if np.size(number) > 1 else 0])
 
 
-def _joints(walk: Forward, module: Module, frames: Sequence[Frame]) -> dict[str, Array]:
+def _joints(walk: Forward, module: Module, frames: Sequence[Any]) -> dict[str, Array]:
     """(x, y) of every pin between two links of a module and (slide,) of every slide, from the links' frames."""
     place = dict(zip(module.links, frames, strict=False))  # a general group that never closes has no frames
     found: dict[str, Array] = {}
     for name, (kind, links) in walk.system.joints.items():
         if name not in module.joints or name in module.driven or any(link not in place for link in links):
             continue
-        first, second = (compose(place[link], walk.local[link, name]) for link in links)
-        if kind == "prismatic":
-            slide = first.c * (second.x - first.x) + first.s * (second.y - first.y)
-            found[name] = np.array([primal(slide)])
+        first, second = (walk.composed(place[link], link, name) for link in links)
+        if kind == "prismatic" or name in turning(walk.system):
+            found[name] = np.array([primal(walk.coordinate(name, first, second))])
         else:
-            local = walk.local[links[0], name]
-            found[name] = np.array([primal(n) for n in point(place[links[0]], local.x, local.y)])
+            found[name] = np.array([primal(n) for n in walk.placed(place[links[0]], links[0], name)])
     return found
 
 
-def _ways(rows: Mapping[str, Array], count: int, taken: int) -> tuple[Way, ...]:
-    """The ways of joints (number, way)."""
-    return tuple(
-        Way(way_name(i), {name: tuple(float(n[i]) for n in numbers) for name, numbers in rows.items()}, i == taken)
-        for i in range(count)
-    )
+def turning(system: System) -> list[str]:
+    """Joints that are told by their turn: those about an axis in space."""
+    if system.mechanism.space == "planar":
+        return []
+    return [name for name, (kind, _) in system.joints.items() if kind in ("revolute", "cylindrical", "helical")]
+
+
+def _ways(rows: Mapping[str, Array], count: int, taken: int, turned: Sequence[str]) -> tuple[Way, ...]:
+    """The ways of joints (number, way); turned: those whose number is an angle."""
+    found = []
+    for i in range(count):
+        told = {name: tuple(float(n[i]) for n in numbers) for name, numbers in rows.items()}
+        turns = {name: numbers[0] for name, numbers in told.items() if name in turned}
+        places = {name: numbers for name, numbers in told.items() if name not in turned}
+        found.append(Way(way_name(i), places, i == taken, turns))
+    return tuple(found)

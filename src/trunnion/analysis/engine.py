@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from trunnion.analysis import fill, kinematics, kinetostatics, scene
+from trunnion.analysis.space import determinacy, forces, motion
 from trunnion.analysis.space import fill as space_fill
-from trunnion.analysis.space import forces, motion
 from trunnion.analysis.space.system import SpatialSystem
 from trunnion.analysis.system import System
 from trunnion.model.mechanism import Mechanism
@@ -35,6 +35,7 @@ class Engine:
     fill_forces: Callable[..., None]
     unwrap: Callable[..., None]
     scene: Callable[..., dict[str, Any]]
+    determinacy: Callable[..., Any]
 
 
 ENGINES = {
@@ -48,6 +49,7 @@ ENGINES = {
         fill.fill_forces,
         fill.unwrap,
         scene.planar,
+        lambda *run: None,  # decided by the structure alone
     ),
     "spatial": Engine(
         SpatialSystem,
@@ -59,6 +61,7 @@ ENGINES = {
         space_fill.fill_forces,
         space_fill.unwrap,
         scene.spatial,
+        determinacy.look,
     ),
 }
 

@@ -258,7 +258,7 @@ def _between(number: Number, here: int, there: int, share: float) -> Number:
 def _mixed(pair: Any, here: int, there: int, share: float) -> Any:
     """Both elements of a joint part of the way between two grid points; axes stay of length one."""
     mixed = each(pair, lambda n: _between(n, here, there, share))
-    parts = [one.normalised() if isinstance(one, tuple) else one for one in mixed]
+    parts: list[Any] = [one.normalised() if hasattr(one, "normalised") else one for one in mixed]
     return type(pair)(*parts) if hasattr(pair, "_fields") else tuple(parts)
 
 

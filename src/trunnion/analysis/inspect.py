@@ -68,8 +68,8 @@ def check(mechanism: Mechanism, steps: int = 360) -> Check:
         for row in json.loads(result.attrs["findings"])
     ]
     walk = forward(run.system, run.values, run.chosen.assembly, run.cycle.times(steps))
-    rank = _rank(walk)
-    if rank is not None and rank != run.system.plan.mobility:
+    rank = run.determinacy.mobility if run.determinacy else _rank(walk)
+    if run.determinacy is None and rank is not None and rank != run.system.plan.mobility:
         what = (
             f"the mobility is {run.system.plan.mobility} by Grübler's formula and {rank} by the rank of the constraints"
         )

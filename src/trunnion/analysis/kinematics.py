@@ -53,7 +53,7 @@ class Forward:
     assembly: list[Any] = field(default_factory=list)
     _elements: dict[tuple[str, str], Any] = field(default_factory=dict)
 
-    def element(self, link: str, joint: str) -> Frame:
+    def element(self, link: str, joint: str) -> Any:
         """Global frame of a joint's element on a link."""
         key = (link, joint)
         if key not in self._elements:

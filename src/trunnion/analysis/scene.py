@@ -21,7 +21,7 @@ DRAWN = 360  # positions at which a load that varies is looked at for the drawin
 
 
 def planar(system: System, values: Values, times: NDArray[np.float64], useful: Sequence[str]) -> dict[str, Any]:
-    """Of a mechanism in the plane. times: over the cycle, for loads that vary; useful: loads whose power is the purpose."""
+    """Of a mechanism in the plane. times: over the cycle, for loads that vary; useful: names of the useful loads."""
     joints = _joints(system)
     elements = system.elements(values)
     for name, (kind, links) in system.joints.items():

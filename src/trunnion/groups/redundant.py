@@ -1,9 +1,9 @@
 """Loops that ask for more than their coordinates can give: least squares for motion and for reactions.
 
 A planar four-bar drawn in space, Bennett's and Sarrus' linkages close although their equations outnumber their
-coordinates. Newton's method then takes the step of least squares, and a position counts where the gap closes. Of the
-reactions, only their sum with what the redundant constraints add can be told; those returned are the smallest: the least
-sum of squares of forces, and of moments at the joints over the size. Real numbers only: a small change of a dimension
+coordinates. Newton's method then takes the step of least squares, and a position counts where the gap closes. Statics
+does not tell what the redundant constraints add to the reactions; those returned are the smallest: the least sum of
+squares of forces, and of moments at the joints over the size. Real numbers only: a small change of a dimension
 takes such a linkage apart, so there is no derivative, and dual parts come out as NaN.
 """
 
@@ -38,7 +38,7 @@ def stacked(matrix: Sequence[Sequence[Number]]) -> Array:
 def pseudo_inverse(matrix: Sequence[Sequence[Number]]) -> list[list[Number]]:
     """J⁺ as rows; NaN where an entry is."""
     table = stacked(matrix)
-    bad = ~np.isfinite(table).all(axis=(-2, -1))
+    bad = np.asarray(~np.isfinite(table).all(axis=(-2, -1)))
     found = np.linalg.pinv(np.where(bad[..., None, None], 0.0, table), rcond=RANK)
     found[bad] = np.nan
     dual = any(isinstance(entry, Dual) for row in matrix for entry in row)
@@ -50,7 +50,7 @@ def least_squares(matrix: Sequence[Sequence[Number]], side: Sequence[Number]) ->
     """x of least |A x − b|, and of those the shortest."""
     table = stacked(matrix)
     right = stacked([[entry] for entry in side])
-    bad = ~(np.isfinite(table).all(axis=(-2, -1)) & np.isfinite(right).all(axis=(-2, -1)))
+    bad = np.asarray(~(np.isfinite(table).all(axis=(-2, -1)) & np.isfinite(right).all(axis=(-2, -1))))
     found = np.linalg.pinv(np.where(bad[..., None, None], 0.0, table), rcond=RANK) @ right
     found[bad] = np.nan
     dual = any(isinstance(entry, Dual) for row in matrix for entry in row)
@@ -70,7 +70,7 @@ def least(group: SpatialGroup, pose: Pose, loads: Sequence[Screw], multipliers: 
     shape = np.broadcast_shapes(start.shape, *(column.shape for column in columns))
     effect = np.stack([np.broadcast_to(column, shape) for column in columns], axis=-1)
     table = stacked(pose.jacobian)
-    bad = ~(np.isfinite(table).all(axis=(-2, -1)) & np.isfinite(start).all(axis=-1))
+    bad = np.asarray(~(np.isfinite(table).all(axis=(-2, -1)) & np.isfinite(start).all(axis=-1)))
     safe = np.where(bad[..., None, None], 0.0, table)
     project = np.eye(count) - safe @ np.linalg.pinv(safe, rcond=RANK)  # onto the null space of Jᵀ
     moves = np.where(bad[..., None, None], 0.0, effect @ project)

@@ -370,10 +370,21 @@ class SpatialGroup:
                     line.append(entry if weight == 1 else -entry if weight == -1 else weight * entry)
             matrix += block
         for link, a, b in self.spinning:
-            axis = _axis(placed, a, b)
+            axis = self._spin_axis(placed, a, b)
             path = self._paths[link]
             matrix.append([path.get(k, 0) * dot(axis, screws[k][i].u) for k, i in self.free])
         return matrix
+
+    def _spin_axis(self, placed: Sequence[Element], a: int, b: int) -> Vector3:
+        """Unit vector of the line about which a link can spin: from ball to ball, or the axis of its other joint."""
+        for k in (a, b):
+            if self.joints[k].kind != "spherical":
+                return placed[k].second.z
+        apart = vector_minus(placed[b].second.place, placed[a].second.place)
+        square = dot(apart, apart)
+        xp = namespace(square)
+        there = primal(square) > 0  # a link without a length has no line
+        return scaled(1 / xp.sqrt(xp.where(there, square, 1.0)), apart)
 
     def _slides(self, joint: int, freedom: int) -> bool:
         return MOTIONS[self.joints[joint].kind].steps[freedom] == "slide"
@@ -382,12 +393,12 @@ class SpatialGroup:
 
     def velocity(self, pose: Pose, outer: Sequence[Screw | None], drive: Sequence[Number] = ()) -> list[Screw]:
         """Twists of the links. outer: of each joint's known link; drive: rates of the driven coordinates."""
-        return self._twists(pose, outer, self.rates(pose, outer, drive))[: self.links]
+        return self.twists(pose, outer, self.rates(pose, outer, drive))[: self.links]
 
     def rates(self, pose: Pose, outer: Sequence[Screw | None], drive: Sequence[Number] = ()) -> list[list[Number]]:
         """Rate of every freedom of every joint, rad/s and m/s."""
         rates = self._driven_only(drive)
-        twists = self._twists(pose, outer, rates)
+        twists = self.twists(pose, outer, rates)
         known = Outside(self, pose, twists, outer)
         rows: list[Number] = []
         for k in self.chords:
@@ -395,7 +406,7 @@ class SpatialGroup:
             for screw, rate in zip(pose.screws[k], rates[k], strict=True):
                 relative_ = minus(relative_, times(rate, screw))
             rows += _entries(relative_, pose.elements[k].second.place, pose.size, slides=False)
-        rows += [dot(_axis(pose.elements, a, b), twists[link].u) for link, a, b in self.spinning]
+        rows += [dot(self._spin_axis(pose.elements, a, b), twists[link].u) for link, a, b in self.spinning]
         return self._closing(pose, rates, rows)
 
     def _driven_only(self, drive: Sequence[Number]) -> list[list[Number]]:
@@ -411,7 +422,8 @@ class SpatialGroup:
             rates[k][i] = value * pose.size if self._slides(k, i) else value
         return rates
 
-    def _twists(self, pose: Pose, outer: Sequence[Screw | None], rates: Sequence[Sequence[Number]]) -> list[Screw]:
+    def twists(self, pose: Pose, outer: Sequence[Screw | None], rates: Sequence[Sequence[Number]]) -> list[Screw]:
+        """Twists of the links from the rates of all freedoms."""
         twists: dict[int, Screw] = {}
         for step in self.steps:
             k = step.joint
@@ -444,7 +456,9 @@ class SpatialGroup:
                 relative_ = minus(relative_, times(value, screw))
             rows += _entries(relative_, pose.elements[k].second.place, pose.size, slides=False)
         for link, a, b in self.spinning:
-            rows.append(dot(_axis(pose.elements, a, b), found[link].u))  # ω · u = 0 and u̇ = ω × u: no further term
+            rows.append(
+                dot(self._spin_axis(pose.elements, a, b), found[link].u)
+            )  # ω · u = 0 and u̇ = ω × u: no further term
         second = self._closing(pose, second, rows)
         return self._accelerations(pose, outer, second, carried)[: self.links]
 
@@ -501,7 +515,7 @@ class SpatialGroup:
             if first != OUTER:
                 carried[first] = minus(carried[first], wrench)
         for (link, a, b), torque in zip(self.spinning, multipliers[6 * len(self.chords) :], strict=True):
-            spin = Screw((0.0, 0.0, 0.0), scaled(torque, _axis(pose.elements, a, b)))
+            spin = Screw((0.0, 0.0, 0.0), scaled(torque, self._spin_axis(pose.elements, a, b)))
             carried[link] = added(carried[link], spin)
         for step in reversed(self.steps):
             total = carried[step.child]
@@ -532,13 +546,12 @@ class SpatialGroup:
         child = {step.joint: step for step in self.steps}
         powers: list[Number] = []
         for k, i in self.free:
-            step = child.get(k)
-            if step is None:
+            if k not in child:
                 powers.append(0.0)
                 continue
-            value = power(outboard[step.child], pose.screws[k][i])
+            value = power(outboard[child[k].child], pose.screws[k][i])
             value = value * pose.size if self._slides(k, i) else value
-            powers.append(value if step.near == 0 else -value)
+            powers.append(value if child[k].near == 0 else -value)
         rows = range(len(pose.inverse[0]))
         return [-_weighted([line[j] for line in pose.inverse], powers) for j in rows]
 
@@ -585,15 +598,6 @@ def _entries(screw: Screw, place: Vector3, size: Number, slides: bool) -> tuple[
     return (*screw.u, x / size, y / size, z / size)
 
 
-def _axis(placed: Sequence[Element], a: int, b: int) -> Vector3:
-    """Unit vector from one joint to another; the x axis where they meet, for a link without a length has no line."""
-    apart = vector_minus(placed[b].second.place, placed[a].second.place)
-    square = dot(apart, apart)
-    xp = namespace(square)
-    there = primal(square) > 0
-    return scaled(1 / xp.sqrt(xp.where(there, square, 1.0)), apart)
-
-
 def _condition(jacobian: Sequence[Sequence[Number]], inverse: Sequence[Sequence[Number]]) -> Number:
     if not inverse:
         return 1.0
@@ -620,7 +624,7 @@ def _weighted(weights: Sequence[Number], values: Sequence[Number]) -> Number:
 
 
 def _mapped(frame: Frame, change: object) -> Frame:
-    return Frame(*(tuple(change(n) for n in vector) for vector in frame))  # type: ignore[operator, arg-type]
+    return Frame(*(tuple(change(n) for n in vector) for vector in frame))  # type: ignore[operator]
 
 
 def _real(frame: Frame) -> Frame:

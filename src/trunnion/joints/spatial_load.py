@@ -8,7 +8,7 @@ A bearing of length L about the axis u carries the load F⊥, M⊥ across its ax
     pezzuti       N = |F⊥| + 2 |M⊥|/L                                                  [P 15-19]
     two-contact   N = |Q₁| + |Q₂|,  Q₁,₂ = F⊥/2 ∓ g,  g = M⊥ × u/L                     [THEORY of the docs, "Friction"]
 
-The second is exact for the same picture, a load carried at both ends; the first is its bound by the triangle inequality.
+The second is exact for a load carried at both ends; the first is its bound by the triangle inequality.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ class BearingLoad:
     """A pin in its bearing, a slider in its guide, or a nut on its thread.
 
     axis: unit vector u; place: middle of the bearing, m; length: L, m. summed: [P]'s sum instead of the two contacts.
-    width: of a guide, over which a pair of forces carries the torsion about the slide, N + 2 |M_u|/width; None of others.
+    width: of a guide, over which a pair of forces carries the torsion about it, N + 2 |M_u|/width; None of others.
     radius: mean radius of a thread, whose flanks also carry N + √(F_u² + (M_u/r)²); None of others.
     """
 

@@ -484,6 +484,6 @@ Hint = Annotated[
     Discriminator(
         _hint_shape,
         custom_error_type="forms",
-        custom_error_message="takes the coordinates of a point, the rotation or slide of a joint, or way-1, way-2, … of a link",
+        custom_error_message="takes coordinates of a point, rotation or slide of a joint, or way-1, way-2, … of a link",
     ),
 ]

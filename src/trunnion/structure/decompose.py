@@ -80,23 +80,41 @@ def taken(mechanism: Mechanism, joint: str) -> int:
 
 
 def mobility_by_formula(mechanism: Mechanism) -> int:
-    """Grübler's count d (n − 1) − Σ (d − f_j) − gear pairs of n links, ground included; d = 3 in the plane, 6 in space."""
+    """Grübler's count d (n − 1) − Σ (d − f_j) − gear pairs of n links; d = 3 in the plane, 6 in space."""
     moving = len(mechanism.effective_links) - 1
     held = sum(taken(mechanism, joint) for joint in mechanism.effective_joints)
     return FREEDOMS[mechanism.space] * moving - held - len(mechanism.gears)
 
 
 def passive(mechanism: Mechanism) -> dict[str, tuple[str, str]]:
-    """Links whose spin is free, with their two joints: both are spherical, and the link can turn about their line."""
+    """Links whose spin is free, with their two joints: the link can turn about a line without moving anything else.
+
+    Both joints are spherical; or one is, and the axis of the other, which frees a turn, goes through its centre.
+    """
     found: dict[str, tuple[str, str]] = {}
-    if mechanism.space == "planar":
+    if mechanism.space == "planar" or mechanism.loop:
         return found
-    for link in mechanism.effective_links:
-        joints = [name for name, joint in mechanism.effective_joints.items() if link in joint.links]
-        balls = all(mechanism.effective_joints[name].type == "spherical" for name in joints)
-        if link != mechanism.fixed_link and len(joints) == 2 and balls:
+    for link in mechanism.links:
+        joints = [name for name, joint in mechanism.joints.items() if link in joint.links]
+        balls = [name for name in joints if mechanism.joints[name].type == "spherical"]
+        if link == mechanism.fixed_link or len(joints) != 2 or not balls:
+            continue
+        if len(balls) == 2 or _through(mechanism, link, balls[0], *(name for name in joints if name not in balls)):
             found[link] = (joints[0], joints[1])
     return found
+
+
+def _through(mechanism: Mechanism, link: str, ball: str, other: str) -> bool:
+    """Whether the axis of a joint that turns goes through the centre of a ball on the same link."""
+    if mechanism.joints[other].type not in ("revolute", "cylindrical"):
+        return False
+    values = mechanism.parameters()
+    centre, place, axis = (
+        np.array([float(np.ravel(values[f"links.{link}.points.{path}.{letter}"])[0]) for letter in "xyz"])
+        for path in (ball, other, f"{other}.axis")
+    )
+    apart = float(np.linalg.norm(np.cross(centre - place, axis / np.linalg.norm(axis))))
+    return apart <= 1e-9 * max(float(np.linalg.norm(centre - place)), 1e-300)
 
 
 def decompose(mechanism: Mechanism) -> Plan:

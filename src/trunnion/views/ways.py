@@ -38,8 +38,9 @@ def places(choice: Choice, way: Way) -> str:
     """Where the inner joints of a group are in one of its ways: 'C (70, 130) mm'."""
     numbers = [abs(n) for one in choice.ways for joint in one.joints.values() for n in joint]
     largest = max((n for n in numbers if math.isfinite(n)), default=0.0)
+    turned = [f"{name} {math.degrees(angle):.4g}°" for name, angle in list(way.turns.items())[:MOST_JOINTS]]
     if not largest:
-        return "at the origin" if numbers else ""
+        return ", ".join(turned) or ("at the origin" if numbers else "")
     factor, unit = prefixed(largest, "m")
     decimals = max(0, 3 - math.floor(math.log10(largest * factor)))
 
@@ -52,4 +53,5 @@ def places(choice: Choice, way: Way) -> str:
         f"{name} ({', '.join(map(text, joint))})" if len(joint) > 1 else f"{name} at {text(joint[0])}"
         for name, joint in list(way.joints.items())[:MOST_JOINTS]
     ]
-    return ", ".join(told) + ", …" * (len(way.joints) > MOST_JOINTS) + f" {unit}"
+    places_ = ", ".join(told) + ", …" * (len(way.joints) > MOST_JOINTS) + f" {unit}"
+    return "; ".join([places_, ", ".join(turned)]) if turned else places_

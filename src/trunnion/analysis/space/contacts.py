@@ -26,7 +26,7 @@ NULL: Vector3 = (0.0, 0.0, 0.0)
 
 
 class Rubbing(NamedTuple):
-    """One contact: its load, its slip speed, m/s, the unit friction on the second link, whether its own joint loads it."""
+    """One contact: load, slip speed, m/s, unit friction on the second link, and whether the joint itself feels that."""
 
     load: ContactLoad
     slip: Number

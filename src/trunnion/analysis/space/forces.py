@@ -86,7 +86,7 @@ def _add_body_loads(back: SpatialBackward) -> None:
             continue
         centre = walk.at(link, walk.space.centre(values, link))
         frame, twist, second = walk.motions[link]
-        force = scaled(mass, tuple(g - a for g, a in zip(gravity, centre.acceleration, strict=True)))  # type: ignore[arg-type]
+        force = scaled(mass, tuple(g - a for g, a in zip(gravity, centre.acceleration, strict=True)))
         moment = NULL if tensor is None else scaled(-1.0, _spin_rate(frame, tensor, twist.u, second.u))
         load = about(force, moment, centre.place)
         back.body_power = back.body_power + power(load, twist)

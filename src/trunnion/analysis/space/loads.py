@@ -104,7 +104,7 @@ def springs(walk: SpatialWalk) -> Iterator[tuple[str, SpatialAction, SpringState
 
 
 def _elongation(walk: SpatialWalk, path: str, joint: str, turns: bool) -> Number:
-    """Turn or slide of a joint beyond the free one: of a driven one whole turns count, of others the nearest is meant."""
+    """Turn or slide of a joint beyond the free one; whole turns count where it is driven, else the nearest is meant."""
     if not turns:
         return walk.coordinates(joint)[1] - walk.values.get(f"{path}.free_length", 0.0)
     free = walk.values.get(f"{path}.free_angle", 0.0)

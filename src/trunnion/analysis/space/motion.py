@@ -55,7 +55,7 @@ class SpatialWalk(Forward):
         """The system."""
         return cast(SpatialSystem, self.system)
 
-    def element(self, link: str, joint: str) -> Frame:  # type: ignore[override]
+    def element(self, link: str, joint: str) -> Frame:
         """Global frame of a joint's element on a link."""
         key = (link, joint)
         if key not in self._elements:

@@ -131,7 +131,7 @@ class SpatialSystem(System):
         return np.where(widest > 0, widest, self._smallest_size(values))
 
     def _smallest_size(self, values: Values) -> Number:
-        """Where all axes meet in one point, as in a spherical linkage: the largest other length of its joints, or 1 m."""
+        """Of a mechanism whose axes all meet in one point: the largest length of its pins, or 1 m."""
         lengths = [primal(value) for path, value in values.items() if path.endswith((".pin.bearing", ".pin.radius"))]
         return functools.reduce(np.maximum, lengths, 0.0) if lengths and np.max(lengths) > 0 else 1.0
 

@@ -1,0 +1,193 @@
+"""Whether the joints determine motion and reactions of a spatial mechanism, told from the rank of its Jacobians.
+
+Grübler's count knows numbers of freedoms only. Where axes are parallel, or meet in a point, some constraints repeat
+others: a planar four-bar drawn in space moves though the count is −2, and what its bearings carry in excess no equation
+of statics tells. The rank of J at assembled poses does: rows − rank constraints are redundant, columns − rank freedoms
+are not determined.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.algebra.nested import each
+from trunnion.algebra.rigid import ZERO, Screw
+from trunnion.analysis.branches import Chosen
+from trunnion.analysis.follow import assemblies, at, lane_of
+from trunnion.analysis.kinematics import forward
+from trunnion.analysis.system import Cycle, System, Values, driven_coordinates
+from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.groups.redundant import RANK, stacked
+from trunnion.groups.spatial import Pose, SpatialGroup
+
+__all__ = ["Determinacy", "Part", "look"]
+
+LOOKED = 12  # positions: what is special at one of them only is a singular position
+PRESENT = 1e-6  # of the largest entry of a null vector
+
+
+class Part(NamedTuple):
+    """Of one module: redundant constraints and undetermined freedoms at every position looked at; joints that carry the
+    former, links that have the latter.
+    """
+
+    module: int
+    redundant: int
+    undetermined: int
+    joints: tuple[str, ...]
+    links: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class _Module:
+    number: int
+    names: tuple[str, ...]
+    links: tuple[str, ...]
+    group: SpatialGroup
+    pose: Pose
+
+
+def look(system: System, values: Values, chosen: Chosen, cycle: Cycle) -> Determinacy:
+    """What the rank says of every module that closes a loop and could be assembled."""
+    walk = forward(system, values, chosen.assembly, cycle.times(LOOKED) if cycle.duration else np.zeros(1))
+    found = []
+    for number, module in enumerate(system.plan.modules):
+        group = cast(SpatialGroup, system.groups[number])
+        if not group.chords:
+            continue
+        pose = walk.poses[number]
+        if not np.any(np.isfinite(np.asarray(pose.gap))):
+            pose = _by_least_squares(system, walk, number, group)
+        if pose is None or not pose.jacobian or not pose.jacobian[0]:
+            continue
+        table = stacked(pose.jacobian)
+        lanes = np.flatnonzero(np.isfinite(table).all(axis=(-2, -1)))
+        if not len(lanes):
+            continue
+        ranks = np.linalg.matrix_rank(table[lanes], rtol=RANK)
+        rank, best = int(np.max(ranks)), int(lanes[np.argmax(ranks)])
+        rows, columns = table.shape[1:]
+        one = _Module(number, module.joints, module.links, group, _lane(pose, best, len(table)))
+        joints, links = _strained(one, table[best]), _loose(one, table[best])
+        found.append(Part(number, rows - rank, columns - rank, joints, links))
+    return Determinacy(system, tuple(found))
+
+
+def _by_least_squares(system: System, walk: Any, number: int, group: SpatialGroup) -> Pose | None:
+    """A module that Newton's method does not close because J is singular, at the start, solved all the same."""
+    module, places = system.plan.modules[number], system.places[number]
+    free = SpatialGroup(group.links, group.joints, group.driven, group.spinning, redundant=True)
+    drive = driven_coordinates(system, module, places, walk.values, walk.time)[0]
+    with np.errstate(all="ignore"):
+        found = assemblies(free, at(walk.pairs(places), 0), [lane_of(q, 0) for q in drive])
+        kept = [lane_of(found.q[i], 0) if np.size(found.q[i]) else np.nan for i in free.kept]
+        if not np.all(np.isfinite(kept)):
+            return None
+        return free.position(at(walk.pairs(places), 0), kept, [lane_of(q, 0) for q in drive])
+
+
+def _lane(pose: Pose | None, lane: int, count: int) -> Pose:
+    """The pose at one position, with plain numbers."""
+
+    def pick(number: Any) -> Any:
+        values = np.ravel(number)
+        return float(values[lane if len(values) == count else 0])
+
+    assert pose is not None
+    frames, elements = each((pose.frames, pose.elements), pick)
+    screws = tuple([each(screw, pick) for screw in joint] for joint in pose.screws)
+    size = pick(pose.size)
+    return pose._replace(frames=frames, elements=elements, screws=screws, size=size)
+
+
+def _strained(module: _Module, table: NDArray[np.float64]) -> tuple[str, ...]:
+    """Joints whose reactions a redundant constraint leaves open: those of self-stress, Jᵀ λ = 0."""
+    left, values, _ = np.linalg.svd(table)
+    rank = int(np.sum(values > RANK * values[0]))
+    names: list[str] = []
+    none = [ZERO] * module.group.links
+    for column in left[:, rank:].T:
+        wrenches = module.group.link_by_link(module.pose, none, list(column))
+        sizes = np.array([_size(wrench) for wrench in wrenches])
+        names += [name for name, size in zip(module.names, sizes, strict=True) if size > PRESENT * sizes.max()]
+    return tuple(dict.fromkeys(name for name in module.names if name in names))
+
+
+def _loose(module: _Module, table: NDArray[np.float64]) -> tuple[str, ...]:
+    """Links that move in the freedoms that nothing determines, J q̇ = 0."""
+    _, values, right = np.linalg.svd(table)
+    rank = int(np.sum(values > RANK * values[0])) if len(values) else 0
+    names: list[str] = []
+    for row in right[rank:]:
+        rates: list[list[float]] = [[0.0] * len(screws) for screws in module.pose.screws]
+        for (k, i), value in zip(module.group.free, row, strict=True):
+            rates[k][i] = float(value)
+        twists = module.group.twists(module.pose, [None] * len(module.names), rates)
+        sizes = np.array([_size(twist) for twist in twists])
+        moving = sizes > PRESENT * max(sizes.max(), 1e-300)
+        names += [name for name, moves in zip(module.links, moving, strict=True) if moves]
+    return tuple(name for name in module.links if name in names)
+
+
+def _size(screw: Screw) -> float:
+    return float(np.sqrt(sum(float(n) ** 2 for vector in screw for n in vector)))
+
+
+@dataclass(frozen=True)
+class Determinacy:
+    """What the joints of a mechanism leave open, module by module."""
+
+    system: System
+    parts: tuple[Part, ...]
+
+    @property
+    def mobility(self) -> int:
+        """Mobility by rank: what the drivers prescribe, spins that move nothing else, and what is not determined."""
+        undetermined = sum(one.undetermined for one in self.parts)
+        return len(self.system.mechanism.drivers) + len(self.system.plan.passive) + undetermined
+
+    def refuse(self) -> None:
+        """Raises MechanismError for what is not determined, unless the smallest reactions are asked for."""
+        errors = [finding for finding in self.findings() if finding.severity is Severity.ERROR]
+        if errors:
+            raise MechanismError(errors)
+
+    def findings(self) -> list[Finding]:
+        """What there is to say of redundant constraints, undetermined freedoms and free spins."""
+        told: list[Finding] = []
+        for one in self.parts:
+            told += [self._undetermined(one)] if one.undetermined else []
+            told += [self._redundant(one)] if one.redundant else []
+        for module in self.system.plan.modules:
+            for link, a, b in module.spinning:
+                what = f"the link '{link}' can spin about the line of {a} and {b} (a passive freedom)"
+                told.append(Finding(what, f"links.{link}", "it is taken not to spin", Severity.NOTE))
+        return told
+
+    @property
+    def _count(self) -> str:
+        return f"the mobility is {self.system.plan.mobility} by Grübler's formula and {self.mobility} by rank"
+
+    def _undetermined(self, one: Part) -> Finding:
+        what = (
+            f"{self._count}: {_many(one.undetermined, 'freedom')} not determined, of the links {', '.join(one.links)}"
+        )
+        return Finding(what, "drivers", "drive them, or give these links joints that hold them")
+
+    def _redundant(self, one: Part) -> Finding:
+        what = f"{self._count}: {_many(one.redundant, 'constraint')} redundant, in the joints {', '.join(one.joints)}"
+        if self.system.mechanism.over_constraint == "refuse":
+            what += "; statics does not determine their reactions"
+            remedy = "free a joint (cylindrical, spherical), or state over_constraint: minimum-norm for the smallest"
+            return Finding(what, "joints", remedy)
+        what += "; their reactions are the smallest that hold the balance"
+        remedy = "misfit and preload come on top: they depend on errors and stiffness"
+        return Finding(what, "joints", remedy, Severity.WARNING)
+
+
+def _many(count: int, what: str) -> str:
+    return f"{count} {what} is" if count == 1 else f"{count} {what}s are"

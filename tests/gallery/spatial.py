@@ -1,0 +1,260 @@
+"""Spatial linkages of the gallery. Angles and slides are those of the tables of the examples, in rad and m."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from scipy.optimize import fsolve
+from scipy.spatial.transform import Rotation
+
+from gallery.entry import STEPS, Entry, Outcome
+
+Row = tuple[str, float, float, float]  # pair R or C, twist in degrees, distance, constant slide
+
+
+def joint(one: Outcome, quantity: str, name: str) -> Any:
+    """A quantity of a joint at every position."""
+    return one.result[quantity].sel(joint=name).values
+
+
+def at(one: Outcome, quantity: str, name: str, degrees: float) -> float:
+    """A quantity of a joint where a crank that goes round from 0 is so far on."""
+    return float(joint(one, quantity, name)[round(degrees / 360 * STEPS)])
+
+
+def ratio(one: Outcome, driven: str, driver: str) -> Any:
+    """Speed of one joint over that of another."""
+    name = "joint_rotation_velocity"
+    return joint(one, name, driven) / joint(one, name, driver)
+
+
+def closed(rows: Sequence[Row], first: float, guess: Sequence[float]) -> Any:
+    """Angles, then slides of the cylindrical rows, that close a loop: the product of its 4×4 matrices is no motion.
+
+    guess: near the solution, which tells its branch: angles of all rows but the first, then slides.
+    """
+
+    def gap(unknown: Any) -> Any:
+        angles, slides = (first, *unknown[: len(rows) - 1]), list(unknown[len(rows) - 1 :])
+        product = np.eye(4)
+        for (kind, twist, distance, slide), angle in zip(rows, angles, strict=True):
+            along = slides.pop(0) if kind == "C" else slide
+            for turn, shift in (([0, 0, angle], [0, 0, along]), ([np.radians(twist), 0, 0], [distance, 0, 0])):
+                step = np.eye(4)
+                step[:3, :3], step[:3, 3] = Rotation.from_rotvec(turn).as_matrix(), shift
+                product = product @ step
+        return [*Rotation.from_matrix(product[:3, :3]).as_rotvec(), *product[:3, 3]]
+
+    return fsolve(gap, guess, xtol=1e-12)
+
+
+def stroke(name: str) -> Callable[[Outcome], float]:
+    """How far a joint slides over the cycle, m."""
+    return lambda one: float(np.ptp(joint(one, "joint_slide", name)))
+
+
+def elliptic(a: float, b: float, c: float, sign: int) -> float:
+    """The root of a cos x + b sin x = c that lies ahead (+1) or behind (−1) of the direction (a, b)."""
+    return float(np.arctan2(b, a) + sign * np.arccos(c / np.hypot(a, b)))
+
+
+# ---- pezzuti-cardan: what its errors do ----------------------------------------------------------------------------
+
+CARDAN: list[Row] = [("R", 89.9, 1e-5, 0.0), ("C", 89.9, 1e-5, 0.0), ("C", 89.9, 2e-5, 0.0), ("C", 164.9, 1e-5, 0.0)]
+
+
+def cardan() -> Any:
+    """Angles of pin-1, pin-2 and output, then their slides, at each of the positions (6, STEPS)."""
+    found = [np.array([np.pi / 2, -np.radians(75), np.pi / 2, 0.0, 0.0, 0.0])]  # without errors: all at right angles
+    for first in np.arange(STEPS) * 2 * np.pi / STEPS:
+        found.append(closed(CARDAN, float(first), found[-1]))
+    return np.transpose(found[1:])
+
+
+def lead(output: Any) -> float:
+    """How far the output runs ahead of and behind the input over the turn."""
+    return float(np.ptp(np.unwrap(output) - np.arange(STEPS) * 2 * np.pi / STEPS))
+
+
+# ---- rccc, seven-r: the loop closed by a root finder -----------------------------------------------------------------
+
+RCCC: list[Row] = [("R", 25, 1.0, 0.6), ("C", 70, 3.0, 0.0), ("C", 55, 2.5, 0.0), ("C", 60, 2.8, 0.0)]
+SEVEN: list[Row] = [
+    ("R", 20, 0.030, -0.172),
+    ("R", 80, 0.100, -0.010),
+    ("R", 65, 0.070, 0.040),
+    ("R", 135, 0.110, -0.030),
+    ("R", 120, 0.150, 0.030),
+    ("R", 95, 0.140, -0.040),
+    ("R", 65, 0.131, -0.095),
+]
+
+
+def seven_half_way() -> float:
+    """Angle of G half a turn on, found in small steps from the start."""
+    angles = np.radians([65.664, 111.601, 5.323, 100.445, 89.941, 163.500])
+    for first in np.linspace(0.0, np.pi, 60):
+        angles = closed(SEVEN, float(first), angles)
+    return float(angles[-1])
+
+
+# ---- rssr, spherical-four-bar: one equation a cos ψ + b sin ψ = c ----------------------------------------------------
+
+
+def rocker_of_rssr(crank: float) -> float:
+    """ψ from |A − B|² = b², A the ball of the crank, B that of the rocker."""
+    a, b, c, d, s1, s4, alpha = 30e-3, 120e-3, 70e-3, 100e-3, 10e-3, 20e-3, np.pi / 3
+    axis, x = np.array([0.0, -np.sin(alpha), np.cos(alpha)]), np.array([1.0, 0.0, 0.0])
+    ball = np.array([a * np.cos(crank), a * np.sin(crank), s1]) - np.array([d, 0.0, 0.0]) - s4 * axis
+    return elliptic(
+        float(ball @ x), float(ball @ np.cross(axis, x)), float((ball @ ball + c * c - b * b) / (2 * c)), -1
+    )
+
+
+def rocker_on_the_sphere(crank: float) -> float:
+    """θ₄ from the angle between the axes of B and C, by the spherical law of cosines."""
+    (s1, _, s3, s4), (c1, c2, c3, c4) = (f(np.radians([30, 75, 65, 80])) for f in (np.sin, np.cos))
+    a = -s1 * c4 * s3 * np.cos(crank) - c1 * s4 * s3
+    b = s1 * s3 * np.sin(crank)
+    return elliptic(a, b, c2 + s1 * np.cos(crank) * s4 * c3 - c1 * c4 * c3, -1)
+
+
+# ---- rssp, swash-plate-pump, sarrus: strokes -------------------------------------------------------------------------
+
+
+def stroke_by_pythagoras() -> float:
+    r, rod, d = 0.04, 0.26, 0.12
+    return float(np.sqrt(rod**2 - (d - r) ** 2) - np.sqrt(rod**2 - (d + r) ** 2))
+
+
+def off_the_straight_line(one: Outcome) -> float:
+    """Of the middle of Sarrus' platform from (0, 0, 2 l sin φ), m."""
+    place = one.result["point_position"].sel(point="platform.middle").transpose("axis", "position").values
+    height = 2 * 0.12 * np.sin(joint(one, "joint_rotation", "A"))
+    return float(np.abs(place - [0 * height, 0 * height, height]).max())
+
+
+# ---- bennett, four-bar -----------------------------------------------------------------------------------------------
+
+
+def bennett_tangents(one: Outcome) -> float:
+    """tan(θ_A/2) tan(θ_B/2) at 60°."""
+    return float(np.prod([np.tan(at(one, "joint_rotation", name, 60) / 2) for name in "AB"]))
+
+
+def rocker_of_four_bar(crank: float) -> float:
+    """Angle of the rocker, from |C − B| = 90 mm."""
+    b = np.array([30 * np.cos(crank) - 100, 30 * np.sin(crank)])
+    return elliptic(float(b[0]), float(b[1]), float((b @ b + 70**2 - 90**2) / (2 * 70)), -1)
+
+
+ENTRIES = {
+    "universal-joint": Entry(
+        says="Greatest speed of the output over that of the input",
+        unit="1",
+        found=lambda one: float(np.abs(ratio(one, "output", "input")).max()),
+        expected=lambda: float(1 / np.cos(np.radians(30))),
+        source="the closed form 1/cos δ",
+        tolerance=1e-12,
+    ),
+    "double-cardan": Entry(
+        says="Largest difference of the output's speed over that of the input from 1",
+        unit="1",
+        found=lambda one: float(np.abs(ratio(one, "D", "A") - 1).max()),
+        expected=lambda: 0.0,
+        source="symmetry about the middle of the shaft",
+        tolerance=1e-12,
+    ),
+    "pezzuti-cardan": Entry(
+        says="How far the output runs ahead of and behind the input, both together",
+        unit="rad",
+        found=lambda one: lead(joint(one, "joint_rotation", "output")),
+        expected=lambda: lead(cardan()[2]),
+        source="closing the four matrices of the loop with SciPy's root finder",
+        tolerance=1e-11,
+    ),
+    "pezzuti-cardan-10mm": Entry(
+        says="Travel of pin-1 along its axis over the turn, which only the errors cause",
+        unit="m",
+        found=stroke("pin-1"),
+        expected=lambda: float(np.ptp(cardan()[3])),
+        source="closing the four matrices of the loop with SciPy's root finder",
+        tolerance=1e-12,
+        lost=STEPS,
+        errors=("locked by friction",),
+    ),
+    "rccc": Entry(
+        says="Slide of the output at 60° of the crank",
+        unit="m",
+        found=lambda one: at(one, "joint_slide", "D", 60),
+        expected=lambda: float(closed(RCCC, np.pi / 3, [1.2, 1.7, 1.4, -3.0, -1.0, -2.1])[5]),
+        source="closing the four matrices of the loop with SciPy's root finder",
+        tolerance=1e-11,
+    ),
+    "rssr": Entry(
+        says="Angle of the rocker at 60° of the crank",
+        unit="rad",
+        found=lambda one: at(one, "joint_rotation", "D", 60),
+        expected=lambda: rocker_of_rssr(np.pi / 3),
+        source="the one equation that the length of the rod leaves",
+        tolerance=1e-12,
+    ),
+    "rssp": Entry(
+        says="Stroke of the ram",
+        unit="m",
+        found=stroke("D"),
+        expected=stroke_by_pythagoras,
+        source="the closed form √(l² − (d − r)²) − √(l² − (d + r)²)",
+        tolerance=1e-14,
+    ),
+    "swash-plate-pump": Entry(
+        says="Stroke of the piston",
+        unit="m",
+        found=stroke("cylinder"),
+        expected=lambda: float(2 * 0.04 * np.tan(np.radians(15))),
+        source="the closed form 2 R tan α",
+        tolerance=1e-14,
+    ),
+    "spherical-four-bar": Entry(
+        says="Angle of the rocker at 90° of the crank",
+        unit="rad",
+        found=lambda one: at(one, "joint_rotation", "D", 90),
+        expected=lambda: rocker_on_the_sphere(np.pi / 2),
+        source="spherical trigonometry",
+        tolerance=1e-12,
+    ),
+    "bennett": Entry(
+        says="tan(θ/2) of the crank times that of the coupler, the same at every position",
+        unit="1",
+        found=bennett_tangents,
+        expected=lambda: float(np.sin(np.radians(80)) / np.sin(np.radians(30))),
+        source="Bennett's closed form sin ½(β + α)/sin ½(β − α)",
+        tolerance=1e-12,
+    ),
+    "sarrus": Entry(
+        says="Largest distance of the platform's middle from the height 2 l sin φ straight above the base",
+        unit="m",
+        found=off_the_straight_line,
+        expected=lambda: 0.0,
+        source="symmetry of the leaves",
+        tolerance=1e-13,
+    ),
+    "seven-r": Entry(
+        says="Angle of the last pin half a turn on",
+        unit="rad",
+        found=lambda one: at(one, "joint_rotation", "G", 180),
+        expected=seven_half_way,
+        source="closing the seven matrices of the loop with SciPy's root finder",
+        tolerance=1e-10,
+    ),
+    "fourbar-in-space": Entry(
+        says="Angle of the rocker at 60° of the crank",
+        unit="rad",
+        found=lambda one: at(one, "joint_rotation", "D", 60),
+        expected=lambda: rocker_of_four_bar(np.pi / 3),
+        source="the law of cosines",
+        tolerance=1e-12,
+    ),
+}

@@ -20,6 +20,7 @@ from trunnion.views.drawing import Picture, framed, labels, sketch
 from trunnion.views.figures import INK, MUTED, RULE, new
 from trunnion.views.lettering import plain
 from trunnion.views.space_assemblies import space_ways
+from trunnion.views.ways import some
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -59,7 +60,7 @@ def ways(mechanism: Mechanism, found: Sequence[Choice] | None = None) -> Figure:
     if mechanism.space == "spatial":
         return space_ways(mechanism, found)
     result = analyse(mechanism, 1)
-    rows = [[_drawn(mechanism, layout(result), choice, way) for way in choice.ways[:MOST_DRAWN]] for choice in found]
+    rows = [[_drawn(mechanism, layout(result), choice, way) for way in some(choice, MOST_DRAWN)] for choice in found]
     box = _box([one.shown for row in rows for one in row])
     columns = min(COLUMNS, max(map(len, rows)))
     lines = [math.ceil(len(row) / columns) for row in rows]

@@ -18,6 +18,7 @@ from trunnion.views.lettering import plain
 from trunnion.views.space import Space, space
 from trunnion.views.space_camera import best, looking
 from trunnion.views.space_figure import Scenery, labels, scenery, sketch
+from trunnion.views.ways import some
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -36,7 +37,7 @@ Drawn = tuple[Way, Space | None, int]  # a way, the mechanism in it if it can be
 def space_ways(mechanism: Mechanism, found: Sequence[Choice]) -> Figure:
     """A drawing for every way of every group that has several, all from one side; the one that is taken is marked."""
     result = analyse(mechanism.with_friction("off"), 1)
-    rows = [[_drawn(mechanism, choice, way) for way in choice.ways[:MOST_DRAWN]] for choice in found]
+    rows = [[_drawn(mechanism, choice, way) for way in some(choice, MOST_DRAWN)] for choice in found]
     known = [shown for row in rows for _, shown, _ in row if shown is not None]
     camera = looking(*best(known[0])) if known else looking(-1.0, 0.5)
     looks = [scenery(shown, camera) for shown in known]
@@ -94,7 +95,9 @@ def _one(axes: Axes, choice: Choice, way: Way, look: Scenery | None, index: int)
     weight = "bold" if way.taken else "normal"
     axes.set_title(plain(title), fontsize=8.5, fontweight=weight, color=INK, loc="left", pad=4)
     if look is None:
-        axes.text(0.03, 0.03, "cannot be assembled in this way", transform=axes.transAxes, fontsize=7, color=MUTED, zorder=8)
+        axes.text(
+            0.03, 0.03, "cannot be assembled in this way", transform=axes.transAxes, fontsize=7, color=MUTED, zorder=8
+        )
         return
     sketch(axes, look, index, choice.links)
     wide = axes.get_xlim()[1] - axes.get_xlim()[0]

@@ -13,6 +13,7 @@ from trunnion.views.cycle import Abscissa, Array, abscissa, column, layout, name
 from trunnion.views.figures import along, curve, frame_peak, legend, new, shade, style_of
 from trunnion.views.lettering import plain
 from trunnion.views.quantities import prefixed
+from trunnion.views.space import NOISE
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -23,6 +24,7 @@ __all__ = ["PLANES", "motion", "reactions", "turned_from_start"]
 
 PLANES = (("x", "y"), ("x", "z"), ("y", "z"))
 TURNING = ("revolute", "cylindrical", "helical", "spherical", "universal")
+ROOM = 44  # characters in a row of the legend of a panel that is one of several
 SLIDING = ("prismatic", "cylindrical", "helical")
 
 
@@ -62,9 +64,7 @@ def reactions(result: xr.Dataset, ideal: xr.Dataset | None, free: dict[str, Any]
 
 
 def _peak(columns: dict[str, Array | None]) -> float:
-    found = [np.nanmax(np.abs(values), initial=0.0) for values in columns.values()
-             if values is not None and np.isfinite(values).any()]  # fmt: skip
-    return float(max(found, default=0.0))
+    return max((float(np.abs(_known(values)).max(initial=0.0)) for values in columns.values()), default=0.0)
 
 
 def motion(result: xr.Dataset) -> Figure:
@@ -77,11 +77,19 @@ def motion(result: xr.Dataset) -> Figure:
     columns = [("joint rotation", "rad", _of_joints(result, "joint_rotation", turning))] if turning else []
     columns += [("joint slide", "m", _of_joints(result, "joint_slide", sliding))] if sliding else []
     columns.append(("turn of the link", "rad", _of_links(result, links)))
-    figure = new("Motion", result, 6.8, 4.0 + 3.6 * (len(columns) - 1) + (2.4 if len(columns) == 1 else 0.0))
+    rows = max(-(-len(members) // _abreast(members)) for _, _, members in columns)
+    figure = new(
+        "Motion", result, 6.2 + 0.2 * rows, 4.0 + 3.6 * (len(columns) - 1) + (2.4 if len(columns) == 1 else 0.0)
+    )
     grid = figure.subplots(3, len(columns), sharex=True, squeeze=False)
     for panels, (noun, unit, members) in zip(grid.T, columns, strict=True):
         _rates(list(panels), result, over, noun, unit, members)
     return figure
+
+
+def _abreast(members: Members) -> int:
+    """Entries in a row of the legend."""
+    return max(1, ROOM // (max(map(len, members), default=0) + 7))
 
 
 Members = dict[str, list[Array | None]]
@@ -89,7 +97,7 @@ Members = dict[str, list[Array | None]]
 
 def _moves(result: xr.Dataset, variable: str, name: str) -> bool:
     values = column(result, variable, joint=name)
-    known = np.array([]) if values is None else values[np.isfinite(values)]
+    known = _known(values)
     return known.size == 1 or (known.size > 1 and bool(np.ptp(known) > 1e-9 * max(1.0, np.abs(known).max())))
 
 
@@ -124,9 +132,29 @@ def turned_from_start(rotation: Array | None) -> Array | None:
     return np.asarray(2 * np.arctan2(np.sqrt(x * x + y * y + z * z), w), dtype=float)
 
 
+def _without_noise(members: Members) -> Members:
+    """Second rates that are rounding beside first rate²/span are zero, as of what moves at constant speed."""
+    known = [_known(values[0]) for values in members.values()]
+    span = max((float(np.ptp(values)) for values in known if values.size), default=0.0)
+    fastest = _peak({name: values[1] for name, values in members.items()})
+    if not span > 0:
+        return members
+    floor = NOISE * fastest**2 / span
+    return {
+        name: [*values[:2], None if values[2] is None else np.where(np.abs(values[2]) < floor, 0.0, values[2])]
+        for name, values in members.items()
+    }
+
+
+def _known(values: Array | None) -> Array:
+    """The values that are numbers; none if there are no values."""
+    return np.empty(0) if values is None else values[np.isfinite(values)]
+
+
 def _rates(panels: list[Axes], result: xr.Dataset, over: Abscissa, noun: str, unit: str, members: Members) -> None:
     """Three panels: the quantity and its first and second rate."""
     link = noun.startswith("turn")
+    members = _without_noise(members)
     for order, axes in enumerate(panels):
         columns = {name: values[order] for name, values in members.items()}
         scope = usual_peak(*columns.values())
@@ -141,6 +169,6 @@ def _rates(panels: list[Axes], result: xr.Dataset, over: Abscissa, noun: str, un
         frame_peak(axes, _peak(columns), scope, scale, unit + ("", "/s", "/s²")[order])
         if order < 2:
             axes.set_xlabel("")
-    legend(panels[0], most=2)
+    legend(panels[0], most=_abreast(members), room=ROOM)
     if len(members) == 1:
         panels[0].set_title(plain(next(iter(members))), fontsize=8.5, loc="left")

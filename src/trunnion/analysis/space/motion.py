@@ -22,7 +22,7 @@ from trunnion.algebra.space import Vector3, cross, dot, plus
 from trunnion.analysis.kinematics import Forward, Motion
 from trunnion.analysis.space.system import SpatialSystem
 from trunnion.analysis.system import Place, Values, driven_coordinates
-from trunnion.groups.spatial import Element
+from trunnion.groups.spatial_tree import Element
 
 __all__ = ["SpatialMotion", "SpatialPoint", "SpatialWalk", "on_the_ground"]
 
@@ -137,8 +137,9 @@ class SpatialWalk(Forward):
         ]
         twists_out = [self.motions[link].twist if link else None for link in outside]
         accelerations_out = [self.motions[link].acceleration if link else None for link in outside]
-        twists = group.velocity(pose, twists_out, rates)
-        accelerations = group.acceleration(pose, twists, twists_out, accelerations_out, seconds, rates)
+        speeds = group.rates(pose, twists_out, rates)
+        twists = group.twists(pose, twists_out, speeds)
+        accelerations = group.acceleration(pose, twists, twists_out, accelerations_out, seconds, speeds)
         for link, frame, twist, second in zip(module.links, pose.frames, twists, accelerations, strict=True):
             self.motions[link] = SpatialMotion(frame, twist, second)
         self.poses.append(pose)

@@ -13,7 +13,7 @@ from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.rigid import ORIGIN, Frame, element, relative, slid, turned, vector_minus
 from trunnion.algebra.space import Vector3, dot
 from trunnion.analysis.system import Place, System, Values
-from trunnion.groups.ccc_group import CylindricalDyad
+from trunnion.groups.cylindrical_dyad import CylindricalDyad
 from trunnion.groups.spatial import SpatialGroup
 from trunnion.groups.tree import OUTER, GroupJoint
 from trunnion.structure.decompose import Module

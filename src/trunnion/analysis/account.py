@@ -42,6 +42,11 @@ DURANGO = (
     "group allowing for friction in the kinematic pairs, J. Braz. Soc. Mech. Sci. & Eng., 2010"
 )
 
+PEZZUTI = (
+    "E. Pezzuti, R. Stefanelli, P. P. Valentini, L. Vita, Computer-aided simulation and testing of spatial linkages "
+    "with joint mechanical errors, Int. J. Numer. Meth. Eng. 65 (2006) 1735-1748"
+)
+
 
 def useful_loads(mechanism: Mechanism) -> list[str]:
     """Loads whose power is the purpose: those marked useful, or all if none is."""
@@ -228,7 +233,8 @@ def _references(mechanism: Mechanism) -> list[str]:
     laws = {
         joint.friction.law or "coulomb" for joint in mechanism.effective_joints.values() if joint.friction is not None
     }
-    return [DURANGO, *(f"{law}: {FRICTION_LAWS[law].source}" for law in sorted(laws)), *mechanism.references]
+    method = DURANGO if mechanism.space == "planar" else PEZZUTI
+    return [method, *(f"{law}: {FRICTION_LAWS[law].source}" for law in sorted(laws)), *mechanism.references]
 
 
 def _summary(

@@ -123,6 +123,15 @@ class SpatialWalk(Forward):
         change = plus(moment_at(rate, two.place), cross(relative.u, speed))
         return dot(rate.u, two.z) + dot(relative.u, carried), dot(change, two.z) + dot(at, carried)
 
+    def slip_motion(self, joint: str) -> tuple[Number, Number]:
+        """Slip of the contact of a joint that moves one way only, along its thread if it has one; m/s, m/s²."""
+        (turn, slide), (turn_rate, slide_rate) = self.rates(joint), self.second_rates(joint)
+        if self.system.joints[joint][0] == "prismatic":
+            return slide, slide_rate
+        lever, lead = self.values[f"joints.{joint}.pin.radius"], self.space.lead(self.values, joint)
+        way = namespace(lever, lead).sqrt(lever * lever + lead * lead)
+        return way * turn, way * turn_rate
+
     def _pair(self, place: Place) -> Any:
         return Element(self._side(place, 0), self._side(place, 1), self.space.lead(self.values, place.joint))
 

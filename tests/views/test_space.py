@@ -240,7 +240,7 @@ def test_every_spatial_result_makes_a_page_without_a_net(spatial):
     page = Page(text)
     assert not page.open
     assert page.scene()["count"] == result.sizes["position"]
-    assert "across a plane of two of its axes" in " ".join(page.words)
+    assert "in the plane of two of its axes" in " ".join(page.words)
     assert len(text) < 1_500_000
 
 

@@ -172,7 +172,8 @@ def _model_notes(mechanism: Mechanism) -> list[Finding]:
     heavy = [name for name, link in bodies.items() if link.mass.source != 0]
     if heavy and mechanism.gravity is None:
         what = f"gravity is not stated and taken as none, though {', '.join(heavy)} have mass"
-        notes.append(Finding(what, "gravity", "state gravity: [0, -9.81], or [0, 0] to say so", Severity.NOTE))
+        down, none = ("[0, -9.81]", "[0, 0]") if mechanism.space == "planar" else ("[0, 0, -9.81]", "[0, 0, 0]")
+        notes.append(Finding(what, "gravity", f"state gravity: {down}, or {none} to say so", Severity.NOTE))
     sliding = {link for joint in mechanism.joints.values() if joint.type == "prismatic" for link in joint.links}
     points = [name for name in heavy if bodies[name].inertia == ZERO_INERTIA and name not in sliding]
     if points:

@@ -157,7 +157,9 @@ def turning(system: System) -> list[str]:
     """Joints that are told by their turn: those about an axis in space."""
     if system.mechanism.space == "planar":
         return []
-    return [name for name, (kind, _) in system.joints.items() if kind in ("revolute", "cylindrical", "helical")]
+    return [
+        name for name, (kind, _) in system.joints.items() if kind in ("revolute", "cylindrical", "helical", "universal")
+    ]
 
 
 def _ways(rows: Mapping[str, Array], count: int, taken: int, turned: Sequence[str]) -> tuple[Way, ...]:

@@ -130,7 +130,7 @@ def design(mechanism: Mechanism, steps: int = 720) -> Design:
 
 
 def _planar(mechanism: Mechanism) -> Run:
-    """The mechanism prepared; MechanismError if it is spatial: transmission angles, poles and Grashof are of the plane."""
+    """The mechanism prepared; MechanismError if it is spatial."""
     if mechanism.space != "planar":
         what = "the figures of design (transmission angle, Grashof, instant centres, shaking force) are of the plane"
         raise MechanismError(Finding(what, "space", "use analyse and locking; screw axes are in the report"))

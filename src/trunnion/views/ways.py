@@ -48,7 +48,7 @@ def places(choice: Choice, way: Way) -> str:
     """Where the inner joints of a group are in one of its ways: 'C (70, 130) mm'."""
     numbers = [abs(n) for one in choice.ways for joint in one.joints.values() for n in joint]
     largest = max((n for n in numbers if math.isfinite(n)), default=0.0)
-    turned = [f"{name} {math.degrees(angle):.4g}°" for name, angle in list(way.turns.items())[:MOST_JOINTS]]
+    turned = [f"{name} {round(math.degrees(angle), 6):.5g}°" for name, angle in list(way.turns.items())[:MOST_JOINTS]]
     if not largest:
         return ", ".join(turned) or ("at the origin" if numbers else "")
     factor, unit = prefixed(largest, "m")

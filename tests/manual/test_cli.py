@@ -313,10 +313,10 @@ def test_wrong_mobility_is_bad_input(run: Run, tmp_path: Path) -> None:
     assert files(tmp_path) == {"model.yaml"}
 
 
-def test_a_spatial_model_is_read_but_not_analysed(run: Run) -> None:
-    done = run("analyse", EXAMPLES / "pezzuti-cardan.yaml")
+def test_design_is_of_the_plane(run: Run) -> None:
+    done = run("design", EXAMPLES / "pezzuti-cardan.yaml")
     assert done.code == 2
-    assert "spatial" in done.err
+    assert "of the plane" in done.err
 
 
 # ---- bad input ------------------------------------------------------------------------------------------------

@@ -87,8 +87,8 @@ class BearingLoad:
 
     frame: axes x, y across and z along the axis u, origin in the middle of the bearing; length: L, m. summed: [P]'s sum
     instead of the two contacts. width: of a guide, over which a pair of forces carries the torsion about it, which adds
-    2 |M_u|/width; None of others. flank: secant of the lead angle of a thread, whose flanks add flank |F_u|; None of
-    others. By F_u alone: M_u may hold the torque of a drive, which the flanks do not carry.
+    2 |M_u|/width; None of others. flank: of a thread, the secant of its angle of lead, whose flanks add flank |F_u|;
+    None of others. By F_u alone: M_u may hold the torque of a drive, which the flanks do not carry.
     It feels F⊥, g in the axes x, y and, of a guide or thread, F_u and M_u.
     """
 

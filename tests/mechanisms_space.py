@@ -60,12 +60,16 @@ def pair_motion(kind: str, rng: np.random.Generator, pitch: float) -> tuple[Fram
 
 
 def body(rng: np.random.Generator, size: float = 0.4) -> Data:
-    """Mass, centre and a physically possible inertia in no particular axes."""
+    """Mass, centre and a physically possible inertia in no particular axes, of the lighter ones about the origin."""
     mass = rng.uniform(1, 3)
     axes, second = random_rotation(rng), mass * (size * rng.uniform(0.2, 0.6, 3)) ** 2  # ∫ x² dm of the three axes
     inertia = axes @ np.diag(np.sum(second) - second) @ axes.T
+    centre = rng.uniform(-0.3, 0.3, 3) * size
+    about = "origin" if mass < 2 else "centre"
+    if about == "origin":
+        inertia = inertia + mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
     named = {key: inertia[i, j] for key, (i, j) in TENSOR.items()}
-    return {"mass": mass, "centre": list(rng.uniform(-0.3, 0.3, 3) * size), "inertia": named}
+    return {"mass": mass, "centre": list(centre), "inertia": named, "inertia_about": about}
 
 
 TENSOR = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
@@ -139,7 +143,7 @@ def rod(one: Array, two: Array) -> Data:
     u = (two - one) / np.linalg.norm(two - one)
     inertia = 0.08 * (np.eye(3) - np.outer(u, u)) + 0.01 * np.outer(u, u)
     named = {key: inertia[i, j] for key, (i, j) in TENSOR.items()}
-    return {"mass": 1.3, "centre": list(one + 0.4 * (two - one)), "inertia": named}
+    return {"mass": 1.3, "centre": list(one + 0.4 * (two - one)), "inertia": named, "inertia_about": "centre"}
 
 
 def started(data: Data, home: dict[str, Frame]) -> Drawn:

@@ -329,6 +329,12 @@ def test_an_over_constrained_model_is_refused_with_its_joints(run: Run) -> None:
     assert "minimum-norm" in done.err
 
 
+def test_design_is_of_the_plane(run: Run) -> None:
+    done = run("design", EXAMPLES / "pezzuti-cardan.yaml")
+    assert done.code == 2
+    assert "of the plane" in done.err
+
+
 # ---- bad input ------------------------------------------------------------------------------------------------
 
 BAD_TEXTS = {

@@ -173,6 +173,9 @@ def reverse_row(back: Reverse, cycle: Cycle) -> dict[str, Any] | None:
     else:
         value = cycle.net(back.delivered) / cycle.net(back.given)
         text += "" if value > 0 else " (it holds itself)"
+        if value > 1:  # over a range what masses and springs have stored comes on top
+            text += " (masses and springs give work too)"
+            value = float("nan")
     return {"label": text, "value": value if np.isfinite(value) else None, "unit": "1"}
 
 

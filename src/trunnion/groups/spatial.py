@@ -113,7 +113,7 @@ class SpatialGroup(SpatialTree):
             if not self.BRANCHES:  # a closed form stays on its branch by itself
                 orientation = np.sign(primal(linalg.determinant(jacobian)))
         gap = self.opening(placed, q, size)
-        condition = _condition(jacobian, inverse)
+        condition = redundant.condition(jacobian) if self.redundant and inverse else _condition(jacobian, inverse)
         all_q = tuple(value for joint in q for value in joint)
         return Pose(frames, placed, screws, all_q, jacobian, inverse, size, gap, condition, orientation)
 

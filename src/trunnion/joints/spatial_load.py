@@ -87,7 +87,8 @@ class BearingLoad:
 
     frame: axes x, y across and z along the axis u, origin in the middle of the bearing; length: L, m. summed: [P]'s sum
     instead of the two contacts. width: of a guide, over which a pair of forces carries the torsion about it, which adds
-    2 |M_u|/width; None of others. radius: mean radius of a thread, whose flanks add √(F_u² + (M_u/r)²); None of others.
+    2 |M_u|/width; None of others. flank: of a thread, the secant of its angle of lead, whose flanks add flank |F_u|;
+    None of others. By F_u alone: M_u may hold the torque of a drive, which the flanks do not carry.
     It feels F⊥, g in the axes x, y and, of a guide or thread, F_u and M_u.
     """
 
@@ -95,7 +96,7 @@ class BearingLoad:
     length: Number
     summed: bool = False
     width: Number | None = None
-    radius: Number | None = None
+    flank: Number | None = None
 
     def felt(self, reaction: Reaction) -> Reaction:
         """F_x, F_y, g_x = M_y/L, g_y = −M_x/L, then F_u and M_u if they count."""
@@ -103,7 +104,7 @@ class BearingLoad:
         moment = minus(moment, cross(self.frame.place, force))
         x, y, z, _ = self.frame
         across = (dot(force, x), dot(force, y), dot(moment, y) / self.length, -(dot(moment, x) / self.length))
-        return across if self.width is None and self.radius is None else (*across, dot(force, z), dot(moment, z))
+        return across if self.width is None and self.flank is None else (*across, dot(force, z), dot(moment, z))
 
     def normal(self, reaction: Reaction) -> Number:
         """N."""
@@ -115,8 +116,8 @@ class BearingLoad:
             found = _length(hx - gx, hy - gy) + _length(hx + gx, hy + gy)
         if self.width is not None:
             found = found + 2 * namespace(more[1]).abs(more[1]) / self.width
-        if self.radius is not None:
-            found = found + _length(more[0], more[1] / self.radius)
+        if self.flank is not None:
+            found = found + self.flank * namespace(more[0]).abs(more[0])
         return found
 
     def gradient(self, reaction: Reaction, normal: Number) -> Reaction:
@@ -136,10 +137,8 @@ class BearingLoad:
         torsion: Number = 0.0
         if self.width is not None:
             torsion = 2 * namespace(more[1]).sign(more[1]) / self.width
-        if self.radius is not None:
-            turn = more[1] / self.radius
-            along, share = _shares(_length(more[0], turn), more[0], turn)
-            torsion = torsion + share / self.radius
+        if self.flank is not None:
+            along = self.flank * namespace(more[0]).sign(more[0])
         return px, py, tx, ty, along, torsion
 
     def bound(self, reaction: Reaction) -> Number:
@@ -157,5 +156,5 @@ class BearingLoad:
             frame=each(self.frame, change),
             length=change(self.length),
             width=None if self.width is None else change(self.width),
-            radius=None if self.radius is None else change(self.radius),
+            flank=None if self.flank is None else change(self.flank),
         )

@@ -101,8 +101,11 @@ def _bearing(walk: SpatialWalk, joint: str, kind: str, frame: Frame) -> BearingL
     if kind == "prismatic":
         length = values[f"{path}.guide.length"]
         return BearingLoad(frame, length, _summed(walk, joint), values.get(f"{path}.guide.width"))
-    radius = values[f"{path}.pin.radius"] if kind == "helical" else None
-    return BearingLoad(frame, values[f"{path}.pin.bearing"], _summed(walk, joint), radius=radius)
+    flank = None
+    if kind == "helical":
+        slope = walk.space.lead(values, joint) / values[f"{path}.pin.radius"]
+        flank = namespace(slope).sqrt(1 + slope * slope)
+    return BearingLoad(frame, values[f"{path}.pin.bearing"], _summed(walk, joint), flank=flank)
 
 
 def _ball(walk: SpatialWalk, joint: str, middle: Vector3) -> Rubbing:

@@ -87,7 +87,12 @@ class SpatialWalk(Forward):
         return compose(frame, self.local[link, joint])
 
     def coordinate(self, joint: str, first: Any, second: Any) -> Number:
-        """Turn of a joint from its elements, or slide if that is all it does."""
+        """Turn of a joint from its elements, of a cross that of its first pin, or slide if that is all it does."""
+        if (
+            self.system.joints[joint][0] == "universal"
+        ):  # the second pin is at (sin θ₁, −cos θ₁, 0) of the first element
+            sine, cosine = dot(second.z, first.x), -dot(second.z, first.y)
+            return namespace(sine, cosine).arctan2(sine, cosine)
         return _dual_angle(first, second)[0 if self.system.turns(joint) else 1]
 
     def _local_place(self, link: str, name: str) -> Vector3:
@@ -122,6 +127,15 @@ class SpatialWalk(Forward):
         speed = moment_at(one.twist, two.place)  # the point of the axis moves along with the first link
         change = plus(moment_at(rate, two.place), cross(relative.u, speed))
         return dot(rate.u, two.z) + dot(relative.u, carried), dot(change, two.z) + dot(at, carried)
+
+    def slip_motion(self, joint: str) -> tuple[Number, Number]:
+        """Slip of the contact of a joint that moves one way only, along its thread if it has one; m/s, m/s²."""
+        (turn, slide), (turn_rate, slide_rate) = self.rates(joint), self.second_rates(joint)
+        if self.system.joints[joint][0] == "prismatic":
+            return slide, slide_rate
+        lever, lead = self.values[f"joints.{joint}.pin.radius"], self.space.lead(self.values, joint)
+        way = namespace(lever, lead).sqrt(lever * lever + lead * lead)
+        return way * turn, way * turn_rate
 
     def _pair(self, place: Place) -> Any:
         return Element(self._side(place, 0), self._side(place, 1), self.space.lead(self.values, place.joint))

@@ -235,7 +235,8 @@ def sweep(
         else:
             save(result, path, units_row)
     head, rows, left_out = swept_table(result, measure)
-    show_rows(f"{result.attrs['name'] or file}\n{measure.replace('_', ' ')} over {' and '.join(grid)}", head, rows)
+    name = f"{measure.replace('_', ' ')} over {' and, in columns, '.join(grid)}"
+    show_rows(f"{mechanism.name or file}\n{name}", head, rows)
     if left_out:
         console().print(f"{left_out:,} points more; --out FILE.csv has all", markup=False, highlight=False)
     say(_placed(_findings(result), file, ["assembly"]))

@@ -43,9 +43,10 @@ def show_rows(title: str, head: list[str], rows: list[list[str]]) -> None:
     """Rows of texts under their heads."""
     from rich.table import Table
 
-    table = Table(title=title, title_justify="left", show_edge=False)
+    console().print(title, style="italic", markup=False, highlight=False, soft_wrap=True)
+    table = Table(show_edge=False)
     for name in head:
-        table.add_column(name, justify="right")
+        table.add_column(name, justify="right", overflow="fold")
     for row in rows:
         table.add_row(*row)
     console().print(table, markup=False, highlight=False)

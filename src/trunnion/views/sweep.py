@@ -36,7 +36,8 @@ def figure(result: xr.Dataset, measure: str = "efficiency") -> Figure:
     scope = usual_peak(y)
     factor, shown = prefixed(scope, unit)
     title = measure.replace("_", " ")
-    sheet = new(f"{title[:1].upper()}{title[1:]} over {over.name}", result)
+    head = title if "." in title else title.capitalize()  # a joint's name stays as it is
+    sheet = new(f"{head} over {over.name}", result)
     axes = sheet.subplots()
     dress(axes, plain(over.title), plain(f"{title} [{shown}]" if shown else title))
     _shade(axes, x, status)

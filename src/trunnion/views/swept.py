@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Scale", "cause", "check_measure", "grid", "scales", "statuses", "table"]
 
-MOST_ROWS, MOST_COLUMNS = 40, 10  # of a table
+MOST_ROWS, MOST_COLUMNS = 40, 8  # of a table
 CAUSES = {
     Status.NOT_CONVERGED: "not converged",
     Status.LOCKED: "locked",
@@ -110,20 +110,19 @@ def _list(result: xr.Dataset, measure: str, over: Scale) -> tuple[list[str], lis
     efforts = [name for name in found if name.endswith(".effort_max")]
     shown = list(dict.fromkeys([measure, "efficiency", *efforts, "friction_power_mean", "locking_margin"]))
     picked, status = _thinned(len(over.values), MOST_ROWS), statuses(result)[:, 0]
-    head = [
-        over.title,
-        *(f"{name.replace('_', ' ')} [{found[name][0]}]".removesuffix(" [1]") for name in shown),
-        "status",
-    ]
-    rows = [
-        [
-            f"{over.values[i]:.6g}",
-            *("" if np.isnan(found[name][1][i]) else _number(found[name][1][i]) for name in shown),
-            str(found["status"][1][i]).replace("_", " ") if status[i] < Status.NOT_CONVERGED else cause(int(status[i])),
-        ]
-        for i in picked
-    ]
+    titles = [f"{name.replace('_', ' ')} [{found[name][0]}]".removesuffix(" [1]") for name in shown]
+    words = [_word(int(code)) for code in status]
+    head = [over.title, *titles, *(["status"] if any(words) else [])]
+    rows = []
+    for i in picked:
+        cells = ["" if np.isnan(found[name][1][i]) else _number(found[name][1][i]) for name in shown]
+        rows.append([_number(over.values[i]), *cells, *([words[i]] if any(words) else [])])
     return head, rows, len(over.values) - len(picked)
+
+
+def _word(code: int) -> str:
+    """What a table says of a point that has no figures, or not quite sound ones."""
+    return cause(code) if code >= Status.NOT_CONVERGED else "near singular" if code == Status.NEAR_SINGULAR else ""
 
 
 def _number(value: float) -> str:
@@ -134,7 +133,7 @@ def _matrix(result: xr.Dataset, measure: str, over: Scale, other: Scale) -> tupl
     _, values = grid(result, measure)
     status = statuses(result)
     down, across = _thinned(values.shape[0], MOST_ROWS), _thinned(values.shape[1], MOST_COLUMNS)
-    head = [over.title, *(f"{other.name} = {other.say(k)}" for k in across)]
+    head = [over.title, *(other.say(k) for k in across)]
     rows = []
     for i in down:
         cells = [

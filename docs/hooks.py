@@ -198,6 +198,14 @@ def results_table() -> str:
     return _rows(("variable", "dimensions", "unit", "meaning"), rows)
 
 
+def sweeps_table() -> str:
+    """Every figure of a sweep."""
+    from trunnion.analysis.sweep import FIGURES
+
+    rows = [(_code(name), ", ".join(one.dims), _unit(one.units), one.long_name) for name, one in FIGURES.items()]
+    return _rows(("variable", "dimension before the swept ones", "unit", "meaning"), rows)
+
+
 def status_table() -> str:
     """Every status."""
     from trunnion.errors import Status
@@ -462,6 +470,7 @@ def _default(field: Any) -> str:
 
 TABLES: dict[str, Callable[..., str]] = {
     "results": results_table,
+    "sweeps": sweeps_table,
     "statuses": status_table,
     "laws": laws_table,
     "motion": motion_table,

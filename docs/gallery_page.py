@@ -35,13 +35,13 @@ def wanted() -> set[tuple[str, str, str]]:
 def page() -> str:
     """The entries as Markdown, by section."""
     known = facts()
-    missing = {path.stem for path in EXAMPLES.glob("*.yaml")} ^ {*known.ENTRIES, *known.ONLY_READ}
+    missing = {path.stem for path in EXAMPLES.glob("*.yaml")} ^ {*known.ENTRIES, *known.REFUSED}
     if missing:
         raise ValueError(f"tests/gallery/facts.py and examples/ do not name the same models: {sorted(missing)}")
     parts = []
     for title, entries in known.SECTIONS.items():
         parts += [f"## {title}", *(_entry(name, entry) for name, entry in entries.items())]
-    parts += ["## Read, not analysed yet", *(_only_read(name, why) for name, why in known.ONLY_READ.items())]
+    parts += ["## Diagnosed and refused", *map(_refused, known.REFUSED)]
     return "\n\n".join(parts) + "\n"
 
 
@@ -66,11 +66,15 @@ def _entry(name: str, entry: Any) -> str:
     return "\n\n".join(parts)
 
 
-def _only_read(name: str, why: str) -> str:
+def _refused(name: str) -> str:
+    """An example that is there for its diagnosis."""
     import trunnion
 
     mechanism = trunnion.read(EXAMPLES / f"{name}.yaml")
-    told = [" ".join(mechanism.notes.split()), why, *_sources(mechanism), f"[{name}.yaml](examples/{name}.yaml)"]
+    found = trunnion.check(mechanism, 72).findings
+    errors = [one for one in found if one.severity == "error"]
+    findings = [f"**Finding.** {one.what[0].upper()}{one.what[1:]}. Remedy: {one.remedy}." for one in errors]
+    told = [" ".join(mechanism.notes.split()), *findings, *_sources(mechanism), f"[{name}.yaml](examples/{name}.yaml)"]
     return "\n\n".join([f"### {mechanism.name}", *told])
 
 

@@ -2,9 +2,10 @@
 
 CSV (and Parquet) have one row a position and flat columns: `time`, `<joint>.rotation`, `<joint>.slide`,
 `<joint>.reaction_x|y`, `<joint>.friction_torque`, `<driver>.effort`, `<link>.<point>.x|y`, `power_in`,
-`power_useful`, `status` and so on, in SI; the other formats hold the whole Dataset. A sweep has one row a point of its
-grid: the swept numbers by the names they were given, then `efficiency`, `<driver>.effort_max`,
-`<joint>.reaction_max`, …, `status`.
+`power_useful`, `status` and so on, in SI; the other formats hold the whole Dataset. In space also z, and
+`<joint>.reaction_moment_x|y|z`, `<joint>.friction_force`, `<link>.x|y|z`, `<link>.rotation_w|x|y|z`,
+`<link>.angular_velocity_x|y|z`. A sweep has one row a point of its grid: the swept numbers by the names they were given,
+then `efficiency`, `<driver>.effort_max`, `<joint>.reaction_max`, …, `status`.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 
 __all__ = ["FORMATS", "check_format", "columns", "figures", "save"]
 
+SLIDING = ("prismatic", "cylindrical", "helical")
 ROWS = 20_000  # written at a time, so that memory does not grow with the number of positions
 
 Column = tuple[str, str, Callable[[slice], NDArray[Any]]]
@@ -39,49 +41,102 @@ def columns(result: xr.Dataset) -> list[Column]:
     """(name, unit, values of a window of rows) of every flat column."""
     if "swept" in result.attrs:
         return [(name, unit, values.__getitem__) for name, (unit, values) in figures(result).items()]
+    stated = json.loads(result.attrs["scene"])
+    spatial = stated.get("space") == "spatial"
+    kinds = {name: joint["type"] for name, joint in stated["joints"].items()}
     found: list[Column] = [("time", "s", lambda window: result["time"].values[window])]
-    prismatic = {
-        name for name, joint in json.loads(result.attrs["scene"])["joints"].items() if joint["type"] != "revolute"
-    }
     for i, joint in enumerate(result["joint"].values):
-        flat = [("joint_rotation", "rotation"), ("joint_rotation_velocity", "rotation_velocity")]
-        flat += [("joint_slide", "slide"), ("joint_slide_velocity", "slide_velocity")] if joint in prismatic else []
-        found += [_column(result, variable, f"{joint}.{name}", (i,)) for variable, name in flat]
-        found += [_column(result, "reaction_force", f"{joint}.reaction_{axis}", (i, k)) for k, axis in enumerate("xy")]
-        if joint in prismatic:
-            found.append(_column(result, "reaction_moment", f"{joint}.reaction_moment", (i,)))
-            found.append(_column(result, "friction_force", f"{joint}.friction_force", (i,)))
-        else:
-            found.append(_column(result, "friction_torque", f"{joint}.friction_torque", (i,)))
+        of_joint = _spatial_joint if spatial else _planar_joint
+        found += of_joint(result, i, str(joint), kinds[str(joint)])
         found.append(_column(result, "friction_power", f"{joint}.friction_power", (i,)))
-    for i, (driver, unit) in enumerate(
-        zip(result["driver"].values, json.loads(result.attrs["driver_units"]), strict=True)
-    ):
-        name, _, values = _column(result, "drive_effort", f"{driver}.effort", (i,))
-        found.append((name, unit, values))
-        for end in ("lower", "upper"):
-            _, _, values = _column(result, f"drive_effort_{end}", "", (i,))
-            found.append((f"{driver}.effort_{end}", unit, values))
-    for i, spring in enumerate(result["spring"].values if "spring" in result.dims else ()):
-        for variable, unit in zip(("force", "elongation"), json.loads(result.attrs["spring_units"])[i], strict=True):
-            name, _, values = _column(result, f"spring_{variable}", f"{spring}.{variable}", (i,))
-            found.append((name, unit, values))
-        found.append(_column(result, "spring_power", f"{spring}.spring_power", (i,)))
-        found.append(_column(result, "damping_power", f"{spring}.damping_power", (i,)))
+    found += _drivers(result) + _springs(result)
     for i, gear in enumerate(result["gear"].values if "gear" in result.dims else ()):
         found.append(_column(result, "gear_torque", f"{gear}.torque", (i,)))
-        found += [_column(result, "gear_force", f"{gear}.force_{axis}", (i, k)) for k, axis in enumerate("xy")]
+        found += _vector(result, "gear_force", f"{gear}.force_", i)
     for i, link in enumerate(result["link"].values):
-        for variable in ("link_angle", "link_angle_velocity", "link_angle_acceleration"):
-            found.append(_column(result, variable, f"{link}.{variable.removeprefix('link_')}", (i,)))
+        found += _spatial_link(result, i, str(link)) if spatial else _planar_link(result, i, str(link))
     for i, point in enumerate(result["point"].values):
-        found += [_column(result, "point_position", f"{point}.{axis}", (i, k)) for k, axis in enumerate("xy")]
+        found += _vector(result, "point_position", f"{point}.", i)
     drive = result["drive_power"].values
     found.append(("power_in", "W", lambda window: drive[:, window].sum(axis=0)))
     found.append(_column(result, "useful_power", "power_useful", ()))
     names = np.array([status.name.lower() for status in Status])
     found.append(("status", "", lambda window: names[result["status"].values[window]]))
     return found
+
+
+def _planar_joint(result: xr.Dataset, i: int, joint: str, kind: str) -> list[Column]:
+    slides = kind != "revolute"
+    flat = [("joint_rotation", "rotation"), ("joint_rotation_velocity", "rotation_velocity")]
+    flat += [("joint_slide", "slide"), ("joint_slide_velocity", "slide_velocity")] if slides else []
+    found = [_column(result, variable, f"{joint}.{name}", (i,)) for variable, name in flat]
+    found += _vector(result, "reaction_force", f"{joint}.reaction_", i)
+    if slides:
+        found.append(_column(result, "reaction_moment", f"{joint}.reaction_moment", (i,)))
+        found.append(_column(result, "friction_force", f"{joint}.friction_force", (i,)))
+    else:
+        found.append(_column(result, "friction_torque", f"{joint}.friction_torque", (i,)))
+    return found
+
+
+def _spatial_joint(result: xr.Dataset, i: int, joint: str, kind: str) -> list[Column]:
+    """Of a joint in space: its motion, force and moment of the reaction, friction along each freedom."""
+    moves = {"rotation": kind not in ("prismatic", "planar", "fixed"), "slide": kind in SLIDING}
+    found = [
+        _column(result, f"joint_{motion}{rate}", f"{joint}.{motion}{rate}", (i,))
+        for motion, there in moves.items()
+        for rate in ("", "_velocity")
+        if there
+    ]
+    found += _vector(result, "reaction_force", f"{joint}.reaction_", i)
+    found += _vector(result, "reaction_moment", f"{joint}.reaction_moment_", i)
+    freedoms = {"torque": moves["rotation"], "force": moves["slide"]}
+    found += [
+        _column(result, f"friction_{what}", f"{joint}.friction_{what}", (i,)) for what, is_ in freedoms.items() if is_
+    ]
+    return found
+
+
+def _planar_link(result: xr.Dataset, i: int, link: str) -> list[Column]:
+    variables = ("link_angle", "link_angle_velocity", "link_angle_acceleration")
+    return [_column(result, one, f"{link}.{one.removeprefix('link_')}", (i,)) for one in variables]
+
+
+def _spatial_link(result: xr.Dataset, i: int, link: str) -> list[Column]:
+    """Pose of a link, origin and quaternion, and how it turns."""
+    found = _vector(result, "link_position", f"{link}.", i)
+    found += [_column(result, "link_rotation", f"{link}.rotation_{one}", (i, k)) for k, one in enumerate("wxyz")]
+    for rate in ("velocity", "acceleration"):
+        found += _vector(result, f"link_angular_{rate}", f"{link}.angular_{rate}_", i)
+    return found
+
+
+def _drivers(result: xr.Dataset) -> list[Column]:
+    """Effort of each driver with the ends of its interval, in the unit of the driver."""
+    found: list[Column] = []
+    for i, (driver, unit) in enumerate(
+        zip(result["driver"].values, json.loads(result.attrs["driver_units"]), strict=True)
+    ):
+        for end in ("", "_lower", "_upper"):
+            name, _, values = _column(result, f"drive_effort{end}", f"{driver}.effort{end}", (i,))
+            found.append((name, unit, values))
+    return found
+
+
+def _springs(result: xr.Dataset) -> list[Column]:
+    found: list[Column] = []
+    for i, spring in enumerate(result["spring"].values if "spring" in result.dims else ()):
+        for variable, unit in zip(("force", "elongation"), json.loads(result.attrs["spring_units"])[i], strict=True):
+            name, _, values = _column(result, f"spring_{variable}", f"{spring}.{variable}", (i,))
+            found.append((name, unit, values))
+        found.append(_column(result, "spring_power", f"{spring}.spring_power", (i,)))
+        found.append(_column(result, "damping_power", f"{spring}.damping_power", (i,)))
+    return found
+
+
+def _vector(result: xr.Dataset, variable: str, name: str, i: int) -> list[Column]:
+    """The components of a vector: its name with each axis behind it."""
+    return [_column(result, variable, f"{name}{axis}", (i, k)) for k, axis in enumerate(result["axis"].values)]
 
 
 def _column(result: xr.Dataset, variable: str, name: str, index: tuple[int, ...]) -> Column:

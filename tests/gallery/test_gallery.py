@@ -9,18 +9,18 @@ import pytest
 
 import trunnion
 from gallery.entry import STEPS, Outcome
-from gallery.facts import ENTRIES, ONLY_READ
+from gallery.facts import ENTRIES, REFUSED
 from trunnion import Status
-from trunnion.errors import Severity
+from trunnion.errors import MechanismError, Severity
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
 def test_every_example_has_an_entry() -> None:
-    assert sorted([*ENTRIES, *ONLY_READ]) == sorted(path.stem for path in EXAMPLES.glob("*.yaml"))
+    assert sorted([*ENTRIES, *REFUSED]) == sorted(path.stem for path in EXAMPLES.glob("*.yaml"))
 
 
-@pytest.mark.parametrize("name", [*ENTRIES, *ONLY_READ])
+@pytest.mark.parametrize("name", [*ENTRIES, *REFUSED])
 def test_every_example_has_a_name_and_notes(name: str) -> None:
     mechanism = trunnion.read(EXAMPLES / f"{name}.yaml")
     assert mechanism.name
@@ -39,3 +39,14 @@ def test_example(name: str) -> None:
     assert np.count_nonzero(result["status"] >= Status.NOT_CONVERGED) == entry.lost
     found, expected = entry.found(Outcome(mechanism, result)), entry.expected()
     assert found == pytest.approx(expected, rel=0, abs=entry.tolerance), entry.says
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_refused(name: str) -> None:
+    """It is checked, its diagnosis is an error, and it is not analysed."""
+    mechanism = trunnion.read(EXAMPLES / f"{name}.yaml")
+    errors = [one.what for one in trunnion.check(mechanism, STEPS).findings if one.severity is Severity.ERROR]
+    assert len(errors) == 1
+    assert REFUSED[name] in errors[0]
+    with pytest.raises(MechanismError, match=REFUSED[name]):
+        trunnion.analyse(mechanism, STEPS)

@@ -12,6 +12,7 @@ import pytest
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.model.check import check_model
 from trunnion.model.contact import contact_lacks, has_guide, has_pin, motions
+from trunnion.model.file import placed
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.parts import Joint
 
@@ -175,7 +176,7 @@ LOOP: dict[str, Any] = {
     "drivers": {"a": {"speed": 1}},
     "loads": {"weight": {"link": "cross", "at": "tip", "force": [0, 0, -1]},
               "brake": {"link": "fork", "at": "c", "force": [0, 0, 1], "moment": [1, 0, 0]},
-              "screw": {"joint": "d", "resisting_force": 3, "resisting_torque": 0.1}},
+              "screw": {"joint": "d", "resisting_force": 3}},
     "springs": {"pull": {"between": ["cross.tip", "ground.a"], "preload": 3}},
     "assembly": {"b": "30 deg", "fork.d": [0, 0, 0], "cross": "way-2"},
     "measures": {"tip": {"point": "fork.c", "axis": "z"}},
@@ -212,6 +213,7 @@ def changed(*path: Any, to: Any) -> dict[str, Any]:
         (changed("links", "cross", "frame", to="d"), "links.cross.frame", "'d' is not a joint of the link 'cross'"),
         (changed("loads", "weight", "at", to="b1"), "loads.weight.at", "the link 'cross' has no point 'b1'"),
         (changed("loads", "weight", "link", to="crass"), "loads.weight.link", "there is no link 'crass'"),
+        (changed("loads", "screw", "resisting_torque", to=1), "loads.screw", "a rotation and a slide at once"),
         (changed("loads", "brake", "moment", to=1), "loads.brake.moment", "is [x, y, z]"),
         (changed("springs", "pull", "between", to=["cross.tip", "ground.b"]), "springs.pull.between", "'ground.b'"),
         (changed("assembly", "fork.a", to=[0, 0, 0]), "assembly.fork.a", "there is no point 'fork.a'"),
@@ -248,6 +250,14 @@ def test_what_is_written_is_what_was_read(extension: str, tmp_path: Path) -> Non
         assert again == mechanism
         assert again.data() == mechanism.data()
         assert again.digest == mechanism.digest
+
+
+def test_later_findings_about_a_row_have_its_line(tmp_path: Path) -> None:
+    path = tmp_path / "loop.yaml"
+    Mechanism(**LOOP).write(path)
+    line = 1 + next(k for k, text in enumerate(path.read_text("utf-8").splitlines()) if "joint: b" in text)
+    for where in ("joints.b", "loop.b.twist"):
+        assert placed([Finding("locks", where)], path) == [Finding("locks", where, line=line, file=str(path))]
 
 
 def test_rows_of_a_loop_are_set_by_name() -> None:

@@ -31,9 +31,40 @@ class Element {
   get textContent() {
     return this.children.map((child) => child?.textContent ?? child).join("");
   }
+  remove() {
+    for (const place of Object.values(places)) place.children = place.children.filter((child) => child !== this);
+  }
+  getBoundingClientRect() {
+    return { left: 0, top: 0, width: 390, height: 300 };
+  }
+  getContext() {
+    return new Brush();
+  }
   find(test) {
     const below = this.children.flatMap((child) => (child instanceof Element ? child.find(test) : []));
     return test(this) ? [this, ...below] : below;
+  }
+}
+
+let painted = 0; // facets and lines on the canvas
+class Brush {
+  beginPath() {}
+  closePath() {}
+  setTransform() {}
+  clearRect() {
+    painted = 0;
+  }
+  moveTo(x, y) {
+    assert.ok(Number.isFinite(x) && Number.isFinite(y), `${x}, ${y}`);
+  }
+  lineTo(x, y) {
+    this.moveTo(x, y);
+  }
+  fill() {
+    assert.match(this.fillStyle, /^(rgb|#)/);
+  }
+  stroke() {
+    painted += 1;
   }
 }
 
@@ -59,11 +90,47 @@ const scene = JSON.parse(readFileSync(process.argv[2], "utf8"));
 const places = Object.fromEntries(["stage", "charts", "polars"].map((name) => [name, new Element(name)]));
 const crank = start(scene, places);
 for (let index = 0; index < scene.count; index += 1) crank.go(index);
-for (const name of ["beforeprint", "afterprint"]) events[name].forEach((act) => act());
 const classes = (name) => (element) => element.attributes.class?.split(" ").includes(name);
+const space = scene.space === "spatial" && scene.solids.length ? steered() : null;
+for (const name of ["beforeprint", "afterprint"]) events[name].forEach((act) => act());
 const seen = (place, name) => places[place].find(classes(name)).length;
+
+/** Everything in a spatial scene switched on, turned, shifted and zoomed: what is then seen. */
+function steered() {
+  const stage = places.stage.find(classes("stage"))[0];
+  const at = (x, y, more = {}) => ({ pointerId: 1, clientX: x, clientY: y, buttons: 1, preventDefault() {}, ...more });
+  const count = (name) => places.stage.find(classes(name)).length;
+  const texts = (name) => places.stage.find(classes(name)).map((element) => element.textContent);
+  const triad = () => places.stage.find(classes("triad")).map((element) => element.attributes.d);
+  const before = { axes: count("joint-axis"), screws: count("screw"), twists: count("twist"), triad: triad() };
+  const boxes = places.stage.find((element) => element.name === "input" && element.attributes.type === "checkbox");
+  for (const box of boxes.filter((one) => ["axes", "moments", "screws"].includes(one.attributes.value))) {
+    box.checked = true;
+    box.listeners.change();
+  }
+  const after = { axes: count("joint-axis"), screws: count("screw"), twists: count("twist"), names: texts("screw-name") };
+  const views = [triad().join()];
+  const act = (name, event) => {
+    stage.listeners[name](event);
+    views.push(triad().join() + places.stage.find(classes("bar"))[0]?.attributes.d + places.stage.find(classes("name"))[0].attributes.x);
+  };
+  stage.listeners.pointerdown(at(100, 100));
+  act("pointermove", at(160, 90));
+  act("pointermove", at(170, 120, { shiftKey: true }));
+  stage.listeners.pointerup(at(170, 120));
+  act("wheel", { deltaY: -240, deltaMode: 0, clientX: 50, clientY: 60, preventDefault() {} });
+  for (const key of ["ArrowLeft", "ArrowUp", "+", "0"]) act("keydown", at(0, 0, { key }));
+  stage.listeners.keydown(at(0, 0, { key: "x", preventDefault: () => assert.fail("not our key") }));
+  const planes = places.polars.find((element) => element.name === "select")[0];
+  planes.value = "y–z";
+  planes.listeners.change();
+  const axes = places.polars.find((element) => element.name === "text").map((element) => element.textContent);
+  return { before, after, views, painted, keys: texts("key"), plane: axes.filter((text) => /^F[xyz]$/.test(text)) };
+}
+
 console.log(
   JSON.stringify({
+    space,
     charts: seen("charts", "chart"),
     polars: seen("polars", "polar"),
     loads: seen("stage", "load"),
@@ -72,7 +139,7 @@ console.log(
     slits: places.stage.find(classes("slit")).map((element) => element.attributes.d),
     labels: places.stage.find(classes("load")).map((element) => {
       const text = element.find((part) => part.name === "text")[0];
-      const shift = Number(/translate\(([-\d.]+),/.exec(element.attributes.transform)[1]);
+      const shift = Number(/translate\(([-\d.]+),/.exec(element.attributes.transform ?? "")?.[1] ?? 0);
       return [shift + Number(text.attributes.x), text.attributes.class ?? "", text.textContent];
     }),
     circles: places.stage.find(classes("pitch-circle")).map((element) => element.attributes.r),

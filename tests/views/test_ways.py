@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from matplotlib.colors import to_hex
@@ -143,6 +145,17 @@ def test_lines_say_names_places_and_what_to_write():
 def test_units_fit_the_size(scale, told):
     (choice,) = choices(prepare(build(four_bar(0.3 * scale, 0.9 * scale, 0.7 * scale, 1.0 * scale))))
     assert places(choice, choice.ways[0]) == told
+
+
+def test_of_many_ways_some_are_told_and_the_one_that_is_taken():
+    (choice,) = choices(prepare(build(four_bar())))
+    many = replace(choice, ways=tuple(replace(choice.ways[0], name=f"way-{n}", taken=n == 30) for n in range(1, 41)))
+    told = lines(many)
+    assert len(told) == 26
+    assert told[22].startswith("way-23")
+    assert told[23].startswith("way-30")
+    assert told[23].endswith("<- taken")
+    assert told[24] == "… and 16 more"
 
 
 def test_a_slide_is_told_by_how_far_it_is_out():

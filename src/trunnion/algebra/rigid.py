@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from trunnion.algebra import space
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.space import IDENTITY, Vector3, cross, dot, plus, scaled, transpose
@@ -73,9 +74,7 @@ def _unit(a: Vector3) -> Vector3:
     return scaled(1 / namespace(size).sqrt(size), a)
 
 
-def vector_minus(a: Vector3, b: Vector3) -> Vector3:
-    """a − b."""
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+vector_minus = space.minus  # `minus` is that of screws
 
 
 # ---- frames ---------------------------------------------------------------------------------------------------
@@ -83,12 +82,7 @@ def vector_minus(a: Vector3, b: Vector3) -> Vector3:
 
 def rotated(frame: Frame, v: Vector3) -> Vector3:
     """R v: a direction given in a frame."""
-    x, y, z = frame.x, frame.y, frame.z
-    return (
-        x[0] * v[0] + y[0] * v[1] + z[0] * v[2],
-        x[1] * v[0] + y[1] * v[1] + z[1] * v[2],
-        x[2] * v[0] + y[2] * v[1] + z[2] * v[2],
-    )
+    return plus(plus(scaled(v[0], frame.x), scaled(v[1], frame.y)), scaled(v[2], frame.z))
 
 
 def point_of(frame: Frame, v: Vector3) -> Vector3:
@@ -116,10 +110,7 @@ def turned(frame: Frame, angle: Number) -> Frame:
     xp = namespace(angle)
     c, s = xp.cos(angle), xp.sin(angle)
     x, y = frame.x, frame.y
-    return frame._replace(
-        x=(c * x[0] + s * y[0], c * x[1] + s * y[1], c * x[2] + s * y[2]),
-        y=(c * y[0] - s * x[0], c * y[1] - s * x[1], c * y[2] - s * x[2]),
-    )
+    return frame._replace(x=plus(scaled(c, x), scaled(s, y)), y=vector_minus(scaled(c, y), scaled(s, x)))
 
 
 def slid(frame: Frame, way: Number) -> Frame:
@@ -134,8 +125,11 @@ def element(place: Vector3, axis: Vector3, x: Vector3 | None) -> Frame:
     """
     z = _unit(axis)
     if x is None:
-        beside = np.abs(primal(z[0])) > 0.999
-        x = (np.where(beside, 0.0, 1.0), np.where(beside, 1.0, 0.0), 0.0)
+        beside = np.asarray(np.abs(primal(z[0])) > 0.999)
+        if np.all(beside == np.ravel(beside)[0]):
+            x = (0.0, 1.0, 0.0) if np.ravel(beside)[0] else (1.0, 0.0, 0.0)
+        else:
+            x = (np.where(beside, 0.0, 1.0), np.where(beside, 1.0, 0.0), 0.0)
     x = vector_minus(x, scaled(dot(x, z), z))
     x = _unit(x)
     return Frame(x, cross(z, x), z, place)

@@ -52,6 +52,11 @@ DURANGO = (
     "group allowing for friction in the kinematic pairs, J. Braz. Soc. Mech. Sci. & Eng., 2010"
 )
 
+PEZZUTI = (
+    "E. Pezzuti, R. Stefanelli, P. P. Valentini, L. Vita, Computer-aided simulation and testing of spatial linkages "
+    "with joint mechanical errors, Int. J. Numer. Meth. Eng. 65 (2006) 1735-1748"
+)
+
 
 def useful_loads(mechanism: Mechanism) -> list[str]:
     """Loads whose power is the purpose: those marked useful, or all if none is."""
@@ -177,7 +182,8 @@ def model_notes(mechanism: Mechanism) -> list[Finding]:
     heavy = [name for name, link in bodies.items() if link.mass.source != 0]
     if heavy and mechanism.gravity is None:
         what = f"gravity is not stated and taken as none, though {', '.join(heavy)} have mass"
-        notes.append(Finding(what, "gravity", "state gravity: [0, -9.81], or [0, 0] to say so", Severity.NOTE))
+        down, none = ("[0, -9.81]", "[0, 0]") if mechanism.space == "planar" else ("[0, 0, -9.81]", "[0, 0, 0]")
+        notes.append(Finding(what, "gravity", f"state gravity: {down}, or {none} to say so", Severity.NOTE))
     sliding = {link for joint in mechanism.joints.values() if joint.type == "prismatic" for link in joint.links}
     points = [name for name in heavy if bodies[name].inertia == ZERO_INERTIA and name not in sliding]
     if points:
@@ -238,7 +244,8 @@ def references(mechanism: Mechanism) -> list[str]:
     laws = {
         joint.friction.law or "coulomb" for joint in mechanism.effective_joints.values() if joint.friction is not None
     }
-    return [DURANGO, *(f"{law}: {FRICTION_LAWS[law].source}" for law in sorted(laws)), *mechanism.references]
+    method = DURANGO if mechanism.space == "planar" else PEZZUTI
+    return [method, *(f"{law}: {FRICTION_LAWS[law].source}" for law in sorted(laws)), *mechanism.references]
 
 
 def _summary(

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
+from trunnion.algebra.nested import each
 from trunnion.analysis.analyse import Run
 from trunnion.analysis.branches import Track
 from trunnion.analysis.hints import way_name
@@ -23,6 +24,7 @@ __all__ = ["Choice", "Way", "choices", "put_together"]
 Array = NDArray[np.float64]
 
 STEPS = 360  # positions among which one is looked for where the ways are apart
+TURNING = ("revolute", "cylindrical", "helical", "universal")
 APART = 1e-3  # of the largest coordinate: nearer ways read alike
 
 
@@ -75,7 +77,8 @@ def choices(run: Run) -> tuple[Choice, ...]:
         assembly = run.chosen.assembly[number]
         with np.errstate(all="ignore"):
             if isinstance(assembly, Track):
-                rows, moment, taken = _joints(walk, module, assembly.ways), assembly.begin, assembly.taken
+                moment, taken = assembly.begin, assembly.taken
+                rows = _joints(walk, module, assembly.ways, int(np.argmin(np.abs(times - moment))))
             elif run.chosen.found[number] > 1:
                 rows, moment = _closed(walk, number, times)
                 taken = list(run.system.groups[number].BRANCHES).index(assembly)
@@ -138,16 +141,28 @@ def _at(number: Array, lane: int) -> float:
     return float(np.ravel(number)[lane if np.size(number) > 1 else 0])
 
 
-def _joints(walk: Forward, module: Module, frames: Sequence[Any]) -> dict[str, Array]:
-    """(x, y) of every pin between two links of a module and (slide,) of every slide, from the links' frames."""
+def _joints(walk: Forward, module: Module, frames: Sequence[Any], lane: int | None = None) -> dict[str, Array]:
+    """Where the joints of a module are, from its links' frames: (x, y[, z]) of every pin or ball between two of them,
+    (slide,) of every slide; (turn,) of every joint about an axis in space, those on known links included.
+
+    lane: the position that the frames are at, None if at all of them.
+    """
     place = dict(zip(module.links, frames, strict=False))  # a general group that never closes has no frames
+    turned = turning(walk.system)
+
+    def element(link: str, name: str) -> Any:
+        if link in place:
+            return walk.composed(place[link], link, name)
+        known = walk.element(link, name)
+        return known if lane is None else each(known, lambda n: n[lane] if np.ndim(n) else n)
+
     found: dict[str, Array] = {}
     for name, (kind, links) in walk.system.joints.items():
-        if name not in module.joints or name in module.driven or any(link not in place for link in links):
+        inside = all(link in place for link in links)
+        if name not in module.joints or name in module.driven or not place or not (inside or name in turned):
             continue
-        first, second = (walk.composed(place[link], link, name) for link in links)
-        if kind == "prismatic" or name in turning(walk.system):
-            found[name] = np.array([primal(walk.coordinate(name, first, second))])
+        if kind == "prismatic" or name in turned:
+            found[name] = np.array([primal(walk.coordinate(name, *(element(link, name) for link in links)))])
         else:
             found[name] = np.array([primal(n) for n in walk.placed(place[links[0]], links[0], name)])
     return found
@@ -157,7 +172,7 @@ def turning(system: System) -> list[str]:
     """Joints that are told by their turn: those about an axis in space."""
     if system.mechanism.space == "planar":
         return []
-    return [name for name, (kind, _) in system.joints.items() if kind in ("revolute", "cylindrical", "helical")]
+    return [name for name, (kind, _) in system.joints.items() if kind in TURNING]
 
 
 def _ways(rows: Mapping[str, Array], count: int, taken: int, turned: Sequence[str]) -> tuple[Way, ...]:

@@ -20,7 +20,7 @@ from trunnion.algebra.namespace import Number
 from trunnion.algebra.nested import each
 from trunnion.analysis import change_points
 from trunnion.analysis.follow import Follower, assemblies, at, lane_of, limits
-from trunnion.analysis.hints import distance, first, hints, misnamed, named_way, nth, told_twice
+from trunnion.analysis.hints import MEETING, distance, first, hints, misnamed, named_way, nth, told_twice
 from trunnion.analysis.kinematics import Forward, pose_of, start
 from trunnion.analysis.system import Cycle, Dial, Positions, System, Values, driven_coordinates
 from trunnion.errors import Finding, MechanismError, Severity
@@ -174,7 +174,7 @@ def choose(system: System, values: Values, cycle: Cycle) -> Chosen:
             assembly, count, decided, said = decision
             findings += said
             if count > 1 and not decided:
-                findings.append(_unstated(module, count))
+                findings.append(_unstated(system, module, count))
             chosen.append(assembly)
             walk.assembly.append(assembly)
             counts.append(count)
@@ -199,13 +199,17 @@ def _misnamed(system: System) -> list[Finding]:
     return found
 
 
-def _unstated(module: Module, count: int) -> Finding:
+def _unstated(system: System, module: Module, count: int) -> Finding:
     links = ", ".join(module.links)
     what = f"links {links} can be assembled in {count} ways and no hint says which; one was taken"
     joint = module.joints[len(module.joints) // 2]
-    remedy = (
-        f"say roughly where a point is at the start, e.g. assembly: {{{joint}: [x, y]}}, or name one as `check` does"
-    )
+    place, hint = "where a point is", f"{{{joint}: [x, y]}}"
+    if system.mechanism.space == "spatial":
+        met = system.joints[joint][0] in MEETING and not system.mechanism.loop
+        place, hint = (
+            (place, f"{{{joint}: [x, y, z]}}") if met else ("how far a joint has turned", f"{{{joint}: 60 deg}}")
+        )
+    remedy = f"say roughly {place} at the start, e.g. assembly: {hint}, or name one as `check` does"
     return Finding(what, "assembly", remedy, Severity.WARNING)
 
 

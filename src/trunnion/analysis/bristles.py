@@ -24,7 +24,6 @@ from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.analysis.kinematics import Assembly, Forward, forward
 from trunnion.analysis.system import Cycle, System, Values, law_of, rubbing
-from trunnion.groups.planar import accelerated, moved
 from trunnion.joints.friction import FrictionLaw
 
 __all__ = ["History", "histories"]
@@ -126,10 +125,7 @@ def _history(walk: Forward, joint: str, length: Number, periodic: bool, reverse:
     law = law_of(walk.system, joint)
     path = f"joints.{joint}.friction"
     parameters = {name: walk.values[f"{path}.{name}"] for name in law.parameters}
-    speed, rate = _slip_motion(walk, joint)
-    if walk.system.joints[joint][0] == "revolute":
-        lever = walk.values[f"joints.{joint}.pin.radius"]
-        speed, rate = speed * lever, rate * lever
+    speed, rate = walk.slip_motion(joint)
     count = np.shape(primal(walk.time))[-1]
     speed, rate = (_full(number, count) for number in (speed, rate))
     if reverse:
@@ -140,20 +136,6 @@ def _history(walk: Forward, joint: str, length: Number, periodic: bool, reverse:
     keep, gain = _mapped(law, parameters, slip, np.ones(count - 1))
     deflections = _chained(keep, gain, periodic)
     return History(law, parameters, speed, rate, length, deflections, periodic)
-
-
-def _slip_motion(walk: Forward, joint: str) -> tuple[Number, Number]:
-    """Speed and acceleration along the freedom of a joint, second link against first (rad or m)."""
-    kind, (first, second) = walk.system.joints[joint]
-    one, two = walk.motions[first], walk.motions[second]
-    if kind == "revolute":
-        return two.twist.w - one.twist.w, two.acceleration.w - one.acceleration.w
-    a, b = walk.element(first, joint), walk.element(second, joint)
-    dx, dy = b.x - a.x, b.y - a.y
-    v1, v2 = moved(walk.twist(first, joint), dx, dy), walk.twist(second, joint)
-    a1, a2 = accelerated(walk.acceleration(first, joint), v1.w, dx, dy), walk.acceleration(second, joint)
-    speed = a.c * (v2.x - v1.x) + a.s * (v2.y - v1.y)
-    return speed, a.c * (a2.x - a1.x) + a.s * (a2.y - a1.y)
 
 
 def _mapped(law: FrictionLaw, parameters: dict[str, Number], slip: _Slip, until: Number) -> tuple[Number, Number]:

@@ -102,7 +102,7 @@ class Design:
 
 def design(mechanism: Mechanism, steps: int = 720) -> Design:
     """The figures of `Design` over `steps` positions of the cycle."""
-    run = prepare(mechanism)
+    run = _planar(mechanism)
     time = run.cycle.times(steps)
     back = run.solve(time)
     walk = back.walk
@@ -127,6 +127,14 @@ def design(mechanism: Mechanism, steps: int = 720) -> Design:
         float(np.max(swing) - np.min(swing)),
         0.0 if np.any(rate * np.sum(rate) <= 0) else float(np.mean(rate)),
     )
+
+
+def _planar(mechanism: Mechanism) -> Run:
+    """The mechanism prepared; MechanismError if it is spatial."""
+    if mechanism.space != "planar":
+        what = "the figures of design (transmission angle, Grashof, instant centres, shaking force) are of the plane"
+        raise MechanismError(Finding(what, "space", "use analyse and locking; screw axes are in the report"))
+    return prepare(mechanism)
 
 
 def _least(values: Array) -> float:
@@ -236,7 +244,7 @@ def grashof(mechanism: Mechanism, run: Run | None = None) -> str:
     With s shortest, l longest, p, q the others: s + l < p + q lets a link turn fully; which one depends on where the
     shortest link is.
     """
-    run = run or prepare(mechanism)
+    run = run or _planar(mechanism)
     kinds = [module.kind for module in run.system.plan.modules]
     if kinds != ["R", "RRR"]:
         return ""
@@ -433,7 +441,7 @@ def _told(label: str, extremes: Extremes, scale: float, unit: str) -> tuple[str,
 
 def report_rows(mechanism: Mechanism, steps: int = 720, fluctuation: float = 0.05) -> list[dict[str, Any]]:
     """The figures as rows with label, value (number, text or None) and unit, as a table shows them."""
-    run = prepare(mechanism)
+    run = _planar(mechanism)
     found = design(mechanism, steps)
     driver = next(iter(mechanism.drivers), "")
     turns = not driver or run.system.joints[driver][0] == "revolute"

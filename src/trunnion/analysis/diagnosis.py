@@ -87,7 +87,7 @@ class Causes:
         for number, pose in enumerate(walk.poses):
             bad = np.zeros(status.shape, bool)
             for frame in pose.frames:
-                bad |= ~np.isfinite(np.broadcast_to(frame.x + frame.c, status.shape))
+                bad |= ~np.isfinite(np.broadcast_to(_sum(frame), status.shape))
             here = np.flatnonzero(bad & left)
             left = left & ~bad
             if not len(here):
@@ -120,6 +120,11 @@ class Causes:
             number: (np.concatenate([p for p, _ in parts]), np.concatenate([s for _, s in parts]))
             for number, parts in self._locked.items()
         }
+
+
+def _sum(frame: Any) -> Number:
+    """A number that is finite where every number of a frame is: of a planar one (x, y, c, s), of one of vectors."""
+    return sum(_sum(part) if isinstance(part, tuple) else part for part in frame)
 
 
 def findings(

@@ -14,6 +14,9 @@ from trunnion.analysis.space import determinacy, forces, motion
 from trunnion.analysis.space import fill as space_fill
 from trunnion.analysis.space.system import SpatialSystem
 from trunnion.analysis.system import System
+from trunnion.errors import Finding, MechanismError
+from trunnion.joints.friction import FRICTION_LAWS
+from trunnion.joints.pairs import PAIRS
 from trunnion.model.mechanism import Mechanism
 from trunnion.structure.decompose import decompose
 
@@ -69,4 +72,19 @@ ENGINES = {
 def build(mechanism: Mechanism) -> System:
     """Decompose a mechanism and prepare its modules. Raises MechanismError if its structure does not determine it."""
     engine = ENGINES[mechanism.space]
+    if mechanism.space == "spatial" and (found := _bristles(mechanism)):
+        raise MechanismError(found)
     return engine.system(mechanism, decompose(mechanism), engine)
+
+
+def _bristles(mechanism: Mechanism) -> list[Finding]:
+    """Laws with bristles in pairs whose slip has no one direction: a deflection is followed along one way only."""
+    found = []
+    for name, joint in mechanism.effective_joints.items():
+        law = joint.friction.law if joint.friction else None
+        if law and FRICTION_LAWS[law].relaxation is not None and PAIRS[joint.type].count > 1:
+            what = f"the bristles of the law {law} bend along one way, the slip of a {joint.type} joint has several"
+            found.append(
+                Finding(what, f"joints.{name}.friction", "use coulomb, viscous, stribeck or brown-mcphee here")
+            )
+    return found

@@ -158,8 +158,15 @@ def _with_own(contact: Contact, column: list[Reaction]) -> list[Reaction]:
     return column
 
 
+class Felt(NamedTuple):
+    """What one contact feels of the frictionless reactions, and of each friction force of 1 N."""
+
+    start: Reaction
+    columns: list[Reaction]
+
+
 class State(NamedTuple):
-    """Reaction and normal load at every contact."""
+    """What every contact feels of the reactions, and its normal load."""
 
     reactions: list[Reaction]
     normals: list[Number]
@@ -200,48 +207,55 @@ class Problem:
         return self.mapped(lambda number: np.broadcast_to(np.asarray(number, float), shape)[chosen]), chosen
 
     @cached_property
+    def felt(self) -> list[Felt]:
+        """What the load of each contact makes of the reactions of its joint: only that is followed in the iteration."""
+        return [
+            Felt(
+                contact.load.felt(self.start[contact.joint]),
+                [contact.load.felt(column[contact.joint]) for column in self.influence],
+            )
+            for contact in self.contacts
+        ]
+
+    @cached_property
     def one_way(self) -> bool:
         """Whether friction changes no load of a pin with friction, as in a driver on a pin: nothing to iterate then."""
         return not any(
-            contact.load.feels(column[contact.joint]) for column in self.influence for contact in self.contacts
+            contact.load.feels(column)
+            for contact, felt in zip(self.contacts, self.felt, strict=True)
+            for column in felt.columns
         )
 
     @cached_property
-    def _alike(self) -> dict[int, int]:
-        """For each joint the first one whose reaction every friction force changes just as much."""
-        found: dict[int, int] = {}
-        for joint in range(len(self.start)):
-            for other in range(joint + 1):
-                pairs = [(column[joint], column[other]) for column in self.influence]
-                if all(a is b for one, two in pairs for a, b in zip(one, two, strict=True)):
-                    found[joint] = other
-                    break
+    def _alike(self) -> list[int]:
+        """For each contact the first one whose reaction every friction force changes just as much."""
+        found: list[int] = []
+        numbers = [[n for column in one.columns for n in column] for one in self.felt]
+        for k, own in enumerate(numbers):
+            same = (i for i in range(k) if all(a is b for a, b in zip(own, numbers[i], strict=False)))
+            found.append(next(same, k))
         return found
 
-    def _changes(self, joint: int, forces: Sequence[Number]) -> Reaction:
-        """What friction forces change in the reaction of one joint."""
-        return tuple(
-            _total([entry * force for entry, force in zip(entries, forces, strict=True) if not is_zero(entry)])
-            for entries in zip(*(column[joint] for column in self.influence), strict=True)
-        )
-
-    def at(self, joints: Sequence[int], forces: Sequence[Number]) -> list[Reaction]:
-        """Reactions of some joints under friction forces; without any, the frictionless ones."""
-        if all(is_zero(force) for force in forces):
-            return [self.start[joint] for joint in joints]
-        changes = {lead: self._changes(lead, forces) for lead in {self._alike[joint] for joint in joints}}
-        return [_added(self.start[joint], changes[self._alike[joint]]) for joint in joints]
-
     def reactions(self, forces: Sequence[Number], known: State) -> list[Reaction]:
-        """Reactions of all joints; those of the contacts are in the state that belongs to the forces."""
-        found = {c.joint: reaction for c, reaction in zip(self.contacts, known.reactions, strict=True)}
-        others = [joint for joint in range(len(self.start)) if joint not in found]
-        found.update(zip(others, self.at(others, forces), strict=True))
+        """Reactions of all joints; where a contact feels the whole of it, it is in the state of the forces."""
+        found = {
+            contact.joint: reaction
+            for contact, felt, reaction in zip(self.contacts, self.felt, known.reactions, strict=True)
+            if felt.start is self.start[contact.joint]
+        }
+        still = all(is_zero(force) for force in forces)
+        for joint, start in enumerate(self.start):
+            if joint not in found:
+                found[joint] = start if still else _added(start, _changes([c[joint] for c in self.influence], forces))
         return [found[joint] for joint in range(len(self.start))]
 
     def state(self, forces: Sequence[Number]) -> State:
         """Reactions and normal loads at the contacts under friction forces."""
-        at = self.at([contact.joint for contact in self.contacts], forces)
+        if all(is_zero(force) for force in forces):
+            at = [one.start for one in self.felt]
+        else:
+            changes = {k: _changes(self.felt[k].columns, forces) for k in set(self._alike)}
+            at = [_added(one.start, changes[k]) for one, k in zip(self.felt, self._alike, strict=True)]
         return State(at, [c.load.normal(reaction) for c, reaction in zip(self.contacts, at, strict=True)])
 
     @cached_property
@@ -256,10 +270,10 @@ class Problem:
     def map_derivative(self, state: State) -> list[list[Number]]:
         """A with A_kl = ∂ law_k / ∂ φ_l."""
         rows = []
-        for contact, reaction, normal, slope in zip(self.contacts, *state, self.slopes, strict=True):
+        for contact, reaction, normal, slope, felt in zip(self.contacts, *state, self.slopes, self.felt, strict=True):
             gradient = contact.load.gradient(reaction, normal)
             scaled = tuple(entry if is_zero(entry) else slope * entry for entry in gradient)
-            rows.append([_along(scaled, column[contact.joint]) for column in self.influence])
+            rows.append([_along(scaled, column) for column in felt.columns])
         return rows
 
     def bound(self, multiples: Sequence[float] | None = None) -> Number:
@@ -269,8 +283,8 @@ class Problem:
         """
         factors = multiples or [1.0] * len(self.contacts)
         rows = [
-            np.abs(factor * slope) * _total([contact.load.bound(column[contact.joint]) for column in self.influence])
-            for contact, slope, factor in zip(self.contacts, self.slopes, factors, strict=True)
+            np.abs(factor * slope) * _total([contact.load.bound(column) for column in felt.columns])
+            for contact, slope, factor, felt in zip(self.contacts, self.slopes, factors, self.felt, strict=True)
         ]
         return _largest(rows)
 
@@ -327,7 +341,7 @@ def _newton(problem: Problem, method: FrictionMethod) -> Settled:
 def _at_once(problem: Problem) -> Settled:
     """Friction from the frictionless reactions, which it does not change but in what no law looks at."""
     forces = problem.target(problem.state([0.0] * len(problem.contacts)).normals)
-    reactions = problem.at(range(len(problem.start)), forces)
+    reactions = problem.reactions(forces, problem.state(forces))
     return Settled(reactions, forces, 1, 0.0, 0.0, True, 1.0, problem=_primal(problem))
 
 
@@ -432,6 +446,14 @@ def frictionless(problem: Problem, chosen: NDArray[np.bool_]) -> list[NDArray[np
 
 def identity_minus(rows: Sequence[Sequence[Number]]) -> list[list[Number]]:
     return [[(1.0 if k == j else 0.0) - entry for j, entry in enumerate(row)] for k, row in enumerate(rows)]
+
+
+def _changes(columns: Sequence[Reaction], forces: Sequence[Number]) -> Reaction:
+    """What friction forces change in a reaction. columns: what 1 N of each does."""
+    return tuple(
+        _total([entry * force for entry, force in zip(entries, forces, strict=True) if not is_zero(entry)])
+        for entries in zip(*columns, strict=True)
+    )
 
 
 def _along(gradient: Reaction, column: Reaction) -> Number:

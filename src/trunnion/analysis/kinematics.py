@@ -119,6 +119,20 @@ class Forward:
             return np.arctan2(second.s, second.c) - np.arctan2(first.s, first.c)
         return first.c * (second.x - first.x) + first.s * (second.y - first.y)
 
+    def slip_motion(self, joint: str) -> tuple[Number, Number]:
+        """Slip of a joint's contact, second link against first, and its rate; m/s, m/s²."""
+        kind, (first, second) = self.system.joints[joint]
+        one, two = self.motions[first], self.motions[second]
+        if kind == "revolute":
+            lever = self.values[f"joints.{joint}.pin.radius"]
+            return lever * (two.twist.w - one.twist.w), lever * (two.acceleration.w - one.acceleration.w)
+        a, b = self.element(first, joint), self.element(second, joint)
+        dx, dy = b.x - a.x, b.y - a.y
+        v1, v2 = moved(self.twist(first, joint), dx, dy), self.twist(second, joint)
+        a1, a2 = accelerated(self.acceleration(first, joint), v1.w, dx, dy), self.acceleration(second, joint)
+        speed = a.c * (v2.x - v1.x) + a.s * (v2.y - v1.y)
+        return speed, a.c * (a2.x - a1.x) + a.s * (a2.y - a1.y)
+
     def pairs(self, places: Sequence[Place]) -> list[Any]:
         """Elements of a module's joints: global on known links, local on its own."""
         return [self._pair(place) for place in places]

@@ -52,16 +52,19 @@ def critical_multiples(back: Backward, most: float) -> dict[str, Array]:
     system, positions = back.walk.system, np.shape(back.walk.time)
     found: dict[str, Array] = {}
     for number, settled in zip(reversed(range(len(system.plan.modules))), back.settled, strict=True):
-        for k, contact in enumerate(settled.problem.contacts if settled.problem else ()):
-            if contact.rubs and settled.problem:
-                joint = system.places[number][contact.joint].joint
-                found[joint] = np.broadcast_to(_alone(settled.problem, k, most), positions)
+        if settled.problem is None:
+            continue
+        contacts = settled.problem.contacts
+        for place in dict.fromkeys(contact.joint for contact in contacts if contact.rubs):
+            own = [contact.joint == place for contact in contacts]
+            joint = system.places[number][place].joint
+            found[joint] = np.broadcast_to(_alone(settled.problem, own, most), positions)
     return {joint: found[joint] for joint in system.joints if joint in found}
 
 
-def _alone(problem: Problem, k: int, most: float) -> Array:
-    """The multiple for one contact: the others' friction is raised to full first, then its own."""
-    multiples = [most if i == k else 1.0 for i in range(len(problem.contacts))]
+def _alone(problem: Problem, own: Sequence[bool], most: float) -> Array:
+    """The multiple for the contacts of one joint: the others' friction is raised to full first, then theirs."""
+    multiples = [most if mine else 1.0 for mine in own]
     bound = problem.bound(multiples)
     doubtful = np.isfinite(bound) & (bound >= 1.0)
     part, chosen = problem.picked(doubtful)
@@ -70,8 +73,8 @@ def _alone(problem: Problem, k: int, most: float) -> Array:
         return result
 
     def weights(share: Array) -> Sequence[Array]:
-        others_, own = np.minimum(share, 1.0), np.maximum(share - 1.0, 0.0)
-        return [own if i == k else others_ for i in range(len(part.contacts))]
+        others_, theirs = np.minimum(share, 1.0), np.maximum(share - 1.0, 0.0)
+        return [theirs if mine else others_ for mine in own]
 
     _, reached = continuation.follow(scaled(part, weights), frictionless(part, chosen), 1.0 + most)
     result[chosen] = np.where(reached >= 1.0 + most, np.inf, np.maximum(reached - 1.0, 0.0))
@@ -170,6 +173,9 @@ def reverse_row(back: Reverse, cycle: Cycle) -> dict[str, Any] | None:
     else:
         value = cycle.net(back.delivered) / cycle.net(back.given)
         text += "" if value > 0 else " (it holds itself)"
+        if value > 1:  # over a range what masses and springs have stored comes on top
+            text += " (masses and springs give work too)"
+            value = float("nan")
     return {"label": text, "value": value if np.isfinite(value) else None, "unit": "1"}
 
 

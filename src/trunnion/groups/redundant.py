@@ -22,7 +22,7 @@ from trunnion.algebra.rigid import ZERO, Screw, moment_at
 if TYPE_CHECKING:
     from trunnion.groups.spatial import Pose, SpatialGroup
 
-__all__ = ["RANK", "least", "least_squares", "pseudo_inverse"]
+__all__ = ["RANK", "condition", "least", "least_squares", "pseudo_inverse"]
 
 Array = NDArray[np.float64]
 RANK = 1e-7  # of the largest singular value: below it a direction counts as lost; rounding leaves some 1e-15
@@ -44,6 +44,18 @@ def pseudo_inverse(matrix: Sequence[Sequence[Number]]) -> list[list[Number]]:
     dual = any(isinstance(entry, Dual) for row in matrix for entry in row)
     rows = [[found[..., i, j] for j in range(found.shape[-1])] for i in range(found.shape[-2])]
     return [[Dual(entry, np.nan) for entry in row] for row in rows] if dual else rows
+
+
+def condition(matrix: Sequence[Sequence[Number]]) -> Array:
+    """2/n √(Σ σ²) √(Σ 1/σ²) over the n singular values, ∞ where a freedom is not determined, NaN where an entry is."""
+    table = stacked(matrix)
+    bad = np.asarray(~np.isfinite(table).all(axis=(-2, -1)))
+    values = np.linalg.svd(np.where(bad[..., None, None], 1.0, table), compute_uv=False)
+    columns = table.shape[-1]
+    with np.errstate(divide="ignore"):
+        lost = (values[..., -1] <= RANK * values[..., 0]) | (values.shape[-1] < columns)
+        found = 2 / columns * np.sqrt(np.sum(values**2, axis=-1) * np.sum(1 / values**2, axis=-1))
+    return np.where(bad, np.nan, np.where(lost, np.inf, found))
 
 
 def least_squares(matrix: Sequence[Sequence[Number]], side: Sequence[Number]) -> list[Number]:

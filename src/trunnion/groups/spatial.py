@@ -16,17 +16,15 @@ the reactions are those of least size, see `groups.redundant`.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
 from trunnion.algebra import linalg
 from trunnion.algebra.dual import Dual, primal
-from trunnion.algebra.namespace import Number, namespace
+from trunnion.algebra.namespace import Number
 from trunnion.algebra.nested import each, flat
 from trunnion.algebra.rigid import (
     ZERO,
@@ -34,21 +32,17 @@ from trunnion.algebra.rigid import (
     Screw,
     added,
     bracket,
-    compose,
     minus,
-    moment_at,
     power,
-    relative,
     times,
-    vector_minus,
 )
-from trunnion.algebra.space import Vector3, cross, dot, plus, scaled
+from trunnion.algebra.space import cross, dot, plus, scaled
 from trunnion.groups import redundant
-from trunnion.groups import tree as spanning
-from trunnion.groups.tree import OUTER, GroupJoint, Step
+from trunnion.groups.spatial_tree import Element, SpatialTree, entries
+from trunnion.groups.tree import OUTER
 from trunnion.joints.spatial import MOTIONS
 
-__all__ = ["Element", "Pose", "SpatialGroup"]
+__all__ = ["Pose", "SpatialGroup"]
 
 QUICK = 8  # rounds for all lanes
 NEWTON_LIMIT = 60  # more for those that need them
@@ -56,18 +50,6 @@ NEARLY = 1e-7  # of its largest allowed step: from here one more round reaches r
 TURN_LIMIT = 0.4  # rad a step: keeps Newton on the branch it starts on
 SLIDE_LIMIT = 0.3  # of the size
 CLOSED = 1e-9  # rad, or of the size: a gap that redundant equations leave at most
-
-
-class Element(NamedTuple):
-    """A joint's element on its first and on its second link, and its lead: slide for one radian of a helical pair."""
-
-    first: Frame
-    second: Frame
-    lead: Number = 0.0
-
-    def side(self, i: int) -> Frame:
-        """The element on the first (0) or second (1) link."""
-        return self.second if i else self.first
 
 
 class Pose(NamedTuple):
@@ -90,86 +72,11 @@ class Pose(NamedTuple):
 
 
 @dataclass(frozen=True)
-class SpatialGroup:
-    """The module with the given joints.
+class SpatialGroup(SpatialTree):
+    """The module with the given joints. redundant: whether the loops may ask for more than the coordinates can give."""
 
-    driven: indices of joints whose first coordinate is prescribed; spinning: links whose spin is free, each with its
-    two spherical joints; redundant: whether the loops may ask for more than the coordinates can give.
-    """
-
-    links: int
-    joints: tuple[GroupJoint, ...]
-    driven: tuple[int, ...] = ()
-    spinning: tuple[tuple[int, int, int], ...] = ()
     redundant: bool = False
     BRANCHES: tuple[int, ...] = ()
-
-    # ---- coordinates ----------------------------------------------------------------------------------------
-
-    @cached_property
-    def steps(self) -> tuple[Step, ...]:
-        """The tree, outermost link last; driven joints are kept in it where they can be."""
-        return spanning.grow(self.links, self.joints, self.driven)
-
-    @cached_property
-    def chords(self) -> tuple[int, ...]:
-        """The joints that the tree leaves out."""
-        inside = {step.joint for step in self.steps}
-        return tuple(k for k in range(len(self.joints)) if k not in inside)
-
-    @cached_property
-    def starts(self) -> tuple[int, ...]:
-        """Where the coordinates of each joint begin in q, and where they end."""
-        counts = [len(MOTIONS[joint.kind].kinds) for joint in self.joints]
-        return tuple(sum(counts[:k]) for k in range(len(counts) + 1))
-
-    @cached_property
-    def kinds(self) -> tuple[str, ...]:
-        """What each entry of q is: "turn", "slide", or "part" of a quaternion."""
-        return tuple(kind for joint in self.joints for kind in MOTIONS[joint.kind].kinds)
-
-    @cached_property
-    def kept(self) -> tuple[int, ...]:
-        """The entries of q that an assembly states: all but the prescribed."""
-        prescribed = {self.starts[k] for k in self.driven}
-        return tuple(i for i in range(len(self.kinds)) if i not in prescribed)
-
-    @cached_property
-    def kept_kinds(self) -> tuple[str, ...]:
-        """What each of them is."""
-        return tuple(self.kinds[i] for i in self.kept)
-
-    @cached_property
-    def free(self) -> tuple[tuple[int, int], ...]:
-        """(joint, freedom) of the unknowns."""
-        return tuple(
-            (k, i)
-            for k, joint in enumerate(self.joints)
-            for i in range(len(MOTIONS[joint.kind].steps))
-            if not (k in self.driven and i == 0)
-        )
-
-    def coordinates(self, start: Sequence[Number], drive: Sequence[Number]) -> list[list[Number]]:
-        """Coordinates of each joint, from those of `kept` and the prescribed ones."""
-        values: list[Number] = [0.0] * len(self.kinds)
-        for i, value in zip(self.kept, start, strict=True):
-            values[i] = value
-        for k, value in zip(self.driven, drive, strict=True):
-            values[self.starts[k]] = value
-        return [values[a:b] for a, b in pairwise(self.starts)]
-
-    @cached_property
-    def _paths(self) -> dict[int, dict[int, int]]:
-        """For each link the joints between it and the known links, each with the sign its screws count with."""
-        paths: dict[int, dict[int, int]] = {OUTER: {}}
-        for step in self.steps:
-            paths[step.child] = {**paths[step.parent], step.joint: 1 if step.near == 0 else -1}
-        return paths
-
-    def weight(self, joint: int, row: int) -> int:
-        """Sign with which the freedoms of a joint open the loop that joint `row` closes; 0 if they do not."""
-        first, second = (self._paths[link] for link in self.joints[row].sides)
-        return second.get(joint, 0) - first.get(joint, 0) - (joint == row)
 
     # ---- position -------------------------------------------------------------------------------------------
 
@@ -194,8 +101,8 @@ class SpatialGroup:
             return self._posed(elements, q, size)
 
     def _posed(self, elements: Sequence[Element], q: list[list[Number]], size: Number) -> Pose:
-        frames, placed, screws = self._place(elements, q)
-        jacobian = self._jacobian(placed, screws, size)
+        frames, placed, screws = self.place(elements, q)
+        jacobian = self.jacobian(placed, screws, size)
         orientation: Number = 1.0
         if not jacobian or not self.free:
             inverse: list[list[Number]] = []
@@ -203,9 +110,10 @@ class SpatialGroup:
             inverse = redundant.pseudo_inverse(jacobian)
         else:
             inverse = linalg.inverse(jacobian)
-            orientation = np.sign(primal(linalg.determinant(jacobian)))
-        gap = self._opening(placed, q, size)
-        condition = _condition(jacobian, inverse)
+            if not self.BRANCHES:  # a closed form stays on its branch by itself
+                orientation = np.sign(primal(linalg.determinant(jacobian)))
+        gap = self.opening(placed, q, size)
+        condition = redundant.condition(jacobian) if self.redundant and inverse else _condition(jacobian, inverse)
         all_q = tuple(value for joint in q for value in joint)
         return Pose(frames, placed, screws, all_q, jacobian, inverse, size, gap, condition, orientation)
 
@@ -219,8 +127,8 @@ class SpatialGroup:
         if np.any(late):
             q, moved_by = self._finish_late(elements, q, size, late)
         q = self._step(elements, q, size)  # quadratic: from NEARLY to rounding
-        placed = self._place(elements, q)[1]
-        closed = (moved_by <= NEARLY) & (self._opening(placed, q, size) <= CLOSED * size)
+        placed = self.place(elements, q)[1]
+        closed = (moved_by <= NEARLY) & (self.opening(placed, q, size) <= CLOSED * size)
         return [[np.where(closed, value, np.nan) for value in joint] for joint in q]
 
     def _iterate(
@@ -274,9 +182,9 @@ class SpatialGroup:
 
     def _steps(self, elements: Sequence[Element], q: list[list[Number]], size: Number) -> list[list[Number]]:
         """Newton's step in every freedom, slides in units of the size; 0 for the driven."""
-        _, placed, screws = self._place(elements, q)
-        gaps = self._gaps(placed, q, size)
-        jacobian = self._jacobian(placed, screws, size)
+        _, placed, screws = self.place(elements, q)
+        gaps = self.gaps(placed, q, size)
+        jacobian = self.jacobian(placed, screws, size)
         if self.redundant:
             found = redundant.least_squares(jacobian, gaps)
         else:
@@ -294,106 +202,7 @@ class SpatialGroup:
             found.append(motion.advanced(values, scaled_))
         return found
 
-    def _place(
-        self, elements: Sequence[Element], q: Sequence[Sequence[Number]]
-    ) -> tuple[tuple[Frame, ...], tuple[Element, ...], tuple[list[Screw], ...]]:
-        """Frames of all links, elements of all joints (global) and the screws of their freedoms."""
-        frames: dict[int, Frame] = {}
-        known: dict[tuple[int, int], Frame] = {}
-
-        def placed(k: int, side: int) -> Frame:
-            if (k, side) not in known:
-                link, local = self.joints[k].sides[side], elements[k].side(side)
-                known[k, side] = local if link == OUTER else compose(frames[link], local)
-            return known[k, side]
-
-        for step in self.steps:
-            k, motion = step.joint, MOTIONS[self.joints[step.joint].kind]
-            move = motion.place if step.near == 0 else motion.unplace
-            known[k, 1 - step.near] = far = move(placed(k, step.near), q[k], elements[k].lead)
-            frames[step.child] = relative(far, elements[k].side(1 - step.near))
-        pairs = tuple(Element(placed(k, 0), placed(k, 1), elements[k].lead) for k in range(len(self.joints)))
-        screws = tuple(MOTIONS[joint.kind].screws(*pair) for joint, pair in zip(self.joints, pairs, strict=True))
-        return tuple(frames[link] for link in range(self.links)), pairs, screws
-
-    def size(self, elements: Sequence[Element]) -> Number:
-        """A length typical of each lane, m: the widest spread of joint elements on one link, or of the known ones."""
-        places: dict[int, list[Vector3]] = {}
-        for joint, one in zip(self.joints, elements, strict=True):
-            for side, link in enumerate(joint.sides):
-                places.setdefault(link, []).append(one.side(side).place)
-        size: Number = 0.0
-        for first, *others in places.values():
-            for other in others:
-                apart = vector_minus(other, first)
-                size = np.fmax(size, np.sqrt(primal(dot(apart, apart))))
-        return np.where(size > 0, size, 1.0)
-
-    # ---- loops ----------------------------------------------------------------------------------------------
-
-    def _loops(self, placed: Sequence[Element], q: Sequence[Sequence[Number]]) -> Iterator[tuple[Vector3, Vector3]]:
-        """Turn and way from where each loop's last joint puts its second element to where that is."""
-        for k in self.chords:
-            one = placed[k]
-            aim = MOTIONS[self.joints[k].kind].place(one.first, q[k], one.lead)
-            turn = plus(plus(cross(aim.x, one.second.x), cross(aim.y, one.second.y)), cross(aim.z, one.second.z))
-            yield scaled(0.5, turn), vector_minus(one.second.place, aim.place)
-
-    def _gaps(self, placed: Sequence[Element], q: Sequence[Sequence[Number]], size: Number) -> list[Number]:
-        """By how much each row is open: rad, and lengths in units of the size; a spin is never open."""
-        rows: list[Number] = []
-        for turn, way in self._loops(placed, q):
-            rows += [*turn, *(length / size for length in way)]
-        return rows + [0.0] * len(self.spinning)
-
-    def _opening(self, placed: Sequence[Element], q: Sequence[Sequence[Number]], size: Number) -> Number:
-        """Largest opening of a loop, m; an angle, taken from the axes themselves, counts as angle times size."""
-        worst: Number = 0.0
-        for k in self.chords:
-            one = placed[k]
-            aim = MOTIONS[self.joints[k].kind].place(one.first, q[k], one.lead)
-            for found, wanted, scale in zip(one.second, aim, (size, size, size, 1.0), strict=True):
-                for a, b in zip(found, wanted, strict=True):
-                    worst = np.maximum(worst, scale * np.abs(primal(a) - primal(b)))
-        return worst
-
-    def _jacobian(self, placed: Sequence[Element], screws: Sequence[list[Screw]], size: Number) -> list[list[Number]]:
-        """Rate of every row for a unit rate of every free coordinate, slides in units of the size."""
-        matrix: list[list[Number]] = []
-        for row in self.chords:
-            place = placed[row].second.place
-            block: list[list[Number]] = [[] for _ in range(6)]
-            for k, i in self.free:
-                weight = self.weight(k, row)
-                entries = _entries(screws[k][i], place, size, self._slides(k, i)) if weight else (0.0,) * 6
-                for line, entry in zip(block, entries, strict=True):
-                    line.append(entry if weight == 1 else -entry if weight == -1 else weight * entry)
-            matrix += block
-        for link, a, b in self.spinning:
-            axis = self._spin_axis(placed, a, b)
-            path = self._paths[link]
-            matrix.append([path.get(k, 0) * dot(axis, screws[k][i].u) for k, i in self.free])
-        return matrix
-
-    def _spin_axis(self, placed: Sequence[Element], a: int, b: int) -> Vector3:
-        """Unit vector of the line about which a link can spin: from ball to ball, or the axis of its other joint."""
-        for k in (a, b):
-            if self.joints[k].kind != "spherical":
-                return placed[k].second.z
-        apart = vector_minus(placed[b].second.place, placed[a].second.place)
-        square = dot(apart, apart)
-        xp = namespace(square)
-        there = primal(square) > 0  # a link without a length has no line
-        return scaled(1 / xp.sqrt(xp.where(there, square, 1.0)), apart)
-
-    def _slides(self, joint: int, freedom: int) -> bool:
-        return MOTIONS[self.joints[joint].kind].steps[freedom] == "slide"
-
     # ---- velocity and acceleration --------------------------------------------------------------------------
-
-    def velocity(self, pose: Pose, outer: Sequence[Screw | None], drive: Sequence[Number] = ()) -> list[Screw]:
-        """Twists of the links. outer: of each joint's known link; drive: rates of the driven coordinates."""
-        return self.twists(pose, outer, self.rates(pose, outer, drive))[: self.links]
 
     def rates(self, pose: Pose, outer: Sequence[Screw | None], drive: Sequence[Number] = ()) -> list[list[Number]]:
         """Rate of every freedom of every joint, rad/s and m/s."""
@@ -405,8 +214,8 @@ class SpatialGroup:
             relative_ = minus(known.of(k, 1), known.of(k, 0))
             for screw, rate in zip(pose.screws[k], rates[k], strict=True):
                 relative_ = minus(relative_, times(rate, screw))
-            rows += _entries(relative_, pose.elements[k].second.place, pose.size, slides=False)
-        rows += [dot(self._spin_axis(pose.elements, a, b), twists[link].u) for link, a, b in self.spinning]
+            rows += entries(relative_, pose.elements[k].second.place, pose.size, slides=False)
+        rows += [dot(self.spin_axis(pose.elements, a, b), twists[link].u) for link, a, b in self.spinning]
         return self._closing(pose, rates, rows)
 
     def _driven_only(self, drive: Sequence[Number]) -> list[list[Number]]:
@@ -419,7 +228,7 @@ class SpatialGroup:
         """The rates with those of the free coordinates that close what is open."""
         for (k, i), line in zip(self.free, pose.inverse, strict=True) if rows else ():
             value = -_weighted(line, rows)
-            rates[k][i] = value * pose.size if self._slides(k, i) else value
+            rates[k][i] = value * pose.size if self.slides(k, i) else value
         return rates
 
     def twists(self, pose: Pose, outer: Sequence[Screw | None], rates: Sequence[Sequence[Number]]) -> list[Screw]:
@@ -439,11 +248,10 @@ class SpatialGroup:
         twists: Sequence[Screw],
         outer_twists: Sequence[Screw | None],
         outer: Sequence[Screw | None],
-        drive: Sequence[Number] = (),
-        rates: Sequence[Number] = (),
+        drive: Sequence[Number],
+        speeds: Sequence[Sequence[Number]],
     ) -> list[Screw]:
-        """Derivatives of the twists of the links. drive: second derivatives of the driven coordinates, rates: first."""
-        speeds = self.rates(pose, outer_twists, rates)
+        """Derivatives of the twists. drive: second derivatives of the driven coordinates; speeds: see `rates`."""
         known = Outside(self, pose, twists, outer_twists)
         carried = [self._carried(pose, speeds[k], k, known.of(k, 0)) for k in range(len(self.joints))]
         second = self._driven_only(drive)
@@ -454,13 +262,13 @@ class SpatialGroup:
             relative_ = minus(minus(after.of(k, 1), after.of(k, 0)), carried[k])
             for screw, value in zip(pose.screws[k], second[k], strict=True):
                 relative_ = minus(relative_, times(value, screw))
-            rows += _entries(relative_, pose.elements[k].second.place, pose.size, slides=False)
+            rows += entries(relative_, pose.elements[k].second.place, pose.size, slides=False)
         for link, a, b in self.spinning:
             rows.append(
-                dot(self._spin_axis(pose.elements, a, b), found[link].u)
+                dot(self.spin_axis(pose.elements, a, b), found[link].u)
             )  # ω · u = 0 and u̇ = ω × u: no further term
         second = self._closing(pose, second, rows)
-        return self._accelerations(pose, outer, second, carried)[: self.links]
+        return self._accelerations(pose, outer, second, carried)
 
     def _carried(self, pose: Pose, speeds: Sequence[Number], k: int, base: Screw) -> Screw:
         """Σ q̇ (V × s) of a joint: its screws are carried along by its first link and by the freedoms before them."""
@@ -515,7 +323,7 @@ class SpatialGroup:
             if first != OUTER:
                 carried[first] = minus(carried[first], wrench)
         for (link, a, b), torque in zip(self.spinning, multipliers[6 * len(self.chords) :], strict=True):
-            spin = Screw((0.0, 0.0, 0.0), scaled(torque, self._spin_axis(pose.elements, a, b)))
+            spin = Screw((0.0, 0.0, 0.0), scaled(torque, self.spin_axis(pose.elements, a, b)))
             carried[link] = added(carried[link], spin)
         for step in reversed(self.steps):
             total = carried[step.child]
@@ -550,7 +358,7 @@ class SpatialGroup:
                 powers.append(0.0)
                 continue
             value = power(outboard[child[k].child], pose.screws[k][i])
-            value = value * pose.size if self._slides(k, i) else value
+            value = value * pose.size if self.slides(k, i) else value
             powers.append(value if child[k].near == 0 else -value)
         rows = range(len(pose.inverse[0]))
         return [-_weighted([line[j] for line in pose.inverse], powers) for j in rows]
@@ -590,14 +398,6 @@ class Outside:
         return (self.outer[k] or ZERO) if link == OUTER else self.twists[link]
 
 
-def _entries(screw: Screw, place: Vector3, size: Number, slides: bool) -> tuple[Number, ...]:
-    """Turn and velocity at a place that a screw gives, lengths in units of the size; a slide is counted in it too."""
-    if slides:
-        return (0.0, 0.0, 0.0, *screw.m)
-    x, y, z = moment_at(screw, place)
-    return (*screw.u, x / size, y / size, z / size)
-
-
 def _condition(jacobian: Sequence[Sequence[Number]], inverse: Sequence[Sequence[Number]]) -> Number:
     if not inverse:
         return 1.0
@@ -621,11 +421,3 @@ def _weighted(weights: Sequence[Number], values: Sequence[Number]) -> Number:
             continue
         total = total + weight * value
     return total
-
-
-def _mapped(frame: Frame, change: object) -> Frame:
-    return Frame(*(tuple(change(n) for n in vector) for vector in frame))  # type: ignore[operator]
-
-
-def _real(frame: Frame) -> Frame:
-    return _mapped(frame, primal)

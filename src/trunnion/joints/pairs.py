@@ -43,7 +43,10 @@ Reaction = tuple[Number, ...]  # planar: force x, y (N), moment (N m) about the 
 
 
 class ContactLoad(Protocol):
-    """How a joint's reaction presses on its contact."""
+    """How a joint's reaction presses on its contact; all but `felt` take what that makes of the reaction."""
+
+    def felt(self, reaction: Reaction) -> Reaction:
+        """The components, linear in the reaction, that the normal load depends on."""
 
     def normal(self, reaction: Reaction) -> Number:
         """Normal load N ≥ 0, N: a seminorm of the reaction."""
@@ -74,6 +77,10 @@ class Load(NamedTuple):
     across: tuple[Number, Number] | None = None
     length: Number = 0.0
     arm: tuple[Number, Number] | None = None
+
+    def felt(self, reaction: Reaction) -> Reaction:
+        """All of it."""
+        return reaction
 
     def normal(self, reaction: Reaction) -> Number:
         """Normal load N ≥ 0, N."""

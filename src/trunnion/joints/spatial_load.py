@@ -13,21 +13,21 @@ The second is exact for a load carried at both ends; the first is its bound by t
 
 from __future__ import annotations
 
+import functools
+import operator
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import cast
 
 import numpy as np
 
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.algebra.rigid import vector_minus
-from trunnion.algebra.space import Vector3, cross, dot, plus, scaled
+from trunnion.algebra.nested import each
+from trunnion.algebra.rigid import Frame
+from trunnion.algebra.space import Vector3, cross, dot, minus
 from trunnion.joints.pairs import Reaction
 
 __all__ = ["BallLoad", "BearingLoad", "halves"]
-
-NULL: Vector3 = (0.0, 0.0, 0.0)
 
 
 def halves(reaction: Reaction) -> tuple[Vector3, Vector3]:
@@ -36,9 +36,9 @@ def halves(reaction: Reaction) -> tuple[Vector3, Vector3]:
     return (fx, fy, fz), (mx, my, mz)
 
 
-def _length(a: Vector3) -> Number:
-    """|a|; of a dual vector without a derivative where a is 0."""
-    square = dot(a, a)
+def _length(*parts: Number) -> Number:
+    """√Σ aᵢ²; of dual numbers without a derivative where all are 0."""
+    square = functools.reduce(operator.add, (part * part for part in parts))
     xp = namespace(square)
     if xp is np:
         return np.sqrt(square)
@@ -46,25 +46,30 @@ def _length(a: Vector3) -> Number:
     return xp.where(there, xp.sqrt(xp.where(there, square, 1.0)), 0.0)
 
 
-def _along(a: Vector3, size: Number) -> Vector3:
-    """a/|a|; 0 where a is."""
-    return scaled(1 / namespace(size).where(primal(size) > 0, size, np.inf), a)
+def _shares(size: Number, *parts: Number) -> tuple[Number, ...]:
+    """aᵢ/|a|; 0 where a is."""
+    factor = 1 / namespace(size).where(primal(size) > 0, size, np.inf)
+    return tuple(part * factor for part in parts)
 
 
 @dataclass(frozen=True)
 class BallLoad:
     """A ball: N = |F|."""
 
+    def felt(self, reaction: Reaction) -> Reaction:
+        """The force."""
+        return reaction[:3]
+
     def normal(self, reaction: Reaction) -> Number:
         """N."""
-        return _length(halves(reaction)[0])
+        return _length(*reaction)
 
     def gradient(self, reaction: Reaction, normal: Number) -> Reaction:
-        """∂N/∂reaction."""
-        return (*_along(halves(reaction)[0], normal), 0.0, 0.0, 0.0)
+        """∂N/∂F."""
+        return _shares(normal, *reaction)
 
     def bound(self, reaction: Reaction) -> Number:
-        """At least the most by which this reaction can change N."""
+        """At least the most by which this can change N."""
         return self.normal(reaction)
 
     def feels(self, reaction: Reaction) -> bool:
@@ -80,62 +85,64 @@ class BallLoad:
 class BearingLoad:
     """A pin in its bearing, a slider in its guide, or a nut on its thread.
 
-    axis: unit vector u; place: middle of the bearing, m; length: L, m. summed: [P]'s sum instead of the two contacts.
-    width: of a guide, over which a pair of forces carries the torsion about it, N + 2 |M_u|/width; None of others.
-    radius: mean radius of a thread, whose flanks also carry N + √(F_u² + (M_u/r)²); None of others.
+    frame: axes x, y across and z along the axis u, origin in the middle of the bearing; length: L, m. summed: [P]'s sum
+    instead of the two contacts. width: of a guide, over which a pair of forces carries the torsion about it, which adds
+    2 |M_u|/width; None of others. flank: of a thread, the secant of its angle of lead, whose flanks add flank |F_u|;
+    None of others. By F_u alone: M_u may hold the torque of a drive, which the flanks do not carry.
+    It feels F⊥, g in the axes x, y and, of a guide or thread, F_u and M_u.
     """
 
-    axis: Vector3
-    place: Vector3
+    frame: Frame
     length: Number
     summed: bool = False
     width: Number | None = None
-    radius: Number | None = None
+    flank: Number | None = None
 
-    def _across(self, reaction: Reaction) -> tuple[Vector3, Vector3, Number, Number]:
-        """F⊥ and g, and the components F_u and M_u along the axis."""
+    def felt(self, reaction: Reaction) -> Reaction:
+        """F_x, F_y, g_x = M_y/L, g_y = −M_x/L, then F_u and M_u if they count."""
         force, moment = halves(reaction)
-        moment = vector_minus(moment, cross(self.place, force))
-        along = dot(force, self.axis)
-        couple = scaled(1 / self.length, cross(moment, self.axis))
-        return vector_minus(force, scaled(along, self.axis)), couple, along, dot(moment, self.axis)
+        moment = minus(moment, cross(self.frame.place, force))
+        x, y, z, _ = self.frame
+        across = (dot(force, x), dot(force, y), dot(moment, y) / self.length, -(dot(moment, x) / self.length))
+        return across if self.width is None and self.flank is None else (*across, dot(force, z), dot(moment, z))
 
     def normal(self, reaction: Reaction) -> Number:
         """N."""
-        force, couple, along, torsion = self._across(reaction)
+        fx, fy, gx, gy, *more = reaction
         if self.summed:
-            found = _length(force) + 2 * _length(couple)
+            found = _length(fx, fy) + 2 * _length(gx, gy)
         else:
-            half = scaled(0.5, force)
-            found = _length(vector_minus(half, couple)) + _length(plus(half, couple))
+            hx, hy = 0.5 * fx, 0.5 * fy
+            found = _length(hx - gx, hy - gy) + _length(hx + gx, hy + gy)
         if self.width is not None:
-            found = found + 2 * namespace(torsion).abs(torsion) / self.width
-        if self.radius is not None:
-            found = found + _length((along, torsion / self.radius, 0.0))
+            found = found + 2 * namespace(more[1]).abs(more[1]) / self.width
+        if self.flank is not None:
+            found = found + self.flank * namespace(more[0]).abs(more[0])
         return found
 
     def gradient(self, reaction: Reaction, normal: Number) -> Reaction:
-        """∂N/∂reaction: by the directions of the contact forces, carried over to the origin."""
-        force, couple, along, torsion = self._across(reaction)
+        """∂N/∂ of what it feels: by the directions of the contact forces."""
+        fx, fy, gx, gy, *more = reaction
         if self.summed:
-            push, turn = _along(force, _length(force)), scaled(2.0, _along(couple, _length(couple)))
+            px, py = _shares(_length(fx, fy), fx, fy)
+            tx, ty = (2 * share for share in _shares(_length(gx, gy), gx, gy))
         else:
-            half = scaled(0.5, force)
-            one, two = vector_minus(half, couple), plus(half, couple)
-            one, two = _along(one, _length(one)), _along(two, _length(two))
-            push, turn = scaled(0.5, plus(one, two)), vector_minus(two, one)
-        moment = scaled(1 / self.length, cross(self.axis, turn))  # g = M × u/L, so t · dg = dM · (u × t)/L
+            hx, hy = 0.5 * fx, 0.5 * fy
+            ax, ay = _shares(_length(hx - gx, hy - gy), hx - gx, hy - gy)
+            bx, by = _shares(_length(hx + gx, hy + gy), hx + gx, hy + gy)
+            px, py, tx, ty = 0.5 * (ax + bx), 0.5 * (ay + by), bx - ax, by - ay
+        if not more:
+            return px, py, tx, ty
+        along: Number = 0.0
+        torsion: Number = 0.0
         if self.width is not None:
-            moment = plus(moment, scaled(2 * namespace(torsion).sign(torsion) / self.width, self.axis))
-        if self.radius is not None:
-            flank = _length((along, torsion / self.radius, 0.0))
-            share = _along((along, torsion / self.radius, 0.0), flank)
-            push = plus(push, scaled(share[0], self.axis))
-            moment = plus(moment, scaled(share[1] / self.radius, self.axis))
-        return (*vector_minus(push, cross(moment, self.place)), *moment)
+            torsion = 2 * namespace(more[1]).sign(more[1]) / self.width
+        if self.flank is not None:
+            along = self.flank * namespace(more[0]).sign(more[0])
+        return px, py, tx, ty, along, torsion
 
     def bound(self, reaction: Reaction) -> Number:
-        """At least the most by which this reaction can change N."""
+        """At least the most by which this can change N."""
         return self.normal(reaction)
 
     def feels(self, reaction: Reaction) -> bool:
@@ -144,15 +151,10 @@ class BearingLoad:
 
     def mapped(self, change: Callable[[Number], Number]) -> BearingLoad:
         """The same with `change` applied to every number."""
-
-        def each(a: Vector3) -> Vector3:
-            return cast(Vector3, tuple(change(n) for n in a))
-
         return replace(
             self,
-            axis=each(self.axis),
-            place=each(self.place),
+            frame=each(self.frame, change),
             length=change(self.length),
             width=None if self.width is None else change(self.width),
-            radius=None if self.radius is None else change(self.radius),
+            flank=None if self.flank is None else change(self.flank),
         )

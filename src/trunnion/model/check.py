@@ -303,6 +303,8 @@ def _joint_load(mechanism: Mechanism, load: Load, where: str) -> Iterator[Findin
         )
     elif load.resisting_torque is None and load.resisting_force is None:
         yield Finding("there is nothing in this load", where, "state resisting_torque or resisting_force")
+    elif load.resisting_torque is not None and load.resisting_force is not None:
+        yield Finding("resists a rotation and a slide at once", where, "state a load for each")
     if load.joint is None or load.joint not in joints:
         yield Finding(f"there is no joint '{load.joint}'", f"{where}.joint", nearest(str(load.joint), joints))
         return

@@ -68,12 +68,14 @@ def placed(findings: Iterable[Finding], path: str | os.PathLike[str], sections: 
     only = set(sections)
     text = read_text(path, "a model file", MAX_BYTES, "start from one of the examples")
     data, lines = _parse(text, _file_type(path))
+    rows = _rows(data)
     found: list[Finding] = []
     for finding in findings:
         section, *names = finding.where.split(".")
-        known = section in data and ".".join([section, *names[:1]]) in lines
+        entry = ".".join([section, *names[:1]])
+        known = entry in rows or (section in data and entry in lines)
         if known and not finding.file and (not only or section in only):
-            finding = finding.at(str(path), _line(finding.where, lines, {}))
+            finding = finding.at(str(path), _line(finding.where, lines, rows))
         found.append(finding)
     return found
 
@@ -250,14 +252,18 @@ class _Builder:
 
 def _placed(findings: Iterable[Finding], file: str, lines: Lines, data: Mapping[str, Any]) -> list[Finding]:
     """Findings with their file and line, in the order of the file."""
-    loop = data.get("loop")
-    rows = {f"loop.{row.get('joint')}": f"loop.{index}" for index, row in _groups(loop)}
-    rows |= {f"joints.{name.partition('.')[2]}": row for name, row in rows.items()}
+    rows = _rows(data)
     placed = [
         finding if finding.file else finding.at(file, finding.line or _line(finding.where, lines, rows))
         for finding in findings
     ]
     return sorted(placed, key=lambda finding: (finding.file != file, finding.file, finding.line or 0))
+
+
+def _rows(data: Mapping[str, Any]) -> dict[str, str]:
+    """Where the rows of the loop stand, by the paths that findings have for them: loop.JOINT and joints.JOINT."""
+    rows = {f"loop.{row.get('joint')}": f"loop.{index}" for index, row in _groups(data.get("loop"))}
+    return rows | {f"joints.{name.partition('.')[2]}": row for name, row in rows.items()}
 
 
 def _groups(items: Any) -> list[tuple[int, dict[str, Any]]]:

@@ -19,6 +19,8 @@ from trunnion.views.cycle import Array, layout
 from trunnion.views.drawing import Picture, framed, labels, sketch
 from trunnion.views.figures import INK, MUTED, RULE, new
 from trunnion.views.lettering import plain
+from trunnion.views.space_assemblies import space_ways
+from trunnion.views.ways import some
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -55,8 +57,10 @@ def ways(mechanism: Mechanism, found: Sequence[Choice] | None = None) -> Figure:
     if not found:
         what = "no group has more than one assembly: there is nothing to choose and nothing to draw"
         raise MechanismError(Finding(what, remedy="draw the mechanism with `trunnion plot --kind mechanism`"))
+    if mechanism.space == "spatial":
+        return space_ways(mechanism, found)
     result = analyse(mechanism, 1)
-    rows = [[_drawn(mechanism, layout(result), choice, way) for way in choice.ways[:MOST_DRAWN]] for choice in found]
+    rows = [[_drawn(mechanism, layout(result), choice, way) for way in some(choice, MOST_DRAWN)] for choice in found]
     box = _box([one.shown for row in rows for one in row])
     columns = min(COLUMNS, max(map(len, rows)))
     lines = [math.ceil(len(row) / columns) for row in rows]

@@ -15,7 +15,10 @@ from trunnion.views.quantities import prefixed
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Abscissa", "Interval", "abscissa", "attribute", "intervals", "layout", "status_text", "thin", "usual_peak"]
+__all__ = [
+    "Abscissa", "Interval", "abscissa", "attribute", "intervals", "layout", "numbers", "series", "status_text", "thin",
+    "usual_peak",
+]  # fmt: skip
 
 Array = NDArray[np.float64]
 TEXTS = {int(status): status.text for status in Status}
@@ -145,6 +148,19 @@ def _constant_speed(time: Array | None, values: Array, known: NDArray[np.bool_])
         last += 1
     slope = (values[last] - values[first]) / (time[last] - time[first])
     return np.asarray(values[first] + slope * (time - time[first]), dtype=float)
+
+
+def numbers(values: Array) -> list[float | None]:
+    """Numbers with seven digits, None for what is not finite."""
+    return [float(f"{value:.7g}") if np.isfinite(value) else None for value in values.tolist()]
+
+
+def series(values: Array | None) -> list[float | None]:
+    """A series for JSON; a single number if it never changes, nothing if there is none."""
+    if values is None:
+        return []
+    constant = values.size > 0 and bool(np.all(values == values[0]))
+    return numbers(values[:1] if constant else values)
 
 
 def status_text(code: int) -> str:

@@ -159,13 +159,13 @@ def square(axes: Axes, most: float, shown: float, factor: float, unit: str) -> N
     _outside(axes, most, unit)
 
 
-def legend(axes: Axes, most: int = 6) -> None:
-    """A legend in rows above the axes, where it hides no curve."""
+def legend(axes: Axes, most: int = 6, room: int = 90) -> None:
+    """A legend in rows above the axes, where it hides no curve; room: characters that a row holds."""
     handles, labels = axes.get_legend_handles_labels()
     if len(handles) < 2:
         return
-    fits = sum(map(len, labels)) + 7 * len(labels) <= 90  # characters a row holds beside the line samples
-    columns = len(labels) if fits else max(1, min(most, 100 // (max(map(len, labels)) + 7)))
+    fits = sum(map(len, labels)) + 7 * len(labels) <= room  # with the line samples
+    columns = len(labels) if fits else max(1, min(most, (room + 10) // (max(map(len, labels)) + 7)))
     axes.legend(
         handles, labels, loc="lower left", bbox_to_anchor=(-0.02, 1.0), ncols=columns, frameon=False, fontsize=8.5,
         labelcolor=INK, handlelength=2.2, columnspacing=1.6, borderaxespad=0.3,

@@ -16,6 +16,7 @@ from matplotlib.lines import Line2D
 
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.output import whole
+from trunnion.views import space_figure, space_plots
 from trunnion.views.cycle import (
     Abscissa,
     Array,
@@ -46,6 +47,7 @@ from trunnion.views.figures import (
 )  # fmt: skip
 from trunnion.views.lettering import plain
 from trunnion.views.quantities import prefixed, quantity
+from trunnion.views.space import is_spatial, without_noise
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -143,14 +145,23 @@ def _mean(values: Array) -> str:
     return f"mean {quantity(float(known.mean()), 'W')}" if known.size else "no answer"
 
 
-def _reaction(result: xr.Dataset, joint: str) -> Array:
-    """(axis, position) N."""
-    picked = result["reaction_force"].sel(joint=joint).transpose("axis", "position")
+def _reaction(result: xr.Dataset, joint: str, plane: tuple[str, str] = ("x", "y")) -> Array:
+    """Two components of the force, (2, position) N."""
+    picked = result["reaction_force"].sel(joint=joint, axis=list(plane)).transpose("axis", "position")
     return np.asarray(picked.values, dtype=float)
+
+
+def _sound(result: xr.Dataset, ideal: xr.Dataset | None) -> tuple[xr.Dataset, xr.Dataset | None]:
+    """Both without reactions that are rounding, as some of a mechanism in space are by its shape."""
+    if not is_spatial(result):
+        return result, ideal
+    return without_noise(result), None if ideal is None else without_noise(ideal)
 
 
 def reactions(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
     """Magnitude of the reaction in each joint; without friction thin and dotted."""
+    if is_spatial(result):
+        return space_plots.reactions(*_sound(result, ideal), FREE)
     over, joints = abscissa(result), names(result, "joint")
     forces = [np.hypot(*_reaction(result, joint)) for joint in joints]
     scope = usual_peak(*forces)
@@ -171,17 +182,26 @@ def reactions(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
 
 
 def polar(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
-    """Polar reaction diagrams: the tip of each joint's force vector over the run, in the global frame."""
+    """Polar reaction diagrams: the tip of each joint's force vector over the run, in the global frame.
+
+    In space a row for each joint: the vector seen along z, y and x.
+    """
     over, joints = abscissa(result), names(result, "joint")
-    columns = min(len(joints), 2 if len(joints) in (2, 4) else 3) or 1
-    rows = -(-len(joints) // columns) or 1
+    planes = space_plots.PLANES if is_spatial(result) else (("x", "y"),)
+    result, ideal = _sound(result, ideal)
+    panels = [(index, joint, plane) for index, joint in enumerate(joints) for plane in planes]
+    columns = min(len(panels), 2 if len(panels) in (2, 4) else 3) or 1
+    rows = -(-len(panels) // columns) or 1
     figure = new("Polar diagrams of the joint reactions", result, 0.9 + rows * 7.4 / columns * 0.92)
     grid = figure.subplots(rows, columns, squeeze=False).ravel()
-    for axes in grid[len(joints) :]:
+    for axes in grid[len(panels) :]:
         axes.set_visible(False)
-    for index, (axes, joint) in enumerate(zip(grid, joints, strict=False)):
-        free = None if ideal is None else _reaction(ideal, joint)
-        _hodograph(axes, over, joint, _reaction(result, joint), free, PALETTE[index % len(PALETTE)])
+    for axes, (index, joint, plane) in zip(grid, panels, strict=False):
+        free = None if ideal is None else _reaction(ideal, joint, plane)
+        colour = PALETTE[index % len(PALETTE)]
+        _hodograph(
+            axes, over, joint if plane == planes[0] else "", plane, _reaction(result, joint, plane), free, colour
+        )
     if ideal is not None:
         lines = [Line2D([], [], color=PALETTE[0], linewidth=1.6), Line2D([], [], **FREE)]
         figure.legend(lines, ["with friction", "without friction"], loc="upper right", ncols=2, frameon=False,
@@ -189,11 +209,13 @@ def polar(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
     return figure
 
 
-def _hodograph(axes: Axes, over: Abscissa, joint: str, force: Array, free: Array | None, colour: str) -> None:
+def _hodograph(
+    axes: Axes, over: Abscissa, joint: str, plane: tuple[str, str], force: Array, free: Array | None, colour: str
+) -> None:
     sizes = [np.hypot(*vector) for vector in (force, free) if vector is not None]
     scope = usual_peak(*sizes)
     factor, unit = prefixed(scope, "N")
-    dress(axes, f"Fx [{unit}]", f"Fy [{unit}]")
+    dress(axes, f"F{plane[0]} [{unit}]", f"F{plane[1]} [{unit}]")
     axes.set_title(plain(joint), fontsize=10, fontweight="bold", color=INK, loc="left")
     axes.axhline(0, color=MUTED, linewidth=0.8, zorder=1.5)
     axes.axvline(0, color=MUTED, linewidth=0.8, zorder=1.5)
@@ -243,7 +265,12 @@ def _outward(force: Array, index: int) -> Array:
 
 
 def mechanism(result: xr.Dataset, ideal: xr.Dataset | None = None, index: int | None = None) -> Figure:
-    """The mechanism at a position (the first that can be drawn, if not told), ghosts, coupler curves, joints named."""
+    """The mechanism at a position, with coupler curves, joints named.
+
+    If the position is not told: in the plane a telling one, with ghosts; in space that of the largest reaction.
+    """
+    if is_spatial(result):
+        return space_figure.mechanism(result, index)
     shown = picture(result)
     count = result.sizes["position"]
     if index is None:
@@ -302,7 +329,9 @@ def power(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
 
 
 def motion(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
-    """Angles of the turning links, slides of the sliding joints, and their rates."""
+    """Angles of the turning links, slides of the sliding joints, and their rates; in space also those of the joints."""
+    if is_spatial(result):
+        return space_plots.motion(result)
     over, stated = abscissa(result), layout(result)
     turning = [name for name in names(result, "link")
                if name != stated["ground"] and _turns(column(result, "link_angle", link=name))]  # fmt: skip

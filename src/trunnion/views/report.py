@@ -53,6 +53,7 @@ def report(result: xr.Dataset, ideal: xr.Dataset | None = None) -> str:
     runs, found = intervals(result), _findings(result)
     context = {
         "name": shown["name"] or "Mechanism", "formula": shown["formula"], "compared": ideal is not None,
+        "spatial": shown.get("space") == "spatial",
         "positions": result.sizes["position"], "thinned": _ordinal(shown), "method": result.attrs.get("method", ""),
         "unanswered": sum(run.stop - run.start for run in runs),
         "summary": _summary(result),

@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.views.cycle import Array, abscissa, attribute, column, intervals, layout, names
+from trunnion.views.cycle import abscissa, attribute, column, intervals, layout, names, numbers, series
+from trunnion.views.space import is_spatial, without_noise
+from trunnion.views.space_scene import space_scene
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,21 +33,23 @@ def scene(result: xr.Dataset, ideal: xr.Dataset | None = None, max_positions: in
     count = result.sizes["position"]
     if ideal is not None and ideal.sizes["position"] != count:
         raise ValueError(f"`ideal` has {ideal.sizes['position']} positions, the result {count}")
+    if is_spatial(result):
+        result, ideal = without_noise(result), None if ideal is None else without_noise(ideal)
     picked = _picked(count, max_positions)
     over = abscissa(result)
     kept = result.isel(position=picked)
     other = None if ideal is None else ideal.isel(position=picked)
     stated = layout(result)
     points = _points(kept)
-    return {
+    shown = {
         "format": FORMAT,
         "name": result.attrs.get("name", ""),
         "formula": result.attrs.get("formula", ""),
         "count": int(picked.size),
         "thinned": count if picked.size < count else None,
         "abscissa": {"label": over.label, "unit": over.unit, "closed": over.closed, "period": over.period,
-                     "values": _numbers(over.values[picked])},
-        "time": _series(column(kept, "time")),
+                     "values": numbers(over.values[picked])},
+        "time": series(column(kept, "time")),
         "status": [int(code) for code in kept["status"].values],
         "states": {str(run.status): run.text for run in intervals(kept, 0)},
         "gaps": [{"from": over.say(int(run.start)), "to": over.say(int(run.stop) - 1), "text": run.text}
@@ -57,9 +61,10 @@ def scene(result: xr.Dataset, ideal: xr.Dataset | None = None, max_positions: in
         "springs": _springs(stated, points),
         "gears": [{"name": name, **circle} for name, pair in stated["gears"].items() for circle in pair],
         "drivers": _drivers(kept, other, stated),
-        "sums": {name: _series(column(kept, name)) for name in SUMS if name in kept},
+        "sums": {name: series(column(kept, name)) for name in SUMS if name in kept},
         "efficiency": _single(result, "efficiency"),
     }  # fmt: skip
+    return shown | space_scene(kept) if is_spatial(result) else shown
 
 
 def _picked(count: int, most: int) -> NDArray[np.intp]:
@@ -68,28 +73,17 @@ def _picked(count: int, most: int) -> NDArray[np.intp]:
     return np.arange(0, count, stride)
 
 
-def _numbers(values: Array) -> list[float | None]:
-    """Numbers with seven digits, None for what is not finite."""
-    return [float(f"{value:.7g}") if np.isfinite(value) else None for value in values.tolist()]
-
-
-def _series(values: Array | None) -> list[float | None]:
-    """A series; a single number if it never changes, nothing if there is none."""
-    if values is None:
-        return []
-    constant = values.size > 0 and bool(np.all(values == values[0]))
-    return _numbers(values[:1] if constant else values)
-
-
 def _single(result: xr.Dataset, name: str) -> float | None:
     value = column(result, name)
-    return None if value is None or value.ndim else _numbers(value.reshape(1))[0]
+    return None if value is None or value.ndim else numbers(value.reshape(1))[0]
 
 
 def _points(result: xr.Dataset) -> dict[str, dict[str, Any]]:
-    """Each "link.point" with its track."""
+    """Each "link.point" with its track; none in space, where the poses of the links tell them."""
+    if is_spatial(result):
+        return {}
     return {
-        name: {axis: _series(column(result, "point_position", point=name, axis=axis)) for axis in ("x", "y")}
+        name: {axis: series(column(result, "point_position", point=name, axis=axis)) for axis in ("x", "y")}
         for name in names(result, "point")
     }
 
@@ -101,7 +95,7 @@ def _links(stated: dict[str, Any], result: xr.Dataset, points: dict[str, Any]) -
     for name, link in stated["links"].items():
         keys = [f"{name}.{point}" for point in link["points"] if f"{name}.{point}" in points]
         free = [key for key in keys if key[len(name) + 1 :] not in stated["joints"]]
-        angle = _series(column(result, "link_angle", link=name)) if name in known else [0.0]
+        angle = series(column(result, "link_angle", link=name)) if name in known and not is_spatial(result) else [0.0]
         rows.append({"name": name, "ground": name == stated["ground"], "points": keys, "free": free, "angle": angle})
     return rows
 
@@ -120,20 +114,29 @@ def _joints(stated: dict[str, Any], result: xr.Dataset, ideal: xr.Dataset | None
                 "at": f"{second}.{name}", "on": f"{first}.{name}",
                 "reaction": _reaction(result, name),
                 "ideal": None if ideal is None else _reaction(ideal, name),
-                "moment": _series(column(result, "reaction_moment", joint=name)),
-                "friction_power": _series(column(result, "friction_power", joint=name)),
+                "moment": _moment(result, name),
+                "friction_power": series(column(result, "friction_power", joint=name)),
             }
         )  # fmt: skip
     return rows
 
 
 def _reaction(result: xr.Dataset, joint: str) -> dict[str, Any]:
-    return {axis: _series(column(result, "reaction_force", joint=joint, axis=axis)) for axis in ("x", "y")}
+    return {axis: series(column(result, "reaction_force", joint=joint, axis=axis)) for axis in names(result, "axis")}
+
+
+def _moment(result: xr.Dataset, joint: str) -> Any:
+    """A series; in space one for each axis."""
+    if not is_spatial(result):
+        return series(column(result, "reaction_moment", joint=joint))
+    return {axis: series(column(result, "reaction_moment", joint=joint, axis=axis)) for axis in names(result, "axis")}
 
 
 def _loads(stated: dict[str, Any], points: dict[str, Any]) -> list[dict[str, Any]]:
-    """Loads that can be drawn: a force at a known point, a moment on a link."""
-    rows = []
+    """Loads that can be drawn: a force at a known point, a moment on a link; those in space are told apart."""
+    rows: list[dict[str, Any]] = []
+    if stated.get("space") == "spatial":
+        return rows
     for name, load in stated["loads"].items():
         at = f"{load.get('link')}.{load.get('at')}"
         force = [float(part) for part in load.get("force") or (0.0, 0.0)]
@@ -155,10 +158,10 @@ def _drivers(result: xr.Dataset, ideal: xr.Dataset | None, stated: dict[str, Any
     units = attribute(result, "driver_units", [])
     rows = []
     for index, name in enumerate(names(result, "driver")):
-        series = {key: _series(column(result, f"drive_{key}", driver=name))
+        values = {key: series(column(result, f"drive_{key}", driver=name))
                   for key in ("effort", "effort_lower", "effort_upper", "power")}  # fmt: skip
-        free = None if ideal is None else _series(column(ideal, "drive_effort", driver=name))
+        free = None if ideal is None else series(column(ideal, "drive_effort", driver=name))
         unit = units[index] if index < len(units) else "N m"
         kind = stated["joints"].get(name, {}).get("type", "revolute")
-        rows.append({"name": name, "unit": unit, "type": kind, "ideal": free, **series})
+        rows.append({"name": name, "unit": unit, "type": kind, "ideal": free, **values})
     return rows

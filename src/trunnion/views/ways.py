@@ -11,9 +11,10 @@ if TYPE_CHECKING:
     from trunnion.analysis.assemblies import Choice, Way
     from trunnion.analysis.inspect import GearPair
 
-__all__ = ["gear_line", "lines", "places"]
+__all__ = ["gear_line", "lines", "places", "some"]
 
 MOST_JOINTS = 8  # named in a line
+MOST_WAYS = 24  # in lines
 
 
 def gear_line(pair: GearPair) -> str:
@@ -29,16 +30,25 @@ def lines(choice: Choice) -> list[str]:
     """The position if it is not the start, each way with its joints, and what to write to take another."""
     wide = max(len(way.name) for way in choice.ways)
     found = [f"as they are at {choice.where}:"] * bool(choice.where)
-    found += [f"{way.name:<{wide}}  {places(choice, way)}{'  <- taken' * way.taken}" for way in choice.ways]
+    told = some(choice, MOST_WAYS)
+    found += [f"{way.name:<{wide}}  {places(choice, way)}{'  <- taken' * way.taken}" for way in told]
+    found += [f"… and {len(choice.ways) - len(told)} more"] * (len(told) < len(choice.ways))
     other = next(way for way in choice.ways if not way.taken)
     return [*found, f"to take another: {choice.line(other)}"]
+
+
+def some(choice: Choice, most: int) -> list[Way]:
+    """The first ways of a choice, no more than `most`, the one that is taken always among them."""
+    first = list(choice.ways[:most])
+    taken = [way for way in choice.ways[most:] if way.taken]
+    return [*first[: len(first) - len(taken)], *taken]
 
 
 def places(choice: Choice, way: Way) -> str:
     """Where the inner joints of a group are in one of its ways: 'C (70, 130) mm'."""
     numbers = [abs(n) for one in choice.ways for joint in one.joints.values() for n in joint]
     largest = max((n for n in numbers if math.isfinite(n)), default=0.0)
-    turned = [f"{name} {math.degrees(angle):.4g}°" for name, angle in list(way.turns.items())[:MOST_JOINTS]]
+    turned = [f"{name} {round(math.degrees(angle), 6):.5g}°" for name, angle in list(way.turns.items())[:MOST_JOINTS]]
     if not largest:
         return ", ".join(turned) or ("at the origin" if numbers else "")
     factor, unit = prefixed(largest, "m")

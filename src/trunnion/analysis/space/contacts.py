@@ -45,14 +45,15 @@ def contacts(walk: SpatialWalk, joint: str) -> Iterator[Rubbing]:
     """The contacts of a joint."""
     kind = walk.system.joints[joint][0]
     middle = bearing_middle(walk, joint)
-    axis = walk.element(walk.system.joints[joint][1][1], joint).z
+    second = walk.element(walk.system.joints[joint][1][1], joint)
+    axis = second.z
     if kind == "spherical":
         yield _ball(walk, joint, middle)
         return
     if kind == "universal":
         yield from _two_pins(walk, joint, middle)
         return
-    load = _bearing(walk, joint, kind, axis, middle)
+    load = _bearing(walk, joint, kind, second._replace(place=middle))
     turn, slide = walk.rates(joint)
     if kind == "prismatic":
         yield Rubbing(load, slide, Screw(axis, about(axis, NULL, middle).m))
@@ -95,13 +96,16 @@ def _summed(walk: SpatialWalk, joint: str) -> bool:
     return friction is not None and friction.model == "pezzuti"
 
 
-def _bearing(walk: SpatialWalk, joint: str, kind: str, axis: Vector3, middle: Vector3) -> BearingLoad:
+def _bearing(walk: SpatialWalk, joint: str, kind: str, frame: Frame) -> BearingLoad:
     values, path = walk.values, f"joints.{joint}"
     if kind == "prismatic":
         length = values[f"{path}.guide.length"]
-        return BearingLoad(axis, middle, length, _summed(walk, joint), values.get(f"{path}.guide.width"))
-    radius = values[f"{path}.pin.radius"] if kind == "helical" else None
-    return BearingLoad(axis, middle, values[f"{path}.pin.bearing"], _summed(walk, joint), radius=radius)
+        return BearingLoad(frame, length, _summed(walk, joint), values.get(f"{path}.guide.width"))
+    flank = None
+    if kind == "helical":
+        slope = walk.space.lead(values, joint) / values[f"{path}.pin.radius"]
+        flank = namespace(slope).sqrt(1 + slope * slope)
+    return BearingLoad(frame, values[f"{path}.pin.bearing"], _summed(walk, joint), flank=flank)
 
 
 def _ball(walk: SpatialWalk, joint: str, middle: Vector3) -> Rubbing:
@@ -120,9 +124,9 @@ def _two_pins(walk: SpatialWalk, joint: str, middle: Vector3) -> Iterator[Rubbin
     values, path = walk.values, f"joints.{joint}"
     first, second = (walk.element(link, joint) for link in walk.system.joints[joint][1])
     lever = values[f"{path}.pin.radius"]
-    for axis, rate in zip((first.z, second.z), pin_rates(walk, joint, first, second), strict=True):
-        load = BearingLoad(axis, middle, values[f"{path}.pin.bearing"], _summed(walk, joint))
-        yield Rubbing(load, lever * rate, Screw(NULL, scaled(lever, axis)), felt=True)
+    for pin, rate in zip((first, second), pin_rates(walk, joint, first, second), strict=True):
+        load = BearingLoad(pin._replace(place=middle), values[f"{path}.pin.bearing"], _summed(walk, joint))
+        yield Rubbing(load, lever * rate, Screw(NULL, scaled(lever, pin.z)), felt=True)
 
 
 def pin_rates(walk: SpatialWalk, joint: str, first: Frame, second: Frame) -> tuple[Number, Number]:

@@ -8,17 +8,22 @@ are not determined.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.algebra.dual import primal
 from trunnion.algebra.nested import each
 from trunnion.algebra.rigid import ZERO, Screw
+from trunnion.algebra.space import dot
 from trunnion.analysis.branches import Chosen
 from trunnion.analysis.follow import assemblies, at, lane_of
+from trunnion.analysis.friction import FrictionMethod
 from trunnion.analysis.kinematics import forward
+from trunnion.analysis.kinetostatics import Given
 from trunnion.analysis.system import Cycle, System, Values, driven_coordinates
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.groups.redundant import RANK, stacked
@@ -74,7 +79,27 @@ def look(system: System, values: Values, chosen: Chosen, cycle: Cycle) -> Determ
         one = _Module(number, module.joints, module.links, group, _lane(pose, best, len(table)))
         joints, links = _strained(one, table[best]), _loose(one, table[best])
         found.append(Part(number, rows - rank, columns - rank, joints, links))
-    return Determinacy(system, tuple(found))
+    return Determinacy(system, tuple(found), _spins(walk))
+
+
+def _spins(walk: Any) -> dict[str, float]:
+    """Largest torque that keeps each link with a free spin from spinning, N m, where it is more than rounding."""
+    if not walk.system.plan.passive:
+        return {}
+    with np.errstate(all="ignore"):
+        back = walk.system.engine.backward(walk, FrictionMethod(), Given())
+    found = {}
+    for link, torque in back.spins.items():
+        joints = [name for name, (_, links) in walk.system.joints.items() if link in links]
+        force = max(_largest(np.sqrt(dot(back.reactions[name].u, back.reactions[name].u))) for name in joints)
+        size = _largest(walk.system.size(walk.values))
+        if _largest(torque) > PRESENT * force * size:
+            found[link] = _largest(torque)
+    return found
+
+
+def _largest(values: Any) -> float:
+    return float(np.nanmax(np.abs(primal(values)), initial=0.0))
 
 
 def _by_least_squares(system: System, walk: Any, number: int, group: SpatialGroup) -> Pose | None:
@@ -139,10 +164,14 @@ def _size(screw: Screw) -> float:
 
 @dataclass(frozen=True)
 class Determinacy:
-    """What the joints of a mechanism leave open, module by module."""
+    """What the joints of a mechanism leave open, module by module.
+
+    spins: torque that would keep a link with a free spin from spinning, where its masses or loads make it spin, N m.
+    """
 
     system: System
     parts: tuple[Part, ...]
+    spins: Mapping[str, float]
 
     @property
     def mobility(self) -> int:
@@ -166,6 +195,11 @@ class Determinacy:
             for link, a, b in module.spinning:
                 what = f"the link '{link}' can spin about the line of {a} and {b} (a passive freedom)"
                 told.append(Finding(what, f"links.{link}", "it is taken not to spin", Severity.NOTE))
+                if link in self.spins:
+                    what = f"nothing keeps the link '{link}' from spinning about {a}-{b}: it would take up to "
+                    what += f"{self.spins[link]:.3g} N m"
+                    remedy = "make it symmetric about that line, or hold its spin by a universal joint at one end"
+                    told.append(Finding(what, f"links.{link}", remedy, Severity.WARNING))
         return told
 
     @property

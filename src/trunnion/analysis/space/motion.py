@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, NamedTuple, cast
 
+import numpy as np
+
+from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.rigid import (
     ORIGIN,
@@ -22,7 +26,7 @@ from trunnion.algebra.space import Vector3, cross, dot, plus
 from trunnion.analysis.kinematics import Forward, Motion
 from trunnion.analysis.space.system import SpatialSystem
 from trunnion.analysis.system import Place, Values, driven_coordinates
-from trunnion.groups.spatial import Element
+from trunnion.groups.spatial_tree import Element
 
 __all__ = ["SpatialMotion", "SpatialPoint", "SpatialWalk", "on_the_ground"]
 
@@ -54,6 +58,20 @@ class SpatialWalk(Forward):
     def space(self) -> SpatialSystem:
         """The system."""
         return cast(SpatialSystem, self.system)
+
+    @cached_property
+    def size(self) -> Number:
+        """Length typical of the mechanism, m."""
+        return self.space.size(self.values, self.local)
+
+    @cached_property
+    def spins(self) -> dict[str, Number]:
+        """Angular speed of every link, rad/s; real parts."""
+        found = {}
+        for link, motion in self.motions.items():
+            square = primal(dot(motion.twist.u, motion.twist.u))
+            found[link] = np.sqrt(square)
+        return found
 
     def element(self, link: str, joint: str) -> Frame:
         """Global frame of a joint's element on a link."""
@@ -87,7 +105,12 @@ class SpatialWalk(Forward):
         return compose(frame, self.local[link, joint])
 
     def coordinate(self, joint: str, first: Any, second: Any) -> Number:
-        """Turn of a joint from its elements, or slide if that is all it does."""
+        """Turn of a joint from its elements, of a cross that of its first pin, or slide if that is all it does."""
+        if (
+            self.system.joints[joint][0] == "universal"
+        ):  # the second pin is at (sin θ₁, −cos θ₁, 0) of the first element
+            sine, cosine = dot(second.z, first.x), -dot(second.z, first.y)
+            return namespace(sine, cosine).arctan2(sine, cosine)
         return _dual_angle(first, second)[0 if self.system.turns(joint) else 1]
 
     def _local_place(self, link: str, name: str) -> Vector3:
@@ -123,6 +146,15 @@ class SpatialWalk(Forward):
         change = plus(moment_at(rate, two.place), cross(relative.u, speed))
         return dot(rate.u, two.z) + dot(relative.u, carried), dot(change, two.z) + dot(at, carried)
 
+    def slip_motion(self, joint: str) -> tuple[Number, Number]:
+        """Slip of the contact of a joint that moves one way only, along its thread if it has one; m/s, m/s²."""
+        (turn, slide), (turn_rate, slide_rate) = self.rates(joint), self.second_rates(joint)
+        if self.system.joints[joint][0] == "prismatic":
+            return slide, slide_rate
+        lever, lead = self.values[f"joints.{joint}.pin.radius"], self.space.lead(self.values, joint)
+        way = namespace(lever, lead).sqrt(lever * lever + lead * lead)
+        return way * turn, way * turn_rate
+
     def _pair(self, place: Place) -> Any:
         return Element(self._side(place, 0), self._side(place, 1), self.space.lead(self.values, place.joint))
 
@@ -137,8 +169,9 @@ class SpatialWalk(Forward):
         ]
         twists_out = [self.motions[link].twist if link else None for link in outside]
         accelerations_out = [self.motions[link].acceleration if link else None for link in outside]
-        twists = group.velocity(pose, twists_out, rates)
-        accelerations = group.acceleration(pose, twists, twists_out, accelerations_out, seconds, rates)
+        speeds = group.rates(pose, twists_out, rates)
+        twists = group.twists(pose, twists_out, speeds)
+        accelerations = group.acceleration(pose, twists, twists_out, accelerations_out, seconds, speeds)
         for link, frame, twist, second in zip(module.links, pose.frames, twists, accelerations, strict=True):
             self.motions[link] = SpatialMotion(frame, twist, second)
         self.poses.append(pose)

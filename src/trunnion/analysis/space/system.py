@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Mapping
 from functools import cached_property
 from typing import cast
 
@@ -13,7 +14,7 @@ from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.rigid import ORIGIN, Frame, element, relative, slid, turned, vector_minus
 from trunnion.algebra.space import Vector3, dot
 from trunnion.analysis.system import Place, System, Values
-from trunnion.groups.ccc_group import CylindricalDyad
+from trunnion.groups.cylindrical_dyad import CylindricalDyad
 from trunnion.groups.spatial import SpatialGroup
 from trunnion.groups.tree import OUTER, GroupJoint
 from trunnion.structure.decompose import Module
@@ -119,9 +120,9 @@ class SpatialSystem(System):
         """Slide for one radian of a helical pair, m; 0 of others."""
         return values[f"joints.{joint}.pitch"] / (2 * np.pi) if self.joints[joint][0] == "helical" else 0.0
 
-    def size(self, values: Values) -> Number:
-        """Length typical of the mechanism, m: the widest spread of two joints on one link."""
-        elements = self.elements(values)
+    def size(self, values: Values, elements: Mapping[tuple[str, str], Frame] | None = None) -> Number:
+        """Length typical of the mechanism, m: the widest spread of two joints on one link; elements: if known."""
+        elements = self.elements(values) if elements is None else elements
         widest: Number = 0.0
         for name in self.mechanism.effective_links:
             places = [frame.place for (link, _), frame in elements.items() if link == name]

@@ -15,12 +15,12 @@ export function full(series, count) {
   return Array.from({ length: count }, (_, index) => at(series, index));
 }
 
-/** Magnitude of a vector {x, y} of series, for every position; null where either part is. */
+/** Magnitude of a vector {x, y} or {x, y, z} of series, for every position; null where any part is. */
 export function magnitude(vector, count) {
+  const parts = Object.values(vector);
   return Array.from({ length: count }, (_, index) => {
-    const x = at(vector.x, index);
-    const y = at(vector.y, index);
-    return x === null || y === null ? null : Math.hypot(x, y);
+    const values = parts.map((series) => at(series, index));
+    return values.includes(null) ? null : Math.hypot(...values);
   });
 }
 
@@ -141,6 +141,17 @@ export function state(scene, index) {
 /** The place of a position in words: "132°", "12.5 mm". */
 export function say({ abscissa: { values, unit } }, index) {
   return unit === "°" ? `${stated(values[index], "")}°` : stated(values[index], unit);
+}
+
+/** Why there is no answer, and over which stretch of the drive. */
+export function cause(scene, index) {
+  const same = (one) => scene.status[one] === scene.status[index];
+  let [first, last] = [index, index];
+  while (first > 0 && same(first - 1)) first -= 1;
+  while (last < scene.count - 1 && same(last + 1)) last += 1;
+  const text = state(scene, index);
+  const stretch = first < last ? ` (${say(scene, first)} to ${say(scene, last)})` : "";
+  return `${text.charAt(0).toUpperCase()}${text.slice(1)}${stretch}.`;
 }
 
 /** Runs [first, last] of positions without an answer. */

@@ -89,3 +89,9 @@ function grouped(text) {
 function superscript(power) {
   return [...String(power)].map((sign) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[sign] ?? "⁻").join("");
 }
+
+/** A name that fits into the drawing; the whole of it is in the tooltip. */
+export function short(name) {
+  const signs = [...name];
+  return signs.length > 14 ? `${signs.slice(0, 13).join("")}…` : name;
+}

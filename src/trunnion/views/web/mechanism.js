@@ -1,9 +1,9 @@
 // The mechanism as SVG: ground, links as bodies, joints, coupler curves, loads, reaction vectors.
 
 import { arrow, longest } from "./arrow.js";
-import { at, bounds, guide, hull, magnitude, peak, place, quantile, say, solved, state, usualPeak } from "./data.js";
+import { at, bounds, cause, guide, hull, magnitude, peak, place, quantile, solved, usualPeak } from "./data.js";
 import { html, onWidth, set, svg } from "./dom.js";
-import { roundBelow, stated } from "./format.js";
+import { roundBelow, short, stated } from "./format.js";
 import { loadsOf, poseLoad } from "./load.js";
 import { poseSlot, slotsOf } from "./slot.js";
 import { coil } from "./spring.js";
@@ -256,12 +256,6 @@ function freePoint(key, link) {
   };
 }
 
-/** A name that fits into the drawing; the whole of it is in the tooltip. */
-function short(name) {
-  const signs = [...name];
-  return signs.length > 14 ? `${signs.slice(0, 13).join("")}…` : name;
-}
-
 /** Length bar and reference arrow, with round numbers. */
 function scales(view) {
   const { frame, fitting, factor } = view;
@@ -315,17 +309,6 @@ function pose(view) {
 
 function drawable(scene, index) {
   return Object.keys(scene.points).every((key) => place(scene, key, index));
-}
-
-/** Why there is no answer, and over which stretch of the drive. */
-function cause(scene, index) {
-  const same = (one) => scene.status[one] === scene.status[index];
-  let [first, last] = [index, index];
-  while (first > 0 && same(first - 1)) first -= 1;
-  while (last < scene.count - 1 && same(last + 1)) last += 1;
-  const text = state(scene, index);
-  const stretch = first < last ? ` (${say(scene, first)} to ${say(scene, last)})` : "";
-  return `${text.charAt(0).toUpperCase()}${text.slice(1)}${stretch}.`;
 }
 
 function spotOf(view, key) {

@@ -6,8 +6,13 @@ import { fixed, prefixed, quantity, tickLabel, ticks } from "./format.js";
 
 const MARGIN = { top: 10, right: 14, bottom: 42, left: 60 };
 
-/** The diagram of `joint`; `kind` colours it, `pick(index, firm)` is called when the reader points at the curve. */
-export function polarChart(scene, joint, kind, pick) {
+/**
+ * The diagram of a joint {name, reaction, ideal}, seen in the plane of two axes; `kind` colours it, `pick(index, firm)` is
+ * called when the reader points at the curve.
+ */
+export function polarChart(scene, { name, reaction, ideal }, kind, pick, [across, up] = ["x", "y"]) {
+  const flat = (vector) => vector && { x: vector[across], y: vector[up] };
+  const joint = { name, reaction: flat(reaction), ideal: flat(ideal) };
   const sizes = magnitude(joint.reaction, scene.count);
   const free = joint.ideal ? magnitude(joint.ideal, scene.count) : [];
   const most = usualPeak(sizes, free);
@@ -29,7 +34,7 @@ export function polarChart(scene, joint, kind, pick) {
     plot,
     cut === null ? null : html("p", { class: "remark" }, `The peak of ${quantity(highest, "N")} lies outside.`),
   );
-  const chart = { scene, joint, kind, scale, cut, plot, frame: null, index: 0 };
+  const chart = { scene, joint, kind, scale, cut, plot, axes: [across, up], frame: null, index: 0 };
   onWidth(plot, (width) => draw(chart, width), 220);
   const point = (event, firm) => chart.frame && pick(closest(chart, event), firm);
   plot.addEventListener("pointerdown", (event) => point(event, true));
@@ -70,8 +75,8 @@ function draw(chart, width) {
         "aria-label": `Polar diagram of the reaction in joint ${joint.name}`,
       },
       ...grid(frame, across, up, side),
-      svg("text", { class: "axis middle", x: MARGIN.left + side / 2, y: height - 5 }, "Fx"),
-      svg("text", { class: "axis", x: 0, y: MARGIN.top + side / 2, dy: "0.32em" }, "Fy"),
+      svg("text", { class: "axis middle", x: MARGIN.left + side / 2, y: height - 5 }, `F${chart.axes[0]}`),
+      svg("text", { class: "axis", x: 0, y: MARGIN.top + side / 2, dy: "0.32em" }, `F${chart.axes[1]}`),
       clipped(
         { x: MARGIN.left, y: MARGIN.top, width: side, height: side },
         joint.ideal ? svg("path", { class: "curve free", d: loop(chart, joint.ideal) }) : null,

@@ -7,6 +7,7 @@ import { fixed, quantity } from "./format.js";
 import { mechanismView } from "./mechanism.js";
 import { listenToKeys, player } from "./player.js";
 import { polarChart } from "./polar.js";
+import { spaceView } from "./space.js";
 
 /** Class that colours the n-th joint's curves and vectors; after six the dash changes. */
 function kindOf(order) {
@@ -34,6 +35,7 @@ function charts(scene, kinds, pick) {
       }),
     );
   list.push(reactionChart(scene, kinds, pick));
+  if (scene.space === "spatial") list.push(momentChart(scene, kinds, pick));
   list.push(powerChart(scene, lost, pick));
   if (sums.efficiency_instant) {
     const values = full(sums.efficiency_instant, count).map((value) => (value === null ? null : 100 * value));
@@ -72,6 +74,14 @@ function reactionChart(scene, kinds, pick) {
     kind: kinds.get(joint.name),
   }));
   return lineChart(scene, { title: "Joint reactions, magnitude", unit: "N", series, pick });
+}
+
+function momentChart(scene, kinds, pick) {
+  const series = scene.joints
+    .map(({ name, moment }) => ({ label: name, values: magnitude(moment, scene.count), kind: kinds.get(name) }))
+    .filter((one) => peak(one.values) > 0);
+  const note = "About the middle of the bearing; drive and friction are not in it.";
+  return lineChart(scene, { title: "Reaction moments, magnitude", unit: "N m", series, note, pick });
 }
 
 function powerChart(scene, lost, pick) {
@@ -163,10 +173,33 @@ function vectorControls(scene, kinds, mechanism) {
   return html("fieldset", { class: "vectors" }, html("legend", {}, "Reactions"), ...labels, all, size);
 }
 
+/** The polar diagrams; in space of the plane that is chosen. */
+function polarPanel(scene, kinds, pick, place) {
+  const panel = { charts: [], index: 0 };
+  const fill = (plane) => {
+    panel.charts.forEach((chart) => chart.element.remove());
+    panel.charts = scene.joints.map((joint) => polarChart(scene, joint, kinds.get(joint.name), pick, plane));
+    place.append(...panel.charts.map((chart) => chart.element));
+    panel.show(panel.index);
+  };
+  panel.show = (index) => {
+    panel.index = index;
+    panel.charts.forEach((chart) => chart.show(index));
+  };
+  if (scene.space === "spatial") {
+    const planes = html("select", {}, ...["x–y", "x–z", "y–z"].map((name) => html("option", {}, name)));
+    planes.addEventListener("change", () => fill(planes.value.split("–")));
+    place.append(html("label", { class: "plane" }, "Plane ", planes));
+  }
+  fill(["x", "y"]);
+  return panel;
+}
+
 /** Build the page into its places. */
 export function start(scene, places) {
   const kinds = new Map(scene.joints.map((joint, order) => [joint.name, kindOf(order)]));
-  const mechanism = mechanismView(scene, kinds);
+  const spatial = scene.space === "spatial";
+  const mechanism = spatial ? spaceView(scene, kinds) : mechanismView(scene, kinds);
   const figures = readout(scene);
   const views = [mechanism, figures];
   const crank = player(scene.count, figures.words, (index) => views.forEach((view) => view.show(index)), { svg });
@@ -175,16 +208,18 @@ export function start(scene, places) {
     else if (!crank.playing()) crank.go(index);
   };
   const curves = charts(scene, kinds, pick);
-  const polars = scene.joints.map((joint) => polarChart(scene, joint, kinds.get(joint.name), pick));
-  views.push(...curves, ...polars);
+  views.push(...curves, polarPanel(scene, kinds, pick, places.polars));
   const hint = html(
     "p",
     { class: "hint" },
-    "Space plays, ← and → step (Shift: ten), Home and End jump; point at a curve to move the crank.",
+    "Space plays, ← and → step (Shift: ten), Home and End jump; point at a curve to move the crank." +
+      (spatial ? " Drag turns the mechanism, with Shift or the right button it shifts, the wheel zooms; so do the keys ← → ↑ ↓ + − 0 once it has the focus." : ""),
   );
-  places.stage.append(mechanism.element, crank.element, figures.element, vectorControls(scene, kinds, mechanism), hint);
+  const vectors = vectorControls(scene, kinds, mechanism);
+  places.stage.append(
+    ...[mechanism.element, crank.element, figures.element, vectors, mechanism.controls, hint].filter(Boolean),
+  );
   places.charts.append(...curves.map((chart) => chart.element));
-  places.polars.append(...polars.map((chart) => chart.element));
   listenToKeys(document, crank);
   crank.go(0);
   return crank;

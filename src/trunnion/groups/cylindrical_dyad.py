@@ -17,7 +17,8 @@ from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.rigid import Frame, compose, relative, vector_minus
 from trunnion.algebra.space import Vector3, cross, dot, plus, scaled, unit, vector_parts
 from trunnion.groups import ccc
-from trunnion.groups.spatial import Element, Pose, SpatialGroup
+from trunnion.groups.spatial import Pose, SpatialGroup
+from trunnion.groups.spatial_tree import Element
 from trunnion.groups.tree import OUTER
 
 __all__ = ["CylindricalDyad"]

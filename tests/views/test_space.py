@@ -1,0 +1,295 @@
+"""Views of spatial results: figures of every kind, a scene that is the result, a page that turns, flat columns."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from stand_in_space import SPATIAL, Z, cardan, every_kind, rssr
+from test_report import Page
+
+from trunnion.errors import MechanismError, Status
+from trunnion.export import columns
+from trunnion.views.plots import PLOTS, mechanism, save
+from trunnion.views.report import report
+from trunnion.views.scene import scene
+from trunnion.views.space import space
+from trunnion.views.space_camera import best, looking
+from trunnion.views.space_figure import scenery
+from trunnion.views.space_paint import facets
+from trunnion.views.space_plots import turned_from_start
+from trunnion.views.space_scene import screw_axis
+from trunnion.views.space_solids import SYMBOLS, solids
+
+BLANK = ("nowhere", "locked")  # no position can be drawn
+
+
+@pytest.fixture(params=SPATIAL)
+def spatial(request):
+    """(name, result) of every kind of spatial result."""
+    return request.param, SPATIAL[request.param]()
+
+
+@pytest.mark.parametrize("name", PLOTS)
+def test_every_figure_of_every_spatial_result(name, spatial, tmp_path):
+    kind, result = spatial
+    if name == "mechanism" and kind in BLANK:
+        with pytest.raises(MechanismError, match="nothing to draw"):
+            PLOTS[name](result, None)
+        return
+    for suffix in ("png", "svg"):
+        path = save(PLOTS[name](result, result), tmp_path / f"figure.{suffix}")
+        assert 5_000 < path.stat().st_size < 3_000_000
+
+
+def _texts(figure):
+    return [text.get_text() for axes in figure.axes for text in [*axes.texts, axes.xaxis.label, axes.yaxis.label]]
+
+
+def test_magnitudes_have_three_components():
+    result = rssr(36)
+    figure = PLOTS["reactions"](result, None)
+    for axes, variable in zip(figure.axes, ("reaction_force", "reaction_moment"), strict=True):
+        line = next(one for one in axes.lines if one.get_label() == "O")
+        expected = np.linalg.norm(result[variable].sel(joint="O").values, axis=0)
+        assert line.get_ydata()[:-1] == pytest.approx(expected)
+    assert {"force of the reaction [N]", "moment of the reaction [N m]"} <= set(_texts(figure))
+
+
+def test_polar_diagrams_show_three_planes():
+    result = rssr(36)
+    figure = PLOTS["polar"](result, None)
+    assert len(figure.axes) == 12
+    labels = [(axes.get_xlabel(), axes.get_ylabel()) for axes in figure.axes[:3]]
+    assert labels == [("Fx [N]", "Fy [N]"), ("Fx [N]", "Fz [N]"), ("Fy [N]", "Fz [N]")]
+    track = figure.axes[2].lines[2].get_xydata()
+    assert track[:-1] == pytest.approx(result.reaction_force.sel(joint="O", axis=["y", "z"]).values.T)
+
+
+def test_motion_tells_rotations_slides_and_links():
+    figure = PLOTS["motion"](every_kind(24), None)
+    assert {"joint rotation [°]", "joint slide [mm]", "turn of the link [°]", "angular velocity [rad/s]"} <= set(
+        _texts(figure)
+    )
+
+
+def test_the_turn_of_a_link_is_its_angle():
+    angle = np.linspace(0, np.pi, 7)
+    axis = np.array([0.6, 0.0, 0.8])
+    turn = np.vstack([np.cos(angle / 2 + 0.2), axis[:, None] * np.sin(angle / 2 + 0.2)])
+    assert turned_from_start(turn * np.array([1, -1, 1, 1, -1, 1, 1])) == pytest.approx(angle, abs=1e-7)
+
+
+def test_the_figure_says_where_how_long_and_how_strong():
+    figure = mechanism(rssr())
+    words = _texts(figure)
+    assert {"O", "A", "B", "C", "E", "tip", "x", "y", "z", "20 mm", "reaction 200 N"} <= set(words)
+    assert "where the reaction is largest" in figure.axes[0].get_title(loc="left")
+    assert "drive angle O = 90°" in mechanism(rssr(), index=30).axes[0].get_title(loc="left")
+
+
+def test_a_position_that_cannot_be_drawn_is_refused():
+    with pytest.raises(MechanismError, match="no position 120 among the 120"):
+        mechanism(rssr(), index=120)
+    with pytest.raises(MechanismError, match="position 50 cannot be assembled"):
+        mechanism(rssr(gap=(40, 60, Status.NOT_ASSEMBLED)), index=50)
+
+
+def test_where_all_axes_meet_there_is_no_scale_unless_a_pin_gives_one():
+    assert "all axes meet in one point: drawn on a sphere" in _texts(mechanism(cardan()))
+    pins = [
+        {"path": f"loop.{name}.pin.radius", "value": 0.01, "unit": "m", "text": "10 mm"} for name in ("input", "pin-1")
+    ]
+    words = _texts(mechanism(cardan(inputs=pins)))
+    assert any(word.endswith(" mm") for word in words)
+
+
+def test_joints_of_one_point_are_drawn_apart():
+    shown = space(cardan())
+    spots = np.array([shown.seated(name)[:, 10] for name in shown.joints])
+    apart = np.linalg.norm(spots[:, None] - spots, axis=2)[~np.eye(4, dtype=bool)]
+    assert apart.min() > 0.2 * shown.size
+    for name in shown.joints:  # along their axes, which leaves the drawing true
+        assert abs(np.cross(shown.seated(name)[:, 10], shown.axis(name)[:, 10])).max() < 1e-12
+
+
+def test_no_mechanism_is_seen_on_its_edge():
+    """Flat ones, turned anyhow: the view shows a good part of their true area."""
+    rng = np.random.default_rng(7)
+    for _ in range(20):
+        result = rssr(24)
+        turn, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+        shown = space(result)
+        flat = shown.spots - shown.spots.mean(axis=0)
+        flat[:, 2] *= 0.01
+        object.__setattr__(shown, "spots", flat @ turn.T)
+        object.__setattr__(shown, "joints", {})
+        seen = looking(*best(shown)).seen(shown.spots)[:, :2]
+        true = np.prod(np.linalg.svd(shown.spots, compute_uv=False)[:2])
+        assert np.prod(np.linalg.svd(seen, compute_uv=False)) > 0.3 * true
+
+
+def test_every_pair_has_a_symbol():
+    from trunnion.joints.pairs import PAIRS
+
+    assert SYMBOLS.keys() == PAIRS.keys()
+    shown = space(every_kind())
+    assert set(shown.joints) == {pair.symbol for pair in PAIRS.values()}
+    assert len(solids(shown)) > 2 * len(shown.joints)
+
+
+@pytest.mark.parametrize("name", ["RSSR", "Cardan", "every kind"])
+def test_facets_look_outwards(name):
+    """The volume that the facets of each solid enclose is positive, and that of what is grown is larger."""
+    shown = space(SPATIAL[name]())
+    for solid in solids(shown):
+        if solid.kind == "wire":
+            continue
+        sizes = []
+        for grown in (0.0, 0.002 * shown.size):
+            found = facets(solid, shown.size, grown)
+            middle = np.mean([corner for one in found for corner in one], axis=0)
+            fans = [
+                (one[0] - middle, one[i] - middle, one[i + 1] - middle) for one in found for i in range(1, len(one) - 1)
+            ]
+            sizes.append(sum(np.linalg.det(fan) for fan in fans) / 6)
+        assert 0 < sizes[0] < sizes[1], solid
+
+
+def test_solids_stay_in_the_box_that_the_figure_shows():
+    look = scenery(space(rssr()))
+    left, below, right, above = look.box
+    for index in range(0, 120, 7):
+        for solid in look.solids:
+            pose = look.shown.poses[solid.link]
+            for corners in facets(solid, look.shown.size):
+                x, y, _ = look.camera.seen(corners @ pose.matrix[:, :, index].T + pose.origin[:, index]).T
+                room = 0.01 * look.diagonal
+                assert x.min() > left - room
+                assert x.max() < right + room
+                assert y.min() > below - room
+                assert y.max() < above + room
+
+
+# ---- scene ----------------------------------------------------------------------------------------------------
+
+
+def test_every_spatial_result_becomes_plain_json(spatial):
+    kind, result = spatial
+    shown = json.loads(json.dumps(scene(result, result), allow_nan=False))
+    assert shown["space"] == "spatial"
+    assert bool(shown["solids"]) == (kind not in BLANK)
+    assert len(json.dumps(shown)) < 500_000
+
+
+def test_the_scene_is_the_result():
+    result = rssr()
+    shown = scene(result, result)
+    joint = next(one for one in shown["joints"] if one["name"] == "C")
+    for axis in "xyz":
+        assert joint["reaction"][axis] == pytest.approx(
+            result.reaction_force.sel(joint="C", axis=axis).values, rel=1e-6
+        )
+        assert joint["moment"][axis] == pytest.approx(result.reaction_moment.sel(joint="C", axis=axis).values, rel=1e-6)
+    rocker = next(one for one in shown["links"] if one["name"] == "rocker")
+    assert rocker["pose"]["w"] == pytest.approx(result.link_rotation.sel(link="rocker", component="w").values, rel=1e-6)
+    assert shown["free"][0] == {"key": "coupler.E", "link": "coupler", "at": pytest.approx([0.06, 0.03, 0], abs=1e-9)}
+    work, brake = shown["loads"]
+    assert (work["at"], work["force"]) == (pytest.approx([0.11, 0, 0.02]), [0, -150.0, 60.0])
+    assert (brake["at"], brake["moment"]) == (pytest.approx([0, 0, 0]), [0, 0, -3.0])
+
+
+def test_screw_axis_of_a_helix():
+    """A body that turns about a line and slides along it: that line, and slide over angle."""
+    rng = np.random.default_rng(3)
+    along = rng.normal(size=3)
+    along /= np.linalg.norm(along)
+    base, place = rng.normal(size=(2, 3))
+    spin, pitch = 4.0, 0.03
+    velocity = spin * np.cross(along, place - base) + pitch * spin * along
+    point, direction, h = screw_axis(spin * along[:, None], place[:, None], velocity[:, None], np.zeros(3))
+    assert direction[:, 0] == pytest.approx(along)
+    assert np.cross(point[:, 0] - base, along) == pytest.approx(np.zeros(3), abs=1e-12)
+    assert point[:, 0] @ along == pytest.approx(0, abs=1e-12)
+    assert h[0] == pytest.approx(pitch)
+
+
+def test_screw_axes_of_the_scene():
+    result = rssr(360)
+    screws = {link["name"]: link["screw"] for link in scene(result)["links"]}
+    assert screws["ground"] is None
+    assert screws["crank"]["w"] == pytest.approx(np.ones(len(screws["crank"]["w"])))
+    assert np.abs(screws["crank"]["x"]).max() < 1e-5
+    assert np.abs(screws["rocker"]["pitch"]).max() < 1e-3 * 0.1
+    assert np.abs(screws["coupler"]["pitch"]).max() > 1e-3
+    still = result.copy(deep=True)
+    still["link_angular_velocity"][:] = 0.0
+    assert set(scene(still)["links"][1]["screw"]["pitch"]) == {None}
+
+
+# ---- page -----------------------------------------------------------------------------------------------------
+
+
+def test_every_spatial_result_makes_a_page_without_a_net(spatial):
+    _, result = spatial
+    text = report(result, result)
+    page = Page(text)
+    assert not page.open
+    assert page.scene()["count"] == result.sizes["position"]
+    assert "in the plane of two of its axes" in " ".join(page.words)
+    assert len(text) < 1_500_000
+
+
+if shutil.which("node"):  # as in test_browser.py
+    from test_browser import page, run
+
+    def test_arithmetic_of_the_drawing():
+        run("space.test.mjs")
+
+    def test_every_spatial_result_is_shown(spatial, tmp_path):
+        kind, result = spatial
+        shown = page(result, tmp_path, result)
+        assert shown["polars"] == result.sizes["joint"]
+        assert (shown["space"] is None) == (kind in BLANK)
+
+    def test_a_spatial_scene_is_steered_and_shows_what_is_chosen(tmp_path):
+        space = page(rssr(24), tmp_path)["space"]
+        assert space["painted"] > 1000
+        assert (space["before"]["axes"], space["before"]["screws"], space["before"]["twists"]) == (0, 0, 0)
+        assert (space["after"]["axes"], space["after"]["screws"], space["after"]["twists"]) == (2, 3, 2)
+        assert [name.split(",")[0] for name in space["after"]["names"]] == ["crank", "coupler", "rocker"]
+        assert "a turn" in space["after"]["names"][1]
+        views = space["views"]
+        assert all(one != two for one, two in pairwise(views))
+        assert space["plane"] == ["Fy", "Fz"] * 4
+        assert "20" in space["keys"][0]
+        assert "mm" in space["keys"][0]
+
+    def test_python_and_browser_look_alike(tmp_path):
+        """The first view of the page is that of the figure: its triad points the same way."""
+        result = rssr(24)
+        camera = scenery(space(result)).camera
+        paths = page(result, tmp_path)["space"]["before"]["triad"]
+        for path, axis in zip(paths, np.eye(3), strict=True):
+            (x0, y0), _, (x1, y1) = (map(float, found) for found in re.findall(r"(-?[\d.]+),(-?[\d.]+)", path)[:3])
+            right, up, _ = camera.seen(axis)
+            assert (x1 - x0, y0 - y1) == (pytest.approx(26 * right, abs=0.2), pytest.approx(26 * up, abs=0.2))
+
+
+# ---- flat columns ---------------------------------------------------------------------------------------------
+
+
+def test_flat_columns_of_every_kind():
+    result = every_kind(12)
+    flat = {name: values(slice(None)) for name, _, values in columns(result)}
+    assert len(flat) == len(columns(result))
+    expected = "C.rotation C.slide H.rotation H.slide P.slide S.rotation C.friction_torque C.friction_force"
+    assert {*expected.split(), "link R.U.z", "link R.rotation_w", "link R.angular_velocity_z"} <= flat.keys()
+    assert not {"P.rotation", "R.slide", "F.rotation", "E.slide"} & flat.keys()
+    assert flat["S.reaction_z"] == pytest.approx(result.reaction_force.sel(joint="S", axis="z").values)
+    assert flat["S.reaction_moment_y"] == pytest.approx(result.reaction_moment.sel(joint="S", axis="y").values)
+    assert Z @ [flat[f"link R.U.{axis}"] for axis in "xyz"] == pytest.approx(np.zeros(12))

@@ -4,8 +4,8 @@ CSV (and Parquet) have one row a position and flat columns: `time`, `<joint>.rot
 `<joint>.reaction_x|y`, `<joint>.friction_torque`, `<driver>.effort`, `<link>.<point>.x|y`, `power_in`,
 `power_useful`, `status` and so on, in SI; the other formats hold the whole Dataset. In space also z, and
 `<joint>.reaction_moment_x|y|z`, `<joint>.friction_force`, `<link>.x|y|z`, `<link>.rotation_w|x|y|z`,
-`<link>.angular_velocity_x|y|z`. A sweep has one row a point of its grid: the swept numbers by the names they were given,
-then `efficiency`, `<driver>.effort_max`, `<joint>.reaction_max`, …, `status`.
+`<link>.angular_velocity_x|y|z`. A sweep has one row a point of its grid: the swept numbers by the names they were
+given, then `efficiency`, `<driver>.effort_max`, `<joint>.reaction_max`, …, `status`.
 """
 
 from __future__ import annotations

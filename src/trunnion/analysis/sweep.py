@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
@@ -282,20 +283,14 @@ def _say(swept: Sequence[Swept], index: Sequence[int]) -> str:
     return ", ".join(one.say(int(i)) for one, i in zip(swept, index, strict=True))
 
 
-class _named:  # noqa: N801 - reads as a statement
+@contextmanager
+def _named(swept: Sequence[Swept], index: tuple[int, ...]) -> Iterator[None]:
     """What is wrong at a point of the grid says at which."""
-
-    def __init__(self, swept: Sequence[Swept], index: tuple[int, ...]) -> None:
-        self.swept, self.index = swept, index
-
-    def __enter__(self) -> None:
-        """Nothing to prepare."""
-
-    def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
-        """Add the point to every finding."""
-        if isinstance(error, MechanismError):
-            where = _say(self.swept, self.index)
-            raise MechanismError([replace(one, what=f"{one.what} (at {where})") for one in error.findings]) from None
+    try:
+        yield
+    except MechanismError as error:
+        where = _say(swept, index)
+        raise MechanismError([replace(one, what=f"{one.what} (at {where})") for one in error.findings]) from None
 
 
 # ---- what there is to say -------------------------------------------------------------------------------------

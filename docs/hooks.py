@@ -3,6 +3,7 @@
 - `<!-- generated: NAME -->` in a page becomes the table of that name, made from the code's own tables.
 - `figures/MODEL/KIND.svg` and `figures/MODEL/report.html` are drawn when a page refers to them. KIND is a plot or
   `assemblies`; MODEL is a file of `examples/`, a block of a page titled `MODEL.yaml`, or an entry of `VARIANTS`.
+- `figures/sweeps/NAME.svg` is drawn by the command of a page, `trunnion sweep … --out NAME.svg`.
 - The gallery is made of the examples and of `tests/gallery/facts.py`; see `gallery_page.py`.
 - `$x$` and `$$x$$` become MathML, which browsers set without any script.
 """
@@ -12,6 +13,9 @@ from __future__ import annotations
 import importlib.util
 import inspect
 import re
+import shlex
+import subprocess
+import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -71,6 +75,8 @@ def on_files(files: Files, config: Any) -> Files:
     """Draw what the pages refer to; put the examples and the schema beside them."""
     pages = {path: path.read_text("utf-8") for path in sorted(DOCS.rglob("*.md"))}
     told = {found for text in pages.values() for found in re.findall(r"figures/([\w-]+)/([\w-]+)\.(svg|html)", text)}
+    swept = {found for found in told if found[0] == "sweeps"}
+    told -= swept
     wanted = told | _gallery().wanted()
     models = models_of(pages.values())
     for model in sorted({name for name, _, _ in wanted}):
@@ -79,6 +85,9 @@ def on_files(files: Files, config: Any) -> Files:
         drawn = _drawn(model, models, kinds, steps, report=(model, "report", "html") in wanted)
         for name, content in drawn.items():
             files.append(File.generated(config, f"figures/{model}/{name}", content=content))
+    for _, name, _ in sorted(swept):
+        content = _swept(name, "\n".join(pages.values()), models)
+        files.append(File.generated(config, f"figures/sweeps/{name}.svg", content=content))
     for path in sorted(EXAMPLES.glob("*.yaml")):
         files.append(File.generated(config, f"examples/{path.name}", abs_src_path=str(path)))
     schema = ROOT / "src" / "trunnion" / "model" / "mechanism.schema.json"
@@ -118,6 +127,23 @@ def _drawn(model: str, models: dict[str, str], kinds: list[str], steps: int, rep
         if report:
             drawn["report.html"] = page(result, ideal).encode()
     return drawn
+
+
+def _swept(name: str, text: str, models: dict[str, str]) -> bytes:
+    """The figure that a page's own command draws, so that the two cannot differ."""
+    command = re.search(rf"^trunnion (sweep .*--out {re.escape(name)}\.svg.*)$", text, re.MULTILINE)
+    if command is None:
+        raise PluginError(f"figures/sweeps/{name}.svg: no page has a command that writes {name}.svg")
+    with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / "examples").mkdir()
+        for model, content in models.items():
+            for place in ("", "examples"):
+                (Path(folder) / place / f"{model}.yaml").write_text(content, encoding="utf-8")
+        call = [sys.executable, "-m", "trunnion.cli", *shlex.split(command[1], comments=True)]
+        done = subprocess.run(call, cwd=folder, capture_output=True, text=True, check=False)
+        if done.returncode not in (0, 1):
+            raise PluginError(f"{command[0]}: {done.stderr}")
+        return (Path(folder) / f"{name}.svg").read_bytes()
 
 
 def _gallery() -> Any:
@@ -170,6 +196,14 @@ def results_table() -> str:
     ]
     rows.append((_code("efficiency"), "", "1", "useful work over drive work of the cycle"))
     return _rows(("variable", "dimensions", "unit", "meaning"), rows)
+
+
+def sweeps_table() -> str:
+    """Every figure of a sweep."""
+    from trunnion.analysis.sweep import FIGURES
+
+    rows = [(_code(name), ", ".join(one.dims), _unit(one.units), one.long_name) for name, one in FIGURES.items()]
+    return _rows(("variable", "dimension before the swept ones", "unit", "meaning"), rows)
 
 
 def status_table() -> str:
@@ -436,6 +470,7 @@ def _default(field: Any) -> str:
 
 TABLES: dict[str, Callable[..., str]] = {
     "results": results_table,
+    "sweeps": sweeps_table,
     "statuses": status_table,
     "laws": laws_table,
     "motion": motion_table,

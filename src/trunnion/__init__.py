@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from trunnion.analysis.friction import FrictionMethod
     from trunnion.analysis.inspect import Check, check
     from trunnion.analysis.locking import locking
+    from trunnion.analysis.sweep import sweep
     from trunnion.errors import Finding, MechanismError, Status
     from trunnion.export import save
     from trunnion.model.file import read_mechanism as read
@@ -36,6 +37,7 @@ _PLACES = {
     "read": "trunnion.model.file",
     "report": "trunnion.views.report",
     "save": "trunnion.export",
+    "sweep": "trunnion.analysis.sweep",
 }
 _ELSEWHERE = {"read": "read_mechanism"}
 _MODULES = {"dual": "trunnion.dual"}
@@ -55,6 +57,7 @@ __all__ = [
     "read",
     "report",
     "save",
+    "sweep",
 ]
 
 

@@ -15,6 +15,8 @@ import typer
 
 from trunnion import __version__
 from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.options import over, points, setting, table_file
+from trunnion.terminal import bar, console, say, show_figures, show_rows, wrote
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -33,6 +35,7 @@ app = typer.Typer(
 
 PLOT_KINDS = "torque, friction-power, reactions, polar, power, mechanism or motion"  # views.plots.PLOTS, not loaded yet
 
+IMAGES = (".png", ".svg", ".pdf")
 INTERRUPTED = 130  # exit status after Ctrl-C
 
 File = Annotated[Path, typer.Argument(help="Model file: YAML, JSON or TOML.", show_default=False)]
@@ -88,7 +91,7 @@ def check(
     with _lines_of(file):
         found = inspect(mechanism)
     rank = "not known: no position can be assembled" if found.rank_mobility is None else str(found.rank_mobility)
-    out = _console()
+    out = console()
     out.print(mechanism.name or file.name, style="bold", markup=False)
     out.print(f"mobility {found.mobility} by formula, {rank} by rank; drivers: {len(mechanism.drivers)}", markup=False)
     out.print(f"formula  {found.formula or '(no moving link)'}", markup=False)
@@ -105,13 +108,13 @@ def check(
                 out.print(f"    {line}", markup=False, highlight=False, soft_wrap=True)
     for pair in found.gears:
         out.print(f"gears    {gear_line(pair)}", markup=False, highlight=False, soft_wrap=True)
-    _say(_placed(found.findings, file, ["assembly"]))
+    say(_placed(found.findings, file, ["assembly"]))
     if assemblies:
         from trunnion.views.assemblies import ways as drawings
         from trunnion.views.plots import save
 
         save(drawings(mechanism, found.choices), assemblies)
-        _wrote(assemblies)
+        wrote(assemblies)
     raise typer.Exit(_status(found.findings))
 
 
@@ -145,7 +148,7 @@ def analyse(
         _write_report(mechanism, result, report)
     _summary(result, file)
     for path in [*(out or []), *([report] if report else [])]:
-        _wrote(path)
+        wrote(path)
     raise typer.Exit(_status(_findings(result)))
 
 
@@ -164,7 +167,7 @@ def design(
     mechanism = _mechanism(file, set_, table, friction)
     with _lines_of(file):
         rows = report_rows(mechanism, steps, fluctuation)
-    _table(mechanism.name or str(file), rows)
+    show_figures(mechanism.name or str(file), rows)
 
 
 @app.command()
@@ -179,9 +182,67 @@ def locking(
     with _lines_of(file):
         run = prepare(mechanism)
         found = look(run, steps)
-    _table(mechanism.name or str(file), report_rows(run, found))
-    _say(_placed(_findings(found), file, ["assembly"]))
+    show_figures(mechanism.name or str(file), report_rows(run, found))
+    say(_placed(_findings(found), file, ["assembly"]))
     raise typer.Exit(_status(_findings(found)))
+
+
+@app.command()
+def sweep(
+    file: File,
+    over_: Annotated[
+        list[str],
+        typer.Option(
+            "--over",
+            help="NAME=FROM:TO:COUNT or NAME=VALUE,VALUE,…: misalignment=0deg:30deg:16. Once or twice.",
+            show_default=False,
+        ),
+    ],
+    measure: Annotated[
+        str, typer.Option("--measure", help="What is drawn, by its name in the CSV file: A.effort_max.")
+    ] = "efficiency",
+    steps: Steps = 360,
+    set_: Set = None,
+    table: TableFile = None,
+    friction: FrictionLaw = None,
+    out: Annotated[
+        list[Path] | None,
+        typer.Option("--out", help="Write it: .csv .json .nc .zarr .parquet, or a figure: .png .svg .pdf. Repeatable."),
+    ] = None,
+    units_row: Annotated[bool, typer.Option("--units-row", help="Second CSV header row with the units.")] = False,
+) -> None:
+    """How efficiency, drive effort, reactions, friction and locking margin change with one or two numbers."""
+    from trunnion.analysis.sweep import sweep as run
+    from trunnion.export import check_format, save
+    from trunnion.views.swept import check_measure
+    from trunnion.views.swept import table as swept_table
+
+    grid = over(over_)
+    drawn = [path for path in out or [] if path.suffix.lower() in IMAGES]
+    for path in out or []:
+        if path not in drawn:
+            check_format(path, IMAGES)
+    mechanism = _mechanism(file, set_, table, friction)
+    check_measure(measure, mechanism)
+    with _lines_of(file), bar("points", points(grid)) as progress:
+        result = run(mechanism, grid, steps, progress=progress)
+    for path in out or []:
+        if path in drawn:
+            from trunnion.views import plots
+            from trunnion.views.sweep import figure
+
+            plots.save(figure(result, measure), path)
+        else:
+            save(result, path, units_row)
+    head, rows, left_out = swept_table(result, measure)
+    name = f"{measure.replace('_', ' ')} over {' and, in columns, '.join(grid)}"
+    show_rows(f"{mechanism.name or file}\n{name}", head, rows)
+    if left_out:
+        console().print(f"{left_out:,} points more; --out FILE.csv has all", markup=False, highlight=False)
+    say(_placed(_findings(result), file, ["assembly"]))
+    for path in out or []:
+        wrote(path)
+    raise typer.Exit(_status(_findings(result)))
 
 
 @app.command()
@@ -205,7 +266,7 @@ def plot(
     unknown = [name for name in kinds if name not in PLOTS]
     if unknown:
         raise MechanismError(Finding(f"there is no plot '{unknown[0]}'", "--kind", f"use one of {', '.join(PLOTS)}"))
-    single = out.suffix.lower() in (".png", ".svg", ".pdf")
+    single = out.suffix.lower() in IMAGES
     if single and len(kinds) > 1:
         raise MechanismError(
             Finding(f"{len(kinds)} plots do not fit one file", str(out), "name a folder, or one --kind")
@@ -219,9 +280,9 @@ def plot(
     for name in kinds:
         path = out if single else out / f"{name}.{image.lstrip('.')}"
         save(PLOTS[name](result, ideal), path)
-        _wrote(path)
+        wrote(path)
     said = [finding for finding in _findings(result) if finding.severity is not Severity.NOTE]
-    _say(_placed(said, file, ["assembly"]))
+    say(_placed(said, file, ["assembly"]))
     raise typer.Exit(_status(_findings(result)))
 
 
@@ -242,7 +303,7 @@ def report(
     with _lines_of(file):
         result = _run(mechanism, steps, _method(method, criterion, iterations))
     _write_report(mechanism, result, out)
-    _wrote(out)
+    wrote(out)
     raise typer.Exit(_status(_findings(result)))
 
 
@@ -259,7 +320,7 @@ def examples(
             title = next(
                 (line[5:].strip() for line in path.read_text("utf-8").splitlines() if line.startswith("name:")), ""
             )
-            _console().print(f"{path.stem:<28} {title}", markup=False, highlight=False, soft_wrap=True)
+            console().print(f"{path.stem:<28} {title}", markup=False, highlight=False, soft_wrap=True)
         return
     source = found.get(name.removesuffix(".yaml"))
     if source is None:
@@ -272,7 +333,7 @@ def examples(
         raise MechanismError(Finding("exists already", str(target), "use --force to overwrite it"))
     with whole(target) as temporary:
         temporary.write_bytes(source.read_bytes())
-    _wrote(target)
+    wrote(target)
 
 
 @app.command()
@@ -329,7 +390,7 @@ def main() -> None:
         if code == INTERRUPTED:
             print("stopped; a file named above as written is whole, no other was begun", file=sys.stderr)
     except MechanismError as error:
-        _say(error.findings)
+        say(error.findings)
         code = 2
     except MemoryError:
         print("error: not enough memory — use fewer --steps", file=sys.stderr)
@@ -343,43 +404,14 @@ def main() -> None:
 # ---- shared by the verbs --------------------------------------------------------------------------------------
 
 
-def _console() -> Any:
-    from rich.console import Console
-
-    return Console()
-
-
-def _wrote(path: Path) -> None:
-    _console().print(f"wrote {path}", markup=False, highlight=False, soft_wrap=True)
-
-
 def _mechanism(file: Path, settings: list[str] | None, tables: list[str] | None, friction: str | None) -> Mechanism:
     """The model with the options `--table`, `--set` and `--friction` applied, in this order."""
     from trunnion.model.file import read_mechanism
 
-    mechanism = read_mechanism(file, dict(_table_file(text) for text in tables or ()))
+    mechanism = read_mechanism(file, dict(table_file(text) for text in tables or ()))
     if settings:
-        mechanism = mechanism.with_values(dict(_setting(text) for text in settings))
+        mechanism = mechanism.with_values(dict(setting(text) for text in settings))
     return mechanism.with_friction(friction) if friction else mechanism
-
-
-def _setting(text: str) -> tuple[str, float | str]:
-    """A name and its value from `name=value`."""
-    name, equals, value = text.partition("=")
-    if not equals or not name.strip() or not value.strip():
-        raise MechanismError(Finding(f"'{text}' sets nothing", "--set", "write name=value, e.g. AB=2.1m"))
-    try:
-        return name.strip(), float(value)
-    except ValueError:
-        return name.strip(), value.strip()
-
-
-def _table_file(text: str) -> tuple[str, str]:
-    """A name and its file from `name=file`."""
-    name, _, path = (part.strip() for part in text.partition("="))
-    if not name or not path:
-        raise MechanismError(Finding(f"'{text}' names no file", "--table", "write NAME=FILE, e.g. A=motion.csv"))
-    return name, path
 
 
 def _method(name: str, criterion: float | None, iterations: int) -> FrictionMethod:
@@ -392,14 +424,8 @@ def _run(mechanism: Mechanism, steps: int, method: FrictionMethod | None) -> xr.
     """Analyse, with a progress bar when it takes long enough to need one."""
     from trunnion.analysis.analyse import analyse as run
 
-    if steps < 200_000 or not sys.stderr.isatty():
-        return run(mechanism, steps, method)
-    from rich.console import Console
-    from rich.progress import Progress
-
-    with Progress(console=Console(stderr=True), transient=True) as progress:
-        task = progress.add_task("positions", total=steps)
-        return run(mechanism, steps, method, progress=lambda done: progress.update(task, completed=done))
+    with bar("positions", steps, least=200_000) as progress:
+        return run(mechanism, steps, method, progress)
 
 
 def _ideal(mechanism: Mechanism, steps: int, method: FrictionMethod | None) -> xr.Dataset | None:
@@ -431,30 +457,8 @@ def _summary(result: xr.Dataset, file: Path) -> None:
     """The short table of an analysis, and its findings."""
     import json
 
-    _table(f"{result.attrs['name']}\n{result.attrs['formula']}", json.loads(result.attrs["summary"]))
-    _say(_placed(_findings(result), file, ["assembly"]))
-
-
-def _table(title: str, rows: list[dict[str, Any]]) -> None:
-    """Figures with label, value and unit; a value may be a text."""
-    from rich.table import Table
-
-    table = Table(title=title, title_justify="left", show_edge=False)
-    table.add_column("")
-    table.add_column("value", justify="right")
-    table.add_column("unit")
-    for row in rows:
-        value = row["value"]
-        if not isinstance(value, str):
-            value = "no answer" if value is None else f"{value + 0.0:.6g}"  # + 0.0: no negative zero
-        table.add_row(row["label"], value, "" if row["unit"] == "1" else row["unit"])
-    _console().print(table, markup=False, highlight=False)
-
-
-def _say(findings: Any) -> None:
-    """Findings on the error stream, one a paragraph, nothing in them taken for markup."""
-    for finding in findings:
-        print(str(finding), file=sys.stderr)
+    show_figures(f"{result.attrs['name']}\n{result.attrs['formula']}", json.loads(result.attrs["summary"]))
+    say(_placed(_findings(result), file, ["assembly"]))
 
 
 @contextmanager

@@ -4,7 +4,8 @@ CSV (and Parquet) have one row a position and flat columns: `time`, `<joint>.rot
 `<joint>.reaction_x|y`, `<joint>.friction_torque`, `<driver>.effort`, `<link>.<point>.x|y`, `power_in`,
 `power_useful`, `status` and so on, in SI; the other formats hold the whole Dataset. In space also z, and
 `<joint>.reaction_moment_x|y|z`, `<joint>.friction_force`, `<link>.x|y|z`, `<link>.rotation_w|x|y|z`,
-`<link>.angular_velocity_x|y|z`.
+`<link>.angular_velocity_x|y|z`. A sweep has one row a point of its grid: the swept numbers by the names they were
+given, then `efficiency`, `<driver>.effort_max`, `<joint>.reaction_max`, …, `status`.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-__all__ = ["FORMATS", "check_format", "columns", "save"]
+__all__ = ["FORMATS", "check_format", "columns", "figures", "save"]
 
 SLIDING = ("prismatic", "cylindrical", "helical")
 ROWS = 20_000  # written at a time, so that memory does not grow with the number of positions
@@ -37,7 +38,9 @@ Column = tuple[str, str, Callable[[slice], NDArray[Any]]]
 
 
 def columns(result: xr.Dataset) -> list[Column]:
-    """(name, unit, values of a window of positions) of every flat column."""
+    """(name, unit, values of a window of rows) of every flat column."""
+    if "swept" in result.attrs:
+        return [(name, unit, values.__getitem__) for name, (unit, values) in figures(result).items()]
     stated = json.loads(result.attrs["scene"])
     spatial = stated.get("space") == "spatial"
     kinds = {name: joint["type"] for name, joint in stated["joints"].items()}
@@ -142,12 +145,34 @@ def _column(result: xr.Dataset, variable: str, name: str, index: tuple[int, ...]
     return name, str(array.attrs["units"]), lambda window: values[window]
 
 
+def figures(sweep: xr.Dataset) -> dict[str, tuple[str, NDArray[Any]]]:
+    """(unit, values, one a point of the grid, the last name running fastest) of a sweep, by the name of the column."""
+    swept = json.loads(sweep.attrs["swept"])
+    shape = tuple(sweep.sizes[name] for name in swept)
+    efforts = json.loads(sweep.attrs["driver_units"])
+    grid = np.meshgrid(*(sweep[name].values for name in swept), indexing="ij")
+    flat = {name: (str(sweep[name].attrs["units"]), axis.ravel()) for name, axis in zip(swept, grid, strict=True)}
+    for name, figure in sweep.data_vars.items():
+        unit, key = str(figure.attrs["units"]), str(name)
+        subject = next((str(dim) for dim in figure.dims if dim not in swept), "")
+        rows = figure.transpose(..., *swept).values.reshape(-1, int(np.prod(shape)))
+        if not subject:
+            flat[key] = (unit, rows[0])
+        for i, member in enumerate(sweep[subject].values if subject else ()):
+            flat[f"{member}.{key.removeprefix('drive_')}"] = (efforts[i] if subject == "driver" else unit, rows[i])
+    flat["status"] = ("", np.array([status.name.lower() for status in Status])[flat["status"][1]])
+    return flat
+
+
 def frames(result: xr.Dataset) -> Iterator[pd.DataFrame]:
     """The flat columns, some rows at a time."""
     import pandas as pd
 
     flat = columns(result)
-    for low in range(0, result.sizes["position"], ROWS):
+    rows = result.sizes.get("position") or int(
+        np.prod([result.sizes[name] for name in json.loads(result.attrs["swept"])])
+    )
+    for low in range(0, rows, ROWS):
         window = slice(low, low + ROWS)
         yield pd.DataFrame({name: values(window) for name, _, values in flat})
 
@@ -220,11 +245,14 @@ FORMATS: dict[str, tuple[Writer, str, str]] = {
 }
 
 
-def check_format(path: str | os.PathLike[str]) -> None:
-    """MechanismError if the file's extension is not one of FORMATS or its package is not installed."""
+def check_format(path: str | os.PathLike[str], others: tuple[str, ...] = ()) -> None:
+    """MechanismError if the file's extension is not one of FORMATS or its package is not installed.
+
+    others: extensions that would do as well, for the message.
+    """
     suffix = Path(path).suffix.lower()
     if suffix not in FORMATS:
-        known = ", ".join(FORMATS)
+        known = ", ".join((*FORMATS, *others))
         raise MechanismError(Finding(f"cannot write a result as '{suffix}'", str(path), f"use one of {known}"))
     _, package, extra = FORMATS[suffix]
     if package and importlib.util.find_spec(package) is None:

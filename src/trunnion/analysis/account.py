@@ -30,7 +30,17 @@ if TYPE_CHECKING:
 
     from trunnion.analysis.analyse import Run
 
-__all__ = ["MARGIN", "fill_power", "finish"]
+__all__ = [
+    "MARGIN",
+    "efficiency",
+    "effort_units",
+    "fill_power",
+    "finding_row",
+    "finish",
+    "model_notes",
+    "references",
+    "sound_positions",
+]
 
 MARGIN = 10.0  # multiple of the friction up to which the locking margin is looked for
 
@@ -114,7 +124,7 @@ def finish(
     near = _near_locking(run, arrays, time, method)
     left_open = run.determinacy.findings() if run.determinacy else []
     found = [
-        *_model_notes(mechanism),
+        *model_notes(mechanism),
         *run.chosen.findings,
         *left_open,
         *_over_the_cycle(run, arrays, causes, time, near),
@@ -126,12 +136,12 @@ def finish(
         "model_hash": mechanism.digest,
         "trunnion_version": __version__,
         "method": method.name,
-        "references": "\n".join(_references(mechanism)),
+        "references": "\n".join(references(mechanism)),
         "flag_values": " ".join(str(int(code)) for code in Status),
         "flag_meanings": " ".join(code.name.lower() for code in Status),
         "driver_units": json.dumps(effort_units(run.system)),
         "spring_units": json.dumps(spring_units(run.system)),
-        "findings": json.dumps([_row(finding) for finding in found], ensure_ascii=False),
+        "findings": json.dumps([finding_row(finding) for finding in found], ensure_ascii=False),
         "summary": json.dumps(_summary(run, arrays, value, time, near), ensure_ascii=False),
         "inputs": json.dumps(_inputs(mechanism), ensure_ascii=False),
         "scene": json.dumps(_scene(run), ensure_ascii=False),
@@ -151,7 +161,7 @@ def spring_units(system: System) -> list[list[str]]:
     return [["N m", "rad"] if turn else ["N", "m"] for turn in turns]
 
 
-def _row(finding: Finding) -> dict[str, str]:
+def finding_row(finding: Finding) -> dict[str, str]:
     return {
         "severity": str(finding.severity),
         "where": finding.where,
@@ -160,7 +170,7 @@ def _row(finding: Finding) -> dict[str, str]:
     }
 
 
-def _model_notes(mechanism: Mechanism) -> list[Finding]:
+def model_notes(mechanism: Mechanism) -> list[Finding]:
     """What the model says that this analysis leaves out, and warnings about the data."""
     notes = [finding for finding in check_model(mechanism) if finding.severity is not Severity.ERROR]
     playing = [
@@ -230,7 +240,7 @@ def _loads_over_the_cycle(run: Run, arrays: Arrays, time: NDArray[np.float64]) -
                 yield Finding(what, f"springs.{name}", "no whole turns are counted in this joint", Severity.WARNING)
 
 
-def _references(mechanism: Mechanism) -> list[str]:
+def references(mechanism: Mechanism) -> list[str]:
     laws = {
         joint.friction.law or "coulomb" for joint in mechanism.effective_joints.values() if joint.friction is not None
     }
@@ -245,7 +255,7 @@ def _summary(
     rows: list[dict[str, Any]] = []
     dial = run.system.dial(run.values, time)
     # extremes are of positions that can be relied on: beside a dead centre they depend on the sampling
-    sound = _sound(arrays["status"])
+    sound = sound_positions(arrays["status"])
     with np.errstate(all="ignore"):
         for i, (name, unit) in enumerate(zip(run.system.mechanism.drivers, effort_units(run.system), strict=True)):
             effort = arrays["drive_effort"][i]
@@ -288,7 +298,7 @@ def _finite(value: float | None) -> float | None:
     return None if value is None or not np.isfinite(value) else float(value)
 
 
-def _sound(status: NDArray[Any]) -> NDArray[np.intp]:
+def sound_positions(status: NDArray[Any]) -> NDArray[np.intp]:
     """Positions whose figures can be relied on: solved; those with a zero speed only if there are no others."""
     best = np.flatnonzero(status == Status.SOLVED)
     return best if len(best) else np.flatnonzero(status == Status.ZERO_SLIP)

@@ -30,13 +30,15 @@ from trunnion.model.mechanism import Mechanism
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Run", "analyse", "analyse_run", "prepare"]
+__all__ = ["Positions", "Run", "analyse", "analyse_run", "check_steps", "positions", "prepare"]
 
 CHUNK = 8192  # positions at a time: the arrays of a walk stay in cache
 MOST_STEPS = 100_000_000
 SINGULAR = 1e6  # condition from which less than about four digits would be left
 TURN_STEPS = 720
 NEAR_SINGULAR = 100.0  # a transmission angle of about a degree
+
+Arrays = dict[str, NDArray[np.float64]]
 
 
 @dataclass(frozen=True)
@@ -130,14 +132,14 @@ def analyse(
     Method: the modules' closed forms or the general group, friction settled per module (`friction.settle`).
     Raises MechanismError if the structure does not determine the motion or `steps` is out of range.
     """
-    _check_steps(steps)
+    check_steps(steps)
     run = prepare(mechanism)
     if run.determinacy is not None:
         run.determinacy.refuse()
     return analyse_run(run, steps, method, progress)
 
 
-def _check_steps(steps: int) -> None:
+def check_steps(steps: int) -> None:
     if not 1 <= steps <= MOST_STEPS:
         remedy = f"give a number from 1 to {MOST_STEPS:,}"
         raise MechanismError(Finding(f"cannot analyse {steps} positions", "steps", remedy))
@@ -150,7 +152,29 @@ def analyse_run(
     progress: Callable[[int], None] | None = None,
 ) -> xr.Dataset:
     """What `analyse` does, for a mechanism that is prepared."""
-    _check_steps(steps)
+    found = positions(run, steps, method, progress)
+    return account.finish(run, found.arrays, found.labels, found.time, found.method, found.causes)
+
+
+@dataclass(frozen=True)
+class Positions:
+    """What every position of a cycle came to, before the books of the cycle are made of it."""
+
+    arrays: Arrays
+    labels: dict[str, list[str]]
+    time: NDArray[np.float64]
+    method: FrictionMethod
+    causes: diagnosis.Causes
+
+
+def positions(
+    run: Run,
+    steps: int = 360,
+    method: FrictionMethod | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> Positions:
+    """The numbers of every variable of `results` at equally spaced positions, their statuses and causes."""
+    check_steps(steps)
     method = replace(method or FrictionMethod(), margin_up_to=account.MARGIN)
     steps = steps if run.cycle.duration > 0 else 1
     time = run.cycle.times(steps)
@@ -165,10 +189,7 @@ def analyse_run(
             progress(window.stop)
     _bracket(arrays, run, time, replace(method, margin_up_to=0.0), causes)  # the margin is known by now
     run.system.engine.unwrap(arrays, run.system, run.values, time)
-    return account.finish(run, arrays, labels, time, method, causes)
-
-
-Arrays = dict[str, NDArray[np.float64]]
+    return Positions(arrays, labels, time, method, causes)
 
 
 def _fill(arrays: Arrays, back: Backward, time: NDArray[np.float64], window: slice, causes: diagnosis.Causes) -> None:

@@ -1,0 +1,73 @@
+"""What the command line prints: tables on the output, findings on the error stream; nothing is taken for markup."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+__all__ = ["bar", "console", "say", "show_figures", "show_rows", "wrote"]
+
+
+def console() -> Any:
+    """Where tables go."""
+    from rich.console import Console
+
+    return Console()
+
+
+def wrote(path: Path) -> None:
+    """Tell of a file that is written."""
+    console().print(f"wrote {path}", markup=False, highlight=False, soft_wrap=True)
+
+
+def show_figures(title: str, rows: list[dict[str, Any]]) -> None:
+    """Figures with label, value and unit; a value may be a text."""
+    from rich.table import Table
+
+    table = Table(title=title, title_justify="left", show_edge=False)
+    table.add_column("")
+    table.add_column("value", justify="right")
+    table.add_column("unit")
+    for row in rows:
+        value = row["value"]
+        if not isinstance(value, str):
+            value = "no answer" if value is None else f"{value + 0.0:.6g}"  # + 0.0: no negative zero
+        table.add_row(row["label"], value, "" if row["unit"] == "1" else row["unit"])
+    console().print(table, markup=False, highlight=False)
+
+
+def show_rows(title: str, head: list[str], rows: list[list[str]]) -> None:
+    """Rows of texts under their heads."""
+    from rich.table import Table
+
+    console().print(title, style="italic", markup=False, highlight=False, soft_wrap=True)
+    table = Table(show_edge=False)
+    for name in head:
+        table.add_column(name, justify="right", overflow="fold")
+    for row in rows:
+        table.add_row(*row)
+    console().print(table, markup=False, highlight=False)
+
+
+def say(findings: Any) -> None:
+    """Findings on the error stream, one a paragraph, nothing in them taken for markup."""
+    for finding in findings:
+        print(str(finding), file=sys.stderr)
+
+
+@contextmanager
+def bar(what: str, total: int, least: int = 0) -> Iterator[Callable[[int], None] | None]:
+    """A progress bar on the error stream, to be called with how many are done; None off a terminal or below `least`."""
+    if total < least or not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import MofNCompleteColumn, Progress
+
+    shown = (*Progress.get_default_columns(), MofNCompleteColumn())
+    with Progress(*shown, console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task(what, total=total)
+        yield lambda done: progress.update(task, completed=done)

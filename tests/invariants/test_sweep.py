@@ -1,0 +1,268 @@
+"""A sweep is so many analyses: every point equals one to the bit, and what has no answer has no figures."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import trunnion
+from trunnion import Mechanism, MechanismError, Status
+from trunnion.analysis.sweep import FIGURES, MOST_POINTS
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+CARDAN = EXAMPLES / "pezzuti-cardan.yaml"
+STEPS = 24
+
+
+def read(name: str) -> Mechanism:
+    return trunnion.read(EXAMPLES / f"{name}.yaml")
+
+
+def expected(result: xr.Dataset) -> dict[str, Any]:
+    """The figures of one cycle, from the definitions and the Dataset of `analyse`."""
+    status = result["status"].values
+    kept = np.flatnonzero(status == Status.SOLVED)
+    kept = kept if kept.size else np.flatnonzero(status == Status.ZERO_SLIP)
+    effort = result["drive_effort"].values
+    size = np.sqrt((result["reaction_force"].values ** 2).sum(axis=1))
+    periodic = result.attrs["periodic"]
+
+    def mean(values: Any) -> float:
+        return float(np.mean(values) if periodic else np.trapezoid(values) / (len(values) - 1))
+
+    return {
+        "efficiency": float(result["efficiency"]),
+        "drive_effort_min": effort[:, kept].min(axis=1),
+        "drive_effort_max": effort[:, kept].max(axis=1),
+        "drive_effort_rms": np.sqrt([mean(row**2) for row in effort]),
+        "drive_power_mean": mean(result["drive_power"].values.sum(axis=0)),
+        "useful_power_mean": mean(result["useful_power"].values),
+        "friction_power_mean": mean(result["friction_power"].values.sum(axis=0)),
+        "reaction_max": size[:, kept].max(axis=1),
+        "locking_margin": float(result["locking_margin"].min()),
+        "without_answer": 0,
+        "status": int(status.max()),
+    }
+
+
+@pytest.mark.parametrize(
+    ("model", "name", "text"),
+    [
+        ("durango-fourbar", "AB", "2.1 m"),
+        ("slider-crank", "O.speed", "1234.5 rpm"),
+        ("pezzuti-cardan", "misalignment", "17 deg"),
+        ("rssr", "joint_defaults.friction.coefficient", "0.07"),
+        ("five-bar-robot", "arm", "260 mm"),  # two drivers
+        ("inverted-slider-crank", "post", "1.02 * 1 m"),  # a range, driven by a slide
+    ],
+)
+def test_a_point_equals_the_analysis_to_the_bit(model: str, name: str, text: str) -> None:
+    mechanism = read(model)
+    if model == "inverted-slider-crank":
+        text = f"1.02 * ({mechanism.dimensions['post'].source})"
+    one = trunnion.analyse(mechanism.with_values({name: text}), STEPS)
+    swept = trunnion.sweep(mechanism, {name: [text]}, STEPS)
+    assert set(swept.data_vars) == set(FIGURES)
+    for key, value in expected(one).items():
+        assert np.array_equal(swept[key].values[..., 0], value, equal_nan=True), key
+    assert swept.attrs["driver_units"] == one.attrs["driver_units"]
+
+
+def test_points_of_a_range_are_the_floats_of_their_texts() -> None:
+    """0, 1, … 30 deg by a range are the same numbers as the texts in a file, each rounded once."""
+    mechanism = read("pezzuti-cardan").with_friction("off")
+    by_range = trunnion.sweep(mechanism, {"misalignment": ("0 deg", "30 deg", 11)}, 1)
+    texts = [f"{angle} deg" for angle in range(0, 31, 3)]
+    by_list = trunnion.sweep(mechanism, {"misalignment": texts}, 1)
+    assert np.array_equal(by_range["misalignment"], by_list["misalignment"])
+    stated = [
+        float(mechanism.with_values({"misalignment": text}).parameters()["dimensions.misalignment"]) for text in texts
+    ]
+    assert by_range["misalignment"].values.tolist() == stated
+    told = by_range["misalignment"].attrs
+    assert (told["units"], told["written_unit"], told["long_name"]) == ("rad", "deg", "dimensions.misalignment")
+    assert told["written_factor"] == math.pi / 180
+
+
+def test_plain_numbers_are_si() -> None:
+    mechanism = read("slider-crank")
+    swept = trunnion.sweep(mechanism, {"O.speed": (50, 100, 3)}, 4)
+    assert swept["O.speed"].values.tolist() == [50.0, 75.0, 100.0]
+    assert swept["O.speed"].attrs["units"] == "rad/s"
+    also = trunnion.sweep(mechanism, {"O.speed": np.array([50, 75, 100])}, 4)
+    assert also["O.speed"].equals(swept["O.speed"])
+    assert trunnion.sweep(mechanism, {"r": [0.05]}, 4)["r"].attrs["units"] == "m"
+
+
+def test_two_names_are_a_grid() -> None:
+    """Dimensions in the order of the names, last; every point is that of the two values."""
+    mechanism = read("durango-fourbar")
+    lengths, coefficients = ["1.6 m", "2 m", "2.2 m"], [0.1, 0.3]
+    seen: list[int] = []
+    grid = trunnion.sweep(
+        mechanism, {"AB": lengths, "B.friction.coefficient": coefficients}, STEPS, progress=seen.append
+    )
+    assert seen == [1, 2, 3, 4, 5, 6]
+    assert grid["efficiency"].dims == ("AB", "B.friction.coefficient")
+    assert grid["reaction_max"].dims == ("joint", "AB", "B.friction.coefficient")
+    for (i, length), (k, coefficient) in itertools.product(enumerate(lengths), enumerate(coefficients)):
+        one = trunnion.analyse(mechanism.with_values({"AB": length, "B.friction.coefficient": coefficient}), STEPS)
+        for key, value in expected(one).items():
+            assert np.array_equal(grid[key].values[..., i, k], value, equal_nan=True), (key, length, coefficient)
+
+
+# ---- the Cardan joint -----------------------------------------------------------------------------------------
+
+
+def test_efficiency_falls_with_misalignment() -> None:
+    """As in Fig. 9, left, of Pezzuti et al. (2006), where rotation prevails over the slide that the errors make."""
+    swept = trunnion.sweep(trunnion.read(CARDAN), {"misalignment": ("1 deg", "31 deg", 5)}, STEPS)
+    assert np.all(np.diff(swept["efficiency"]) < -0.01)
+    assert np.all(np.diff(swept["friction_power_mean"]) > 0)
+    ratio = swept["useful_power_mean"] / swept["drive_power_mean"]
+    assert np.allclose(ratio, swept["efficiency"], rtol=1e-14)
+
+
+def test_efficiency_falls_with_misalignment_by_their_own_friction(tmp_path: Path) -> None:
+    """From no misalignment on; and beyond 21° the joint locks, which is told and no number."""
+    text = CARDAN.read_text("utf-8")
+    changed = text.replace("coefficient: 0.42}", "coefficient: 0.42, model: pezzuti}")
+    assert changed != text
+    (tmp_path / "own.yaml").write_text(changed, "utf-8")
+    swept = trunnion.sweep(
+        trunnion.read(tmp_path / "own.yaml"), {"misalignment": [f"{a} deg" for a in (0, 1, 15, 30)]}, STEPS
+    )
+    assert np.all(np.diff(swept["efficiency"][:-1]) < 0)
+    assert int(swept["status"][-1]) == Status.LOCKED
+    for key in set(FIGURES) - {"locking_margin", "status", "without_answer"}:
+        assert np.all(np.isnan(swept[key].values[..., -1])), key
+        assert np.all(np.isfinite(swept[key].values[..., :-1])), key
+    assert int(swept["without_answer"][-1]) > 0
+    assert float(swept["locking_margin"][-1]) < 1 < float(swept["locking_margin"][-2])
+    said = json.loads(swept.attrs["findings"])[0]
+    assert said["severity"] == "error"
+    assert "1 of 4 points" in said["what"]
+    assert "misalignment = 30 deg" in said["what"]
+    assert "locked" in said["what"]
+
+
+def test_efficiency_falls_with_speed() -> None:
+    """As in Fig. 9, right: forces of inertia grow with the square of the speed and load the bearings."""
+    mechanism = trunnion.read(CARDAN)
+    swept = trunnion.sweep(mechanism, {"input.speed": ("50 rpm", "1500 rpm", 4)}, STEPS)
+    assert np.all(np.diff(swept["efficiency"]) < 0)
+    assert float(swept["efficiency"][0] - swept["efficiency"][-1]) > 0.1
+    massless = {f"{link}.mass": 0.0 for link in mechanism.links}
+    massless |= {f"{link}.inertia.{key}": 0.0 for link in mechanism.links for key in ("xx", "yy", "zz")}
+    massless |= {"input-shaft.inertia.yz": 0.0}
+    light = trunnion.sweep(mechanism.with_values(massless), {"input.speed": ("50 rpm", "1500 rpm", 3)}, STEPS)
+    assert np.allclose(light["efficiency"], light["efficiency"][0], rtol=1e-12)  # without masses speed does nothing
+
+
+def test_without_friction_nothing_is_lost() -> None:
+    mechanism = trunnion.read(CARDAN).with_friction("off")
+    grid = trunnion.sweep(mechanism, {"misalignment": ("0 deg", "40 deg", 5), "input.speed": (5, 150, 2)}, 72)
+    assert np.allclose(grid["efficiency"], 1, rtol=0, atol=1e-12)
+    assert np.all(grid["friction_power_mean"] == 0)
+    assert np.all(np.isinf(grid["locking_margin"]))
+
+
+# ---- what cannot be answered, what cannot be asked --------------------------------------------------------------
+
+
+def test_points_that_cannot_be_assembled_have_no_figures() -> None:
+    swept = trunnion.sweep(read("durango-fourbar"), {"AB": ["2.1 m", "2.6 m", "2.2 m"]}, 72)
+    assert swept["status"].values.tolist()[1] == Status.NOT_ASSEMBLED
+    assert int(swept["without_answer"][1]) == 5
+    assert np.isfinite(swept["drive_effort_max"].values[0]).tolist() == [True, False, True]
+    assert np.isnan(swept["locking_margin"][1])
+    said = [row for row in json.loads(swept.attrs["findings"]) if row["severity"] == "error"]
+    assert len(said) == 1
+    assert "1 of 3 points" in said[0]["what"]
+    assert "AB = 2.6 m (5 positions" in said[0]["what"]
+
+
+BAD: dict[str, tuple[dict[str, Any], str]] = {
+    "nothing": ({}, "0 names"),
+    "three names": ({"AB": [2], "BC": [6], "CD": [3]}, "3 names"),
+    "unknown name": ({"AX": [1, 2]}, "known: 'AB', 'BC'"),
+    "several numbers": ({"coefficient": [0.1, 0.2]}, "say which"),
+    "not one number": ({"joints.B.friction": [0.1]}, "set one of"),
+    "the same twice": ({"AB": [2], "dimensions.AB": [2]}, "same number"),
+    "wrong unit": ({"A.speed": ["1 kg", "2 kg"]}, "angular speed"),
+    "wrong unit of a dimension": ({"AB": ["1 deg", "2 deg"]}, "length"),
+    "wrong unit of an end": ({"A.speed": (1, "2 m", 3)}, "angular speed"),
+    "one end without unit": ({"AB": (1, "2000 mm", 3)}, "1 has no unit"),
+    "no such unit": ({"AB": ["2 mn"]}, "unit"),
+    "no values": ({"AB": []}, "no values"),
+    "a text": ({"AB": "2 m"}, "no list"),
+    "a number": ({"AB": 2}, "no list"),
+    "no count": ({"AB": (1, 2)}, "from, to and count"),
+    "a broken count": ({"AB": (1, 2, 2.5)}, "from, to and count"),
+    "zero count": ({"AB": (1, 2, 0)}, "range of 0 values"),
+    "one of a range": ({"AB": (1, 2, 1)}, "range of 1 value "),
+    "negative count": ({"AB": (1, 2, -3)}, "range of -3 values"),
+    "too many": ({"AB": (1, 2, MOST_POINTS + 1)}, "100,001 points"),
+    "too many together": ({"AB": (1, 2, 1000), "BC": (5, 6, 1000)}, "1,000 × 1,000 points"),
+    "not finite": ({"AB": [math.nan]}, "finite"),
+    "impossible": ({"crank.mass": [1.0, -1.0]}, "links.crank.mass"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_what_cannot_be_swept_is_said_with_a_remedy(case: str) -> None:
+    over, word = BAD[case]
+    with pytest.raises(MechanismError) as caught:
+        trunnion.sweep(read("durango-fourbar"), over, 4)
+    assert word in str(caught.value)
+    assert all(finding.remedy for finding in caught.value.findings)
+
+
+def test_no_steps() -> None:
+    with pytest.raises(MechanismError, match="0 positions"):
+        trunnion.sweep(read("durango-fourbar"), {"AB": [2]}, 0)
+
+
+def test_a_name_of_the_result_needs_its_path() -> None:
+    data = read("slider-crank").data()
+    data["dimensions"]["efficiency"] = "1"
+    mechanism = Mechanism(**data)
+    with pytest.raises(MechanismError, match=r"dimensions\.efficiency"):
+        trunnion.sweep(mechanism, {"efficiency": [1, 2]}, 4)
+    assert "dimensions.efficiency" in trunnion.sweep(mechanism, {"dimensions.efficiency": [1, 2]}, 4).dims
+
+
+def test_what_is_wrong_at_a_point_says_at_which() -> None:
+    """Two values that are sound each by itself and impossible together."""
+    inertia = {"cross.inertia.xx": [6.0e-6, 4.5e-6], "cross.inertia.zz": [2.0e-6, 5.0e-6]}
+    mechanism = trunnion.read(CARDAN).with_friction("off")
+    with pytest.raises(MechanismError, match=r"\(at cross\.inertia\.xx = 4\.5e-06 .*, cross\.inertia\.zz = 5e-06 .*\)"):
+        trunnion.sweep(mechanism, inertia, 4)
+
+
+# ---- files ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("suffix", [".nc", ".zarr", ".json"])
+def test_a_grid_is_kept_whole(suffix: str, tmp_path: Path) -> None:
+    grid = trunnion.sweep(read("durango-fourbar"), {"AB": ["2.1 m", "2.6 m"], "C.friction.coefficient": [0.1, 0.2]}, 36)
+    path = tmp_path / f"grid{suffix}"
+    trunnion.save(grid, path)
+    if suffix == ".json":
+        told = json.loads(path.read_text("utf-8"))
+        assert told["data_vars"]["friction_power_mean"]["data"][1] == [None, None]
+        assert told["data_vars"]["friction_power_mean"]["data"][0] == grid["friction_power_mean"].values[0].tolist()
+        return
+    again = xr.load_dataset(path) if suffix == ".nc" else xr.open_zarr(path).load()
+    for name, values in grid.variables.items():
+        assert np.array_equal(again[name].values, values.values, equal_nan=values.dtype.kind == "f"), name
+        assert again[name].attrs.get("units") == values.attrs.get("units")
+    assert again.attrs["findings"] == grid.attrs["findings"]
+    assert [path.name for path in tmp_path.iterdir()] == [f"grid{suffix}"]

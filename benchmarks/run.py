@@ -214,7 +214,11 @@ def linkages(console: Console, rounds: int) -> list[tuple[str, bool]]:
         "links at once, motion given and not timed, solved once with a right side for each joint's friction; "
         "deviation: of its forces, friction and efforts from Trunnion's, relative to the largest of their kind."
     )
-    limits: list[tuple[str, bool]] = groups.verdicts(found)
+    spatial = import_module("benchmarks.spatial")
+    with console.status("spatial linkage"):
+        table, in_space = spatial.fill(rounds)
+    console.print(table)
+    limits: list[tuple[str, bool]] = groups.verdicts(found) + spatial.verdicts(in_space)
     return limits
 
 

@@ -313,6 +313,22 @@ def test_wrong_mobility_is_bad_input(run: Run, tmp_path: Path) -> None:
     assert files(tmp_path) == {"model.yaml"}
 
 
+def test_a_spatial_model_is_checked_and_analysed(run: Run) -> None:
+    done = run("check", EXAMPLES / "rssr.yaml")
+    assert (done.code, "mobility 2 by formula, 2 by rank" in done.out) == (0, True)
+    assert "links.rod: the link 'rod' can spin about the line of B and C" in done.err
+    assert run("analyse", EXAMPLES / "pezzuti-cardan.yaml").code == 0
+    locked = run("analyse", EXAMPLES / "pezzuti-cardan-10mm.yaml")
+    assert (locked.code, "locked by friction at every position" in locked.err) == (1, True)
+
+
+def test_an_over_constrained_model_is_refused_with_its_joints(run: Run) -> None:
+    done = run("analyse", EXAMPLES / "fourbar-in-space.yaml")
+    assert done.code == 2
+    assert "in the joints A, B, C, D" in done.err
+    assert "minimum-norm" in done.err
+
+
 def test_design_is_of_the_plane(run: Run) -> None:
     done = run("design", EXAMPLES / "pezzuti-cardan.yaml")
     assert done.code == 2

@@ -275,7 +275,7 @@ def test_no_odd_value_anywhere_gives_anything_but_findings(example: Path) -> Non
             if draw.random() < 0.2:
                 del holder[key]  # type: ignore[arg-type]
             else:
-                holder[key] = draw.choice(ODD)  # type: ignore[index, call-overload]
+                holder[key] = copy.deepcopy(draw.choice(ODD))  # type: ignore[index, call-overload]  # the next may go into it
         try:
             Mechanism(**data).parameters()
         except MechanismError as error:

@@ -7,6 +7,8 @@ Velocities and accelerations of the result are differences of its own poses too.
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 import pytest
 
@@ -73,7 +75,9 @@ class Compared:
         assert np.linalg.norm(q) == pytest.approx(1.0, abs=1e-12)
         return Frame(place, turned(q))
 
+    @functools.cache  # noqa: B019 - a dozen objects, all kept below
     def motion(self, i: int) -> dict[str, Motion]:
+        """The oracle's own motion at a position."""
         drive = {
             name: Drive(*(float(self.array(f"joint_{self.way(name)}{rate}", i, joint=name)) for rate in RATES))
             for name in self.oracle.drivers
@@ -109,6 +113,12 @@ class Compared:
             assert given == pytest.approx(effort, abs=limit * size), driver
 
 
+@functools.cache
+def comparison(name: str, friction: bool) -> Compared:
+    """Made once for all tests of it."""
+    return Compared(stated(name, friction))
+
+
 RATES = ("", "_velocity", "_acceleration")
 POINT = ("position", "velocity", "acceleration")
 
@@ -116,7 +126,7 @@ POINT = ("position", "velocity", "acceleration")
 @pytest.mark.parametrize("name", FAST)
 def test_motion(name: str) -> None:
     """Places to 1e-12, rates to 1e-10: a link's free spin is zero, so its rates are compared too."""
-    compared = Compared(stated(name, False))
+    compared = comparison(name, False)
     for i in compared.positions:
         motions = compared.motion(i)
         for link, motion in motions.items():
@@ -141,7 +151,7 @@ def test_motion(name: str) -> None:
 
 @pytest.mark.parametrize("name", FAST)
 def test_forces_without_friction(name: str) -> None:
-    compared = Compared(stated(name, False))
+    compared = comparison(name, False)
     for i in compared.positions:
         found = compared.oracle.balance(compared.motion(i))
         compared.forces_agree(i, found, 1e-10)
@@ -150,7 +160,7 @@ def test_forces_without_friction(name: str) -> None:
 @pytest.mark.parametrize("name", FAST)
 def test_forces_with_given_friction(name: str) -> None:
     """The oracle is told the friction of the result as a load."""
-    compared = Compared(stated(name, True))
+    compared = comparison(name, True)
     rubs = 0.0
     for i in compared.positions:
         motions = compared.motion(i)
@@ -163,7 +173,7 @@ def test_forces_with_given_friction(name: str) -> None:
 @pytest.mark.parametrize("name", NAMES)
 def test_forces_with_friction_by_its_law(name: str) -> None:
     """The oracle finds friction by its own formulas and its own Newton."""
-    compared = Compared(stated(name, True))
+    compared = comparison(name, True)
     for i in compared.positions:
         motions = compared.motion(i)
         found, friction = compared.oracle.rub(motions)

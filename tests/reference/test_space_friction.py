@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import Any
 
 import numpy as np
@@ -146,6 +146,37 @@ def test_long_bearing_runs() -> None:
     other = analysed(cardan(model="pezzuti"), 72, method=slow)
     assert int(other.friction_iterations.max()) > 100
     np.testing.assert_allclose(other.drive_effort.values, result.drive_effort.values, rtol=1e-6)
+
+
+ONE_SIGN = pytest.mark.xfail(
+    strict=True, reason="turn and slide at rest are given one sign, so two of the ends are missed"
+)
+
+
+@pytest.mark.parametrize("model", ["two-contact", pytest.param("pezzuti", marks=ONE_SIGN)])
+def test_pin_at_rest(model: str) -> None:
+    """At θ₁ = 0 a pin of the Cardan joint does not turn: its friction is an interval, and so is the torque.
+
+    The ends are the oracle's answers with the pin taken to slip one way and the other, by [P] to turn and to slide so.
+    """
+    data = cardan(error=0.0, offset=0.0, model=model)
+    result = analysed(data, 8)
+    assert int(result.status.values[0]) == int(trunnion.Status.ZERO_SLIP)
+    compared = Compared.__new__(Compared)
+    compared.result, compared.oracle = result, Oracle(unrolled(data))
+    motions, oracle = compared.motion(0), compared.oracle
+    rates = {joint: oracle.slip(motions, joint)._replace(slide=0.0) for joint in oracle.joints}
+    still = min(rates, key=lambda joint: abs(rates[joint].turn))
+    assert abs(rates[still].turn) < 1e-9
+    ends = []
+    for turn, slide in product((1.0, -1.0), (1.0, 0.0, -1.0) if model == "pezzuti" else (0.0,)):
+        rates[still] = rates[still]._replace(turn=turn, slide=slide)
+        oracle.slip = lambda _, joint: rates[joint]  # type: ignore[method-assign]
+        ends.append(oracle.rub(motions)[0].effort["input"])
+    lower, upper = (float(result[f"drive_effort_{end}"].values[0, 0]) for end in ("lower", "upper"))
+    assert upper - lower > 0.1
+    np.testing.assert_allclose([lower, upper], [min(ends), max(ends)], rtol=1e-8)
+    assert lower <= float(result.drive_effort.values[0, 0]) <= upper
 
 
 # ---- screws -----------------------------------------------------------------------------------------------------

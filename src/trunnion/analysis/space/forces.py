@@ -142,9 +142,8 @@ def _slip(walk: SpatialWalk, joint: str) -> Slip:
     kind, (first, second) = walk.system.joints[joint]
     if kind == "fixed":
         return Slip(0.0, False)
-    pace, size = walk.system.pace(walk.values), walk.system.size(walk.values)
-    spins = [np.sqrt(primal(dot(walk.motions[link].twist.u, walk.motions[link].twist.u))) for link in (first, second)]
-    scale = ZERO_SLIP * (spins[0] + spins[1] + pace)
+    pace, size = walk.system.pace(walk.values), walk.size
+    scale = ZERO_SLIP * (walk.spins[first] + walk.spins[second] + pace)
     if kind in ("spherical", "universal", "planar"):
         turn = walk.against(joint).u
         speed = np.sqrt(primal(dot(turn, turn)))

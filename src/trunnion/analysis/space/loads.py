@@ -72,7 +72,7 @@ def _resist(walk: SpatialWalk, load: Load, size: Number, turns: bool, at_rest: f
     joint = load.joint or ""
     speed = walk.rates(joint)[0 if turns else 1]
     pace = walk.system.pace(walk.values)
-    scale = ZERO_SLIP * pace * (1.0 if turns else walk.system.size(walk.values))
+    scale = ZERO_SLIP * pace * (1.0 if turns else walk.size)
     sign = np.sign(np.where(np.abs(primal(speed)) <= scale, at_rest, primal(speed)))
     if load.only is not None:
         sign = np.where(sign == (1.0 if load.only == "positive" else -1.0), sign, 0.0)

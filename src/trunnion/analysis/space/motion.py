@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, NamedTuple, cast
 
+import numpy as np
+
+from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.rigid import (
     ORIGIN,
@@ -54,6 +58,20 @@ class SpatialWalk(Forward):
     def space(self) -> SpatialSystem:
         """The system."""
         return cast(SpatialSystem, self.system)
+
+    @cached_property
+    def size(self) -> Number:
+        """Length typical of the mechanism, m."""
+        return self.space.size(self.values, self.local)
+
+    @cached_property
+    def spins(self) -> dict[str, Number]:
+        """Angular speed of every link, rad/s; real parts."""
+        found = {}
+        for link, motion in self.motions.items():
+            square = primal(dot(motion.twist.u, motion.twist.u))
+            found[link] = np.sqrt(square)
+        return found
 
     def element(self, link: str, joint: str) -> Frame:
         """Global frame of a joint's element on a link."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Mapping
 from functools import cached_property
 from typing import cast
 
@@ -119,9 +120,9 @@ class SpatialSystem(System):
         """Slide for one radian of a helical pair, m; 0 of others."""
         return values[f"joints.{joint}.pitch"] / (2 * np.pi) if self.joints[joint][0] == "helical" else 0.0
 
-    def size(self, values: Values) -> Number:
-        """Length typical of the mechanism, m: the widest spread of two joints on one link."""
-        elements = self.elements(values)
+    def size(self, values: Values, elements: Mapping[tuple[str, str], Frame] | None = None) -> Number:
+        """Length typical of the mechanism, m: the widest spread of two joints on one link; elements: if known."""
+        elements = self.elements(values) if elements is None else elements
         widest: Number = 0.0
         for name in self.mechanism.effective_links:
             places = [frame.place for (link, _), frame in elements.items() if link == name]

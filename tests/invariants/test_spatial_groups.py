@@ -1,0 +1,331 @@
+"""Spatial groups by themselves: pairs in motion, closed form and general group, derivatives, balance of forces."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from trunnion.algebra.dual import derivative, seed
+from trunnion.algebra.nested import flat
+from trunnion.algebra.rigid import (
+    ORIGIN,
+    Frame,
+    Screw,
+    added,
+    compose,
+    element,
+    minus,
+    moment_at,
+    power,
+    relative,
+)
+from trunnion.groups.cylindrical_dyad import CylindricalDyad
+from trunnion.groups.spatial import Pose, SpatialGroup
+from trunnion.groups.spatial_tree import Element
+from trunnion.groups.tree import OUTER, GroupJoint
+from trunnion.joints.spatial import MOTIONS
+
+Array = NDArray[np.float64]
+LANES = 400
+LEAD = 0.013
+
+
+def random_frame(rng: np.random.Generator, lanes: int = 1, reach: float = 1.0) -> Frame:
+    """Any frame; plain numbers for one lane."""
+    shape: Any = () if lanes == 1 else (lanes,)
+    place, axis, x = (tuple(rng.normal(size=shape) for _ in range(3)) for _ in range(3))
+    return element(tuple(reach * n for n in place), axis, x)  # type: ignore[arg-type]
+
+
+def numbers(value: Any) -> Array:
+    return np.array(np.broadcast_arrays(*flat(value)), float)
+
+
+@pytest.mark.parametrize("kind", MOTIONS)
+@given(seed_=st.integers(0, 10**6))
+@settings(max_examples=25, deadline=None)
+def test_a_pair_placed_and_taken_back_is_where_it_was(kind: str, seed_: int) -> None:
+    rng = np.random.default_rng(seed_)
+    motion, first = MOTIONS[kind], random_frame(rng)
+    q = list(rng.uniform(-3, 3, len(motion.kinds)))
+    second = motion.place(first, q, LEAD)
+    axes = np.array([second.x, second.y, second.z])
+    assert np.allclose(axes @ axes.T, np.eye(3), atol=1e-14)
+    assert np.linalg.det(axes) == pytest.approx(1.0)
+    assert np.allclose(numbers(motion.unplace(second, q, LEAD)), numbers(first), atol=1e-13)
+
+
+@pytest.mark.parametrize("kind", MOTIONS)
+def test_the_screws_of_a_pair_are_its_velocities(kind: str) -> None:
+    rng = np.random.default_rng(7)
+    motion, first = MOTIONS[kind], random_frame(rng)
+    q = list(rng.uniform(-1, 1, len(motion.kinds)))
+    if kind == "spherical":
+        q = [part / np.linalg.norm(q) for part in q]
+    second = motion.place(first, q, LEAD)
+    screws = motion.screws(first, second, LEAD)
+    assert len(screws) == len(motion.steps)
+    h = 1e-6
+    for i, screw in enumerate(screws):
+        ends = []
+        for sign in (1.0, -1.0):
+            steps = [sign * h if j == i else 0.0 for j in range(len(screws))]
+            ends.append(motion.place(first, motion.advanced(q, steps), LEAD))
+        for axis in range(3):  # the ends of the second element's axes, one metre out
+            points = [np.add(end.place, end[axis]) for end in ends]
+            speed = (points[0] - points[1]) / (2 * h)
+            at = np.add(second.place, second[axis])
+            assert np.allclose(speed, moment_at(screw, tuple(at)), atol=1e-8)
+
+
+# ---- the cylindrical dyad ---------------------------------------------------------------------------------------
+
+
+def dyad(sides: tuple[tuple[int, int], ...]) -> tuple[tuple[GroupJoint, ...], list[Element]]:
+    """Three cylindrical joints and their elements: random links between random known axes that they can reach."""
+    rng = np.random.default_rng(len(sides) + sum(map(sum, sides)))
+    joints = tuple(GroupJoint("cylindrical", pair) for pair in sides)
+    links = [[random_frame(rng, LANES) for _ in range(2)] for _ in range(2)]
+    # where the links are: then the known axes follow, so that the dyad closes
+    frames = [random_frame(rng, LANES) for _ in range(2)]
+    b = compose(frames[0], links[0][0])
+    c0 = compose(frames[0], links[0][1])
+    turn, slide = rng.uniform(-3, 3, LANES), rng.normal(size=LANES)
+    c1 = MOTIONS["cylindrical"].place(c0, [turn, slide], 0.0)
+    frames[1] = relative(c1, links[1][0])
+    d = compose(frames[1], links[1][1])
+    known = [
+        MOTIONS["cylindrical"].place(one, [rng.uniform(-3, 3, LANES), rng.normal(size=LANES)], 0.0) for one in (b, d)
+    ]
+    by_link = [{OUTER: known[0], 0: links[0][0]}, {0: links[0][1], 1: links[1][0]}, {OUTER: known[1], 1: links[1][1]}]
+    return joints, [Element(by[one], by[two]) for by, (one, two) in zip(by_link, sides, strict=True)]
+
+
+SIDES = [((OUTER, 0), (0, 1), (1, OUTER)), ((0, OUTER), (1, 0), (OUTER, 1)), ((OUTER, 0), (1, 0), (OUTER, 1))]
+
+
+@pytest.mark.parametrize("sides", SIDES)
+def test_the_closed_form_of_the_dyad_is_the_general_group(sides: tuple[tuple[int, int], ...]) -> None:
+    joints, elements = dyad(sides)
+    closed, general = CylindricalDyad(2, joints, BRANCHES=(1, -1)), SpatialGroup(2, joints)
+    rng = np.random.default_rng(3)
+    outer = [Screw(tuple(rng.normal(size=3)), tuple(rng.normal(size=3))) for _ in range(2)]
+    outer_second = [Screw(tuple(rng.normal(size=3)), tuple(rng.normal(size=3))) for _ in range(2)]
+    known = [outer[0], None, outer[1]]
+    known_second = [outer_second[0], None, outer_second[1]]
+    loads = [Screw(tuple(rng.normal(size=3)), tuple(rng.normal(size=3))) for _ in range(2)]
+    solved = 0
+    for branch in (1, -1):
+        pose = closed.position(elements, branch)
+        sound = np.isfinite(pose.gap) & (pose.condition < 1e3)
+        assert np.mean(sound) > 0.8
+        assert np.max(pose.gap[sound]) < 1e-12
+        start = [q + 1e-3 for q in pose.q]
+        other = general.position(elements, start)
+        same = sound & np.isfinite(other.gap) & (np.abs(np.subtract(other.q, pose.q)).max(axis=0) < 0.1)
+        solved += int(np.count_nonzero(same))
+        found, wanted = (
+            answers(closed, pose, known, known_second, loads),
+            answers(general, other, known, known_second, loads),
+        )
+        scale = np.max(np.abs(wanted[:, same]), axis=0)
+        assert np.max(np.abs(found[:, same] - wanted[:, same]) / scale) < 1e-10
+    assert solved > LANES
+
+
+def answers(group: SpatialGroup, pose: Pose, outer: Any, outer_second: Any, loads: Any) -> Array:
+    """Everything that a group finds, (number, lane)."""
+    speeds = group.rates(pose, outer)
+    twists = group.twists(pose, outer, speeds)
+    seconds = group.acceleration(pose, twists, outer, outer_second, (), speeds)
+    return numbers((pose.frames, tuple(twists), tuple(seconds), tuple(group.reactions(pose, loads))))
+
+
+# ---- the general group ------------------------------------------------------------------------------------------
+
+# one loop each of mobility one, driven at its first joint: kinds, and where the links' elements lie
+LOOPS = {
+    "RSSR": ("revolute", "spherical", "spherical", "revolute"),
+    "RSSP": ("revolute", "spherical", "spherical", "prismatic"),
+    "RCCC": ("revolute", "cylindrical", "cylindrical", "cylindrical"),
+    "RRRC U": ("revolute", "revolute", "universal", "revolute", "cylindrical"),
+    "RHCRR R": ("revolute", "helical", "cylindrical", "revolute", "revolute", "revolute"),
+    "RRERR": ("revolute", "revolute", "planar", "revolute", "revolute"),
+    "7R": ("revolute",) * 7,
+    "PUSR": ("prismatic", "universal", "spherical", "revolute"),
+}
+
+
+def loop(kinds: tuple[str, ...], at: Array) -> tuple[SpatialGroup, list[Element], list[Any], float]:
+    """A loop that closes for coordinates drawn at random: group, elements, coordinates to start from, drive."""
+    rng = np.random.default_rng(sum(map(len, kinds)) + len(kinds))
+    q = [list(rng.uniform(-1, 1, len(MOTIONS[kind].kinds))) for kind in kinds]
+    place, locals_ = ORIGIN, []
+    for kind, coordinates in zip(kinds, q, strict=True):
+        first = random_frame(rng, reach=0.5)
+        second = random_frame(rng, reach=0.5)
+        locals_.append((first, second))
+        place = relative(MOTIONS[kind].place(compose(place, first), coordinates, LEAD), second)
+    # the last link is the ground again: the last joint's element on it is where it has got to
+    last = compose(place, locals_[-1][1])
+    sides = [(k - 1 if k else OUTER, k if k < len(kinds) - 1 else OUTER) for k in range(len(kinds))]
+    joints = tuple(GroupJoint(kind, pair) for kind, pair in zip(kinds, sides, strict=True))
+    elements = [Element(a, b, LEAD) for a, b in locals_]
+    elements[-1] = elements[-1]._replace(second=last)
+    spinning = tuple((k, k, k + 1) for k in range(len(kinds) - 1) if kinds[k] == kinds[k + 1] == "spherical")
+    group = SpatialGroup(len(kinds) - 1, joints, (0,), spinning)
+    flat_q = [value for joint in q for value in joint]
+    start = [np.full(np.shape(at), flat_q[i]) for i in group.kept]
+    return group, elements, start, float(q[0][0])
+
+
+def follow(group: SpatialGroup, elements: list[Element], start: list[Any], drive: Array) -> list[Pose]:
+    """Poses one after the other from the first."""
+    poses = []
+    for value in drive:
+        pose = group.position(elements, start, [value])
+        start = [pose.q[i] for i in group.kept]
+        poses.append(pose)
+    return poses
+
+
+@pytest.mark.parametrize("kinds", LOOPS.values(), ids=LOOPS)
+def test_velocities_and_accelerations_are_derivatives(kinds: tuple[str, ...]) -> None:
+    group, elements, start, drive = loop(kinds, np.zeros(()))
+    h, rate, second = 1e-3, 0.7, -0.4
+    times_ = h * np.arange(-3, 4)
+    values = drive + rate * times_ + second * times_**2 / 2
+    middle_first = [3, 4, 5, 6]
+    forward = follow(group, elements, start, values[middle_first])
+    backward = follow(group, elements, [forward[0].q[i] for i in group.kept], values[[2, 1, 0]])
+    poses = [*reversed(backward), *forward]
+    middle = poses[3]
+    assert float(middle.gap) < 1e-12
+    nothing = [None] * len(kinds)
+    speeds = group.rates(middle, nothing, [rate])
+    twists = group.twists(middle, nothing, speeds)
+    seconds = group.acceleration(middle, twists, nothing, nothing, [second], speeds)
+    spun = {link for link, _, _ in group.spinning}
+    for link in set(range(group.links)) - spun:
+        frames = [pose.frames[link] for pose in poses]
+        for axis in (0, 1, 2):
+            track = np.array([np.add(frame.place, frame[axis]) for frame in frames], float)
+            speed = (track[4] - track[2]) * 45 - (track[5] - track[1]) * 9 + (track[6] - track[0])
+            curve = (
+                270 * (track[4] + track[2]) - 27 * (track[5] + track[1]) + 2 * (track[6] + track[0]) - 490 * track[3]
+            )
+            v = moment_at(twists[link], tuple(track[3]))
+            w = np.array(twists[link].u, float)
+            a = np.add(moment_at(seconds[link], tuple(track[3])), np.cross(w, v))
+            assert np.allclose(speed / (60 * h), np.array(v, float), rtol=1e-7, atol=1e-7)
+            assert np.allclose(curve / (180 * h * h), np.array(a, float), rtol=2e-5, atol=2e-5)
+
+
+@pytest.mark.parametrize("kinds", LOOPS.values(), ids=LOOPS)
+def test_reactions_hold_every_link_and_do_no_work_in_the_freedoms(kinds: tuple[str, ...]) -> None:
+    group, elements, start, drive = loop(kinds, np.zeros(()))
+    pose = group.position(elements, start, [drive])
+    rng = np.random.default_rng(11)
+    loads = [Screw(tuple(rng.normal(size=3)), tuple(rng.normal(size=3))) for _ in range(group.links)]
+    for link, a, b in group.spinning:  # nothing holds a free spin: loads without a moment about its line
+        axis = np.array(group.spin_axis(pose.elements, a, b), float)
+        place = pose.elements[a].second.place
+        about = np.array(moment_at(loads[link], place), float)
+        excess = axis * float(axis @ about)
+        loads[link] = minus(loads[link], Screw((0.0, 0.0, 0.0), tuple(excess)))
+    found = group.reactions(pose, loads)
+    scale = max(float(np.max(np.abs(numbers(wrench)))) for wrench in found)
+    for link in range(group.links):
+        total = loads[link]
+        for joint, wrench in zip(group.joints, found, strict=True):
+            total = added(total, wrench) if joint.sides[1] == link else total
+            total = minus(total, wrench) if joint.sides[0] == link else total
+        assert np.max(np.abs(numbers(total))) < 1e-11 * scale
+    for k, wrench in enumerate(found):
+        for i, screw in enumerate(pose.screws[k]):
+            if not (k in group.driven and i == 0):
+                assert abs(float(power(wrench, screw))) < 1e-11 * scale
+    speeds = group.rates(pose, [None] * len(kinds), [1.0])
+    twists = group.twists(pose, [None] * len(kinds), speeds)
+    work = sum(float(power(load, twist)) for load, twist in zip(loads, twists, strict=True))
+    assert float(power(found[0], pose.screws[0][0])) == pytest.approx(-work, abs=1e-11 * scale)
+
+
+@pytest.mark.parametrize("kinds", LOOPS.values(), ids=LOOPS)
+def test_dual_parts_are_derivatives_by_a_dimension(kinds: tuple[str, ...]) -> None:
+    group, elements, start, drive = loop(kinds, np.zeros(()))
+
+    def outcome(change: Any) -> Any:
+        first = elements[1].first
+        x, y, z = first.place
+        moved = [elements[0], elements[1]._replace(first=first._replace(place=(x + change, y, z))), *elements[2:]]
+        pose = group.position(moved, start, [drive])
+        loads = [Screw((1.0, 2.0, -1.0), (0.3, 0.1, 0.2))] * group.links
+        return pose.elements, tuple(group.reactions(pose, loads))
+
+    spun = bool(group.spinning)  # their frames depend on the way there, their joints do not
+    h = 1e-6
+
+    def chosen(value: Any) -> list[Any]:
+        elements_, reactions = value
+        return [*(n for one in elements_ for n in one.second.place), *(() if spun else flat(reactions))]
+
+    exact = [derivative(n) for n in chosen(outcome(seed(0.0)))]
+    ends = [np.array([float(n) for n in chosen(outcome(sign * h))]) for sign in (1.0, -1.0)]
+    differences = (ends[0] - ends[1]) / (2 * h)
+    assert np.allclose(np.array(exact, float), differences, rtol=1e-6, atol=1e-6 * np.max(np.abs(differences)))
+
+
+@given(seed_=st.integers(0, 10**6), size=st.floats(1e-6, 1e4))
+@settings(max_examples=20, deadline=None)
+def test_a_loop_of_any_size_anywhere_turns_alike(seed_: int, size: float) -> None:
+    """The same loop scaled and moved as a whole: the same angles, condition, and forces; moments scaled."""
+    rng = np.random.default_rng(seed_)
+    group, elements, start, drive = loop(LOOPS["RSSR"], np.zeros(()))
+    whole = random_frame(rng, reach=0.3)
+
+    def changed(frame: Frame, outer: bool) -> Frame:
+        frame = compose(whole, frame) if outer else frame
+        return frame._replace(place=tuple(size * n for n in frame.place))
+
+    moved = [
+        Element(*(changed(one.side(i), joint.sides[i] == OUTER) for i in (0, 1)), size * one.lead)
+        for one, joint in zip(elements, group.joints, strict=True)
+    ]
+    here, there = group.position(elements, start, [drive]), group.position(moved, start, [drive])
+    assert float(there.gap) < 1e-12 * size
+    assert np.allclose(np.array(there.q, float), np.array(here.q, float), atol=1e-9)
+    assert float(there.condition) == pytest.approx(float(here.condition), rel=1e-8)
+
+
+def test_lanes_that_do_not_close_are_nan() -> None:
+    """A rod too short for its ends has no pose, in its lanes alone."""
+    group, elements, start, drive = loop(LOOPS["RSSR"], np.zeros(4))
+    rod = elements[1].second
+    stretch = np.array([1.0, 1.0, 1e-3, 1.0])
+    far = elements[2].first
+    shorter = tuple(a + stretch * (b - a) for a, b in zip(rod.place, far.place, strict=True))
+    changed = [*elements[:2], elements[2]._replace(first=far._replace(place=shorter)), elements[3]]
+    pose = group.position(changed, start, [drive])
+    assert list(np.isfinite(pose.gap)) == [True, True, False, True]
+
+
+def test_redundant_loops_give_the_smallest_reactions() -> None:
+    """A bar on two coaxial hinges, pushed in the middle: half on each, no moments that the push does not need."""
+    x = (1.0, 0.0, 0.0)
+    ends = [element((0.0, 0.0, z), (0.0, 0.0, 1.0), x) for z in (-1.0, 1.0)]
+    joints = tuple(GroupJoint("revolute", (OUTER, 0)) for _ in ends)
+    group = SpatialGroup(1, joints, (0,), redundant=True)
+    pose = group.position([Element(end, end) for end in ends], [np.zeros(1)], [np.zeros(1)])
+    push = Screw((0.0, -6.0, 0.0), (0.0, 0.0, 0.0))
+    first, second = group.reactions(pose, [push])
+    assert np.allclose(numbers(first.u)[:, 0], (0.0, 3.0, 0.0))
+    assert np.allclose(numbers(second.u)[:, 0], (0.0, 3.0, 0.0))
+    for wrench, one in zip((first, second), pose.elements, strict=True):
+        assert np.max(np.abs(numbers(moment_at(wrench, one.second.place)))) < 1e-12
+    assert np.max(np.abs(numbers(added(added(first, second), push)))) < 1e-12

@@ -1,0 +1,89 @@
+"""Planar mechanisms drawn in space, held three times more than needed in every loop: the planar answer is theirs.
+
+With loads in the plane the smallest reactions that balance have nothing across it: both ends of a bearing carry
+half the force each and its friction is the planar f r |F|; a guide's ends are those of the planar guide.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import trunnion
+from mechanisms import MODELS, Data, build, model
+
+NAMES = [
+    name
+    for name, data in MODELS.items()
+    if "gears" not in data() and "springs" not in data() and len(data()["links"]) <= 6
+]
+STEPS = 16
+
+
+def raised(data: Data) -> Data:
+    """The same model in space: z across the plane, pins along z; inertia about x and y is that of a thin plate."""
+
+    def point(stated: Any, joint: dict[str, Any] | None) -> Data:
+        at = stated["at"] if isinstance(stated, dict) else stated
+        found: Data = {"at": [*at, 0.0]}
+        if joint and joint["type"] == "prismatic":
+            return {**found, "axis": [*stated["axis"], 0.0], "x": [0, 0, 1]}
+        return {**found, "axis": [0, 0, 1], "x": [1, 0, 0]} if joint else found
+
+    links: Data = {}
+    for name, link in data["links"].items():
+        points = {p: point(stated, data["joints"].get(p)) for p, stated in link["points"].items()}
+        links[name] = {**link, "points": points}
+        if "centre" in link:
+            links[name]["centre"] = [*link["centre"], 0.0]
+        if "inertia" in link:
+            links[name]["inertia"] = {"xx": link["inertia"] / 2, "yy": link["inertia"] / 2, "zz": link["inertia"]}
+    loads: Data = {}
+    for name, load in data.get("loads", {}).items():
+        loads[name] = dict(load)
+        if "force" in load:
+            loads[name]["force"] = [*load["force"], 0.0]
+        if "moment" in load:
+            loads[name]["moment"] = [0.0, 0.0, load["moment"]]
+    defaults = data["joint_defaults"]
+    hints = {name: [*hint, 0.0] if isinstance(hint, list) else hint for name, hint in data.get("assembly", {}).items()}
+    return {
+        **data,
+        "space": "spatial",
+        "over_constraint": "minimum-norm",
+        "gravity": [*data["gravity"], 0.0],
+        "links": links,
+        "loads": loads,
+        "assembly": hints,
+        "joint_defaults": {**defaults, "pin": {**defaults["pin"], "bearing": 0.05}},
+    }
+
+
+@pytest.mark.parametrize("friction", [None, 0.12])
+@pytest.mark.parametrize("name", NAMES)
+def test_planar_mechanism_in_space(name: str, friction: float | None) -> None:
+    """Motion to 1e-10, forces to 1e-8 of the largest; nothing across the plane."""
+    data = model(MODELS[name](), friction=friction)
+    flat = trunnion.analyse(build(MODELS[name](), friction=friction), steps=STEPS)
+    space = trunnion.analyse(trunnion.Mechanism(trunnion=1, **raised(data)), steps=STEPS)
+    np.testing.assert_array_equal(flat.status.values, space.status.values)
+    points = [p for p in flat.point.values if p in space.point.values]
+    for what, limit in (("position", 1e-10), ("velocity", 1e-9), ("acceleration", 1e-8)):
+        one, two = (result[f"point_{what}"].sel(point=points).values for result in (flat, space))
+        scale = max(1.0, float(np.nanmax(np.abs(one))))
+        np.testing.assert_allclose(two[:, :2], one, rtol=0, atol=limit * scale, err_msg=what)
+        np.testing.assert_allclose(two[:, 2], 0, rtol=0, atol=limit * scale, err_msg=what)
+    scale = float(np.nanmax(np.abs(flat.reaction_force.values)))
+    force = space.reaction_force.sel(joint=flat.joint.values).values
+    np.testing.assert_allclose(force[:, :2], flat.reaction_force.values, rtol=0, atol=1e-8 * scale)
+    np.testing.assert_allclose(force[:, 2], 0, rtol=0, atol=1e-8 * scale)
+    moment = space.reaction_moment.sel(joint=flat.joint.values).values
+    np.testing.assert_allclose(moment[:, 2], flat.reaction_moment.values, rtol=0, atol=1e-8 * scale)
+    np.testing.assert_allclose(moment[:, :2], 0, rtol=0, atol=1e-8 * scale)
+    for what in ("friction_torque", "friction_force", "drive_effort", "friction_power"):
+        one, two = flat[what].values, space[what].values
+        np.testing.assert_allclose(two, one, rtol=0, atol=1e-8 * scale, err_msg=what)
+    if friction:
+        assert np.nanmax(np.abs(flat.friction_power.values)) > 1e-3

@@ -274,8 +274,9 @@ def _summary(
         rows.append({"label": f"efficiency of the cycle{_why(value, arrays, run.cycle)}", "value": value, "unit": "1"})
         back = near_locking.reverse_row(near.back, run.cycle) if near else None
         rows += [back] if back else []
-        rows.append({"label": "power residual, largest, of peak drive power", "value": balance(arrays), "unit": "1"})
-    solved = int(np.count_nonzero(arrays["status"] < Status.NOT_CONVERGED))
+        solved = int(np.count_nonzero(arrays["status"] < Status.NOT_CONVERGED))
+        residual = balance(arrays) if solved else None
+        rows.append({"label": "power residual, largest, of peak drive power", "value": residual, "unit": "1"})
     rows.append(
         {"label": "friction iterations, most", "value": int(np.max(arrays["friction_iterations"])), "unit": "1"}
     )

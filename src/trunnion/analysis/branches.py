@@ -164,7 +164,7 @@ def choose(system: System, values: Values, cycle: Cycle) -> Chosen:
     with np.errstate(all="ignore"):
         for number, module in enumerate(system.plan.modules):
             group = system.groups[number]
-            if module.rank == 1:
+            if module.rank == 1 or not (group.BRANCHES or getattr(group, "kept", ())):  # nothing to choose
                 decision = Decision(None, 1, True)
             elif not group.BRANCHES:
                 drive, _, _ = driven_coordinates(system, module, system.places[number], values, times)
@@ -297,7 +297,7 @@ def _track(walk: Forward, number: int, group: Any, drive: Sequence[Number], time
     clock = Clock.of(walk.system, walk.values)
     for begin in _starts(grid):
         found = assemblies(group, at(elements, begin), [lane_of(q, begin) for q in drive])
-        if found.q[0].size:
+        if found.orientation.size:
             break
     else:
         return Decision(Track(times, rows, 0.0, periodic, clock, turns, np.array([], np.intp)), 0, True)

@@ -43,6 +43,8 @@ __all__ = [
     "settle",
 ]
 
+DOUBTFUL_ROUNDS = 20  # of Newton's method, where no certificate says that it ends at the solution that is looked for
+
 Method = Literal["newton", "successive-approximation"]
 
 
@@ -292,6 +294,7 @@ class Problem:
 def _newton(problem: Problem, method: FrictionMethod) -> Settled:
     """Newton from no friction; lanes without the certificate of `bound` are followed by continuation.
 
+    The rounds counted are Newton's; the continuation that such lanes then go through settles which solution it is.
     The matrix is kept while a round reduces the change a hundredfold, which in all but the worst cases is always.
     """
     real = _primal(problem)
@@ -314,7 +317,8 @@ def _newton(problem: Problem, method: FrictionMethod) -> Settled:
         forces = _corrected(real, state, forces, inverse)
         before, state = state, real.state(forces)
         previous, change = change, _changed(state, before)
-        done = ~(change > method.tolerance(state.normals)) | ~certain  # nor has a lane of NaN anything to wait for
+        # a lane of NaN has nothing to wait for, nor has one for long that is followed all the same
+        done = ~(change > method.tolerance(state.normals)) | (~certain & (rounds >= DOUBTFUL_ROUNDS))
         if np.all(done):
             break
         renew = bool(np.any((change > 0.01 * previous) & ~done))

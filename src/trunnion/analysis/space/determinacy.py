@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
 from trunnion.algebra.nested import each
-from trunnion.algebra.rigid import ZERO, Screw
-from trunnion.algebra.space import dot
+from trunnion.algebra.rigid import ZERO, Screw, moment_at
+from trunnion.algebra.space import dot, minus
 from trunnion.analysis.branches import Chosen
 from trunnion.analysis.follow import assemblies, at, lane_of
 from trunnion.analysis.friction import FrictionMethod
@@ -79,23 +79,34 @@ def look(system: System, values: Values, chosen: Chosen, cycle: Cycle) -> Determ
         one = _Module(number, module.joints, module.links, group, _lane(pose, best, len(table)))
         joints, links = _strained(one, table[best]), _loose(one, table[best])
         found.append(Part(number, rows - rank, columns - rank, joints, links))
-    return Determinacy(system, tuple(found), _spins(walk))
+    return Determinacy(system, tuple(found), *_spins(walk))
 
 
-def _spins(walk: Any) -> dict[str, float]:
-    """Largest torque that keeps each link with a free spin from spinning, N m, where it is more than rounding."""
+def _spins(walk: Any) -> tuple[dict[str, float], dict[str, float]]:
+    """Largest torques about the line of each link with a free spin, N m, where they are more than rounding: what keeps
+    it from spinning, and what friction in its joints adds."""
     if not walk.system.plan.passive:
-        return {}
+        return {}, {}
     with np.errstate(all="ignore"):
         back = walk.system.engine.backward(walk, FrictionMethod(), Given())
-    found = {}
+    found, dragged = {}, {}
     for link, torque in back.spins.items():
         joints = [name for name, (_, links) in walk.system.joints.items() if link in links]
         force = max(_largest(np.sqrt(dot(back.reactions[name].u, back.reactions[name].u))) for name in joints)
         size = _largest(walk.system.size(walk.values))
         if _largest(torque) > PRESENT * force * size:
             found[link] = _largest(torque)
-    return found
+        one, two = (walk.element(link, name).place for name in joints)
+        line = minus(two, one)
+        drag: Any = 0.0
+        for name in joints:
+            sign = 1.0 if walk.system.joints[name][1][1] == link else -1.0
+            drag = drag + sign * dot(moment_at(back.friction_wrenches[name], one), line)
+        length = np.sqrt(primal(dot(line, line)))
+        drag = primal(drag) / np.where(length > 0, length, np.nan)
+        if _largest(drag) > PRESENT * force * size:
+            dragged[link] = _largest(drag)
+    return found, dragged
 
 
 def _largest(values: Any) -> float:
@@ -166,12 +177,14 @@ def _size(screw: Screw) -> float:
 class Determinacy:
     """What the joints of a mechanism leave open, module by module.
 
-    spins: torque that would keep a link with a free spin from spinning, where its masses or loads make it spin, N m.
+    spins: torque that would keep a link with a free spin from spinning, where its masses or loads make it spin, N m;
+    dragged: what friction in its joints leaves out of balance about the line, N m.
     """
 
     system: System
     parts: tuple[Part, ...]
     spins: Mapping[str, float]
+    dragged: Mapping[str, float]
 
     @property
     def mobility(self) -> int:
@@ -194,7 +207,10 @@ class Determinacy:
         for module in self.system.plan.modules:
             for link, a, b in module.spinning:
                 what = f"the link '{link}' can spin about the line of {a} and {b} (a passive freedom)"
-                told.append(Finding(what, f"links.{link}", "it is taken not to spin", Severity.NOTE))
+                remedy = "it is taken not to spin"
+                if link in self.dragged:
+                    remedy += f"; friction of its joints would drag it round with up to {self.dragged[link]:.3g} N m"
+                told.append(Finding(what, f"links.{link}", remedy, Severity.NOTE))
                 if link in self.spins:
                     what = f"nothing keeps the link '{link}' from spinning about {a}-{b}: it would take up to "
                     what += f"{self.spins[link]:.3g} N m"

@@ -127,7 +127,9 @@ class SpatialWalk(Forward):
     def coordinates(self, joint: str) -> tuple[Number, Number]:
         """Turn in (−π, π] rad and slide, m, of a joint on one axis: θ and s of its dual angle."""
         first, second = self.system.joints[joint][1]
-        return _dual_angle(self.element(first, joint), self.element(second, joint))
+        turn, slide = _dual_angle(self.element(first, joint), self.element(second, joint))
+        path = f"loop.{joint}"  # the constant slide of a revolute row, the constant rotation of a prismatic one
+        return turn + self.values.get(f"{path}.rotation", 0.0), slide + self.values.get(f"{path}.slide", 0.0)
 
     def rates(self, joint: str) -> tuple[Number, Number]:
         """θ̇ and ṡ of a joint on one axis, rad/s and m/s."""

@@ -187,15 +187,28 @@ def _unit(text: str) -> str:
 
 
 def results_table() -> str:
-    """Every variable of a result."""
-    from trunnion.results import VARIABLES
+    """Every variable of a result, in the plane and in space: one row where it is the same in both."""
+    from trunnion.results import variables
 
-    rows = [
-        (_code(name), ", ".join((*one.dims, "position")), _unit(one.units), one.long_name)
-        for name, one in VARIABLES.items()
-    ]
-    rows.append((_code("efficiency"), "", "1", "useful work over drive work of the cycle"))
-    return _rows(("variable", "dimensions", "unit", "meaning"), rows)
+    plane, space = variables("planar"), variables("spatial")
+    rows: list[tuple[object, ...]] = []
+    for name in _in_order(list(plane), list(space)):
+        forms = [(where, known[name]) for where, known in (("plane", plane), ("space", space)) if name in known]
+        if len(forms) == 2 and forms[0][1] == forms[1][1]:
+            forms = [("", forms[0][1])]
+        for where, one in forms:
+            rows.append((_code(name), where, ", ".join((*one.dims, "position")), _unit(one.units), one.long_name))
+    rows.append((_code("efficiency"), "", "", "1", "useful work over drive work of the cycle"))
+    return _rows(("variable", "only in", "dimensions", "unit", "meaning"), rows)
+
+
+def _in_order(first: list[str], second: list[str]) -> list[str]:
+    """The names of both lists, those of the second alone behind the one they follow there."""
+    merged = list(first)
+    for before, name in zip([None, *second], second, strict=False):
+        if name not in merged:
+            merged.insert(merged.index(before) + 1 if before else 0, name)
+    return merged
 
 
 def sweeps_table() -> str:
@@ -299,8 +312,8 @@ MOVES = {
 
 
 def groups_table() -> str:
-    """Every module with a closed form."""
-    from trunnion.groups import GROUPS
+    """Every module with a closed form, and what solves the others."""
+    from trunnion.groups import GROUPS, cylindrical_dyad
 
     rows = []
     for name, group in GROUPS.items():
@@ -308,7 +321,10 @@ def groups_table() -> str:
         home = group.__name__ if is_module else type(group).__module__
         about = inspect.getdoc(group if is_module else inspect.getmodule(type(group))) or ""
         rows.append((_code(name), _code(home.removeprefix("trunnion.")), about.splitlines()[0]))
+    about = inspect.getdoc(cylindrical_dyad) or ""
+    rows.append(("`CCC`, in space", "`groups.cylindrical_dyad`", about.splitlines()[0]))
     rows.append(("every other", "`groups.general`", "Any planar group, by Newton's method and one Jacobian"))
+    rows.append(("every other, in space", "`groups.spatial`", "Any spatial group, likewise; drivers too"))
     return _rows(("module", "where", "what"), rows)
 
 

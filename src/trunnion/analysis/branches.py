@@ -178,7 +178,7 @@ def choose(system: System, values: Values, cycle: Cycle) -> Chosen:
             chosen.append(assembly)
             walk.assembly.append(assembly)
             counts.append(count)
-            if isinstance(assembly, Track) and not np.any(np.isfinite(assembly.coordinates)):
+            if isinstance(assembly, Track) and count == 0:
                 findings.append(_never(module))
             if isinstance(assembly, Track) and len(assembly.again):
                 findings.append(_anew(module, system.dial(values, times), assembly.again))
@@ -295,12 +295,15 @@ def _track(walk: Forward, number: int, group: Any, drive: Sequence[Number], time
     grid = len(times)
     rows = np.full((len(group.kept), grid), np.nan)
     clock = Clock.of(walk.system, walk.values)
+    nowhere = np.array([], np.intp)
+    if not group.kept:  # joints without a free coordinate: there is nothing to choose or to follow
+        return Decision(Track(times, rows, 1.0, periodic, clock, turns, nowhere), 1, True)
     for begin in _starts(grid):
         found = assemblies(group, at(elements, begin), [lane_of(q, begin) for q in drive])
         if found.orientation.size:
             break
     else:
-        return Decision(Track(times, rows, 0.0, periodic, clock, turns, np.array([], np.intp)), 0, True)
+        return Decision(Track(times, rows, 0.0, periodic, clock, turns, nowhere), 0, True)
     ways = len(found.orientation)
     named = named_way(walk.system, module, ways)
     every = np.broadcast_to(distance(walk, module, found.frames, lambda n: n, nth(begin)), (ways,))

@@ -30,6 +30,8 @@ RANK = 1e-7  # of the largest singular value: below it a direction counts as los
 
 def stacked(matrix: Sequence[Sequence[Number]]) -> Array:
     """(lane, row, column) of a matrix whose entries broadcast over the lanes."""
+    if not matrix[0]:
+        return np.zeros((1, len(matrix), 0))
     flat = np.broadcast_arrays(*(np.asarray(primal(entry), float) for row in matrix for entry in row), np.zeros(1))[:-1]
     table = np.stack(flat, axis=-1)
     return cast(Array, table.reshape(*table.shape[:-1], len(matrix), len(matrix[0])))
@@ -88,7 +90,7 @@ def least(group: SpatialGroup, pose: Pose, loads: Sequence[Screw], multipliers: 
     moves = np.where(bad[..., None, None], 0.0, effect @ project)
     wanted = np.where(bad[..., None], 0.0, np.broadcast_to(start, shape))
     change = (project @ np.linalg.pinv(moves, rcond=RANK) @ wanted[..., None])[..., 0]
-    change[bad] = np.nan
+    change = np.where(bad[..., None], np.nan, change)
     return [primal(value) - change[..., j] for j, value in enumerate(multipliers)]
 
 

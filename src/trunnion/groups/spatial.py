@@ -104,15 +104,16 @@ class SpatialGroup(SpatialTree):
         frames, placed, screws = self.place(elements, q)
         jacobian = self.jacobian(placed, screws, size)
         orientation: Number = 1.0
+        gap = self.opening(placed, q, size)
         if not jacobian or not self.free:
             inverse: list[list[Number]] = []
+            orientation = np.where(gap <= CLOSED * size, 1.0, np.nan)  # no coordinate could close what is open
         elif self.redundant:
             inverse = redundant.pseudo_inverse(jacobian)
         else:
             inverse = linalg.inverse(jacobian)
             if not self.BRANCHES:  # a closed form stays on its branch by itself
                 orientation = np.sign(primal(linalg.determinant(jacobian)))
-        gap = self.opening(placed, q, size)
         condition = redundant.condition(jacobian) if self.redundant and inverse else _condition(jacobian, inverse)
         all_q = tuple(value for joint in q for value in joint)
         return Pose(frames, placed, screws, all_q, jacobian, inverse, size, gap, condition, orientation)
@@ -346,7 +347,7 @@ class SpatialGroup(SpatialTree):
     def _multipliers(self, pose: Pose, loads: Sequence[Screw]) -> list[Number]:
         """λ of every row."""
         if not pose.inverse:
-            return []
+            return [0.0] * len(pose.jacobian)
         outboard = dict(enumerate(loads))
         for step in reversed(self.steps):
             if step.parent != OUTER:

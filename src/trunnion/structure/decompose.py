@@ -89,7 +89,8 @@ def mobility_by_formula(mechanism: Mechanism) -> int:
 def passive(mechanism: Mechanism) -> dict[str, tuple[str, str]]:
     """Links whose spin is free, with their two joints: the link can turn about a line without moving anything else.
 
-    Both joints are spherical; or one is, and the axis of the other, which frees a turn, goes through its centre.
+    Both joints are spherical; or one is, and the axis of the other, which frees a turn, goes through its centre. A turn
+    that is driven is not free.
     """
     found: dict[str, tuple[str, str]] = {}
     if mechanism.space == "planar" or mechanism.loop:
@@ -106,7 +107,7 @@ def passive(mechanism: Mechanism) -> dict[str, tuple[str, str]]:
 
 def _through(mechanism: Mechanism, link: str, ball: str, other: str) -> bool:
     """Whether the axis of a joint that turns goes through the centre of a ball on the same link."""
-    if mechanism.joints[other].type not in ("revolute", "cylindrical"):
+    if mechanism.joints[other].type not in ("revolute", "cylindrical") or other in mechanism.drivers:
         return False
     values = mechanism.parameters()
     centre, place, axis = (

@@ -67,13 +67,13 @@ def look(system: System, values: Values, chosen: Chosen, cycle: Cycle) -> Determ
         pose = walk.poses[number]
         if not np.any(np.isfinite(np.asarray(pose.gap))):
             pose = _by_least_squares(system, walk, number, group)
-        if pose is None or not pose.jacobian or not pose.jacobian[0]:
+        if pose is None or not pose.jacobian:
             continue
         table = stacked(pose.jacobian)
         lanes = np.flatnonzero(np.isfinite(table).all(axis=(-2, -1)))
         if not len(lanes):
             continue
-        ranks = np.linalg.matrix_rank(table[lanes], rtol=RANK)
+        ranks = np.linalg.matrix_rank(table[lanes], rtol=RANK) if table.size else np.zeros(len(lanes))
         rank, best = int(np.max(ranks)), int(lanes[np.argmax(ranks)])
         rows, columns = table.shape[1:]
         one = _Module(number, module.joints, module.links, group, _lane(pose, best, len(table)))
@@ -143,7 +143,7 @@ def _lane(pose: Pose | None, lane: int, count: int) -> Pose:
 def _strained(module: _Module, table: NDArray[np.float64]) -> tuple[str, ...]:
     """Joints whose reactions a redundant constraint leaves open: those of self-stress, Jᵀ λ = 0."""
     left, values, _ = np.linalg.svd(table)
-    rank = int(np.sum(values > RANK * values[0]))
+    rank = int(np.sum(values > RANK * values[0])) if len(values) else 0
     names: list[str] = []
     none = [ZERO] * module.group.links
     for column in left[:, rank:].T:

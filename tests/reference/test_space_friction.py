@@ -148,28 +148,25 @@ def test_long_bearing_runs() -> None:
     np.testing.assert_allclose(other.drive_effort.values, result.drive_effort.values, rtol=1e-6)
 
 
-ONE_SIGN = pytest.mark.xfail(
-    strict=True, reason="turn and slide at rest are given one sign, so two of the ends are missed"
-)
-
-
-@pytest.mark.parametrize("model", ["two-contact", pytest.param("pezzuti", marks=ONE_SIGN)])
+@pytest.mark.parametrize("model", ["two-contact", "pezzuti"])
 def test_pin_at_rest(model: str) -> None:
     """At θ₁ = 0 a pin of the Cardan joint does not turn: its friction is an interval, and so is the torque.
 
     The ends are the oracle's answers with the pin taken to slip one way and the other, by [P] to turn and to slide so.
     """
-    data = cardan(error=0.0, offset=0.0, model=model)
+    data = cardan(error=0.0, offset=0.0, model=model) if model == "two-contact" else cardan(model=model)
     result = analysed(data, 8)
     assert int(result.status.values[0]) == int(trunnion.Status.ZERO_SLIP)
     compared = Compared.__new__(Compared)
     compared.result, compared.oracle = result, Oracle(unrolled(data))
     motions, oracle = compared.motion(0), compared.oracle
-    rates = {joint: oracle.slip(motions, joint)._replace(slide=0.0) for joint in oracle.joints}
+    rates = {joint: oracle.slip(motions, joint) for joint in oracle.joints}
+    if model == "two-contact":  # nothing slides in a joint without errors: what is left is rounding
+        rates = {joint: rate._replace(slide=0.0) for joint, rate in rates.items()}
     still = min(rates, key=lambda joint: abs(rates[joint].turn))
     assert abs(rates[still].turn) < 1e-9
     ends = []
-    for turn, slide in product((1.0, -1.0), (1.0, 0.0, -1.0) if model == "pezzuti" else (0.0,)):
+    for turn, slide in product(*[(1.0, 0.0, -1.0)] * 2) if model == "pezzuti" else [(1.0, 0.0), (-1.0, 0.0)]:
         rates[still] = rates[still]._replace(turn=turn, slide=slide)
         oracle.slip = lambda _, joint: rates[joint]  # type: ignore[method-assign]
         ends.append(oracle.rub(motions)[0].effort["input"])

@@ -20,7 +20,7 @@ from trunnion.analysis.bristles import History, histories
 from trunnion.analysis.engine import build
 from trunnion.analysis.friction import FrictionMethod
 from trunnion.analysis.kinematics import forward
-from trunnion.analysis.kinetostatics import Backward, Given, solve
+from trunnion.analysis.kinetostatics import Backward, Given, Sense, solve
 from trunnion.analysis.space.determinacy import Determinacy
 from trunnion.analysis.system import COMMON_TURNS, Cycle, System, Values, sticking
 from trunnion.errors import Finding, MechanismError, Status
@@ -55,7 +55,7 @@ class Run:
         time: Number,
         values: Values | None = None,
         method: FrictionMethod | None = None,
-        zero_slip: Mapping[str, float] | None = None,
+        zero_slip: Mapping[str, Sense] | None = None,
     ) -> Backward:
         """Motion and forces at the given times (s), nominal or with other values; see `kinetostatics.solve`.
 
@@ -316,8 +316,8 @@ def _widen(
     method: FrictionMethod,
 ) -> None:
     """Widen the interval by what the friction of one joint can do with either sign."""
-    ends = [run.solve(time, method=method, zero_slip={joint: sign}).efforts for sign in (-1.0, 1.0)]
+    ends = [run.solve(time, method=method, zero_slip={joint: sign}).efforts for sign in run.system.senses(joint)]
     for i, name in enumerate(run.system.mechanism.drivers):
         changes = [np.broadcast_to(end[name], time.shape) - effort[i, positions] for end in ends]
-        lower[i, positions] += np.minimum(0.0, np.minimum(*changes))
-        upper[i, positions] += np.maximum(0.0, np.maximum(*changes))
+        lower[i, positions] += np.minimum(0.0, np.min(changes, axis=0))
+        upper[i, positions] += np.maximum(0.0, np.max(changes, axis=0))

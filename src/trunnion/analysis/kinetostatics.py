@@ -21,21 +21,31 @@ from trunnion.groups.protocol import Group
 from trunnion.joints.friction import FrictionLaw
 from trunnion.joints.pairs import Load
 
-__all__ = ["Backward", "Given", "backward", "solve"]
+__all__ = ["Backward", "Given", "Sense", "backward", "sense_of", "solve"]
 
 ZERO_SLIP = 1e-10  # of the speeds about the joint: below it the sign of a relative speed is rounding noise
+
+
+Sense = float | tuple[float, ...]
 
 
 @dataclass(frozen=True)
 class Given:
     """What the joints bring along beside their motion, by joint.
 
-    zero_slip: sign of the slip to take where the relative speed is zero; 0 if not stated. deflections: of the bristles
+    zero_slip: sign of the slip to take where the relative speed is zero, one for each contact of the joint or one for
+    all; 0 if not stated. deflections: of the bristles
     of laws that have them, m, in the sense of the slip; that of steady sliding if not stated.
     """
 
-    zero_slip: Mapping[str, float] = field(default_factory=dict)
+    zero_slip: Mapping[str, Sense] = field(default_factory=dict)
     deflections: Mapping[str, Number] = field(default_factory=dict)
+
+
+def sense_of(zero_slip: Mapping[str, Sense], joint: str, contact: int = 0) -> float:
+    """The sign to take for one contact of a joint."""
+    sense = zero_slip.get(joint, 0.0)
+    return sense[contact] if isinstance(sense, tuple) else sense
 
 
 class GearLoad(NamedTuple):
@@ -130,10 +140,11 @@ def _add_body_loads(back: Backward) -> None:
         _add(back, link, Wrench(*force, moment), centre.place)
 
 
-def _add_stated_loads(back: Backward, zero_slip: Mapping[str, float]) -> None:
+def _add_stated_loads(back: Backward, zero_slip: Mapping[str, Sense]) -> None:
     """The loads and springs of the model, with the power each gives the mechanism."""
     mechanism = back.walk.system.mechanism
-    for name, action in stated_loads(back.walk, back.slips, zero_slip):
+    senses = {joint: sense_of(zero_slip, joint) for joint in zero_slip}
+    for name, action in stated_loads(back.walk, back.slips, senses):
         back.load_powers[name] = action.power
         _act(back, f"loads.{name}", action)
     for name, action, state in springs(back.walk, back.slips) if mechanism.springs else ():
@@ -225,7 +236,7 @@ def _contact(back: Backward, links: tuple[str, ...], k: int, place: Place, given
             units.append(_signed(link, place.links, push))
     speed = slip.speed
     if np.any(slip.zero):
-        forced = given.zero_slip.get(place.joint, 0.0) * np.maximum(np.abs(primal(speed)), 1e-300)
+        forced = sense_of(given.zero_slip, place.joint) * np.maximum(np.abs(primal(speed)), 1e-300)
         speed = namespace(speed).where(slip.zero, forced, speed)
     speed = sign * lever * speed
     if place.joint in given.deflections:

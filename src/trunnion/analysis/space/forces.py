@@ -6,6 +6,8 @@ carried to the origin: −m a_C and −(J ω̇ + ω × J ω), gyroscopic terms i
 
 from __future__ import annotations
 
+import functools
+import operator
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -17,9 +19,9 @@ from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.rigid import ZERO, Frame, Screw, about, added, minus, moment_at, power, rotated, times
 from trunnion.algebra.space import Vector3, cross, dot, plus, scaled, transpose
 from trunnion.analysis.friction import Contact, FrictionMethod, settle
-from trunnion.analysis.kinetostatics import ZERO_SLIP, Backward, Given
+from trunnion.analysis.kinetostatics import Backward, Given, Sense, sense_of
 from trunnion.analysis.loads import Slip
-from trunnion.analysis.space.contacts import Rubbing, bearing_middle, contacts
+from trunnion.analysis.space.contacts import Rubbing, at_rest, bearing_middle, contacts, stillness
 from trunnion.analysis.space.loads import springs, stated_loads
 from trunnion.analysis.space.motion import SpatialWalk
 from trunnion.analysis.system import Place, law_of
@@ -119,10 +121,11 @@ def _spin_rate(frame: Frame, tensor: tuple[Vector3, Vector3, Vector3], w: Vector
     return rotated(frame, plus(times_tensor(local_second), cross(local_w, times_tensor(local_w))))
 
 
-def _add_stated_loads(back: SpatialBackward, zero_slip: Mapping[str, float]) -> None:
+def _add_stated_loads(back: SpatialBackward, zero_slip: Mapping[str, Sense]) -> None:
     """The loads and springs of the model, with the power each gives the mechanism."""
     walk = back.space
-    for name, action in stated_loads(walk, zero_slip):
+    senses = {joint: sense_of(zero_slip, joint) for joint in zero_slip}
+    for name, action in stated_loads(walk, senses):
         back.load_powers[name] = action.power
         back.undefined[f"loads.{name}"] = action.undefined
         for link, wrench in action.on:
@@ -135,26 +138,24 @@ def _add_stated_loads(back: SpatialBackward, zero_slip: Mapping[str, float]) -> 
 
 
 def _slip(walk: SpatialWalk, joint: str) -> Slip:
-    """Slip that decides a joint's friction or resistance, and whether it is zero but for rounding.
-
-    Of a pair on one axis its rate; of a cylindrical one its turn if it does not slide, else the resultant counts.
-    """
-    kind, (first, second) = walk.system.joints[joint]
+    """Slip of a joint, and where a contact of it, or else its turn, is at rest but for rounding."""
+    kind = walk.system.joints[joint][0]
     if kind == "fixed":
         return Slip(0.0, False)
-    pace, size = walk.system.pace(walk.values), walk.size
-    scale = ZERO_SLIP * (walk.spins[first] + walk.spins[second] + pace)
+    zero = functools.reduce(operator.or_, at_rest(walk, joint)) if _rubs(walk, joint) else _still(walk, joint, kind)
     if kind in ("spherical", "universal", "planar"):
-        turn = walk.against(joint).u
-        speed = np.sqrt(primal(dot(turn, turn)))
-        return Slip(speed, speed <= scale)
-    turn_rate, slide_rate = walk.rates(joint)
-    still = np.abs(primal(turn_rate)) <= scale
-    if kind == "prismatic":
-        return Slip(slide_rate, np.abs(primal(slide_rate)) <= scale * size)
-    if kind == "cylindrical" and _rubs(walk, joint):
-        still = still & (np.abs(primal(slide_rate)) <= scale * size)
-    return Slip(turn_rate, still)
+        spin = walk.against(joint).u
+        return Slip(np.sqrt(primal(dot(spin, spin))), zero)
+    turn, slide = walk.rates(joint)
+    return Slip(slide if kind == "prismatic" else turn, zero)
+
+
+def _still(walk: SpatialWalk, joint: str, kind: str) -> Number:
+    """Where a joint without friction does not move as the loads that resist it see it."""
+    if kind not in ("revolute", "cylindrical", "helical", "prismatic"):
+        return False
+    place = 1 if kind == "prismatic" else 0
+    return np.abs(primal(walk.rates(joint)[place])) <= stillness(walk, joint)[place]
 
 
 def _rubs(walk: SpatialWalk, joint: str) -> bool:
@@ -183,9 +184,10 @@ def _settle_module(back: SpatialBackward, number: int, method: FrictionMethod, g
     rubbing: list[Rubbing] = []
     for k, place in enumerate(places):
         if _rubs(walk, place.joint):
-            for one in contacts(walk, place.joint):
+            for i, one in enumerate(contacts(walk, place.joint)):
                 rubbing.append(one)
-                found.append(_contact(back, module.links, k, place, one, given))
+                sense = sense_of(given.zero_slip, place.joint, i)
+                found.append(_contact(back, module.links, k, place, one, given, sense))
     settled = settle(_Flat(group), pose, loads, found, method)
     back.settled.append(settled)
     for (link, _, _), torque in zip(module.spinning, group.spin_torques(pose, loads), strict=True):
@@ -207,16 +209,22 @@ def _nothing() -> Number:
 
 
 def _contact(
-    back: SpatialBackward, links: tuple[str, ...], k: int, place: Place, one: Rubbing, given: Given
+    back: SpatialBackward,
+    links: tuple[str, ...],
+    k: int,
+    place: Place,
+    one: Rubbing,
+    given: Given,
+    sense: float,
 ) -> Contact:
-    """One contact of a joint as `friction` sees it."""
-    walk, slip = back.space, back.slips[place.joint]
+    """One contact of a joint as `friction` sees it; sense: sign of the slip to take where there is none."""
+    walk = back.space
     law = law_of(walk.system, place.joint)
     parameters = {name: walk.values[f"joints.{place.joint}.friction.{name}"] for name in law.parameters}
     speed = one.slip
-    if np.any(slip.zero):
-        forced = given.zero_slip.get(place.joint, 0.0) * np.maximum(np.abs(primal(speed)), 1e-300)
-        speed = namespace(speed).where(slip.zero, forced, speed)
+    if np.any(one.zero):
+        forced = sense * np.maximum(np.abs(primal(speed)), 1e-300)
+        speed = namespace(speed).where(one.zero, forced, speed)
     if place.joint in given.deflections:
         parameters["deflection"] = given.deflections[place.joint]
     first, second = place.links

@@ -298,3 +298,13 @@ def test_a_contact_without_extent_is_refused(where: str, contact: Data) -> None:
             drivers={"A": {"speed": 1.0}, "B": {"range": [0.0, 0.1], "speed": 0.1}},
         )  # fmt: skip
     assert [finding.where for finding in refused.value.findings] == [where]
+
+
+def test_a_driver_too_many_is_named() -> None:
+    data = copy.deepcopy(rssr().data)
+    data["drivers"]["D"] = {"speed": 1.0}
+    said = prepare(Mechanism(**data)).chosen.findings
+    assert any(
+        "the mobility is 2 by Grübler's formula (1 of it spins of a link alone) and the number of drivers 2" in one.what
+        for one in said
+    )

@@ -179,7 +179,7 @@ def choose(system: System, values: Values, cycle: Cycle) -> Chosen:
             walk.assembly.append(assembly)
             counts.append(count)
             if isinstance(assembly, Track) and count == 0:
-                findings.append(_never(module))
+                findings.append(_never(system, module))
             if isinstance(assembly, Track) and len(assembly.again):
                 findings.append(_anew(module, system.dial(values, times), assembly.again))
             pose = pose_of(walk, number, assembly, times)
@@ -220,9 +220,15 @@ def _anew(module: Module, dial: Dial, positions: Positions) -> Finding:
     return Finding(what, "links", remedy, Severity.WARNING)
 
 
-def _never(module: Module) -> Finding:
+def _never(system: System, module: Module) -> Finding:
     what = f"links {', '.join(module.links)} cannot be assembled anywhere along the cycle"
-    return Finding(what, "links", "check the lengths, or give a better assembly hint", Severity.WARNING)
+    remedy = "check the lengths, or give a better assembly hint"
+    if module.redundant:
+        plan, drivers = system.plan, len(system.mechanism.drivers)
+        spins = f" ({len(plan.passive)} of it spins of a link alone)" if plan.passive else ""
+        what += f"; the mobility is {plan.mobility} by Grübler's formula{spins} and the number of drivers {drivers}"
+        remedy += "; only special dimensions let so many constraints agree: remove a driver or free a joint"
+    return Finding(what, "links", remedy, Severity.WARNING)
 
 
 # ---- closed forms ---------------------------------------------------------------------------------------------

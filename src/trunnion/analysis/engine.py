@@ -26,7 +26,8 @@ __all__ = ["ENGINES", "Engine", "build"]
 @dataclass(frozen=True)
 class Engine:
     """system: makes a mechanism with its plan ready; start: a walk that knows the ground alone; backward: reactions and
-    friction of a walk; labels, absent, fill_motion, fill_forces, unwrap: of the result; scene: for the drawings.
+    friction of a walk; labels, absent, fill_motion, fill_forces, unwrap: of the result; scene: for the drawings;
+    determinacy: what the rank says of a run, None where the structure decides.
     """
 
     system: Callable[..., System]

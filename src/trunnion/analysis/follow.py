@@ -42,6 +42,7 @@ GUESSES = 512
 FEW = 16  # guesses at each place where an assembly is looked for again
 PROBES = 96  # such places in the gaps of a track
 MOST_CONDITION = 1e8  # of an assembly that counts
+SAME = 1e-6  # of signatures: nearer assemblies are one
 SEED = 20060704  # of the guesses: the same assemblies every time
 TURN_JUMP = 0.35  # rad between neighbours of the grid: more is another branch
 SLIDE_JUMP = 0.25  # of the group's size, likewise
@@ -85,7 +86,7 @@ def assemblies(group: Followed, elements: Elements, drive: Sequence[Number]) -> 
     good = np.flatnonzero(sound)
     kept: list[int] = []
     for lane in good:
-        if all(np.max(np.abs(key[:, lane] - key[:, other])) > 1e-6 for other in kept):
+        if all(np.max(np.abs(key[:, lane] - key[:, other])) > SAME for other in kept):
             kept.append(int(lane))
     kept.sort(key=lambda lane: tuple(np.round(key[:, lane], 6)))  # a numbering that does not depend on the guesses
     return pose._replace(
@@ -177,6 +178,7 @@ class Follower:
         if not len(probes):
             return probes
         found = self._found_at(probes)
+        left_out: list[Array] = []
         for probe, ways in zip(probes, found, strict=True):
             if np.isfinite(rows[0, probe]) or not ways.size:
                 continue
@@ -184,11 +186,24 @@ class Follower:
             before = rows[:, known[np.argmin(np.abs(known - probe))]]
             fresh = np.full_like(rows, np.nan)
             fresh[:, probe] = ways[:, int(np.argmin(self._apart(ways, before)))]
+            if any(self._alike(fresh[:, probe], other[:, probe], int(probe)) for other in left_out):
+                continue  # to follow it again would end as before
             self.both_ways(fresh, int(probe), periodic)
             filled = np.isfinite(fresh[0])
-            if not np.any(filled & np.isfinite(rows[0])):
+            if np.any(filled & np.isfinite(rows[0])):
+                left_out.append(fresh)
+            else:
                 rows[:, filled] = fresh[:, filled]
         return np.flatnonzero(gaps & np.isfinite(rows[0]))
+
+    def _alike(self, one: Array, other: Array, index: int) -> bool:
+        """Whether the coordinates of two assemblies at a grid point put the links into the same places."""
+        if not np.all(np.isfinite(other)):
+            return False
+        elements, drive = at(self.elements, index), [lane_of(n, index) for n in self.drive]
+        pose = self.group.position(elements, list(np.stack([one, other], axis=1)), drive)
+        key = [np.broadcast_to(n, (2,)) for n in self.group.signature(pose, extent(self.group, elements))]
+        return bool(np.max(np.abs(np.diff(key, axis=1))) <= SAME)
 
     def _found_at(self, probes: NDArray[np.intp]) -> list[Array]:
         """Coordinates (free, way) of assemblies of the right sense at each grid point, found from FEW guesses each."""

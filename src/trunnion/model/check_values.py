@@ -74,7 +74,8 @@ def _joint(mechanism: Mechanism, name: str, numbers: ParameterSet) -> Iterator[F
             if parameter in joint.friction.parameters:
                 key = f"friction.{parameter}"
                 yield from _law_value(declared, parameter, value(key), stated(key))
-        for size in ("pin.radius", "guide.length"):
+        across = ("pin.bearing", "guide.width") if mechanism.space == "spatial" else ()
+        for size in ("pin.radius", "guide.length", *across):
             if value(size) == 0:
                 yield Finding("is 0, where friction needs it", stated(size), "give a value above 0")
     for part, size in (("pin", "radius"), ("guide", "length")):

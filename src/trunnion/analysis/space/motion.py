@@ -106,9 +106,7 @@ class SpatialWalk(Forward):
 
     def coordinate(self, joint: str, first: Any, second: Any) -> Number:
         """Turn of a joint from its elements, of a cross that of its first pin, or slide if that is all it does."""
-        if (
-            self.system.joints[joint][0] == "universal"
-        ):  # the second pin is at (sin θ₁, −cos θ₁, 0) of the first element
+        if self.system.joints[joint][0] == "universal":  # its second pin lies at (sin θ₁, −cos θ₁, 0)
             sine, cosine = dot(second.z, first.x), -dot(second.z, first.y)
             return namespace(sine, cosine).arctan2(sine, cosine)
         return _dual_angle(first, second)[0 if self.system.turns(joint) else 1]

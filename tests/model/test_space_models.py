@@ -340,3 +340,23 @@ def test_a_fixed_joint_is_not_asked_for_friction_by_the_defaults() -> None:
     joints = Mechanism(**data).effective_joints
     assert joints["a"].friction is not None
     assert (joints["b"].friction, joints["b"].pin) == (None, None)
+
+
+def test_choices_among_words_are_set_like_numbers() -> None:
+    examples = Path(__file__).parents[2] / "examples"
+    four_bar = Mechanism.read(examples / "fourbar-in-space.yaml")
+    assert four_bar.over_constraint == "refuse"
+    assert four_bar.with_values({"over_constraint": "minimum-norm"}).over_constraint == "minimum-norm"
+    with pytest.raises(MechanismError, match="'refuse' or 'minimum-norm'"):
+        four_bar.with_values({"over_constraint": "some"})
+    cardan = Mechanism.read(examples / "pezzuti-cardan.yaml")
+
+    def models(mechanism: Mechanism) -> list[str | None]:
+        return [joint.friction.model for joint in mechanism.effective_joints.values() if joint.friction]
+
+    assert models(cardan) == ["two-contact"] * 4
+    assert models(cardan.with_values({"joint_defaults.friction.model": "pezzuti"})) == ["pezzuti"] * 4
+    one = cardan.with_values({"joints.pin-1.friction.model": "pezzuti"})
+    assert models(one) == ["two-contact", "pezzuti", "two-contact", "two-contact"]
+    with pytest.raises(MechanismError):
+        cardan.with_values({"joints.pin-9.friction.model": "pezzuti"})

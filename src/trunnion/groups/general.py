@@ -23,6 +23,7 @@ import numpy as np
 from trunnion.algebra import linalg
 from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number, namespace
+from trunnion.algebra.nested import each, flat
 from trunnion.groups import tree as spanning
 from trunnion.groups.cuts import Row, rows
 from trunnion.groups.gear import NUMBERS, ONE, Gear, GearRow, actions
@@ -138,12 +139,12 @@ class General:
         """
         with np.errstate(all="ignore"):
             q = self._newton(
-                [(_real(a), _real(b)) for a, b in elements],
+                [each(pair, primal) for pair in elements],
                 [primal(value) for value in assembly],
                 [primal(value) for value in drive],
             )
-            numbers = [*drive, *(n for pair in elements for frame in pair for n in frame)]
-            depth = max((_depth(number) for number in numbers), default=0)
+            numbers = [*drive, *(n for pair in elements for n in flat(pair))]
+            depth = max((n.depth for n in numbers if isinstance(n, Dual)), default=0)
             q = self.coordinates(elements, [q[i] for i in self.free], drive)
             for _ in range(depth):
                 q = self._step(elements, q, drive)
@@ -200,7 +201,7 @@ class General:
         def part(number: Number) -> Number:
             return np.broadcast_to(number, shape)[late]
 
-        some = [(Frame(*(part(n) for n in a)), Frame(*(part(n) for n in b))) for a, b in elements]
+        some = [each(pair, part) for pair in elements]
         found, last = self._iterate(
             some, [part(v) for v in q], [part(v) for v in drive], [part(s) for s in scale], NEWTON_LIMIT
         )
@@ -508,11 +509,3 @@ def _moved_from(pose: Pose, wrench: Wrench, at: Frame) -> Wrench:
     """A wrench about the common reference point, about `at`."""
     reference = _reference(pose)
     return about(wrench, at.x - reference.x, at.y - reference.y)
-
-
-def _depth(number: Number) -> int:
-    return number.depth if isinstance(number, Dual) else 0
-
-
-def _real(frame: Frame) -> Frame:
-    return Frame(*(primal(n) for n in frame))

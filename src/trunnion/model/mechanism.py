@@ -190,13 +190,27 @@ class Mechanism(Part):
         }
 
     def with_values(self, values: Mapping[str, float | str]) -> Mechanism:
-        """The mechanism with some entries replaced, by names as in `parameters`; texts are read as in a file."""
+        """The mechanism with some entries replaced, by names as in `parameters`; texts are read as in a file.
+
+        So are the choices `over_constraint`, `joint_defaults.friction.model` and `joints.NAME.friction.model`.
+        """
         data = self.data()
         for name, value in values.items():
-            _assign(
-                data, self.parameter_set.entries[self.parameter_set.resolve(name)].location, value, self.coordinates
-            )
+            location = self._choice(name) or self.parameter_set.entries[self.parameter_set.resolve(name)].location
+            _assign(data, location, value, self.coordinates)
         return Mechanism(**data)
+
+    def _choice(self, name: str) -> Location | None:
+        """Where a choice among words stands; None if the name is of a number."""
+        if name in ("over_constraint", "joint_defaults.friction.model"):
+            return tuple(name.split("."))
+        section, _, rest = name.partition(".")
+        joint = rest.removesuffix(".friction.model")
+        if section != "joints" or joint == rest or joint not in self.stated_joints:
+            return None
+        rows = [row.joint for row in self.loop]
+        place: Location = ("loop", rows.index(joint)) if joint in rows else ("joints", joint)
+        return (*place, "friction", "model")
 
     def with_table(self, name: str, path: str | os.PathLike[str]) -> Mechanism:
         """The mechanism with the points of a driver or table replaced by the two columns of a CSV file.

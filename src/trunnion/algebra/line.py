@@ -19,6 +19,7 @@ from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.space import (
     Vector3,
     cross,
+    divided,
     dot,
     plus,
     scaled,
@@ -127,7 +128,7 @@ def _parallel(first: Vector3, second: Vector3) -> Perpendicular:
     distance = _size(step)
     base = foot(u)
     theta = np.where(sense > 0, 0.0, np.pi)
-    beside = line(base, scaled(1 / np.where(distance == 0, np.nan, distance), step))
+    beside = line(base, divided(step, np.where(distance == 0, np.nan, distance)))
     feet = base, plus(base, step)
     depth = max(number.depth if isinstance(number, Dual) else 0 for number in (*first, *second))
     if depth == 0:

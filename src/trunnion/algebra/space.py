@@ -19,6 +19,7 @@ __all__ = [
     "Vector3",
     "apply",
     "cross",
+    "divided",
     "dot",
     "length",
     "minus",
@@ -111,7 +112,13 @@ def unit(a: Vector3) -> Vector3:
     """a/|a|; NaN where a (its real part) is 0. Of a dual vector: the line of the screw, whatever its pitch."""
     size = length(a)
     xp = namespace(size)
-    return scaled(1 / xp.where(primal(size) == 0, float("nan"), size), a)
+    return divided(a, xp.where(primal(size) == 0, float("nan"), size))
+
+
+def divided(a: Vector3, divisor: Number) -> Vector3:
+    """a/divisor; NaN in every component where the divisor is NaN, literal zeros included."""
+    factor = 1 / divisor
+    return factor * a[0], factor * a[1], factor * a[2]
 
 
 def where(condition: Number, a: Vector3, b: Vector3) -> Vector3:

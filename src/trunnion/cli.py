@@ -299,6 +299,10 @@ def report(
     iterations: Rounds = 200,
 ) -> None:
     """One self-contained HTML file: animation, plots, findings, balance, input data."""
+    if out.suffix.lower() not in (".html", ".htm"):
+        raise MechanismError(
+            Finding(f"a report is HTML, '{out.name}' is not", "--out", "write a .html file and print it")
+        )
     mechanism = _mechanism(file, set_, table, friction)
     with _lines_of(file):
         result = _run(mechanism, steps, _method(method, criterion, iterations))

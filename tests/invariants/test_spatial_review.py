@@ -61,9 +61,13 @@ def told_from_elsewhere(data: Data, axes: Array, shift: Array) -> Data:
 def in_other_axes(link: Data, axes: Array, shift: Array) -> Data:
     """A link told in another frame of its own."""
     tensor = np.array([[link["inertia"].get("".join(sorted(a + b)), 0.0) for b in "xyz"] for a in "xyz"])
+    centre = np.array(link["centre"])
+    if link.get("inertia_about") == "origin":
+        tensor = tensor - link["mass"] * (centre @ centre * np.eye(3) - np.outer(centre, centre))
     tensor = axes @ tensor @ axes.T
     return {
         **link,
+        "inertia_about": "centre",
         "points": {name: moved(point, axes, shift) for name, point in link["points"].items()},
         "centre": list(turned(link["centre"], axes) + shift),
         "inertia": {key: float(tensor[place]) for key, place in TENSOR.items()},

@@ -275,7 +275,7 @@ def test_a_linkage_that_does_not_close_everywhere_says_where_and_by_how_much(run
 def test_a_linkage_that_never_closes_is_said_to(run: Run) -> None:
     done = run("analyse", FOUR_BAR, "--set", "BC=0.3m")
     assert done.code == 1
-    assert "cannot be assembled at every position" in done.err
+    assert "cannot be assembled at any position" in done.err
     assert "no answer" in done.out or "0" in done.out
 
 
@@ -451,3 +451,32 @@ def test_help_needs_no_heavy_imports() -> None:
     code = "import sys, trunnion.cli; print([m for m in ('numpy', 'xarray', 'pint', 'matplotlib') if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+# ---- in space -------------------------------------------------------------------------------------------------
+
+
+def test_redundant_bearings_are_refused_by_every_verb_and_can_be_asked_for(run: Run) -> None:
+    model = EXAMPLES / "fourbar-in-space.yaml"
+    for verb in ("analyse", "locking"):
+        done = run(verb, model)
+        assert done.code == 2
+        assert "3 constraints are redundant" in done.err
+    assert run("check", model).code == 1
+    assert run("analyse", model, "--set", "over_constraint=minimum-norm", "--steps", "8").code == 0
+
+
+def test_too_many_drivers_in_space(run: Run, tmp_path: Path) -> None:
+    text = (EXAMPLES / "rccc.yaml").read_text("utf-8").replace("drivers:", "drivers:\n  D: {speed: 5 rpm}", 1)
+    model = tmp_path / "model.yaml"
+    model.write_text(text, "utf-8")
+    done = run("analyse", model)
+    assert done.code == 2
+    assert "the mobility is 1 by Grübler's formula and 1 by rank, but there are 2 drivers" in done.err
+
+
+def test_a_report_is_html(run: Run, tmp_path: Path) -> None:
+    done = run("report", EXAMPLES / "rssr.yaml", "--out", tmp_path / "report.pdf")
+    assert done.code == 2
+    assert "HTML" in done.err
+    assert not list(tmp_path.iterdir())

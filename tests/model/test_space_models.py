@@ -360,3 +360,29 @@ def test_choices_among_words_are_set_like_numbers() -> None:
     assert models(one) == ["two-contact", "pezzuti", "two-contact", "two-contact"]
     with pytest.raises(MechanismError):
         cardan.with_values({"joints.pin-9.friction.model": "pezzuti"})
+
+
+def test_a_spatial_model_that_does_not_say_so_has_one_finding() -> None:
+    data = Mechanism.read(Path(__file__).parents[2] / "examples" / "rssr.yaml").data()
+    del data["space"]
+    with pytest.raises(MechanismError) as raised:
+        Mechanism(**data)
+    (finding,) = raised.value.findings
+    assert finding.where == "space"
+    assert "space: spatial" in finding.remedy
+
+
+def test_a_plain_angle_of_many_turns_is_doubted() -> None:
+    data = Mechanism.read(Path(__file__).parents[2] / "examples" / "universal-joint.yaml").data()
+    data["loop"][0]["twist"] = 90
+    doubts = [finding for finding in check_model(Mechanism(**data)) if finding.severity is Severity.WARNING]
+    assert any(
+        "14.3 turns" in finding.what and finding.remedy == "write 90 deg if it is in degrees" for finding in doubts
+    )
+
+
+@pytest.mark.parametrize(("text", "value"), [("20 Nm", 20.0), ("3 kNm", 3000.0), ("5 mNm", 0.005), ("20 N m", 20.0)])
+def test_torques_written_without_a_space(text: str, value: float) -> None:
+    cardan = Mechanism.read(Path(__file__).parents[2] / "examples" / "pezzuti-cardan.yaml")
+    torque = cardan.with_values({"loads.brake.resisting_torque": text}).parameters()["loads.brake.resisting_torque"]
+    assert torque == pytest.approx(value, rel=1e-15)

@@ -305,18 +305,29 @@ def sound_positions(status: NDArray[Any]) -> NDArray[np.intp]:
 
 
 def _reaction_rows(system: System, arrays: Arrays, dial: Dial, sound: NDArray[np.intp]) -> list[dict[str, Any]]:
-    """Largest reaction of every joint; stroke of every slide."""
+    """Largest reaction of every joint, in space its moment too; stroke of every slide."""
     rows: list[dict[str, Any]] = []
+    loads = [("reaction", "reaction_force", "N")]
+    if system.mechanism.space == "spatial":
+        loads.append(("reaction moment", "reaction_moment", "N m"))
     for i, (name, (kind, _)) in enumerate(system.joints.items()):
-        if len(sound):
-            size = np.sqrt(np.sum(arrays["reaction_force"][i] ** 2, axis=0))
+        for what, variable, unit in loads if len(sound) else ():
+            size = np.sqrt(np.sum(arrays[variable][i] ** 2, axis=0))
             top = int(sound[np.argmax(size[sound])])
-            rows.append({"label": f"reaction of {name}, largest, at {dial.at(top)}", "value": size[top], "unit": "N"})
+            if system.mechanism.space == "planar" or size[top] > _rounding(arrays, variable):
+                rows.append(
+                    {"label": f"{what} of {name}, largest, at {dial.at(top)}", "value": size[top], "unit": unit}
+                )
         slide = arrays["joint_slide"][i]
         if kind == "prismatic" and np.any(np.isfinite(slide)):
             stroke = np.nanmax(slide) - np.nanmin(slide)
             rows.append({"label": f"stroke of {name}", "value": stroke, "unit": "m"})
     return rows
+
+
+def _rounding(arrays: Arrays, variable: str) -> float:
+    """What is no more than rounding of the reactions or of the drive."""
+    return 1e-11 * max(_peak(arrays[variable]), _peak(arrays["drive_effort"]), 1e-300)
 
 
 def _margin(margin: NDArray[np.float64], dial: Dial) -> dict[str, Any]:

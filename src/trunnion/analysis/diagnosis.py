@@ -176,13 +176,16 @@ def _together(zero: dict[str, Positions]) -> list[tuple[str, Positions]]:
 
 def _not_assembled(causes: Causes, dial: Dial, part: _Open) -> Finding:
     module = causes.system.plan.modules[part.module]
-    head = f"cannot be assembled {dial.intervals(part.positions)}"
+    everywhere = len(part.positions) == len(dial.values) > 1
+    head = f"cannot be assembled {'at any position' if everywhere else dial.intervals(part.positions)}"
     where = f"links {', '.join(module.links)}"
     remedy = "change the lengths or the range of the driver"
     if not part.reasons:
-        return Finding(
-            f"{head}: these links do not get there from their start without being taken apart", where, remedy
-        )
+        why = "do not close" if everywhere else "do not get there from their start without being taken apart"
+        if everywhere and module.redundant:
+            remedy = "its joints constrain more than they free, so it closes with special dimensions only: check them, "
+            remedy += "or let joints slide or tilt (cylindrical, spherical)"
+        return Finding(f"{head}: these links {why}", where, remedy)
     told = [
         f"{text} by up to {_length(float(np.nanmax(figure)))}"
         for text, figure in part.reasons.items()

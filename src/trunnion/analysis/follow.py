@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.nested import each
 
-__all__ = ["GUESSES", "Follower", "assemblies", "at", "lane_of", "limits"]
+__all__ = ["GUESSES", "SEED", "Follower", "assemblies", "at", "extent", "guess_reaches", "lane_of", "limits"]
 
 Array = NDArray[np.float64]
 Elements = Sequence[Any]  # per joint: both its elements, as nested tuples of numbers
@@ -76,7 +76,7 @@ def assemblies(group: Followed, elements: Elements, drive: Sequence[Number]) -> 
     """All assemblies found at one position from many guesses, each once, along the last axis of a pose."""
     rng = np.random.default_rng(SEED)
     spread = extent(group, elements)
-    guesses = [rng.uniform(-reach, reach, GUESSES) for reach in _reaches(group, spread)]
+    guesses = [rng.uniform(-reach, reach, GUESSES) for reach in guess_reaches(group, spread)]
     pose = group.position(elements, guesses, drive)
     shape = (GUESSES,)
     key = np.array([np.broadcast_to(n, shape) for n in group.signature(pose, spread)])
@@ -96,7 +96,7 @@ def assemblies(group: Followed, elements: Elements, drive: Sequence[Number]) -> 
     )
 
 
-def _reaches(group: Followed, spread: float) -> list[float]:
+def guess_reaches(group: Followed, spread: float) -> list[float]:
     """How far a guess of each coordinate may lie from 0."""
     return [{"turn": np.pi, "slide": 2 * spread, "part": 1.0}[kind] for kind in group.kept_kinds]
 
@@ -210,7 +210,7 @@ class Follower:
         rng = np.random.default_rng(SEED)
         spread = extent(self.group, self.elements)
         lanes = np.repeat(probes, FEW)
-        guesses = [far * rng.uniform(-1, 1, len(lanes)) for far in _reaches(self.group, spread)]
+        guesses = [far * rng.uniform(-1, 1, len(lanes)) for far in guess_reaches(self.group, spread)]
         pose = self.group.position(at(self.elements, lanes), guesses, [lane_of(n, lanes) for n in self.drive])
         sound = np.broadcast_to(pose.orientation, lanes.shape) == self.orientation
         sound &= np.broadcast_to(pose.condition, lanes.shape) < MOST_CONDITION

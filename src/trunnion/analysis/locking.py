@@ -47,6 +47,8 @@ def look(run: Run, steps: int = 360) -> xr.Dataset:
     import xarray as xr
 
     mechanism = run.system.mechanism
+    if run.determinacy is not None:
+        run.determinacy.refuse()
     if not 1 <= steps <= MOST_STEPS:
         raise MechanismError(Finding(f"cannot look at {steps} positions", "steps", f"give 1 to {MOST_STEPS:,}"))
     result = analyse_run(run, steps)

@@ -105,6 +105,9 @@ class SpatialGroup(SpatialTree):
         jacobian = self.jacobian(placed, screws, size)
         orientation: Number = 1.0
         gap = self.opening(placed, q, size)
+        if self.chords and not self.free:  # held fast: either it closes as it is or not at all
+            hole = np.where(gap <= CLOSED * size, 0.0, np.nan)
+            frames = each(frames, lambda n: n + hole)
         if not jacobian or not self.free:
             inverse: list[list[Number]] = []
             orientation = np.where(gap <= CLOSED * size, 1.0, np.nan)  # no coordinate could close what is open

@@ -39,6 +39,9 @@ def check_model(mechanism: Mechanism, lost: Collection[str] = ()) -> list[Findin
     lost: names of entries that could not be read; what follows from their absence is not reported.
     """
     unreadable: set[str] = set()
+    if "space" not in mechanism.model_fields_set and _looks_spatial(mechanism):
+        what = "this is a spatial model: it has a loop, or points with three coordinates"
+        return [Finding(what, "space", "state space: spatial")]
     findings = [*_quantities(mechanism, unreadable), *space(mechanism), *_links(mechanism), *_joints(mechanism)]
     findings += [] if lost else _absent(mechanism)
     findings += [*loop(mechanism), *gears(mechanism), *_drivers(mechanism), *_loads(mechanism)]
@@ -48,6 +51,12 @@ def check_model(mechanism: Mechanism, lost: Collection[str] = ()) -> list[Findin
         findings += check_values(mechanism, numbers)
     findings = list(dict.fromkeys(findings))  # a default that several joints share is found once
     return [finding for finding in findings if not any(_speaks_of(finding, name) for name in lost)]
+
+
+def _looks_spatial(mechanism: Mechanism) -> bool:
+    """Whether most that is stated has three coordinates, or there is a loop."""
+    sizes = [len(place.at) for link in mechanism.links.values() for place in link.points.values()]
+    return bool(mechanism.loop) or (sizes.count(3) > len(sizes) / 2)
 
 
 def _speaks_of(finding: Finding, name: str) -> bool:

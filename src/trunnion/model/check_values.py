@@ -16,6 +16,7 @@ from trunnion.model.check_loads import spring_values, table_values
 from trunnion.model.check_space import direction_values, pitch_values
 from trunnion.model.parameters import ParameterSet
 from trunnion.model.parts import InertiaTensor, Link, freedoms
+from trunnion.model.units import KINDS
 
 if TYPE_CHECKING:
     from trunnion.model.mechanism import Mechanism
@@ -38,6 +39,8 @@ def check_values(mechanism: Mechanism, numbers: ParameterSet) -> Iterator[Findin
             yield Finding(
                 f"'{entry.quantity.source}' has no finite value ({values[path]})", path, "check divisions and roots"
             )
+        if entry.kind is KINDS["angle"] and isinstance(entry.quantity.source, int | float) and not entry.alias:
+            yield from _radians(path, float(values[path]))
         if entry.path.rpartition(".")[2] in _NOT_NEGATIVE and not entry.alias and values[path] < 0:
             yield Finding(f"is {values[path]:g}, which is negative", path, "give a value of at least 0")
     for name, link in mechanism.links.items():
@@ -56,6 +59,13 @@ def check_values(mechanism: Mechanism, numbers: ParameterSet) -> Iterator[Findin
 
 
 _NOT_NEGATIVE = frozenset({"mass", "radius", "length", "bearing", "clearance", "resisting_torque", "resisting_force"})
+
+
+def _radians(path: str, angle: float) -> Iterator[Finding]:
+    """A plain number that is many turns is likely meant in degrees."""
+    if abs(angle) > 2 * np.pi and not path.startswith("drivers."):
+        what = f"is {angle:g} rad, which is {angle / (2 * np.pi):.3g} turns: a plain number is in radians"
+        yield Finding(what, path, f"write {angle:g} deg if it is in degrees", Severity.WARNING)
 
 
 def _joint(mechanism: Mechanism, name: str, numbers: ParameterSet) -> Iterator[Finding]:

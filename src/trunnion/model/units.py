@@ -138,6 +138,7 @@ def _registry() -> pint.UnitRegistry[Fraction]:
     return registry
 
 
+_TORQUE = re.compile(r"(?<![\w])([mkM]?)Nm(?![\w])")
 # Those that a misspelt one is compared with; pint knows many more.
 _USUAL = "mm cm m µm km in ft deg rad mrad kg g mg t lb s ms min N mN kN MN lbf Pa kPa MPa GPa bar psi J kJ W kW rpm"
 
@@ -160,7 +161,8 @@ def unit(text: str) -> tuple[Fraction, Dimension]:
     """Factor to SI and dimension of a unit such as `N m`, `kg m^2`, `rpm`; UnitError if it is none of mechanics."""
     registry = _registry()
     try:
-        parsed = registry.parse_units(text.replace("·", "*").replace("⋅", "*"))
+        spaced = _TORQUE.sub(r"\1N m", text)  # pint reads Nm as a measure of yarn
+        parsed = registry.parse_units(spaced.replace("·", "*").replace("⋅", "*"))
         factor, root = registry.get_root_units(parsed)
     except Exception as error:  # pint raises its own, tokenizer and arithmetic errors on text that is no unit
         raise UnitError(f"the unit '{text}' is not known", _meant(text)) from error

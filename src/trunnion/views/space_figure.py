@@ -105,6 +105,8 @@ def mechanism(result: xr.Dataset, index: int | None = None) -> Figure:
     status = int(result["status"].values[index])
     if status >= Status.NOT_CONVERGED:
         facts.append(status_text(status).split(":")[0])
+    if any(look.shown.shifts.values()):
+        facts.append("joints on one spot drawn apart")
     axes.set_title(plain("    ".join(filter(None, facts))), fontsize=8.5, color=MUTED, loc="left")
     return figure
 

@@ -42,7 +42,7 @@ def space_scene(result: xr.Dataset) -> dict[str, Any]:
         "solids": [solid.data() for solid in look.solids],
         "free": [{"key": key, "link": key.split(".", 1)[0], "at": _vector(at)} for key, at in shown.free.items()],
         "seats": {name: _seat(shown, name) for name in shown.joints},
-        "loads": _loads(shown),
+        "loads": _loads(shown), "apart": any(shown.shifts.values()),
     }  # fmt: skip
 
 

@@ -9,7 +9,7 @@ are not determined.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, cast
 
 import numpy as np
@@ -20,7 +20,7 @@ from trunnion.algebra.nested import each
 from trunnion.algebra.rigid import ZERO, Screw, moment_at
 from trunnion.algebra.space import dot, minus
 from trunnion.analysis.branches import Chosen
-from trunnion.analysis.follow import assemblies, at, lane_of
+from trunnion.analysis.follow import SEED, at, extent, guess_reaches, lane_of
 from trunnion.analysis.friction import FrictionMethod
 from trunnion.analysis.kinematics import forward
 from trunnion.analysis.kinetostatics import Given
@@ -32,12 +32,13 @@ from trunnion.groups.spatial import Pose, SpatialGroup
 __all__ = ["Determinacy", "Part", "look"]
 
 LOOKED = 12  # positions: what is special at one of them only is a singular position
+TRIES = 96  # guesses at a pose
 PRESENT = 1e-6  # of the largest entry of a null vector
 
 
 class Part(NamedTuple):
     """Of one module: redundant constraints and undetermined freedoms at every position looked at; joints that carry the
-    former, links that have the latter.
+    former, links that have the latter. surplus: drivers more than there are freedoms, for which it does not close.
     """
 
     module: int
@@ -45,6 +46,7 @@ class Part(NamedTuple):
     undetermined: int
     joints: tuple[str, ...]
     links: tuple[str, ...]
+    surplus: int = 0
 
 
 @dataclass(frozen=True)
@@ -67,6 +69,8 @@ def look(system: System, values: Values, chosen: Chosen, cycle: Cycle) -> Determ
         pose = walk.poses[number]
         if not np.any(np.isfinite(np.asarray(pose.gap))):
             pose = _by_least_squares(system, walk, number, group)
+        if pose is None and module.redundant:
+            found += _too_many(system, walk, number, group)
         if pose is None or not pose.jacobian:
             continue
         table = stacked(pose.jacobian)
@@ -113,17 +117,32 @@ def _largest(values: Any) -> float:
     return float(np.nanmax(np.abs(primal(values)), initial=0.0))
 
 
+def _too_many(system: System, walk: Any, number: int, group: SpatialGroup) -> list[Part]:
+    """Whether a module does not close because it has more drivers than freedoms: it is solved without any."""
+    pose = _by_least_squares(system, walk, number, replace(group, driven=()))
+    if pose is None:
+        return []
+    table = stacked(pose.jacobian)[0]
+    surplus = len(group.driven) - (table.shape[1] - int(np.linalg.matrix_rank(table, rtol=RANK)))
+    return [Part(number, 0, 0, (), (), surplus)] if surplus > 0 else []
+
+
 def _by_least_squares(system: System, walk: Any, number: int, group: SpatialGroup) -> Pose | None:
     """A module that Newton's method does not close because J is singular, at the start, solved all the same."""
     module, places = system.plan.modules[number], system.places[number]
     free = SpatialGroup(group.links, group.joints, group.driven, group.spinning, redundant=True)
-    drive = driven_coordinates(system, module, places, walk.values, walk.time)[0]
+    drive = driven_coordinates(system, module, places, walk.values, walk.time)[0] if group.driven else []
+    elements, drive = at(walk.pairs(places), 0), [lane_of(q, 0) for q in drive]
+    rng, reaches = np.random.default_rng(SEED), guess_reaches(free, extent(free, elements))
     with np.errstate(all="ignore"):
-        found = assemblies(free, at(walk.pairs(places), 0), [lane_of(q, 0) for q in drive])
-        kept = [lane_of(found.q[i], 0) if np.size(found.q[i]) else np.nan for i in free.kept]
-        if not np.all(np.isfinite(kept)):
+        pose = free.position(elements, [rng.uniform(-reach, reach, TRIES) for reach in reaches], drive)
+        closed = np.flatnonzero(np.isfinite(np.broadcast_to(pose.gap, (TRIES,))))
+        if not len(closed):
             return None
-        return free.position(at(walk.pairs(places), 0), kept, [lane_of(q, 0) for q in drive])
+        table = stacked(pose.jacobian)
+        ranks = np.linalg.matrix_rank(np.broadcast_to(table, (TRIES, *table.shape[1:]))[closed], rtol=RANK)
+        best = closed[int(np.argmax(ranks))]
+        return free.position(elements, [lane_of(pose.q[i], best) for i in free.kept], drive)
 
 
 def _lane(pose: Pose | None, lane: int, count: int) -> Pose:
@@ -189,7 +208,7 @@ class Determinacy:
     @property
     def mobility(self) -> int:
         """Mobility by rank: what the drivers prescribe, spins that move nothing else, and what is not determined."""
-        undetermined = sum(one.undetermined for one in self.parts)
+        undetermined = sum(one.undetermined - one.surplus for one in self.parts)
         return len(self.system.mechanism.drivers) + len(self.system.plan.passive) + undetermined
 
     def refuse(self) -> None:
@@ -202,6 +221,7 @@ class Determinacy:
         """What there is to say of redundant constraints, undetermined freedoms and free spins."""
         told: list[Finding] = []
         for one in self.parts:
+            told += [self._overdriven()] if one.surplus else []
             told += [self._undetermined(one)] if one.undetermined else []
             told += [self._redundant(one)] if one.redundant else []
         for module in self.system.plan.modules:
@@ -221,6 +241,12 @@ class Determinacy:
     @property
     def _count(self) -> str:
         return f"the mobility is {self.system.plan.mobility} by Grübler's formula and {self.mobility} by rank"
+
+    def _overdriven(self) -> Finding:
+        spins = len(self.system.plan.passive)
+        beside = f", {spins} of it spins of a link alone" if spins else ""
+        what = f"{self._count}{beside}, but there are {len(self.system.mechanism.drivers)} drivers"
+        return Finding(what, "drivers", "remove a driver")
 
     def _undetermined(self, one: Part) -> Finding:
         what = (

@@ -213,7 +213,8 @@ export function start(scene, places) {
     "p",
     { class: "hint" },
     "Space plays, ← and → step (Shift: ten), Home and End jump; point at a curve to move the crank." +
-      (spatial ? " Drag turns the mechanism, with Shift or the right button it shifts, the wheel zooms; so do the keys ← → ↑ ↓ + − 0 once it has the focus." : ""),
+      (spatial ? " Drag turns the mechanism, with Shift or the right button it shifts, the wheel zooms; so do the keys ← → ↑ ↓ + − 0 once it has the focus." : "") +
+      (scene.apart ? " Joints on one spot are drawn apart along their axes; between them the scale does not hold." : ""),
   );
   const vectors = vectorControls(scene, kinds, mechanism);
   places.stage.append(

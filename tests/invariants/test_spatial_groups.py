@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from trunnion import Mechanism, analyse
 from trunnion.algebra.dual import derivative, seed
 from trunnion.algebra.nested import flat
 from trunnion.algebra.rigid import (
@@ -329,3 +331,19 @@ def test_redundant_loops_give_the_smallest_reactions() -> None:
     for wrench, one in zip((first, second), pose.elements, strict=True):
         assert np.max(np.abs(numbers(moment_at(wrench, one.second.place)))) < 1e-12
     assert np.max(np.abs(numbers(added(added(first, second), push)))) < 1e-12
+
+
+@pytest.mark.parametrize("reversed_", [False, True])
+def test_a_link_with_a_free_spin_moves_as_it_is_said_to(reversed_: bool) -> None:
+    """A point off the line of its balls has the velocity of its places: the link does not spin on the way."""
+    data = Mechanism.read(Path(__file__).parents[2] / "examples" / "rssr.yaml").data()
+    data["links"]["rod"]["points"]["P"] = [0.05, 0.02, 0.01]
+    if reversed_:
+        for joint in ("B", "C"):
+            data["joints"][joint]["links"] = data["joints"][joint]["links"][::-1]
+    result = analyse(Mechanism(**data), 2000)
+    place, speed = (result[f"point_{what}"].sel(point="rod.P").values for what in ("position", "velocity"))
+    step = float(result["time"][1] - result["time"][0])
+    found = (place[:, 2:] - place[:, :-2]) / (2 * step)
+    assert np.max(np.abs(found - speed[:, 1:-1])) < 2e-4 * np.max(np.abs(speed))
+    assert float(result["closure_residual"].max()) < 1e-14

@@ -27,6 +27,8 @@ from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.groups.gear import NUMBERS, rotation
 from trunnion.groups.general import OUTER
 from trunnion.groups.protocol import Elements
+from trunnion.groups.spatial import SpatialGroup
+from trunnion.groups.spins import unspun
 from trunnion.structure.decompose import Module
 
 __all__ = ["Chosen", "Track", "choose"]
@@ -320,6 +322,8 @@ def _track(walk: Forward, number: int, group: Any, drive: Sequence[Number], time
     follower = Follower(group, elements, drive, orientation)
     follower.both_ways(rows, begin, periodic)
     again = follower.revisit(rows, periodic)
+    if isinstance(group, SpatialGroup):
+        rows = unspun(group, elements, rows, drive)
     track = Track(times, rows, orientation, periodic, clock, turns, again, float(times[begin]), found.frames, best)
     if named is None:
         return Decision(track, ways, decided)

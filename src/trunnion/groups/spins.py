@@ -1,0 +1,74 @@
+"""Links whose spin is free, carried along a track of poses without spinning.
+
+Which way such a link has turned about its line moves nothing else, so position by Newton's method leaves it as it was
+guessed. The velocity is that of no spin, ω · u = 0; a track on which the link does so as well is had by turning it, at
+each of its poses, by what it has spun since the start: from one pose to the next the link should turn by the shortest
+way from one direction of its line to the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.groups.spatial_tree import Element
+
+if TYPE_CHECKING:
+    from trunnion.groups.spatial import SpatialGroup
+
+__all__ = ["unspun"]
+
+Array = NDArray[np.float64]
+
+
+def unspun(group: SpatialGroup, elements: Sequence[Element], rows: Array, drive: Sequence[Any]) -> Array:
+    """Coordinates (kept, grid) of a track with the same poses but for the spins, which are taken out."""
+    if not group.spinning or rows.shape[1] < 2:
+        return rows
+    pose = group.position(elements, list(rows), drive)
+    grid = rows.shape[1]
+    place = {i: n for n, i in enumerate(group.kept)}
+    rows = rows.copy()
+    for link, a, b in group.spinning:
+        axis = _full(group.spin_axis(pose.elements, a, b), grid)
+        spun = _spun(axis, _full(pose.frames[link].x, grid), _full(pose.frames[link].y, grid))
+        for k in (a, b):
+            first = pose.elements[k].first
+            sense = -1.0 if group.joints[k].sides[1] == link else 1.0  # back by what it has spun
+            begin = group.starts[k]
+            if group.joints[k].kind == "spherical":
+                local = np.array([np.sum(axis * _full(one, grid), axis=0) for one in (first.x, first.y, first.z)])
+                where = [place[begin + i] for i in range(4)]
+                rows[where] = _turned(rows[where], local, sense * spun)
+            elif begin in place:
+                rows[place[begin]] += sense * spun
+    return rows
+
+
+def _full(vector: Sequence[Any], grid: int) -> Array:
+    return np.array([np.broadcast_to(n, (grid,)) for n in vector], float)
+
+
+def _spun(axis: Array, x: Array, y: Array) -> Array:
+    """Angle by which a link has spun since the first pose of a run without gaps, rad; axis, x, y: (3, grid)."""
+    before, after = axis[:, :-1], axis[:, 1:]
+    turn, cosine = np.cross(before, after, axis=0), np.sum(before * after, axis=0)
+    # of its axes that at right angles to the line: one of the two is far enough from it
+    side = np.where(np.abs(np.sum(x * axis, axis=0)) < 0.9, x, y)
+    old, new = side[:, :-1], np.where(np.abs(np.sum(x * axis, axis=0))[:-1] < 0.9, x[:, 1:], y[:, 1:])
+    # Rodrigues: the shortest turn from one direction to the other, sin about `turn`, cos between them
+    scale = np.sum(turn * old, axis=0) / (1 + cosine)
+    carried = cosine * old + np.cross(turn, old, axis=0) + scale * turn
+    carried, new = (one - np.sum(one * after, axis=0) * after for one in (carried, new))
+    step = np.arctan2(np.sum(np.cross(carried, new, axis=0) * after, axis=0), np.sum(carried * new, axis=0))
+    return np.concatenate([[0.0], np.cumsum(np.nan_to_num(step))])
+
+
+def _turned(q: Array, axis: Array, angle: Array) -> Array:
+    """Quaternion (4, grid) of a turn about an axis after the turn q: the product of both."""
+    c, v = np.cos(angle / 2), np.sin(angle / 2) * axis
+    w, u = q[0], q[1:]
+    return np.vstack([c * w - np.sum(v * u, axis=0), c * u + w * v + np.cross(v, u, axis=0)])

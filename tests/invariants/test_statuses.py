@@ -58,7 +58,7 @@ def test_not_assembled_because_too_near() -> None:
 def test_never_assembled() -> None:
     result = analyse(four_bar(0.1, 0.2, 0.2, 1.0), 8)
     assert np.all(result["status"] == Status.NOT_ASSEMBLED)
-    assert "at every position" in texts(result)
+    assert "at any position" in texts(result)
     assert np.isnan(float(result["efficiency"]))
 
 

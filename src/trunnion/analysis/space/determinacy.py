@@ -123,8 +123,9 @@ def _too_many(system: System, walk: Any, number: int, group: SpatialGroup) -> li
     if pose is None:
         return []
     table = stacked(pose.jacobian)[0]
-    surplus = len(group.driven) - (table.shape[1] - int(np.linalg.matrix_rank(table, rtol=RANK)))
-    return [Part(number, 0, 0, (), (), surplus)] if surplus > 0 else []
+    freedoms = table.shape[1] - int(np.linalg.matrix_rank(table, rtol=RANK))
+    surplus = len(group.driven) - freedoms  # without any freedom it is its dimensions that do not let it move
+    return [Part(number, 0, 0, (), (), surplus)] if freedoms and surplus > 0 else []
 
 
 def _by_least_squares(system: System, walk: Any, number: int, group: SpatialGroup) -> Pose | None:

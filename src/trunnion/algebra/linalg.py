@@ -13,7 +13,7 @@ import numpy as np
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
 
-__all__ = ["condition", "cross", "determinant", "dot", "inverse", "quick_inverse", "solve"]
+__all__ = ["condition", "cross", "determinant", "dot", "inverse", "quick_inverse", "solve", "weighted"]
 
 Vector = tuple[Number, Number]
 
@@ -26,6 +26,15 @@ def dot(a: Vector, b: Vector) -> Number:
 def cross(a: Vector, b: Vector) -> Number:
     """z component of a × b of planar vectors."""
     return a[0] * b[1] - a[1] * b[0]
+
+
+def weighted(weights: Sequence[Number], values: Sequence[Number]) -> Number:
+    """Σ wᵢ vᵢ; a literal zero costs nothing."""
+    total: Number = 0.0
+    for weight, value in zip(weights, values, strict=True):
+        if not any(isinstance(one, float) and one == 0.0 for one in (weight, value)):
+            total = total + weight * value
+    return total
 
 
 def solve(matrix: Sequence[Sequence[Number]], *sides: Sequence[Number]) -> list[list[Number]]:

@@ -1,13 +1,16 @@
-"""Numbers in nested tuples, as frames and elements are: one change for all of them, or all of them in a row."""
+"""Numbers in nested tuples, as frames and elements are: one change for all, all in a row, some lanes of them."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from typing import Any, TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
+
 from trunnion.algebra.namespace import Number
 
-__all__ = ["each", "flat"]
+__all__ = ["each", "flat", "replaced"]
 
 _Nested = TypeVar("_Nested")
 
@@ -31,3 +34,10 @@ def flat(value: Any) -> Iterator[Number]:
             yield from flat(one)
     else:
         yield value
+
+
+def replaced(number: Number, lanes: NDArray[np.bool_], new: Number) -> NDArray[np.float64]:
+    """The number in the shape of `lanes`, with others in the lanes that are chosen."""
+    whole = np.array(np.broadcast_to(number, lanes.shape), float)
+    whole[lanes] = new
+    return whole

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from trunnion.algebra import linalg
 from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number
+from trunnion.algebra.nested import replaced
 from trunnion.analysis import continuation
 from trunnion.errors import Finding, MechanismError
 from trunnion.groups.planar import is_zero, less
@@ -406,11 +407,7 @@ def _follow(problem: Problem, forces: Sequence[Number], lanes: Number) -> tuple[
     part, chosen = problem.picked(lanes)
     shape = chosen.shape
     found, reached = continuation.follow(scaled(part), frictionless(part, chosen))
-    result = []
-    for force, value in zip(forces, found, strict=True):
-        whole = np.array(np.broadcast_to(force, shape), float)
-        whole[chosen] = value
-        result.append(whole)
+    result = [replaced(force, chosen, value) for force, value in zip(forces, found, strict=True)]
     shares = np.ones(shape)
     shares[chosen] = reached
     return result, shares

@@ -23,7 +23,7 @@ import numpy as np
 from trunnion.algebra import linalg
 from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.algebra.nested import each, flat
+from trunnion.algebra.nested import each, flat, replaced
 from trunnion.groups import tree as spanning
 from trunnion.groups.cuts import Row, rows
 from trunnion.groups.gear import NUMBERS, ONE, Gear, GearRow, actions
@@ -207,12 +207,7 @@ class General:
         )
         moved_by = np.zeros(shape)
         moved_by[late] = last
-        merged = []
-        for value, new in zip(q, found, strict=True):
-            whole = np.array(np.broadcast_to(value, shape), float)
-            whole[late] = new
-            merged.append(whole)
-        return merged, moved_by
+        return [replaced(value, late, new) for value, new in zip(q, found, strict=True)], moved_by
 
     def _step(
         self, elements: Elements, q: Sequence[Number], drive: Sequence[Number], limits: Sequence[Number] | None = None
@@ -326,7 +321,7 @@ class General:
 
         open_rates = [row.rate(pose.elements, ends, drive) for row in self._rows]
         for i, line in zip(self.free, pose.inverse, strict=True):
-            rates[i] = -_weighted(line, open_rates)
+            rates[i] = -linalg.weighted(line, open_rates)
         return rates
 
     def _twists(self, pose: Pose, outer: Sequence[Twist | None], rates: Sequence[Number]) -> list[Twist]:
@@ -377,7 +372,7 @@ class General:
         second = self.coordinates((), [0.0] * len(self.free), drive)
         gaps = self._gap_accelerations(known, self._accelerations(known, speeds, second), drive)
         for i, line in zip(self.free, pose.inverse, strict=True):
-            second[i] = -_weighted(line, gaps)
+            second[i] = -linalg.weighted(line, gaps)
         return self._accelerations(known, speeds, second)
 
     def _accelerations(self, known: _Motion, speeds: Sequence[Number], second: Sequence[Number]) -> list[Acceleration]:
@@ -469,7 +464,7 @@ class General:
                 if i in path:
                     outboard = added(outboard, carried[link], 1.0)
             powers.append(screws[i].x * outboard.x + screws[i].y * outboard.y + screws[i].w * outboard.m)
-        return [-_weighted([line[j] for line in pose.inverse], powers) for j in range(len(self._rows))]
+        return [-linalg.weighted([line[j] for line in pose.inverse], powers) for j in range(len(self._rows))]
 
     def closure(self, pose: Pose) -> Number:
         """Largest distance by which a cut joint is open, m."""
@@ -485,13 +480,6 @@ class _Motion(NamedTuple):
     twists: list[Twist]
     outer_twists: Sequence[Twist | None]
     outer: Sequence[Acceleration | None]
-
-
-def _weighted(weights: Sequence[Number], values: Sequence[Number]) -> Number:
-    total: Number = 0.0
-    for weight, value in zip(weights, values, strict=True):
-        total = total + weight * value
-    return total
 
 
 def _reference(pose: Pose) -> Frame:

@@ -25,7 +25,7 @@ import numpy as np
 from trunnion.algebra import linalg
 from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number
-from trunnion.algebra.nested import each, flat
+from trunnion.algebra.nested import each, flat, replaced
 from trunnion.algebra.rigid import (
     ZERO,
     Frame,
@@ -171,13 +171,10 @@ class SpatialGroup(SpatialTree):
         found, last = self._iterate(some, [[part(v) for v in joint] for joint in q], part(size), NEWTON_LIMIT)
         moved_by = np.zeros(shape)
         moved_by[late] = last
-        merged: list[list[Number]] = []
-        for joint, new in zip(q, found, strict=True):
-            merged.append([])
-            for value, better in zip(joint, new, strict=True):
-                whole = np.array(np.broadcast_to(value, shape), float)
-                whole[late] = better
-                merged[-1].append(whole)
+        merged = [
+            [replaced(value, late, better) for value, better in zip(joint, new, strict=True)]
+            for joint, new in zip(q, found, strict=True)
+        ]
         return merged, moved_by
 
     def _step(self, elements: Sequence[Element], q: list[list[Number]], size: Number) -> list[list[Number]]:
@@ -231,7 +228,7 @@ class SpatialGroup(SpatialTree):
     def _closing(self, pose: Pose, rates: list[list[Number]], rows: Sequence[Number]) -> list[list[Number]]:
         """The rates with those of the free coordinates that close what is open."""
         for (k, i), line in zip(self.free, pose.inverse, strict=True) if rows else ():
-            value = -_weighted(line, rows)
+            value = -linalg.weighted(line, rows)
             rates[k][i] = value * pose.size if self.slides(k, i) else value
         return rates
 
@@ -365,7 +362,7 @@ class SpatialGroup(SpatialTree):
             value = value * pose.size if self.slides(k, i) else value
             powers.append(value if child[k].near == 0 else -value)
         rows = range(len(pose.inverse[0]))
-        return [-_weighted([line[j] for line in pose.inverse], powers) for j in rows]
+        return [-linalg.weighted([line[j] for line in pose.inverse], powers) for j in rows]
 
     def closure(self, pose: Pose) -> Number:
         """Largest distance by which a loop is open, m; an angle counts as angle times size."""
@@ -416,12 +413,3 @@ def _condition(jacobian: Sequence[Sequence[Number]], inverse: Sequence[Sequence[
                     total = total + real * real
         direct, reverse = (total, reverse) if matrix is jacobian else (direct, total)
     return 2 * np.sqrt(direct * reverse) / len(inverse)
-
-
-def _weighted(weights: Sequence[Number], values: Sequence[Number]) -> Number:
-    total: Number = 0.0
-    for weight, value in zip(weights, values, strict=True):
-        if (isinstance(weight, float) and weight == 0.0) or (isinstance(value, float) and value == 0.0):
-            continue
-        total = total + weight * value
-    return total

@@ -193,7 +193,8 @@ def _settle_module(back: SpatialBackward, number: int, method: FrictionMethod, g
     for (link, _, _), torque in zip(module.spinning, group.spin_torques(pose, loads), strict=True):
         back.spins[link] = torque
     for k, place in enumerate(places):
-        friction, loss, own = ZERO, _nothing(), ZERO
+        friction, own = ZERO, ZERO
+        loss: Number = 0.0
         for contact, one, force in zip(found, rubbing, settled.forces, strict=True):
             if contact.joint == k:
                 part = times(force, one.unit)
@@ -202,10 +203,6 @@ def _settle_module(back: SpatialBackward, number: int, method: FrictionMethod, g
         wrench = minus(Screw(*halves(settled.reactions[k])), own)
         driven = module.driven.index(place.joint) if place.joint in module.driven else None
         _record(back, place, wrench, friction, loss, None if driven is None else pose.screws[k][0])
-
-
-def _nothing() -> Number:
-    return 0.0
 
 
 def _contact(

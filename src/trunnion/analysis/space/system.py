@@ -117,11 +117,6 @@ class SpatialSystem(System):
             frame = turned(frame, values[f"{path}.rotation"])
         return frame
 
-    def local_place(self, values: Values, link: str, point: str) -> Vector3:
-        """Local place of a named point, m."""
-        path = f"links.{link}.points.{point}"
-        return vector(values, path) if f"{path}.y" in values else self.elements(values)[link, point].place
-
     def centre(self, values: Values, link: str) -> Vector3:  # type: ignore[override]
         """Local place of a link's mass centre, m."""
         return vector(values, f"links.{link}.centre")

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
+from trunnion.analysis import shifts
 from trunnion.errors import Finding, MechanismError
 from trunnion.groups import GROUPS, Group
 from trunnion.groups.gear import Gear
@@ -199,8 +200,22 @@ class System:
         ratio, phase = values[f"gears.{name}.ratio"], values[f"gears.{name}.phase"]
         return (1 / ratio, -phase / ratio) if name in self.turned_round else (ratio, phase)
 
-    def elements(self, values: Values) -> dict[tuple[str, str], Frame]:
-        """Local frame of every joint's element, by (link, joint); c, s is the direction of a slide."""
+    def elements(self, values: Values) -> dict[tuple[str, str], Any]:
+        """Local frame of every joint's element, by (link, joint): errors of joints and seats are in the second ones."""
+        found = self.holes(values)
+        for name, (kind, (_, second)) in self.joints.items():
+            found[second, name] = shifts.seated_planar(found[second, name], kind, values, name)
+        return found
+
+    def holes(self, values: Values) -> dict[tuple[str, str], Any]:
+        """The same where every pin lies in the middle of its hole."""
+        found = self.stated_elements(values)
+        for name, (_, (_, second)) in self.joints.items():
+            found[second, name] = shifts.misaligned_planar(found[second, name], values, name)
+        return found
+
+    def stated_elements(self, values: Values) -> dict[tuple[str, str], Any]:
+        """The same without errors of joints; c, s is the direction of a slide."""
         found: dict[tuple[str, str], Frame] = {}
         for name, (kind, links) in self.joints.items():
             for link in links:

@@ -65,6 +65,11 @@ class SpatialWalk(Forward):
         return self.space.size(self.values, self.local)
 
     @cached_property
+    def _stated(self) -> dict[tuple[str, str], Frame]:
+        """Elements without errors: the points of a loop's links do not move with what lies in them."""
+        return self.space.stated_elements(self.values)
+
+    @cached_property
     def spins(self) -> dict[str, Number]:
         """Angular speed of every link, rad/s; real parts."""
         found = {}
@@ -114,7 +119,7 @@ class SpatialWalk(Forward):
     def _local_place(self, link: str, name: str) -> Vector3:
         path = f"links.{link}.points.{name}"
         if f"{path}.z" not in self.values:
-            return cast(Vector3, self.local[link, name].place)
+            return self._stated[link, name].place
         return cast(Vector3, tuple(self.values[f"{path}.{axis}"] for axis in "xyz"))
 
     def against(self, joint: str) -> Screw:

@@ -14,6 +14,7 @@ from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.rigid import ORIGIN, Frame, element, relative, slid, turned, vector_minus
 from trunnion.algebra.space import Vector3, dot
+from trunnion.analysis import shifts
 from trunnion.analysis.system import Place, System, Values
 from trunnion.groups.cylindrical_dyad import CylindricalDyad
 from trunnion.groups.spatial import SpatialGroup
@@ -77,8 +78,22 @@ class SpatialSystem(System):
 
     # ---- elements -------------------------------------------------------------------------------------------
 
-    def elements(self, values: Values) -> dict[tuple[str, str], Frame]:  # type: ignore[override]
-        """Local frame of every joint's element, by (link, joint): its place, z along the axis of the joint."""
+    def elements(self, values: Values) -> dict[tuple[str, str], Frame]:
+        """Local frame of every joint's element, by (link, joint): errors of joints and seats are in the second ones."""
+        found = self.holes(values)
+        for name, (kind, (_, second)) in self.joints.items():
+            found[second, name] = shifts.seated(found[second, name], kind, values, name)
+        return found
+
+    def holes(self, values: Values) -> dict[tuple[str, str], Frame]:
+        """The same where every pin lies in the middle of its hole."""
+        found = self.stated_elements(values)
+        for name, (_, (_, second)) in self.joints.items():
+            found[second, name] = shifts.misaligned(found[second, name], values, name)
+        return found
+
+    def stated_elements(self, values: Values) -> dict[tuple[str, str], Frame]:
+        """The same without errors of joints: its place, z along the axis of the joint."""
         if self.mechanism.loop:
             return self._loop_elements(values)
         found: dict[tuple[str, str], Frame] = {}

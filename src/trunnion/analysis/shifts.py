@@ -1,0 +1,124 @@
+"""Errors of a joint as shifts of its hole: misalignment that is stated, and play where a seat is known.
+
+The second element of a joint is the hole's frame. An error moves it before the pair does, S → S Â, so modules meet
+only another local element. Where the numbers of a seat are among the values (`seats.JOINT.1.x` …, see `clearance`)
+the pin lies there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from trunnion.algebra import rigid
+from trunnion.algebra.dual import primal
+from trunnion.algebra.namespace import Number, namespace
+from trunnion.algebra.space import plus, scaled
+from trunnion.groups import planar
+from trunnion.joints.clearance import CLEARANCE_MODELS, ClearanceModel, leaning
+
+__all__ = ["Play", "clearance", "hole", "misaligned", "misaligned_planar", "play_of", "seated", "seated_planar"]
+
+Values = Mapping[str, Number]
+
+
+class Play(NamedTuple):
+    """The play of one joint: its model, the radius of each end, m, and the length H, m."""
+
+    model: ClearanceModel
+    radii: tuple[Number, ...]
+    length: Number
+
+
+def clearance(values: Values, joint: str) -> Number | None:
+    """Radial clearance R − r of a pin, or the play of a guide to either side, m; None if none is stated."""
+    for part in ("pin", "guide"):
+        path = f"joints.{joint}.{part}"
+        if f"{path}.clearance" in values:
+            return values[f"{path}.clearance"]
+        if f"{path}.hole_radius" in values and f"{path}.radius" in values:
+            return values[f"{path}.hole_radius"] - values[f"{path}.radius"]
+    return None
+
+
+def play_of(space: str, kind: str, values: Values, joint: str) -> Play | None:
+    """The play that a joint states; None if it has none, or of a kind that has no model of it."""
+    model = CLEARANCE_MODELS[space].get(kind)
+    own = clearance(values, joint)
+    path = f"joints.{joint}"
+    floats = values.get(f"{path}.pin.end_float", 0.0) if model and model.axial else 0.0
+    if model is None or (own is None and np.all(primal(floats) == 0)):
+        return None
+    radius = (own if own is not None else 0.0) + values.get(f"{path}.pin.cylindricity", 0.0)
+    radii = tuple(0.5 * floats if i in model.axial else radius for i in range(len(model.ends)))
+    return Play(model, radii, length_of(model, values, joint))
+
+
+def length_of(model: ClearanceModel, values: Values, joint: str) -> Number:
+    """Length H over which the ends of a play lie apart, m; NaN if it is not stated, 1 where it does not matter."""
+    if model.size is None:
+        return 1.0
+    part, keys = model.size
+    return next((values[path] for key in keys if (path := f"joints.{joint}.{part}.{key}") in values), np.nan)
+
+
+def hole(frame: rigid.Frame, values: Values, joint: str) -> rigid.Frame:
+    """The frame of the hole in space: the second element, moved along its axis by the offset of the pin."""
+    offset = values.get(f"joints.{joint}.pin.offset")
+    return frame if offset is None else frame._replace(place=plus(frame.place, scaled(offset, frame.z)))
+
+
+def misaligned(frame: rigid.Frame, values: Values, joint: str) -> rigid.Frame:
+    """The second element of a joint in space with the misalignment of its axis."""
+    return rigid.compose(frame, _misalignment(values, joint)) if _leans(values, joint) else frame
+
+
+def misaligned_planar(frame: planar.Frame, values: Values, joint: str) -> planar.Frame:
+    """The second element of a joint in the plane, moved by its misalignment."""
+    if not _leans(values, joint):
+        return frame
+    place = _misalignment(values, joint).place
+    return planar.compose(frame, planar.Frame(place[0], place[1]))
+
+
+def seated(frame: rigid.Frame, kind: str, values: Values, joint: str) -> rigid.Frame:
+    """The second element of a joint in space where its pin lies in the hole."""
+    model = CLEARANCE_MODELS["spatial"].get(kind)
+    offsets = model.offsets(values, f"seats.{joint}") if model else None
+    if model is None or offsets is None:
+        return frame
+    middle = hole(frame, values, joint)
+    lain = rigid.compose(middle, model.shift(offsets, length_of(model, values, joint)))
+    back = values.get(f"joints.{joint}.pin.offset")
+    return lain if back is None else lain._replace(place=plus(lain.place, scaled(-back, lain.z)))
+
+
+def seated_planar(frame: planar.Frame, kind: str, values: Values, joint: str) -> planar.Frame:
+    """The second element of a joint in the plane where its pin lies in the hole."""
+    model = CLEARANCE_MODELS["planar"].get(kind)
+    offsets = model.offsets(values, f"seats.{joint}") if model else None
+    if model is None or offsets is None:
+        return frame
+    return planar.compose(frame, planar.Frame(*model.shift(offsets, length_of(model, values, joint))))
+
+
+def _leans(values: Values, joint: str) -> bool:
+    """Whether a misalignment is stated that may be other than 0."""
+    path = f"joints.{joint}.misalignment"
+    numbers = (values.get(f"{path}.{key}", 0.0) for key in ("tilt", "offset"))
+    return any(not (isinstance(number, int | float) and number == 0) for number in numbers)
+
+
+def _misalignment(values: Values, joint: str) -> rigid.Frame:
+    """Leaned by `tilt` towards the direction `towards`, moved by `offset` along `offset_towards`, in the hole's
+    frame.
+    """
+    path = f"joints.{joint}.misalignment"
+    tilt, towards = values.get(f"{path}.tilt", 0.0), values.get(f"{path}.towards", 0.0)
+    offset, aside = values.get(f"{path}.offset", 0.0), values.get(f"{path}.offset_towards", towards)
+    xp = namespace(tilt, towards, offset, aside)
+    slope = xp.sin(tilt) / xp.cos(tilt)
+    place = (offset * xp.cos(aside), offset * xp.sin(aside))
+    return leaning((slope * xp.cos(towards), slope * xp.sin(towards)), 0.0, place)

@@ -86,7 +86,7 @@ def _earles_wu(force: NDArray[np.float64], time: NDArray[np.float64], periodic: 
     along = np.sum(force * rate, axis=1)
     with np.errstate(all="ignore"):
         across = np.sqrt(np.maximum(np.sum(rate * rate, axis=1) - along**2 / size, 0.0))
-        return np.asarray(np.where(size > 0, across / size, np.nan))
+        return np.where(size > 0, across / size, np.nan)
 
 
 def _least_loaded(forces: NDArray[np.float64], rows: Sequence[int], late: NDArray[np.intp]) -> NDArray[np.intp]:
@@ -96,7 +96,7 @@ def _least_loaded(forces: NDArray[np.float64], rows: Sequence[int], late: NDArra
     peak = np.max(sizes, axis=-1, keepdims=True)
     share = np.where(there, sizes / np.where(peak > 0, peak, 1.0), np.inf)
     least = np.argmin(np.min(share, axis=1)[:, late], axis=0) if len(late) else np.zeros(0, np.intp)
-    return np.asarray(rows, np.intp)[least]
+    return np.array([rows[k] for k in least], np.intp)
 
 
 def _of_joint(seat: Seat, forces: NDArray[np.float64], periodic: bool, largest: float) -> Loss:

@@ -23,7 +23,7 @@ from trunnion.algebra.nested import flat
 from trunnion.analysis.friction import FrictionMethod
 from trunnion.analysis.kinetostatics import Backward
 from trunnion.analysis.shifts import Play, play_of
-from trunnion.analysis.system import Cycle, System, Values
+from trunnion.analysis.system import Cycle, System, Values, rubbing
 from trunnion.joints.clearance import described, pressed, turned_by_friction
 
 if TYPE_CHECKING:
@@ -165,7 +165,7 @@ def settle(run: Run, seen: Lanes, method: FrictionMethod, start: Backward) -> Se
     rounds, change = np.zeros(len(seen.times), np.intp), np.zeros(len(seen.times))
     if any(seat.given is None for seat in run.seats):
         _iterate(run, seen.times, quick, offsets, rounds, change, closely=False)
-    rates = _rates(run, seen, offsets)
+    rates = _rates(run, seen, offsets, start)
     mine = {path: numbers[seen.own] for path, numbers in offsets.items()}
     rounds, change = rounds[seen.own], change[seen.own]
     back = run.at(time, mine, method, rates=rates)
@@ -204,21 +204,35 @@ def _iterate(
         left = left[(change[left] > enough) & (rounds[left] < ROUNDS)]
 
 
-def _rates(run: Run, seen: Lanes, offsets: Mapping[str, NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
+def _rates(
+    run: Run, seen: Lanes, offsets: Mapping[str, NDArray[np.float64]], start: Backward
+) -> dict[str, NDArray[np.float64]]:
     """How fast the seats travel, m/s, by central differences; 0 where one jumps, and where nothing moves.
 
-    A seat that turns by more than a right angle between the neighbours of a position is taken to jump.
+    Where a joint with friction turns round between the neighbours of a position its seat jumps by twice atan μ:
+    there the difference is taken on the side of the position. So it is 0 where a seat turns by more than a right angle.
     """
-    span = seen.times[seen.after] - seen.times[seen.before]
+    one, two = _alike(run.system, seen, start)
+    span = seen.times[two] - seen.times[one]
     found: dict[str, NDArray[np.float64]] = {}
     for seat in run.seats:
         for end in seat.play.model.ends:
             paths = [f"seats.{seat.joint}.{key}" for key in end]
-            one, two = ([offsets[path][side] for path in paths] for side in (seen.before, seen.after))
-            smooth = (functools.reduce(operator.add, (a * b for a, b in zip(one, two, strict=True))) > 0) & (span > 0)
-            for path, a, b in zip(paths, one, two, strict=True):
+            was, is_ = ([offsets[path][side] for path in paths] for side in (one, two))
+            smooth = (functools.reduce(operator.add, (a * b for a, b in zip(was, is_, strict=True))) > 0) & (span > 0)
+            for path, a, b in zip(paths, was, is_, strict=True):
                 found[path] = np.where(smooth, (b - a) / np.where(span > 0, span, 1.0), 0.0)
     return {path: rate for path, rate in found.items() if np.any(rate)}
+
+
+def _alike(system: System, seen: Lanes, start: Backward) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Lanes before and after each position, or the position itself where a friction has another sense on that side."""
+    before, after = seen.before.copy(), seen.after.copy()
+    for joint in rubbing(system):
+        sense = np.broadcast_to(np.sign(primal(start.slips[joint].speed)), seen.times.shape)
+        before = np.where(sense[before] == sense[seen.own], before, seen.own)
+        after = np.where(sense[after] == sense[seen.own], after, seen.own)
+    return before, after
 
 
 def _loads(run: Run, back: Backward) -> dict[str, list[Vector]]:

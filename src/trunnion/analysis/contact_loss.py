@@ -54,8 +54,7 @@ def find(arrays: Arrays, run: Run, time: NDArray[np.float64]) -> list[Loss]:
     """Losses of contact of every joint that its load seats; written into `contact_lost` and the status."""
     found: list[Loss] = []
     joints = list(run.system.joints)
-    meant = arrays["reaction_force"] - arrays["reaction_force_change"]
-    arrays["contact_loss_number"][:] = _earles_wu(meant, time, run.cycle.periodic)
+    arrays["contact_loss_number"][:] = _numbers(arrays, run, time)
     largest = float(np.nanmax(np.abs(arrays["reaction_force"]), initial=0.0))
     late = np.flatnonzero(arrays["seat_change"] > TOLERANCE)
     loaded = [seat for seat in run.seats if seat.given is None]
@@ -72,6 +71,14 @@ def find(arrays: Arrays, run: Run, time: NDArray[np.float64]) -> list[Loss]:
     status = arrays["status"]
     np.maximum(status, np.where(anywhere, status.dtype.type(Status.CONTACT_LOST), status.dtype.type(0)), out=status)
     return found
+
+
+def _numbers(arrays: Arrays, run: Run, time: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The figure of Earles and Wu of every joint: of its reaction without play, in space of the force on an end."""
+    if run.system.mechanism.space == "planar":
+        return _earles_wu(arrays["reaction_force"] - arrays["reaction_force_change"], time, run.cycle.periodic)
+    ends = [_earles_wu(arrays["end_force"][:, end], time, run.cycle.periodic) for end in (0, 1)]
+    return np.fmax(*ends)
 
 
 def _earles_wu(force: NDArray[np.float64], time: NDArray[np.float64], periodic: bool) -> NDArray[np.float64]:

@@ -23,6 +23,7 @@ from trunnion.model.check_values import check_values
 from trunnion.model.contact import motions
 from trunnion.model.expression import MOTION, RESERVED
 from trunnion.model.names import nearest
+from trunnion.model.parameter_names import ERRORS
 from trunnion.model.parameters import ParameterSet, dimension_errors, entries, evaluation_order
 from trunnion.model.parts import Driver, Friction, Joint, Load, Measure, freedoms
 from trunnion.model.quantity import UNREADABLE
@@ -106,7 +107,7 @@ def _dimensions(mechanism: Mechanism, known: dict[str, Dimension | None], unread
     deviations = dimension_errors(entries(mechanism)) if mechanism.errors else {}
     order, circles = evaluation_order(dimensions, deviations)
     for circle in circles:
-        unreadable.update(f"dimensions.{name}" for name in circle)
+        unreadable.update(f"{before}dimensions.{name}" for name in circle for before in ("", ERRORS))
         ring = " → ".join([*circle, circle[0]])
         yield Finding(f"is defined by itself: {ring}", f"dimensions.{circle[0]}", "give one of them a value")
     for name in order:

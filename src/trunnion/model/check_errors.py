@@ -105,7 +105,7 @@ def _pin(mechanism: Mechanism, name: str, own: Pin | None, where: str) -> Iterat
         what = "an end float is the play along the axis of a revolute joint in space"
         yield Finding(what, f"{where}.pin.end_float", "remove it")
     if merged and merged.fit and isinstance(found := _fit(mechanism, name), Finding):
-        yield Finding(found.what, f"{where}.pin.fit" if own and own.fit else "joint_defaults.pin.fit", found.remedy)
+        yield Finding(found.what, _fit_place(mechanism, name), found.remedy)
 
 
 def _fit(mechanism: Mechanism, name: str) -> FitLimits | Finding | None:
@@ -194,7 +194,7 @@ def play_values(mechanism: Mechanism, name: str, numbers: ParameterSet) -> Itera
     yield from _play_sign(mechanism, name, joint, numbers)
     found = _fit(mechanism, name)
     if isinstance(found, FitLimits):
-        yield from _press(joint, found, where)
+        yield from _press(joint, found, _fit_place(mechanism, name))
     yield from _play_size(mechanism, name, joint, values)
 
 
@@ -213,7 +213,13 @@ def _play_sign(mechanism: Mechanism, name: str, joint: Joint, numbers: Parameter
         yield Finding(what, entry.alias or entry.path, "check the two; a press fit is a fixed joint")
     elif joint.seat not in (None, "free"):
         what = f"the nominal play of the fit {pin.fit.source} is {_um(hole - radius)} on the radius: no pin lies in it"
-        yield Finding(what, f"{where}.pin.fit", "take another fit, fits: maximum, or seat: free")
+        yield Finding(what, _fit_place(mechanism, name), "take another fit, fits: maximum, or seat: free")
+
+
+def _fit_place(mechanism: Mechanism, name: str) -> str:
+    """Where the fit of a joint is stated: with the joint or with the defaults."""
+    own = mechanism.stated_joints[name].pin
+    return f"joints.{name}.pin.fit" if own and own.fit else "joint_defaults.pin.fit"
 
 
 def _press(joint: Joint, found: FitLimits, where: str) -> Iterator[Finding]:
@@ -222,10 +228,10 @@ def _press(joint: Joint, found: FitLimits, where: str) -> Iterator[Finding]:
     reach = f"its play on the diameter is {_um(found.minimum)} to {_um(found.maximum)}"
     if found.maximum <= MEASURABLE:
         what = f"{text} is a press fit, no play: it cannot turn as a bearing; {reach}"
-        yield Finding(what, f"{where}.pin.fit", "take a shaft of class e to h, such as g6", Severity.WARNING)
+        yield Finding(what, where, "take a shaft of class e to h, such as g6", Severity.WARNING)
     elif found.minimum < -MEASURABLE:
         what = f"{text} may press: {reach}"
-        yield Finding(what, f"{where}.pin.fit", "take a shaft of class e to h, such as g6", Severity.WARNING)
+        yield Finding(what, where, "take a shaft of class e to h, such as g6", Severity.WARNING)
 
 
 def _play_size(mechanism: Mechanism, name: str, joint: Joint, values: Mapping[str, Number]) -> Iterator[Finding]:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from trunnion import sweep
 from trunnion.algebra.dual import Dual
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.model.check import check_model
@@ -91,14 +92,45 @@ def test_short_names_stay_unique_beside_errors() -> None:
     assert off.with_values({"errors.links.crank.mass": 0.2}).errors["crank.mass"].evaluate() == 0.2
 
 
+def test_paths_of_what_is_not_stated_yet() -> None:
+    paths = {
+        "errors.AB": "errors.dimensions.AB",
+        "AB": "dimensions.AB",
+        "B.pin.clearance": "joints.B.pin.clearance",
+        "joints.B.seat.xi": "joints.B.seat.xi",
+        "joint_defaults.pin.clearance": "joint_defaults.pin.clearance",
+    }
+    assert {name: FOURBAR.path_of(name) for name in paths} == paths
+    for name in (
+        "B.pin.clearence",
+        "X.pin.clearance",
+        "joint_defaults.misalignment.tilt",
+        "B.pin.fit",
+        "B.seat.direction",
+    ):
+        with pytest.raises(MechanismError):
+            FOURBAR.path_of(name)
+    kinds = FOURBAR.with_values({"errors.AB": 1e-5, "errors.gamma": 1e-5}).parameter_kinds()
+    assert [kinds[f"errors.dimensions.{name}"].unit for name in ("AB", "gamma")] == ["m", "rad"]
+
+
+def test_sweeps_over_what_is_not_stated_and_what_has_an_error() -> None:
+    off = FOURBAR.with_values({"errors.AB": "1 mm"})
+    lengths = sweep(off, {"AB": ("1.9 m", "2.1 m", 3)}, steps=6)
+    assert lengths["AB"].values == pytest.approx([1.9, 2.0, 2.1], rel=1e-15)
+    errors = sweep(FOURBAR, {"errors.AB": ("0 mm", "2 mm", 3)}, steps=6)
+    expected = sweep(FOURBAR, {"AB": ("2 m", "2.002 m", 3)}, steps=6)
+    np.testing.assert_allclose(errors["efficiency"], expected["efficiency"], rtol=1e-12)
+
+
 @pytest.mark.parametrize(
     ("values", "what"),
     [
         ({"errors.ABX": 1}, "there is no number named 'ABX' — did you mean 'AB'?"),
         ({"errors.mass": 1}, "the name 'mass' stands for 4 numbers"),
-        ({"errors.AB": "1 deg"}, "errors.AB: '1 deg' is an angle, 'AB' a length"),
-        ({"errors.AB": "0.1"}, "errors.AB: '0.1' is a number, 'AB' a length"),
-        ({"errors.gamma": "1 mm"}, "errors.gamma: '1 mm' is a length, 'gamma' an angle"),
+        ({"errors.AB": "1 deg"}, "errors.AB: '1 deg' is an angle where a length is needed"),
+        ({"errors.AB": "0.1"}, "errors.AB: '0.1' has no unit where a length is needed"),
+        ({"errors.gamma": "1 mm"}, "errors.gamma: '1 mm' is a length where an angle is needed"),
         ({"errors.crank.mass": "1 mm"}, "errors.crank.mass: '1 mm' is a length where a mass is needed"),
         ({"errors.AB": 1e-5, "errors.dimensions.AB": 1e-5}, "'dimensions.AB' and 'AB' are the same number"),
         ({"errors.AB": "AB / 1000"}, "is defined by itself: AB → AB"),

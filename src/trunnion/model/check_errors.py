@@ -14,13 +14,12 @@ from trunnion.model.contact import PLAY_PAIRS, has_guide, has_pin, has_play, pla
 from trunnion.model.joint_parts import Joint, Pin, Seat
 from trunnion.model.merge import stated
 from trunnion.model.parameter_names import ERRORS, ParameterNames
-from trunnion.model.parameters import Entry, ParameterSet, entries, nominal_dimensions
-from trunnion.model.units import Dimension, dimension_text, fits
+from trunnion.model.parameters import ParameterSet, entries, nominal_dimensions
 
 if TYPE_CHECKING:
     from trunnion.model.mechanism import Mechanism
 
-__all__ = ["error_unit", "errors", "joint_errors", "play_values"]
+__all__ = ["errors", "joint_errors", "play_values"]
 
 STEEPEST = np.pi / 4  # of a tilt: beyond it is another design, and more likely a slip of the unit
 MEASURABLE = 1e-9  # m: half a millionth of a millimetre of interference is rounding
@@ -52,16 +51,6 @@ def errors(mechanism: Mechanism) -> Iterator[Finding]:
             yield Finding(
                 f"'{path}' varies with the motion and has no one error", where, "state one of a dimension in it"
             )
-
-
-def error_unit(entry: Entry, dimension: Dimension | None, known: Mapping[str, Dimension | None]) -> Iterator[Finding]:
-    """Whether the error of a dimension of the model measures what the dimension does; that of others has their kind."""
-    section, _, name = entry.path.removeprefix(ERRORS).partition(".")
-    wanted = known.get(name) if section == "dimensions" and entry.path.startswith(ERRORS) else None
-    if dimension is None or wanted is None or (fits(dimension, wanted) and any(dimension) == any(wanted)):
-        return
-    what = f"'{entry.quantity.source}' is {dimension_text(dimension)}, '{name}' {dimension_text(wanted)}"
-    yield Finding(what, entry.where, "give the error in a unit of what it changes")
 
 
 # ---- what is stated of joints ---------------------------------------------------------------------------------

@@ -239,18 +239,27 @@ class Mechanism(Part):
             _assign(data, self._location(name), value, self.coordinates)
         return Mechanism(**data)
 
+    def path_of(self, name: str) -> str:
+        """The path of the number that a name means in `with_values`, stated or not; MechanismError if it means none."""
+        try:
+            return self.parameter_set.resolve(name)
+        except MechanismError:
+            found = self._unstated(name)
+            if not found:
+                raise
+            return found[0]
+
     def _location(self, name: str) -> Location:
         """Where what a name means stands, or would stand; MechanismError if it means nothing."""
         choice = self._choice(name)
         if choice:
             return choice
-        try:
-            return self.parameter_set.entries[self.parameter_set.resolve(name)].location
-        except MechanismError:
-            found = self._unstated(name)
-            if not found:
-                raise
-            return found
+        entry = self.parameter_set.entries.get(self.path_of(name))
+        if entry:
+            return entry.location
+        found = self._unstated(name)
+        assert found is not None  # or it would have no path
+        return found[1]
 
     def _choice(self, name: str) -> Location | None:
         """Where a choice among words stands; None if the name is of a number."""
@@ -262,21 +271,22 @@ class Mechanism(Part):
                 return (*holder, *choice.split("."))
         return None
 
-    def _unstated(self, name: str) -> Location | None:
-        """Where the error of a number, or a number of a joint that the file may state and does not, would stand."""
+    def _unstated(self, name: str) -> tuple[str, Location] | None:
+        """Path and place of the error of a number, or of a number of a joint, that the file may state and does not."""
         if name.startswith("errors."):
             named = name.removeprefix("errors.")
-            self.parameter_set.resolve(named)
-            return ("errors", named)
+            return f"errors.{self.parameter_set.resolve(named)}", ("errors", named)
         for part, kind in _JOINT_PARTS.items():
             before, found, rest = name.rpartition(f".{part}.")
             holder = self._holder(before) if found else None
             key, *below = rest.split(".")
             if not holder or key not in kind.model_fields or (holder == ("joint_defaults",) and part == "misalignment"):
                 continue
-            if key == "direction":
-                return (*holder, part, key, "xyz".index(below[0])) if below in (["x"], ["y"], ["z"]) else None
-            return None if below or key == "fit" else (*holder, part, key)
+            owner = before if before.startswith("joint") and before not in self.stated_joints else f"joints.{before}"
+            path = f"{owner}.{part}.{rest}"
+            if key == "direction" and below in (["x"], ["y"], ["z"]):
+                return path, (*holder, part, key, "xyz".index(below[0]))
+            return None if below or key in ("fit", "direction") else (path, (*holder, part, key))
         return None
 
     def _holder(self, name: str) -> Location | None:

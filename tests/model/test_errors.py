@@ -321,6 +321,10 @@ def test_the_end_float_of_the_defaults_is_for_revolute_joints() -> None:
 def test_choices_are_refused_with_those_there_are() -> None:
     assert "is none of 'free' or 'loaded'" in refusal(PLAYING, {"joints.A.seat": "lose"})
     assert "'minimum', 'mean' or 'maximum'" in refusal(PLAYING, {"fits": "meen"})
+    data = PLAYING.data()
+    data["joints"]["A"]["seat"] = {}
+    with pytest.raises(MechanismError, match=r"joints\.A\.seat: says nowhere to lie"):
+        Mechanism(**data)
     assert "takes free, loaded or a group" in refusal(PLAYING, {"joints.A.seat": [1, 2]})
 
 

@@ -60,6 +60,7 @@ def joint_errors(mechanism: Mechanism) -> Iterator[Finding]:
     """Plays, seats and misalignments that a joint cannot have, or that lack something."""
     for name, joint in mechanism.effective_joints.items():
         own, where = mechanism.stated_joints[name], f"joints.{name}"
+        yield from _empty_seat(own.seat, where)
         if own.misalignment is not None:
             yield from _misalignment(own, f"{where}.misalignment", mechanism.space == "spatial")
         if has_pin(joint.type):
@@ -147,10 +148,16 @@ def _seat(mechanism: Mechanism, joint: Joint, stated_at: str, where: str) -> Ite
         yield Finding("a pin in the plane does not lean: its beta is 0", f"{at}.beta", "keep xi")
 
 
+def _empty_seat(seat: object, where: str) -> Iterator[Finding]:
+    if isinstance(seat, Seat) and not stated(seat):
+        yield Finding("says nowhere to lie", f"{where}.seat", "write {xi: 30 deg}, or of a ball {direction: [0, 0, 1]}")
+
+
 def _defaults(mechanism: Mechanism) -> Iterator[Finding]:
     """Defaults that mean no joint."""
     pin, seat = mechanism.joint_defaults.pin, mechanism.joint_defaults.seat
     joints = mechanism.effective_joints.values()
+    yield from _empty_seat(seat, "joint_defaults")
     if pin and pin.end_float is not None and mechanism.space == "planar":
         yield Finding("there is no end float in the plane", "joint_defaults.pin.end_float", "remove it")
     if seat not in (None, "free") and not any(has_play(joint) for joint in joints):

@@ -271,7 +271,8 @@ def _fill_as_built(
     scratch = results.allocate(labels, len(seen.times), run.system.engine.absent(run.system))
     meant = run.ideal(seen.times, quick)
     _fill(scratch, meant, seen.times, slice(0, len(seen.times)))
-    scratch = {name: array[..., seen.own] for name, array in scratch.items()}
+    own = slice(int(seen.own[0]), int(seen.own[-1]) + 1)
+    scratch = {name: array[..., own] for name, array in scratch.items()}
     for name, array in ideal.items():
         array[..., window] = scratch[name]
     if run.seats:

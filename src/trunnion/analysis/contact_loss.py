@@ -58,11 +58,11 @@ def find(arrays: Arrays, run: Run, time: NDArray[np.float64]) -> list[Loss]:
     largest = float(np.nanmax(np.abs(arrays["reaction_force"]), initial=0.0))
     late = np.flatnonzero(arrays["seat_change"] > TOLERANCE)
     loaded = [seat for seat in run.seats if seat.given is None]
+    least = _least_loaded(arrays["end_force"][..., late], [joints.index(one.joint) for one in loaded])
     for seat in loaded:
         i = joints.index(seat.joint)
         loss = _of_joint(seat, arrays["end_force"][i], run.cycle.periodic, largest)
-        mine = _least_loaded(arrays["end_force"], [joints.index(one.joint) for one in loaded], late) == i
-        loss = Loss(loss.joint, loss.places, loss.least, loss.peak, late[mine], loss.loaded)
+        loss = Loss(loss.joint, loss.places, loss.least, loss.peak, late[least == i], loss.loaded)
         if loss.places or len(loss.unsettled) or not loss.loaded:
             found.append(loss)
         lost = np.array([round(place) % len(time) for place, _ in loss.places], np.intp)
@@ -96,13 +96,10 @@ def _earles_wu(force: NDArray[np.float64], time: NDArray[np.float64], periodic: 
         return np.where(size > 0, across / size, np.nan)
 
 
-def _least_loaded(forces: NDArray[np.float64], rows: Sequence[int], late: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Of the joints with loaded seats that whose end bears least of its peak, at each position that did not settle."""
-    sizes = np.sqrt(np.sum(np.nan_to_num(forces[rows]) ** 2, axis=2))
-    there = np.any(np.isfinite(forces[rows]), axis=2)
-    peak = np.max(sizes, axis=-1, keepdims=True)
-    share = np.where(there, sizes / np.where(peak > 0, peak, 1.0), np.inf)
-    least = np.argmin(np.min(share, axis=1)[:, late], axis=0) if len(late) else np.zeros(0, np.intp)
+def _least_loaded(forces: NDArray[np.float64], rows: Sequence[int]) -> NDArray[np.intp]:
+    """Of the joints with loaded seats that whose end bears least, at each of some positions."""
+    sizes = np.sqrt(np.sum(forces[rows] ** 2, axis=2))
+    least = np.argmin(np.nan_to_num(np.min(np.where(np.isfinite(sizes), sizes, np.inf), axis=1)), axis=0)
     return np.array([rows[k] for k in least], np.intp)
 
 

@@ -280,6 +280,8 @@ def _fill_as_built(
         causes.note_seats(seated.offsets)
         _fill(arrays, seated.back, part, window, causes)
         fill_seats(arrays, run.seats, seated, window)
+        status = arrays["status"][window]
+        np.maximum(status, np.where(seated.sticks, status.dtype.type(Status.ZERO_SLIP), 0), out=status)
     else:
         _fill(arrays, run.solve(part, method=method), part, window, causes)
     links = labels["link"]

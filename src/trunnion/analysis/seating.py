@@ -53,7 +53,8 @@ class Seated:
     """What the positions of one walk came to with their pins in their seats.
 
     offsets: by the names of `shifts` (`seats.JOINT.1.x`), m; loads: of the pin on each end of its hole, N, by joint;
-    rounds: of the iteration; change: of the seats in the last round, of their clearances.
+    rounds: of the iteration; change: of the seats in the last round, of their clearances; turning: positions at which a
+    joint with friction is about to turn round.
     """
 
     back: Backward
@@ -61,11 +62,15 @@ class Seated:
     loads: dict[str, list[Vector]]
     rounds: NDArray[np.intp]
     change: NDArray[np.float64]
+    turning: NDArray[np.bool_]
 
     @property
-    def unsettled(self) -> NDArray[np.bool_]:
-        """Positions whose seats did not come to rest."""
-        return self.change > TOLERANCE
+    def sticks(self) -> NDArray[np.bool_]:
+        """Positions whose seats do not come to rest since a joint turns round there: either sense turns it back.
+
+        The pin travels across its hole while the joint itself is at rest, and its friction is an interval.
+        """
+        return (self.change > TOLERANCE) & self.turning
 
 
 def seats(system: System, values: Values) -> list[Seat]:
@@ -165,14 +170,14 @@ def settle(run: Run, seen: Lanes, method: FrictionMethod, start: Backward) -> Se
     offsets = _next(run, start, len(seen.times))
     rounds, change = np.zeros(len(seen.times), np.intp), np.zeros(len(seen.times))
     loaded = any(seat.given is None for seat in run.seats)
+    turning = _slow(run.system, start)[seen.own]
     if loaded:
         _iterate(run, seen.times, quick, offsets, rounds, change, np.sqrt(TOLERANCE))
     rates = _rates(run, seen, offsets, start)
     mine = {path: numbers[seen.own] for path, numbers in offsets.items()}
     rounds, change = rounds[seen.own], change[seen.own]
     if loaded:  # where a joint turns round, the travel of the seats decides the sense of its friction
-        turns = np.flatnonzero(_slow(run.system, start)[seen.own])
-        _iterate(run, time, quick, mine, rounds, change, TOLERANCE, turns, rates)
+        _iterate(run, time, quick, mine, rounds, change, TOLERANCE, np.flatnonzero(turning), rates)
     back = run.at(time, mine, method, rates=rates)
     if loaded:  # this walk shows whether the seats have settled
         rounds += rounds < ROUNDS
@@ -181,7 +186,7 @@ def settle(run: Run, seen: Lanes, method: FrictionMethod, start: Backward) -> Se
         if len(left):
             _iterate(run, time, quick, mine, rounds, change, TOLERANCE, left, rates)
             back = run.at(time, mine, method, rates=rates)
-    return Seated(back, mine, _loads(run, back), rounds, change)
+    return Seated(back, mine, _loads(run, back), rounds, change, turning)
 
 
 def _slow(system: System, start: Backward) -> NDArray[np.bool_]:

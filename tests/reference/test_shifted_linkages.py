@@ -17,7 +17,8 @@ from mechanisms import MODELS, build, four_bar, model
 from mechanisms_space import MODELS as SPACE_MODELS
 from mechanisms_space import Drawn
 from mechanisms_space import rssr as rssr_model
-from reference.maximal_space import Array, Data, Drive, Frame, Linkage, element, point, rotation
+from reference.maximal_space import Array, Data, Drive, Frame, Linkage, rotation
+from reference.shifted_space import moved
 from trunnion.joints.clearance import CLEARANCE_MODELS, worst_case
 
 FOUR_BAR = (0.100, 0.030, 0.090, 0.070)  # ground, crank, coupler, rocker; m
@@ -193,31 +194,6 @@ def offsets_for(space: str, data: Data, size: float, seed: int) -> dict[str, flo
             keys = [key for end in CLEARANCE_MODELS[space][joint["type"]].ends for key in end]
             found |= {f"seats.{name}.{key}": float(size * rng.uniform(-1, 1)) for key in keys}
     return found
-
-
-def moved(data: Data, seats: dict[str, float]) -> Data:
-    """The model in space with second elements moved as the offsets say."""
-    links = {name: {**link, "points": dict(link["points"])} for name, link in data["links"].items()}
-    defaults = data.get("joint_defaults", {})
-    for name, joint in data["joints"].items():
-        own = {key.removeprefix(f"seats.{name}."): n for key, n in seats.items() if key.startswith(f"seats.{name}.")}
-        if not own:
-            continue
-        pin, guide = ({**defaults.get(key, {}), **joint.get(key, {})} for key in ("pin", "guide"))
-        link = joint["links"][1]
-        if joint["type"] == "spherical":
-            shift = Frame(np.array([own[f"1.{axis}"] for axis in "xyz"]), np.eye(3))
-        else:
-            length = guide["length"] if joint["type"] == "prismatic" else pin.get("length", pin.get("bearing"))
-            (x1, y1), (x2, y2) = ([own[f"{end}.{axis}"] for axis in "xy"] for end in (1, 2))
-            lean = np.array([x2 - x1, y2 - y1]) / length
-            axis, size = np.array([-lean[1], lean[0], 0]), float(np.hypot(*lean))
-            place = np.array([(x1 + x2) / 2, (y1 + y2) / 2, own.get("3.z", 0.0)])
-            shift = Frame(place, rotation(axis, np.arctan(size)))
-            middle = Frame(np.array([0, 0, pin.get("offset", 0.0)]), np.eye(3))
-            shift = middle @ shift @ middle.inverse()
-        links[link]["points"][name] = point(element(links[link], name) @ shift)
-    return {**data, "links": links}
 
 
 @pytest.mark.parametrize("name", SPACE_MODELS)

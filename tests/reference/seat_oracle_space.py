@@ -74,10 +74,16 @@ def _values(data: Data, offsets: Mapping[str, Array]) -> dict[str, float]:
     }
 
 
+def _hole(data: Data, motions: Mapping[str, Motion], name: str) -> Frame:
+    """The second element where the pin lies in the middle of its hole."""
+    second = data["joints"][name]["links"][1]
+    own = element(data["links"][second], name)
+    return motions[second].frame @ own if second in motions else own
+
+
 def _loads(data: Data, motions: Mapping[str, Motion], oracle: Oracle, found: Solution, name: str) -> Array:
     """Q of each end in the frame of the hole, whose middle the moment counts about."""
-    second = data["joints"][name]["links"][1]
-    hole = motions[second].frame @ element(data["links"][second], name)
+    hole = _hole(data, motions, name)
     force = hole.axes.T @ found.force[name]
     if _ball(data, name):
         return np.array([force])
@@ -95,16 +101,23 @@ def _loads(data: Data, motions: Mapping[str, Motion], oracle: Oracle, found: Sol
 
 def _seat(data: Data, motions: Mapping[str, Motion], loads: Array, oracle: Oracle, name: str) -> Array:
     """c = ρ n: Q = N (n − μ t), t the way the hole slips past the pin at n."""
-    mu, rho = oracle.coefficient(name), _clearance(data, name)
+    mu, rho = oracle.coefficient(name) * _across(data, motions, oracle, name), _clearance(data, name)
     one, two = oracle.elements(motions, name)
-    second = data["joints"][name]["links"][1]
-    hole = motions[second].frame @ element(data["links"][second], name)
+    hole = _hole(data, motions, name)
     spin = hole.axes.T @ (two.spin - one.spin)
     seats = np.zeros_like(loads)
     for end, load in enumerate(loads):
         n = load / np.linalg.norm(load)
         seats[end] = rho * (_ball_contact(n, mu, spin) if _ball(data, name) else _pin_contact(n, mu, spin[2]))
     return seats
+
+
+def _across(data: Data, motions: Mapping[str, Motion], oracle: Oracle, name: str) -> float:
+    """Share of the friction that acts across the axis: all of it but where a pin slides along its hole too."""
+    if data["joints"][name]["type"] != "cylindrical":
+        return 1.0
+    slip = oracle.slip(motions, name)
+    return float(abs(slip.turn) / np.hypot(slip.turn, slip.slide / _pin(data, name)["radius"]))
 
 
 def _pin_contact(q: Array, mu: float, rate: float) -> Array:

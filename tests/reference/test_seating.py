@@ -66,7 +66,11 @@ def offsets_of(run: Run, result: xr.Dataset) -> dict[str, Array]:
 @pytest.mark.parametrize("friction", [0.0, 0.12, 0.3])
 @pytest.mark.parametrize("name", LINKAGES)
 def test_seats_reactions_and_places(name: str, friction: float) -> None:
-    """All pins and the guide with play: seats to 2e-6 of the clearance, links to 1e-9, forces and drive to 1e-8."""
+    """All pins and the guide with play: seats to 2e-6 of the clearance, links to 1e-9, forces and drive to 1e-8.
+
+    Forces at the seats as found, with pins held in them: with friction, that a seat travels turns the slip round a
+    little earlier or later, and the result has that.
+    """
     data, steps = loaded(name, friction), 36
     result, oracle = analysed(data, steps), LINKAGES[name][1](data)
     assert set(result.status.values) <= {int(Status.SOLVED)}
@@ -82,7 +86,7 @@ def test_seats_reactions_and_places(name: str, friction: float) -> None:
                 place = complex(*found[end, :2]) if pin else found[end, 1]
                 assert abs(place - c) < 2e-6 * oracle.clearance(joint)
                 load = complex(*loads[end, :2]) if pin else loads[end, 1]
-                assert abs(load - q) < 5e-3 * abs(q) + 0.05
+                assert abs(load - q) < (1e-3 if friction else 1e-6) * abs(q) + 1e-8
         for link, motion in settled.links.items():
             turned = float(result.link_angle.sel(link=link).values[i]) - motion.angle
             assert abs(np.angle(np.exp(1j * turned))) < 1e-9
@@ -233,6 +237,15 @@ def test_guide_whose_ends_change_sides() -> None:
     assert len(lost) <= 2 * sum(np.sum(np.diff(side) != 0) + 1 for side in sides)
 
 
+@pytest.mark.xfail(strict=True, reason="what lies between two positions is taken from the line between their loads")
+def test_a_load_that_turns_quickly_does_not_jump() -> None:
+    """Degree by degree the load of the rod's pin stays above 5 % of its peak and the seat follows; 15° apart too."""
+    fine = analysed(loaded("slider-crank"), 360)
+    assert not fine.contact_lost.values.any()
+    assert float(np.min(np.hypot(*fine.end_force.sel(joint="B").values[0]))) > 4.0
+    assert not analysed(loaded("slider-crank"), 24).contact_lost.values.any()
+
+
 # ---- power ----------------------------------------------------------------------------------------------------
 
 
@@ -264,7 +277,6 @@ def test_a_cycle_without_friction_takes_no_work(name: str) -> None:
     )
 
 
-@pytest.mark.xfail(strict=True, reason="ω² r of the accelerations has the seats' way in ω, their α and a have not")
 @pytest.mark.parametrize("name", LINKAGES)
 def test_reactions_of_a_result_are_those_of_its_seats(name: str) -> None:
     """The forces that `analyse` writes are those of the oracle at the same seats, to 1e-8."""
@@ -274,7 +286,8 @@ def test_reactions_of_a_result_are_those_of_its_seats(name: str) -> None:
         settled = oracle.settle(float(theta))
         size = max(np.hypot(*force) for force in settled.solution.force.values())
         for joint, force in settled.solution.force.items():
-            np.testing.assert_allclose(result.reaction_force.sel(joint=joint).values[:, i], force, atol=1e-8 * size)
+            written = result.reaction_force.sel(joint=joint).values[:, i]
+            np.testing.assert_allclose(written, force, rtol=0, atol=1e-8 * size)
 
 
 def test_velocities_contain_the_way_of_the_seats() -> None:
@@ -367,6 +380,8 @@ def test_rssr_with_play_in_all_joints(friction: float) -> None:
             np.testing.assert_allclose(found, ends, rtol=0, atol=2e-6 * 2e-5)
             force = [float(np.ravel(n)[0]) for n in back.reactions[joint].u]
             np.testing.assert_allclose(force, settled.solution.force[joint], rtol=0, atol=1e-7 * size)
+            written = result.reaction_force.sel(joint=joint).values[:, i]  # with the slip of seats that travel
+            np.testing.assert_allclose(written, force, rtol=0, atol=(5e-4 if friction else 1e-7) * size)
 
 
 def test_cardan_with_play_in_all_joints() -> None:

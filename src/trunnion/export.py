@@ -5,7 +5,8 @@ CSV (and Parquet) have one row a position and flat columns: `time`, `<joint>.rot
 `power_useful`, `status` and so on, in SI; the other formats hold the whole Dataset. In space also z, and
 `<joint>.reaction_moment_x|y|z`, `<joint>.friction_force`, `<link>.x|y|z`, `<link>.rotation_w|x|y|z`,
 `<link>.angular_velocity_x|y|z`. A sweep has one row a point of its grid: the swept numbers by the names they were
-given, then `efficiency`, `<driver>.effort_max`, `<joint>.reaction_max`, …, `status`.
+given, then `efficiency`, `<driver>.effort_max`, `<joint>.reaction_max`, …, `status`. The play of joints has `drive`,
+`<measure>`, `<measure>.worst_case`, `<measure>.rss`, `<measure>.deviation`, `<measure>.<joint>.worst_case`, ….
 """
 
 from __future__ import annotations
@@ -41,6 +42,8 @@ def columns(result: xr.Dataset) -> list[Column]:
     """(name, unit, values of a window of rows) of every flat column."""
     if "swept" in result.attrs:
         return [(name, unit, values.__getitem__) for name, (unit, values) in figures(result).items()]
+    if "measure" in result.dims:
+        return _played(result)
     stated = json.loads(result.attrs["scene"])
     spatial = stated.get("space") == "spatial"
     kinds = {name: joint["type"] for name, joint in stated["joints"].items()}
@@ -60,6 +63,23 @@ def columns(result: xr.Dataset) -> list[Column]:
     drive = result["drive_power"].values
     found.append(("power_in", "W", lambda window: drive[:, window].sum(axis=0)))
     found.append(_column(result, "useful_power", "power_useful", ()))
+    names = np.array([status.name.lower() for status in Status])
+    found.append(("status", "", lambda window: names[result["status"].values[window]]))
+    return found
+
+
+def _played(result: xr.Dataset) -> list[Column]:
+    """Of the play of joints: each measure, its worst case, RSS, standard deviation, and each joint's part in them."""
+    found: list[Column] = [("time", "s", lambda window: result["time"].values[window])]
+    found.append(("drive", str(result["drive"].attrs["units"]), lambda window: result["drive"].values[window]))
+    for i, (measure, unit) in enumerate(
+        zip(result["measure"].values, json.loads(result.attrs["measure_units"]), strict=True)
+    ):
+        keys = {"value": "", "worst_case_total": ".worst_case", "rss": ".rss", "deviation_total": ".deviation"}
+        parts = [(key, f"{measure}{end}", (i,)) for key, end in keys.items()]
+        for j, joint in enumerate(result["joint"].values):
+            parts += [(key, f"{measure}.{joint}.{key}", (i, j)) for key in ("worst_case", "deviation")]
+        found += [(name, unit, _column(result, key, name, index)[2]) for key, name, index in parts]
     names = np.array([status.name.lower() for status in Status])
     found.append(("status", "", lambda window: names[result["status"].values[window]]))
     return found

@@ -73,11 +73,12 @@ class Status(IntEnum):
     SOLVED = 0, "solved"
     ZERO_SLIP = 1, "a relative speed is zero: what resists that joint is an interval"
     NEAR_SINGULAR = 2, "close to a singular position: forces and speeds are very sensitive to the dimensions"
-    NOT_CONVERGED = 3, "the friction iteration did not converge"
-    LOCKED = 4, "locked by friction: no drive effort moves the mechanism"
-    LOAD_UNDEFINED = 5, "a load or spring has no value: outside its table, a division by zero, a length of zero"
-    SINGULAR = 6, "singular position (dead centre): speeds and forces have no finite value"
-    NOT_ASSEMBLED = 7, "cannot be assembled"
+    CONTACT_LOST = 3, "a pin loses contact: its load passes through zero and its seat would jump"
+    NOT_CONVERGED = 4, "the friction iteration did not converge"
+    LOCKED = 5, "locked by friction: no drive effort moves the mechanism"
+    LOAD_UNDEFINED = 6, "a load or spring has no value: outside its table, a division by zero, a length of zero"
+    SINGULAR = 7, "singular position (dead centre): speeds and forces have no finite value"
+    NOT_ASSEMBLED = 8, "cannot be assembled"
 
     @property
     def solved(self) -> bool:

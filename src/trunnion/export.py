@@ -76,7 +76,7 @@ def _played(result: xr.Dataset) -> list[Column]:
         zip(result["measure"].values, json.loads(result.attrs["measure_units"]), strict=True)
     ):
         keys = {"value": "", "worst_case_total": ".worst_case", "rss": ".rss", "deviation_total": ".deviation"}
-        parts = [(key, f"{measure}{end}", (i,)) for key, end in keys.items()]
+        parts: list[tuple[str, str, tuple[int, ...]]] = [(key, f"{measure}{end}", (i,)) for key, end in keys.items()]
         for j, joint in enumerate(result["joint"].values):
             parts += [(key, f"{measure}.{joint}.{key}", (i, j)) for key in ("worst_case", "deviation")]
         found += [(name, unit, _column(result, key, name, index)[2]) for key, name, index in parts]

@@ -21,12 +21,17 @@ __all__ = ["VARIABLES", "Variable", "allocate", "dataset", "variables"]
 
 @dataclass(frozen=True)
 class Variable:
-    """Dimensions before `position`, unit and long name of a result; the only space that has it, empty if both."""
+    """Dimensions before `position`, unit and long name of a result; the only space that has it, empty if both.
+
+    part: of what results alone: "seats" of pins that do not lie in the middle of their holes, "errors" of a
+    mechanism with any error.
+    """
 
     dims: tuple[str, ...]
     units: str
     long_name: str
     space: str = ""
+    part: str = ""
 
 
 def _rates(name: str, dims: tuple[str, ...], unit: str, long_name: str, space: str = "") -> dict[str, Variable]:
@@ -77,6 +82,37 @@ VARIABLES: dict[str, Variable] = {
     "friction_contraction": Variable((), "1", "contraction of the friction iteration; from 1 on it may diverge"),
     "locking_margin": Variable((), "1", "multiple of the friction at which the position locks, ∞ if beyond 10"),
     "status": Variable((), "1", "code of the position's status; see the attribute flag_meanings"),
+    "seat_offset": Variable(
+        ("joint", "end", "axis"), "m", "offset of the pin's axis from the hole's at each end, hole's axes", part="seats"
+    ),
+    "seat_beta": Variable(("joint",), "rad", "angle β between the seats of a pin's ends", part="seats"),
+    "seat_xi": Variable(("joint",), "rad", "direction ξ of a pin's seat in its hole", part="seats"),
+    "seat_xi_pin": Variable(("joint",), "rad", "direction ξ of a pin's seat in the pin's own frame", part="seats"),
+    "end_force": Variable(
+        ("joint", "end", "axis"), "N", "force of the pin on each end of its hole, hole's axes", part="seats"
+    ),
+    "contact_position": Variable(
+        ("joint", "end", "axis"), "m", "place where the pin touches its hole at each end", part="seats"
+    ),
+    "contact_lost": Variable(("joint",), "1", "1 where the seat of the pin would have to jump", part="seats"),
+    "contact_loss_number": Variable(
+        ("joint",), "rad/(N s)", "rate of turn of the reaction over its size (Earles and Wu)", part="seats"
+    ),
+    "seat_rounds": Variable((), "1", "rounds to settle seats and reactions", part="seats"),
+    "seat_change": Variable((), "1", "change of a seat in the last round, of its clearance", part="seats"),
+    "point_error": Variable(("point", "axis"), "m", "place of the point against the ideal mechanism", part="errors"),
+    "link_error": Variable(("link",), "rad", "angle of the link against the ideal mechanism", part="errors"),
+    "joint_rotation_error": Variable(
+        ("joint",), "rad", "rotation of the joint against the ideal mechanism", part="errors"
+    ),
+    "joint_slide_error": Variable(("joint",), "m", "slide of the joint against the ideal mechanism", part="errors"),
+    "reaction_force_change": Variable(
+        ("joint", "axis"), "N", "reaction less that of the ideal mechanism", part="errors"
+    ),
+    "drive_effort_change": Variable(("driver",), "N m", "drive effort less that of the ideal mechanism", part="errors"),
+    "friction_power_change": Variable(
+        ("joint",), "W", "power lost to friction less that of the ideal mechanism", part="errors"
+    ),
 }
 # what is a vector in space
 IN_SPACE = {
@@ -86,8 +122,11 @@ IN_SPACE = {
     "friction_torque": Variable(
         ("joint",), "N m", "friction torque on the second link about its axis, or against its turn"
     ),
+    "link_error": Variable(
+        ("link", "axis"), "rad", "rotation vector of the link against the ideal mechanism", part="errors"
+    ),
 }
-INTEGERS = {"status": np.int8, "friction_iterations": np.int32}
+INTEGERS = {"status": np.int8, "friction_iterations": np.int32, "contact_lost": np.int8, "seat_rounds": np.int32}
 # the same array until something sets them apart
 SAME_AS = {"drive_effort_lower": "drive_effort", "drive_effort_upper": "drive_effort"}
 
@@ -104,11 +143,18 @@ def _space(labels: Labels) -> str:
     return "spatial" if "component" in labels else "planar"
 
 
-def allocate(labels: Labels, positions: int, absent: Sequence[str] = ()) -> dict[str, NDArray[np.float64]]:
-    """Arrays for every variable, to be filled, position last; those in `absent` are zero and take no memory."""
+def allocate(
+    labels: Labels, positions: int, absent: Sequence[str] = (), parts: Sequence[str] = ()
+) -> dict[str, NDArray[np.float64]]:
+    """Arrays for every variable, to be filled, position last; those in `absent` are zero and take no memory.
+
+    parts: of those variables that not every result has.
+    """
     arrays: dict[str, NDArray[np.float64]] = {}
     for name, variable in variables(_space(labels)).items():
         if name in SAME_AS or not labels.keys() >= set(variable.dims):  # no springs, no spring_force
+            continue
+        if variable.part and variable.part not in parts:
             continue
         shape = (*(len(labels[dim]) for dim in variable.dims), positions)
         if name in absent:
@@ -127,6 +173,7 @@ def dataset(
     time: NDArray[np.float64],
     efficiency: float,
     attributes: Mapping[str, str | float],
+    ideal_efficiency: float | None = None,
 ) -> xr.Dataset:
     """The arrays as an xarray Dataset with coordinates, units and long names."""
     import xarray as xr
@@ -143,6 +190,10 @@ def dataset(
     found["efficiency"] = xr.Variable(
         (), efficiency, {"units": "1", "long_name": "useful work over drive work of the cycle"}
     )
+    if ideal_efficiency is not None:
+        found["efficiency_ideal"] = xr.Variable(
+            (), ideal_efficiency, {"units": "1", "long_name": "efficiency of the mechanism without errors"}
+        )
     coordinates = {dim: (dim, np.asarray(names, dtype=str)) for dim, names in labels.items()}
     times = xr.Variable("position", time, {"units": "s", "long_name": "time from the start of the cycle"})
     return xr.Dataset(found, {**coordinates, "time": times}, dict(attributes))

@@ -11,12 +11,14 @@ from numpy.typing import NDArray
 
 from trunnion import __version__, results
 from trunnion.algebra.namespace import Number
-from trunnion.analysis import diagnosis, near_locking
+from trunnion.analysis import contact_loss, diagnosis, near_locking
+from trunnion.analysis.asbuilt import summary_rows
 from trunnion.analysis.friction import FrictionMethod
 from trunnion.analysis.kinematics import start
 from trunnion.analysis.kinetostatics import Backward
 from trunnion.analysis.loads import Stated
 from trunnion.analysis.scene import DRAWN
+from trunnion.analysis.shifts import clearance
 from trunnion.analysis.system import Cycle, Dial, System, rubbing
 from trunnion.errors import Finding, Severity, Status
 from trunnion.joints.friction import FRICTION_LAWS
@@ -28,7 +30,7 @@ from trunnion.model.units import KINDS, Dimension, si_unit
 if TYPE_CHECKING:
     import xarray as xr
 
-    from trunnion.analysis.analyse import Run
+    from trunnion.analysis.analyse import Positions, Run
 
 __all__ = [
     "MARGIN",
@@ -110,17 +112,12 @@ def efficiency(arrays: Arrays, cycle: Cycle) -> float:
     return cycle.net(arrays["useful_power"]) / work if work > 0 else float("nan")
 
 
-def finish(
-    run: Run,
-    arrays: dict[str, NDArray[np.float64]],
-    labels: Mapping[str, Sequence[str]],
-    time: NDArray[np.float64],
-    method: FrictionMethod,
-    causes: diagnosis.Causes,
-) -> xr.Dataset:
+def finish(run: Run, found_positions: Positions) -> xr.Dataset:
     """The Dataset with its attributes: formula, findings, summary, input data, drawing data, provenance."""
-    mechanism = run.system.mechanism
+    mechanism, arrays, time = run.system.mechanism, found_positions.arrays, found_positions.time
+    method, causes = found_positions.method, found_positions.causes
     value = efficiency(arrays, run.cycle)
+    ideal = efficiency(found_positions.ideal, run.cycle) if found_positions.ideal else None
     near = _near_locking(run, arrays, time, method)
     left_open = run.determinacy.findings() if run.determinacy else []
     found = [
@@ -128,6 +125,9 @@ def finish(
         *run.chosen.findings,
         *left_open,
         *_over_the_cycle(run, arrays, causes, time, near),
+        *contact_loss.findings(
+            found_positions.losses, arrays, list(run.system.joints), run.system.dial(run.values, time)
+        ),
     ]
     attributes: dict[str, str | float] = {
         "name": mechanism.name,
@@ -142,12 +142,12 @@ def finish(
         "driver_units": json.dumps(effort_units(run.system)),
         "spring_units": json.dumps(spring_units(run.system)),
         "findings": json.dumps([finding_row(finding) for finding in found], ensure_ascii=False),
-        "summary": json.dumps(_summary(run, arrays, value, time, near), ensure_ascii=False),
+        "summary": json.dumps(_summary(run, arrays, value, time, near, ideal), ensure_ascii=False),
         "inputs": json.dumps(_inputs(mechanism), ensure_ascii=False),
         "scene": json.dumps(_scene(run), ensure_ascii=False),
         "periodic": int(run.cycle.periodic),
     }
-    return results.dataset(arrays, labels, time, value, attributes)
+    return results.dataset(arrays, found_positions.labels, time, value, attributes, ideal)
 
 
 def effort_units(system: System) -> list[str]:
@@ -173,10 +173,11 @@ def finding_row(finding: Finding) -> dict[str, str]:
 def model_notes(mechanism: Mechanism) -> list[Finding]:
     """What the model says that this analysis leaves out, and warnings about the data."""
     notes = [finding for finding in check_model(mechanism) if finding.severity is not Severity.ERROR]
+    values = mechanism.parameters()
     playing = [
         name
         for name, joint in mechanism.effective_joints.items()
-        if (joint.pin and (joint.pin.clearance or joint.pin.fit)) or (joint.guide and joint.guide.clearance)
+        if name not in mechanism.seated and clearance(values, name) is not None
     ]
     bodies = {name: link for name, link in mechanism.effective_links.items() if name != mechanism.fixed_link}
     heavy = [name for name, link in bodies.items() if link.mass.source != 0]
@@ -190,8 +191,9 @@ def model_notes(mechanism: Mechanism) -> list[Finding]:
         what = f"{', '.join(points)} have a mass but no inertia: they are taken as point masses at their centres"
         notes.append(Finding(what, "links", "state inertia: …", Severity.NOTE))
     if playing:
-        what = f"clearance and fit of {', '.join(playing)} are not in this analysis: the joints have no play"
-        notes.append(Finding(what, "joints", severity=Severity.NOTE))
+        what = f"the pins of {', '.join(playing)} are taken to lie in the middle of their play"
+        remedy = "state seat: loaded, or analyse with --seat loaded; the play verb tells what the play can do"
+        notes.append(Finding(what, "joints", remedy, Severity.NOTE))
     return notes
 
 
@@ -249,7 +251,12 @@ def references(mechanism: Mechanism) -> list[str]:
 
 
 def _summary(
-    run: Run, arrays: Arrays, value: float, time: NDArray[np.float64], near: near_locking.Locking | None
+    run: Run,
+    arrays: Arrays,
+    value: float,
+    time: NDArray[np.float64],
+    near: near_locking.Locking | None,
+    ideal: float | None,
 ) -> list[dict[str, Any]]:
     """The figures one looks at first."""
     rows: list[dict[str, Any]] = []
@@ -282,6 +289,9 @@ def _summary(
                 top = int(sound[np.argmax(lost[sound])])
                 rows.append({"label": f"friction power, largest, at {dial.at(top)}", "value": lost[top], "unit": "W"})
         rows.append({"label": f"efficiency of the cycle{_why(value, arrays, run.cycle)}", "value": value, "unit": "1"})
+        if ideal is not None:
+            rows.append({"label": "efficiency of the cycle without errors", "value": ideal, "unit": "1"})
+            rows += summary_rows(run, arrays, dial)
         back = near_locking.reverse_row(near.back, run.cycle) if near else None
         rows += [back] if back else []
         solved = int(np.count_nonzero(arrays["status"] < Status.NOT_CONVERGED))

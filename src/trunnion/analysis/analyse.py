@@ -14,13 +14,15 @@ from numpy.typing import NDArray
 from trunnion import results
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.nested import flat
-from trunnion.analysis import account, diagnosis
+from trunnion.analysis import account, contact_loss, diagnosis
+from trunnion.analysis.asbuilt import fill_errors, fill_seats
 from trunnion.analysis.branches import Chosen, choose
 from trunnion.analysis.bristles import History, histories
 from trunnion.analysis.engine import build
 from trunnion.analysis.friction import FrictionMethod
 from trunnion.analysis.kinematics import Forward, forward
 from trunnion.analysis.kinetostatics import Backward, Given, Sense, solve
+from trunnion.analysis.seating import Lanes, Seat, lanes, seats, settle
 from trunnion.analysis.space.determinacy import Determinacy
 from trunnion.analysis.system import COMMON_TURNS, Cycle, System, Values, sticking
 from trunnion.errors import Finding, MechanismError, Status
@@ -73,9 +75,57 @@ class Run:
         """
         values = self.values if values is None else values
         past = self._past if values is self.values else self._histories(values)
+        return self._solve(time, values, past, method, zero_slip)
+
+    def _solve(
+        self,
+        time: Number,
+        values: Values,
+        past: Mapping[str, History],
+        method: FrictionMethod | None,
+        zero_slip: Mapping[str, Sense] | None = None,
+        rates: Mapping[str, Number] | None = None,
+    ) -> Backward:
         deflections = {joint: history.at(time) for joint, history in past.items()}
-        given = Given(zero_slip or {}, deflections)
+        given = Given(zero_slip or {}, deflections, rates or {})
         return solve(self.system, values, self.chosen.assembly, time, method, given)
+
+    def at(
+        self,
+        time: Number,
+        offsets: Mapping[str, Number],
+        method: FrictionMethod | None = None,
+        zero_slip: Mapping[str, Sense] | None = None,
+        rates: Mapping[str, Number] | None = None,
+    ) -> Backward:
+        """Motion and forces at the given times (s) with the pins at offsets in their holes, which change at rates."""
+        return self._solve(time, {**self.values, **offsets}, self._past, method, zero_slip, rates)
+
+    def ideal(self, time: Number, method: FrictionMethod | None = None) -> Backward:
+        """Motion and forces at the given times (s) without errors and with every pin in the middle of its hole."""
+        values = self._ideal_values
+        return self._solve(time, self.values if values is None else values, self._ideal_past, method)
+
+    @functools.cached_property
+    def seats(self) -> list[Seat]:
+        """Joints whose pins lie in seats that are given or follow the load."""
+        return seats(self.system, self.values)
+
+    @functools.cached_property
+    def _ideal_values(self) -> Values | None:
+        """The numbers of the ideal mechanism; None if they are those of the mechanism itself."""
+        ideal = self.system.mechanism.ideal_parameters()
+        same = all(value is self.values[path] or value == self.values[path] for path, value in ideal.items())
+        return None if same else ideal
+
+    @functools.cached_property
+    def erring(self) -> bool:
+        """Whether it is another mechanism than the ideal one."""
+        return bool(self.seats) or self._ideal_values is not None
+
+    @functools.cached_property
+    def _ideal_past(self) -> dict[str, History]:
+        return self._past if self._ideal_values is None else self._histories(self._ideal_values)
 
     def _histories(self, values: Values) -> dict[str, History]:
         with np.errstate(all="ignore"):
@@ -163,18 +213,23 @@ def analyse_run(
 ) -> xr.Dataset:
     """What `analyse` does, for a mechanism that is prepared."""
     found = positions(run, steps, method, progress)
-    return account.finish(run, found.arrays, found.labels, found.time, found.method, found.causes)
+    return account.finish(run, found)
 
 
 @dataclass(frozen=True)
 class Positions:
-    """What every position of a cycle came to, before the books of the cycle are made of it."""
+    """What every position of a cycle came to, before the books of the cycle are made of it.
+
+    ideal: powers of the mechanism without errors, if it has any; losses: of contact.
+    """
 
     arrays: Arrays
     labels: dict[str, list[str]]
     time: NDArray[np.float64]
     method: FrictionMethod
     causes: diagnosis.Causes
+    ideal: Arrays
+    losses: list[contact_loss.Loss]
 
 
 def positions(
@@ -188,25 +243,72 @@ def positions(
     method = replace(method or FrictionMethod(), margin_up_to=account.MARGIN)
     steps = steps if run.cycle.duration > 0 else 1
     time = run.cycle.times(steps)
-    labels = run.system.engine.labels(run.system)
-    arrays = results.allocate(labels, steps, run.system.engine.absent(run.system))
+    labels = run.system.engine.labels(run.system) | ({"end": ["1", "2"]} if run.seats else {})
+    parts = [part for part, there in (("seats", run.seats), ("errors", run.erring)) if there]
+    arrays = results.allocate(labels, steps, run.system.engine.absent(run.system), parts)
     causes = diagnosis.Causes(run.system)
+    ideal = {name: np.zeros(arrays[name].shape, arrays[name].dtype) for name in IDEAL} if run.erring else {}
     for low in range(0, steps, CHUNK):
         window = slice(low, min(low + CHUNK, steps))
-        back = run.solve(time[window], method=method)
-        _fill(arrays, back, time[window], window, causes)
+        if run.erring:
+            _fill_as_built(arrays, ideal, run, time, window, method, causes)
+        else:
+            _fill(arrays, run.solve(time[window], method=method), time[window], window, causes)
         if progress:
             progress(window.stop)
     _bracket(arrays, run, time, replace(method, margin_up_to=0.0), causes)  # the margin is known by now
+    losses = contact_loss.find(arrays, run, time) if run.seats else []
     run.system.engine.unwrap(arrays, run.system, run.values, time)
-    return Positions(arrays, labels, time, method, causes)
+    return Positions(arrays, labels, time, method, causes, ideal, losses)
 
 
-def _fill(arrays: Arrays, back: Backward, time: NDArray[np.float64], window: slice, causes: diagnosis.Causes) -> None:
+IDEAL = ("drive_power", "useful_power", "status")  # what the efficiency of the ideal mechanism is made of
+
+
+def _fill_as_built(
+    arrays: Arrays,
+    ideal: Arrays,
+    run: Run,
+    time: NDArray[np.float64],
+    window: slice,
+    method: FrictionMethod,
+    causes: diagnosis.Causes,
+) -> None:
+    """One chunk of a mechanism with errors beside the ideal one."""
+    part, quick = time[window], replace(method, margin_up_to=0.0)
+    labels = run.system.engine.labels(run.system)
+    seen = lanes(part, run.cycle) if run.seats else Lanes(part, *[np.arange(len(part))] * 3)
+    scratch = results.allocate(labels, len(seen.times), run.system.engine.absent(run.system))
+    meant = run.ideal(seen.times, quick)
+    _fill(scratch, meant, seen.times, slice(0, len(seen.times)))
+    scratch = {name: array[..., seen.own] for name, array in scratch.items()}
+    for name, array in ideal.items():
+        array[..., window] = scratch[name]
+    if run.seats:
+        seated = settle(run, seen, method, meant)
+        causes.note_seats(seated.offsets)
+        _fill(arrays, seated.back, part, window, causes)
+        fill_seats(arrays, run.seats, seated, window)
+    else:
+        _fill(arrays, run.solve(part, method=method), part, window, causes)
+    links = labels["link"]
+    joints = [(links.index(first), links.index(second)) for _, (first, second) in run.system.joints.values()]
+    fill_errors(arrays, scratch, joints, window)
+    _blank(arrays, arrays["status"][window].astype(np.int8), window)
+
+
+def _fill(
+    arrays: Arrays,
+    back: Backward,
+    time: NDArray[np.float64],
+    window: slice,
+    causes: diagnosis.Causes | None = None,
+) -> None:
     """Write one chunk into the result; what a status rules out becomes NaN."""
     status = status_of(back, arrays["status"][window].shape)
     arrays["status"][window] = status
-    causes.note(back, status, window.start)
+    if causes:
+        causes.note(back, status, window.start)
     with np.errstate(all="ignore"):
         engine = back.walk.system.engine
         engine.fill_motion(arrays, back, window)
@@ -276,6 +378,10 @@ FORCES = [
     *("reaction_force", "reaction_moment", "friction_torque", "friction_force", "friction_moment", "friction_power"),
     *("drive_effort", "drive_power", "power_residual", "friction_change", "friction_contraction"),
     *("spring_force", "spring_power", "damping_power", "gear_torque", "gear_force"),
+    *("reaction_force_change", "drive_effort_change", "friction_power_change"),
+    # where the load is not known, neither is the seat
+    *("seat_offset", "seat_beta", "seat_xi", "seat_xi_pin", "end_force", "contact_position"),
+    *("point_error", "link_error", "joint_rotation_error", "joint_slide_error"),
 ]
 POSES = [
     *("point_position", "link_angle", "link_position", "link_rotation", "joint_rotation", "joint_slide"),
@@ -314,10 +420,11 @@ def _bracket(
         return  # both are the effort itself
     lower = arrays["drive_effort_lower"] = arrays["drive_effort"].copy()
     upper = arrays["drive_effort_upper"] = arrays["drive_effort"].copy()
+    seated = causes.seats()
     for joint, positions in causes.zero_slip().items():
         for low in range(0, len(positions), CHUNK):
             part = positions[low : low + CHUNK]
-            _widen(lower, upper, arrays["drive_effort"], run, time[part], part, joint, method)
+            _widen(lower, upper, arrays["drive_effort"], run, time[part], part, joint, method, seated)
 
 
 def _widen(
@@ -329,9 +436,11 @@ def _widen(
     positions: NDArray[np.intp],
     joint: str,
     method: FrictionMethod,
+    seated: Mapping[str, NDArray[np.float64]],
 ) -> None:
     """Widen the interval by what the friction of one joint can do with either sign."""
-    ends = [run.solve(time, method=method, zero_slip={joint: sign}).efforts for sign in run.system.senses(joint)]
+    offsets = {path: numbers[positions] for path, numbers in seated.items()}
+    ends = [run.at(time, offsets, method, {joint: sign}).efforts for sign in run.system.senses(joint)]
     for i, name in enumerate(run.system.mechanism.drivers):
         changes = [np.broadcast_to(end[name], time.shape) - effort[i, positions] for end in ends]
         lower[i, positions] += np.minimum(0.0, np.min(changes, axis=0))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -41,6 +42,7 @@ class Causes:
     _locked: dict[int, list[tuple[Positions, NDArray[np.float64]]]] = field(default_factory=dict)
     _singular: dict[int, list[Positions]] = field(default_factory=dict)
     _undefined: dict[str, list[Positions]] = field(default_factory=dict)
+    _seats: dict[str, list[NDArray[np.float64]]] = field(default_factory=dict)
 
     def note(self, back: Backward, status: NDArray[np.int8], offset: int) -> None:
         """Look at one chunk, whose first position has the number `offset`."""
@@ -64,6 +66,15 @@ class Causes:
                 locked = np.flatnonzero((share < 1.0) & (status == Status.LOCKED))
                 if len(locked):
                     self._locked.setdefault(number, []).append((locked + offset, share[locked]))
+
+    def note_seats(self, offsets: Mapping[str, NDArray[np.float64]]) -> None:
+        """Keep where the pins of one chunk lie."""
+        for path, numbers in offsets.items():
+            self._seats.setdefault(path, []).append(numbers)
+
+    def seats(self) -> dict[str, NDArray[np.float64]]:
+        """Offsets of the pins at all positions, by the names of `shifts`."""
+        return {path: np.concatenate(parts) for path, parts in self._seats.items()}
 
     def _note_singular(self, walk: Forward, status: NDArray[np.int8], offset: int) -> None:
         """The module whose condition is the worst at each singular position."""

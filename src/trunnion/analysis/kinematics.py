@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number
 from trunnion.analysis.system import Place, System, Values, driven_coordinates
 from trunnion.groups.planar import Acceleration, Frame, Twist, accelerated, compose, moved, point
@@ -63,6 +65,21 @@ class Forward:
             else:
                 self._elements[key] = compose(frame, local)
         return self._elements[key]
+
+    @cached_property
+    def holes(self) -> dict[tuple[str, str], Any]:
+        """Local frame of every joint's element where its pin lies in the middle of its hole."""
+        return self.system.holes(self.values)
+
+    def hole(self, joint: str) -> Any:
+        """Global frame of the hole of a joint: in its second link, axes of the link, of a guide along its slide."""
+        second = self.system.joints[joint][1][1]
+        return compose(self.motions[second].frame, self.holes[second, joint])
+
+    def hole_spin(self, joint: str) -> tuple[Number, ...]:
+        """Angular velocity of the hole of a joint against its pin, rad/s."""
+        first, second = self.system.joints[joint][1]
+        return (self.motions[second].twist.w - self.motions[first].twist.w,)
 
     def backward(self) -> Forward:
         """The same positions passed the other way: velocities turned round, accelerations as they are."""
@@ -144,6 +161,15 @@ class Forward:
         link = place.links[i]
         return self.element(link, place.joint) if place.outer[i] else self.local[link, place.joint]
 
+    def carried(self, frames: Mapping[str, Any]) -> None:
+        """Add to the velocity of every link what the ε parts of its frame say: that of seats which travel."""
+        for link, frame in frames.items():
+            motion = self.motions[link]
+            spin = primal(frame.c) * rate_of(frame.s) - primal(frame.s) * rate_of(frame.c)
+            x, y, w = motion.twist
+            travel = Twist(x + rate_of(frame.x), y + rate_of(frame.y), w + spin)
+            self.motions[link] = motion._replace(twist=travel)
+
     def take(self, number: int, pose: Any, time: Number) -> None:
         """Add the motion of one module, whose pose is known."""
         system = self.system
@@ -188,14 +214,43 @@ def pose_of(walk: Forward, number: int, assembly: Any, time: Number) -> Any:
     return group.position(walk.pairs(places), assembly, drive)
 
 
-def forward(system: System, values: Values, assembly: Assembly, time: Number) -> Forward:
+def forward(
+    system: System, values: Values, assembly: Assembly, time: Number, rates: Mapping[str, Number] | None = None
+) -> Forward:
     """Walk the plan forward at the given times (s).
 
-    NaN from the first module that cannot be assembled onward, lane by lane.
+    NaN from the first module that cannot be assembled onward, lane by lane. rates: of values that change along the way
+    beside the drive, as the seats of pins do, 1/s: the velocities of the links contain them, the accelerations do not.
     """
     walk = start(system, values)
     walk.time = time
     with np.errstate(all="ignore"):
         for number in range(len(system.plan.modules)):
             walk.take(number, pose_of(walk, number, assembly[number], time), time)
+        if rates:
+            walk.carried(_travelling(system, {**values, **_seeded(values, rates)}, assembly, time))
     return walk
+
+
+def _seeded(values: Values, rates: Mapping[str, Number]) -> dict[str, Number]:
+    return {path: Dual(values[path], rate) for path, rate in rates.items()}
+
+
+def _travelling(system: System, values: Values, assembly: Assembly, time: Number) -> dict[str, Any]:
+    """Frames of all links, with ε parts from those of the values: poses alone."""
+    walk = start(system, values)
+    walk.time = time
+    found: dict[str, Any] = {}
+    still = walk.motions[system.mechanism.fixed_link]
+    for number, module in enumerate(system.plan.modules):
+        pose = pose_of(walk, number, assembly[number], time)
+        for link, frame in zip(module.links, pose.frames, strict=True):
+            found[link] = frame
+            walk.motions[link] = still._replace(frame=frame)
+        walk.poses.append(pose)
+    return found
+
+
+def rate_of(number: Number) -> Number:
+    """The ε part of a number, 0 of a plain one."""
+    return number.dual if isinstance(number, Dual) else 0.0

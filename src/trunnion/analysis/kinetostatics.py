@@ -17,7 +17,7 @@ from trunnion.analysis.system import Place, System, Values, law_of
 from trunnion.groups.gear import Action as GearAction
 from trunnion.groups.gear import Gear, Mesh, actions, apart, mesh
 from trunnion.groups.general import General
-from trunnion.groups.planar import ZERO_LOAD, Wrench, about, added
+from trunnion.groups.planar import ZERO_LOAD, Wrench, about, added, moved
 from trunnion.groups.protocol import Group
 from trunnion.joints.friction import FrictionLaw
 from trunnion.joints.pairs import Load
@@ -36,11 +36,13 @@ class Given:
 
     zero_slip: sign of the slip to take where the relative speed is zero, one for each contact of the joint or one for
     all; 0 if not stated. deflections: of the bristles
-    of laws that have them, m, in the sense of the slip; that of steady sliding if not stated.
+    of laws that have them, m, in the sense of the slip; that of steady sliding if not stated. seat_rates: how fast the
+    seats among the values (`seats.JOINT.1.x` …) travel, m/s.
     """
 
     zero_slip: Mapping[str, Sense] = field(default_factory=dict)
     deflections: Mapping[str, Number] = field(default_factory=dict)
+    seat_rates: Mapping[str, Number] = field(default_factory=dict)
 
 
 def sense_of(zero_slip: Mapping[str, Sense], joint: str, contact: int = 0) -> float:
@@ -62,7 +64,9 @@ class Backward:
 
     reactions: on the second link by the first, about the joint's point on the second, friction and drive effort
     not included; friction: torque (N m) or force along the slide (N) on the second link; settled: per module;
-    undefined: where each load or spring (by path) has no value.
+    undefined: where each load or spring (by path) has no value; turning: of joints that rub and turn, the contact and
+    the share of its friction that acts about the axis; travels: whether seats do, so that a joint also loses what its
+    load does on the way of its pin; passed: power that each joint passes on to its links in all.
     """
 
     walk: Forward
@@ -77,10 +81,27 @@ class Backward:
     springs: dict[str, SpringState] = field(default_factory=dict)
     gears: dict[str, GearLoad] = field(default_factory=dict)
     undefined: dict[str, Number] = field(default_factory=dict)
+    turning: dict[str, tuple[Contact, Number]] = field(default_factory=dict)
+    travels: bool = False
+    passed: dict[str, Number] = field(default_factory=dict)
 
     def friction_power(self, joint: str) -> Number:
         """Power lost in a joint, W."""
+        if self.travels:
+            return self.lost(joint)
         return -(self.friction[joint] * self.slips[joint].speed)
+
+    def lost(self, joint: str) -> Number:
+        """What a joint takes out and its driver does not put in, W: friction, and the load on its seat's way."""
+        driven = self.efforts[joint] * self.walk.rate(joint) if joint in self.efforts else 0.0
+        return driven - self.passed[joint]
+
+    def on_hole(self, joint: str) -> tuple[tuple[Number, ...], tuple[Number, ...]]:
+        """Force, N, and moment about its middle, N m, of the pin on the hole of a joint, in the hole's frame."""
+        hole = self.walk.hole(joint)
+        at = self.walk.element(self.walk.system.joints[joint][1][1], joint)
+        x, y, moment = about(self.reactions[joint], hole.x - at.x, hole.y - at.y)
+        return (x * hole.c + y * hole.s, y * hole.c - x * hole.s), (moment,)
 
 
 def solve(
@@ -96,16 +117,17 @@ def solve(
     values: every number by path; floats, arrays (sample, 1) or dual numbers. time: (position,).
     given: what is known of the joints beside the motion.
     """
-    walk = forward(system, values, assembly, time)
+    given = given or Given()
+    walk = forward(system, values, assembly, time, given.seat_rates)
     with np.errstate(all="ignore"):
-        found: Backward = system.engine.backward(walk, method or FrictionMethod(), given or Given())
+        found: Backward = system.engine.backward(walk, method or FrictionMethod(), given)
     return found
 
 
 def backward(walk: Forward, method: FrictionMethod, given: Given) -> Backward:
     """Reactions and friction of every module, last module first."""
     system = walk.system
-    back = Backward(walk, dict.fromkeys(system.mechanism.links, ZERO_LOAD))
+    back = Backward(walk, dict.fromkeys(system.mechanism.links, ZERO_LOAD), travels=bool(given.seat_rates))
     for name in system.joints:
         back.slips[name] = _slip(walk, name)
     _add_body_loads(back)
@@ -221,6 +243,8 @@ def _settle_module(back: Backward, number: int, method: FrictionMethod, given: G
         if system.mechanism.effective_joints[place.joint].friction is not None and not place.witness:
             contact, levers[k] = _contact(back, module.links, k, place, given)
             contacts.append(contact)
+            if place.kind == "revolute":
+                back.turning[place.joint] = contact, 1.0
     contacts += [_teeth(back, number, i) for i, gear in enumerate(_gears(group)) if gear.carriers]
     settled = settle(group, walk.poses[number], loads, contacts, method)
     back.settled.append(settled)
@@ -295,12 +319,21 @@ def _record(back: Backward, place: Place, reaction: Wrench, friction: Number, dr
         bare = Wrench(reaction.x - effort * axis.c, reaction.y - effort * axis.s, reaction.m)
     back.reactions[place.joint] = bare
     back.friction[place.joint] = friction
+    if back.travels:
+        back.passed[place.joint] = _passed(walk, place.joint, first, second, whole)
     if driven:
         back.efforts[place.joint] = effort
     for link, outer in zip(place.links, place.outer, strict=True):
         if outer and link != walk.system.mechanism.fixed_link:
             sign = 1.0 if link == second else -1.0
             _add(back, link, Wrench(*(sign * n for n in whole)), (at.x, at.y))
+
+
+def _passed(walk: Forward, joint: str, first: str, second: str, whole: Wrench) -> Number:
+    """Power of all that a joint does to its second link and, reversed, to its first, W."""
+    at, frame = walk.element(second, joint), walk.motions[first].frame
+    one, two = moved(walk.motions[first].twist, at.x - frame.x, at.y - frame.y), walk.twist(second, joint)
+    return whole.x * (two.x - one.x) + whole.y * (two.y - one.y) + whole.m * (two.w - one.w)
 
 
 # ---- gear pairs -----------------------------------------------------------------------------------------------

@@ -30,7 +30,8 @@ NULL: Vector3 = (0.0, 0.0, 0.0)
 
 class Rubbing(NamedTuple):
     """One contact: load, slip speed, m/s, unit friction on the second link, where the speed is zero but for rounding,
-    and whether the joint itself feels its friction.
+    and whether the joint itself feels its friction; turning: the share of the friction that acts about the joint's own
+    axis and so turns the pin's seat, None if it does not.
     """
 
     load: ContactLoad
@@ -38,6 +39,7 @@ class Rubbing(NamedTuple):
     unit: Screw
     zero: Number
     felt: bool = False
+    turning: Number | None = None
 
 
 def bearing_middle(walk: SpatialWalk, joint: str) -> Vector3:
@@ -92,13 +94,13 @@ def contacts(walk: SpatialWalk, joint: str) -> Iterator[Rubbing]:
     lever = walk.values[f"joints.{joint}.pin.radius"]
     moment = Screw(NULL, scaled(lever, axis))
     if kind == "revolute":
-        yield Rubbing(load, lever * turn, moment, zero[0])
+        yield Rubbing(load, lever * turn, moment, zero[0], turning=1.0)
     elif kind == "helical":
         lead = walk.space.lead(walk.values, joint)
         way = namespace(lead, lever).sqrt(lever * lever + lead * lead)
         yield Rubbing(load, way * turn, _mixed(axis, middle, lever, lever / way, lead / way), zero[0])
     elif _summed(walk, joint):
-        yield Rubbing(load, lever * turn, moment, zero[0])
+        yield Rubbing(load, lever * turn, moment, zero[0], turning=1.0)
         yield Rubbing(load, slide, about(axis, NULL, middle), zero[1])
     else:
         yield _resultant(load, axis, middle, lever, (lever * turn, slide), zero[0])
@@ -114,7 +116,7 @@ def _resultant(
     speed = xp.where(moves, xp.sqrt(xp.where(moves, square, 1.0)), 0.0)
     share = 1 / xp.where(moves, speed, 1.0)
     cosine, sine = xp.where(moves, slip[0] * share, 1.0), xp.where(moves, slip[1] * share, 0.0)
-    return Rubbing(load, speed, _mixed(axis, middle, lever, cosine, sine), zero)
+    return Rubbing(load, speed, _mixed(axis, middle, lever, cosine, sine), zero, turning=xp.abs(cosine))
 
 
 def _mixed(axis: Vector3, middle: Vector3, lever: Number, cosine: Number, sine: Number) -> Screw:
@@ -147,7 +149,7 @@ def _ball(walk: SpatialWalk, joint: str, middle: Vector3, zero: Number) -> Rubbi
     moves = primal(square) > 0
     speed = xp.where(moves, xp.sqrt(xp.where(moves, square, 1.0)), 0.0)
     direction = scaled(1 / xp.where(moves, speed, 1.0), turn)
-    return Rubbing(BallLoad(), radius * speed, Screw(NULL, scaled(radius, direction)), zero)
+    return Rubbing(BallLoad(), radius * speed, Screw(NULL, scaled(radius, direction)), zero, turning=1.0)
 
 
 def _two_pins(walk: SpatialWalk, joint: str, middle: Vector3, zero: Sequence[Number]) -> Iterator[Rubbing]:

@@ -57,14 +57,21 @@ class SpatialBackward(Backward):
 
     def friction_power(self, joint: str) -> Number:
         """Power lost in a joint, W."""
-        return self.losses[joint]
+        return self.lost(joint) if self.travels else self.losses[joint]
+
+    def on_hole(self, joint: str) -> tuple[tuple[Number, ...], tuple[Number, ...]]:
+        """Force, N, and moment about its middle, N m, of the pin on the hole of a joint, in the hole's frame."""
+        frame, reaction = self.space.hole(joint), self.reactions[joint]
+        moment = moment_at(reaction, frame.place)
+        axes = frame[:3]
+        return tuple(dot(reaction.u, axis) for axis in axes), tuple(dot(moment, axis) for axis in axes)
 
 
 def backward(walk: SpatialWalk, method: FrictionMethod, given: Given) -> SpatialBackward:
     """Reactions and friction of every module, last module first."""
     system = walk.system
     loads: dict[str, Any] = dict.fromkeys(system.mechanism.effective_links, ZERO)
-    back = SpatialBackward(walk, loads)
+    back = SpatialBackward(walk, loads, travels=bool(given.seat_rates))
     for name in system.joints:
         back.slips[name] = _slip(walk, name)
     _add_body_loads(back)
@@ -203,6 +210,8 @@ def _settle_module(back: SpatialBackward, number: int, method: FrictionMethod, g
                 rubbing.append(one)
                 sense = sense_of(given.zero_slip, place.joint, i)
                 found.append(_contact(back, module.links, k, place, one, given, sense))
+                if one.turning is not None:
+                    back.turning[place.joint] = found[-1], one.turning
     settled = settle(_Flat(group), pose, loads, found, method)
     back.settled.append(settled)
     for (link, _, _), torque in zip(module.spinning, group.spin_torques(pose, loads), strict=True):
@@ -253,7 +262,10 @@ def _record(
     back.reactions[joint] = _without_drive(back, joint, wrench, driven)
     back.friction_wrenches[joint], back.losses[joint] = friction, loss
     back.friction[joint] = _scalar(back, joint, friction, loss)
-    _pass_on(back, place, added(wrench, friction))
+    whole = added(wrench, friction)
+    if back.travels:
+        back.passed[joint] = power(whole, back.space.against(joint))
+    _pass_on(back, place, whole)
 
 
 def _without_drive(back: SpatialBackward, joint: str, wrench: Screw, driven: Screw | None) -> Screw:

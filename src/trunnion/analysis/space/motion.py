@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple, cast
@@ -10,11 +11,13 @@ import numpy as np
 
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
+from trunnion.algebra.nested import each
 from trunnion.algebra.rigid import (
     ORIGIN,
     ZERO,
     Frame,
     Screw,
+    added,
     compose,
     minus,
     moment_at,
@@ -22,8 +25,9 @@ from trunnion.algebra.rigid import (
     times,
     vector_minus,
 )
-from trunnion.algebra.space import Vector3, cross, dot, plus
-from trunnion.analysis.kinematics import Forward, Motion
+from trunnion.algebra.space import Vector3, cross, dot, plus, scaled
+from trunnion.analysis.kinematics import Forward, Motion, rate_of
+from trunnion.analysis.shifts import hole
 from trunnion.analysis.space.system import SpatialSystem
 from trunnion.analysis.system import Place, Values, driven_coordinates
 from trunnion.groups.spatial_tree import Element
@@ -84,6 +88,16 @@ class SpatialWalk(Forward):
         if key not in self._elements:
             self._elements[key] = compose(self.motions[link].frame, self.local[key])
         return cast(Frame, self._elements[key])
+
+    def hole(self, joint: str) -> Frame:
+        """Global frame of the hole of a joint: in its second link, z along the axis, in the middle of the bearing."""
+        second = self.system.joints[joint][1][1]
+        return hole(compose(self.motions[second].frame, self.holes[second, joint]), self.values, joint)
+
+    def hole_spin(self, joint: str) -> Vector3:
+        """Angular velocity of the hole of a joint against its pin in the hole's frame, rad/s."""
+        spin, frame = self.against(joint).u, self.hole(joint)
+        return dot(spin, frame.x), dot(spin, frame.y), dot(spin, frame.z)
 
     def backward(self) -> SpatialWalk:
         """The same positions passed the other way: velocities turned round, accelerations as they are."""
@@ -159,6 +173,16 @@ class SpatialWalk(Forward):
         lever, lead = self.values[f"joints.{joint}.pin.radius"], self.space.lead(self.values, joint)
         way = namespace(lever, lead).sqrt(lever * lever + lead * lead)
         return way * turn, way * turn_rate
+
+    def carried(self, frames: Mapping[str, Any]) -> None:
+        """Add to the twist of every link what the ε parts of its frame say: ω = ½ Σ e × ė, v of the origin p."""
+        for link, frame in frames.items():
+            motion = self.motions[link]
+            parts = [(each(axis, primal), each(axis, rate_of)) for axis in frame]
+            (x, dx), (y, dy), (z, dz), (place, rate) = parts
+            spin = scaled(0.5, plus(plus(cross(x, dx), cross(y, dy)), cross(z, dz)))
+            travel = Screw(spin, vector_minus(rate, cross(spin, place)))
+            self.motions[link] = motion._replace(twist=added(motion.twist, travel))
 
     def _pair(self, place: Place) -> Any:
         return Element(self._side(place, 0), self._side(place, 1), self.space.lead(self.values, place.joint))

@@ -2,7 +2,7 @@
 
 import { stated } from "./format.js";
 
-const FIRST_UNSOLVED = 3; // errors.Status.NOT_CONVERGED: from here on the forces have no value
+const FIRST_UNSOLVED = 4; // errors.Status.NOT_CONVERGED: from here on the forces have no value
 
 /** The value of a series at a position; a series of one number holds everywhere. */
 export function at(series, index) {

@@ -1,0 +1,201 @@
+"""Where a pin loses contact: the load of an end passes through zero, and its seat would have to jump across the hole.
+
+The massless-link model of play keeps the pin at the wall of its hole. That ends where the load vanishes or turns
+round: seen here by a load that turns by more than a right angle from one position to the next while it passes near
+zero, or by a seat that does not settle, since there the load changes more by the seat than it presses. Beside it the
+figure of a zero-clearance analysis that S. W. E. Earles and C. L. S. Wu (Predicting the occurrence of contact loss
+and impact at a bearing from a zero-clearance analysis, Proc. 4th World Congress on the Theory of Machines and
+Mechanisms, 1975, 1013-1018) found to tell impact: rate of turn of the reaction over its size, from about 1 rad/(N s)
+on. It is empirical, and has a unit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.analysis.seating import NO_LOAD, ROUNDS, TOLERANCE, Seat
+from trunnion.analysis.system import Dial
+from trunnion.errors import Finding, Severity, Status
+
+if TYPE_CHECKING:
+    from trunnion.analysis.analyse import Run
+
+__all__ = ["EARLES_WU", "Loss", "find", "findings"]
+
+EARLES_WU = 1.0  # rad/(N s)
+NEAR = 0.1  # of the largest load: as near to zero as a load passes that turns round between two positions
+MOST_PLACES = 6  # named in one finding
+
+Arrays = dict[str, NDArray[np.float64]]
+
+
+@dataclass(frozen=True)
+class Loss:
+    """Loss of contact of one joint: where (position, whole and fraction), at which end, least load there, N, largest
+    load, N.
+
+    unsettled: positions whose seats did not settle; loaded: whether anything presses it at all.
+    """
+
+    joint: str
+    places: list[tuple[float, int]]
+    least: float
+    peak: float
+    unsettled: NDArray[np.intp]
+    loaded: bool = True
+
+
+def find(arrays: Arrays, run: Run, time: NDArray[np.float64]) -> list[Loss]:
+    """Losses of contact of every joint that its load seats; written into `contact_lost` and the status."""
+    found: list[Loss] = []
+    joints = list(run.system.joints)
+    arrays["contact_loss_number"][:] = _numbers(arrays, run, time)
+    largest = float(np.nanmax(np.abs(arrays["reaction_force"]), initial=0.0))
+    late = np.flatnonzero(arrays["seat_change"] > TOLERANCE)
+    loaded = [seat for seat in run.seats if seat.given is None]
+    for seat in loaded:
+        i = joints.index(seat.joint)
+        loss = _of_joint(seat, arrays["end_force"][i], run.cycle.periodic, largest)
+        mine = _least_loaded(arrays["end_force"], [joints.index(one.joint) for one in loaded], late) == i
+        loss = Loss(loss.joint, loss.places, loss.least, loss.peak, late[mine], loss.loaded)
+        if loss.places or len(loss.unsettled) or not loss.loaded:
+            found.append(loss)
+        lost = np.array([round(place) % len(time) for place, _ in loss.places], np.intp)
+        arrays["contact_lost"][i, np.union1d(lost, loss.unsettled).astype(np.intp)] = 1
+    anywhere = np.any(arrays["contact_lost"] > 0, axis=0)
+    status = arrays["status"]
+    np.maximum(status, np.where(anywhere, status.dtype.type(Status.CONTACT_LOST), status.dtype.type(0)), out=status)
+    return found
+
+
+def _numbers(arrays: Arrays, run: Run, time: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The figure of Earles and Wu of every joint: of its reaction without play, in space of the force on an end."""
+    if run.system.mechanism.space == "planar":
+        return _earles_wu(arrays["reaction_force"] - arrays["reaction_force_change"], time, run.cycle.periodic)
+    ends = [_earles_wu(arrays["end_force"][:, end], time, run.cycle.periodic) for end in (0, 1)]
+    return np.fmax(*ends)
+
+
+def _earles_wu(force: NDArray[np.float64], time: NDArray[np.float64], periodic: bool) -> NDArray[np.float64]:
+    """|F × Ḟ|/|F|³, rad/(N s), of every joint, by central differences over the positions; NaN of a single one."""
+    if len(time) < 3:
+        return np.full((len(force), len(time)), np.nan)
+    step = time[1] - time[0]
+    around = np.concatenate([force[..., -1:], force, force[..., :1]], axis=-1) if periodic else force
+    rate = np.gradient(around, step, axis=-1)
+    rate = rate[..., 1:-1] if periodic else rate
+    size = np.sum(force * force, axis=1)
+    along = np.sum(force * rate, axis=1)
+    with np.errstate(all="ignore"):
+        across = np.sqrt(np.maximum(np.sum(rate * rate, axis=1) - along**2 / size, 0.0))
+        return np.where(size > 0, across / size, np.nan)
+
+
+def _least_loaded(forces: NDArray[np.float64], rows: Sequence[int], late: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Of the joints with loaded seats that whose end bears least of its peak, at each position that did not settle."""
+    sizes = np.sqrt(np.sum(np.nan_to_num(forces[rows]) ** 2, axis=2))
+    there = np.any(np.isfinite(forces[rows]), axis=2)
+    peak = np.max(sizes, axis=-1, keepdims=True)
+    share = np.where(there, sizes / np.where(peak > 0, peak, 1.0), np.inf)
+    least = np.argmin(np.min(share, axis=1)[:, late], axis=0) if len(late) else np.zeros(0, np.intp)
+    return np.array([rows[k] for k in least], np.intp)
+
+
+def _of_joint(seat: Seat, forces: NDArray[np.float64], periodic: bool, largest: float) -> Loss:
+    """Where the load of an end of one joint passes through zero."""
+    places: list[tuple[float, int]] = []
+    least, peak = np.inf, 0.0
+    loads = list(_end_loads(seat, forces))
+    top = max((float(np.nanmax(_size(load), initial=0.0)) for _, load, _ in loads), default=0.0)
+    if top <= NO_LOAD * largest:
+        return Loss(seat.joint, [], 0.0, top, np.zeros(0, np.intp), loaded=False)
+    for end, load, axial in loads:
+        own = float(np.nanmax(_size(load), initial=0.0))
+        if own <= NO_LOAD * largest or (axial and own <= NO_LOAD * top):
+            continue  # nothing ever presses this end
+        for place, size in _passages(load, own, periodic):
+            places.append((place, end))
+            least = min(least, size)
+        peak = max(peak, own)
+    return Loss(seat.joint, sorted(places), least, peak, np.zeros(0, np.intp))
+
+
+def _end_loads(seat: Seat, forces: NDArray[np.float64]) -> Iterator[tuple[int, NDArray[np.float64], bool]]:
+    """(number of the end, its load (component, position), whether it is axial) of every end that can move at all."""
+    for number, (end, radius) in enumerate(zip(seat.play.model.ends, seat.play.radii, strict=True)):
+        if np.any(np.asarray(radius) > 0):
+            place = min(int(end[0][0]), 2) - 1
+            rows = ["xyz".index(key.split(".")[1]) for key in end]
+            yield place + 1, forces[place][rows], number in seat.play.model.axial
+
+
+def _size(load: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.asarray(np.sqrt(np.sum(load * load, axis=0)))
+
+
+def _passages(load: NDArray[np.float64], peak: float, periodic: bool) -> Iterator[tuple[float, float]]:
+    """(position with its fraction, least load) wherever a load turns round near zero, or is zero."""
+    after = np.roll(load, -1, axis=1)
+    step = after - load
+    square = np.sum(step * step, axis=0)
+    with np.errstate(all="ignore"):
+        share = np.clip(-np.sum(load * step, axis=0) / square, 0.0, 1.0)
+    nearest = _size(load + share * step)
+    turns = (np.sum(load * after, axis=0) < 0) & (nearest <= NEAR * peak)
+    if not periodic and len(turns):
+        turns[-1] = False
+    nothing = _size(load) <= NO_LOAD * peak
+    for k in np.flatnonzero(turns | nothing):
+        yield (float(k), float(_size(load)[k])) if nothing[k] else (float(k + share[k]), float(nearest[k]))
+
+
+def findings(found: Sequence[Loss], arrays: Arrays, joints: Sequence[str], dial: Dial) -> list[Finding]:
+    """One finding for each joint that loses contact, and for each that nothing presses."""
+    told: list[Finding] = []
+    for loss in found:
+        where = f"joints.{loss.joint}"
+        if not loss.loaded:
+            what = "no load presses its pin: it is taken to lie in the middle of its hole"
+            told.append(Finding(what, where, "give the seat, or leave it free", Severity.NOTE))
+            continue
+        if loss.places:
+            told.append(Finding(_lost(loss, dial), where, _number(arrays, joints.index(loss.joint), dial),
+                                Severity.WARNING))  # fmt: skip
+        if len(loss.unsettled):
+            worst = float(np.nanmax(arrays["seat_change"][loss.unsettled]))
+            what = f"its seat did not settle in {ROUNDS} rounds {dial.intervals(loss.unsettled)}: it still changes by "
+            what += f"{worst:.2g} of its clearance, since the seat changes the load more than it presses"
+            told.append(Finding(what, where, "there the pin floats: contact is lost", Severity.WARNING))
+    return told
+
+
+def _lost(loss: Loss, dial: Dial) -> str:
+    shown = [f"{_at(dial, place)}{f' (end {end})' if end else ''}" for place, end in loss.places[:MOST_PLACES]]
+    more = len(loss.places) - MOST_PLACES
+    text = ", ".join(shown) + (f" and {more} more" if more > 0 else "")
+    head = f"its pin loses contact at {text}: the load comes down to {loss.least:.3g} of {loss.peak:.3g} N, turns round"
+    return f"{head} and the seat would jump"
+
+
+def _number(arrays: Arrays, i: int, dial: Dial) -> str:
+    numbers = arrays["contact_loss_number"][i]
+    if not np.any(np.isfinite(numbers)):
+        return "expect impact there"
+    top = int(np.nanargmax(numbers))
+    return (
+        f"expect impact: the reaction turns at up to {numbers[top]:.3g} rad/(N s) at {dial.at(top)}, "
+        f"impact is likely from {EARLES_WU:g} (Earles and Wu)"
+    )
+
+
+def _at(dial: Dial, place: float) -> str:
+    """A place between two positions."""
+    k = int(place)
+    values = dial.values
+    step = values[1] - values[0] if len(values) > 1 else 0.0
+    return f"{values[k % len(values)] + (place - k) * step:.4g}{dial.unit}"

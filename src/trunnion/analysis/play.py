@@ -23,10 +23,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra import rigid
 from trunnion.algebra.dual import Dual, derivative, primal
 from trunnion.algebra.namespace import Number
-from trunnion.algebra.space import dot
 from trunnion.analysis import kinetostatics, shifts
 from trunnion.analysis.account import model_notes
 from trunnion.analysis.analyse import Run, check_steps, pose_status, prepare, status_of
@@ -40,7 +38,6 @@ from trunnion.analysis.space import forces
 from trunnion.analysis.space.motion import SpatialWalk
 from trunnion.analysis.system import System, Values
 from trunnion.errors import Finding, MechanismError, Severity, Status
-from trunnion.groups import planar
 from trunnion.joints.clearance import CLEARANCE_MODELS, Vector, worst_case
 from trunnion.model.mechanism import Mechanism
 
@@ -59,52 +56,32 @@ Loads = dict[str, list[Vector]]  # load at each end, by joint
 
 
 def plays(system: System, values: Values) -> dict[str, Play]:
-    """The play of every joint that has some, by joint."""
-    found = {
-        name: shifts.play_of(system.mechanism.space, kind, values, name) for name, (kind, _) in system.joints.items()
-    }
-    return {name: one for name, one in found.items() if one is not None}
+    """The play of every joint that states some, by joint; where it is less than none, the fit presses: none."""
+    space, found = system.mechanism.space, {}
+    for name, (kind, _) in system.joints.items():
+        one = shifts.play_of(space, kind, values, name)
+        if one is not None:
+            found[name] = one._replace(radii=tuple(np.where(radius > 0, radius, 0.0) for radius in one.radii))
+    return found
 
 
 def by_virtual_load(walk: Forward, measure: Measure, known: Mapping[str, Play]) -> Loads:
     """Qᵢ of a measure of the motion at each end of each joint: ∂y/∂cᵢ, in its unit a metre, hole's frame."""
     loads = measure.loads(walk)
-    if isinstance(walk, SpatialWalk):
-        back = forces.under(walk, loads)
-        holes = walk.space.holes(walk.values)
-        return {name: _ends_in_space(walk, name, back.reactions[name], holes, play) for name, play in known.items()}
-    reactions = kinetostatics.under(walk, loads).reactions
-    return {name: _ends_in_the_plane(walk, name, reactions[name], play) for name, play in known.items()}
-
-
-def _ends_in_the_plane(walk: Forward, joint: str, reaction: planar.Wrench, play: Play) -> list[Vector]:
-    hole = walk.element(walk.system.joints[joint][1][1], joint)
-    x, y = planar.turned(hole.c, -hole.s, reaction.x, reaction.y)
-    return play.model.loads((x, y), (reaction.m,), play.length)
-
-
-def _ends_in_space(
-    walk: SpatialWalk, joint: str, reaction: rigid.Screw, holes: Mapping[tuple[str, str], rigid.Frame], play: Play
-) -> list[Vector]:
-    second = walk.system.joints[joint][1][1]
-    local = shifts.hole(holes[second, joint], walk.values, joint)
-    hole = rigid.compose(walk.motions[second].frame, local)
-    moment = rigid.moment_at(reaction, hole.place)
-    axes = (hole.x, hole.y, hole.z)
-    force = tuple(dot(reaction.u, axis) for axis in axes)
-    return play.model.loads(force, tuple(dot(moment, axis) for axis in axes), play.length)
+    back = forces.under(walk, loads) if isinstance(walk, SpatialWalk) else kinetostatics.under(walk, loads)
+    return {name: play.model.loads(*back.on_hole(name), play.length) for name, play in known.items()}
 
 
 def by_duals(run: Run, measure: Measure, known: Mapping[str, Play], time: Array, method: FrictionMethod) -> Loads:
     """The same by derivatives through the whole analysis, of measures of the motion or of an effort."""
     paths = [f"seats.{name}.{key}" for name, play in known.items() for end in play.model.ends for key in end]
     rows = np.eye(len(paths))[:, :, None]  # (offset, sample, 1): each sample moves one offset
-    values = dict(run.values) | {path: Dual(0.0, row) for path, row in zip(paths, rows, strict=True)}
+    offsets = {path: Dual(0.0, row) for path, row in zip(paths, rows, strict=True)}
     with np.errstate(all="ignore"):
         if measure.of_motion:
-            number = measure.value(forward(run.system, values, run.chosen.assembly, time))
+            number = measure.value(forward(run.system, {**run.values, **offsets}, run.chosen.assembly, time))
         else:
-            number = run.solve(time, values, method).efforts[measure.subject]
+            number = run.at(time, offsets, method).efforts[measure.subject]
     slopes = iter(np.broadcast_to(derivative(number), (len(paths), len(time))))
     return {name: [tuple(next(slopes) for _ in end) for end in play.model.ends] for name, play in known.items()}
 
@@ -270,6 +247,10 @@ def _model_findings(run: Run, effect: Effect) -> Iterator[Finding]:
             what = "constraints are redundant: the worst case is an upper bound, for pins that must fit one another"
             yield Finding(what, "joints", "the deviation supposes that each may lie anywhere", Severity.WARNING)
     yield from _left_out(run, effect.plays)
+    yield from _spinning(run, effect.measures)
+    if run.seats:
+        what = f"play is counted from the middle of the holes: the seats of {', '.join(one.joint for one in run.seats)}"
+        yield Finding(f"{what} are not taken", "joints", "analyse takes them", Severity.NOTE)
     yield from _over_limits(run, effect)
     dial = run.system.dial(run.values, effect.time)
     for code in Status:
@@ -298,6 +279,18 @@ def _left_out(run: Run, known: Mapping[str, Play]) -> Iterator[Finding]:
         what = f"gears turn in {', '.join(toothed)}: what their play does between the teeth is left out"
         remedy = "a gear's centre off by e across the line of centres turns it by e over its pitch radius more"
         yield Finding(what, "gears", remedy, Severity.WARNING)
+
+
+def _spinning(run: Run, measures: Sequence[Measure]) -> Iterator[Finding]:
+    """Measures of links that may spin about the line of their joints."""
+    for link, *ends in (one for module in run.system.plan.modules for one in module.spinning):
+        for measure in measures:
+            owner, _, point = measure.subject.partition(".")
+            if owner == link and (measure.kind == "angle" or (measure.kind == "point" and point not in ends)):
+                what = (
+                    f"'{link}' can spin about the line of {' and '.join(ends)}: it is taken not to, whatever the play"
+                )
+                yield Finding(what, f"measures.{measure.name}", "measure one of these points", Severity.WARNING)
 
 
 def _over_limits(run: Run, effect: Effect) -> Iterator[Finding]:

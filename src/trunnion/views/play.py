@@ -21,6 +21,7 @@ __all__ = ["MOST_PANELS", "Table", "figure", "tables"]
 
 MOST_PANELS = 6
 PANEL = 3.3  # height, inches
+FLOATING = 3  # ends of a pin: two across and that of the float
 HATCHES = ("", "//", "..", "xx")
 
 
@@ -28,17 +29,17 @@ def figure(result: xr.Dataset) -> Figure:
     """A panel for each measure: the joints' worst cases on top of one another, their RSS dashed."""
     over, names = _over(result), result["measure"].values[:MOST_PANELS]
     sheet = new("What the play of the joints does", result, height=1.0 + PANEL * len(names))
-    units = json.loads(result.attrs["measure_units"])
+    units, limits = (json.loads(result.attrs[key]) for key in ("measure_units", "limits"))
     panels = sheet.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
     for i, (axes, name) in enumerate(zip(panels, names, strict=True)):
-        _panel(axes, result.isel(measure=i), over, str(name), units[i])
+        _panel(axes, result.isel(measure=i), over, str(name), units[i], limits[i])
         shade(axes, result, over)
         if axes is not panels[-1]:
             axes.set_xlabel("")
     return sheet
 
 
-def _panel(axes: Axes, result: xr.Dataset, over: Abscissa, name: str, unit: str) -> None:
+def _panel(axes: Axes, result: xr.Dataset, over: Abscissa, name: str, unit: str, limit: float | None) -> None:
     rows, total, rss = (result[key].values for key in ("worst_case", "worst_case_total", "rss"))
     most, shown = float(np.nanmax(total, initial=0.0)), usual_peak(total)
     factor, label = prefixed(shown, unit)
@@ -58,6 +59,8 @@ def _panel(axes: Axes, result: xr.Dataset, over: Abscissa, name: str, unit: str)
         floor = floor + row
     axes.plot(x, floor, color=INK, linewidth=1.4, label="sum: worst case", **_marks(x))
     axes.plot(x, lanes[-1], color=INK, linewidth=1.2, linestyle=(0, (5, 2)), label="RSS")
+    if limit is not None:
+        axes.axhline(limit * factor, color=PALETTE[1], linewidth=1.2, linestyle=(0, (1, 1.5)), label="limit")
     axes.set_ylim(bottom=0.0)
     frame_peak(axes, most, shown, factor, unit)
     legend(axes)
@@ -124,6 +127,8 @@ def _table(result: xr.Dataset, over: Abscissa, name: str, unit: str) -> Table:
 
 
 def _play(result: xr.Dataset, j: int) -> str:
-    """How far the pin of a joint can go, each kind of end once."""
-    radii = [radius for radius in result["radius"].values[j] if np.isfinite(radius)]
-    return ", ".join(f"±{quantity(float(radius), 'm')}" for radius in dict.fromkeys(radii))
+    """How far the pin of a joint can go to either side, its end float apart; nothing said of a float of 0."""
+    radii = [float(radius) for radius in result["radius"].values[j] if np.isfinite(radius)]
+    across, along = (radii[:2], radii[2:]) if len(radii) == FLOATING else (radii, [])
+    found = [f"±{quantity(radius, 'm')}" for radius in dict.fromkeys(across)]
+    return ", ".join([*found, *(f"float ±{quantity(radius, 'm')}" for radius in along if radius > 0)])

@@ -16,10 +16,12 @@ import typer
 from trunnion import __version__
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.options import (
+    IMAGES,
     Criterion,
     Drawn,
     File,
     FrictionLaw,
+    Kinds,
     Measures,
     Method,
     Out,
@@ -52,9 +54,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
-PLOT_KINDS = "torque, friction-power, reactions, polar, power, mechanism or motion"  # views.plots.PLOTS, not loaded yet
-
-IMAGES = (".png", ".svg", ".pdf")
 INTERRUPTED = 130  # exit status after Ctrl-C
 
 
@@ -195,15 +194,14 @@ def sweep(
 ) -> None:
     """How efficiency, drive effort, reactions, friction and locking margin change with one or two numbers."""
     from trunnion.analysis.sweep import sweep as run
-    from trunnion.export import check_format, save
+    from trunnion.export import save
+    from trunnion.playing import check_files
     from trunnion.views.swept import check_measure
     from trunnion.views.swept import table as swept_table
 
     grid = over(over_)
     drawn = [path for path in out or [] if path.suffix.lower() in IMAGES]
-    for path in out or []:
-        if path not in drawn:
-            check_format(path, IMAGES)
+    check_files(out or [])
     mechanism = _mechanism(file, set_, table, friction)
     check_measure(measure, mechanism)
     with _lines_of(file), bar("points", points(grid)) as progress:
@@ -255,10 +253,7 @@ def play(
 def plot(
     file: File,
     out: Annotated[Path, typer.Option("--out", help="Folder, or a .png, .svg or .pdf file of one plot.")],
-    kind: Annotated[
-        list[str] | None,
-        typer.Option("--kind", help=f"{PLOT_KINDS}. Repeatable; all if not given.", show_default=False),
-    ] = None,
+    kind: Kinds = None,
     steps: Steps = 360,
     set_: Set = None,
     table: TableFile = None,

@@ -12,10 +12,12 @@ import typer
 from trunnion.errors import Finding, MechanismError
 
 __all__ = [
+    "IMAGES",
     "Criterion",
     "Drawn",
     "File",
     "FrictionLaw",
+    "Kinds",
     "Measures",
     "Method",
     "Out",
@@ -31,6 +33,9 @@ __all__ = [
     "setting",
     "table_file",
 ]
+
+IMAGES = (".png", ".svg", ".pdf")
+PLOT_KINDS = "torque, friction-power, reactions, polar, power, mechanism or motion"  # views.plots.PLOTS, not loaded yet
 
 File = Annotated[Path, typer.Argument(help="Model file: YAML, JSON or TOML.", show_default=False)]
 Steps = Annotated[int, typer.Option("--steps", help="Equally spaced positions over the turn or range.")]
@@ -70,6 +75,9 @@ Out = Annotated[
     typer.Option("--out", help="Write it: .csv .json .nc .zarr .parquet, or a figure: .png .svg .pdf. Repeatable."),
 ]
 UnitsRow = Annotated[bool, typer.Option("--units-row", help="Second CSV header row with the units.")]
+Kinds = Annotated[
+    list[str] | None, typer.Option("--kind", help=f"{PLOT_KINDS}. Repeatable; all if not given.", show_default=False)
+]
 Measures = Annotated[
     list[str] | None,
     typer.Option(

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from trunnion.errors import Finding, MechanismError
+from trunnion.options import IMAGES
 from trunnion.terminal import show_rows, wrote
 
 if TYPE_CHECKING:
@@ -14,9 +15,7 @@ if TYPE_CHECKING:
 
     from trunnion.model.mechanism import Mechanism
 
-__all__ = ["IMAGES", "check_files", "show"]
-
-IMAGES = (".png", ".svg", ".pdf")
+__all__ = ["check_files", "show"]
 
 
 def check_files(out: Sequence[Path]) -> None:

@@ -261,6 +261,11 @@ def test_dead_centres_have_no_answer_and_say_so() -> None:
     assert 10 < out.sum() < 350
     assert np.array_equal(np.isnan(result["worst_case"].values[0, 0]), out)
     assert any("cannot be assembled" in row["what"] for row in json.loads(result.attrs["findings"]))
+    result = trunnion.play(trunnion.Mechanism(**data), steps=36000)
+    sound = result["status"].values < Status.NEAR_SINGULAR
+    told = json.loads(result.attrs["summary"])[0]["value"]  # close to a dead centre first order says little
+    assert told == np.max(result["worst_case_total"].values[0, sound])
+    assert told < 0.5 * np.nanmax(result["worst_case_total"].values)
 
 
 @pytest.mark.parametrize(

@@ -32,7 +32,7 @@ from trunnion.analysis.fill import unwrap_row
 from trunnion.analysis.friction import FrictionMethod
 from trunnion.analysis.kinematics import Forward, forward
 from trunnion.analysis.measures import MEASURES, Measure, named, outputs
-from trunnion.analysis.play_result import dataset
+from trunnion.analysis.play_result import dataset, relied_on
 from trunnion.analysis.shifts import Play
 from trunnion.analysis.space import forces
 from trunnion.analysis.space.motion import SpatialWalk
@@ -296,7 +296,7 @@ def _spinning(run: Run, measures: Sequence[Measure]) -> Iterator[Finding]:
 def _over_limits(run: Run, effect: Effect) -> Iterator[Finding]:
     """Measures whose worst case is above their limit."""
     dial = run.system.dial(run.values, effect.time)
-    for measure, total in zip(effect.measures, effect.total, strict=True):
+    for measure, total in zip(effect.measures, relied_on(effect.total, effect.status), strict=True):
         over = np.flatnonzero(total > np.nan if measure.limit is None else total > measure.limit)
         if len(over):
             unit = measure.unit(run.system)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from trunnion.analysis.analyse import Run
 
-__all__ = ["VARIABLES", "Variable", "dataset"]
+__all__ = ["VARIABLES", "Variable", "dataset", "relied_on"]
 
 Array = NDArray[np.float64]
 
@@ -133,6 +133,12 @@ def dataset(found: Found, findings: Sequence[Finding]) -> xr.Dataset:
     return xr.Dataset(variables, {**told, "time": times, "drive": over}, attributes)
 
 
+def relied_on(numbers: Array, status: NDArray[np.int8]) -> Array:
+    """The numbers, (…, position), NaN close to dead centres, where first order says little; all if all are close."""
+    near = status >= Status.NEAR_SINGULAR
+    return numbers if np.all(near) else np.where(near, np.nan, numbers)
+
+
 def _unit(variable: Variable, units: Sequence[str]) -> dict[str, str]:
     """The unit, if it is one for all measures."""
     if variable.units:
@@ -153,7 +159,7 @@ def _summary(found: Found, units: Sequence[str], dial: Any) -> list[dict[str, An
     """Of each measure the largest worst case, what each joint has in it, RSS and deviation there."""
     rows: list[dict[str, Any]] = []
     for i, (measure, unit) in enumerate(zip(found.measures, units, strict=True)):
-        total = found.total[i]
+        total = relied_on(found.total[i], found.status)
         if not np.any(np.isfinite(total)):
             rows.append({"label": f"{measure.name}, worst case", "value": None, "unit": unit})
             continue

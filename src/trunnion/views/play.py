@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from trunnion.analysis.play_result import relied_on
 from trunnion.views.cycle import Abscissa, Array, thin, usual_peak
 from trunnion.views.figures import INK, PALETTE, along, frame_peak, legend, new, shade
 from trunnion.views.lettering import plain
@@ -105,12 +106,12 @@ def tables(result: xr.Dataset) -> list[Table]:
 
 
 def _table(result: xr.Dataset, over: Abscissa, name: str, unit: str) -> Table:
-    total = result["worst_case_total"].values
+    total = _relied_on(result, "worst_case_total")
     if not np.isfinite(total).any():
         return Table(f"{name}: no position has an answer", HEAD, [])
-    top, rows = int(np.nanargmax(total)), []
+    top, rows, effects = int(np.nanargmax(total)), list[list[str]](), _relied_on(result, "worst_case")
     for j, joint in enumerate(result["joint"].values):
-        effect = result["worst_case"].values[j]
+        effect = effects[j]
         where = over.say(int(np.nanargmax(effect))) if np.nanmax(effect) > 0 else "—"
         share = f"{100 * effect[top] / total[top]:.1f} %" if total[top] > 0 else "—"
         rows.append([str(joint), _play(result, j), quantity(float(np.nanmax(effect)), unit), where, share])
@@ -119,11 +120,15 @@ def _table(result: xr.Dataset, over: Abscissa, name: str, unit: str) -> Table:
         ("all, RSS", "rss"),
         ("all, standard deviation", "deviation_total"),
     ):
-        row = result[key].values
+        row = _relied_on(result, key)
         best = int(np.nanargmax(row))
         rows.append([label, "", quantity(float(row[best]), unit), over.say(best), ""])
     low, high = (quantity(float(pick(result["value"].values)), unit) for pick in (np.nanmin, np.nanmax))
     return Table(f"{name}, from {low} to {high}; shares are at {over.say(top)}", HEAD, rows)
+
+
+def _relied_on(result: xr.Dataset, name: str) -> Array:
+    return relied_on(result[name].values, result["status"].values)
 
 
 def _play(result: xr.Dataset, j: int) -> str:

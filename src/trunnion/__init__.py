@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from trunnion.analysis.friction import FrictionMethod
     from trunnion.analysis.inspect import Check, check
     from trunnion.analysis.locking import locking
+    from trunnion.analysis.play import play
     from trunnion.analysis.sweep import sweep
     from trunnion.errors import Finding, MechanismError, Status
     from trunnion.export import save
@@ -33,6 +34,7 @@ _PLACES = {
     "analyse": "trunnion.analysis.analyse",
     "check": "trunnion.analysis.inspect",
     "locking": "trunnion.analysis.locking",
+    "play": "trunnion.analysis.play",
     "prepare": "trunnion.analysis.analyse",
     "read": "trunnion.model.file",
     "report": "trunnion.views.report",
@@ -53,6 +55,7 @@ __all__ = [
     "check",
     "dual",
     "locking",
+    "play",
     "prepare",
     "read",
     "report",

@@ -15,7 +15,28 @@ import typer
 
 from trunnion import __version__
 from trunnion.errors import Finding, MechanismError, Severity
-from trunnion.options import over, points, setting, table_file
+from trunnion.options import (
+    IMAGES,
+    Criterion,
+    Drawn,
+    File,
+    FrictionLaw,
+    Kinds,
+    Measures,
+    Method,
+    Out,
+    Over,
+    Report,
+    Rounds,
+    Set,
+    Steps,
+    TableFile,
+    UnitsRow,
+    over,
+    points,
+    setting,
+    table_file,
+)
 from trunnion.terminal import bar, console, say, show_figures, show_rows, wrote
 
 if TYPE_CHECKING:
@@ -33,35 +54,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
-PLOT_KINDS = "torque, friction-power, reactions, polar, power, mechanism or motion"  # views.plots.PLOTS, not loaded yet
-
-IMAGES = (".png", ".svg", ".pdf")
 INTERRUPTED = 130  # exit status after Ctrl-C
-
-File = Annotated[Path, typer.Argument(help="Model file: YAML, JSON or TOML.", show_default=False)]
-Steps = Annotated[int, typer.Option("--steps", help="Equally spaced positions over the turn or range.")]
-Set = Annotated[
-    list[str] | None,
-    typer.Option("--set", help="Replace a value: AB=2.1m, crank.mass=5kg, B.friction.coefficient=0.3. Repeatable."),
-]
-TableFile = Annotated[
-    list[str] | None,
-    typer.Option("--table", help="NAME=FILE.csv: points of a driver or table, two columns. Repeatable."),
-]
-FrictionLaw = Annotated[
-    str | None, typer.Option("--friction", help="off, or a friction law for all joints with friction.")
-]
-Method = Annotated[str, typer.Option("--method", help="newton, or successive-approximation (Durango et al., 2010).")]
-Criterion = Annotated[
-    float | None,
-    typer.Option(
-        "--criterion", help="Largest change of a reaction at which the iteration ends, N.", show_default=False
-    ),
-]
-Rounds = Annotated[int, typer.Option("--iterations", help="Most rounds of the friction iteration.")]
-Report = Annotated[
-    Path | None, typer.Option("--report", help="Also write the report, one HTML file.", show_default=False)
-]
 
 
 @app.command()
@@ -132,7 +125,7 @@ def analyse(
         list[Path] | None, typer.Option("--out", help="Write the result: .csv .json .nc .zarr .parquet. Repeatable.")
     ] = None,
     report: Report = None,
-    units_row: Annotated[bool, typer.Option("--units-row", help="Second CSV header row with the units.")] = False,
+    units_row: UnitsRow = False,
 ) -> None:
     """Motion, reactions with friction, drive effort and power over the cycle."""
     from trunnion.export import check_format, save
@@ -190,38 +183,25 @@ def locking(
 @app.command()
 def sweep(
     file: File,
-    over_: Annotated[
-        list[str],
-        typer.Option(
-            "--over",
-            help="NAME=FROM:TO:COUNT or NAME=VALUE,VALUE,…: misalignment=0deg:30deg:16. Once or twice.",
-            show_default=False,
-        ),
-    ],
-    measure: Annotated[
-        str, typer.Option("--measure", help="What is drawn, by its name in the CSV file: A.effort_max.")
-    ] = "efficiency",
+    over_: Over,
+    measure: Drawn = "efficiency",
     steps: Steps = 360,
     set_: Set = None,
     table: TableFile = None,
     friction: FrictionLaw = None,
-    out: Annotated[
-        list[Path] | None,
-        typer.Option("--out", help="Write it: .csv .json .nc .zarr .parquet, or a figure: .png .svg .pdf. Repeatable."),
-    ] = None,
-    units_row: Annotated[bool, typer.Option("--units-row", help="Second CSV header row with the units.")] = False,
+    out: Out = None,
+    units_row: UnitsRow = False,
 ) -> None:
     """How efficiency, drive effort, reactions, friction and locking margin change with one or two numbers."""
     from trunnion.analysis.sweep import sweep as run
-    from trunnion.export import check_format, save
+    from trunnion.export import save
+    from trunnion.playing import check_files
     from trunnion.views.swept import check_measure
     from trunnion.views.swept import table as swept_table
 
     grid = over(over_)
     drawn = [path for path in out or [] if path.suffix.lower() in IMAGES]
-    for path in out or []:
-        if path not in drawn:
-            check_format(path, IMAGES)
+    check_files(out or [])
     mechanism = _mechanism(file, set_, table, friction)
     check_measure(measure, mechanism)
     with _lines_of(file), bar("points", points(grid)) as progress:
@@ -246,13 +226,34 @@ def sweep(
 
 
 @app.command()
+def play(
+    file: File,
+    measure: Measures = None,
+    steps: Steps = 360,
+    set_: Set = None,
+    table: TableFile = None,
+    friction: FrictionLaw = None,
+    out: Out = None,
+    units_row: UnitsRow = False,
+) -> None:
+    """What the play of every joint does to measures: worst case, share of each joint, standard deviation."""
+    from trunnion.analysis.play import play as run
+    from trunnion.playing import check_files, show
+
+    check_files(out or [])
+    mechanism = _mechanism(file, set_, table, friction)
+    with _lines_of(file):
+        result = run(mechanism, measure, steps)
+    show(mechanism, result, out or [], units_row)
+    say(_placed(_findings(result), file, ["measures", "joints"]))
+    raise typer.Exit(_status(_findings(result)))
+
+
+@app.command()
 def plot(
     file: File,
     out: Annotated[Path, typer.Option("--out", help="Folder, or a .png, .svg or .pdf file of one plot.")],
-    kind: Annotated[
-        list[str] | None,
-        typer.Option("--kind", help=f"{PLOT_KINDS}. Repeatable; all if not given.", show_default=False),
-    ] = None,
+    kind: Kinds = None,
     steps: Steps = 360,
     set_: Set = None,
     table: TableFile = None,

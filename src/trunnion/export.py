@@ -8,7 +8,8 @@ CSV (and Parquet) have one row a position and flat columns: `time`, `<joint>.rot
 `<link>.<point>.error_x|y`; of pins in their seats `<joint>.seat_1_x` …, `<joint>.end_force_1_x` …,
 `<joint>.contact_1_x` …, `<joint>.seat_beta`, `<joint>.seat_xi`, `<joint>.seat_xi_pin`, `<joint>.contact_lost`. A
 sweep has one row a point of its grid: the swept numbers by the names they were given, then `efficiency`,
-`<driver>.effort_max`, `<joint>.reaction_max`, …, `status`.
+`<driver>.effort_max`, `<joint>.reaction_max`, …, `status`. The play of joints has `drive`, `<measure>`,
+`<measure>.worst_case`, `<measure>.rss`, `<measure>.deviation`, `<measure>.<joint>.worst_case`, ….
 """
 
 from __future__ import annotations
@@ -44,6 +45,8 @@ def columns(result: xr.Dataset) -> list[Column]:
     """(name, unit, values of a window of rows) of every flat column."""
     if "swept" in result.attrs:
         return [(name, unit, values.__getitem__) for name, (unit, values) in figures(result).items()]
+    if "measure" in result.dims:
+        return _played(result)
     stated = json.loads(result.attrs["scene"])
     spatial = stated.get("space") == "spatial"
     kinds = {name: joint["type"] for name, joint in stated["joints"].items()}
@@ -68,6 +71,23 @@ def columns(result: xr.Dataset) -> list[Column]:
     found.append(_column(result, "useful_power", "power_useful", ()))
     if "seat_rounds" in result:
         found.append(_column(result, "seat_rounds", "seat_rounds", ()))
+    names = np.array([status.name.lower() for status in Status])
+    found.append(("status", "", lambda window: names[result["status"].values[window]]))
+    return found
+
+
+def _played(result: xr.Dataset) -> list[Column]:
+    """Of the play of joints: each measure, its worst case, RSS, standard deviation, and each joint's part in them."""
+    found: list[Column] = [("time", "s", lambda window: result["time"].values[window])]
+    found.append(("drive", str(result["drive"].attrs["units"]), lambda window: result["drive"].values[window]))
+    for i, (measure, unit) in enumerate(
+        zip(result["measure"].values, json.loads(result.attrs["measure_units"]), strict=True)
+    ):
+        keys = {"value": "", "worst_case_total": ".worst_case", "rss": ".rss", "deviation_total": ".deviation"}
+        parts: list[tuple[str, str, tuple[int, ...]]] = [(key, f"{measure}{end}", (i,)) for key, end in keys.items()]
+        for j, joint in enumerate(result["joint"].values):
+            parts += [(key, f"{measure}.{joint}.{key}", (i, j)) for key in ("worst_case", "deviation")]
+        found += [(name, unit, _column(result, key, name, index)[2]) for key, name, index in parts]
     names = np.array([status.name.lower() for status in Status])
     found.append(("status", "", lambda window: names[result["status"].values[window]]))
     return found

@@ -17,6 +17,7 @@ from trunnion import __version__
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.options import over, points, setting, table_file
 from trunnion.terminal import bar, console, say, show_figures, show_rows, wrote
+from trunnion.verbs.assemble import assemble
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -187,6 +188,9 @@ def locking(
     raise typer.Exit(_status(_findings(found)))
 
 
+app.command()(assemble)
+
+
 @app.command()
 def sweep(
     file: File,
@@ -268,9 +272,8 @@ def plot(
         raise MechanismError(Finding(f"there is no plot '{unknown[0]}'", "--kind", f"use one of {', '.join(PLOTS)}"))
     single = out.suffix.lower() in IMAGES
     if single and len(kinds) > 1:
-        raise MechanismError(
-            Finding(f"{len(kinds)} plots do not fit one file", str(out), "name a folder, or one --kind")
-        )
+        remedy = "name a folder, or one --kind"
+        raise MechanismError(Finding(f"{len(kinds)} plots do not fit one file", str(out), remedy))
     mechanism = _mechanism(file, set_, table, friction)
     with _lines_of(file):
         result = _run(mechanism, steps, None)
@@ -300,9 +303,8 @@ def report(
 ) -> None:
     """One self-contained HTML file: animation, plots, findings, balance, input data."""
     if out.suffix.lower() not in (".html", ".htm"):
-        raise MechanismError(
-            Finding(f"a report is HTML, '{out.name}' is not", "--out", "write a .html file and print it")
-        )
+        what = f"a report is HTML, '{out.name}' is not"
+        raise MechanismError(Finding(what, "--out", "write a .html file and print it"))
     mechanism = _mechanism(file, set_, table, friction)
     with _lines_of(file):
         result = _run(mechanism, steps, _method(method, criterion, iterations))

@@ -5,7 +5,8 @@ CSV (and Parquet) have one row a position and flat columns: `time`, `<joint>.rot
 `power_useful`, `status` and so on, in SI; the other formats hold the whole Dataset. In space also z, and
 `<joint>.reaction_moment_x|y|z`, `<joint>.friction_force`, `<link>.x|y|z`, `<link>.rotation_w|x|y|z`,
 `<link>.angular_velocity_x|y|z`. A sweep has one row a point of its grid: the swept numbers by the names they were
-given, then `efficiency`, `<driver>.effort_max`, `<joint>.reaction_max`, …, `status`.
+given, then `efficiency`, `<driver>.effort_max`, `<joint>.reaction_max`, …, `status`. What `assemble` finds has one row a
+position: `<driver>.coordinate`, `needed_share`, `needed_clearance`, …, `<joint>.uniform_1_x` of end 1, …, `status`.
 """
 
 from __future__ import annotations
@@ -41,6 +42,8 @@ def columns(result: xr.Dataset) -> list[Column]:
     """(name, unit, values of a window of rows) of every flat column."""
     if "swept" in result.attrs:
         return [(name, unit, values.__getitem__) for name, (unit, values) in figures(result).items()]
+    if "assembling" in result.attrs:
+        return _fit(result)
     stated = json.loads(result.attrs["scene"])
     spatial = stated.get("space") == "spatial"
     kinds = {name: joint["type"] for name, joint in stated["joints"].items()}
@@ -63,6 +66,26 @@ def columns(result: xr.Dataset) -> list[Column]:
     names = np.array([status.name.lower() for status in Status])
     found.append(("status", "", lambda window: names[result["status"].values[window]]))
     return found
+
+
+def _fit(result: xr.Dataset) -> list[Column]:
+    """Of whether a mechanism goes together: needs, openings, then offsets of the ends that have a play."""
+    found: list[Column] = [("time", "s", lambda window: result["time"].values[window])]
+    units = json.loads(result.attrs["coordinate_units"])
+    for i, (driver, unit) in enumerate(zip(result["driver"].values, units, strict=True)):
+        _, _, values = _column(result, "drive_coordinate", "", (i,))
+        found.append((f"{driver}.coordinate", unit, values))
+    flat = [str(name) for name, one in result.data_vars.items() if one.dims == ("position",) and name != "status"]
+    found += [_column(result, name, name, ()) for name in flat]
+    joints, ends, axes = (result[dim].values for dim in ("joint", "end", "axis"))
+    for kind in ("stated", "uniform"):
+        offsets = result[f"{kind}_offset"]
+        known = np.isfinite(offsets.values).any(axis=-1)
+        for i, k, m in np.argwhere(known):
+            found.append(_column(result, offsets.name, f"{joints[i]}.{kind}_{ends[k]}_{axes[m]}", (i, k, m)))
+    names = dict(zip(result.attrs["flag_values"].split(), result.attrs["flag_meanings"].split(), strict=True))
+    told = np.array([names[str(code)] for code in result["status"].values])
+    return [*found, ("status", "", lambda window: told[window])]
 
 
 def _planar_joint(result: xr.Dataset, i: int, joint: str, kind: str) -> list[Column]:

@@ -24,7 +24,7 @@ from trunnion.analysis.analyse import check_steps
 from trunnion.analysis.branches import choose
 from trunnion.analysis.engine import build
 from trunnion.analysis.kinematics import forward
-from trunnion.analysis.space.cone import Ask, Found, least_play
+from trunnion.analysis.space.cone import CLOSED, Ask, Found, least_play
 from trunnion.analysis.space.loops import End, Loops, ends_of
 from trunnion.analysis.space.starts import Start, start_of
 from trunnion.analysis.space.system import SpatialSystem
@@ -232,9 +232,16 @@ class Study:
         evened = np.array(self.evened, float)
         base, share = (np.zeros(len(ends)), radii) if stated else (radii * (1 - evened), evened)
         ask = Ask(base, share, tuple(len(end.axes) for end in ends))
-        loops, q = Loops.of(self.system, self.values, ends, time), self.start(time)
+        loops, none = Loops.of(self.system, self.values, ends, time), np.zeros((len(time), sum(ask.widths)))
         with np.errstate(all="ignore"):
-            return least_play(loops, q, np.zeros((len(time), sum(ask.widths))), ask)
+            q, gap = loops.least_open(self.start(time), none)
+            if not ends:
+                least = np.where(np.isnan(gap), np.nan, np.where(gap <= CLOSED, 0.0, np.inf))
+                return Found(least, least, q, none, none, gap, 0)
+            found = least_play(loops, q, none, ask)
+        fits = gap <= CLOSED  # as it is: what is found beside it is rounding
+        found.least[fits], found.bound[fits], found.offsets[fits], found.weights[fits] = 0.0, 0.0, 0.0, 0.0
+        return found
 
     def result(self, time: Array) -> Result:
         """The whole answer."""
@@ -248,7 +255,7 @@ class Study:
         arrays["needed_share"], arrays["needed_clearance"] = shares.least, needs.least
         arrays["closure_residual"] = _worst(shares, needs, lambda one: one.opening)
         arrays["certificate"] = _worst(
-            shares, needs, lambda one: np.where(one.least > 0, (one.least - one.bound) / one.least, 0.0)
+            shares, needs, lambda one: (one.least - one.bound) / np.where(one.least > 0, one.least, 1.0)
         )
         share = shares.least
         status = np.where(np.isinf(share), Fit.RIGID, np.where(share > ENOUGH, Fit.SHORT, Fit.FITS))
@@ -263,14 +270,11 @@ class Study:
     def _open(self, time: Array, q: Array) -> tuple[Array, Array]:
         """How far the loops are open, in angle, rad, and in length, m, where they are open least without play."""
         loops, none = Loops.of(self.system, self.values, (), time), np.zeros((len(time), 0))
-        angle, length = np.full(len(time), np.nan), np.full(len(time), np.nan)
-        lanes = np.flatnonzero(np.isfinite(q).all(axis=1))
-        part = loops.at(lanes)
-        q, _ = part.least_open(q[lanes], none[lanes])
-        rows = part.linear(q, none[lanes]).gap[:, : 6 * len(loops.group.chords)].reshape(len(lanes), -1, 2, 3)
+        q, _ = loops.least_open(q, none)
+        with np.errstate(all="ignore"):
+            rows = loops.linear(q, none).gap[:, : 6 * len(loops.group.chords)].reshape(len(time), -1, 2, 3)
         sizes = np.max(np.linalg.norm(rows, axis=-1), axis=1)
-        angle[lanes], length[lanes] = sizes[:, 0], sizes[:, 1] * loops.size
-        return angle, length
+        return sizes[:, 0], sizes[:, 1] * loops.size
 
     def _place(self, found: Found, ends: Sequence[End], offsets: Array, parts: Array) -> None:
         """Offsets and parts of the ends at their places in the result."""
@@ -309,7 +313,8 @@ class Study:
 
 def _worst(one: Found, other: Found, of: Callable[[Found], Array]) -> Array:
     """The larger of a number of two searches, of those that have an answer."""
-    rows = [np.where(np.isfinite(found.least), of(found), -np.inf) for found in (one, other)]
+    with np.errstate(invalid="ignore"):
+        rows = [np.where(np.isfinite(found.least), of(found), -np.inf) for found in (one, other)]
     most = np.maximum(*rows)
     return np.where(np.isfinite(most), most, np.nan)
 

@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 CLOSED = 1e-12  # rad, or of the size: a gap that counts as closed
 SETTLED = 1e-9  # of t
 ROUNDS = 60
-PATIENCE = 12  # rounds before steps are halved
+PATIENCE = 12
 NOTHING = 1e-13  # of the size: a play below it is rounding
 FINE = 1e-12  # tolerances of the cone programme
 SOUND = ("Solved", "AlmostSolved", "InsufficientProgress")
@@ -67,18 +67,23 @@ class Found:
 
 
 def least_play(loops: Loops, q: Array, c: Array, ask: Ask) -> Found:
-    """The least t at every lane, from coordinates (lane, kept) and offsets (lane, component)."""
+    """The least t at every lane, from coordinates (lane, kept) and offsets (lane, component).
+
+    A step is halved where the gap grew, from the round PATIENCE on.
+    """
     lanes, ends = len(q), len(ask.widths)
     q, c = q.copy(), c.copy()
     least, bound = np.full(lanes, np.nan), np.full(lanes, np.nan)
-    weights, before = np.zeros((lanes, ends)), np.full(lanes, np.nan)
+    weights, before, gaps = np.zeros((lanes, ends)), np.full(lanes, np.nan), np.full(lanes, np.inf)
     active = np.flatnonzero(np.isfinite(q).all(axis=1))
     rounds = 0
     while len(active) and rounds < ROUNDS:
         part = loops.at(active)
         linear = part.linear(q[active], c[active])
-        closed = np.max(np.abs(linear.gap), axis=1, initial=0.0) <= CLOSED
-        settled = closed & (np.abs(least[active] - before[active]) <= SETTLED * np.abs(least[active]))
+        gap = np.max(np.abs(linear.gap), axis=1, initial=0.0)
+        grew = (gap > gaps[active]) & (rounds >= PATIENCE)
+        gaps[active] = gap
+        settled = (gap <= CLOSED) & (np.abs(least[active] - before[active]) <= SETTLED * np.abs(least[active]))
         steps = np.zeros((len(active), linear.jacobian.shape[2]))
         done = settled.copy()
         for place, lane in enumerate(active):
@@ -91,7 +96,7 @@ def least_play(loops: Loops, q: Array, c: Array, ask: Ask) -> Found:
             before[lane], least[lane], bound[lane] = least[lane], answer.least, answer.bound
             weights[lane] = answer.weights
             largest = float(np.max(np.abs(answer.steps), initial=0.0))
-            whole = (1.0 if rounds < PATIENCE else 0.5) * min(1.0, LARGEST / max(largest, 1e-300))
+            whole = (0.5 if grew[place] else 1.0) * min(1.0, LARGEST / max(largest, 1e-300))
             steps[place] = whole * answer.steps
             c[lane] += whole * (answer.offsets - c[lane])
         moving = ~done

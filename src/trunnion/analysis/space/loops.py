@@ -181,14 +181,19 @@ class Loops:
 
     def least_open(self, q: Array, c: Array) -> tuple[Array, Array]:
         """Coordinates near by at which the loops are open least (least squares), and by how much: (lane,)."""
+        lanes = np.flatnonzero(np.isfinite(q).all(axis=1))
+        part, near = self.at(lanes), q[lanes]
         for _ in range(ROUNDS):
-            linear = self.linear(q, c)
+            linear = part.linear(near, c[lanes])
             steps = -(np.linalg.pinv(linear.jacobian) @ linear.gap[..., None])[..., 0]
             largest = np.max(np.abs(steps), axis=-1, initial=0.0)
-            q = self.moved(q, steps * np.minimum(1.0, LARGEST / np.maximum(largest, 1e-300))[:, None])
+            near = part.moved(near, steps * np.minimum(1.0, LARGEST / np.maximum(largest, 1e-300))[:, None])
             if not np.any(largest > STILL):
                 break
-        return q, np.max(np.abs(self.linear(q, c).gap), axis=-1, initial=0.0)
+        found, gap = q.copy(), np.full(len(q), np.nan)
+        found[lanes] = near
+        gap[lanes] = np.max(np.abs(part.linear(near, c[lanes]).gap), axis=-1, initial=0.0)
+        return found, gap
 
 
 def _full(rows: Sequence[Number], shape: tuple[int, ...]) -> Array:

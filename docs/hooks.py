@@ -410,7 +410,7 @@ def public_names() -> str:
 # ---- the model file -------------------------------------------------------------------------------------------
 
 SECTIONS = ("Link", "Point", "PolarPoint", "InertiaTensor", "Joint", "Pin", "Guide", "Friction", "JointDefaults",
-            "LoopJoint", "Driver", "Load", "Measure")  # fmt: skip
+            "Misalignment", "Seat", "LoopJoint", "Driver", "Load", "Measure")  # fmt: skip
 
 
 def meanings() -> dict[str, dict[str, str]]:

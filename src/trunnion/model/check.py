@@ -15,6 +15,7 @@ from trunnion.errors import Finding, Severity
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.joints.motion import MOTION_LAWS
 from trunnion.joints.pairs import PAIRS
+from trunnion.model.check_errors import error_unit, errors, joint_errors
 from trunnion.model.check_gears import gears
 from trunnion.model.check_loads import motion_dimensions, springs, tables, unknown_name
 from trunnion.model.check_space import contact, coordinates, driven, loop, pitch, resisted, space
@@ -22,7 +23,7 @@ from trunnion.model.check_values import check_values
 from trunnion.model.contact import motions
 from trunnion.model.expression import MOTION, RESERVED
 from trunnion.model.names import nearest
-from trunnion.model.parameters import ParameterSet, entries, evaluation_order
+from trunnion.model.parameters import ParameterSet, dimension_errors, entries, evaluation_order
 from trunnion.model.parts import Driver, Friction, Joint, Load, Measure, freedoms
 from trunnion.model.quantity import UNREADABLE
 from trunnion.model.units import ANY, Dimension, UnitError
@@ -45,6 +46,7 @@ def check_model(mechanism: Mechanism, lost: Collection[str] = ()) -> list[Findin
     findings = [*_quantities(mechanism, unreadable), *space(mechanism), *_links(mechanism), *_joints(mechanism)]
     findings += [] if lost else _absent(mechanism)
     findings += [*loop(mechanism), *gears(mechanism), *_drivers(mechanism), *_loads(mechanism)]
+    findings += [*errors(mechanism), *joint_errors(mechanism)]
     findings += [*springs(mechanism), *_others(mechanism)]
     numbers = ParameterSet(mechanism, unreadable) if unreadable else mechanism.parameter_set
     with np.errstate(all="ignore"):  # absurd numbers may overflow in a check; they are still only numbers
@@ -81,15 +83,17 @@ def _quantities(mechanism: Mechanism, unreadable: set[str]) -> Iterator[Finding]
         if missing := [name for name in names if name not in sayable]:
             unreadable.add(entry.path)
             for name in missing:
-                yield unknown_name(mechanism, name, entry.path, entry.quantity.source, known)
+                yield unknown_name(mechanism, name, entry.where, entry.quantity.source, known)
             continue
         if entry.varies and entry.quantity.tolerance:
             what = f"'{entry.quantity.source}' varies with the motion and has a tolerance"
-            yield Finding(what, entry.path, "state a dimension with the tolerance and use it in the expression")
+            yield Finding(what, entry.where, "state a dimension with the tolerance and use it in the expression")
         try:
-            entry.quantity.check(sayable, entry.kind)
+            measured = entry.quantity.check(sayable, entry.kind)
         except UnitError as error:
-            yield Finding(error.what, entry.path, error.remedy)
+            yield Finding(error.what, entry.where, error.remedy)
+        else:
+            yield from error_unit(entry, measured, known)
     for name in mechanism.dimensions:
         if name not in used:
             yield Finding("is not used", f"dimensions.{name}", "remove it", Severity.NOTE)
@@ -99,7 +103,8 @@ def _dimensions(mechanism: Mechanism, known: dict[str, Dimension | None], unread
     """Names of the dimensions and what each measures: `known` receives it, `unreadable` the paths without a value."""
     dimensions = mechanism.dimensions
     known.update(dict.fromkeys(dimensions))
-    order, circles = evaluation_order(dimensions)
+    deviations = dimension_errors(entries(mechanism)) if mechanism.errors else {}
+    order, circles = evaluation_order(dimensions, deviations)
     for circle in circles:
         unreadable.update(f"dimensions.{name}" for name in circle)
         ring = " → ".join([*circle, circle[0]])

@@ -11,9 +11,11 @@ import numpy as np
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, Severity
 from trunnion.joints.friction import FRICTION_LAWS, LawParameter
+from trunnion.model.check_errors import play_values
 from trunnion.model.check_gears import gear_values
 from trunnion.model.check_loads import spring_values, table_values
 from trunnion.model.check_space import direction_values, pitch_values
+from trunnion.model.parameter_names import ERRORS
 from trunnion.model.parameters import ParameterSet
 from trunnion.model.parts import InertiaTensor, Link, freedoms
 from trunnion.model.units import KINDS
@@ -37,16 +39,21 @@ def check_values(mechanism: Mechanism, numbers: ParameterSet) -> Iterator[Findin
         broken = any(np.isnan(values[one]) for one in entry.depends if one in values)
         if entry.quantity.names and not broken and not np.isfinite(values[path]) and not numbers.is_unreadable(path):
             yield Finding(
-                f"'{entry.quantity.source}' has no finite value ({values[path]})", path, "check divisions and roots"
+                f"'{entry.quantity.source}' has no finite value ({values[path]})",
+                entry.where,
+                "check divisions and roots",
             )
         if entry.kind is KINDS["angle"] and isinstance(entry.quantity.source, int | float) and not entry.alias:
-            yield from _radians(path, float(values[path]))
+            yield from _radians(entry.where, float(values[path]))
+        if path.startswith(ERRORS):
+            continue  # a deviation has a sign
         if entry.path.rpartition(".")[2] in _NOT_NEGATIVE and not entry.alias and values[path] < 0:
             yield Finding(f"is {values[path]:g}, which is negative", path, "give a value of at least 0")
     for name, link in mechanism.links.items():
         yield from _inertia(mechanism, link, values, f"links.{name}")
     for name in mechanism.effective_joints:
         yield from _joint(mechanism, name, numbers)
+        yield from play_values(mechanism, name, numbers)
     for name in mechanism.drivers:
         yield from _driver(mechanism, name, values)
     yield from gear_values(mechanism, values)
@@ -58,7 +65,10 @@ def check_values(mechanism: Mechanism, numbers: ParameterSet) -> Iterator[Findin
     yield from _sides(mechanism, values)
 
 
-_NOT_NEGATIVE = frozenset({"mass", "radius", "length", "bearing", "clearance", "resisting_torque", "resisting_force"})
+_NOT_NEGATIVE = frozenset(
+    {"mass", "radius", "hole_radius", "length", "bearing", "clearance", "cylindricity", "end_float"}
+    | {"resisting_torque", "resisting_force"}
+)
 
 
 def _radians(path: str, angle: float) -> Iterator[Finding]:
@@ -93,9 +103,6 @@ def _joint(mechanism: Mechanism, name: str, numbers: ParameterSet) -> Iterator[F
         if clearance >= body > 0:
             what = f"is {clearance:g} m, not less than the {size} {body:g} m of the {part}"
             yield Finding(what, stated(f"{part}.clearance"), "check its unit")
-    pin = mechanism.stated_joints[name].pin or mechanism.joint_defaults.pin
-    if pin and pin.fit and (pin.radius or pin.clearance):
-        yield Finding("a fit states radius and clearance already", f"{where}.pin", "keep the fit or the numbers")
 
 
 def _law_value(declared: LawParameter, parameter: str, number: Number, where: str) -> Iterator[Finding]:

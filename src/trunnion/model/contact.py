@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
-from trunnion.model.parts import Joint, freedoms
+from collections.abc import Mapping
 
-__all__ = ["contact_lacks", "has_guide", "has_pin", "motions"]
+from trunnion.algebra.namespace import Number
+from trunnion.model.joint_parts import Joint, freedoms
+
+__all__ = ["PLAY_PAIRS", "contact_lacks", "has_guide", "has_pin", "has_play", "motions", "play"]
+
+PLAY_PAIRS = ("revolute", "prismatic", "cylindrical", "spherical")  # those whose play is modelled
 
 _MOTIONS = {
     "revolute": ("rotation",),
@@ -37,3 +42,28 @@ def contact_lacks(joint: Joint, spatial: bool) -> tuple[str, ...]:
     if not spatial or joint.type == "spherical":
         return radius
     return radius if joint.pin and (joint.pin.bearing or joint.pin.length) else (*radius, "bearing")
+
+
+def has_play(joint: Joint) -> bool:
+    """Whether a joint is of a type whose play is modelled and states one, be it 0."""
+    if joint.type not in PLAY_PAIRS:
+        return False
+    if has_guide(joint.type):
+        return joint.guide is not None and joint.guide.clearance is not None
+    pin = joint.pin
+    return pin is not None and (pin.clearance is not None or (pin.radius is not None and pin.hole_radius is not None))
+
+
+def play(joint: Joint, name: str, values: Mapping[str, Number]) -> Number:
+    """How far each end of a joint's pin, slider or ball can lie from the middle of its hole, m; 0 without a play.
+
+    The radial clearance, that between the radii where none is stated, and the cylindricity. values: by path.
+    """
+    if not has_play(joint):
+        return 0.0
+    if has_guide(joint.type):
+        return values[f"joints.{name}.guide.clearance"]
+    pin = f"joints.{name}.pin"
+    stated = values.get(f"{pin}.clearance")
+    clearance = values[f"{pin}.hole_radius"] - values[f"{pin}.radius"] if stated is None else stated
+    return clearance + values.get(f"{pin}.cylindricity", 0.0)

@@ -16,12 +16,15 @@ from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.model.check import check_model
+from trunnion.model.contact import play
 from trunnion.model.findings import repair, schema_findings
+from trunnion.model.merge import FitChoice, merge_joint
 from trunnion.model.names import nearest
-from trunnion.model.parameters import Location, ParameterSet, merge_joint
+from trunnion.model.parameters import Location, ParameterSet, nominal_dimensions
 from trunnion.model.parts import (
     Driver,
     Gear,
+    Guide,
     Hint,
     Joint,
     JointDefaults,
@@ -29,8 +32,11 @@ from trunnion.model.parts import (
     Load,
     LoopJoint,
     Measure,
+    Misalignment,
     Name,
     Part,
+    Pin,
+    Seat,
     Spring,
     Table,
 )
@@ -53,9 +59,11 @@ class Mechanism(Part):
     name: str = ""
     space: Literal["planar", "spatial"] = "planar"
     over_constraint: Literal["refuse", "minimum-norm"] = "refuse"
+    fits: FitChoice = "mean"
     gravity: Annotated[tuple[Acceleration, ...], Field(min_length=2, max_length=3)] | None = None
     ground: str | None = None
     dimensions: Mapping[Name, AnyQuantity] = {}
+    errors: Mapping[str, AnyQuantity] = {}
     links: Mapping[Name, Link] = {}
     joints: Mapping[Name, Joint] = {}
     joint_defaults: JointDefaults = JointDefaults()
@@ -136,6 +144,8 @@ class Mechanism(Part):
                 pin=row.pin,
                 guide=row.guide,
                 friction=row.friction,
+                misalignment=row.misalignment,
+                seat=row.seat,
             )
         return stated
 
@@ -143,7 +153,13 @@ class Mechanism(Part):
     def effective_joints(self) -> Mapping[str, Joint]:
         """Every joint with the defaults merged in and its friction complete: law, model and all parameters."""
         spatial = self.space == "spatial"
-        return {name: merge_joint(joint, self.joint_defaults, spatial) for name, joint in self.stated_joints.items()}
+        pins = [self.joint_defaults.pin, *(joint.pin for joint in self.stated_joints.values())]
+        named = any(pin and pin.fit and pin.fit.size.names for pin in pins)
+        sizes = nominal_dimensions(self) if named else {}
+        return {
+            name: merge_joint(joint, self.joint_defaults, spatial, self.fits, sizes)
+            for name, joint in self.stated_joints.items()
+        }
 
     @cached_property
     def points(self) -> Mapping[str, tuple[str, ...]]:
@@ -169,8 +185,29 @@ class Mechanism(Part):
         overrides: values by path or by an ending that is unique (`AB`, `crank.mass`): floats, arrays (sample, 1)
         or dual numbers; what depends on them follows. MechanismError names the nearest if a name is unknown.
         A load that is an expression of the motion is no number: it is there only if an override makes it one.
+        Numbers with an error are as built, nominal and deviation; an override of such a number replaces the sum.
         """
         return self.parameter_set.evaluate(overrides)
+
+    def ideal_parameters(self, overrides: Mapping[str, Number] | None = None) -> dict[str, Number]:
+        """Every number as `parameters` gives it, without errors and with every axis where it belongs."""
+        return self.parameter_set.ideal(overrides)
+
+    @cached_property
+    def seated(self) -> Mapping[str, Literal["loaded"] | Seat]:
+        """How the pin lies in its hole, of every joint that has a play and a seat other than free."""
+        numbers = self.parameter_set.nominal
+        return {
+            name: joint.seat
+            for name, joint in self.effective_joints.items()
+            if joint.seat is not None and joint.seat != "free" and play(joint, name, numbers) > 0
+        }
+
+    @cached_property
+    def has_errors(self) -> bool:
+        """Whether anything is off nominal: a number with an error, an axis, or a pin that does not lie centred."""
+        numbers = self.parameter_set.nominal
+        return bool(self.seated) or any(numbers[path] != 0 for path in self.parameter_set.errors)
 
     def parameter_kinds(self) -> dict[str, Kind]:
         """What each parameter measures, with its SI unit, by path."""
@@ -192,25 +229,59 @@ class Mechanism(Part):
     def with_values(self, values: Mapping[str, float | str]) -> Mechanism:
         """The mechanism with some entries replaced, by names as in `parameters`; texts are read as in a file.
 
-        So are the choices `over_constraint`, `joint_defaults.friction.model` and `joints.NAME.friction.model`.
+        So are the choices `over_constraint`, `fits`, `joint_defaults.friction.model`, `joint_defaults.seat` and the
+        last two of a joint. Sizes, seat and misalignment of a joint and the error of a number need not be stated yet.
         """
         data = self.data()
         for name, value in values.items():
-            location = self._choice(name) or self.parameter_set.entries[self.parameter_set.resolve(name)].location
-            _assign(data, location, value, self.coordinates)
+            _assign(data, self._location(name), value, self.coordinates)
         return Mechanism(**data)
+
+    def _location(self, name: str) -> Location:
+        """Where what a name means stands, or would stand; MechanismError if it means nothing."""
+        choice = self._choice(name)
+        if choice:
+            return choice
+        try:
+            return self.parameter_set.entries[self.parameter_set.resolve(name)].location
+        except MechanismError:
+            found = self._unstated(name)
+            if not found:
+                raise
+            return found
 
     def _choice(self, name: str) -> Location | None:
         """Where a choice among words stands; None if the name is of a number."""
-        if name in ("over_constraint", "joint_defaults.friction.model"):
-            return tuple(name.split("."))
+        if name in ("over_constraint", "fits"):
+            return (name,)
         section, _, rest = name.partition(".")
-        joint = rest.removesuffix(".friction.model")
-        if section != "joints" or joint == rest or joint not in self.stated_joints:
+        for choice in (("friction", "model"), ("seat",)):
+            if name == ".".join(("joint_defaults", *choice)):
+                return ("joint_defaults", *choice)
+            joint = rest.removesuffix("." + ".".join(choice))
+            if section == "joints" and joint != rest and joint in self.stated_joints:
+                return (*self._joint_location(joint), *choice)
+        return None
+
+    def _unstated(self, name: str) -> Location | None:
+        """Where the error of a number, or a number of a joint that the file may state and does not, would stand."""
+        if name.startswith("errors."):
+            named = name.removeprefix("errors.")
+            self.parameter_set.resolve(named)
+            return ("errors", named)
+        joint, _, rest = name.removeprefix("joints.").partition(".")
+        part, *keys = rest.split(".")
+        kinds: dict[str, type[Part]] = {"pin": Pin, "guide": Guide, "misalignment": Misalignment, "seat": Seat}
+        if joint not in self.stated_joints or part not in kinds or not keys or keys[0] not in kinds[part].model_fields:
             return None
+        place = (*self._joint_location(joint), part, keys[0])
+        if keys[0] == "direction":
+            return (*place, "xyz".index(keys[1])) if keys[1:] in (["x"], ["y"], ["z"]) else None
+        return place if len(keys) == 1 and keys[0] != "fit" else None
+
+    def _joint_location(self, joint: str) -> Location:
         rows = [row.joint for row in self.loop]
-        place: Location = ("loop", rows.index(joint)) if joint in rows else ("joints", joint)
-        return (*place, "friction", "model")
+        return ("loop", rows.index(joint)) if joint in rows else ("joints", joint)
 
     def with_table(self, name: str, path: str | os.PathLike[str]) -> Mechanism:
         """The mechanism with the points of a driver or table replaced by the two columns of a CSV file.
@@ -274,6 +345,6 @@ def _assign(data: dict[str, Any], location: Location, value: float | str | Quant
         if following == "at" and isinstance(holder[key], list):
             holder[key] = {"at": holder[key]}
         elif isinstance(following, str) and not isinstance(holder[key], dict):
-            holder[key] = {"coefficient": holder[key]}  # the short form of friction
+            holder[key] = {} if key == "seat" else {"coefficient": holder[key]}  # the short form of friction
         holder = holder[key]
     holder[location[-1]] = value

@@ -8,29 +8,26 @@ then cheap, and arrays (sample, 1) or dual numbers flow through the expressions 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from graphlib import CycleError, TopologicalSorter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from pydantic import BaseModel
 
 from trunnion.algebra.namespace import Number
-from trunnion.errors import Finding, MechanismError
+from trunnion.errors import MechanismError
 from trunnion.joints.friction import FRICTION_LAWS
-from trunnion.joints.pairs import PAIRS
-from trunnion.model.contact import contact_lacks, has_guide, has_pin
 from trunnion.model.expression import MOTION
-from trunnion.model.names import nearest
+from trunnion.model.merge import DEFAULT_LAW
+from trunnion.model.parameter_names import ERRORS, ParameterNames
 from trunnion.model.parts import (
     Driver,
     Friction,
     Gear,
-    Guide,
     Joint,
-    JointDefaults,
     Measure,
-    Pin,
     Point,
     Spring,
     freedoms,
@@ -41,10 +38,8 @@ from trunnion.model.units import ANY, KINDS, Kind, unit
 if TYPE_CHECKING:
     from trunnion.model.mechanism import Mechanism
 
-__all__ = ["Entry", "ParameterSet", "entries", "evaluation_order", "merge_joint"]
+__all__ = ["Entry", "ParameterSet", "dimension_errors", "entries", "evaluation_order", "nominal_dimensions"]
 
-DEFAULT_LAW = "coulomb"
-NO_FRICTION = Quantity(0)
 Location = tuple[str | int, ...]
 
 
@@ -53,6 +48,7 @@ class Entry:
     """One named number: its path, where it stands in the model's sections, what was written, what it measures.
 
     alias: path of the number it follows while it has no value of its own (a default of all joints).
+    error: path of the deviation that is added to it.
     varies: it speaks of the motion: not a number of the set until an override makes it one, but an expression that
     the analysis evaluates at every position.
     """
@@ -63,15 +59,41 @@ class Entry:
     kind: Kind
     alias: str = ""
     varies: bool = False
+    error: str = ""
 
     @property
     def depends(self) -> tuple[str, ...]:
         """Paths of the numbers that it is computed from."""
-        return (self.alias,) if self.alias else tuple(f"dimensions.{name}" for name in self.quantity.names)
+        own = (self.alias,) if self.alias else tuple(f"dimensions.{name}" for name in self.quantity.names)
+        return (*own, self.error) if self.error else own
+
+    @property
+    def where(self) -> str:
+        """Where a finding about it points: to a deviation as it was written, not by the full path."""
+        return f"{ERRORS}{self.location[1]}" if self.path.startswith(ERRORS) else self.path
 
 
-def entries(mechanism: Mechanism) -> Iterator[Entry]:
-    """Every number of a mechanism, defaults filled in; what an entry follows comes before it, dimensions apart."""
+def entries(mechanism: Mechanism) -> list[Entry]:
+    """Every number of a mechanism, defaults filled in; what an entry follows comes before it, dimensions apart.
+
+    Last come the deviations that the model states of them; those whose name means no number are left out.
+    """
+    found = list(_numbers(mechanism))
+    if not mechanism.errors:
+        return found
+    names = ParameterNames(entry.path for entry in found)
+    kinds = {entry.path: entry.kind for entry in found}
+    errors: dict[str, Entry] = {}
+    for name, quantity in mechanism.errors.items():
+        with suppress(MechanismError):  # a finding of its own
+            path = names.resolve(name)
+            errors[path] = Entry(f"{ERRORS}{path}", ("errors", name), quantity, kinds[path])
+    shifted = [replace(one, error=errors[one.path].path) if one.path in errors else one for one in found]
+    return [*shifted, *errors.values()]
+
+
+def _numbers(mechanism: Mechanism) -> Iterator[Entry]:
+    """Every number of a mechanism but its errors."""
     yield from _walk(mechanism.dimensions, "dimensions", ("dimensions",))
     for entry in _walk(mechanism.joint_defaults, "joint_defaults", ("joint_defaults",)):
         friction = mechanism.joint_defaults.friction if entry.location[1] == "friction" else None
@@ -138,23 +160,29 @@ def _joint_entries(mechanism: Mechanism, name: str, joint: Joint) -> Iterator[En
     rows = [row.joint for row in mechanism.loop]
     location: Location = ("loop", rows.index(name)) if name in rows else ("joints", name)
     yield from _walk(joint.pitch, f"joints.{name}.pitch", (*location, "pitch"))
-    for key in ("pin", "guide", "friction"):
+    for key in ("pin", "guide", "friction", "seat"):
         part, default = getattr(joint, key), getattr(mechanism.joint_defaults, key)
-        for entry in _walk(part, f"joints.{name}.{key}", (*location, key)):
-            leaf = str(entry.location[-1])
-            shared = _stated(default).get(leaf) is entry.quantity
-            kind = _law_kind(part, leaf) if isinstance(part, Friction) else entry.kind
-            alias = f"joint_defaults.{key}.{leaf}" if shared else ""
+        own = f"joints.{name}.{key}"
+        shared = {one.path: one.quantity for one in _walk(default, own, ())}
+        for entry in _walk(part, own, (*location, key)):
+            kind = _law_kind(part, str(entry.location[-1])) if isinstance(part, Friction) else entry.kind
+            follows = shared.get(entry.path) is entry.quantity
+            alias = f"joint_defaults.{entry.path.removeprefix(f'joints.{name}.')}" if follows else ""
             yield Entry(entry.path, entry.location, entry.quantity, kind, alias)
+    yield from _misalignment(joint, f"joints.{name}.misalignment", (*location, "misalignment"))
     pin = joint.pin
     if pin and pin.length and not pin.bearing:
         path = f"joints.{name}.pin"
         yield Entry(f"{path}.bearing", (*location, "pin", "bearing"), pin.length, pin.length.kind, f"{path}.length")
 
 
-def _stated(part: BaseModel | None) -> Mapping[str, Any]:
-    """What was written of a part: its own values by key."""
-    return {} if part is None else {key: getattr(part, key) for key in sorted(part.model_fields_set)}
+def _misalignment(joint: Joint, path: str, location: Location) -> Iterator[Entry]:
+    """How the axis of a joint lies off; the direction of its offset follows that of its tilt while it has no own."""
+    one = joint.misalignment
+    yield from _walk(one, path, location)
+    if one and one.towards and one.offset_towards is None:
+        towards = one.towards
+        yield Entry(f"{path}.offset_towards", (*location, "offset_towards"), towards, towards.kind, f"{path}.towards")
 
 
 def _law_kind(friction: Friction, parameter: str) -> Kind:
@@ -212,53 +240,16 @@ def _measure_kind(mechanism: Mechanism, measure: Measure) -> Kind:
     return KINDS["force" if joint and "rotation" not in freedoms(joint.type) else "moment"]
 
 
-def merge_joint(joint: Joint, defaults: JointDefaults, spatial: bool = False) -> Joint:
-    """A joint with the defaults that apply to its type, its friction complete: law, model and every parameter."""
-    pin, guide = joint.pin, joint.guide
-    if has_pin(joint.type) and (pin or defaults.pin):
-        pin = Pin(**_pin(_stated(defaults.pin), _stated(pin)))
-    if has_guide(joint.type) and (guide or defaults.guide):
-        guide = Guide(**{**_stated(defaults.guide), **_stated(guide)})
-    rubs = PAIRS[joint.type].count > 0  # nothing slips in a fixed joint: it needs no exception from the defaults
-    friction = _friction(_stated(defaults.friction) if rubs else {}, _stated(joint.friction))
-    merged = joint.model_copy(update={"pin": pin, "guide": guide, "friction": friction})
-    if friction and friction.parameters.get("coefficient") == NO_FRICTION:
-        touches = has_pin(joint.type) or has_guide(joint.type)
-        if not touches or contact_lacks(merged, spatial):
-            return merged.model_copy(update={"friction": None})  # friction: 0 asks for no radius or length
-    return merged
+def evaluation_order(
+    dimensions: Mapping[str, Quantity], errors: Mapping[str, Quantity] | None = None
+) -> tuple[list[str], list[list[str]]]:
+    """Dimensions in an order in which each follows those it speaks of, and the circles that have none.
 
-
-def _pin(default: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:
-    """A pin's own values over the defaults; a fit replaces radius and clearance and the other way round."""
-    if "fit" in own:
-        default = {key: value for key, value in default.items() if key not in ("radius", "clearance")}
-    elif own.keys() & {"radius", "clearance"}:
-        default = {key: value for key, value in default.items() if key != "fit"}
-    merged = {**default, **own}
-    if merged.get("fit") and not merged.get("radius"):
-        size = merged["fit"].size
-        half = size.source / 2 if not isinstance(size.source, str) else f"({size.source}) / 2"
-        merged["radius"] = Quantity.read(half, size.kind)
-    return merged
-
-
-def _friction(default: Mapping[str, Any], own: Mapping[str, Any]) -> Friction | None:
-    """Friction complete: the joint's own over the file's defaults (those its law knows) over the law's."""
-    if not default and not own:
-        return None
-    law = own.get("law") or default.get("law") or DEFAULT_LAW
-    declared = FRICTION_LAWS[law].parameters
-    if default.get("law", law) != law:
-        default = {key: value for key, value in default.items() if key in declared}
-    filled = {key: one.default for key, one in declared.items() if one.default is not None}
-    model = own.get("model") or default.get("model") or "two-contact"
-    return Friction.model_validate({**filled, **default, **own, "law": law, "model": model})
-
-
-def evaluation_order(dimensions: Mapping[str, Quantity]) -> tuple[list[str], list[list[str]]]:
-    """Dimensions in an order in which each follows those it speaks of, and the circles that have none."""
+    errors: deviations of some of them, which may speak of dimensions too.
+    """
     graph = {name: {one for one in quantity.names if one in dimensions} for name, quantity in dimensions.items()}
+    for name, quantity in (errors or {}).items():
+        graph[name] |= {one for one in quantity.names if one in dimensions}
     circles: list[list[str]] = []
     while True:
         try:
@@ -269,23 +260,58 @@ def evaluation_order(dimensions: Mapping[str, Quantity]) -> tuple[list[str], lis
             graph = {name: set() if name in circle else needs for name, needs in graph.items()}
 
 
+def dimension_errors(found: Iterable[Entry]) -> dict[str, Quantity]:
+    """Deviations of dimensions by the name of the dimension."""
+    before = f"{ERRORS}dimensions."
+    return {one.path.removeprefix(before): one.quantity for one in found if one.path.startswith(before)}
+
+
+def nominal_dimensions(mechanism: Mechanism) -> dict[str, Number]:
+    """The dimensions without errors; nan where one has no value."""
+    order, circles = evaluation_order(mechanism.dimensions)
+    lost = {name for circle in circles for name in circle}
+    names: dict[str, Number] = {}
+    for name in order:
+        quantity = mechanism.dimensions[name]
+        sound = name not in lost and set(quantity.names) <= names.keys()
+        names[name] = quantity.evaluate(names) if sound else np.nan
+    return names
+
+
 class ParameterSet:
     """The numbers of one mechanism, compiled; `unreadable` paths are nan and so is what depends on them."""
 
     def __init__(self, mechanism: Mechanism, unreadable: Iterable[str] = ()) -> None:
-        found = list(entries(mechanism))
-        order, _ = evaluation_order(mechanism.dimensions)
-        rank = {f"dimensions.{name}": place for place, name in enumerate(order)}
-        found.sort(key=lambda entry: rank.get(entry.path, len(rank)))  # stable: the rest keeps its order
+        found = entries(mechanism)
+        order, _ = evaluation_order(mechanism.dimensions, dimension_errors(found))
+        place = {f"dimensions.{name}": rank for rank, name in enumerate(order)}
+        last = len(place)
+
+        def rank(entry: Entry) -> tuple[int, bool]:
+            """Dimensions in their order, then the rest; a deviation goes before what it shifts."""
+            deviates = entry.path.startswith(ERRORS)
+            return place.get(entry.path.removeprefix(ERRORS) if deviates else entry.path, last), not deviates
+
+        found.sort(key=rank)  # stable: the rest keeps its order
         self.entries: dict[str, Entry] = {entry.path: entry for entry in found}
+        self.names = ParameterNames(self.entries)
         self._unreadable = frozenset(unreadable)
         numbers = [entry for entry in self.entries.values() if not entry.varies]
         self._dependent = [entry for entry in numbers if entry.depends]
+        self._ideal = {entry.path: 0.0 for entry in numbers if _is_error(entry.path)}
         self.nominal: dict[str, Number] = {}
         self._nominal_names: dict[str, Number] = {}
         for entry in numbers:
             self._evaluate(entry, self.nominal, self._nominal_names)
-        self._endings: dict[str, list[str]] | None = None
+
+    @property
+    def errors(self) -> tuple[str, ...]:
+        """Paths of the deviations, and of the tilts and offsets of axes: all 0 in the ideal mechanism."""
+        return tuple(self._ideal)
+
+    def ideal(self, overrides: Mapping[str, Number] | None = None) -> dict[str, Number]:
+        """Every number as `evaluate` gives it, without errors."""
+        return self.evaluate({**(overrides or {}), **self._ideal})
 
     def evaluate(self, overrides: Mapping[str, Number] | None = None) -> dict[str, Number]:
         """Every number in SI by path, some replaced; MechanismError if a name is unknown or not unique."""
@@ -317,6 +343,8 @@ class ParameterSet:
             value = values[entry.alias]
         else:
             value = entry.quantity.evaluate(names)
+        if entry.error:
+            value = value + values[entry.error]
         values[entry.path] = value
         section, _, name = entry.path.partition(".")
         if section == "dimensions":
@@ -324,29 +352,11 @@ class ParameterSet:
 
     def resolve(self, name: str) -> str:
         """The path that a name means: a path, a dimension, or an ending that only one path has."""
-        if name in self.entries:
-            return name
-        if f"dimensions.{name}" in self.entries:
-            return f"dimensions.{name}"
-        if self._endings is None:
-            self._endings = {}
-            for path in self.entries:
-                parts = path.split(".")
-                for start in range(1, len(parts)):
-                    self._endings.setdefault(".".join(parts[start:]), []).append(path)
-        paths = self._endings.get(name, [])
-        if len(paths) == 1:
-            return paths[0]
-        if paths:
-            some = ", ".join(paths[:6]) + (", …" if len(paths) > 6 else "")
-            raise MechanismError(
-                Finding(f"the name '{name}' stands for {len(paths)} numbers", remedy=f"say which: {some}")
-            )
-        below = [path for path in self.entries if f".{path}.".find(f".{name}.") >= 0]
-        if below:
-            some = ", ".join(below[:6]) + (", …" if len(below) > 6 else "")
-            raise MechanismError(Finding(f"'{name}' is not one number", remedy=f"set one of {some}"))
-        dimensions = [path.partition(".")[2] for path in self.entries if path.startswith("dimensions.")]
-        # a short name is most likely a mistyped dimension; endings such as `x` resemble everything
-        known = [*self.entries, *self._endings] if "." in name or not dimensions else dimensions
-        raise MechanismError(Finding(f"there is no number named '{name}'", remedy=nearest(name, known)))
+        return self.names.resolve(name)
+
+
+def _is_error(path: str) -> bool:
+    """Whether a number is an error of the mechanism as built: a deviation, or how an axis lies off."""
+    section, _, rest = path.partition(".")
+    misaligned = section == "joints" and rest.endswith((".misalignment.tilt", ".misalignment.offset"))
+    return misaligned or path.startswith(ERRORS)

@@ -7,33 +7,37 @@ left out stay unset, so that a model is written back with what was stated and no
 from __future__ import annotations
 
 import re
-import unicodedata
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
 from pydantic import (
-    AfterValidator,
-    BaseModel,
-    ConfigDict,
     Discriminator,
     Field,
     GetJsonSchemaHandler,
-    PlainSerializer,
-    PlainValidator,
     SerializerFunctionWrapHandler,
     Tag,
-    WithJsonSchema,
     model_serializer,
     model_validator,
 )
 from pydantic.json_schema import JsonSchemaValue
-from pydantic_core import CoreSchema, PydanticCustomError
+from pydantic_core import CoreSchema
 
-from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.joints.motion import MOTION_LAWS, MotionLaw
-from trunnion.joints.pairs import PAIRS
-from trunnion.model.names import nearest
+from trunnion.model.joint_parts import (
+    FRICTION_MODELS,
+    JOINT_TYPES,
+    Fit,
+    Friction,
+    Guide,
+    Joint,
+    JointDefaults,
+    LoopJoint,
+    Misalignment,
+    Pin,
+    Seat,
+    freedoms,
+)
+from trunnion.model.part import FORMS, Direction, Name, Part, Position, forms, known, shape
 from trunnion.model.quantity import (
     Angle,
     AngleOrLength,
@@ -51,9 +55,10 @@ from trunnion.model.quantity import (
     Stiffness,
     Time,
 )
-from trunnion.model.units import KINDS, UnitError
+from trunnion.model.units import KINDS
 
 __all__ = [
+    "FORMS",
     "FRICTION_MODELS",
     "JOINT_TYPES",
     "Driver",
@@ -61,6 +66,7 @@ __all__ = [
     "Friction",
     "Gear",
     "Guide",
+    "Hint",
     "InertiaTensor",
     "Joint",
     "JointDefaults",
@@ -68,79 +74,19 @@ __all__ = [
     "Load",
     "LoopJoint",
     "Measure",
+    "Misalignment",
+    "Name",
     "Part",
     "Pin",
     "Point",
     "PolarPoint",
+    "Seat",
     "Spring",
     "Table",
     "freedoms",
 ]
 
-JOINT_TYPES = tuple(PAIRS)
-FRICTION_MODELS = ("two-contact", "pezzuti")
-
-
-def freedoms(joint_type: str) -> tuple[str, ...]:
-    """The motions a joint of this type frees, of ("rotation", "slide"): a rotation has a pin, a slide alone a guide."""
-    return PAIRS[joint_type].freedoms
-
-
-def _name(name: str) -> str:
-    """A name that can stand in a path and in a message."""
-    if not name.strip() or name != name.strip():
-        raise _problem(f"the name {name[:80]!r} is empty or begins or ends with a space", "remove the space")
-    if "." in name:
-        raise _problem(f"the name '{name[:80]}' has a dot, which separates the parts of a path", "use - or _")
-    if len(name) > 80 or any(unicodedata.category(sign) in ("Cc", "Cf", "Cs", "Zl", "Zp") for sign in name):
-        raise _problem(f"the name {name[:80]!r} has control characters or over 80", "use a short printable name")
-    return name
-
-
-def _problem(what: str, remedy: str) -> PydanticCustomError:
-    return PydanticCustomError("stated", "{what}", {"what": what, "remedy": remedy})
-
-
-def _known(table: tuple[str, ...], noun: str) -> Any:
-    """Annotations of a text that must be an entry of a table, for validation and JSON Schema."""
-
-    def check(value: str) -> str:
-        if value not in table:
-            raise _problem(f"'{value[:80]}' is not a {noun}", nearest(value, table))
-        return value
-
-    return AfterValidator(check), WithJsonSchema({"type": "string", "enum": list(table)})
-
-
-FORMS = (":group", ":list", ":value", ":way")  # tags of the forms an entry may have
-
-
-def _shape(value: object) -> str:
-    """Which of the forms of an entry was written: a list, a group of entries or a single value."""
-    if isinstance(value, (Mapping, BaseModel)):
-        return ":group"
-    return ":list" if isinstance(value, (list, tuple)) else ":value"
-
-
-def _forms(text: str) -> Discriminator:
-    return Discriminator(_shape, custom_error_type="forms", custom_error_message=f"takes {text}")
-
-
-_check_type, _schema_type = _known(JOINT_TYPES, "joint type")
-_check_law, _schema_law = _known(tuple(FRICTION_LAWS), "friction law")
-_check_motion, _schema_motion = _known(tuple(MOTION_LAWS), "motion law")
-_check_model, _schema_model = _known(FRICTION_MODELS, "friction model")
-
-Name = Annotated[str, AfterValidator(_name)]
-JointType = Annotated[str, _check_type, _schema_type]
-Position = Annotated[tuple[Length, ...], Field(min_length=2, max_length=3)]
-Direction = Annotated[tuple[Dimensionless, ...], Field(min_length=2, max_length=3)]
-
-
-class Part(BaseModel):
-    """An entry of a model file: immutable, an unknown key is an error."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, hide_input_in_errors=True)
+_check_motion, _schema_motion = known(tuple(MOTION_LAWS), "motion law")
 
 
 class Point(Part):
@@ -197,150 +143,16 @@ class Link(Part):
     centre: (
         Annotated[
             Annotated[Position, Tag(":list")] | Annotated[PolarPoint, Tag(":group")],
-            _forms("[x, y] or {distance: …, angle: …}"),
+            forms("[x, y] or {distance: …, angle: …}"),
         ]
         | None
     ) = None
     inertia: Annotated[
         Annotated[Inertia, Tag(":value")] | Annotated[InertiaTensor, Tag(":group")],
-        _forms("a number or a group {xx: …, yy: …, zz: …}"),
+        forms("a number or a group {xx: …, yy: …, zz: …}"),
     ] = Quantity(0, KINDS["moment of inertia"])
     inertia_about: Literal["centre", "origin"] = "centre"
     frame: str | None = None
-
-
-_FIT = re.compile(r"^(?P<size>.*\S)\s+(?P<hole>[A-Z]{1,2}[0-9]{1,2})\s*/\s*(?P<shaft>[a-z]{1,2}[0-9]{1,2})$")
-
-
-@dataclass(frozen=True)
-class Fit:
-    """An ISO 286 fit such as `20 mm H7/g6`: diameter, hole class and shaft class, as written."""
-
-    source: str
-    size: Quantity
-    hole: str
-    shaft: str
-
-    @classmethod
-    def read(cls, source: object) -> Fit:
-        """A fit from its text; a pydantic error if it is none."""
-        if isinstance(source, Fit):
-            return source
-        found = _FIT.match(source.strip()) if isinstance(source, str) else None
-        if not isinstance(source, str) or not found:
-            raise _problem(f"{str(source)[:60]!r} is not a fit", "write diameter, hole and shaft as 20 mm H7/g6")
-        try:
-            size = Quantity.read(found["size"], KINDS["length"])
-        except UnitError as error:
-            raise _problem(error.what, error.remedy) from error
-        return cls(source, size, found["hole"], found["shaft"])
-
-
-FitText = Annotated[
-    Fit,
-    PlainValidator(Fit.read),
-    PlainSerializer(lambda fit: fit.source),
-    WithJsonSchema({"type": "string", "description": "an ISO 286 fit", "examples": ["20 mm H7/g6"]}),
-]
-
-
-class Pin(Part):
-    """Pin and hole of a joint that turns.
-
-    length: of the pin in its hole (for play); bearing: effective length for friction, `length` if not stated;
-    clearance: hole radius less pin radius; fit: diameter and clearance by ISO 286 instead; offset: of the
-    middle of the bearing from the joint's point, along the axis.
-    """
-
-    radius: Length | None = None
-    length: Length | None = None
-    bearing: Length | None = None
-    clearance: Length | None = None
-    fit: FitText | None = None
-    offset: Length | None = None
-
-
-class Guide(Part):
-    """Slider and guide of a joint that slides: length in contact, width over which it carries torsion, play across."""
-
-    length: Length | None = None
-    width: Length | None = None
-    clearance: Length | None = None
-
-
-class Friction(BaseModel):
-    """Friction of a joint: a law with its parameters, or one number, the coefficient (law: coulomb)."""
-
-    model_config = ConfigDict(extra="allow", frozen=True, hide_input_in_errors=True)
-    __pydantic_extra__: dict[str, AnyQuantity]
-
-    law: Annotated[str, _check_law, _schema_law] | None = None
-    model: Annotated[str, _check_model, _schema_model] | None = None
-
-    @property
-    def parameters(self) -> Mapping[str, Quantity]:
-        """Parameters of the law by name: every key beside `law` and `model`."""
-        return self.__pydantic_extra__
-
-    @classmethod
-    def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        """The number, or the group with the parameters of every law in the table."""
-        group = handler.resolve_ref_schema(handler(schema))
-        declared = {key: one for law in FRICTION_LAWS.values() for key, one in law.parameters.items()}
-        number = group["additionalProperties"]["type"]
-        for key, one in declared.items():
-            unit = f", {one.unit}" if one.unit else ""
-            group["properties"][key] = {"type": number, "description": f"{one.meaning}{unit}"}
-        group["additionalProperties"] = False
-        return {"anyOf": [{"type": number}, group], "description": group.pop("description")}
-
-    @model_validator(mode="before")
-    @classmethod
-    def _read_number(cls, value: object) -> object:
-        return {"coefficient": value} if isinstance(value, (int, float, str, Quantity)) else value
-
-    @model_serializer(mode="wrap")
-    def _write_number(self, write: SerializerFunctionWrapHandler) -> Any:
-        long = write(self)
-        return long["coefficient"] if list(long) == ["coefficient"] else long
-
-
-class JointDefaults(Part):
-    """What every joint has unless it says otherwise: pins where it turns, guides where it slides."""
-
-    pin: Pin | None = None
-    guide: Guide | None = None
-    friction: Friction | None = None
-
-
-class Joint(Part):
-    """A kinematic pair between two links, at the point of its own name on both.
-
-    pitch: slide of a helical pair for one turn, positive for a right-hand thread.
-    """
-
-    type: JointType
-    links: tuple[str, str]
-    pitch: Length | None = None
-    pin: Pin | None = None
-    guide: Guide | None = None
-    friction: Friction | None = None
-
-
-class LoopJoint(Part):
-    """A row of a dual Denavit–Hartenberg table: the joint, then the link after it up to the next joint."""
-
-    joint: Name
-    type: JointType
-    link: Name
-    twist: Angle = Quantity(0, KINDS["angle"])
-    distance: Length = Quantity(0, KINDS["length"])
-    slide: Length | None = None
-    rotation: Angle | None = None
-    pitch: Length | None = None
-    pin: Pin | None = None
-    guide: Guide | None = None
-    friction: Friction | None = None
 
 
 class Driver(Part):
@@ -402,7 +214,7 @@ class Load(Part):
         Annotated[
             Annotated[Moment, Tag(":value")]
             | Annotated[tuple[Moment, ...], Field(min_length=3, max_length=3), Tag(":list")],
-            _forms("one moment (planar) or [x, y, z]"),
+            forms("one moment (planar) or [x, y, z]"),
         ]
         | None
     ) = None
@@ -474,7 +286,7 @@ _LIKE_A_WAY = re.compile(r"(?i)^way[-_ ]\w*$")  # meant as a name, whatever is w
 
 
 def _hint_shape(value: object) -> str:
-    return ":way" if isinstance(value, str) and _LIKE_A_WAY.match(value) else _shape(value)
+    return ":way" if isinstance(value, str) and _LIKE_A_WAY.match(value) else shape(value)
 
 
 Hint = Annotated[

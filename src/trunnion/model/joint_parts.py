@@ -1,0 +1,248 @@
+"""The joints of a model file: what a pair is made of, how it sits, what is wrong with it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
+
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    GetJsonSchemaHandler,
+    PlainSerializer,
+    PlainValidator,
+    SerializerFunctionWrapHandler,
+    Tag,
+    WithJsonSchema,
+    model_serializer,
+    model_validator,
+)
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema
+
+from trunnion.joints.friction import FRICTION_LAWS
+from trunnion.joints.pairs import PAIRS
+from trunnion.model.part import Direction, Name, Part, forms, known, problem
+from trunnion.model.quantity import Angle, AnyQuantity, Length, Quantity
+from trunnion.model.units import KINDS, UnitError
+
+__all__ = [
+    "FRICTION_MODELS",
+    "JOINT_TYPES",
+    "Fit",
+    "Friction",
+    "Guide",
+    "Joint",
+    "JointDefaults",
+    "LoopJoint",
+    "Misalignment",
+    "Pin",
+    "Seat",
+    "freedoms",
+]
+
+JOINT_TYPES = tuple(PAIRS)
+FRICTION_MODELS = ("two-contact", "pezzuti")
+
+
+def freedoms(joint_type: str) -> tuple[str, ...]:
+    """The motions a joint of this type frees, of ("rotation", "slide"): a rotation has a pin, a slide alone a guide."""
+    return PAIRS[joint_type].freedoms
+
+
+_check_type, _schema_type = known(JOINT_TYPES, "joint type")
+_check_law, _schema_law = known(tuple(FRICTION_LAWS), "friction law")
+_check_model, _schema_model = known(FRICTION_MODELS, "friction model")
+
+JointType = Annotated[str, _check_type, _schema_type]
+
+
+_FIT = re.compile(r"^(?P<size>.*\S)\s+(?P<hole>[A-Z]{1,2}[0-9]{1,2})\s*/\s*(?P<shaft>[a-z]{1,2}[0-9]{1,2})$")
+
+
+@dataclass(frozen=True)
+class Fit:
+    """An ISO 286 fit such as `20 mm H7/g6`: diameter, hole class and shaft class, as written."""
+
+    source: str
+    size: Quantity
+    hole: str
+    shaft: str
+
+    @classmethod
+    def read(cls, source: object) -> Fit:
+        """A fit from its text; a pydantic error if it is none."""
+        if isinstance(source, Fit):
+            return source
+        found = _FIT.match(source.strip()) if isinstance(source, str) else None
+        if not isinstance(source, str) or not found:
+            raise problem(f"{str(source)[:60]!r} is not a fit", "write diameter, hole and shaft as 20 mm H7/g6")
+        try:
+            size = Quantity.read(found["size"], KINDS["length"])
+        except UnitError as error:
+            raise problem(error.what, error.remedy) from error
+        if size.tolerance:
+            raise problem(f"the size of {source[:60]!r} has a tolerance of its own", "the classes of the fit state it")
+        return cls(source, size, found["hole"], found["shaft"])
+
+
+FitText = Annotated[
+    Fit,
+    PlainValidator(Fit.read),
+    PlainSerializer(lambda fit: fit.source),
+    WithJsonSchema({"type": "string", "description": "an ISO 286 fit", "examples": ["20 mm H7/g6"]}),
+]
+
+
+class Pin(Part):
+    """Pin and hole of a joint that turns.
+
+    length: of the pin in its hole (for play); bearing: effective length for friction, `length` if not stated;
+    clearance: hole radius less pin radius; fit: both radii by ISO 286 instead; offset: of the middle of the bearing
+    from the joint's point, along the axis; cylindricity: how much the pin may lie further out at its ends than the
+    clearance lets it; end_float: play along the axis, end to end.
+    """
+
+    radius: Length | None = None
+    hole_radius: Length | None = None
+    length: Length | None = None
+    bearing: Length | None = None
+    clearance: Length | None = None
+    fit: FitText | None = None
+    offset: Length | None = None
+    cylindricity: Length | None = None
+    end_float: Length | None = None
+
+
+class Guide(Part):
+    """Slider and guide of a joint that slides: length in contact, width over which it carries torsion, play across."""
+
+    length: Length | None = None
+    width: Length | None = None
+    clearance: Length | None = None
+
+
+class Seat(Part):
+    """Where a pin, slider or ball lies in its play, given once for all positions.
+
+    beta, xi: its ends lie at the angles xi + beta/2 and xi − beta/2 from the hole's x (of a guide, its clearance times
+    the cosines of these aside); direction: of a ball, in the frame of the joint on the second link.
+    """
+
+    beta: Angle | None = None
+    xi: Angle | None = None
+    direction: Direction | None = None
+
+    def complete(self) -> Seat:
+        """With zeros for the angles that were not stated, unless a direction is."""
+        if self.direction is not None and self.beta is None and self.xi is None:
+            return self
+        zero = Quantity(0, KINDS["angle"])
+        return self.model_copy(update={"beta": self.beta or zero, "xi": self.xi or zero})
+
+
+SeatChoice = Annotated[
+    Annotated[Literal["free", "loaded"], Tag(":value")] | Annotated[Seat, Tag(":group")],
+    forms("free, loaded or a group {beta: …, xi: …}"),
+]
+
+
+class Misalignment(Part):
+    """How the axis of the hole lies off its nominal place on the joint's second link.
+
+    tilt, towards: it leans by this angle towards this direction, counted about the axis from the joint's x;
+    offset, offset_towards: and is moved by this length along that one, `towards` if not stated.
+    """
+
+    tilt: Angle | None = None
+    towards: Angle | None = None
+    offset: Length | None = None
+    offset_towards: Angle | None = None
+
+    def complete(self, spatial: bool) -> Misalignment:
+        """With zeros for what was not stated; in the plane nothing tilts. `offset_towards` stays as it is."""
+        zeros = {"tilt": "angle", "towards": "angle", "offset": "length"}
+        missing = [key for key in zeros if getattr(self, key) is None and (spatial or key != "tilt")]
+        return self.model_copy(update={key: Quantity(0, KINDS[zeros[key]]) for key in missing})
+
+
+class Friction(BaseModel):
+    """Friction of a joint: a law with its parameters, or one number, the coefficient (law: coulomb)."""
+
+    model_config = ConfigDict(extra="allow", frozen=True, hide_input_in_errors=True)
+    __pydantic_extra__: dict[str, AnyQuantity]
+
+    law: Annotated[str, _check_law, _schema_law] | None = None
+    model: Annotated[str, _check_model, _schema_model] | None = None
+
+    @property
+    def parameters(self) -> Mapping[str, Quantity]:
+        """Parameters of the law by name: every key beside `law` and `model`."""
+        return self.__pydantic_extra__
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        """The number, or the group with the parameters of every law in the table."""
+        group = handler.resolve_ref_schema(handler(schema))
+        declared = {key: one for law in FRICTION_LAWS.values() for key, one in law.parameters.items()}
+        number = group["additionalProperties"]["type"]
+        for key, one in declared.items():
+            unit = f", {one.unit}" if one.unit else ""
+            group["properties"][key] = {"type": number, "description": f"{one.meaning}{unit}"}
+        group["additionalProperties"] = False
+        return {"anyOf": [{"type": number}, group], "description": group.pop("description")}
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read_number(cls, value: object) -> object:
+        return {"coefficient": value} if isinstance(value, (int, float, str, Quantity)) else value
+
+    @model_serializer(mode="wrap")
+    def _write_number(self, write: SerializerFunctionWrapHandler) -> Any:
+        long = write(self)
+        return long["coefficient"] if list(long) == ["coefficient"] else long
+
+
+class JointDefaults(Part):
+    """What every joint has unless it says otherwise: pins where it turns, guides where it slides."""
+
+    pin: Pin | None = None
+    guide: Guide | None = None
+    friction: Friction | None = None
+    seat: SeatChoice | None = None
+
+
+class Joint(Part):
+    """A kinematic pair between two links, at the point of its own name on both.
+
+    pitch: slide of a helical pair for one turn, positive for a right-hand thread.
+    """
+
+    type: JointType
+    links: tuple[str, str]
+    pitch: Length | None = None
+    pin: Pin | None = None
+    guide: Guide | None = None
+    friction: Friction | None = None
+    misalignment: Misalignment | None = None
+    seat: SeatChoice | None = None
+
+
+class LoopJoint(Part):
+    """A row of a dual Denavit–Hartenberg table: the joint, then the link after it up to the next joint."""
+
+    joint: Name
+    type: JointType
+    link: Name
+    twist: Angle = Quantity(0, KINDS["angle"])
+    distance: Length = Quantity(0, KINDS["length"])
+    slide: Length | None = None
+    rotation: Angle | None = None
+    pitch: Length | None = None
+    pin: Pin | None = None
+    guide: Guide | None = None
+    friction: Friction | None = None
+    misalignment: Misalignment | None = None
+    seat: SeatChoice | None = None

@@ -1,0 +1,148 @@
+"""A joint with the defaults of its model merged in, and its fit as radii with tolerances."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import BaseModel
+
+from trunnion.algebra.namespace import Number
+from trunnion.errors import MechanismError
+from trunnion.joints.fits import fit
+from trunnion.joints.friction import FRICTION_LAWS
+from trunnion.joints.pairs import PAIRS
+from trunnion.model.contact import contact_lacks, has_guide, has_pin, has_play
+from trunnion.model.joint_parts import Fit, Friction, Guide, Joint, JointDefaults, Misalignment, Pin, Seat, SeatChoice
+from trunnion.model.quantity import Quantity
+
+__all__ = ["DEFAULT_LAW", "FitChoice", "merge_joint", "stated"]
+
+DEFAULT_LAW = "coulomb"
+NO_FRICTION = Quantity(0)
+FitChoice = Literal["minimum", "mean", "maximum"]
+
+
+def merge_joint(
+    joint: Joint,
+    defaults: JointDefaults,
+    spatial: bool = False,
+    limits: FitChoice = "mean",
+    dimensions: Mapping[str, Number] | None = None,
+) -> Joint:
+    """A joint with the defaults that apply to its type, its friction complete: law, model and every parameter.
+
+    limits: which limits of a fit are nominal; dimensions: nominal values of the dimensions that its size may speak of.
+    """
+    pin, guide = joint.pin, joint.guide
+    if has_pin(joint.type) and (pin or defaults.pin):
+        default = {key: one for key, one in stated(defaults.pin).items() if key != "end_float" or _floats(joint)}
+        pin = Pin(**_pin(default, stated(pin), limits, dimensions or {}))
+    if has_guide(joint.type) and (guide or defaults.guide):
+        guide = Guide(**{**stated(defaults.guide), **stated(guide)})
+    rubs = PAIRS[joint.type].count > 0  # nothing slips in a fixed joint: it needs no exception from the defaults
+    friction = _friction(stated(defaults.friction) if rubs else {}, stated(joint.friction))
+    merged = joint.model_copy(update={"pin": pin, "guide": guide, "friction": friction})
+    merged = merged.model_copy(
+        update={"misalignment": _misalignment(joint, spatial), "seat": _seat(merged, defaults.seat)}
+    )
+    if friction and friction.parameters.get("coefficient") == NO_FRICTION:
+        touches = has_pin(joint.type) or has_guide(joint.type)
+        if not touches or contact_lacks(merged, spatial):
+            return merged.model_copy(update={"friction": None})  # friction: 0 asks for no radius or length
+    return merged
+
+
+def stated(part: BaseModel | None) -> Mapping[str, Any]:
+    """What was written of a part: its own values by key."""
+    return {} if part is None else {key: getattr(part, key) for key in sorted(part.model_fields_set)}
+
+
+def _floats(joint: Joint) -> bool:
+    """Whether a default end float means this joint."""
+    return joint.type == "revolute"
+
+
+def _pin(
+    default: Mapping[str, Any], own: Mapping[str, Any], limits: FitChoice, dimensions: Mapping[str, Number]
+) -> dict[str, Any]:
+    """A pin's own values over the defaults; one way to state the play replaces the others."""
+    if "fit" in own:
+        default = {key: one for key, one in default.items() if key not in ("radius", "hole_radius", "clearance")}
+    elif own.keys() & {"radius", "hole_radius", "clearance"}:
+        default = {key: one for key, one in default.items() if key != "fit"}
+    for key, other in (("clearance", "hole_radius"), ("hole_radius", "clearance")):
+        if key in own and other not in own:
+            default = {name: one for name, one in default.items() if name != other}
+    merged = {**default, **own}
+    if merged.get("fit"):
+        for key, radius in _radii(merged["fit"], limits, dimensions).items():
+            merged[key] = merged.get(key) or radius
+    return merged
+
+
+def _radii(stated_fit: Fit, limits: FitChoice, dimensions: Mapping[str, Number]) -> dict[str, Quantity]:
+    """Radii of pin and hole of a fit with their tolerances; half the size for the pin alone where it has no limits."""
+    size = stated_fit.size
+    known = set(size.names) <= dimensions.keys()
+    value = float(size.evaluate(dimensions)) if known else np.nan
+    try:
+        found = fit(value, stated_fit.hole, stated_fit.shaft)
+    except MechanismError:  # a finding of its own
+        return {"radius": _half(size, 0.0, None)}
+    radii = {}
+    # the smallest play is that of the largest pin in the smallest hole
+    for key, (low, high), end in (
+        ("radius", found.shaft_limits, {"minimum": 1.0, "mean": 0.5, "maximum": 0.0}),
+        ("hole_radius", found.hole_limits, {"minimum": 0.0, "mean": 0.5, "maximum": 1.0}),
+    ):
+        share = end[limits]
+        nominal, width = (low + share * (high - low)) / 2, (high - low) / 2
+        radii[key] = _half(size, round(nominal, 12), (round(-share * width, 12), round((1 - share) * width, 12)))
+    return radii
+
+
+def _half(size: Quantity, deviation: float, tolerance: tuple[float, float] | None) -> Quantity:
+    """Half a diameter and a deviation (m) of the radius."""
+    if isinstance(size.source, str):
+        sign = "-" if deviation < 0 else "+"
+        text = f"({size.source}) / 2" + f" {sign} {abs(deviation):.12g} m" * (deviation != 0)
+        half = Quantity.read(text, size.kind)
+    else:
+        half = Quantity.read(size.source / 2 + deviation, size.kind)
+    return replace(half, tolerance=tolerance)
+
+
+def _misalignment(joint: Joint, spatial: bool) -> Misalignment | None:
+    """Complete where a joint can have one, so that its numbers can be set; as stated, for a finding, where not."""
+    if joint.type not in ("revolute", "cylindrical"):
+        return joint.misalignment
+    return (joint.misalignment or Misalignment()).complete(spatial)
+
+
+def _seat(joint: Joint, default: SeatChoice | None) -> SeatChoice:
+    """A joint's own seat; else the default where it has a play that this can mean; else free."""
+    own = joint.seat
+    suits = default is not None and has_play(joint)
+    if isinstance(default, Seat):
+        suits = suits and (default.direction is not None) == (joint.type == "spherical")
+    if own is None:
+        own = default if suits else "free"
+    elif isinstance(own, Seat) and isinstance(default, Seat) and suits:
+        own = Seat(**{**stated(default), **stated(own)})
+    return own.complete() if isinstance(own, Seat) else own or "free"
+
+
+def _friction(default: Mapping[str, Any], own: Mapping[str, Any]) -> Friction | None:
+    """Friction complete: the joint's own over the file's defaults (those its law knows) over the law's."""
+    if not default and not own:
+        return None
+    law = own.get("law") or default.get("law") or DEFAULT_LAW
+    declared = FRICTION_LAWS[law].parameters
+    if default.get("law", law) != law:
+        default = {key: value for key, value in default.items() if key in declared}
+    filled = {key: one.default for key, one in declared.items() if one.default is not None}
+    model = own.get("model") or default.get("model") or "two-contact"
+    return Friction.model_validate({**filled, **default, **own, "law": law, "model": model})

@@ -16,7 +16,7 @@ import typer
 from trunnion import __version__
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.options import over, points, setting, table_file
-from trunnion.terminal import bar, console, say, show_figures, show_rows, wrote
+from trunnion.terminal import bar, console, findings_of, say, show_figures, show_rows, wrote
 from trunnion.verbs.assemble import assemble
 
 if TYPE_CHECKING:
@@ -150,7 +150,7 @@ def analyse(
     _summary(result, file)
     for path in [*(out or []), *([report] if report else [])]:
         wrote(path)
-    raise typer.Exit(_status(_findings(result)))
+    raise typer.Exit(_status(findings_of(result)))
 
 
 @app.command()
@@ -184,8 +184,8 @@ def locking(
         run = prepare(mechanism)
         found = look(run, steps)
     show_figures(mechanism.name or str(file), report_rows(run, found))
-    say(_placed(_findings(found), file, ["assembly"]))
-    raise typer.Exit(_status(_findings(found)))
+    say(_placed(findings_of(found), file, ["assembly"]))
+    raise typer.Exit(_status(findings_of(found)))
 
 
 app.command()(assemble)
@@ -243,10 +243,10 @@ def sweep(
     show_rows(f"{mechanism.name or file}\n{name}", head, rows)
     if left_out:
         console().print(f"{left_out:,} points more; --out FILE.csv has all", markup=False, highlight=False)
-    say(_placed(_findings(result), file, ["assembly"]))
+    say(_placed(findings_of(result), file, ["assembly"]))
     for path in out or []:
         wrote(path)
-    raise typer.Exit(_status(_findings(result)))
+    raise typer.Exit(_status(findings_of(result)))
 
 
 @app.command()
@@ -284,9 +284,9 @@ def plot(
         path = out if single else out / f"{name}.{image.lstrip('.')}"
         save(PLOTS[name](result, ideal), path)
         wrote(path)
-    said = [finding for finding in _findings(result) if finding.severity is not Severity.NOTE]
+    said = [finding for finding in findings_of(result) if finding.severity is not Severity.NOTE]
     say(_placed(said, file, ["assembly"]))
-    raise typer.Exit(_status(_findings(result)))
+    raise typer.Exit(_status(findings_of(result)))
 
 
 @app.command()
@@ -310,7 +310,7 @@ def report(
         result = _run(mechanism, steps, _method(method, criterion, iterations))
     _write_report(mechanism, result, out)
     wrote(out)
-    raise typer.Exit(_status(_findings(result)))
+    raise typer.Exit(_status(findings_of(result)))
 
 
 @app.command()
@@ -450,21 +450,12 @@ def _write_report(mechanism: Mechanism, result: xr.Dataset, path: Path) -> None:
         temporary.write_text(text, encoding="utf-8")
 
 
-def _findings(result: xr.Dataset) -> list[Finding]:
-    import json
-
-    return [
-        Finding(row["what"], row["where"], row["remedy"], Severity(row["severity"]))
-        for row in json.loads(result.attrs["findings"])
-    ]
-
-
 def _summary(result: xr.Dataset, file: Path) -> None:
     """The short table of an analysis, and its findings."""
     import json
 
     show_figures(f"{result.attrs['name']}\n{result.attrs['formula']}", json.loads(result.attrs["summary"]))
-    say(_placed(_findings(result), file, ["assembly"]))
+    say(_placed(findings_of(result), file, ["assembly"]))
 
 
 @contextmanager

@@ -5,8 +5,8 @@ CSV (and Parquet) have one row a position and flat columns: `time`, `<joint>.rot
 `power_useful`, `status` and so on, in SI; the other formats hold the whole Dataset. In space also z, and
 `<joint>.reaction_moment_x|y|z`, `<joint>.friction_force`, `<link>.x|y|z`, `<link>.rotation_w|x|y|z`,
 `<link>.angular_velocity_x|y|z`. A sweep has one row a point of its grid: the swept numbers by the names they were
-given, then `efficiency`, `<driver>.effort_max`, `<joint>.reaction_max`, …, `status`. What `assemble` finds has one row a
-position: `<driver>.coordinate`, `needed_share`, `needed_clearance`, …, `<joint>.uniform_1_x` of end 1, …, `status`.
+given, then `efficiency`, `<driver>.effort_max`, `<joint>.reaction_max`, …, `status`. What `assemble` finds has one row
+a position: `<driver>.coordinate`, `needed_share`, `needed_clearance`, …, `<joint>.uniform_1_x` of end 1, …, `status`.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ def _fit(result: xr.Dataset) -> list[Column]:
         offsets = result[f"{kind}_offset"]
         known = np.isfinite(offsets.values).any(axis=-1)
         for i, k, m in np.argwhere(known):
-            found.append(_column(result, offsets.name, f"{joints[i]}.{kind}_{ends[k]}_{axes[m]}", (i, k, m)))
+            found.append(_column(result, f"{kind}_offset", f"{joints[i]}.{kind}_{ends[k]}_{axes[m]}", (i, k, m)))
     names = dict(zip(result.attrs["flag_values"].split(), result.attrs["flag_meanings"].split(), strict=True))
     told = np.array([names[str(code)] for code in result["status"].values])
     return [*found, ("status", "", lambda window: told[window])]

@@ -12,7 +12,7 @@ import typer
 
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.options import setting
-from trunnion.terminal import bar, say, show_figures, wrote
+from trunnion.terminal import bar, findings_of, say, show_figures, wrote
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -67,10 +67,7 @@ def assemble(
         else:
             save(result, path, units_row)
     show_figures(f"{result.attrs['name'] or file}\n{result.attrs['formula']}", json.loads(result.attrs["summary"]))
-    findings = [
-        Finding(row["what"], row["where"], row["remedy"], Severity(row["severity"]))
-        for row in json.loads(result.attrs["findings"])
-    ]
+    findings = findings_of(result)
     say(_placed(findings, file))
     for path in out or []:
         wrote(path)

@@ -1,4 +1,4 @@
-"""The figure of whether a mechanism goes together: the clearance that it needs over the drive, and where it is needed."""
+"""The figure of whether a mechanism goes together: the clearance that it needs over the drive, and in which joints."""
 
 from __future__ import annotations
 
@@ -57,7 +57,8 @@ def _over(result: xr.Dataset) -> Abscissa:
             turn = float(steps[0]) * values.size if steps.size else 0.0
             closed = bool(result.attrs["periodic"]) and unit == "rad" and abs(abs(turn) - 2 * np.pi) < 1e-6
             of = "angle" if unit == "rad" else "slide"
-            return Abscissa(f"drive {of} {drivers[0]}", shown, values * factor, closed, turn * factor if closed else 0.0)
+            period = turn * factor if closed else 0.0
+            return Abscissa(f"drive {of} {drivers[0]}", shown, values * factor, closed, period)
     factor, unit = prefixed(float(np.abs(time).max(initial=0.0)), "s")
     return Abscissa("time", unit, time * factor)
 
@@ -65,7 +66,7 @@ def _over(result: xr.Dataset) -> Abscissa:
 def _need(axes: Axes, result: xr.Dataset, over: Abscissa) -> None:
     """The clearance, the same in all pins, that each position needs, and the largest."""
     need = np.asarray(result["needed_clearance"].values, float)
-    most = float(result.attrs["smallest_clearance"])
+    most = float(result["smallest_clearance"])
     known = need[np.isfinite(need)]
     factor, unit = prefixed(float(known.max(initial=0.0)), "m")
     along(axes, over, f"needed clearance [{unit}]")

@@ -116,11 +116,7 @@ class Loops:
 
     def at(self, lanes: NDArray[np.intp]) -> Loops:
         """The same at some of the lanes."""
-        return replace(self, drive=tuple(np.broadcast_to(q, np.shape(q))[lanes] if np.ndim(q) else q for q in self.drive))
-
-    def lanes(self) -> int:
-        """How many positions there are."""
-        return max((len(q) for q in self.drive if np.ndim(q)), default=1)
+        return replace(self, drive=tuple(q[lanes] if np.ndim(q) else q for q in self.drive))
 
     # ---- geometry -------------------------------------------------------------------------------------------
 

@@ -75,7 +75,7 @@ def start_of(system: SpatialSystem, values: Values, ideal: Values, cycle: Cycle)
     what = "the axes and lengths as stated do not fit, and neither do they without the errors"
     if nearly is None:
         raise MechanismError(Finding(f"{what}: nowhere is every loop nearly closed", "links", "check the lengths"))
-    remedy = "what is off is told against the pose in which the loops are open least; state it as misalignment or errors"
+    remedy = "what is off counts from where the loops are open least; it may be stated as misalignment or errors"
     return nearly, [Finding(what, "links", remedy, Severity.NOTE)]
 
 

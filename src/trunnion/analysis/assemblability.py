@@ -149,14 +149,13 @@ class Study:
     def result(self, time: Array) -> Result:
         """The whole answer."""
         result = Result(self.system, self.values, time, list(self.findings))
-        result.of = ", ".join(
-            dict.fromkeys(end.joint for end, even in zip(self.pins, self.evened, strict=True) if even)
-        )
-        result.pins = all(end.pin for end, even in zip(self.pins, self.evened, strict=True) if even)
+        even = [end for end, evened in zip(self.pins, self.evened, strict=True) if evened]
+        result.of, result.pins = ", ".join(dict.fromkeys(end.joint for end in even)), all(end.pin for end in even)
         result.played = bool(self.stated)
         arrays, there = result.arrays, self._open(result)
-        if np.any(arrays["open_angle"][there] > CLOSED) or np.any(arrays["open_length"][there] > 0):
-            _check_lengths(self.system, self.values, self.pins)
+        if not np.any(arrays["open_angle"][there] + arrays["open_length"][there] > 0):
+            return self._fitting(result, there)
+        _check_lengths(self.system, self.values, self.pins)
         shares, needs = self.solve(time, stated=True), self.solve(time, stated=False)
         for found, ends, name in ((shares, self.stated, "stated"), (needs, self.pins, "uniform")):
             self._place(found, ends, arrays[f"{name}_offset"], arrays[f"{name}_part"])

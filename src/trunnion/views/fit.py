@@ -32,14 +32,17 @@ def figure(result: xr.Dataset) -> Figure:
     over = _over(result)
     share = column(result, "needed_share")
     stated = share is not None and bool(np.any(np.isfinite(share) & (share > 0)))
-    sheet = new("What clearance it needs to go together", result, 6.6 if stated else 5.0)
-    panels = list(sheet.subplots(3 if stated else 2, 1, sharex=True, squeeze=False)[:, 0])
-    for axes in panels[: 2 if stated else 1]:
+    parted = bool(np.nanmax(result["uniform_part"].values, initial=0.0) > 0)
+    count = 1 + stated + parted
+    sheet = new("What clearance it needs to go together", result, 2.0 + 1.6 * count)
+    panels = list(sheet.subplots(count, 1, sharex=True, squeeze=False)[:, 0])
+    for axes in panels[: 1 + stated]:
         _shade(axes, result, over)
     _need(panels[0], result, over)
     if stated and share is not None:
         _share(panels[1], share, over)
-    _parts(panels[-1], result, over)
+    if parted:
+        _parts(panels[-1], result, over)
     for axes in panels[:-1]:
         axes.set_xlabel("")
     return sheet
@@ -78,8 +81,13 @@ def _need(axes: Axes, result: xr.Dataset, over: Abscissa) -> None:
         axes.annotate(plain(text), (0.01, most * factor), xycoords=("axes fraction", "data"), fontsize=8, color=INK,
                       xytext=(0, 3), textcoords="offset points")  # fmt: skip
         axes.set_ylim(0, 1.22 * most * factor)
-    elif not known.size:
-        axes.set_yticks([])
+        return
+    axes.set_yticks([])
+    axes.set_ylim(-0.1, 1)
+    if known.size and most == 0:
+        axes.text(
+            0.5, 0.5, "none: it goes together without", transform=axes.transAxes, ha="center", fontsize=9, color=INK
+        )
 
 
 def _share(axes: Axes, share: Array, over: Abscissa) -> None:
@@ -107,6 +115,7 @@ def _parts(axes: Axes, result: xr.Dataset, over: Abscissa) -> None:
 
 def _shade(axes: Axes, result: xr.Dataset, over: Abscissa) -> None:
     """Grey where the mechanism does not go together with the stated clearances, if they are enough somewhere."""
+    # where they are nowhere enough the whole would be grey, which tells nothing
     short = np.asarray(result["status"].values) != FITS
     if short.all() or not short.any():
         return

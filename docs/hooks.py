@@ -3,7 +3,7 @@
 - `<!-- generated: NAME -->` in a page becomes the table of that name, made from the code's own tables.
 - `figures/MODEL/KIND.svg` and `figures/MODEL/report.html` are drawn when a page refers to them. KIND is a plot or
   `assemblies`; MODEL is a file of `examples/`, a block of a page titled `MODEL.yaml`, or an entry of `VARIANTS`.
-- `figures/sweeps/NAME.svg` is drawn by the command of a page, `trunnion sweep … --out NAME.svg`.
+- `figures/sweeps/NAME.svg` is drawn by the command of a page, `trunnion sweep … --out NAME.svg`, or `assemble`.
 - The gallery is made of the examples and of `tests/gallery/facts.py`; see `gallery_page.py`.
 - `$x$` and `$$x$$` become MathML, which browsers set without any script.
 """
@@ -131,7 +131,7 @@ def _drawn(model: str, models: dict[str, str], kinds: list[str], steps: int, rep
 
 def _swept(name: str, text: str, models: dict[str, str]) -> bytes:
     """The figure that a page's own command draws, so that the two cannot differ."""
-    command = re.search(rf"^trunnion (sweep .*--out {re.escape(name)}\.svg.*)$", text, re.MULTILINE)
+    command = re.search(rf"^trunnion ((?:sweep|assemble) .*--out {re.escape(name)}\.svg.*)$", text, re.MULTILINE)
     if command is None:
         raise PluginError(f"figures/sweeps/{name}.svg: no page has a command that writes {name}.svg")
     with tempfile.TemporaryDirectory() as folder:
@@ -217,6 +217,14 @@ def sweeps_table() -> str:
 
     rows = [(_code(name), ", ".join(one.dims), _unit(one.units), one.long_name) for name, one in FIGURES.items()]
     return _rows(("variable", "dimension before the swept ones", "unit", "meaning"), rows)
+
+
+def assembling_table() -> str:
+    """Every variable of whether a mechanism goes together."""
+    from trunnion.analysis.assemblability import FIGURES
+
+    rows = [(_code(name), ", ".join(one.dims), _unit(one.units), one.long_name) for name, one in FIGURES.items()]
+    return _rows(("variable", "dimensions", "unit", "meaning"), rows)
 
 
 def status_table() -> str:
@@ -487,6 +495,7 @@ def _default(field: Any) -> str:
 TABLES: dict[str, Callable[..., str]] = {
     "results": results_table,
     "sweeps": sweeps_table,
+    "assembling": assembling_table,
     "statuses": status_table,
     "laws": laws_table,
     "motion": motion_table,

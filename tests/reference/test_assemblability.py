@@ -208,7 +208,7 @@ def turned(angle: Array) -> Array:
 
 
 class Loop:
-    """The closure of the four-bar in homogeneous matrices, which shares no code with the library; (…, turns or ends)."""
+    """The closure of the four-bar in homogeneous matrices, no code shared with the library; (…, turns or ends)."""
 
     def __init__(self, errors: Data, crank: float) -> None:
         self.errors, self.crank = errors, crank

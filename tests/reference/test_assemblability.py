@@ -516,3 +516,31 @@ def test_where_it_cannot_be_assembled() -> None:
     assert float(found.closure_residual.max()) < OPEN
     told = json.loads(found.attrs["findings"])
     assert any("cannot be assembled, with or without errors" in row["what"] for row in told)
+
+
+def test_a_freedom_that_nothing_drives_is_refused() -> None:
+    data = four_bar({"B": LEAN})
+    del data["drivers"]
+    with pytest.raises(
+        trunnion.MechanismError, match="1 freedom is not determined, of the links crank, coupler, rocker"
+    ):
+        solved(data)
+
+
+@pytest.mark.parametrize("degrees", [1, 5, 15])
+def test_errors_that_are_not_small(degrees: float) -> None:
+    """The sequence of cone programmes settles on the exact closure there too; the need is nearly proportional."""
+    small, large = (solved(four_bar({"B": {"tilt": np.radians(one)}}), 12) for one in (0.01, degrees))
+    sound(large)
+    ratio = np.tan(np.radians(degrees)) / np.radians(0.01)
+    np.testing.assert_allclose(large.needed_clearance, ratio * small.needed_clearance, rtol=0.02 * degrees)
+
+
+def test_pins_held_along_one_axis_and_out_of_line() -> None:
+    """No end float, parallel holes: a line that leans nowhere fits to first order only; it is not guessed."""
+    found = solved(hinges(0.3, 0.03, {"misalignment": {"offset": 1e-4}}), 6)
+    unsettled = found.status == Fit.UNSETTLED
+    assert unsettled.any()
+    assert np.isnan(found.needed_clearance[unsettled]).all()
+    assert np.isnan(found.smallest_clearance)
+    assert any("give one an end float" in row["remedy"] for row in json.loads(found.attrs["findings"]))

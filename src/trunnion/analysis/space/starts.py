@@ -66,10 +66,10 @@ def start_of(system: SpatialSystem, values: Values, ideal: Values, cycle: Cycle)
     Raises MechanismError where the mechanism leaves a freedom undetermined, or is nowhere even nearly closed.
     """
     chosen = choose(system, ideal, cycle)
+    told = [one for one in look(system, ideal, chosen, cycle).findings() if one.where == "drivers"]
+    if told:
+        raise MechanismError(told)
     if chosen.found[0]:
-        told = [one for one in look(system, ideal, chosen, cycle).findings() if one.where == "drivers"]
-        if told:
-            raise MechanismError(told)
         return _Ideal(system, ideal, chosen), list(chosen.findings)
     nearly = _followed(system, values, cycle)
     what = "the axes and lengths as stated do not fit, and neither do they without the errors"

@@ -24,7 +24,10 @@ __all__ = ["ENOUGH", "FIGURES", "Fit", "Result", "labels"]
 Array = NDArray[np.float64]
 ENOUGH = 1 + 1e-9  # of the stated clearances: all of it is enough
 TOLD = 0.05  # a joint's part in the need that is worth telling
-SOURCE = "P. J. Goulart and Y. Chen, Clarabel: an interior-point solver for conic programs, arXiv:2405.12762"
+SOURCE = (
+    "P. J. Goulart and Y. Chen, Clarabel: an interior-point solver for conic programs with quadratic objectives, "
+    "arXiv:2405.12762"
+)
 
 
 class Fit(IntEnum):

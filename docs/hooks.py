@@ -3,8 +3,8 @@
 - `<!-- generated: NAME -->` in a page becomes the table of that name, made from the code's own tables.
 - `figures/MODEL/KIND.svg` and `figures/MODEL/report.html` are drawn when a page refers to them. KIND is a plot or
   `assemblies`; MODEL is a file of `examples/`, a block of a page titled `MODEL.yaml`, or an entry of `VARIANTS`.
-- `figures/sweeps/NAME.svg` and `figures/plays/NAME.svg` are drawn by the command of a page, `trunnion sweep … --out
-  NAME.svg` and `trunnion play …`.
+- `figures/sweeps/NAME.svg`, `figures/plays/NAME.svg` and `figures/assembles/NAME.svg` are drawn by the command of a
+  page, `trunnion sweep … --out NAME.svg` and so on.
 - The gallery is made of the examples and of `tests/gallery/facts.py`; see `gallery_page.py`.
 - `$x$` and `$$x$$` become MathML, which browsers set without any script.
 """
@@ -76,7 +76,7 @@ def on_files(files: Files, config: Any) -> Files:
     """Draw what the pages refer to; put the examples and the schema beside them."""
     pages = {path: path.read_text("utf-8") for path in sorted(DOCS.rglob("*.md"))}
     told = {found for text in pages.values() for found in re.findall(r"figures/([\w-]+)/([\w-]+)\.(svg|html)", text)}
-    swept = {found for found in told if found[0] in ("sweeps", "plays")}
+    swept = {found for found in told if found[0] in ("sweeps", "plays", "assembles")}
     told -= swept
     wanted = told | _gallery().wanted()
     models = models_of(pages.values())
@@ -228,6 +228,14 @@ def plays_table() -> str:
         (_code(name), ", ".join(one.dims), _unit(one.units) if one.units else "of the measure", one.long_name)
         for name, one in VARIABLES.items()
     ]
+    return _rows(("variable", "dimension", "unit", "meaning"), rows)
+
+
+def assembling_table() -> str:
+    """Every variable of whether a mechanism goes together."""
+    from trunnion.analysis.assemblability import FIGURES
+
+    rows = [(_code(name), ", ".join(one.dims), _unit(one.units), one.long_name) for name, one in FIGURES.items()]
     return _rows(("variable", "dimensions", "unit", "meaning"), rows)
 
 
@@ -500,6 +508,7 @@ TABLES: dict[str, Callable[..., str]] = {
     "results": results_table,
     "sweeps": sweeps_table,
     "plays": plays_table,
+    "assembling": assembling_table,
     "statuses": status_table,
     "laws": laws_table,
     "motion": motion_table,

@@ -13,6 +13,7 @@ __version__ = "0.1.0"
 if TYPE_CHECKING:
     from trunnion import dual
     from trunnion.analysis.analyse import analyse, prepare
+    from trunnion.analysis.assemblability import assemble
     from trunnion.analysis.friction import FrictionMethod
     from trunnion.analysis.inspect import Check, check
     from trunnion.analysis.locking import locking
@@ -32,6 +33,7 @@ _PLACES = {
     "Status": "trunnion.errors",
     "Check": "trunnion.analysis.inspect",
     "analyse": "trunnion.analysis.analyse",
+    "assemble": "trunnion.analysis.assemblability",
     "check": "trunnion.analysis.inspect",
     "locking": "trunnion.analysis.locking",
     "play": "trunnion.analysis.play",
@@ -52,6 +54,7 @@ __all__ = [
     "MechanismError",
     "Status",
     "analyse",
+    "assemble",
     "check",
     "dual",
     "locking",

@@ -37,7 +37,8 @@ from trunnion.options import (
     setting,
     table_file,
 )
-from trunnion.terminal import bar, console, say, show_figures, show_rows, wrote
+from trunnion.terminal import bar, console, findings_of, say, show_figures, show_rows, wrote
+from trunnion.verbs.assemble import assemble
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -142,7 +143,7 @@ def analyse(
     _summary(result, file)
     for path in [*(out or []), *([report] if report else [])]:
         wrote(path)
-    raise typer.Exit(_status(_findings(result)))
+    raise typer.Exit(_status(findings_of(result)))
 
 
 @app.command()
@@ -176,8 +177,11 @@ def locking(
         run = prepare(mechanism)
         found = look(run, steps)
     show_figures(mechanism.name or str(file), report_rows(run, found))
-    say(_placed(_findings(found), file, ["assembly"]))
-    raise typer.Exit(_status(_findings(found)))
+    say(_placed(findings_of(found), file, ["assembly"]))
+    raise typer.Exit(_status(findings_of(found)))
+
+
+app.command()(assemble)
 
 
 @app.command()
@@ -195,7 +199,7 @@ def sweep(
     """How efficiency, drive effort, reactions, friction and locking margin change with one or two numbers."""
     from trunnion.analysis.sweep import sweep as run
     from trunnion.export import save
-    from trunnion.playing import check_files
+    from trunnion.verbs.play import check_files
     from trunnion.views.swept import check_measure
     from trunnion.views.swept import table as swept_table
 
@@ -219,10 +223,10 @@ def sweep(
     show_rows(f"{mechanism.name or file}\n{name}", head, rows)
     if left_out:
         console().print(f"{left_out:,} points more; --out FILE.csv has all", markup=False, highlight=False)
-    say(_placed(_findings(result), file, ["assembly"]))
+    say(_placed(findings_of(result), file, ["assembly"]))
     for path in out or []:
         wrote(path)
-    raise typer.Exit(_status(_findings(result)))
+    raise typer.Exit(_status(findings_of(result)))
 
 
 @app.command()
@@ -238,7 +242,7 @@ def play(
 ) -> None:
     """What the play of every joint does to measures: worst case, share of each joint, standard deviation."""
     from trunnion.analysis.play import play as run
-    from trunnion.playing import check_files, show
+    from trunnion.verbs.play import check_files, show
 
     check_files(out or [])
     mechanism = _mechanism(file, set_, table, friction)
@@ -269,9 +273,8 @@ def plot(
         raise MechanismError(Finding(f"there is no plot '{unknown[0]}'", "--kind", f"use one of {', '.join(PLOTS)}"))
     single = out.suffix.lower() in IMAGES
     if single and len(kinds) > 1:
-        raise MechanismError(
-            Finding(f"{len(kinds)} plots do not fit one file", str(out), "name a folder, or one --kind")
-        )
+        remedy = "name a folder, or one --kind"
+        raise MechanismError(Finding(f"{len(kinds)} plots do not fit one file", str(out), remedy))
     mechanism = _mechanism(file, set_, table, friction)
     with _lines_of(file):
         result = _run(mechanism, steps, None)
@@ -282,9 +285,9 @@ def plot(
         path = out if single else out / f"{name}.{image.lstrip('.')}"
         save(PLOTS[name](result, ideal), path)
         wrote(path)
-    said = [finding for finding in _findings(result) if finding.severity is not Severity.NOTE]
+    said = [finding for finding in findings_of(result) if finding.severity is not Severity.NOTE]
     say(_placed(said, file, ["assembly"]))
-    raise typer.Exit(_status(_findings(result)))
+    raise typer.Exit(_status(findings_of(result)))
 
 
 @app.command()
@@ -301,15 +304,14 @@ def report(
 ) -> None:
     """One self-contained HTML file: animation, plots, findings, balance, input data."""
     if out.suffix.lower() not in (".html", ".htm"):
-        raise MechanismError(
-            Finding(f"a report is HTML, '{out.name}' is not", "--out", "write a .html file and print it")
-        )
+        what = f"a report is HTML, '{out.name}' is not"
+        raise MechanismError(Finding(what, "--out", "write a .html file and print it"))
     mechanism = _mechanism(file, set_, table, friction)
     with _lines_of(file):
         result = _run(mechanism, steps, _method(method, criterion, iterations))
     _write_report(mechanism, result, out)
     wrote(out)
-    raise typer.Exit(_status(_findings(result)))
+    raise typer.Exit(_status(findings_of(result)))
 
 
 @app.command()
@@ -449,21 +451,12 @@ def _write_report(mechanism: Mechanism, result: xr.Dataset, path: Path) -> None:
         temporary.write_text(text, encoding="utf-8")
 
 
-def _findings(result: xr.Dataset) -> list[Finding]:
-    import json
-
-    return [
-        Finding(row["what"], row["where"], row["remedy"], Severity(row["severity"]))
-        for row in json.loads(result.attrs["findings"])
-    ]
-
-
 def _summary(result: xr.Dataset, file: Path) -> None:
     """The short table of an analysis, and its findings."""
     import json
 
     show_figures(f"{result.attrs['name']}\n{result.attrs['formula']}", json.loads(result.attrs["summary"]))
-    say(_placed(_findings(result), file, ["assembly"]))
+    say(_placed(findings_of(result), file, ["assembly"]))
 
 
 @contextmanager

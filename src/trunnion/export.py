@@ -9,7 +9,9 @@ CSV (and Parquet) have one row a position and flat columns: `time`, `<joint>.rot
 `<joint>.contact_1_x` …, `<joint>.seat_beta`, `<joint>.seat_xi`, `<joint>.seat_xi_pin`, `<joint>.contact_lost`. A
 sweep has one row a point of its grid: the swept numbers by the names they were given, then `efficiency`,
 `<driver>.effort_max`, `<joint>.reaction_max`, …, `status`. The play of joints has `drive`, `<measure>`,
-`<measure>.worst_case`, `<measure>.rss`, `<measure>.deviation`, `<measure>.<joint>.worst_case`, ….
+`<measure>.worst_case`, `<measure>.rss`, `<measure>.deviation`, `<measure>.<joint>.worst_case`, …. What
+`assemble` finds has one row a position: `<driver>.coordinate`, `needed_share`, `needed_clearance`, …,
+`<joint>.uniform_1_x` of end 1, …, `status`.
 """
 
 from __future__ import annotations
@@ -47,6 +49,8 @@ def columns(result: xr.Dataset) -> list[Column]:
         return [(name, unit, values.__getitem__) for name, (unit, values) in figures(result).items()]
     if "measure" in result.dims:
         return _played(result)
+    if "assembling" in result.attrs:
+        return _fit(result)
     stated = json.loads(result.attrs["scene"])
     spatial = stated.get("space") == "spatial"
     kinds = {name: joint["type"] for name, joint in stated["joints"].items()}
@@ -91,6 +95,26 @@ def _played(result: xr.Dataset) -> list[Column]:
     names = np.array([status.name.lower() for status in Status])
     found.append(("status", "", lambda window: names[result["status"].values[window]]))
     return found
+
+
+def _fit(result: xr.Dataset) -> list[Column]:
+    """Of whether a mechanism goes together: needs, openings, then offsets of the ends that have a play."""
+    found: list[Column] = [("time", "s", lambda window: result["time"].values[window])]
+    units = json.loads(result.attrs["coordinate_units"])
+    for i, (driver, unit) in enumerate(zip(result["driver"].values, units, strict=True)):
+        _, _, values = _column(result, "drive_coordinate", "", (i,))
+        found.append((f"{driver}.coordinate", unit, values))
+    flat = [str(name) for name, one in result.data_vars.items() if one.dims == ("position",) and name != "status"]
+    found += [_column(result, name, name, ()) for name in flat]
+    joints, ends, axes = (result[dim].values for dim in ("joint", "end", "axis"))
+    for kind in ("stated", "uniform"):
+        offsets = result[f"{kind}_offset"]
+        known = np.isfinite(offsets.values).any(axis=-1)
+        for i, k, m in np.argwhere(known):
+            found.append(_column(result, f"{kind}_offset", f"{joints[i]}.{kind}_{ends[k]}_{axes[m]}", (i, k, m)))
+    names = dict(zip(result.attrs["flag_values"].split(), result.attrs["flag_meanings"].split(), strict=True))
+    told = np.array([names[str(code)] for code in result["status"].values])
+    return [*found, ("status", "", lambda window: told[window])]
 
 
 def _planar_joint(result: xr.Dataset, i: int, joint: str, kind: str) -> list[Column]:

@@ -249,8 +249,8 @@ def play(
     with _lines_of(file):
         result = run(mechanism, measure, steps)
     show(mechanism, result, out or [], units_row)
-    say(_placed(_findings(result), file, ["measures", "joints"]))
-    raise typer.Exit(_status(_findings(result)))
+    say(_placed(findings_of(result), file, ["measures", "joints"]))
+    raise typer.Exit(_status(findings_of(result)))
 
 
 @app.command()

@@ -33,7 +33,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
-PLOT_KINDS = "torque, friction-power, reactions, polar, power, mechanism or motion"  # views.plots.PLOTS, not loaded yet
+PLOT_KINDS = "torque, friction-power, reactions, polar, power, mechanism, motion, error, seat or beta"  # views.plots
 
 IMAGES = (".png", ".svg", ".pdf")
 INTERRUPTED = 130  # exit status after Ctrl-C
@@ -260,16 +260,15 @@ def plot(
     image: Annotated[str, typer.Option("--format", help="png, svg or pdf, for a folder of plots.")] = "png",
 ) -> None:
     """Figures: drive torque, friction power, reactions, polar diagram, mechanism with coupler curve."""
-    from trunnion.views.plots import PLOTS, save
+    from trunnion.views.plots import PLOTS, drawable, save
 
-    kinds = kind or list(PLOTS)
-    unknown = [name for name in kinds if name not in PLOTS]
+    unknown = [name for name in kind or [] if name not in PLOTS]
     if unknown:
         raise MechanismError(Finding(f"there is no plot '{unknown[0]}'", "--kind", f"use one of {', '.join(PLOTS)}"))
     single = out.suffix.lower() in IMAGES
-    if single and len(kinds) > 1:
+    if single and len(kind or PLOTS) > 1:
         raise MechanismError(
-            Finding(f"{len(kinds)} plots do not fit one file", str(out), "name a folder, or one --kind")
+            Finding(f"{len(kind or PLOTS)} plots do not fit one file", str(out), "name a folder, or one --kind")
         )
     mechanism = _mechanism(file, set_, table, friction)
     with _lines_of(file):
@@ -277,9 +276,9 @@ def plot(
     ideal = _ideal(mechanism, steps, None)
     if not single:
         _folder(out)
-    for name in kinds:
+    for name, figure in [(name, PLOTS[name](result, ideal)) for name in kind or drawable(result)]:
         path = out if single else out / f"{name}.{image.lstrip('.')}"
-        save(PLOTS[name](result, ideal), path)
+        save(figure, path)
         wrote(path)
     said = [finding for finding in _findings(result) if finding.severity is not Severity.NOTE]
     say(_placed(said, file, ["assembly"]))

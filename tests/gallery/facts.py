@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from gallery import benchmarks, drawing, four_bars, geared, presses, several_loops, sliders, spatial
+from gallery import benchmarks, drawing, four_bars, geared, presses, several_loops, sliders, spatial, with_errors
 from gallery.entry import Entry
 
 __all__ = ["ENTRIES", "REFUSED", "SECTIONS"]
@@ -23,6 +23,7 @@ SECTIONS: Mapping[str, Mapping[str, Entry]] = {
     "Presses": presses.ENTRIES,
     "Two drives, a large group, a benchmark": benchmarks.ENTRIES,
     "In space": spatial.ENTRIES,
+    "With play and misaligned axes": with_errors.ENTRIES,
 }
 ENTRIES: Mapping[str, Entry] = {name: entry for section in SECTIONS.values() for name, entry in section.items()}
 

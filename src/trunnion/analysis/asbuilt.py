@@ -49,6 +49,8 @@ def _fill_ends(
     array: NDArray[np.float64], seat: Seat, vectors: Sequence[Vector], window: slice, shared: bool = False
 ) -> None:
     """Vectors of the ends at end 1 and 2; what is along the axis belongs to both, a force by halves."""
+    for place in {key[0] for end in seat.play.model.ends for key in end} - {"3"}:
+        array[int(place) - 1, :, window] = 0.0
     for end, vector in zip(seat.play.model.ends, vectors, strict=True):
         for key, number in zip(end, vector, strict=True):
             place, axis = key.split(".")

@@ -54,6 +54,7 @@ class Forward:
     poses: list[Any] = field(default_factory=list)
     assembly: list[Any] = field(default_factory=list)
     _elements: dict[tuple[str, str], Any] = field(default_factory=dict)
+    _held: dict[str, Any] = field(default_factory=dict)
 
     def element(self, link: str, joint: str) -> Any:
         """Global frame of a joint's element on a link."""
@@ -105,7 +106,7 @@ class Forward:
     def acceleration(self, link: str, joint: str) -> Acceleration:
         """Acceleration of the element."""
         motion = self.motions[link]
-        return accelerated(motion.acceleration, motion.twist.w, *self.arm(link, joint))
+        return accelerated(motion.acceleration, self.held(link).w, *self.arm(link, joint))
 
     def point(self, link: str, name: str) -> PointMotion:
         """Motion of a named point of a link."""
@@ -118,7 +119,7 @@ class Forward:
         place = point(frame, x, y)
         arm = place[0] - frame.x, place[1] - frame.y
         velocity = moved(twist, *arm)
-        second = accelerated(acceleration, twist.w, *arm)
+        second = accelerated(acceleration, self.held(link).w, *arm)
         return PointMotion(place, (velocity.x, velocity.y), (second.x, second.y))
 
     def placed(self, frame: Any, link: str, name: str) -> tuple[Number, ...]:
@@ -161,8 +162,13 @@ class Forward:
         link = place.links[i]
         return self.element(link, place.joint) if place.outer[i] else self.local[link, place.joint]
 
+    def held(self, link: str) -> Any:
+        """Velocity of a link with its pins held in their seats: what accelerations go with."""
+        return self._held.get(link, self.motions[link].twist)
+
     def carried(self, frames: Mapping[str, Any]) -> None:
         """Add to the velocity of every link what the ε parts of its frame say: that of seats which travel."""
+        self._held.update({link: motion.twist for link, motion in self.motions.items()})
         for link, frame in frames.items():
             motion = self.motions[link]
             spin = primal(frame.c) * rate_of(frame.s) - primal(frame.s) * rate_of(frame.c)

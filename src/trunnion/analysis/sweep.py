@@ -179,7 +179,7 @@ def _grid(mechanism: Mechanism, over: Over) -> tuple[Swept, ...]:
         raise MechanismError(Finding(what, "over", f"give 1 to {MOST_NAMES}, such as misalignment=0deg:30deg:7"))
     paths: dict[str, str] = {}
     for name in over:
-        path = mechanism.parameter_set.resolve(name)
+        path = mechanism.path_of(name)
         if path in paths:
             what = f"'{paths[path]}' and '{name}' are the same number, {path}"
             raise MechanismError(Finding(what, "over", "sweep over each once"))
@@ -252,11 +252,10 @@ def _swept(mechanism: Mechanism, name: str, path: str, given: Any) -> Swept:
 
 def _read(changed: Mechanism, path: str, value: float | str) -> _Value:
     """A value that the mechanism took, as it was written."""
-    found = changed.parameters().get(path)
-    if found is None:
+    if path not in changed.parameters():
         what = f"'{value}' is no number but changes with the motion"
         raise MechanismError(Finding(what, path, "sweep over a dimension in it"))
-    si = float(found)
+    si = float(changed.parameter_set.stated(path))
     text = normalise(value).strip() if isinstance(value, str) else ""
     literal = LITERAL.fullmatch(text.removeprefix("-").strip())
     if not literal:

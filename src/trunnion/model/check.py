@@ -15,7 +15,7 @@ from trunnion.errors import Finding, Severity
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.joints.motion import MOTION_LAWS
 from trunnion.joints.pairs import PAIRS
-from trunnion.model.check_errors import error_unit, errors, joint_errors
+from trunnion.model.check_errors import errors, joint_errors
 from trunnion.model.check_gears import gears
 from trunnion.model.check_loads import motion_dimensions, springs, tables, unknown_name
 from trunnion.model.check_space import contact, coordinates, driven, loop, pitch, resisted, space
@@ -23,6 +23,7 @@ from trunnion.model.check_values import check_values
 from trunnion.model.contact import motions
 from trunnion.model.expression import MOTION, RESERVED
 from trunnion.model.names import nearest
+from trunnion.model.parameter_names import ERRORS
 from trunnion.model.parameters import ParameterSet, dimension_errors, entries, evaluation_order
 from trunnion.model.parts import Driver, Friction, Joint, Load, Measure, freedoms
 from trunnion.model.quantity import UNREADABLE
@@ -89,11 +90,9 @@ def _quantities(mechanism: Mechanism, unreadable: set[str]) -> Iterator[Finding]
             what = f"'{entry.quantity.source}' varies with the motion and has a tolerance"
             yield Finding(what, entry.where, "state a dimension with the tolerance and use it in the expression")
         try:
-            measured = entry.quantity.check(sayable, entry.kind)
+            entry.quantity.check(sayable, entry.kind)
         except UnitError as error:
             yield Finding(error.what, entry.where, error.remedy)
-        else:
-            yield from error_unit(entry, measured, known)
     for name in mechanism.dimensions:
         if name not in used:
             yield Finding("is not used", f"dimensions.{name}", "remove it", Severity.NOTE)
@@ -106,7 +105,7 @@ def _dimensions(mechanism: Mechanism, known: dict[str, Dimension | None], unread
     deviations = dimension_errors(entries(mechanism)) if mechanism.errors else {}
     order, circles = evaluation_order(dimensions, deviations)
     for circle in circles:
-        unreadable.update(f"dimensions.{name}" for name in circle)
+        unreadable.update(f"{before}dimensions.{name}" for name in circle for before in ("", ERRORS))
         ring = " → ".join([*circle, circle[0]])
         yield Finding(f"is defined by itself: {ring}", f"dimensions.{circle[0]}", "give one of them a value")
     for name in order:

@@ -14,13 +14,12 @@ from trunnion.model.contact import PLAY_PAIRS, has_guide, has_pin, has_play, pla
 from trunnion.model.joint_parts import Joint, Pin, Seat
 from trunnion.model.merge import stated
 from trunnion.model.parameter_names import ERRORS, ParameterNames
-from trunnion.model.parameters import Entry, ParameterSet, entries, nominal_dimensions
-from trunnion.model.units import Dimension, dimension_text, fits
+from trunnion.model.parameters import ParameterSet, entries, nominal_dimensions
 
 if TYPE_CHECKING:
     from trunnion.model.mechanism import Mechanism
 
-__all__ = ["error_unit", "errors", "joint_errors", "play_values"]
+__all__ = ["errors", "joint_errors", "play_values"]
 
 STEEPEST = np.pi / 4  # of a tilt: beyond it is another design, and more likely a slip of the unit
 MEASURABLE = 1e-9  # m: half a millionth of a millimetre of interference is rounding
@@ -54,16 +53,6 @@ def errors(mechanism: Mechanism) -> Iterator[Finding]:
             )
 
 
-def error_unit(entry: Entry, dimension: Dimension | None, known: Mapping[str, Dimension | None]) -> Iterator[Finding]:
-    """Whether the error of a dimension of the model measures what the dimension does; that of others has their kind."""
-    section, _, name = entry.path.removeprefix(ERRORS).partition(".")
-    wanted = known.get(name) if section == "dimensions" and entry.path.startswith(ERRORS) else None
-    if dimension is None or wanted is None or (fits(dimension, wanted) and any(dimension) == any(wanted)):
-        return
-    what = f"'{entry.quantity.source}' is {dimension_text(dimension)}, '{name}' {dimension_text(wanted)}"
-    yield Finding(what, entry.where, "give the error in a unit of what it changes")
-
-
 # ---- what is stated of joints ---------------------------------------------------------------------------------
 
 
@@ -71,6 +60,7 @@ def joint_errors(mechanism: Mechanism) -> Iterator[Finding]:
     """Plays, seats and misalignments that a joint cannot have, or that lack something."""
     for name, joint in mechanism.effective_joints.items():
         own, where = mechanism.stated_joints[name], f"joints.{name}"
+        yield from _empty_seat(own.seat, where)
         if own.misalignment is not None:
             yield from _misalignment(own, f"{where}.misalignment", mechanism.space == "spatial")
         if has_pin(joint.type):
@@ -105,7 +95,7 @@ def _pin(mechanism: Mechanism, name: str, own: Pin | None, where: str) -> Iterat
         what = "an end float is the play along the axis of a revolute joint in space"
         yield Finding(what, f"{where}.pin.end_float", "remove it")
     if merged and merged.fit and isinstance(found := _fit(mechanism, name), Finding):
-        yield Finding(found.what, f"{where}.pin.fit" if own and own.fit else "joint_defaults.pin.fit", found.remedy)
+        yield Finding(found.what, _fit_place(mechanism, name), found.remedy)
 
 
 def _fit(mechanism: Mechanism, name: str) -> FitLimits | Finding | None:
@@ -158,10 +148,16 @@ def _seat(mechanism: Mechanism, joint: Joint, stated_at: str, where: str) -> Ite
         yield Finding("a pin in the plane does not lean: its beta is 0", f"{at}.beta", "keep xi")
 
 
+def _empty_seat(seat: object, where: str) -> Iterator[Finding]:
+    if isinstance(seat, Seat) and not stated(seat):
+        yield Finding("says nowhere to lie", f"{where}.seat", "write {xi: 30 deg}, or of a ball {direction: [0, 0, 1]}")
+
+
 def _defaults(mechanism: Mechanism) -> Iterator[Finding]:
     """Defaults that mean no joint."""
     pin, seat = mechanism.joint_defaults.pin, mechanism.joint_defaults.seat
     joints = mechanism.effective_joints.values()
+    yield from _empty_seat(seat, "joint_defaults")
     if pin and pin.end_float is not None and mechanism.space == "planar":
         yield Finding("there is no end float in the plane", "joint_defaults.pin.end_float", "remove it")
     if seat not in (None, "free") and not any(has_play(joint) for joint in joints):
@@ -194,7 +190,7 @@ def play_values(mechanism: Mechanism, name: str, numbers: ParameterSet) -> Itera
     yield from _play_sign(mechanism, name, joint, numbers)
     found = _fit(mechanism, name)
     if isinstance(found, FitLimits):
-        yield from _press(joint, found, where)
+        yield from _press(joint, found, _fit_place(mechanism, name))
     yield from _play_size(mechanism, name, joint, values)
 
 
@@ -213,7 +209,13 @@ def _play_sign(mechanism: Mechanism, name: str, joint: Joint, numbers: Parameter
         yield Finding(what, entry.alias or entry.path, "check the two; a press fit is a fixed joint")
     elif joint.seat not in (None, "free"):
         what = f"the nominal play of the fit {pin.fit.source} is {_um(hole - radius)} on the radius: no pin lies in it"
-        yield Finding(what, f"{where}.pin.fit", "take another fit, fits: maximum, or seat: free")
+        yield Finding(what, _fit_place(mechanism, name), "take another fit, fits: maximum, or seat: free")
+
+
+def _fit_place(mechanism: Mechanism, name: str) -> str:
+    """Where the fit of a joint is stated: with the joint or with the defaults."""
+    own = mechanism.stated_joints[name].pin
+    return f"joints.{name}.pin.fit" if own and own.fit else "joint_defaults.pin.fit"
 
 
 def _press(joint: Joint, found: FitLimits, where: str) -> Iterator[Finding]:
@@ -222,10 +224,10 @@ def _press(joint: Joint, found: FitLimits, where: str) -> Iterator[Finding]:
     reach = f"its play on the diameter is {_um(found.minimum)} to {_um(found.maximum)}"
     if found.maximum <= MEASURABLE:
         what = f"{text} is a press fit, no play: it cannot turn as a bearing; {reach}"
-        yield Finding(what, f"{where}.pin.fit", "take a shaft of class e to h, such as g6", Severity.WARNING)
+        yield Finding(what, where, "take a shaft of class e to h, such as g6", Severity.WARNING)
     elif found.minimum < -MEASURABLE:
         what = f"{text} may press: {reach}"
-        yield Finding(what, f"{where}.pin.fit", "take a shaft of class e to h, such as g6", Severity.WARNING)
+        yield Finding(what, where, "take a shaft of class e to h, such as g6", Severity.WARNING)
 
 
 def _play_size(mechanism: Mechanism, name: str, joint: Joint, values: Mapping[str, Number]) -> Iterator[Finding]:

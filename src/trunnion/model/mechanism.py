@@ -46,6 +46,8 @@ from trunnion.model.units import Kind
 __all__ = ["Mechanism"]
 
 FIXED_NAMES = ("ground", "frame")
+# Parts of a joint whose numbers can be set before the file states them.
+_JOINT_PARTS: Mapping[str, type[Part]] = {"pin": Pin, "guide": Guide, "misalignment": Misalignment, "seat": Seat}
 
 
 class Mechanism(Part):
@@ -237,47 +239,62 @@ class Mechanism(Part):
             _assign(data, self._location(name), value, self.coordinates)
         return Mechanism(**data)
 
+    def path_of(self, name: str) -> str:
+        """The path of the number that a name means in `with_values`, stated or not; MechanismError if it means none."""
+        try:
+            return self.parameter_set.resolve(name)
+        except MechanismError:
+            found = self._unstated(name)
+            if not found:
+                raise
+            return found[0]
+
     def _location(self, name: str) -> Location:
         """Where what a name means stands, or would stand; MechanismError if it means nothing."""
         choice = self._choice(name)
         if choice:
             return choice
-        try:
-            return self.parameter_set.entries[self.parameter_set.resolve(name)].location
-        except MechanismError:
-            found = self._unstated(name)
-            if not found:
-                raise
-            return found
+        entry = self.parameter_set.entries.get(self.path_of(name))
+        if entry:
+            return entry.location
+        found = self._unstated(name)
+        assert found is not None  # or it would have no path
+        return found[1]
 
     def _choice(self, name: str) -> Location | None:
         """Where a choice among words stands; None if the name is of a number."""
         if name in ("over_constraint", "fits"):
             return (name,)
-        section, _, rest = name.partition(".")
-        for choice in (("friction", "model"), ("seat",)):
-            if name == ".".join(("joint_defaults", *choice)):
-                return ("joint_defaults", *choice)
-            joint = rest.removesuffix("." + ".".join(choice))
-            if section == "joints" and joint != rest and joint in self.stated_joints:
-                return (*self._joint_location(joint), *choice)
+        for choice in ("friction.model", "seat"):
+            holder = self._holder(name.removesuffix(f".{choice}")) if name.endswith(f".{choice}") else None
+            if holder:
+                return (*holder, *choice.split("."))
         return None
 
-    def _unstated(self, name: str) -> Location | None:
-        """Where the error of a number, or a number of a joint that the file may state and does not, would stand."""
+    def _unstated(self, name: str) -> tuple[str, Location] | None:
+        """Path and place of the error of a number, or of a number of a joint, that the file may state and does not."""
         if name.startswith("errors."):
             named = name.removeprefix("errors.")
-            self.parameter_set.resolve(named)
-            return ("errors", named)
-        joint, _, rest = name.removeprefix("joints.").partition(".")
-        part, *keys = rest.split(".")
-        kinds: dict[str, type[Part]] = {"pin": Pin, "guide": Guide, "misalignment": Misalignment, "seat": Seat}
-        if joint not in self.stated_joints or part not in kinds or not keys or keys[0] not in kinds[part].model_fields:
-            return None
-        place = (*self._joint_location(joint), part, keys[0])
-        if keys[0] == "direction":
-            return (*place, "xyz".index(keys[1])) if keys[1:] in (["x"], ["y"], ["z"]) else None
-        return place if len(keys) == 1 and keys[0] != "fit" else None
+            return f"errors.{self.parameter_set.resolve(named)}", ("errors", named)
+        for part, kind in _JOINT_PARTS.items():
+            before, found, rest = name.rpartition(f".{part}.")
+            holder = self._holder(before) if found else None
+            key, *below = rest.split(".")
+            if not holder or key not in kind.model_fields or (holder == ("joint_defaults",) and part == "misalignment"):
+                continue
+            owner = before if before.startswith("joint") and before not in self.stated_joints else f"joints.{before}"
+            path = f"{owner}.{part}.{rest}"
+            if key == "direction" and below in (["x"], ["y"], ["z"]):
+                return path, (*holder, part, key, "xyz".index(below[0]))
+            return None if below or key in ("fit", "direction") else (path, (*holder, part, key))
+        return None
+
+    def _holder(self, name: str) -> Location | None:
+        """Where `joint_defaults`, or a joint by its name or path, stands."""
+        joint = name.removeprefix("joints.")
+        if joint in self.stated_joints:
+            return self._joint_location(joint)
+        return ("joint_defaults",) if name == "joint_defaults" else None
 
     def _joint_location(self, joint: str) -> Location:
         rows = [row.joint for row in self.loop]

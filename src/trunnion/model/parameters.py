@@ -33,7 +33,7 @@ from trunnion.model.parts import (
     freedoms,
 )
 from trunnion.model.quantity import Quantity
-from trunnion.model.units import ANY, KINDS, Kind, unit
+from trunnion.model.units import ANY, KINDS, Dimension, Kind, UnitError, si_unit, unit
 
 if TYPE_CHECKING:
     from trunnion.model.mechanism import Mechanism
@@ -83,11 +83,13 @@ def entries(mechanism: Mechanism) -> list[Entry]:
         return found
     names = ParameterNames(entry.path for entry in found)
     kinds = {entry.path: entry.kind for entry in found}
+    measured = _dimension_kinds(mechanism)
     errors: dict[str, Entry] = {}
     for name, quantity in mechanism.errors.items():
         with suppress(MechanismError):  # a finding of its own
             path = names.resolve(name)
-            errors[path] = Entry(f"{ERRORS}{path}", ("errors", name), quantity, kinds[path])
+            kind = measured.get(path.removeprefix("dimensions."), kinds[path])
+            errors[path] = Entry(f"{ERRORS}{path}", ("errors", name), quantity, kind)
     shifted = [replace(one, error=errors[one.path].path) if one.path in errors else one for one in found]
     return [*shifted, *errors.values()]
 
@@ -266,6 +268,20 @@ def dimension_errors(found: Iterable[Entry]) -> dict[str, Quantity]:
     return {one.path.removeprefix(before): one.quantity for one in found if one.path.startswith(before)}
 
 
+def _dimension_kinds(mechanism: Mechanism) -> dict[str, Kind]:
+    """What each dimension measures, as far as its value tells."""
+    known: dict[str, Dimension | None] = {}
+    for name in evaluation_order(mechanism.dimensions)[0]:
+        with suppress(UnitError, KeyError):  # findings of their own
+            known[name] = mechanism.dimensions[name].check(known, ANY)
+    usual = {kind.dimensions[0]: kind for kind in KINDS.values()}
+    return {
+        name: usual.get(one) or Kind("quantity", si_unit(one), f"1 {si_unit(one)}", (one,))
+        for name, one in known.items()
+        if one is not None
+    }
+
+
 def nominal_dimensions(mechanism: Mechanism) -> dict[str, Number]:
     """The dimensions without errors; nan where one has no value."""
     order, circles = evaluation_order(mechanism.dimensions)
@@ -308,6 +324,11 @@ class ParameterSet:
     def errors(self) -> tuple[str, ...]:
         """Paths of the deviations, and of the tilts and offsets of axes: all 0 in the ideal mechanism."""
         return tuple(self._ideal)
+
+    def stated(self, path: str) -> Number:
+        """A number as it was stated, without the error that is added to it."""
+        entry = self.entries[path]
+        return self.evaluate({entry.error: 0.0} if entry.error else None)[path]
 
     def ideal(self, overrides: Mapping[str, Number] | None = None) -> dict[str, Number]:
         """Every number as `evaluate` gives it, without errors."""

@@ -96,7 +96,7 @@ def _add_body_loads(back: SpatialBackward) -> None:
         centre = walk.at(link, walk.space.centre(values, link))
         frame, twist, second = walk.motions[link]
         force = scaled(mass, tuple(g - a for g, a in zip(gravity, centre.acceleration, strict=True)))
-        moment = NULL if tensor is None else scaled(-1.0, _spin_rate(frame, tensor, twist.u, second.u))
+        moment = NULL if tensor is None else scaled(-1.0, _spin_rate(frame, tensor, walk.held(link).u, second.u))
         load = about(force, moment, centre.place)
         back.body_power = back.body_power + power(load, twist)
         back.loads[link] = added(back.loads[link], load)

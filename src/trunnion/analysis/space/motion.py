@@ -112,8 +112,9 @@ class SpatialWalk(Forward):
         """Motion of the point of a link with local coordinates, m: v = v₀ + ω × p, a = a₀ + ω̇ × p + ω × v."""
         frame, twist, second = self.motions[link]
         place = point_of(frame, local)
-        velocity = moment_at(twist, place)
-        return SpatialPoint(place, velocity, plus(moment_at(second, place), cross(twist.u, velocity)))
+        held = self.held(link)
+        curving = cross(held.u, moment_at(held, place))
+        return SpatialPoint(place, moment_at(twist, place), plus(moment_at(second, place), curving))
 
     def placed(self, frame: Any, link: str, name: str) -> tuple[Number, ...]:
         """Place of a named point of a link, or of its element of a joint, if the link lies in a frame."""
@@ -158,10 +159,11 @@ class SpatialWalk(Forward):
         """θ̈ and s̈ of a joint on one axis: with ẑ carried by the first link, (ẑ · V)˙ = ẑ · V̇ + (Ω × ẑ) · V."""
         (first, second_link), two = self.system.joints[joint][1], self.element(self.system.joints[joint][1][1], joint)
         one, other = self.motions[first], self.motions[second_link]
-        relative, rate = self.against(joint), minus(other.acceleration, one.acceleration)
-        carried = cross(one.twist.u, two.z)
+        base = self.held(first)
+        relative, rate = minus(self.held(second_link), base), minus(other.acceleration, one.acceleration)
+        carried = cross(base.u, two.z)
         at = moment_at(relative, two.place)
-        speed = moment_at(one.twist, two.place)  # the point of the axis moves along with the first link
+        speed = moment_at(base, two.place)  # the point of the axis moves along with the first link
         change = plus(moment_at(rate, two.place), cross(relative.u, speed))
         return dot(rate.u, two.z) + dot(relative.u, carried), dot(change, two.z) + dot(at, carried)
 
@@ -176,6 +178,7 @@ class SpatialWalk(Forward):
 
     def carried(self, frames: Mapping[str, Any]) -> None:
         """Add to the twist of every link what the ε parts of its frame say: ω = ½ Σ e × ė, v of the origin p."""
+        self._held.update({link: motion.twist for link, motion in self.motions.items()})
         for link, frame in frames.items():
             motion = self.motions[link]
             parts = [(each(axis, primal), each(axis, rate_of)) for axis in frame]

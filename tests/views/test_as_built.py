@@ -14,6 +14,8 @@ from trunnion.views.as_built import angle_scale, broken, continued, losses, outp
 from trunnion.views.error_plot import error
 from trunnion.views.plots import PLOTS, READY, drawable, save
 from trunnion.views.seat_plot import FACTORS, PIN
+from trunnion.views.sweep import figure as sweep_figure
+from trunnion.views.swept import table
 
 INCH = 0.0254
 
@@ -245,3 +247,31 @@ def test_the_scene_of_the_result_tells_the_plays(cardan):
     }  # fmt: skip
     free = trunnion.analyse(trunnion.Mechanism.read(EXAMPLES / "pezzuti-cardan.yaml"), 4)
     assert json.loads(free.attrs["scene"])["plays"] == {}
+
+
+# ---- sweeps ---------------------------------------------------------------------------------------------------
+
+
+def test_a_sweep_is_drawn_beside_the_ideal_mechanism(slider, tmp_path):
+    mechanism = trunnion.Mechanism.read(EXAMPLES / "pezzuti-cardan-as-built.yaml")
+    swept = trunnion.sweep(mechanism, {"misalignment": ["0 deg", "10 deg", "20 deg"]}, 36)
+    axes = sweep_figure(swept).axes[0]
+    built, ideal = (_label(axes, name).get_ydata() for name in ("as built", "ideal"))
+    assert built == pytest.approx(swept["efficiency"].values)
+    assert ideal == pytest.approx(swept["efficiency_ideal"].values)
+    lost = swept["status"].values == Status.CONTACT_LOST
+    told = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert ("contact lost at some position" in told) == lost.any()
+    head, rows, _ = table(swept)
+    assert head[:3] == ["misalignment [deg]", "efficiency", "efficiency ideal"]
+    assert ([row[-1] == "contact lost" for row in rows] == lost).all()
+    save(sweep_figure(swept, "output.transmission_error_max"), tmp_path / "error.png")
+    free = trunnion.sweep(mechanism.with_values({"joint_defaults.friction.coefficient": 0.1}),
+                          {"misalignment": ["10 deg", "20 deg"], "input.speed": [10, 100]}, 12)  # fmt: skip
+    assert "ideal, dashed" in [text.get_text() for text in sweep_figure(free).axes[0].get_legend().get_texts()]
+
+
+def test_a_figure_of_errors_that_a_sweep_lacks_is_told(plain):
+    mechanism = trunnion.Mechanism.read(EXAMPLES / "durango-fourbar.yaml")
+    with pytest.raises(MechanismError, match="no mechanism of the sweep has errors"):
+        sweep_figure(trunnion.sweep(mechanism, {"AB": [2.0, 2.1]}, 4), "efficiency_ideal")

@@ -141,7 +141,7 @@ class Seats(NamedTuple):
 
     @property
     def planar_guide(self) -> bool:
-        return self.kind == "guide" and not np.isfinite(self.offsets[:, 0]).any()
+        return self.kind == "guide" and self.offsets.shape[1] == 2
 
 
 def seated(result: xr.Dataset) -> list[Seats]:
@@ -152,7 +152,7 @@ def seated(result: xr.Dataset) -> list[Seats]:
         offsets, forces = (column(result, name, joint=joint) for name in ("seat_offset", "end_force"))
         if offsets is None or forces is None or not np.isfinite(offsets).any():
             continue
-        ends = 2 if np.isfinite(offsets[1]).any() else 1
+        ends = 1 if play["kind"] == "ball" or (play["kind"] == "pin" and offsets.shape[1] == 2) else 2
         first, second = stated["joints"][joint]["links"]
         found.append(
             Seats(joint, play["kind"], play["clearance"], play["float"], play["length"], offsets[:ends], forces[:ends],

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["error", "mark_losses"]
+__all__ = ["LOST", "error", "mark_losses"]
 
 LOST = "#a1260d"  # the colour of what goes wrong, beside those of the curves
 

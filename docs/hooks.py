@@ -3,7 +3,8 @@
 - `<!-- generated: NAME -->` in a page becomes the table of that name, made from the code's own tables.
 - `figures/MODEL/KIND.svg` and `figures/MODEL/report.html` are drawn when a page refers to them. KIND is a plot or
   `assemblies`; MODEL is a file of `examples/`, a block of a page titled `MODEL.yaml`, or an entry of `VARIANTS`.
-- `figures/sweeps/NAME.svg` is drawn by the command of a page, `trunnion sweep … --out NAME.svg`.
+- `figures/sweeps/NAME.svg`, `figures/plays/NAME.svg` and `figures/assembles/NAME.svg` are drawn by the command of a
+  page, `trunnion sweep … --out NAME.svg` and so on.
 - The gallery is made of the examples and of `tests/gallery/facts.py`; see `gallery_page.py`.
 - `$x$` and `$$x$$` become MathML, which browsers set without any script.
 """
@@ -75,7 +76,7 @@ def on_files(files: Files, config: Any) -> Files:
     """Draw what the pages refer to; put the examples and the schema beside them."""
     pages = {path: path.read_text("utf-8") for path in sorted(DOCS.rglob("*.md"))}
     told = {found for text in pages.values() for found in re.findall(r"figures/([\w-]+)/([\w-]+)\.(svg|html)", text)}
-    swept = {found for found in told if found[0] == "sweeps"}
+    swept = {found for found in told if found[0] in ("sweeps", "plays", "assembles")}
     told -= swept
     wanted = told | _gallery().wanted()
     models = models_of(pages.values())
@@ -85,9 +86,9 @@ def on_files(files: Files, config: Any) -> Files:
         drawn = _drawn(model, models, kinds, steps, report=(model, "report", "html") in wanted)
         for name, content in drawn.items():
             files.append(File.generated(config, f"figures/{model}/{name}", content=content))
-    for _, name, _ in sorted(swept):
-        content = _swept(name, "\n".join(pages.values()), models)
-        files.append(File.generated(config, f"figures/sweeps/{name}.svg", content=content))
+    for verbs, name, _ in sorted(swept):
+        content = _swept(verbs.removesuffix("s"), name, "\n".join(pages.values()), models)
+        files.append(File.generated(config, f"figures/{verbs}/{name}.svg", content=content))
     for path in sorted(EXAMPLES.glob("*.yaml")):
         files.append(File.generated(config, f"examples/{path.name}", abs_src_path=str(path)))
     schema = ROOT / "src" / "trunnion" / "model" / "mechanism.schema.json"
@@ -129,11 +130,11 @@ def _drawn(model: str, models: dict[str, str], kinds: list[str], steps: int, rep
     return drawn
 
 
-def _swept(name: str, text: str, models: dict[str, str]) -> bytes:
+def _swept(verb: str, name: str, text: str, models: dict[str, str]) -> bytes:
     """The figure that a page's own command draws, so that the two cannot differ."""
-    command = re.search(rf"^trunnion (sweep .*--out {re.escape(name)}\.svg.*)$", text, re.MULTILINE)
+    command = re.search(rf"^trunnion ({verb} .*--out {re.escape(name)}\.svg.*)$", text, re.MULTILINE)
     if command is None:
-        raise PluginError(f"figures/sweeps/{name}.svg: no page has a command that writes {name}.svg")
+        raise PluginError(f"figures/{verb}s/{name}.svg: no page has a command that writes {name}.svg")
     with tempfile.TemporaryDirectory() as folder:
         (Path(folder) / "examples").mkdir()
         for model, content in models.items():
@@ -217,6 +218,25 @@ def sweeps_table() -> str:
 
     rows = [(_code(name), ", ".join(one.dims), _unit(one.units), one.long_name) for name, one in FIGURES.items()]
     return _rows(("variable", "dimension before the swept ones", "unit", "meaning"), rows)
+
+
+def plays_table() -> str:
+    """Every variable of the play of joints."""
+    from trunnion.analysis.play_result import VARIABLES
+
+    rows = [
+        (_code(name), ", ".join(one.dims), _unit(one.units) if one.units else "of the measure", one.long_name)
+        for name, one in VARIABLES.items()
+    ]
+    return _rows(("variable", "dimension", "unit", "meaning"), rows)
+
+
+def assembling_table() -> str:
+    """Every variable of whether a mechanism goes together."""
+    from trunnion.analysis.assemblability import FIGURES
+
+    rows = [(_code(name), ", ".join(one.dims), _unit(one.units), one.long_name) for name, one in FIGURES.items()]
+    return _rows(("variable", "dimensions", "unit", "meaning"), rows)
 
 
 def status_table() -> str:
@@ -487,6 +507,8 @@ def _default(field: Any) -> str:
 TABLES: dict[str, Callable[..., str]] = {
     "results": results_table,
     "sweeps": sweeps_table,
+    "plays": plays_table,
+    "assembling": assembling_table,
     "statuses": status_table,
     "laws": laws_table,
     "motion": motion_table,

@@ -13,9 +13,11 @@ __version__ = "0.1.0"
 if TYPE_CHECKING:
     from trunnion import dual
     from trunnion.analysis.analyse import analyse, prepare
+    from trunnion.analysis.assemblability import assemble
     from trunnion.analysis.friction import FrictionMethod
     from trunnion.analysis.inspect import Check, check
     from trunnion.analysis.locking import locking
+    from trunnion.analysis.play import play
     from trunnion.analysis.sweep import sweep
     from trunnion.errors import Finding, MechanismError, Status
     from trunnion.export import save
@@ -31,8 +33,10 @@ _PLACES = {
     "Status": "trunnion.errors",
     "Check": "trunnion.analysis.inspect",
     "analyse": "trunnion.analysis.analyse",
+    "assemble": "trunnion.analysis.assemblability",
     "check": "trunnion.analysis.inspect",
     "locking": "trunnion.analysis.locking",
+    "play": "trunnion.analysis.play",
     "prepare": "trunnion.analysis.analyse",
     "read": "trunnion.model.file",
     "report": "trunnion.views.report",
@@ -50,9 +54,11 @@ __all__ = [
     "MechanismError",
     "Status",
     "analyse",
+    "assemble",
     "check",
     "dual",
     "locking",
+    "play",
     "prepare",
     "read",
     "report",

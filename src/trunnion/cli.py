@@ -15,8 +15,30 @@ import typer
 
 from trunnion import __version__
 from trunnion.errors import Finding, MechanismError, Severity
-from trunnion.options import over, points, setting, table_file
-from trunnion.terminal import bar, console, say, show_figures, show_rows, wrote
+from trunnion.options import (
+    IMAGES,
+    Criterion,
+    Drawn,
+    File,
+    FrictionLaw,
+    Kinds,
+    Measures,
+    Method,
+    Out,
+    Over,
+    Report,
+    Rounds,
+    Set,
+    Steps,
+    TableFile,
+    UnitsRow,
+    over,
+    points,
+    setting,
+    table_file,
+)
+from trunnion.terminal import bar, console, findings_of, say, show_figures, show_rows, wrote
+from trunnion.verbs.assemble import assemble
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -33,35 +55,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
-PLOT_KINDS = "torque, friction-power, reactions, polar, power, mechanism, motion, error, seat or beta"  # views.plots
-
-IMAGES = (".png", ".svg", ".pdf")
 INTERRUPTED = 130  # exit status after Ctrl-C
-
-File = Annotated[Path, typer.Argument(help="Model file: YAML, JSON or TOML.", show_default=False)]
-Steps = Annotated[int, typer.Option("--steps", help="Equally spaced positions over the turn or range.")]
-Set = Annotated[
-    list[str] | None,
-    typer.Option("--set", help="Replace a value: AB=2.1m, crank.mass=5kg, B.friction.coefficient=0.3. Repeatable."),
-]
-TableFile = Annotated[
-    list[str] | None,
-    typer.Option("--table", help="NAME=FILE.csv: points of a driver or table, two columns. Repeatable."),
-]
-FrictionLaw = Annotated[
-    str | None, typer.Option("--friction", help="off, or a friction law for all joints with friction.")
-]
-Method = Annotated[str, typer.Option("--method", help="newton, or successive-approximation (Durango et al., 2010).")]
-Criterion = Annotated[
-    float | None,
-    typer.Option(
-        "--criterion", help="Largest change of a reaction at which the iteration ends, N.", show_default=False
-    ),
-]
-Rounds = Annotated[int, typer.Option("--iterations", help="Most rounds of the friction iteration.")]
-Report = Annotated[
-    Path | None, typer.Option("--report", help="Also write the report, one HTML file.", show_default=False)
-]
 
 
 @app.command()
@@ -132,7 +126,7 @@ def analyse(
         list[Path] | None, typer.Option("--out", help="Write the result: .csv .json .nc .zarr .parquet. Repeatable.")
     ] = None,
     report: Report = None,
-    units_row: Annotated[bool, typer.Option("--units-row", help="Second CSV header row with the units.")] = False,
+    units_row: UnitsRow = False,
 ) -> None:
     """Motion, reactions with friction, drive effort and power over the cycle."""
     from trunnion.export import check_format, save
@@ -149,7 +143,7 @@ def analyse(
     _summary(result, file)
     for path in [*(out or []), *([report] if report else [])]:
         wrote(path)
-    raise typer.Exit(_status(_findings(result)))
+    raise typer.Exit(_status(findings_of(result)))
 
 
 @app.command()
@@ -183,45 +177,35 @@ def locking(
         run = prepare(mechanism)
         found = look(run, steps)
     show_figures(mechanism.name or str(file), report_rows(run, found))
-    say(_placed(_findings(found), file, ["assembly"]))
-    raise typer.Exit(_status(_findings(found)))
+    say(_placed(findings_of(found), file, ["assembly"]))
+    raise typer.Exit(_status(findings_of(found)))
+
+
+app.command()(assemble)
 
 
 @app.command()
 def sweep(
     file: File,
-    over_: Annotated[
-        list[str],
-        typer.Option(
-            "--over",
-            help="NAME=FROM:TO:COUNT or NAME=VALUE,VALUE,…: misalignment=0deg:30deg:16. Once or twice.",
-            show_default=False,
-        ),
-    ],
-    measure: Annotated[
-        str, typer.Option("--measure", help="What is drawn, by its name in the CSV file: A.effort_max.")
-    ] = "efficiency",
+    over_: Over,
+    measure: Drawn = "efficiency",
     steps: Steps = 360,
     set_: Set = None,
     table: TableFile = None,
     friction: FrictionLaw = None,
-    out: Annotated[
-        list[Path] | None,
-        typer.Option("--out", help="Write it: .csv .json .nc .zarr .parquet, or a figure: .png .svg .pdf. Repeatable."),
-    ] = None,
-    units_row: Annotated[bool, typer.Option("--units-row", help="Second CSV header row with the units.")] = False,
+    out: Out = None,
+    units_row: UnitsRow = False,
 ) -> None:
     """How efficiency, drive effort, reactions, friction and locking margin change with one or two numbers."""
     from trunnion.analysis.sweep import sweep as run
-    from trunnion.export import check_format, save
+    from trunnion.export import save
+    from trunnion.verbs.play import check_files
     from trunnion.views.swept import check_measure
     from trunnion.views.swept import table as swept_table
 
     grid = over(over_)
     drawn = [path for path in out or [] if path.suffix.lower() in IMAGES]
-    for path in out or []:
-        if path not in drawn:
-            check_format(path, IMAGES)
+    check_files(out or [])
     mechanism = _mechanism(file, set_, table, friction)
     check_measure(measure, mechanism)
     with _lines_of(file), bar("points", points(grid)) as progress:
@@ -239,20 +223,41 @@ def sweep(
     show_rows(f"{mechanism.name or file}\n{name}", head, rows)
     if left_out:
         console().print(f"{left_out:,} points more; --out FILE.csv has all", markup=False, highlight=False)
-    say(_placed(_findings(result), file, ["assembly"]))
+    say(_placed(findings_of(result), file, ["assembly"]))
     for path in out or []:
         wrote(path)
-    raise typer.Exit(_status(_findings(result)))
+    raise typer.Exit(_status(findings_of(result)))
+
+
+@app.command()
+def play(
+    file: File,
+    measure: Measures = None,
+    steps: Steps = 360,
+    set_: Set = None,
+    table: TableFile = None,
+    friction: FrictionLaw = None,
+    out: Out = None,
+    units_row: UnitsRow = False,
+) -> None:
+    """What the play of every joint does to measures: worst case, share of each joint, standard deviation."""
+    from trunnion.analysis.play import play as run
+    from trunnion.verbs.play import check_files, show
+
+    check_files(out or [])
+    mechanism = _mechanism(file, set_, table, friction)
+    with _lines_of(file):
+        result = run(mechanism, measure, steps)
+    show(mechanism, result, out or [], units_row)
+    say(_placed(findings_of(result), file, ["measures", "joints"]))
+    raise typer.Exit(_status(findings_of(result)))
 
 
 @app.command()
 def plot(
     file: File,
     out: Annotated[Path, typer.Option("--out", help="Folder, or a .png, .svg or .pdf file of one plot.")],
-    kind: Annotated[
-        list[str] | None,
-        typer.Option("--kind", help=f"{PLOT_KINDS}. Repeatable; all if not given.", show_default=False),
-    ] = None,
+    kind: Kinds = None,
     steps: Steps = 360,
     set_: Set = None,
     table: TableFile = None,
@@ -267,9 +272,8 @@ def plot(
         raise MechanismError(Finding(f"there is no plot '{unknown[0]}'", "--kind", f"use one of {', '.join(PLOTS)}"))
     single = out.suffix.lower() in IMAGES
     if single and len(kind or PLOTS) > 1:
-        raise MechanismError(
-            Finding(f"{len(kind or PLOTS)} plots do not fit one file", str(out), "name a folder, or one --kind")
-        )
+        what = f"{len(kind or PLOTS)} plots do not fit one file"
+        raise MechanismError(Finding(what, str(out), "name a folder, or one --kind"))
     mechanism = _mechanism(file, set_, table, friction)
     with _lines_of(file):
         result = _run(mechanism, steps, None)
@@ -280,9 +284,9 @@ def plot(
         path = out if single else out / f"{name}.{image.lstrip('.')}"
         save(figure, path)
         wrote(path)
-    said = [finding for finding in _findings(result) if finding.severity is not Severity.NOTE]
+    said = [finding for finding in findings_of(result) if finding.severity is not Severity.NOTE]
     say(_placed(said, file, ["assembly"]))
-    raise typer.Exit(_status(_findings(result)))
+    raise typer.Exit(_status(findings_of(result)))
 
 
 @app.command()
@@ -299,15 +303,14 @@ def report(
 ) -> None:
     """One self-contained HTML file: animation, plots, findings, balance, input data."""
     if out.suffix.lower() not in (".html", ".htm"):
-        raise MechanismError(
-            Finding(f"a report is HTML, '{out.name}' is not", "--out", "write a .html file and print it")
-        )
+        what = f"a report is HTML, '{out.name}' is not"
+        raise MechanismError(Finding(what, "--out", "write a .html file and print it"))
     mechanism = _mechanism(file, set_, table, friction)
     with _lines_of(file):
         result = _run(mechanism, steps, _method(method, criterion, iterations))
     _write_report(mechanism, result, out)
     wrote(out)
-    raise typer.Exit(_status(_findings(result)))
+    raise typer.Exit(_status(findings_of(result)))
 
 
 @app.command()
@@ -447,21 +450,12 @@ def _write_report(mechanism: Mechanism, result: xr.Dataset, path: Path) -> None:
         temporary.write_text(text, encoding="utf-8")
 
 
-def _findings(result: xr.Dataset) -> list[Finding]:
-    import json
-
-    return [
-        Finding(row["what"], row["where"], row["remedy"], Severity(row["severity"]))
-        for row in json.loads(result.attrs["findings"])
-    ]
-
-
 def _summary(result: xr.Dataset, file: Path) -> None:
     """The short table of an analysis, and its findings."""
     import json
 
     show_figures(f"{result.attrs['name']}\n{result.attrs['formula']}", json.loads(result.attrs["summary"]))
-    say(_placed(_findings(result), file, ["assembly"]))
+    say(_placed(findings_of(result), file, ["assembly"]))
 
 
 @contextmanager

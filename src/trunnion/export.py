@@ -4,8 +4,14 @@ CSV (and Parquet) have one row a position and flat columns: `time`, `<joint>.rot
 `<joint>.reaction_x|y`, `<joint>.friction_torque`, `<driver>.effort`, `<link>.<point>.x|y`, `power_in`,
 `power_useful`, `status` and so on, in SI; the other formats hold the whole Dataset. In space also z, and
 `<joint>.reaction_moment_x|y|z`, `<joint>.friction_force`, `<link>.x|y|z`, `<link>.rotation_w|x|y|z`,
-`<link>.angular_velocity_x|y|z`. A sweep has one row a point of its grid: the swept numbers by the names they were
-given, then `efficiency`, `<driver>.effort_max`, `<joint>.reaction_max`, …, `status`.
+`<link>.angular_velocity_x|y|z`. Of a mechanism with errors also `<joint>.rotation_error`, `<joint>.slide_error`,
+`<link>.<point>.error_x|y`; of pins in their seats `<joint>.seat_1_x` …, `<joint>.end_force_1_x` …,
+`<joint>.contact_1_x` …, `<joint>.seat_beta`, `<joint>.seat_xi`, `<joint>.seat_xi_pin`, `<joint>.contact_lost`. A
+sweep has one row a point of its grid: the swept numbers by the names they were given, then `efficiency`,
+`<driver>.effort_max`, `<joint>.reaction_max`, …, `status`. The play of joints has `drive`, `<measure>`,
+`<measure>.worst_case`, `<measure>.rss`, `<measure>.deviation`, `<measure>.<joint>.worst_case`, …. What
+`assemble` finds has one row a position: `<driver>.coordinate`, `needed_share`, `needed_clearance`, …,
+`<joint>.uniform_1_x` of end 1, …, `status`.
 """
 
 from __future__ import annotations
@@ -41,6 +47,10 @@ def columns(result: xr.Dataset) -> list[Column]:
     """(name, unit, values of a window of rows) of every flat column."""
     if "swept" in result.attrs:
         return [(name, unit, values.__getitem__) for name, (unit, values) in figures(result).items()]
+    if "measure" in result.dims:
+        return _played(result)
+    if "assembling" in result.attrs:
+        return _fit(result)
     stated = json.loads(result.attrs["scene"])
     spatial = stated.get("space") == "spatial"
     kinds = {name: joint["type"] for name, joint in stated["joints"].items()}
@@ -49,6 +59,7 @@ def columns(result: xr.Dataset) -> list[Column]:
         of_joint = _spatial_joint if spatial else _planar_joint
         found += of_joint(result, i, str(joint), kinds[str(joint)])
         found.append(_column(result, "friction_power", f"{joint}.friction_power", (i,)))
+        found += _errors_of_joint(result, i, str(joint), kinds[str(joint)])
     found += _drivers(result) + _springs(result)
     for i, gear in enumerate(result["gear"].values if "gear" in result.dims else ()):
         found.append(_column(result, "gear_torque", f"{gear}.torque", (i,)))
@@ -57,12 +68,53 @@ def columns(result: xr.Dataset) -> list[Column]:
         found += _spatial_link(result, i, str(link)) if spatial else _planar_link(result, i, str(link))
     for i, point in enumerate(result["point"].values):
         found += _vector(result, "point_position", f"{point}.", i)
+        if "point_error" in result:
+            found += _vector(result, "point_error", f"{point}.error_", i)
     drive = result["drive_power"].values
     found.append(("power_in", "W", lambda window: drive[:, window].sum(axis=0)))
     found.append(_column(result, "useful_power", "power_useful", ()))
+    if "seat_rounds" in result:
+        found.append(_column(result, "seat_rounds", "seat_rounds", ()))
     names = np.array([status.name.lower() for status in Status])
     found.append(("status", "", lambda window: names[result["status"].values[window]]))
     return found
+
+
+def _played(result: xr.Dataset) -> list[Column]:
+    """Of the play of joints: each measure, its worst case, RSS, standard deviation, and each joint's part in them."""
+    found: list[Column] = [("time", "s", lambda window: result["time"].values[window])]
+    found.append(("drive", str(result["drive"].attrs["units"]), lambda window: result["drive"].values[window]))
+    for i, (measure, unit) in enumerate(
+        zip(result["measure"].values, json.loads(result.attrs["measure_units"]), strict=True)
+    ):
+        keys = {"value": "", "worst_case_total": ".worst_case", "rss": ".rss", "deviation_total": ".deviation"}
+        parts: list[tuple[str, str, tuple[int, ...]]] = [(key, f"{measure}{end}", (i,)) for key, end in keys.items()]
+        for j, joint in enumerate(result["joint"].values):
+            parts += [(key, f"{measure}.{joint}.{key}", (i, j)) for key in ("worst_case", "deviation")]
+        found += [(name, unit, _column(result, key, name, index)[2]) for key, name, index in parts]
+    names = np.array([status.name.lower() for status in Status])
+    found.append(("status", "", lambda window: names[result["status"].values[window]]))
+    return found
+
+
+def _fit(result: xr.Dataset) -> list[Column]:
+    """Of whether a mechanism goes together: needs, openings, then offsets of the ends that have a play."""
+    found: list[Column] = [("time", "s", lambda window: result["time"].values[window])]
+    units = json.loads(result.attrs["coordinate_units"])
+    for i, (driver, unit) in enumerate(zip(result["driver"].values, units, strict=True)):
+        _, _, values = _column(result, "drive_coordinate", "", (i,))
+        found.append((f"{driver}.coordinate", unit, values))
+    flat = [str(name) for name, one in result.data_vars.items() if one.dims == ("position",) and name != "status"]
+    found += [_column(result, name, name, ()) for name in flat]
+    joints, ends, axes = (result[dim].values for dim in ("joint", "end", "axis"))
+    for kind in ("stated", "uniform"):
+        offsets = result[f"{kind}_offset"]
+        known = np.isfinite(offsets.values).any(axis=-1)
+        for i, k, m in np.argwhere(known):
+            found.append(_column(result, f"{kind}_offset", f"{joints[i]}.{kind}_{ends[k]}_{axes[m]}", (i, k, m)))
+    names = dict(zip(result.attrs["flag_values"].split(), result.attrs["flag_meanings"].split(), strict=True))
+    told = np.array([names[str(code)] for code in result["status"].values])
+    return [*found, ("status", "", lambda window: told[window])]
 
 
 def _planar_joint(result: xr.Dataset, i: int, joint: str, kind: str) -> list[Column]:
@@ -95,6 +147,30 @@ def _spatial_joint(result: xr.Dataset, i: int, joint: str, kind: str) -> list[Co
         _column(result, f"friction_{what}", f"{joint}.friction_{what}", (i,)) for what, is_ in freedoms.items() if is_
     ]
     return found
+
+
+def _errors_of_joint(result: xr.Dataset, i: int, joint: str, kind: str) -> list[Column]:
+    """Of a joint of a mechanism with errors: what moves it against the ideal one, and where its pin lies."""
+    found: list[Column] = []
+    if "joint_rotation_error" in result and kind not in ("prismatic", "fixed"):
+        found.append(_column(result, "joint_rotation_error", f"{joint}.rotation_error", (i,)))
+    if "joint_slide_error" in result and kind in SLIDING:
+        found.append(_column(result, "joint_slide_error", f"{joint}.slide_error", (i,)))
+    if "seat_offset" not in result or not np.any(np.isfinite(result["seat_offset"].values[i])):
+        return found
+    for end, name in enumerate(result["end"].values):
+        if np.any(np.isfinite(result["seat_offset"].values[i, end])):
+            for variable, said in (
+                ("seat_offset", "seat"),
+                ("end_force", "end_force"),
+                ("contact_position", "contact"),
+            ):
+                found += [
+                    _column(result, variable, f"{joint}.{said}_{name}_{axis}", (i, end, k))
+                    for k, axis in enumerate(result["axis"].values)
+                ]
+    found += [_column(result, f"seat_{angle}", f"{joint}.seat_{angle}", (i,)) for angle in ("beta", "xi", "xi_pin")]
+    return [*found, _column(result, "contact_lost", f"{joint}.contact_lost", (i,))]
 
 
 def _planar_link(result: xr.Dataset, i: int, link: str) -> list[Column]:

@@ -1,14 +1,91 @@
-"""What the texts of the command line's options say: `name=value`, `name=file`, `name=from:to:count`."""
+"""The options that verbs share, and what their texts say: `name=value`, `name=file`, `name=from:to:count`."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
 
 from trunnion.errors import Finding, MechanismError
 
-__all__ = ["over", "points", "setting", "table_file"]
+__all__ = [
+    "IMAGES",
+    "Criterion",
+    "Drawn",
+    "File",
+    "FrictionLaw",
+    "Kinds",
+    "Measures",
+    "Method",
+    "Out",
+    "Over",
+    "Report",
+    "Rounds",
+    "Set",
+    "Steps",
+    "TableFile",
+    "UnitsRow",
+    "over",
+    "points",
+    "setting",
+    "table_file",
+]
+
+IMAGES = (".png", ".svg", ".pdf")
+PLOT_KINDS = "torque, friction-power, reactions, polar, power, mechanism, motion, error, seat or beta"  # of views.plots
+
+File = Annotated[Path, typer.Argument(help="Model file: YAML, JSON or TOML.", show_default=False)]
+Steps = Annotated[int, typer.Option("--steps", help="Equally spaced positions over the turn or range.")]
+Set = Annotated[
+    list[str] | None,
+    typer.Option("--set", help="Replace a value: AB=2.1m, crank.mass=5kg, B.friction.coefficient=0.3. Repeatable."),
+]
+TableFile = Annotated[
+    list[str] | None,
+    typer.Option("--table", help="NAME=FILE.csv: points of a driver or table, two columns. Repeatable."),
+]
+FrictionLaw = Annotated[
+    str | None, typer.Option("--friction", help="off, or a friction law for all joints with friction.")
+]
+Method = Annotated[str, typer.Option("--method", help="newton, or successive-approximation (Durango et al., 2010).")]
+Criterion = Annotated[
+    float | None,
+    typer.Option(
+        "--criterion", help="Largest change of a reaction at which the iteration ends, N.", show_default=False
+    ),
+]
+Rounds = Annotated[int, typer.Option("--iterations", help="Most rounds of the friction iteration.")]
+Report = Annotated[
+    Path | None, typer.Option("--report", help="Also write the report, one HTML file.", show_default=False)
+]
+Over = Annotated[
+    list[str],
+    typer.Option(
+        "--over",
+        help="NAME=FROM:TO:COUNT or NAME=VALUE,VALUE,…: misalignment=0deg:30deg:16. Once or twice.",
+        show_default=False,
+    ),
+]
+Drawn = Annotated[str, typer.Option("--measure", help="What is drawn, by its name in the CSV file: A.effort_max.")]
+Out = Annotated[
+    list[Path] | None,
+    typer.Option("--out", help="Write it: .csv .json .nc .zarr .parquet, or a figure: .png .svg .pdf. Repeatable."),
+]
+UnitsRow = Annotated[bool, typer.Option("--units-row", help="Second CSV header row with the units.")]
+Kinds = Annotated[
+    list[str] | None, typer.Option("--kind", help=f"{PLOT_KINDS}. Repeatable; all if not given.", show_default=False)
+]
+Measures = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--measure",
+        help="A measure of the model, or rocker.C.x, angle:rocker, rotation:D, slide:S, effort:A. Repeatable.",
+        show_default=False,
+    ),
+]
 
 
 def setting(text: str) -> tuple[str, float | str]:

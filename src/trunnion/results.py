@@ -162,6 +162,8 @@ def allocate(
         else:
             # zeroed pages take no memory until something is written: rows of the ground never are
             arrays[name] = np.zeros(shape, INTEGERS.get(name, np.float64))
+            if variable.part == "seats" and name not in INTEGERS:
+                arrays[name][:] = np.nan  # of joints and ends that have none
     for name, other in SAME_AS.items():
         arrays[name] = arrays[other]
     return arrays

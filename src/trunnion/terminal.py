@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-__all__ = ["bar", "console", "say", "show_figures", "show_rows", "wrote"]
+from trunnion.errors import Finding, Severity
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["bar", "console", "findings_of", "say", "show_figures", "show_rows", "wrote"]
 
 
 def console() -> Any:
@@ -50,6 +56,12 @@ def show_rows(title: str, head: list[str], rows: list[list[str]]) -> None:
     for row in rows:
         table.add_row(*row)
     console().print(table, markup=False, highlight=False)
+
+
+def findings_of(result: xr.Dataset) -> list[Finding]:
+    """The findings that a result carries."""
+    rows = json.loads(result.attrs["findings"])
+    return [Finding(row["what"], row["where"], row["remedy"], Severity(row["severity"])) for row in rows]
 
 
 def say(findings: Any) -> None:

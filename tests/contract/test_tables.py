@@ -13,6 +13,7 @@ from mechanisms import KIND
 from trunnion.algebra.dual import Dual, derivative, functions, primal
 from trunnion.errors import Status
 from trunnion.groups import GROUPS
+from trunnion.joints.clearance import CLEARANCE_MODELS, pressed, worst_case
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.joints.pairs import PAIRS, Load
 from trunnion.model.contact import has_guide, has_pin, motions
@@ -170,6 +171,99 @@ def test_gradient_of_the_normal_load(turn: float | None, x: float, y: float, m: 
 
 def test_gradient_without_load_is_zero() -> None:
     assert [float(g) for g in Load().gradient((0.0, 0.0, 0.0), 0.0)] == [0.0, 0.0, 0.0]
+
+
+# ---- play of pairs --------------------------------------------------------------------------------------------
+
+PLAYS = [(space, kind) for space, models in CLEARANCE_MODELS.items() for kind in models]
+felt = components.filter(lambda n: n == 0 or abs(n) > 1e-9)  # the square of less is 0
+wrenches = st.tuples(st.tuples(*[felt] * 3), st.tuples(*[felt] * 3))
+
+
+@pytest.mark.parametrize(("space", "kind"), PLAYS)
+def test_play_of_a_pair(space: str, kind: str) -> None:
+    """Of a kind of pair there is; ends with a number and axes of their own; a length wherever two ends lie apart."""
+    play = CLEARANCE_MODELS[space][kind]
+    assert PAIRS[kind].planar or space == "spatial"
+    keys = [key for end in play.ends for key in end]
+    assert len(set(keys)) == len(keys)
+    assert [key.split(".")[1] in "xyz" for key in keys] == [True] * len(keys)
+    assert set(play.axial) < set(range(len(play.ends)))
+    assert (play.size is not None) == ({key.split(".")[0] for key in keys} >= {"1", "2"})
+    assert has_guide(kind) == (play.size is not None and play.size[0] == "guide")
+    offsets = [tuple(0.1 * i + k for k in range(len(end))) for i, end in enumerate(play.ends)]
+    paths = play.paths("seats.A", offsets)
+    assert list(paths) == [f"seats.A.{key}" for key in keys]
+    assert play.offsets(paths, "seats.A") == offsets
+    assert play.offsets(paths, "seats.B") is None
+    some = dict([next(iter(paths.items()))])  # what is not there is 0
+    assert play.offsets(some, "seats.A") == [tuple(some.get(f"seats.A.{key}", 0.0) for key in end) for end in play.ends]
+
+
+def shift_numbers(shift: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Rotation matrix and place of a shift, in the plane as in space."""
+    if not isinstance(shift[0], tuple):
+        x, y, c, s = (float(n) for n in shift)
+        return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]), np.array([x, y, 0.0])
+    return np.array([[float(n) for n in axis] for axis in shift[:3]]).T, np.array([float(n) for n in shift[3]])
+
+
+@pytest.mark.parametrize(("space", "kind"), PLAYS)
+@given(st.integers(0, 10**6), st.floats(1e-6, 1e-2), st.floats(0.02, 1.0))
+def test_shift_stays_within_the_clearance(space: str, kind: str, seed: int, rho: float, length: float) -> None:
+    """A rotation and a place: none without offsets, no farther than ρ, tilted no more than 2ρ/H along each axis."""
+    play, rng = CLEARANCE_MODELS[space][kind], np.random.default_rng(seed)
+    offsets = []
+    for end in play.ends:
+        vector = rng.normal(size=len(end))
+        offsets.append(tuple(rho * rng.choice([0.0, rng.uniform(), 1.0]) * vector / np.linalg.norm(vector)))
+    axes, place = shift_numbers(play.shift(offsets, length))
+    np.testing.assert_allclose(axes @ axes.T, np.eye(3), rtol=0, atol=1e-15)
+    free = 1 if kind in ("revolute", "cylindrical", "spherical") else 2  # a guide: ρ along each of its axes
+    assert np.linalg.norm(place) <= rho * np.sqrt(free + len(play.axial)) * (1 + 1e-12)
+    assert np.arccos(min((np.trace(axes) - 1) / 2, 1.0)) <= np.arctan(2 * rho * np.sqrt(free) / length) + 3e-8
+    none = shift_numbers(play.shift([(0.0,) * len(end) for end in play.ends], length))
+    np.testing.assert_array_equal(none[0], np.eye(3))
+    np.testing.assert_array_equal(none[1], np.zeros(3))
+
+
+@pytest.mark.parametrize(("space", "kind"), PLAYS)
+@given(wrenches, wrenches, st.floats(0.02, 1.0), st.floats(-50, 50), st.integers(0, 10**6))
+def test_seat_and_worst_case(
+    space: str, kind: str, one: Any, other: Any, length: float, factor: float, seed: int
+) -> None:
+    """Loads at the ends are linear in force and moment; the worst case is the support function of the play: even,
+    homogeneous, subadditive, attained by the seat and by no other place; the seat is odd.
+    """
+    play, rng = CLEARANCE_MODELS[space][kind], np.random.default_rng(seed)
+    radii = rng.uniform(1e-6, 1e-3, len(play.ends))
+
+    def loads(wrench: Any) -> list[np.ndarray]:
+        return [np.array(load, float) for load in play.loads(*(tuple(part) for part in wrench), length)]
+
+    def most(wrench: Any) -> float:
+        return float(worst_case([tuple(load) for load in loads(wrench)], radii))
+
+    size = 1e-12 * (np.abs(one).max() + np.abs(other).max()) / length * max(1.0, abs(factor))
+    both = np.array(one) + factor * np.array(other)
+    for a, b, whole in zip(loads(one), loads(other), loads(both), strict=True):
+        np.testing.assert_allclose(whole, a + factor * b, rtol=0, atol=size)
+    assert [len(load) for load in loads(one)] == [len(end) for end in play.ends]
+    expected = sum(r * float(np.linalg.norm(load)) for r, load in zip(radii, loads(one), strict=True))
+    assert most(one) == pytest.approx(expected, rel=1e-14)
+    assert most(factor * np.array(one)) == pytest.approx(abs(factor) * most(one), rel=1e-12)
+    assert most(np.array(one) + np.array(other)) <= most(one) + most(other) + size * 1e-3
+    seat = [np.array(pressed(tuple(load), r)) for load, r in zip(loads(one), radii, strict=True)]
+    opposite = [np.array(pressed(tuple(-load), r)) for load, r in zip(loads(one), radii, strict=True)]
+    work = 0.0
+    for load, vector, reverse, radius in zip(loads(one), seat, opposite, radii, strict=True):
+        np.testing.assert_array_equal(reverse, -vector)
+        assert np.linalg.norm(vector) <= radius * (1 + 1e-15)
+        anywhere = rng.normal(size=len(load))
+        anywhere = radius * rng.uniform() * anywhere / np.linalg.norm(anywhere)
+        assert load @ anywhere <= load @ vector * (1 + 1e-12)
+        work += float(load @ vector)
+    assert work == pytest.approx(most(one), rel=1e-14)
 
 
 # ---- groups and statuses --------------------------------------------------------------------------------------

@@ -107,7 +107,7 @@ CASES = [
     ("C: [100 mm, 60 mm, 20 mm]", "rod.C: 30 deg", 33, "assembly.rod.C", "not an angle", "[x, y, z]"),
     ("C: [100 mm, 60 mm, 20 mm]", "D: 30 deg", 33, "assembly.D", "an angle where a length", "60 mm"),
     ("C: [100 mm, 60 mm, 20 mm]", "wheel: way-1", 33, "assembly.wheel", "and 'wheel' is none", "'crank'"),
-    ("{point: rod.C, axis: z}", "{angle: rod}", 35, "measures.height.angle", "not turned by one angle", "link.point"),
+    ("{point: rod.C, axis: z}", "{angle: rod}", 35, "measures.height.angle", "not turned by one angle", "add axis"),
     ("inertia: {xx: 1.0e-6, yy: 9.6e-4, zz: 9.6e-4}", "inertia: 9.6e-4", 13, "links.rod.inertia",
      "of a spatial link is {xx", "{xx"),
     ("yy: 9.6e-4, zz", "yy: 1.9e-3, zz", 13, "links.rod.inertia", "no body has the principal moments", "about"),

@@ -20,7 +20,7 @@ from trunnion.analysis.branches import Chosen, choose
 from trunnion.analysis.bristles import History, histories
 from trunnion.analysis.engine import build
 from trunnion.analysis.friction import FrictionMethod
-from trunnion.analysis.kinematics import forward
+from trunnion.analysis.kinematics import Forward, forward
 from trunnion.analysis.kinetostatics import Backward, Given, Sense, solve
 from trunnion.analysis.seating import Lanes, Seat, lanes, seats, settle
 from trunnion.analysis.space.determinacy import Determinacy
@@ -32,7 +32,17 @@ from trunnion.model.mechanism import Mechanism
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Positions", "Run", "analyse", "analyse_run", "check_steps", "positions", "prepare"]
+__all__ = [
+    "Positions",
+    "Run",
+    "analyse",
+    "analyse_run",
+    "check_steps",
+    "pose_status",
+    "positions",
+    "prepare",
+    "status_of",
+]
 
 CHUNK = 8192  # positions at a time: the arrays of a walk stay in cache
 MOST_STEPS = 100_000_000
@@ -271,7 +281,8 @@ def _fill_as_built(
     scratch = results.allocate(labels, len(seen.times), run.system.engine.absent(run.system))
     meant = run.ideal(seen.times, quick)
     _fill(scratch, meant, seen.times, slice(0, len(seen.times)))
-    scratch = {name: array[..., seen.own] for name, array in scratch.items()}
+    own = slice(int(seen.own[0]), int(seen.own[-1]) + 1)
+    scratch = {name: array[..., own] for name, array in scratch.items()}
     for name, array in ideal.items():
         array[..., window] = scratch[name]
     if run.seats:
@@ -279,6 +290,8 @@ def _fill_as_built(
         causes.note_seats(seated.offsets)
         _fill(arrays, seated.back, part, window, causes)
         fill_seats(arrays, run.seats, seated, window)
+        status = arrays["status"][window]
+        np.maximum(status, np.where(seated.sticks, status.dtype.type(Status.ZERO_SLIP), 0), out=status)
     else:
         _fill(arrays, run.solve(part, method=method), part, window, causes)
     links = labels["link"]
@@ -295,7 +308,7 @@ def _fill(
     causes: diagnosis.Causes | None = None,
 ) -> None:
     """Write one chunk into the result; what a status rules out becomes NaN."""
-    status = _status(back, arrays["status"][window].shape)
+    status = status_of(back, arrays["status"][window].shape)
     arrays["status"][window] = status
     if causes:
         causes.note(back, status, window.start)
@@ -308,32 +321,37 @@ def _fill(
     _blank(arrays, status, window)
 
 
-def _status(back: Backward, shape: tuple[int, ...]) -> NDArray[np.int8]:
+def status_of(back: Backward, shape: tuple[int, ...]) -> NDArray[np.int8]:
     """The gravest status of every position."""
     walk = back.walk
-    status = np.zeros(shape, np.int8)
+    status = pose_status(walk, shape)
 
     def raise_to(code: Status, where: Number) -> None:
         np.maximum(status, np.where(where, np.int8(code), np.int8(0)), out=status)
 
-    placed: Number = True
-    condition: Number = 1.0
-    for group, pose in zip(walk.system.groups, walk.poses, strict=True):
-        for frame in pose.frames:
-            placed = placed & np.isfinite(_sum(flat(frame)))
-        condition = np.maximum(condition, group.condition(pose))
     for name in sticking(walk.system):
         raise_to(Status.ZERO_SLIP, back.slips[name].zero)
-    raise_to(Status.NEAR_SINGULAR, condition > NEAR_SINGULAR)
     for settled in back.settled:
         raise_to(Status.NOT_CONVERGED, ~np.asarray(settled.converged, bool))
         raise_to(Status.LOCKED, np.asarray(settled.share) < 1.0)
     raise_to(Status.NOT_CONVERGED, ~np.isfinite(_sum_of_forces(back)))
     for undefined in back.undefined.values():
         raise_to(Status.LOAD_UNDEFINED, undefined)
-    raise_to(Status.SINGULAR, ~(condition <= SINGULAR))
-    raise_to(Status.NOT_ASSEMBLED, ~np.asarray(placed))
     return status
+
+
+def pose_status(walk: Forward, shape: tuple[int, ...]) -> NDArray[np.int8]:
+    """The gravest status of every position that its motion alone decides."""
+    placed: Number = True
+    condition: Number = 1.0
+    for group, pose in zip(walk.system.groups, walk.poses, strict=True):
+        for frame in pose.frames:
+            placed = placed & np.isfinite(_sum(flat(frame)))
+        condition = np.maximum(condition, group.condition(pose))
+    status = np.where(condition > NEAR_SINGULAR, np.int8(Status.NEAR_SINGULAR), np.int8(Status.SOLVED))
+    status = np.where(condition <= SINGULAR, status, np.int8(Status.SINGULAR))
+    status = np.where(placed, status, np.int8(Status.NOT_ASSEMBLED))
+    return np.array(np.broadcast_to(status, shape), np.int8)
 
 
 def _sum_of_forces(back: Backward) -> Number:

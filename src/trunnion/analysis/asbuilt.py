@@ -25,13 +25,10 @@ __all__ = ["fill_errors", "fill_seats", "summary_rows"]
 Arrays = dict[str, NDArray[np.float64]]
 Vector = Sequence[Number]
 AXES = "xyz"
-SEATS = ("seat_offset", "seat_beta", "seat_xi", "seat_xi_pin", "end_force", "contact_position")
 
 
 def fill_seats(arrays: Arrays, found: Sequence[Seat], seated: Seated, window: slice) -> None:
-    """Seats, end forces and places of contact of one chunk; NaN of joints and ends that have none."""
-    for name in SEATS:
-        arrays[name][..., window] = np.nan
+    """Seats, end forces and places of contact of one chunk."""
     walk = seated.back.walk
     joints = list(walk.system.joints)
     for seat in found:
@@ -66,12 +63,11 @@ def _describe(arrays: Arrays, i: int, window: slice, walk: Forward, seat: Seat) 
     if len(seat.play.model.ends[0]) == 3:
         return
     if len(seat.play.model.ends) == 1:
-        first = second = (ends[0, 0], ends[0, 1])
+        beta, xi = np.zeros(()), np.arctan2(ends[0, 1], ends[0, 0])
     elif len(seat.play.model.ends[0]) == 1 and len(seat.play.model.ends) == 2:  # a guide of the plane, from its normal
-        first, second = ((end[1], np.zeros_like(end[1])) for end in ends)
+        beta, xi = describing(*((end[1], np.zeros_like(end[1])) for end in ends))
     else:
-        first, second = ((end[0], end[1]) for end in ends)
-    beta, xi = describing(first, second)
+        beta, xi = describing(*((end[0], end[1]) for end in ends))
     arrays["seat_beta"][i, window], arrays["seat_xi"][i, window] = beta, xi
     if walk.system.turns(seat.joint):
         one, two = (walk.element(link, seat.joint) for link in walk.system.joints[seat.joint][1])

@@ -12,7 +12,7 @@ on. It is empirical, and has a unit.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -39,7 +39,8 @@ class Loss:
     """Loss of contact of one joint: where (position, whole and fraction), at which end, least load there, N, largest
     load, N.
 
-    unsettled: positions whose seats did not settle; loaded: whether anything presses it at all.
+    unsettled: positions whose seats did not settle; loaded: whether anything presses it at all; turns: whether its
+    load has a direction that can turn, as that of a guide has not.
     """
 
     joint: str
@@ -48,6 +49,7 @@ class Loss:
     peak: float
     unsettled: NDArray[np.intp]
     loaded: bool = True
+    turns: bool = True
 
 
 def find(arrays: Arrays, run: Run, time: NDArray[np.float64]) -> list[Loss]:
@@ -56,13 +58,15 @@ def find(arrays: Arrays, run: Run, time: NDArray[np.float64]) -> list[Loss]:
     joints = list(run.system.joints)
     arrays["contact_loss_number"][:] = _numbers(arrays, run, time)
     largest = float(np.nanmax(np.abs(arrays["reaction_force"]), initial=0.0))
-    late = np.flatnonzero(arrays["seat_change"] > TOLERANCE)
+    # where a joint turns round, the sense of its friction is what does not settle
+    late = np.flatnonzero((arrays["seat_change"] > TOLERANCE) & (arrays["status"] != Status.ZERO_SLIP))
     loaded = [seat for seat in run.seats if seat.given is None]
+    least = _least_loaded(arrays["end_force"][..., late], [joints.index(one.joint) for one in loaded])
     for seat in loaded:
         i = joints.index(seat.joint)
         loss = _of_joint(seat, arrays["end_force"][i], run.cycle.periodic, largest)
-        mine = _least_loaded(arrays["end_force"], [joints.index(one.joint) for one in loaded], late) == i
-        loss = Loss(loss.joint, loss.places, loss.least, loss.peak, late[mine], loss.loaded)
+        turns = any(len(end) > 1 for end in seat.play.model.ends)
+        loss = replace(loss, unsettled=late[least == i], turns=turns)
         if loss.places or len(loss.unsettled) or not loss.loaded:
             found.append(loss)
         lost = np.array([round(place) % len(time) for place, _ in loss.places], np.intp)
@@ -96,13 +100,10 @@ def _earles_wu(force: NDArray[np.float64], time: NDArray[np.float64], periodic: 
         return np.where(size > 0, across / size, np.nan)
 
 
-def _least_loaded(forces: NDArray[np.float64], rows: Sequence[int], late: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Of the joints with loaded seats that whose end bears least of its peak, at each position that did not settle."""
-    sizes = np.sqrt(np.sum(np.nan_to_num(forces[rows]) ** 2, axis=2))
-    there = np.any(np.isfinite(forces[rows]), axis=2)
-    peak = np.max(sizes, axis=-1, keepdims=True)
-    share = np.where(there, sizes / np.where(peak > 0, peak, 1.0), np.inf)
-    least = np.argmin(np.min(share, axis=1)[:, late], axis=0) if len(late) else np.zeros(0, np.intp)
+def _least_loaded(forces: NDArray[np.float64], rows: Sequence[int]) -> NDArray[np.intp]:
+    """Of the joints with loaded seats that whose end bears least, at each of some positions."""
+    sizes = np.sqrt(np.sum(forces[rows] ** 2, axis=2))
+    least = np.argmin(np.nan_to_num(np.min(np.where(np.isfinite(sizes), sizes, np.inf), axis=1)), axis=0)
     return np.array([rows[k] for k in least], np.intp)
 
 
@@ -157,6 +158,14 @@ def _passages(load: NDArray[np.float64], peak: float, periodic: bool) -> Iterato
 def findings(found: Sequence[Loss], arrays: Arrays, joints: Sequence[str], dial: Dial) -> list[Finding]:
     """One finding for each joint that loses contact, and for each that nothing presses."""
     told: list[Finding] = []
+    if "seat_change" not in arrays:
+        return told
+    stuck = np.flatnonzero((arrays["seat_change"] > TOLERANCE) & (arrays["status"] == Status.ZERO_SLIP))
+    if len(stuck):
+        worst = float(np.nanmax(arrays["seat_change"][stuck]))
+        what = f"a joint with friction turns round while its pin travels {dial.intervals(stuck)}: its friction may act "
+        what += f"either way, and a seat changes by up to {worst:.2g} of its clearance with it"
+        told.append(Finding(what, "joints", severity=Severity.NOTE))
     for loss in found:
         where = f"joints.{loss.joint}"
         if not loss.loaded:
@@ -164,12 +173,12 @@ def findings(found: Sequence[Loss], arrays: Arrays, joints: Sequence[str], dial:
             told.append(Finding(what, where, "give the seat, or leave it free", Severity.NOTE))
             continue
         if loss.places:
-            told.append(Finding(_lost(loss, dial), where, _number(arrays, joints.index(loss.joint), dial),
-                                Severity.WARNING))  # fmt: skip
+            remedy = _number(arrays, joints.index(loss.joint), dial) if loss.turns else "expect impact there"
+            told.append(Finding(_lost(loss, dial), where, remedy, Severity.WARNING))
         if len(loss.unsettled):
             worst = float(np.nanmax(arrays["seat_change"][loss.unsettled]))
             what = f"its seat did not settle in {ROUNDS} rounds {dial.intervals(loss.unsettled)}: it still changes by "
-            what += f"{worst:.2g} of its clearance, since the seat changes the load more than it presses"
+            what += f"{worst:.2g} of its clearance, as the load there changes more with the seat than it presses"
             told.append(Finding(what, where, "there the pin floats: contact is lost", Severity.WARNING))
     return told
 

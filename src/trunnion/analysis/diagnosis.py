@@ -196,6 +196,10 @@ def _not_assembled(causes: Causes, dial: Dial, part: _Open) -> Finding:
         if everywhere and module.redundant:
             remedy = "its joints constrain more than they free, so it closes with special dimensions only: check them, "
             remedy += "or let joints slide or tilt (cylindrical, spherical)"
+            if causes.system.mechanism.has_errors:
+                remedy = (
+                    "its errors may fit into the play of its pins: `trunnion assemble` tells, and how much that takes"
+                )
         return Finding(f"{head}: these links {why}", where, remedy)
     told = [
         f"{text} by up to {_length(float(np.nanmax(figure)))}"

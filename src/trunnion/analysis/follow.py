@@ -259,7 +259,7 @@ class Follower:
         elements = [_mixed(one, here, there, share) for one in self.elements]
         drive = [_between(q, here, there, share) for q in self.drive]
         pose = self.group.position(elements, list(guess), drive)
-        found = np.array([float(pose.q[i]) for i in self.group.kept])
+        found = np.array([float(np.ravel(pose.q[i])[0]) for i in self.group.kept])
         if not np.all(np.isfinite(found)) or pose.orientation != self.orientation:
             return None
         limits = self._limits(extent(self.group, elements))

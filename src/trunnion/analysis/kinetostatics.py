@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,6 +14,7 @@ from trunnion.analysis.friction import Contact, FrictionMethod, Settled, settle
 from trunnion.analysis.kinematics import Assembly, Forward, forward
 from trunnion.analysis.loads import Action, Slip, SpringState, springs, stated_loads
 from trunnion.analysis.system import Place, System, Values, law_of
+from trunnion.groups.gear import Action as GearAction
 from trunnion.groups.gear import Gear, Mesh, actions, apart, mesh
 from trunnion.groups.general import General
 from trunnion.groups.planar import ZERO_LOAD, Wrench, about, added, moved
@@ -21,7 +22,7 @@ from trunnion.groups.protocol import Group
 from trunnion.joints.friction import FrictionLaw
 from trunnion.joints.pairs import Load
 
-__all__ = ["Backward", "Given", "Sense", "backward", "sense_of", "solve"]
+__all__ = ["Backward", "Given", "Sense", "backward", "sense_of", "solve", "under"]
 
 ZERO_SLIP = 1e-10  # of the speeds about the joint: below it the sign of a relative speed is rounding noise
 
@@ -133,6 +134,29 @@ def backward(walk: Forward, method: FrictionMethod, given: Given) -> Backward:
     _add_stated_loads(back, given.zero_slip)
     for number in reversed(range(len(system.plan.modules))):
         _settle_module(back, number, method, given)
+    return back
+
+
+def under(walk: Forward, loads: Mapping[str, Wrench]) -> Backward:
+    """Reactions to these loads alone, each about the origin of its link, without friction; the drivers hold still.
+
+    They are what moves with the play of joints, so gear pairs pass torques alone: their ratio holds between rotations,
+    which no offset of a pin changes.
+    """
+    system = walk.system
+    back = Backward(walk, dict.fromkeys(system.mechanism.links, ZERO_LOAD) | dict(loads))
+    for number in reversed(range(len(system.plan.modules))):
+        module, places, group = system.plan.modules[number], system.places[number], system.groups[number]
+        pose, gears = walk.poses[number], tuple(gear._replace(carriers=None) for gear in _gears(group))
+        if isinstance(group, General):
+            group = replace(group, gears=gears)
+        reactions = group.reactions(pose, [back.loads[link] for link in module.links])
+        for k, place in enumerate(places):
+            if not place.witness:
+                _record(back, place, Wrench(*reactions[k]), 0.0, driven=place.joint in module.driven)
+        for i, gear in enumerate(gears):
+            torque = Wrench(*reactions[len(places) + i]).m
+            _push(back, number, actions(gear, pose.elements, pose.ratios[i], torque))
     return back
 
 
@@ -354,7 +378,7 @@ SEPARATION = FrictionLaw(_separation)
 def _record_gear(back: Backward, number: int, i: int, name: str, torque: Number, separation: Number) -> None:
     """Keep what a gear pair does, and load the known links with it."""
     walk = back.walk
-    places, pose = walk.system.places[number], walk.poses[number]
+    pose = walk.poses[number]
     gear = _gears(walk.system.groups[number])[i]
     done = actions(gear, pose.elements, pose.ratios[i], torque)
     force: tuple[Number, Number] = (0.0, 0.0)
@@ -366,7 +390,13 @@ def _record_gear(back: Backward, number: int, i: int, name: str, torque: Number,
         back.gears[name] = GearLoad(-torque * pose.ratios[i], (-force[0], -force[1]))
     else:
         back.gears[name] = GearLoad(torque, force)
+    _push(back, number, done)
+
+
+def _push(back: Backward, number: int, done: Sequence[GearAction]) -> None:
+    """Load the known links of a module with what a gear pair does."""
+    system = back.walk.system
     for joint, side, wrench, at in done:
-        place = places[joint]
-        if place.outer[side] and place.links[side] != walk.system.mechanism.fixed_link:
+        place = system.places[number][joint]
+        if place.outer[side] and place.links[side] != system.mechanism.fixed_link:
             _add(back, place.links[side], wrench, (at.x, at.y))

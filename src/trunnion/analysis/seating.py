@@ -33,6 +33,7 @@ __all__ = ["ROUNDS", "Lanes", "Seat", "Seated", "lanes", "loads_of", "seats", "s
 
 ROUNDS = 10  # most of the iteration
 FINE = 720  # positions of a cycle whose neighbours are near enough to tell how fast a seat travels
+SLOW = 0.01  # of its largest speed: below it the travel of the seats may turn the slip of a joint round
 TOLERANCE = 1e-6  # change of a seat, of its clearance; the next one is as much smaller again
 NO_LOAD = 1e-9  # of the largest reaction of a position: a load below it is rounding and presses nothing anywhere
 
@@ -52,7 +53,8 @@ class Seated:
     """What the positions of one walk came to with their pins in their seats.
 
     offsets: by the names of `shifts` (`seats.JOINT.1.x`), m; loads: of the pin on each end of its hole, N, by joint;
-    rounds: of the iteration; change: of the seats in the last round, of their clearances.
+    rounds: of the iteration; change: of the seats in the last round, of their clearances; turning: positions at which a
+    joint with friction is about to turn round.
     """
 
     back: Backward
@@ -60,11 +62,15 @@ class Seated:
     loads: dict[str, list[Vector]]
     rounds: NDArray[np.intp]
     change: NDArray[np.float64]
+    turning: NDArray[np.bool_]
 
     @property
-    def unsettled(self) -> NDArray[np.bool_]:
-        """Positions whose seats did not come to rest."""
-        return self.change > TOLERANCE
+    def sticks(self) -> NDArray[np.bool_]:
+        """Positions whose seats do not come to rest since a joint turns round there: either sense turns it back.
+
+        The pin travels across its hole while the joint itself is at rest, and its friction is an interval.
+        """
+        return (self.change > TOLERANCE) & self.turning
 
 
 def seats(system: System, values: Values) -> list[Seat]:
@@ -163,19 +169,33 @@ def settle(run: Run, seen: Lanes, method: FrictionMethod, start: Backward) -> Se
     quick, time = replace(method, margin_up_to=0.0), seen.times[seen.own]
     offsets = _next(run, start, len(seen.times))
     rounds, change = np.zeros(len(seen.times), np.intp), np.zeros(len(seen.times))
-    if any(seat.given is None for seat in run.seats):
-        _iterate(run, seen.times, quick, offsets, rounds, change, closely=False)
+    loaded = any(seat.given is None for seat in run.seats)
+    turning = _slow(run.system, start)[seen.own]
+    if loaded:
+        _iterate(run, seen.times, quick, offsets, rounds, change, np.sqrt(TOLERANCE))
     rates = _rates(run, seen, offsets, start)
     mine = {path: numbers[seen.own] for path, numbers in offsets.items()}
     rounds, change = rounds[seen.own], change[seen.own]
+    if loaded:  # where a joint turns round, the travel of the seats decides the sense of its friction
+        _iterate(run, time, quick, mine, rounds, change, TOLERANCE, np.flatnonzero(turning), rates)
     back = run.at(time, mine, method, rates=rates)
-    if np.any(rounds):  # the last walk shows whether the seats have settled
+    if loaded:  # this walk shows whether the seats have settled
         rounds += rounds < ROUNDS
         change = _change(run.seats, mine, _next(run, back, len(time)), np.arange(len(time)))
-        if np.any((change > TOLERANCE) & (rounds < ROUNDS)):
-            _iterate(run, time, quick, mine, rounds, change, closely=True)
+        left = np.flatnonzero((change > TOLERANCE) & (rounds < ROUNDS))
+        if len(left):
+            _iterate(run, time, quick, mine, rounds, change, TOLERANCE, left, rates)
             back = run.at(time, mine, method, rates=rates)
-    return Seated(back, mine, _loads(run, back), rounds, change)
+    return Seated(back, mine, _loads(run, back), rounds, change, turning)
+
+
+def _slow(system: System, start: Backward) -> NDArray[np.bool_]:
+    """Where a joint with friction is about to turn round."""
+    found: Number = False
+    for joint in rubbing(system):
+        speed = np.abs(primal(start.slips[joint].speed))
+        found = found | (speed <= SLOW * np.nanmax(speed, initial=0.0))
+    return np.broadcast_to(np.asarray(found, bool), np.shape(start.walk.time))
 
 
 def _iterate(
@@ -185,20 +205,22 @@ def _iterate(
     offsets: dict[str, NDArray[np.float64]],
     rounds: NDArray[np.intp],
     change: NDArray[np.float64],
-    closely: bool,
+    enough: float,
+    left: NDArray[np.intp] | None = None,
+    rates: Mapping[str, NDArray[np.float64]] | None = None,
 ) -> None:
-    """Seats and reactions in turn, in place, until all positions have settled or had their rounds.
+    """Seats and reactions in turn, in place, until the positions have settled or had their rounds.
 
-    closely: until the change itself is small enough; otherwise until the next one will be, as it is about the square.
+    enough: change at which to end; the next one is about its square. left: positions, all if not given.
     """
-    enough = TOLERANCE if closely else np.sqrt(TOLERANCE)
-    left = np.flatnonzero((change > enough) & (rounds < ROUNDS)) if closely else np.arange(len(time))
+    left = np.arange(len(time)) if left is None else left[rounds[left] < ROUNDS]
     while len(left):
-        found = run.at(time[left], {path: numbers[left] for path, numbers in offsets.items()}, method)
+        part = {path: numbers[left] for path, numbers in offsets.items()}
+        found = run.at(time[left], part, method, rates={path: rate[left] for path, rate in (rates or {}).items()})
         wanted = _next(run, found, len(left))
         rounds[left] += 1
         change[left] = _change(run.seats, offsets, wanted, left)
-        moved = change[left] > (TOLERANCE if closely else 0.0)
+        moved = change[left] > (TOLERANCE if enough == TOLERANCE else 0.0)
         for path, numbers in wanted.items():
             offsets[path][left[moved]] = numbers[moved]
         left = left[(change[left] > enough) & (rounds[left] < ROUNDS)]

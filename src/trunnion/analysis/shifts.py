@@ -72,7 +72,11 @@ def hole(frame: rigid.Frame, values: Values, joint: str) -> rigid.Frame:
 
 def misaligned(frame: rigid.Frame, values: Values, joint: str) -> rigid.Frame:
     """The second element of a joint in space with the misalignment of its axis."""
-    return rigid.compose(frame, _misalignment(values, joint)) if _leans(values, joint) else frame
+    if not _leans(values, joint):
+        return frame
+    leant = rigid.compose(hole(frame, values, joint), _misalignment(values, joint))
+    back = values.get(f"joints.{joint}.pin.offset")
+    return leant if back is None else leant._replace(place=plus(leant.place, scaled(-back, leant.z)))
 
 
 def misaligned_planar(frame: planar.Frame, values: Values, joint: str) -> planar.Frame:

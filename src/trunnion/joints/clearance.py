@@ -133,9 +133,12 @@ def pin_transform(clearance: Number, length: Number, beta: Number, xi: Number) -
     """Â of the pin-hole pair from [P]'s description, hole's frame → pin's frame.  [P 12-14]
 
     clearance ρ and length H, m; β, ξ, rad, broadcast. Same as Z(ξ) X(α̂) Z(−ξ) with tan α = (2ρ/H) sin(β/2) and
-    d = ρ cos(β/2).
+    d = ρ cos(β/2), and not by way of the end offsets: their difference has no digits left where β is small.
     """
-    return _pin_shift(described(clearance, beta, xi), length)
+    xp = namespace(clearance, length, beta, xi)
+    c, s = xp.cos(xi), xp.sin(xi)
+    slope, aside = 2 * clearance / length * xp.sin(0.5 * beta), clearance * xp.cos(0.5 * beta)
+    return leaning((slope * s, -(slope * c)), 0.0, (aside * c, aside * s))
 
 
 # ---- description ----------------------------------------------------------------------------------------------
@@ -153,10 +156,10 @@ def described(radius: Number, beta: Number, xi: Number) -> list[Vector]:
 def describing(first: Vector, second: Vector) -> tuple[Number, Number]:
     """β in (−π, π] and ξ in (−π, π] of two end offsets, rad; of pins that lie at their holes' walls [P 12, 13].
 
-    From half angles, so that β near 0 keeps its digits: β is the angle from c₂ to c₁.
+    β is the angle from c₂ to c₁; from c₂ × (c₁ − c₂), so that β near 0 keeps the digits of the offsets.
     """
     (x1, y1), (x2, y2) = first, second
-    beta = np.arctan2(x2 * y1 - y2 * x1, x1 * x2 + y1 * y2)
+    beta = np.arctan2(x2 * (y1 - y2) - y2 * (x1 - x2) + 0.0, x1 * x2 + y1 * y2)  # −0 would make −π of π
     xi = np.arctan2(y2, x2) + 0.5 * beta
     return beta, np.where(xi > np.pi, xi - 2 * np.pi, np.where(xi <= -np.pi, xi + 2 * np.pi, xi))
 

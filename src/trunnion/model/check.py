@@ -18,6 +18,7 @@ from trunnion.joints.pairs import PAIRS
 from trunnion.model.check_errors import errors, joint_errors
 from trunnion.model.check_gears import gears
 from trunnion.model.check_loads import motion_dimensions, springs, tables, unknown_name
+from trunnion.model.check_measures import check_measure, point_exists
 from trunnion.model.check_space import contact, coordinates, driven, loop, pitch, resisted, space
 from trunnion.model.check_values import check_values
 from trunnion.model.contact import motions
@@ -25,7 +26,7 @@ from trunnion.model.expression import MOTION, RESERVED
 from trunnion.model.names import nearest
 from trunnion.model.parameter_names import ERRORS
 from trunnion.model.parameters import ParameterSet, dimension_errors, entries, evaluation_order
-from trunnion.model.parts import Driver, Friction, Joint, Load, Measure, freedoms
+from trunnion.model.parts import Driver, Friction, Joint, Load, freedoms
 from trunnion.model.quantity import UNREADABLE
 from trunnion.model.units import ANY, Dimension, UnitError
 
@@ -339,7 +340,7 @@ def _others(mechanism: Mechanism) -> Iterator[Finding]:
                 yield Finding(what, where, nearest(name, moving))
             continue
         if point and point not in points.get(link, ()):
-            yield from _point(mechanism, name, where)
+            yield from point_exists(mechanism, name, where)
         elif not point and name not in joints:
             yield Finding(f"there is no joint '{name}'", where, nearest(name, joints))
         if isinstance(hint, tuple):
@@ -350,30 +351,4 @@ def _others(mechanism: Mechanism) -> Iterator[Finding]:
             what = f"one number does not say how far a {joints[name].type} joint has moved"
             yield Finding(what, where, f"say where it is: {coordinates(mechanism)}")
     for name, measure in mechanism.measures.items():
-        yield from _measure(mechanism, measure, f"measures.{name}")
-
-
-def _measure(mechanism: Mechanism, measure: Measure, where: str) -> Iterator[Finding]:
-    subjects = [key for key in ("point", "effort", "angle") if getattr(measure, key) is not None]
-    if len(subjects) != 1:
-        found = " and ".join(subjects) or "nothing"
-        yield Finding(f"measures {found}", where, "state one of point, effort or angle")
-    if (measure.point is None) != (measure.axis is None):
-        yield Finding("a point is measured along an axis", where, "write {point: link.point, axis: x}")
-    if measure.axis == "z" and mechanism.space == "planar":
-        yield Finding("there is no z in the plane", f"{where}.axis", "write x or y")
-    if measure.point is not None:
-        yield from _point(mechanism, measure.point, f"{where}.point")
-    if measure.effort is not None and measure.effort not in mechanism.drivers:
-        what = f"there is no driver '{measure.effort}'"
-        yield Finding(what, f"{where}.effort", nearest(measure.effort, mechanism.drivers))
-    links = mechanism.effective_links
-    if measure.angle is not None and measure.angle not in links:
-        yield Finding(f"there is no link '{measure.angle}'", f"{where}.angle", nearest(measure.angle, links))
-
-
-def _point(mechanism: Mechanism, name: str, where: str) -> Iterator[Finding]:
-    """Whether `link.point` exists."""
-    known = [f"{link}.{point}" for link, points in mechanism.points.items() for point in points]
-    if name not in known:
-        yield Finding(f"there is no point '{name}'", where, nearest(name, known) + " (write link.point)")
+        yield from check_measure(mechanism, measure, f"measures.{name}")

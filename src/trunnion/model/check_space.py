@@ -46,10 +46,6 @@ def space(mechanism: Mechanism) -> Iterator[Finding]:
         if isinstance(link.centre, PolarPoint):
             what = "distance and angle place a point in the plane only"
             yield Finding(what, f"links.{name}.centre", "write [x, y, z]")
-    for name, measure in mechanism.measures.items():
-        if measure.angle is not None:
-            what = "a link in space is not turned by one angle"
-            yield Finding(what, f"measures.{name}.angle", "measure {point: link.point, axis: x}")
 
 
 # ---- joints ---------------------------------------------------------------------------------------------------

@@ -237,7 +237,7 @@ def _spring_kind(mechanism: Mechanism, spring: Spring, entry: Entry) -> Kind:
 
 def _measure_kind(mechanism: Mechanism, measure: Measure) -> Kind:
     if measure.effort is None:
-        return KINDS["length" if measure.angle is None else "angle"]
+        return KINDS["length" if measure.angle is None and measure.rotation is None else "angle"]
     joint = mechanism.effective_joints.get(measure.effort)
     return KINDS["force" if joint and "rotation" not in freedoms(joint.type) else "moment"]
 

@@ -272,12 +272,14 @@ class Gear(Part):
 
 
 class Measure(Part):
-    """A number to watch over the cycle: a coordinate of a point, the effort of a driver, or the angle of a link."""
+    """A number to watch: a coordinate of a point, rotation or slide of a joint, angle of a link, effort of a driver."""
 
     point: str | None = None
     axis: Literal["x", "y", "z"] | None = None
     effort: str | None = None
     angle: str | None = None
+    rotation: str | None = None
+    slide: str | None = None
     limit: AnyQuantity | None = None
 
 

@@ -30,7 +30,7 @@ from trunnion.joints.pairs import Reaction
 from trunnion.joints.spatial_load import halves
 from trunnion.model.parts import InertiaTensor
 
-__all__ = ["SpatialBackward", "backward"]
+__all__ = ["SpatialBackward", "backward", "under"]
 
 NULL: Vector3 = (0.0, 0.0, 0.0)
 
@@ -78,6 +78,21 @@ def backward(walk: SpatialWalk, method: FrictionMethod, given: Given) -> Spatial
     _add_stated_loads(back, given.zero_slip)
     for number in reversed(range(len(system.plan.modules))):
         _settle_module(back, number, method, given)
+    return back
+
+
+def under(walk: SpatialWalk, loads: Mapping[str, Screw]) -> SpatialBackward:
+    """Reactions to these loads alone, about the origin, without friction; the drivers hold still."""
+    system = walk.space
+    none: dict[str, Any] = dict.fromkeys(system.mechanism.effective_links, ZERO)
+    back = SpatialBackward(walk, none | dict(loads))
+    for number in reversed(range(len(system.plan.modules))):
+        module, places, pose = system.plan.modules[number], system.places[number], walk.poses[number]
+        wrenches = system.groups[number].reactions(pose, [back.loads[link] for link in module.links])
+        for k, (place, wrench) in enumerate(zip(places, wrenches, strict=True)):
+            driven = pose.screws[k][0] if place.joint in module.driven else None
+            back.reactions[place.joint] = _without_drive(back, place.joint, wrench, driven)
+            _pass_on(back, place, wrench)
     return back
 
 
@@ -243,23 +258,31 @@ def _record(
     back: SpatialBackward, place: Place, wrench: Screw, friction: Screw, loss: Number, driven: Screw | None
 ) -> None:
     """Keep a joint's reaction, friction and drive effort; load its known link with all three."""
-    walk, joint = back.space, place.joint
-    drive = ZERO
-    if driven is not None:
-        effort = power(wrench, driven)
-        back.efforts[joint] = effort
-        axis = walk.element(place.links[1], joint).z
-        drive = times(
-            effort, Screw(NULL, axis) if walk.system.turns(joint) else about(axis, NULL, _place_of(walk, joint))
-        )
-    back.reactions[joint] = minus(wrench, drive)
+    joint = place.joint
+    back.reactions[joint] = _without_drive(back, joint, wrench, driven)
     back.friction_wrenches[joint], back.losses[joint] = friction, loss
     back.friction[joint] = _scalar(back, joint, friction, loss)
     whole = added(wrench, friction)
     if back.travels:
-        back.passed[joint] = power(whole, walk.against(joint))
+        back.passed[joint] = power(whole, back.space.against(joint))
+    _pass_on(back, place, whole)
+
+
+def _without_drive(back: SpatialBackward, joint: str, wrench: Screw, driven: Screw | None) -> Screw:
+    """The wrench of a joint less the drive effort, which is kept; driven: the screw of the freedom, None if none is."""
+    if driven is None:
+        return wrench
+    walk, effort = back.space, power(wrench, driven)
+    back.efforts[joint] = effort
+    axis = walk.element(walk.system.joints[joint][1][1], joint).z
+    drive = Screw(NULL, axis) if walk.system.turns(joint) else about(axis, NULL, _place_of(walk, joint))
+    return minus(wrench, times(effort, drive))
+
+
+def _pass_on(back: SpatialBackward, place: Place, whole: Screw) -> None:
+    """Load the known link of a joint with all that it does."""
     for i, (link, outer) in enumerate(zip(place.links, place.outer, strict=True)):
-        if outer and link != walk.system.mechanism.fixed_link:
+        if outer and link != back.walk.system.mechanism.fixed_link:
             back.loads[link] = added(back.loads[link], whole if i == 1 else times(-1.0, whole))
 
 

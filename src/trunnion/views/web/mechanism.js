@@ -169,8 +169,10 @@ function ground(view) {
         ? Array.from({ length: scene.count }, (_, index) => place(scene, one.at, index)).filter(Boolean)
         : [];
       if (!spots.length) return null;
-      if (one.type !== "prismatic") return support(frame, spots[0]);
-      return rail(frame, spots, guide(scene, one, 0), play(scene, one.name) * frame.scale);
+      const own = scene.built && [one.on, one.at].find((key) => key === `${fixed}.${one.name}`);
+      const base = (own && place(scene, own, 0)) || spots[0]; // a pin off the middle of its hole does not move the ground
+      if (one.type !== "prismatic") return support(frame, base);
+      return rail(frame, base, spots, guide(scene, one, 0), play(scene, one.name) * frame.scale);
     })
     .filter(Boolean);
 }
@@ -186,12 +188,12 @@ function support(frame, spot) {
 }
 
 /** `apart`: px by which the play widens the guide to either side. */
-function rail(frame, spots, angle, apart) {
+function rail(frame, base, spots, angle, apart) {
   const [ux, uy] = [Math.cos(angle), Math.sin(angle)];
   const along = spots.map(([x, y]) => x * ux + y * uy);
   const [low, high] = [Math.min(...along), Math.max(...along)];
-  const shift = (low + high) / 2 - along[0];
-  const [x, y] = frame.to([spots[0][0] + shift * ux, spots[0][1] + shift * uy]);
+  const shift = (low + high) / 2 - (base[0] * ux + base[1] * uy);
+  const [x, y] = frame.to([base[0] + shift * ux, base[1] + shift * uy]);
   const half = ((high - low) / 2) * frame.scale + 26;
   const gap = 11 + apart;
   return svg("g", { class: "ground" }, hatching(x + gap * uy, y + gap * ux, -angle, half));

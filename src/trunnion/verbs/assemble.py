@@ -1,0 +1,88 @@
+"""`trunnion assemble`: whether the stated clearances take up the errors, and the smallest clearance that would."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.options import setting
+from trunnion.terminal import bar, findings_of, say, show_figures, wrote
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["assemble"]
+
+IMAGES = (".png", ".svg", ".pdf")
+
+
+class Uniform(StrEnum):
+    """What has one and the same clearance where the smallest is looked for."""
+
+    PINS = "pins"
+    ALL = "all"
+
+
+def assemble(
+    file: Annotated[Path, typer.Argument(help="Model file: YAML, JSON or TOML.", show_default=False)],
+    steps: Annotated[int, typer.Option("--steps", help="Equally spaced positions over the turn or range.")] = 72,
+    set_: Annotated[
+        list[str] | None, typer.Option("--set", help="Replace a value: B.misalignment.tilt=0.2deg. Repeatable.")
+    ] = None,
+    uniform: Annotated[
+        Uniform, typer.Option("--uniform", help="What shares the smallest clearance: pins, or all kinds of play.")
+    ] = Uniform.PINS,
+    out: Annotated[
+        list[Path] | None,
+        typer.Option("--out", help="Write it: .csv .json .nc .zarr .parquet, or a figure: .png .svg .pdf. Repeatable."),
+    ] = None,
+    units_row: Annotated[bool, typer.Option("--units-row", help="Second CSV header row with the units.")] = False,
+) -> None:
+    """Whether it goes together with axes out of line: needed share of the clearances, smallest clearance."""
+    from trunnion.analysis.assemblability import assemble as run
+    from trunnion.export import check_format, save
+    from trunnion.model.file import read_mechanism
+
+    drawn = [path for path in out or [] if path.suffix.lower() in IMAGES]
+    for path in out or []:
+        if path not in drawn:
+            check_format(path, IMAGES)
+    mechanism = read_mechanism(file)
+    if set_:
+        mechanism = mechanism.with_values(dict(setting(text) for text in set_))
+    try:
+        with bar("positions", steps, least=1000) as progress:
+            result = run(mechanism, steps, uniform.value, progress)
+    except MechanismError as error:
+        raise MechanismError(_placed(error.findings, file)) from None
+    for path in out or []:
+        if path in drawn:
+            _draw(result, path)
+        else:
+            save(result, path, units_row)
+    show_figures(f"{result.attrs['name'] or file}\n{result.attrs['formula']}", json.loads(result.attrs["summary"]))
+    findings = findings_of(result)
+    say(_placed(findings, file))
+    for path in out or []:
+        wrote(path)
+    raise typer.Exit(1 if any(one.severity is Severity.ERROR for one in findings) else 0)
+
+
+def _draw(result: xr.Dataset, path: Path) -> None:
+    from trunnion.views.fit import figure
+    from trunnion.views.plots import save
+
+    save(figure(result), path)
+
+
+def _placed(findings: Iterable[Finding], file: Path) -> list[Finding]:
+    """Findings with the line of the model file."""
+    from trunnion.model.file import placed
+
+    return placed(findings, file, ["assembly"])

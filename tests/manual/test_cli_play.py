@@ -1,0 +1,131 @@
+"""`trunnion play` as a user meets it: tables, files, figure, findings, and faults with nothing half-written."""
+
+from __future__ import annotations
+
+import csv
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import trunnion
+from played import four_bar
+from trunnion import cli
+from trunnion.model.file import write_mechanism
+from trunnion.views.play import figure, tables
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+SLIDER = EXAMPLES / "toleranced-slider-crank.yaml"
+Run = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Run:
+    """The verb, in this process, in an empty folder."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "140")
+
+    def call(*arguments: object) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["trunnion", "play", *map(str, arguments)])
+        capsys.readouterr()
+        code = 0
+        try:
+            cli.main()
+        except SystemExit as stop:
+            code = int(stop.code or 0)
+        out, err = (text.replace("\u00a0", " ") for text in capsys.readouterr())
+        assert "Traceback" not in err + out
+        return code, out, err
+
+    return call
+
+
+def test_tables_and_files(run: Run, tmp_path: Path) -> None:
+    files = [f"p{end}" for end in (".csv", ".json", ".nc", ".svg", ".png")]
+    code, out, _ = run(SLIDER, "--steps", 36, "--units-row", *(f"--out={name}" for name in files))
+    assert code == 0
+    assert {path.name for path in tmp_path.iterdir()} == set(files)
+    assert "stroke-position, from 150" in out
+    assert "all, worst case" in out
+    assert all(f"wrote {name}" in out for name in files)
+    with (tmp_path / "p.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert rows[0]["stroke-position"] == "m"
+    result = trunnion.play(trunnion.read(SLIDER), steps=36)
+    column = [float(row["drive-torque.O.worst_case"]) for row in rows[1:]]
+    assert column == pytest.approx(result["worst_case"].sel(measure="drive-torque", joint="O").values)
+    with xr.open_dataset(tmp_path / "p.nc") as read:
+        np.testing.assert_array_equal(read["sensitivity"].values, result["sensitivity"].values)
+    assert json.loads((tmp_path / "p.json").read_text())["attrs"]["drive"] == "O"
+    ElementTree.parse(tmp_path / "p.svg")
+
+
+def test_measures_of_the_command_line(run: Run) -> None:
+    code, out, _ = run(SLIDER, "--steps", 12, "--measure", "angle:rod", "--measure", "drive-torque")
+    assert code == 0
+    assert "angle:rod, from" in out
+    assert "drive-torque, from" in out
+    assert "stroke-position" not in out
+
+
+def test_outputs_where_no_measure_is_stated(run: Run, tmp_path: Path) -> None:
+    write_mechanism(four_bar("C"), tmp_path / "bar.yaml")
+    code, out, err = run("bar.yaml", "--steps", 12, "--set", "C.pin.clearance=0.04mm")
+    assert code == 0
+    assert "rotation:D" in out
+    assert "±40.00 µm" in out
+    assert "no measure is stated: rotation:D taken" in err
+
+
+def test_a_limit_is_a_finding_with_the_line_of_the_file(run: Run, tmp_path: Path) -> None:
+    data = four_bar("C").data() | {"measures": {"swing": {"rotation": "D", "limit": "0.01 deg"}}}
+    write_mechanism(trunnion.Mechanism(**data), tmp_path / "bar.yaml")
+    code, _, err = run("bar.yaml", "--steps", 12, "--out", "bar.svg")
+    assert code == 1
+    assert "measures.swing.limit: the worst case is" in err
+    assert err.startswith("bar.yaml:")
+    assert (tmp_path / "bar.svg").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "what"),
+    [
+        (["--measure", "rotation:Z"], "no joint 'Z'"),
+        (["--measure", "Q"], "is no measure"),
+        (["--out", "p.xyz"], "cannot write a result as '.xyz'"),
+        (["--steps", "0"], "cannot analyse 0 positions"),
+        (["--out", "p.svg", *(f"--measure=piston.{p}.{a}" for p in "QS" for a in "xy"), "--measure=angle:rod",
+          "--measure=angle:crank", "--measure=rotation:P"], "7 measures do not fit one figure"),
+    ],
+)  # fmt: skip
+def test_faults(run: Run, tmp_path: Path, arguments: list[str], what: str) -> None:
+    code, _, err = run(SLIDER, *arguments)
+    assert code == 2
+    assert what in err
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_figure_stacks_the_joints_up_to_the_sum() -> None:
+    result = trunnion.play(trunnion.read(SLIDER), ["piston.Q.x"], steps=72)
+    (axes,) = figure(result).axes
+    total = next(line for line in axes.lines if line.get_label() == "sum: worst case").get_xydata()
+    assert total[-1, 0] == pytest.approx(360)  # the turn closes
+    assert total[:-1, 1] == pytest.approx(result["worst_case_total"].values[0] * 1e6)
+    assert len(axes.collections) == 4
+    assert axes.get_ylabel() == "worst case of piston.Q.x [µm]"
+
+
+def test_one_position_and_no_answer_are_drawn_and_told() -> None:
+    result = trunnion.play(four_bar("C"), ["rotation:D"], steps=1)
+    assert figure(result).axes
+    assert tables(result)[0].rows[0][0] == "C"
+    empty = result.copy(deep=True)
+    for key in ("worst_case", "worst_case_total", "rss", "deviation_total"):
+        empty[key] = np.nan * empty[key]
+    assert "no position has an answer" in tables(empty)[0].title
+    assert figure(empty).axes

@@ -1,0 +1,126 @@
+"""Mechanisms with play in their joints, and what an offset of a pin really does, for the tests of `play`."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from mechanisms import Array
+from mechanisms_parts import Data
+from trunnion import Mechanism
+from trunnion.analysis.analyse import Run
+from trunnion.analysis.kinematics import forward
+from trunnion.analysis.measures import Measure
+from trunnion.analysis.shifts import Play
+from trunnion.joints.clearance import CLEARANCE_MODELS, Vector
+
+__all__ = ["changes", "four_bar", "measures_of", "offsets_of", "pressed_to", "rssr", "with_play"]
+
+RSSR = {"a": 0.03, "b": 0.12, "c": 0.07, "d": 0.1, "alpha": np.pi / 3, "s1": 0.01, "s4": 0.02}
+
+
+def with_play(data: Data, clearance: float = 1e-5, float_: float = 0.0) -> Mechanism:
+    """A mechanism of plain data with the same clearance in every joint that can have one."""
+    data = copy.deepcopy(data)
+    space = data.get("space", "planar")
+    rows = data["loop"] if "loop" in data else data["joints"].values()
+    for joint in rows:
+        if joint["type"] not in CLEARANCE_MODELS[space]:
+            continue
+        slides, ball = joint["type"] == "prismatic", joint["type"] == "spherical"
+        sizes = {"length": 0.3} if slides else {"radius": 0.01}
+        sizes |= {"bearing": 0.2} if space == "spatial" and not slides and not ball else {}
+        part = "guide" if slides else "pin"
+        joint[part] = sizes | joint.get(part, {}) | {"clearance": clearance}
+        if float_ and space == "spatial" and joint["type"] == "revolute":
+            joint[part]["end_float"] = float_
+    return Mechanism(**{"trunnion": 1, **data})
+
+
+def measures_of(run: Run) -> list[str]:
+    """Names of every measure of the motion that a mechanism has."""
+    mechanism = run.system.mechanism
+    axes = mechanism.coordinates
+    turning = ("revolute", "cylindrical", "helical")
+    sliding = ("prismatic", "cylindrical", "helical")
+    found = [f"{link}.{point}.{axis}" for link, point in run.system.points for axis in "xyz"[:axes]]
+    found += [f"rotation:{name}" for name, (kind, _) in run.system.joints.items() if kind in turning]
+    found += [f"slide:{name}" for name, (kind, _) in run.system.joints.items() if kind in sliding]
+    ends = ("",) if axes == 2 else (".x", ".y", ".z")
+    spinning = {link for module in run.system.plan.modules for link, _, _ in module.spinning}
+    return found + [f"angle:{link}{end}" for link in mechanism.effective_links if link not in spinning for end in ends]
+
+
+def offsets_of(plays: Mapping[str, Play], offsets: Mapping[str, Sequence[Vector]]) -> dict[str, Array]:
+    """Offsets at the ends of joints by the names that `System.elements` knows."""
+    return {
+        path: np.asarray(number)
+        for name, ends in offsets.items()
+        for path, number in plays[name].model.paths(f"seats.{name}", ends).items()
+    }
+
+
+def pressed_to(load: Vector, radius: float) -> Vector:
+    """The offset of largest work."""
+    size = float(np.sqrt(sum(float(np.ravel(part)[0]) ** 2 for part in load)))
+    return tuple(radius * float(np.ravel(part)[0]) / size if size > 0 else 0.0 for part in load)
+
+
+def changes(run: Run, measure: Measure, offsets: Mapping[str, Array], time: Array) -> Array:
+    """What offsets change in a measure of the motion, by the exact closure."""
+    base = measure.value(forward(run.system, run.values, run.chosen.assembly, time))
+    moved = measure.value(forward(run.system, {**run.values, **offsets}, run.chosen.assembly, time))
+    return np.asarray(moved - base)
+
+
+def four_bar(joint: str, clearance: float = 2e-5) -> Mechanism:
+    """Links of 100, 30, 90, 70 mm, crank from 60°, play in one joint."""
+    ends = {"A": ["ground", "crank"], "B": ["crank", "coupler"], "C": ["coupler", "rocker"], "D": ["ground", "rocker"]}
+    joints: Data = {name: {"type": "revolute", "links": links} for name, links in ends.items()}
+    joints[joint]["pin"] = {"radius": 0.005, "clearance": clearance}
+    return Mechanism(
+        trunnion=1,
+        links={
+            "ground": {"points": {"A": [0, 0], "D": [0.1, 0]}},
+            "crank": {"points": {"A": [0, 0], "B": [0.03, 0]}},
+            "coupler": {"points": {"B": [0, 0], "C": [0.09, 0]}},
+            "rocker": {"points": {"D": [0, 0], "C": [0.07, 0]}},
+        },
+        joints=joints,
+        drivers={"A": {"speed": 1.0, "start": np.radians(60)}},
+        assembly={"C": [0.1, 0.07]},
+    )
+
+
+def rssr(clearance: float = 2e-5, float_: float = 0.0, hole_on: str = "rocker") -> Mechanism:
+    """The RSSR linkage with a pin and hole at its output: 20 mm long, the middle on the common normal."""
+    k, s4 = [0, -np.sin(RSSR["alpha"]), np.cos(RSSR["alpha"])], RSSR["s4"]
+    pin: Data = {"radius": 0.01, "hole_radius": 0.01 + clearance, "length": 0.02}
+    if float_:
+        pin["end_float"] = float_
+    links = ["ground", "rocker"] if hole_on == "rocker" else ["rocker", "ground"]
+    return Mechanism(
+        trunnion=1,
+        space="spatial",
+        links={
+            "ground": {
+                "points": {
+                    "A": {"at": [0, 0, 0], "axis": [0, 0, 1], "x": [1, 0, 0]},
+                    "D": {"at": [RSSR["d"], 0, 0], "axis": k, "x": [1, 0, 0]},
+                }
+            },
+            "crank": {"points": {"A": {"at": [0, 0, 0], "axis": [0, 0, 1], "x": [1, 0, 0]}, "B": [0.03, 0, 0.01]}},
+            "rod": {"points": {"B": [0, 0, 0], "C": [RSSR["b"], 0, 0]}},
+            "rocker": {"points": {"D": {"at": [0, 0, 0], "axis": [0, 0, 1], "x": [1, 0, 0]}, "C": [RSSR["c"], 0, s4]}},
+        },
+        joints={
+            "A": {"type": "revolute", "links": ["ground", "crank"]},
+            "B": {"type": "spherical", "links": ["crank", "rod"]},
+            "C": {"type": "spherical", "links": ["rod", "rocker"]},
+            "D": {"type": "revolute", "links": links, "pin": pin},
+        },
+        drivers={"A": {"speed": 1.0, "start": np.radians(60)}},
+        assembly={"D": np.radians(74) * (1 if hole_on == "rocker" else -1)},
+    )

@@ -1,0 +1,546 @@
+"""Does it assemble at all: closed forms, an independent closure with SciPy's optimiser, invariances, what is said."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+from scipy.spatial.transform import Rotation
+
+import trunnion
+from mechanisms import Data
+from trunnion.analysis.assemblability import Fit, Study
+from trunnion.analysis.engine import build
+from trunnion.analysis.space.loops import Loops
+
+Array = NDArray[np.float64]
+LENGTHS = (0.100, 0.030, 0.090, 0.070)  # ground, crank, coupler, rocker
+PIN = 0.020
+LEAN = {"tilt": np.radians(0.2)}
+UPRIGHT = {"axis": [0, 0, 1], "x": [1, 0, 0]}
+OPEN = 1e-12
+
+
+def hinges(apart: float, pin: float, second: Data, kind: str = "revolute") -> trunnion.Mechanism:
+    """A leaf on two coaxial hinges."""
+    points = {"A": {"at": [0, 0, 0], **UPRIGHT}, "B": {"at": [0, 0, apart], **UPRIGHT}}
+    joints = {"A": {"type": "revolute"}, "B": {"type": kind, **second}}
+    return trunnion.Mechanism(
+        space="spatial",
+        links={"frame": {"points": points}, "leaf": {"points": points}},
+        joints={name: {**joint, "links": ["frame", "leaf"]} for name, joint in joints.items()},
+        joint_defaults={"pin": {"radius": 0.005, "length": pin}},
+        ground="frame",
+        drivers={"A": {"speed": 1.0}},
+    )
+
+
+def four_bar(
+    errors: Data, pins: Data | None = None, scale: float = 1.0, moved: Any = None, order: str = "ABCD"
+) -> Data:
+    """A planar four-bar drawn in space, pins upright; errors and pins by joint; moved: the ground's frame."""
+    ground, crank, coupler, rocker = (scale * length for length in LENGTHS)
+
+    def point(x: float) -> Data:
+        return {"at": [x, 0, 0], **UPRIGHT}
+
+    def elsewhere(x: float) -> Data:
+        if moved is None:
+            return point(x)
+        turn, way = moved
+        return {
+            "at": list(turn.apply([x, 0, 0]) + way),
+            "axis": list(turn.apply([0, 0, 1])),
+            "x": list(turn.apply([1, 0, 0])),
+        }
+
+    links = {"A": ["ground", "crank"], "B": ["crank", "coupler"], "C": ["coupler", "rocker"], "D": ["ground", "rocker"]}
+    hint = np.array([0.03, 0.07, 0]) * scale
+    hint = hint if moved is None else moved[0].apply(hint) + moved[1]
+    joints = {
+        name: {
+            "type": "revolute",
+            "links": links[name],
+            **({"misalignment": errors[name]} if name in errors else {}),
+            "pin": {"length": PIN * scale, **(pins or {}).get(name, {})},
+        }
+        for name in order
+    }
+    return {
+        "space": "spatial",
+        "links": {
+            "ground": {"points": {"A": elsewhere(0), "D": elsewhere(ground)}},
+            "crank": {"points": {"A": point(0), "B": point(crank)}},
+            "coupler": {"points": {"B": point(0), "C": point(coupler)}},
+            "rocker": {"points": {"D": point(0), "C": point(rocker)}},
+        },
+        "joints": joints,
+        "joint_defaults": {"pin": {"radius": 0.005 * scale}},
+        "drivers": {"A": {"speed": 1.0}},
+        "assembly": {"C": list(hint)},
+    }
+
+
+def solved(data: Data | trunnion.Mechanism, steps: int = 72, **options: Any) -> xr.Dataset:
+    mechanism = data if isinstance(data, trunnion.Mechanism) else trunnion.Mechanism(**data)
+    return trunnion.assemble(mechanism, steps, **options)
+
+
+def sound(result: xr.Dataset) -> None:
+    """Every position closes exactly, and no position could do with less."""
+    assert float(result.closure_residual.max()) < OPEN
+    assert float(np.abs(result.certificate).max()) < 1e-9
+
+
+# ---- two coaxial hinges ---------------------------------------------------------------------------------------
+
+
+def leaned(apart: float, pin: float, tilt: float) -> float:
+    """Smallest clearance of two coaxial pin holes, one leaned by `tilt`, of a pin line free along its axis.
+
+    In the plane of the tilt the line x = a + m z passes the holes' end planes; the second hole's slope against it is
+    tan(δ − φ), m = tan φ. Best is to go through the middle of the leaned hole (b = 0) with
+
+        H/2 tan(δ − φ) = (D + H/2) tan φ
+
+    so that both ends there and the far end of the other hole bear alike. With T = tan δ:
+    ρ = (√((D + H)² + (2 D + H) H T²) − (D + H))/(2 T), for small angles δ H (2 D + H)/(4 (D + H)).
+    """
+    t, total = np.tan(tilt), apart + pin
+    grown = (2 * apart + pin) * pin * t * t
+    return float(grown / (np.sqrt(total**2 + grown) + total) / (2 * t))
+
+
+@pytest.mark.parametrize(("apart", "pin"), [(0.3, 0.03), (0.05, 0.04)])
+@pytest.mark.parametrize("degrees", [0.02, 0.2, 1.0])
+def test_hinges_with_a_leaned_hole(apart: float, pin: float, degrees: float) -> None:
+    lean = {"misalignment": {"tilt": np.radians(degrees), "towards": 0.7}}
+    found = solved(hinges(apart, pin, lean, "cylindrical"), 6)
+    sound(found)
+    wanted = leaned(apart, pin, np.radians(degrees))
+    small = np.radians(degrees) * pin * (2 * apart + pin) / (4 * (apart + pin))
+    assert wanted == pytest.approx(small, rel=2e-4)
+    np.testing.assert_allclose(found.needed_clearance, wanted, rtol=1e-7)
+    floating = {**lean, "pin": {"end_float": 1e-3}}  # the float moves the pin's ends a little along the hole
+    np.testing.assert_allclose(
+        solved(hinges(apart, pin, floating), 6).needed_clearance, wanted, rtol=1e-6 + np.radians(degrees) ** 2
+    )
+
+
+@pytest.mark.parametrize("towards", [0.0, 2.0])
+def test_hinges_with_a_hole_out_of_line(towards: float) -> None:
+    """The line through both middles leans by e/D in each hole: ρ = e H/(2 D), exact, for the holes are parallel."""
+    apart, pin, offset = 0.3, 0.03, 1e-4
+    second = {"misalignment": {"offset": offset, "offset_towards": towards}}
+    found = solved(hinges(apart, pin, second, "cylindrical"), 6)
+    sound(found)
+    np.testing.assert_allclose(found.needed_clearance, offset * pin / (2 * apart), rtol=1e-7)
+
+
+def test_hinges_held_along_their_axis() -> None:
+    """Without any end float the pins also keep their distance: against SciPy on the geometry of the pin line."""
+    apart, pin, tilt = 0.3, 0.03, np.radians(0.2)
+    found = solved(hinges(apart, pin, {"misalignment": {"tilt": tilt}}), 4)
+    sound(found)
+    hole = Rotation.from_rotvec([0, tilt, 0]).as_matrix()
+    middle, unit = np.array([0, 0, apart]), 5e-5
+
+    def ends(x: Array) -> Array:
+        """Offsets of the pin line through points of both middle planes, at the four end planes."""
+        one, two = np.array([x[0], x[1], 0]) * unit, middle + hole @ np.array([x[2], x[3], 0]) * unit
+        rows = []
+        for frame, origin in ((np.eye(3), np.zeros(3)), (hole, middle)):
+            start, way = frame.T @ (one - origin), frame.T @ (two - one)
+            rows += [(start + way * (z - start[2]) / way[2])[:2] for z in (-pin / 2, pin / 2)]
+        return np.array(rows) / unit
+
+    def length(x: Array) -> float:
+        one, two = np.array([x[0], x[1], 0]) * unit, middle + hole @ np.array([x[2], x[3], 0]) * unit
+        return float((two - one) @ (two - one) - apart**2) / unit**2
+
+    rng = np.random.default_rng(5)
+    best = np.inf
+    for _ in range(12):
+        rules = [
+            {"type": "ineq", "fun": lambda x: x[4] ** 2 - (ends(x) ** 2).sum(axis=1)},
+            {"type": "eq", "fun": length},
+        ]
+        start = np.append(rng.uniform(-1, 1, 4), 2)
+        one = minimize(
+            lambda x: x[4], start, constraints=rules, method="SLSQP", options={"ftol": 1e-14, "maxiter": 500}
+        )
+        if one.success and abs(length(one.x)) < 1e-8:
+            best = min(best, unit * one.x[4])
+    np.testing.assert_allclose(found.needed_clearance, best, rtol=1e-6)
+    assert best > 1.01 * leaned(apart, pin, tilt)
+
+
+# ---- four-bar -------------------------------------------------------------------------------------------------
+
+
+def rotation(vector: Array) -> Array:
+    """Rodrigues' formula, (…, 3) → (…, 3, 3)."""
+    angle = np.linalg.norm(vector, axis=-1)[..., None, None]
+    x, y, z = np.moveaxis(vector, -1, 0)
+    o = np.zeros_like(x)
+    cross = np.stack([np.stack(row, axis=-1) for row in ((o, -z, y), (z, o, -x), (-y, x, o))], axis=-2)
+    half = np.sinc(angle / (2 * np.pi))  # sin(a/2)/(a/2)
+    return np.asarray(np.eye(3) + np.sinc(angle / np.pi) * cross + 0.5 * half**2 * (cross @ cross))
+
+
+def matrix(vector: Array, way: Array) -> Array:
+    found = np.zeros((*np.broadcast_shapes(vector.shape[:-1], way.shape[:-1]), 4, 4))
+    found[..., :3, :3], found[..., :3, 3], found[..., 3, 3] = rotation(vector), way, 1.0
+    return found
+
+
+def along(x: float) -> Array:
+    return matrix(np.zeros(3), np.array([x, 0, 0]))
+
+
+def turned(angle: Array) -> Array:
+    return matrix(np.stack([0 * angle, 0 * angle, angle], axis=-1), np.zeros(3))
+
+
+class Loop:
+    """The closure of the four-bar in homogeneous matrices, no code shared with the library; (…, turns or ends)."""
+
+    def __init__(self, errors: Data, crank: float) -> None:
+        self.errors, self.crank = errors, crank
+
+    def hole(self, joint: str, x: float, c: Array) -> Array:
+        """Frame of the pin in a link whose hole lies at x: leaned by the error, then as its ends c (…, 2, 2) lie."""
+
+        def lean(slope: Array, way: Array) -> Array:
+            size = np.linalg.norm(slope, axis=-1, keepdims=True)
+            axis = np.stack([-slope[..., 1], slope[..., 0], 0 * slope[..., 0]], axis=-1)
+            bent = axis * np.where(size > 0, np.arctan(size) / np.where(size > 0, size, 1), 1)
+            return matrix(bent, np.concatenate([way, 0 * way[..., :1]], axis=-1))
+
+        error = self.errors.get(joint, {})
+        way = error.get("towards", 0.0)
+        side = np.array([np.cos(way), np.sin(way)])
+        error_ = lean(np.tan(error.get("tilt", 0.0)) * side, error.get("offset", 0.0) * side)
+        return np.asarray(along(x) @ error_ @ lean((c[..., 1, :] - c[..., 0, :]) / PIN, c.mean(axis=-2)))
+
+    def open(self, q: Array, c: Array) -> Array:
+        """Turn and way (over the ground's length) by which the rocker misses its bearing; c (…, joint, end, 2)."""
+        ground, crank, coupler, rocker = LENGTHS
+
+        def back(frame: Array) -> Array:
+            found = np.array(frame)
+            found[..., :3, :3] = np.swapaxes(frame[..., :3, :3], -1, -2)
+            found[..., :3, 3:] = -found[..., :3, :3] @ frame[..., :3, 3:]
+            return found
+
+        at = turned(np.array(self.crank)) @ back(self.hole("A", 0, c[..., 0, :, :]))
+        at = at @ along(crank) @ turned(q[..., 0]) @ back(self.hole("B", 0, c[..., 1, :, :]))
+        at = at @ along(coupler) @ turned(q[..., 1]) @ back(self.hole("C", rocker, c[..., 2, :, :]))
+        missing = back(along(ground) @ turned(q[..., 2])) @ at @ self.hole("D", 0, c[..., 3, :, :])
+        turn = np.stack([missing[..., i, j] - missing[..., j, i] for i, j in ((2, 1), (0, 2), (1, 0))], axis=-1)
+        return np.concatenate([turn / 2, missing[..., :3, 3] / ground], axis=-1)
+
+    def home(self) -> Array:
+        """Turns of B, C and D of the ideal linkage, the coupler's end above the ground."""
+        ground, crank, coupler, rocker = LENGTHS
+        b = crank * np.exp(1j * self.crank)
+        way = ground - b
+        inner = np.arccos((coupler**2 + abs(way) ** 2 - rocker**2) / (2 * coupler * abs(way)))
+        angle = np.angle(way) + inner
+        rock = np.angle(b + coupler * np.exp(1j * angle) - ground)
+        return np.array([angle - self.crank, rock - angle, rock])
+
+    def closed_within(self, radius: float, seed: int) -> float:
+        """Least opening, over radius/pin length, with all ends within `radius`, from a random start."""
+        rng, home, unit = np.random.default_rng(seed), self.home(), radius / PIN
+
+        def rows(x: Array) -> Array:
+            return self.open(home + unit * x[..., :3], radius * x[..., 3:].reshape(*x.shape[:-1], 4, 2, 2)) / unit
+
+        def slope(x: Array) -> Array:
+            step = 1e-4
+            return 2 * rows(x) @ ((rows(x + step * np.eye(19)) - rows(x - step * np.eye(19))) / (2 * step)).T
+
+        def room(x: Array) -> Array:
+            return np.asarray(1 - (x[3:].reshape(8, 2) ** 2).sum(axis=1))
+
+        def room_slope(x: Array) -> Array:
+            found = np.zeros((8, 19))
+            for k in range(8):
+                found[k, 3 + 2 * k : 5 + 2 * k] = -2 * x[3 + 2 * k : 5 + 2 * k]
+            return found
+
+        start = np.append(rng.uniform(-1, 1, 3), rng.uniform(-0.7, 0.7, 16))
+        found = minimize(
+            lambda x: float(np.sum(rows(x) ** 2)), start, jac=slope, method="SLSQP",
+            constraints={"type": "ineq", "fun": room, "jac": room_slope}, options={"ftol": 1e-16, "maxiter": 400},
+        )  # fmt: skip
+        return float(np.max(np.abs(rows(found.x))))
+
+
+@pytest.mark.parametrize("joint", ["B", "D"])
+def test_four_bar_against_an_independent_closure(joint: str) -> None:
+    errors = {joint: {**LEAN, "towards": 0.5}}
+    found = solved(four_bar(errors))
+    sound(found)
+    place = int(np.argmax(found.needed_clearance.values))
+    need = float(found.needed_clearance[place])
+    loop = Loop(errors, float(found.drive_coordinate[0, place]))
+    offsets = found.uniform_offset.isel(position=place).values[:, :2, :2]
+    np.testing.assert_allclose(np.hypot(*np.moveaxis(offsets, -1, 0)).max(), need, rtol=1e-9)
+
+    def turns(q: Array) -> Array:
+        return loop.open(q, offsets)
+
+    q = loop.home()  # the library's offsets close the other geometry: three turns, six equations
+    for _ in range(8):
+        slope = np.stack([(turns(q + step) - turns(q - step)) / 2e-6 for step in 1e-6 * np.eye(3)], axis=-1)
+        q = q - np.linalg.lstsq(slope, turns(q), rcond=None)[0]
+    assert np.abs(turns(q)).max() < 1e-12
+    above = loop.closed_within(1.001 * need, 0)
+    below = [loop.closed_within(0.999 * need, seed) for seed in range(3)]
+    assert above < 1e-8
+    assert min(below) > 1e-3  # from every start the same
+    assert max(below) < 1.001 * min(below)
+
+
+def test_stated_clearances_enough_and_not() -> None:
+    errors = {"B": LEAN}
+    need = float(solved(four_bar(errors)).smallest_clearance)
+    tall = {name: {"clearance": 1.0001 * need} for name in "ABCD"}
+    enough = solved(four_bar(errors, tall))
+    assert (enough.status == Fit.FITS).all()
+    assert float(enough.largest_share) == pytest.approx(1 / 1.0001, rel=1e-9)
+    assert [row["severity"] for row in json.loads(enough.attrs["findings"])] == ["note"]
+    low = {name: {"clearance": 0.9 * need} for name in "ABCD"}
+    short = solved(four_bar(errors, low))
+    np.testing.assert_array_equal(short.status == Fit.SHORT, short.needed_clearance > 0.9 * need)
+    np.testing.assert_allclose(short.needed_share * 0.9 * need, short.needed_clearance, rtol=1e-9)
+    (told,) = json.loads(short.attrs["findings"])
+    assert told["severity"] == "error"
+    assert "between 125° and 310° of A" in told["what"]
+    assert f"{1e6 * need:.5g} um" in told["remedy"]
+
+
+def test_a_joint_without_play_has_no_offset() -> None:
+    """Its ends are no unknowns, the others need more; other clearances count by their own sizes."""
+    errors = {"B": LEAN}
+    every, some = (
+        solved(four_bar(errors, {name: {"clearance": 2e-5} for name in names}), 12) for names in ("ABCD", "ABC")
+    )
+    sound(some)
+    assert np.isnan(some.stated_offset.sel(joint="D")).all()
+    assert (some.stated_part.sel(joint="D") == 0).all()
+    assert some.attrs["assembling"] == "A, B, C"
+    assert (some.needed_share > 1.1 * every.needed_share).all()
+    wide = solved(four_bar(errors, {name: {"clearance": 4e-5 if name == "B" else 2e-5} for name in "ABCD"}), 12)
+    assert (wide.needed_share < every.needed_share).all()
+    np.testing.assert_allclose(wide.needed_clearance, every.needed_clearance, rtol=1e-9)
+    np.testing.assert_allclose(wide.stated_part.sum(["joint", "end"]), 1, rtol=1e-6)
+
+
+def test_no_play_is_stated() -> None:
+    found = solved(four_bar({"B": LEAN}), 36)
+    assert (found.status == Fit.RIGID).all()
+    assert np.isinf(found.needed_share).all()
+    (told,) = json.loads(found.attrs["findings"])
+    assert told["what"].startswith(
+        "no play is stated: the loops stay open by up to 0.3898 mm and 0.2° at every position"
+    )
+    assert "the same in the pins A, B, C, D, is 14.345 um" in told["remedy"]
+    unsized = four_bar({"B": LEAN})
+    for joint in unsized["joints"].values():
+        del joint["pin"]["length"]
+    with pytest.raises(trunnion.MechanismError, match="depends on its length, which is not stated — state length or"):
+        solved(unsized)
+
+
+def test_part_is_the_derivative() -> None:
+    """A little more clearance in one pin lowers the needed share of all by its part."""
+    errors, clearance, more = {"B": LEAN}, 2e-5, 1e-9
+    flat = solved(four_bar(errors, {name: {"clearance": clearance} for name in "ABCD"}), 9)
+    for joint in "AC":
+        pins = {name: {"clearance": clearance + more * (name == joint)} for name in "ABCD"}
+        slope = (solved(four_bar(errors, pins), 9).needed_share / flat.needed_share - 1) * clearance / more
+        np.testing.assert_allclose(-slope, flat.stated_part.sel(joint=joint).sum("end"), atol=2e-4)
+
+
+# ---- other linkages -------------------------------------------------------------------------------------------
+
+
+def test_bennett_with_a_twist_that_is_off() -> None:
+    """The same whether the error is stated as one, and so the ideal linkage is known, or the twist as it is."""
+    plain = trunnion.read("examples/bennett.yaml")
+    twist = float(plain.parameters()["loop.B.twist"])
+    off = np.radians(0.1)
+    stated, twice = (
+        solved(trunnion.Mechanism(**{**plain.data(), "errors": {"loop.B.twist": size}}), 24) for size in (off, 2 * off)
+    )
+    sound(stated)
+    np.testing.assert_allclose(twice.needed_clearance, 2 * stated.needed_clearance, rtol=0.02)
+    direct = solved(plain.with_values({"loop.B.twist": twist + off}), 24)
+    np.testing.assert_allclose(direct.needed_clearance, stated.needed_clearance, rtol=1e-9)
+    assert any("do not fit" in row["what"] for row in json.loads(direct.attrs["findings"]))
+
+
+@pytest.mark.parametrize("name", ["bennett", "sarrus", "fourbar-in-space", "spherical-four-bar"])
+def test_axes_that_fit_need_nothing(name: str) -> None:
+    found = solved(trunnion.read(f"examples/{name}.yaml"), 12)
+    assert (found.status == Fit.FITS).all()
+    assert (found.needed_clearance == 0).all()
+    assert float(found.smallest_clearance) == 0
+    assert any("loops close without any clearance" in row["what"] for row in json.loads(found.attrs["findings"]))
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("rssr", "its joints constrain no more than its links have freedoms"),
+        ("pezzuti-cardan", "its joints constrain no more than its links have freedoms"),
+        ("durango-fourbar", "in the plane no joint constrains twice"),
+    ],
+)
+def test_no_redundant_joint_needs_no_clearance(name: str, said: str) -> None:
+    found = solved(trunnion.read(f"examples/{name}.yaml"), 12)
+    assert (found.status == Fit.FITS).all()
+    assert (found.needed_clearance == 0).all()
+    assert any(said in row["what"] for row in json.loads(found.attrs["findings"]))
+
+
+def test_guide_and_pins() -> None:
+    """A slider-crank in space whose crank pin leans: the guide's own play helps, and can share the clearance."""
+
+    def point(x: float, guide: bool = False) -> Data:
+        return {"at": [x, 0, 0], **({"axis": [1, 0, 0], "x": [0, 0, 1]} if guide else UPRIGHT)}
+
+    def model(play: Data) -> Data:
+        return {
+            "space": "spatial",
+            "links": {
+                "ground": {"points": {"A": point(0), "S": point(0, True)}},
+                "crank": {"points": {"A": point(0), "B": point(0.05)}},
+                "rod": {"points": {"B": point(0), "C": point(0.2)}},
+                "slider": {"points": {"C": point(0), "S": point(0, True)}},
+            },
+            "joints": {
+                "A": {"type": "revolute", "links": ["ground", "crank"]},
+                "B": {"type": "revolute", "links": ["crank", "rod"], "misalignment": LEAN},
+                "C": {"type": "revolute", "links": ["rod", "slider"]},
+                "S": {
+                    "type": "prismatic",
+                    "links": ["ground", "slider"],
+                    "guide": {"length": 0.06, "width": 0.04, **play},
+                },
+            },
+            "joint_defaults": {"pin": {"radius": 0.005, "length": 0.02}},
+            "drivers": {"A": {"speed": 1.0}},
+            "assembly": {"C": [0.25, 0, 0]},
+        }
+
+    stiff = solved(model({}), 24)
+    loose = model({"clearance": 1e-4})
+    for joint in "ABC":
+        loose["joints"][joint]["pin"] = {"clearance": 5e-5}
+    helped, shared = solved(loose, 24), solved(loose, 24, uniform="all")
+    for found in (stiff, helped, shared):
+        sound(found)
+    assert (helped.needed_clearance < 0.9 * stiff.needed_clearance).all()
+    assert (shared.needed_clearance < stiff.needed_clearance).all()
+    assert shared.attrs["assembling"] == "A, B, C, S"
+    spread = shared.uniform_offset.sel(joint="S")
+    assert float(np.abs(spread).max()) <= float(shared.needed_clearance.max()) * (1 + 1e-9)
+    assert float(np.abs(helped.uniform_offset.sel(joint="S")).max()) <= 1e-4 * (1 + 1e-9)
+
+
+# ---- derivatives and invariances ------------------------------------------------------------------------------
+
+
+def test_derivatives_by_differences() -> None:
+    mechanism = trunnion.Mechanism(**four_bar({"B": LEAN, "D": {"offset": 1e-4, "towards": 1.0}}))
+    system: Any = build(mechanism)
+    values = mechanism.parameters()
+    study = Study.of(system, values, mechanism.ideal_parameters(), system.cycle(values), "pins")
+    time = np.array([0.3, 2.0, 5.0])
+    found = study.solve(time, stated=False)
+    loops = Loops.of(system, values, study.pins, time)
+    linear = loops.linear(found.q, found.offsets)
+    step = 1e-6
+    for k in range(linear.jacobian.shape[2]):
+        ways = [np.tile(sign * step * np.eye(linear.jacobian.shape[2])[k], (3, 1)) for sign in (1, -1)]
+        up, down = (loops.linear(loops.moved(found.q, way), found.offsets).gap for way in ways)
+        np.testing.assert_allclose(linear.jacobian[..., k], (up - down) / (2 * step), atol=1e-9)
+    for k in range(linear.effect.shape[2]):
+        ways = [np.tile(sign * step * np.eye(linear.effect.shape[2])[k], (3, 1)) for sign in (1, -1)]
+        up, down = (loops.linear(found.q, found.offsets + way).gap for way in ways)
+        np.testing.assert_allclose(linear.effect[..., k], (up - down) / (2 * step), atol=1e-6)
+
+
+def test_invariances() -> None:
+    """Lengths times 1000, another frame of the ground, other orders of the joints."""
+    errors = {"B": LEAN, "C": {"tilt": 1e-3, "towards": 1.0, "offset": 2e-5}}
+    plain = solved(four_bar(errors), 24)
+    sound(plain)
+    large = {
+        name: {**error, **({"offset": 1e3 * error["offset"]} if "offset" in error else {})}
+        for name, error in errors.items()
+    }
+    np.testing.assert_allclose(
+        solved(four_bar(large, scale=1e3), 24).needed_clearance, 1e3 * plain.needed_clearance, rtol=1e-8
+    )
+    moved = (Rotation.from_rotvec([0.4, -1.1, 0.7]), np.array([0.3, -0.2, 0.5]))
+    for other in (four_bar(errors, moved=moved), four_bar(errors, order="DCBA"), four_bar(errors, order="CADB")):
+        found = solved(other, 24).sel(joint=plain.joint)
+        np.testing.assert_allclose(found.needed_clearance, plain.needed_clearance, rtol=1e-8)
+        np.testing.assert_allclose(found.uniform_part.sum("end"), plain.uniform_part.sum("end"), atol=1e-4)
+
+
+def test_sampling_does_not_decide_the_smallest_clearance() -> None:
+    coarse, fine = (float(solved(four_bar({"B": LEAN}), steps).smallest_clearance) for steps in (10, 144))
+    assert coarse == pytest.approx(fine, rel=1e-7)
+
+
+def test_where_it_cannot_be_assembled() -> None:
+    """A linkage that does not turn all the way says where, with its answer elsewhere."""
+    data = four_bar({"B": LEAN})
+    data["links"]["crank"]["points"]["B"]["at"] = [0.065, 0, 0]
+    found = solved(data, 36)
+    apart = found.status == Fit.APART
+    assert 0 < int(apart.sum()) < 36
+    assert np.isnan(found.needed_clearance[apart]).all()
+    assert np.isfinite(found.needed_clearance[~apart]).all()
+    assert float(found.closure_residual.max()) < OPEN
+    told = json.loads(found.attrs["findings"])
+    assert any("cannot be assembled, with or without errors" in row["what"] for row in told)
+
+
+def test_a_freedom_that_nothing_drives_is_refused() -> None:
+    data = four_bar({"B": LEAN})
+    del data["drivers"]
+    with pytest.raises(
+        trunnion.MechanismError, match="1 freedom is not determined, of the links crank, coupler, rocker"
+    ):
+        solved(data)
+
+
+@pytest.mark.parametrize("degrees", [1, 5, 15])
+def test_errors_that_are_not_small(degrees: float) -> None:
+    """The sequence of cone programmes settles on the exact closure there too; the need is nearly proportional."""
+    small, large = (solved(four_bar({"B": {"tilt": np.radians(one)}}), 12) for one in (0.01, degrees))
+    sound(large)
+    ratio = np.tan(np.radians(degrees)) / np.radians(0.01)
+    np.testing.assert_allclose(large.needed_clearance, ratio * small.needed_clearance, rtol=0.02 * degrees)
+
+
+def test_pins_held_along_one_axis_and_out_of_line() -> None:
+    """No end float, parallel holes: a line that leans nowhere fits to first order only; it is not guessed."""
+    found = solved(hinges(0.3, 0.03, {"misalignment": {"offset": 1e-4}}), 6)
+    unsettled = found.status == Fit.UNSETTLED
+    assert unsettled.any()
+    assert np.isnan(found.needed_clearance[unsettled]).all()
+    assert np.isnan(found.smallest_clearance)
+    assert any("give one an end float" in row["remedy"] for row in json.loads(found.attrs["findings"]))

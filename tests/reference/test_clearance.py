@@ -1,0 +1,494 @@
+"""Play of joints against the geometry and mechanics it stands for, each written here once more from first principles.
+
+The pin's shift against the screw along the common perpendicular of two lines and against dual matrices, 50 digits as
+the measure of rounding; seats against an optimiser over the play; friction against the balance of a contact.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mpmath as mp
+import numpy as np
+import pytest
+from scipy import optimize
+
+from reference.maximal_space import Array
+from trunnion.algebra.dual import Dual, derivative, primal
+from trunnion.algebra.rigid import Frame as RigidFrame
+from trunnion.joints.clearance import (
+    CLEARANCE_MODELS,
+    described,
+    describing,
+    ellipse_error,
+    pin_transform,
+    pressed,
+    turned_by_friction,
+    worst_case,
+)
+
+mp.mp.dps = 50
+CASES = 20_000
+
+
+def numbers(frame: RigidFrame) -> tuple[Array, Array]:
+    """Rotation (3, 3, …) with the axes as columns, and place (3, …)."""
+    axes = [[np.asarray(primal(axis[row])) for axis in frame[:3]] for row in range(3)]
+    shape = np.broadcast_shapes(*(np.shape(n) for row in axes for n in row), *(np.shape(n) for n in frame.place))
+    rotation_ = np.array([[np.broadcast_to(n, shape) for n in row] for row in axes], float)
+    return rotation_, np.array([np.broadcast_to(n, shape) for n in frame.place], float)
+
+
+def drawn(count: int = CASES, least: float = 1e-3) -> tuple[Array, Array, Array, Array]:
+    """ρ and H in m, β away from 0, ξ."""
+    rng = np.random.default_rng(5)
+    rho, length = 10.0 ** rng.uniform(-6, -2, count), 10.0 ** rng.uniform(-2, 0, count)
+    beta = rng.uniform(least, np.pi, count) * rng.choice([-1, 1], count)
+    return rho, length, beta, rng.uniform(-np.pi, np.pi, count)
+
+
+# ---- the shift as geometry --------------------------------------------------------------------------------------
+
+
+def common_perpendicular(hole: tuple[Array, Array], pin: tuple[Array, Array]) -> tuple[Array, Array]:
+    """The screw along the common perpendicular of two lines that carries the first to the second; (…, 3) each.
+
+    Lines by a point and a direction. Returns R (…, 3, 3) and where the screw takes the origin.
+    """
+    (p, u), (q, v) = hole, pin
+    v = v / np.linalg.norm(v, axis=-1, keepdims=True)
+    normal = np.cross(u, v)
+    sine = np.linalg.norm(normal, axis=-1, keepdims=True)
+    cosine, n = np.sum(u * v, axis=-1, keepdims=True), normal / sine
+    gap = q - p
+    foot = p + u * np.sum(np.cross(gap, v) * n, axis=-1, keepdims=True) / sine  # on the first line
+    slide = np.sum(gap * n, axis=-1, keepdims=True)
+    zero = np.zeros_like(n[..., 0])
+    skew = np.array(
+        [[zero, -n[..., 2], n[..., 1]], [n[..., 2], zero, -n[..., 0]], [-n[..., 1], n[..., 0], zero]]
+    ).transpose(2, 0, 1)
+    turn = np.eye(3) + sine[..., None] * skew + (sine**2 / (1 + cosine))[..., None] * skew @ skew
+    return turn, foot - np.einsum("nij,nj->ni", turn, foot) + slide * n
+
+
+def test_shift_is_the_screw_along_the_common_perpendicular() -> None:
+    """20 000 pins: hole's axis z, pin's axis through C₁ and C₂ on circles of radius ρ at z = ∓H/2; to 1e-12."""
+    rho, length, beta, xi = drawn()
+    ends = [
+        np.column_stack([rho * np.cos(angle), rho * np.sin(angle), side * length / 2])
+        for angle, side in ((xi + beta / 2, -1), (xi - beta / 2, 1))
+    ]
+    none = np.zeros_like(ends[0])
+    turn, place = common_perpendicular((none, none + np.array([0, 0, 1.0])), (ends[0], ends[1] - ends[0]))
+    axes, found = numbers(pin_transform(rho, length, beta, xi))
+    np.testing.assert_allclose(axes.transpose(2, 0, 1), turn, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(found.T, place, rtol=0, atol=1e-12)
+    # in shares of the clearance too: the tilt is small and must not hide behind the ones of the matrix
+    np.testing.assert_allclose(found.T / rho[:, None], place / rho[:, None], rtol=0, atol=1e-9)
+    tilt, expected = axes[:2, 2].T * (length / rho)[:, None], turn[:, :2, 2] * (length / rho)[:, None]
+    np.testing.assert_allclose(tilt, expected, rtol=0, atol=1e-9)
+
+
+def dual_product(*matrices: tuple[Array, Array]) -> tuple[Array, Array]:
+    """(A + ε B)(C + ε D) …, by parts."""
+    real, dual = matrices[0]
+    for more_real, more_dual in matrices[1:]:
+        real, dual = real @ more_real, real @ more_dual + dual @ more_real
+    return real, dual
+
+
+def about(axis: int, angle: Array, slide: Array) -> tuple[Array, Array]:
+    """Dual rotation about x or z by angle + ε slide: f(a + ε b) = f(a) + ε b f′(a) of each entry."""
+    real, dual = (np.zeros((len(angle), 3, 3)) for _ in range(2))
+    i, j = {0: (1, 2), 2: (0, 1)}[axis]
+    c, s = np.cos(angle), np.sin(angle)
+    for target, cosine, sine, one in ((real, c, s, 1.0), (dual, -slide * s, slide * c, 0.0)):
+        target[:, i, i] = target[:, j, j] = cosine
+        target[:, i, j], target[:, j, i] = -sine, sine
+        target[:, axis, axis] = one
+    return real, dual
+
+
+def test_shift_is_the_product_of_dual_rotations() -> None:
+    """Z(ξ) X(α̂) Z(−ξ) = R + ε [p]× R with α̂ = α + ε d, tan α = (2ρ/H) sin(β/2), d = ρ cos(β/2); to 1e-15."""
+    rho, length, beta, xi = drawn(least=0.0)
+    alpha, none = np.arctan(2 * rho / length * np.sin(beta / 2)), np.zeros_like(rho)
+    x = about(0, alpha, rho * np.cos(beta / 2))
+    real, dual = dual_product(about(2, xi, none), x, about(2, -xi, none))
+    axes, place = numbers(pin_transform(rho, length, beta, xi))
+    np.testing.assert_allclose(axes.transpose(2, 0, 1), real, rtol=0, atol=1e-15)
+    moment = dual @ real.transpose(0, 2, 1)  # [p]×
+    expected = np.array([moment[:, 2, 1], moment[:, 0, 2], moment[:, 1, 0]])
+    np.testing.assert_allclose(place, expected, rtol=0, atol=1e-15)
+
+
+def precise(rho: Any, length: Any, beta: Any, xi: Any) -> tuple[list[list[Any]], list[Any]]:
+    """The same matrix in 50 digits: I + sin α [e]× + (1 − cos α) [e]×², and its place."""
+    rho, length, beta, xi = (mp.mpf(n) for n in (rho, length, beta, xi))
+    alpha, d = mp.atan(2 * rho / length * mp.sin(beta / 2)), rho * mp.cos(beta / 2)
+    c, s = mp.cos(xi), mp.sin(xi)
+    skew = mp.matrix([[0, 0, s], [0, 0, -c], [-s, c, 0]])
+    turn = mp.eye(3) + mp.sin(alpha) * skew + 2 * mp.sin(alpha / 2) ** 2 * skew * skew
+    return [[turn[i, k] for k in range(3)] for i in range(3)], [d * c, d * s, mp.mpf(0)]
+
+
+@pytest.mark.parametrize("exponent", [0, -1, -3, -6, -9, -12, -15, -100])
+def test_no_digit_is_lost_at_small_beta(exponent: int) -> None:
+    """Tilt and displacement hold 15 digits of their own however small β is; so do those near β = π."""
+    rng = np.random.default_rng(-exponent)
+    for _ in range(100):
+        rho, length, xi = 10 ** rng.uniform(-6, -3), rng.uniform(0.005, 0.1), rng.uniform(-3, 3)
+        for beta in (10.0**exponent, -(10.0**exponent), np.pi - 10.0**exponent):
+            (turn, place), found = precise(rho, length, beta, xi), pin_transform(rho, length, beta, xi)
+            tilt = mp.hypot(turn[0][2], turn[1][2])
+            assert mp.hypot(found.z[0] - turn[0][2], found.z[1] - turn[1][2]) <= 1e-15 * tilt
+            d = mp.hypot(place[0], place[1])
+            assert mp.hypot(found.place[0] - place[0], found.place[1] - place[1]) <= 1e-15 * d
+            for axis, k in ((found.x, 0), (found.y, 1), (found.z, 2)):
+                assert all(abs(axis[i] - turn[i][k]) <= 3e-16 for i in range(3))
+
+
+@pytest.mark.parametrize("exponent", [0, -3, -6, -9, -12, -15])
+def test_beta_of_end_offsets_keeps_the_digits_they_have(exponent: int) -> None:
+    """β and ξ of two offsets against 50 digits of the same numbers; the offsets themselves are rounded at 1e-16 ρ."""
+    rng = np.random.default_rng(3)
+    for _ in range(100):
+        rho, xi = 10 ** rng.uniform(-6, -3), rng.uniform(-3, 3)
+        first, second = described(rho, 10.0**exponent, xi)
+        (x1, y1), (x2, y2) = ([mp.mpf(float(n)) for n in end] for end in (first, second))
+        beta = mp.atan2(x2 * y1 - y2 * x1, x1 * x2 + y1 * y2)
+        found = describing(first, second)
+        assert abs(float(found[0]) - beta) <= 1e-15 * abs(beta)
+        turns = (float(found[1]) - (mp.atan2(y2, x2) + beta / 2)) / (2 * mp.pi)
+        assert abs(turns - mp.nint(turns)) <= 1e-15
+        assert -np.pi < float(found[1]) <= np.pi
+
+
+def test_beta_zero_is_a_pure_shift_and_beta_pi_crosses_the_axes() -> None:
+    rho, length, _, xi = drawn()
+    axes, place = numbers(pin_transform(rho, length, 0.0 * xi, xi))
+    np.testing.assert_array_equal(axes, np.broadcast_to(np.eye(3)[:, :, None], axes.shape))
+    np.testing.assert_allclose(place, [rho * np.cos(xi), rho * np.sin(xi), 0 * xi], rtol=1e-15)
+    axes, place = numbers(pin_transform(rho, length, np.pi, xi))
+    assert np.max(np.abs(place) / rho) < 1e-16, "the axes cross in the middle"
+    np.testing.assert_allclose(np.hypot(axes[0, 2], axes[1, 2]) / axes[2, 2], 2 * rho / length, rtol=1e-14)
+    np.testing.assert_allclose(axes[0, 2] * np.cos(xi) + axes[1, 2] * np.sin(xi), 0, rtol=0, atol=1e-16)
+    beta, _ = describing(*described(rho, np.pi, xi))
+    np.testing.assert_allclose(np.abs(beta), np.pi, rtol=1e-15)
+    for first, second in (((1.0, 0.0), (-1.0, 0.0)), ((-1.0, 0.0), (1.0, 0.0)), ((0.0, -1.0), (0.0, 1.0))):
+        beta, turned = describing(first, second)
+        assert float(beta) == np.pi
+        assert -np.pi < float(turned) <= np.pi
+
+
+def test_description_has_two_names_for_one_place() -> None:
+    """(ξ, β) and (ξ + π, β − 2π) are the same pin; of described offsets the name with β in (−π, π] comes back."""
+    rho, length, beta, xi = drawn(least=0.0)
+    for one, other in zip(
+        numbers(pin_transform(rho, length, beta, xi)),
+        numbers(pin_transform(rho, length, beta - 2 * np.pi, xi + np.pi)),
+        strict=True,
+    ):
+        np.testing.assert_allclose(one, other, rtol=0, atol=1e-15)
+    found_beta, found_xi = describing(*described(rho, beta, xi))
+    np.testing.assert_allclose(found_beta, beta, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(found_xi, xi, rtol=0, atol=1e-14)
+    found_beta, found_xi = describing(*described(rho, beta - 2 * np.pi, xi + np.pi))
+    np.testing.assert_allclose(found_beta, beta, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(found_xi, xi, rtol=0, atol=1e-14)
+    ends = [rho * (np.cos(xi + sign * beta / 2) + 1j * np.sin(xi + sign * beta / 2)) for sign in (1, -1)]
+    for vector, end in zip(described(rho, beta, xi), ends, strict=True):
+        np.testing.assert_allclose(vector[0] + 1j * vector[1], end, rtol=1e-15)
+
+
+def test_shift_is_a_rotation_and_the_ends_are_farther_apart_than_the_bearing_is_long() -> None:
+    """Orthonormal to 1e-15; |C₁C₂| = H/cos α, both ends on the pin's axis at ± half of that from its middle."""
+    rho, length, beta, xi = drawn(least=0.0)
+    axes, place = numbers(pin_transform(rho, length, beta, xi))
+    grams = np.einsum("kin,kjn->ijn", axes, axes) - np.eye(3)[:, :, None]
+    assert np.max(np.abs(grams)) < 1e-15
+    np.testing.assert_allclose(np.linalg.det(axes.transpose(2, 0, 1)), 1, rtol=0, atol=1e-15)
+    far = length / axes[2, 2] / 2
+    for sign, vector in zip((-1, 1), described(rho, beta, xi), strict=True):
+        np.testing.assert_allclose(place + sign * far * axes[:, 2], [*vector, sign * length / 2], rtol=0, atol=2e-16)
+    c1, c2 = (np.array([*v, s * length / 2]) for v, s in zip(described(rho, beta, xi), (-1, 1), strict=True))
+    np.testing.assert_allclose(np.linalg.norm(c2 - c1, axis=0), 2 * far, rtol=1e-15)
+
+
+def test_pin_anywhere_in_its_hole_lies_on_the_line_of_its_ends() -> None:
+    """The shift of any offsets, inside the holes too: z along C₂ − C₁, the origin at their middle, no spin about z."""
+    rng = np.random.default_rng(8)
+    for kind in ("revolute", "cylindrical", "prismatic"):
+        play = CLEARANCE_MODELS["spatial"][kind]
+        c1, c2 = rng.uniform(-1e-2, 1e-2, (2, 2, 2000))
+        length, float_ = rng.uniform(0.01, 0.2, 2000), rng.uniform(-1e-3, 1e-3, 2000)
+        ends = {"revolute": [c1, c2, (float_,)], "cylindrical": [c1, c2], "prismatic": [(n,) for n in (*c1, *c2)]}
+        axes, place = numbers(play.shift(ends[kind], length))
+        u = np.array([*(c2 - c1), length])
+        np.testing.assert_allclose(axes[:, 2], u / np.linalg.norm(u, axis=0), rtol=0, atol=5e-16)
+        along = float_ if kind == "revolute" else 0 * float_
+        np.testing.assert_allclose(place, [*(c1 + c2) / 2, along], rtol=0, atol=1e-17)
+        np.testing.assert_allclose(axes[1, 0], axes[0, 1], rtol=0, atol=0)  # a rotation about a line in x, y
+
+
+def test_derivatives_of_the_shift() -> None:
+    """∂Â/∂(ρ, H, β, ξ) and by every end offset: dual parts against 50 digits, at β = 0 and π too."""
+    rng = np.random.default_rng(11)
+    for beta in (0.0, 1e-15, 1e-8, 0.3, -2.0, 3.0, float(np.pi)):
+        given = [2e-4, 0.02, beta, float(rng.uniform(-3, 3))]
+        for n in range(4):
+            found = pin_transform(*(Dual(g, 1.0) if i == n else g for i, g in enumerate(given)))
+
+            def entry(number: Any, row: int, column: int, n: int = n, given: list[float] = given) -> Any:
+                turn, place = precise(*(number if i == n else g for i, g in enumerate(given)))
+                return turn[row][column] if column < 3 else place[row]
+
+            columns = (found.x, found.y, found.z, found.place)
+            expected = [[float(mp.diff(lambda q, i=i, k=k: entry(q, i, k), given[n])) for i in range(3)]
+                        for k in range(4)]  # fmt: skip
+            scale = np.max(np.abs(expected))
+            for k in range(4):
+                slopes = [float(np.ravel(derivative(columns[k][i] + 0.0 * Dual(0.0, 1.0)))[0]) for i in range(3)]
+                np.testing.assert_allclose(slopes, expected[k], rtol=1e-13, atol=1e-15 * scale)
+
+
+# ---- the seat under a load --------------------------------------------------------------------------------------
+
+# what the play of a pair lets its pin do, from the picture: places of the ends along the axis in H (z; of a planar
+# guide x), what of the small motion t + φ × r there is held, and which parts of force and moment it carries
+PICTURE: dict[tuple[str, str], tuple[list[tuple[float, str]], str]] = {
+    ("planar", "revolute"): ([(0.0, "xy")], "xy"),
+    ("planar", "prismatic"): ([(-0.5, "y"), (0.5, "y")], "yc"),
+    ("spatial", "revolute"): ([(-0.5, "xy"), (0.5, "xy"), (0.0, "z")], "xyzab"),
+    ("spatial", "cylindrical"): ([(-0.5, "xy"), (0.5, "xy")], "xyab"),
+    ("spatial", "prismatic"): ([(-0.5, "x"), (-0.5, "y"), (0.5, "x"), (0.5, "y")], "xyab"),
+    ("spatial", "spherical"): ([(0.0, "xyz")], "xyz"),
+}
+MODELS = [(space, kind) for space, models in CLEARANCE_MODELS.items() for kind in models]
+
+
+def held(space: str, kind: str, length: float) -> list[Array]:
+    """For each end the matrix that takes the small motion (t, φ), in the parts that count, to the end's offset."""
+    ends, parts = PICTURE[space, kind]
+    columns = ["xyzabc".index(part) for part in parts]
+    found = []
+    for at, letters in ends:
+        r = np.array([at * length, 0, 0]) if space == "planar" else np.array([0, 0, at * length])
+        motion = np.hstack([np.eye(3), [[0, r[2], -r[1]], [-r[2], 0, r[0]], [r[1], -r[0], 0]]])  # t + φ × r
+        found.append(motion[["xyz".index(letter) for letter in letters]][:, columns])
+    return found
+
+
+def best_motion(matrices: list[Array], radii: Array, load: Array) -> tuple[Array, float]:
+    """Small motion of most work, load · motion, with every end within its radius: by SLSQP from the middle."""
+    scale = np.array([1.0 / max(np.max(np.abs(np.vstack(matrices)[:, k])), 1e-9) for k in range(len(load))])
+    work = load * scale / np.linalg.norm(load * scale)
+
+    def room(motion: Array) -> Array:
+        return np.array([r * r - np.sum((m @ (scale * motion)) ** 2) for m, r in zip(matrices, radii, strict=True)])
+
+    def slope(motion: Array) -> Array:
+        return np.array([-2 * (m @ (scale * motion)) @ m * scale for m in matrices])
+
+    result = optimize.minimize(
+        lambda q: -work @ q, 0.1 * work, jac=lambda q: -work, method="SLSQP",
+        constraints={"type": "ineq", "fun": room, "jac": slope}, options={"ftol": 1e-16, "maxiter": 500},
+    )  # fmt: skip
+    return scale * result.x, float(load @ (scale * result.x))
+
+
+def test_every_play_has_a_picture() -> None:
+    assert set(PICTURE) == set(MODELS)
+
+
+@pytest.mark.parametrize(("space", "kind"), MODELS)
+def test_loaded_seat_does_most_work(space: str, kind: str) -> None:
+    """F · t + M · φ over the play, against an optimiser: offsets to 1e-6 of the clearance."""
+    play, rng = CLEARANCE_MODELS[space][kind], np.random.default_rng(17)
+    parts = PICTURE[space, kind][1]
+    for _ in range(60):
+        length = float(rng.uniform(0.5, 3.0))
+        radii = rng.uniform(0.5, 1.5, len(play.ends))
+        wrench = np.zeros(6)
+        wrench[["xyzabc".index(part) for part in parts]] = rng.normal(size=len(parts)) * rng.choice([1.0, 30.0])
+        matrices = held(space, kind, length)
+        load = wrench[["xyzabc".index(part) for part in parts]]
+        motion, work = best_motion(matrices, radii, load)
+        loads = play.loads(tuple(wrench[:3]), tuple(wrench[3:]), length)
+        seat = [np.array(pressed(q, r), float) for q, r in zip(loads, radii, strict=True)]
+        for matrix, vector, radius in zip(matrices, seat, radii, strict=True):
+            np.testing.assert_allclose(vector, matrix @ motion, rtol=0, atol=1e-6 * radius)
+            assert np.linalg.norm(vector) == pytest.approx(radius, rel=1e-15)
+        assert float(worst_case(loads, radii)) == pytest.approx(work, rel=1e-7)
+        assert sum(float(np.dot(q, c)) for q, c in zip(loads, seat, strict=True)) == pytest.approx(work, rel=1e-7)
+
+
+@pytest.mark.parametrize(("space", "kind"), MODELS)
+def test_offsets_are_what_the_shift_does_to_the_ends(space: str, kind: str) -> None:
+    """The pin's frame of small offsets moves its ends by them: the linear part of the shift is the picture's."""
+    play, rng, length, h = CLEARANCE_MODELS[space][kind], np.random.default_rng(2), 0.07, 1e-6
+    matrices = np.vstack(held(space, kind, length))
+    columns = ["xyzabc".index(part) for part in PICTURE[space, kind][1]]
+    for _ in range(20):
+        offsets = [tuple(h * rng.normal(size=len(end))) for end in play.ends]
+        shift = play.shift(offsets, length)
+        motion = np.zeros(6)
+        if space == "planar":
+            motion[:2], motion[5] = shift[:2], np.arctan2(shift[3], shift[2])
+        else:
+            axes, place = numbers(shift)
+            motion[:3] = place
+            motion[3:] = [axes[2, 1], axes[0, 2], axes[1, 0]]
+        flat = np.concatenate([np.array(end) for end in offsets])
+        np.testing.assert_allclose(matrices @ motion[columns], flat, rtol=0, atol=1e-8 * h)  # next is (c/H)²
+
+
+def test_seat_snaps_where_the_moment_is_half_the_force_times_the_length() -> None:
+    """M ⟂ F: β = 0 while |M| < |F| H/2, β = π beyond; at it one end carries nothing and is in the middle."""
+    play, length, size, rho = CLEARANCE_MODELS["spatial"]["cylindrical"], 0.02, 50.0, 2e-5
+    for angle in np.linspace(-3, 3, 13):
+        force = size * np.array([np.cos(angle), np.sin(angle), 0])
+        across = np.array([-np.sin(angle), np.cos(angle), 0])
+        for sign in (1, -1):
+            for share, expected in ((0.0, 0.0), (0.5, 0.0), (1 - 1e-12, 0.0), (1 + 1e-12, np.pi), (7.0, np.pi)):
+                moment = sign * share * size * length / 2 * across
+                ends = [pressed(q, rho) for q in play.loads(tuple(force), tuple(moment), length)]
+                beta, _ = describing(*ends)
+                # the end with next to no load points where rounding leaves it
+                limit = 1e-2 if abs(share - 1) < 1e-6 else 1e-12
+                assert abs(abs(float(beta)) - expected) < limit, (share, angle)
+        moment = size * length / 2 * across
+        loads = play.loads((size, 0.0, 0.0), (0.0, size * length / 2, 0.0), length)
+        assert loads[0] == (0.0, 0.0)
+        assert pressed(loads[0], rho) == (0.0, 0.0)
+        assert pressed(loads[1], rho) == (rho, 0.0)
+
+
+def test_planar_limit_is_the_massless_link() -> None:
+    """c = ρ F/|F|, in the plane and in space with a force at mid-length alone (β = 0 exactly)."""
+    rng = np.random.default_rng(4)
+    for force in rng.normal(size=(2000, 2)) * 10 ** rng.uniform(-9, 9, (2000, 1)):
+        rho = 10 ** rng.uniform(-6, -3)
+        expected = rho * force / np.hypot(*force)
+        (load,) = CLEARANCE_MODELS["planar"]["revolute"].loads((*force,), (0.0,), 1.0)
+        np.testing.assert_allclose(pressed(load, rho), expected, rtol=5e-16)
+        loads = CLEARANCE_MODELS["spatial"]["cylindrical"].loads((*force, 3.0), (0.0, 0.0, 2.0), 0.03)
+        assert loads[0] == loads[1]
+        np.testing.assert_allclose(pressed(loads[0], rho), expected, rtol=5e-16)
+        assert float(describing(*(pressed(q, rho) for q in loads))[0]) == 0
+
+
+def test_ends_carry_the_force_and_the_moment() -> None:
+    """Σ Qᵢ = F and Σ rᵢ × Qᵢ = M in the parts that the play holds."""
+    rng = np.random.default_rng(6)
+    for space, kind in MODELS:
+        play, parts = CLEARANCE_MODELS[space][kind], PICTURE[space, kind][1]
+        columns = ["xyzabc".index(part) for part in parts]
+        wrench, length = rng.normal(size=6), 0.3
+        loads = play.loads(tuple(wrench[:3]), tuple(wrench[3:]), length)
+        carried = sum(m.T @ np.array(q, float) for m, q in zip(held(space, kind, length), loads, strict=True))
+        np.testing.assert_allclose(carried, wrench[columns], rtol=1e-13)
+
+
+# ---- friction turns the seat ------------------------------------------------------------------------------------
+
+
+def test_friction_turns_a_pin_against_the_slip() -> None:
+    """Q = N (n − μ t): t the way the hole's wall slips past the pin at the contact n, ω z × n; each end by itself."""
+    rng = np.random.default_rng(21)
+    for _ in range(2000):
+        load, mu, rate = rng.normal(size=2) * 10 ** rng.uniform(-3, 4), rng.uniform(0, 1.2), rng.normal()
+        n = np.array(turned_by_friction((*load,), mu, (rate,)))
+        assert np.hypot(*n) == pytest.approx(np.hypot(*load), rel=1e-15)
+        n = n / np.hypot(*n)
+        t = np.sign(rate) * np.array([-n[1], n[0]])
+        size = load @ n
+        assert size > 0, "the wall presses"
+        np.testing.assert_allclose(size * (n - mu * t), load, rtol=0, atol=1e-13 * np.hypot(*load))
+        turned = np.angle((n[0] + 1j * n[1]) / (load[0] + 1j * load[1]))
+        assert turned == pytest.approx(np.sign(rate) * np.arctan(mu), abs=1e-14)
+        c = np.array(pressed((*n,), 1.0))
+        np.testing.assert_allclose(c, n, rtol=0, atol=1e-15)  # the pin touches the hole where it lies
+    assert turned_by_friction((3.0, 4.0), 0.3, (0.0,)) == (3.0, 4.0)
+    assert turned_by_friction((3.0,), 0.3, (1.0,)) == (3.0,)
+
+
+def test_friction_turns_both_ends_of_a_pin_in_space() -> None:
+    """The two contacts together carry F and M about mid-length, with friction at both."""
+    play, rng, length, mu = CLEARANCE_MODELS["spatial"]["revolute"], np.random.default_rng(22), 0.04, 0.3
+    for _ in range(300):
+        force, moment, rate = rng.normal(size=3), 0.1 * rng.normal(size=3), rng.normal()
+        loads = play.loads(tuple(force), tuple(moment), length)
+        whole = np.zeros(6)
+        for load, z in zip(loads[:2], (-length / 2, length / 2), strict=True):
+            n = np.array([*turned_by_friction(load, mu, (rate,)), 0.0])
+            size = np.hypot(*load) / np.hypot(1, mu)
+            n = n / np.linalg.norm(n)
+            contact = size * (n - mu * np.sign(rate) * np.cross([0, 0, 1], n))
+            whole += np.concatenate([contact, np.cross([0, 0, z], contact)])
+        np.testing.assert_allclose(whole[[0, 1, 3, 4]], [*force[:2], *moment[:2]], rtol=0, atol=1e-14)
+
+
+def test_friction_turns_a_ball_about_its_spin() -> None:
+    """Q = N (n − μ t), t ∥ ω × n, for any load and spin; on the pole, within atan μ, it need not slip."""
+    rng, poles = np.random.default_rng(23), 0
+    for _ in range(4000):
+        load, mu, spin = rng.normal(size=3) * 10 ** rng.uniform(-3, 3), rng.uniform(0.01, 1.2), rng.normal(size=3)
+        found = np.array(turned_by_friction((*load,), mu, (*spin,)), float)
+        size, axis = np.linalg.norm(load), spin / np.linalg.norm(spin)
+        assert np.linalg.norm(found) == pytest.approx(size, rel=1e-14)
+        n = found / np.linalg.norm(found)
+        off_axis = np.arctan2(np.linalg.norm(np.cross(axis, load)), abs(axis @ load))
+        if off_axis < np.arctan(mu):
+            poles += 1
+            np.testing.assert_allclose(n, np.sign(axis @ load) * axis, rtol=0, atol=1e-14)
+            side = load - (load @ n) * n
+            assert load @ n > 0
+            assert np.linalg.norm(side) <= mu * (load @ n), "friction at rest holds it"
+            continue
+        t = np.cross(axis, n)
+        t = t / np.linalg.norm(t)
+        normal = load @ n
+        assert normal == pytest.approx(size / np.hypot(1, mu), rel=1e-12)
+        # the root next to the pole costs digits there
+        limit = 1e-13 + 1e-15 / max(off_axis - np.arctan(mu), 1e-16)
+        np.testing.assert_allclose(normal * (n - mu * t), load, rtol=0, atol=min(limit, 1e-7) * size)
+    assert 200 < poles < 3000
+    assert turned_by_friction((1.0, 2.0, 3.0), 0.3, (0.0, 0.0, 0.0)) == (1.0, 2.0, 3.0)
+
+
+# ---- the ends are ellipses --------------------------------------------------------------------------------------
+
+
+def room_of_an_ellipse(radius: Any, hole: Any, half: Any, angle: Any) -> Any:
+    """How far an ellipse (half its long axis along x) can shift from the middle of a circle along a direction.
+
+    The largest c with |c n + e(τ)| ≤ R for all τ: for each point of the ellipse a quadratic in c, the least of them.
+    """
+    n = (mp.cos(angle), mp.sin(angle))
+
+    def reach(tau: Any) -> Any:
+        x, y = half * mp.cos(tau), radius * mp.sin(tau)
+        along, across = x * n[0] + y * n[1], x * n[1] - y * n[0]
+        return -along + mp.sqrt(hole**2 - across**2)
+
+    tau = mp.findroot(lambda q: mp.diff(reach, q), angle)
+    return reach(tau)
+
+
+@pytest.mark.parametrize("beta", [0.5, 1.5, 2.5, float(np.pi)])
+def test_circles_for_ellipses(beta: float) -> None:
+    """A leaning pin's section is an ellipse r by r/cos α; where the seat lies it has less room than ρ.
+
+    (2rρ/H²) sin⁴(β/2) is the share of the clearance that is missing, to first order in that share and in (ρ/H)²: the
+    half axis is longer by r α²/2, α = (2ρ/H) sin(β/2), and meets the wall at the angle π/2 ± β/2 to it.
+    """
+    for r, rho, length in ((0.01, 1e-5, 0.02), (0.01, 2e-5, 0.01), (0.05, 1e-4, 0.02), (0.02, 1e-6, 0.05)):
+        r_, rho_, b = mp.mpf(r), mp.mpf(rho), mp.mpf(beta)
+        alpha = mp.atan(2 * rho_ / length * mp.sin(b / 2))
+        # c₁ stands at ξ + β/2, the pin leans towards ξ − π/2
+        room = room_of_an_ellipse(r_, r_ + rho_, r_ / mp.cos(alpha), b / 2 + mp.pi / 2)
+        missing, formula = float((rho_ - room) / rho_), float(ellipse_error(rho, r, length, beta))
+        assert missing > 0
+        worst = float(ellipse_error(rho, r, length))
+        assert missing == pytest.approx(formula, rel=3 * worst + 3 * (rho / length) ** 2 + 3 * rho / r)

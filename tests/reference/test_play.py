@@ -1,0 +1,313 @@
+"""The play of joints against published-style reference values, derivatives through the engine, and brute force.
+
+Brute force moves the pins in their holes and closes the mechanism exactly: `played.changes`.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy import optimize
+
+import mechanisms
+import mechanisms_space
+import trunnion
+from played import changes, four_bar, measures_of, offsets_of, pressed_to, rssr, with_play
+from trunnion import MechanismError, Status
+from trunnion.analysis.analyse import Run, prepare
+from trunnion.analysis.friction import FrictionMethod
+from trunnion.analysis.kinematics import forward
+from trunnion.analysis.measures import named, outputs
+from trunnion.analysis.play import by_duals, by_virtual_load, plays, variance
+from trunnion.joints.clearance import worst_case
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+NOW = np.zeros(1)
+
+
+# ---- known numbers --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("joint", "ABCD")
+def test_four_bar(joint: str) -> None:
+    """0.02 mm in any one joint turns the rocker by up to 0.017902° at 60°: the links carry one force, 1/(c sin μ)."""
+    mechanism = four_bar(joint)
+    result = trunnion.play(mechanism, steps=6)
+    at = result.isel(position=0)
+    assert np.degrees(float(at["value"].item())) == pytest.approx(95.195700, abs=1e-6)
+    assert np.degrees(float(at["worst_case"].item())) == pytest.approx(0.017902, abs=5e-7)
+    assert float(at["deviation"].item()) == pytest.approx(float(at["worst_case"].item()) / 2, rel=1e-12)  # a disc
+    run = prepare(mechanism)
+    (measure,) = outputs(run.system)
+    angles = np.linspace(0, 2 * np.pi, 3601)[:, None]
+    offsets = {f"seats.{joint}.1.x": 2e-5 * np.cos(angles), f"seats.{joint}.1.y": 2e-5 * np.sin(angles)}
+    brute = np.degrees(np.max(np.abs(changes(run, measure, offsets, NOW))))
+    assert brute == pytest.approx(0.017902, abs=1e-5)
+    assert abs(brute - np.degrees(float(at["worst_case"].item()))) < 3e-4 * brute  # second order in the play
+
+
+@pytest.mark.parametrize("hole_on", ["rocker", "ground"])
+def test_rssr(hole_on: str) -> None:
+    """0.044402° by the formula, 0.044448° over the exact transform of the pin in its hole (the greater side)."""
+    mechanism = rssr(hole_on=hole_on)
+    result = trunnion.play(mechanism, ["rotation:D"], steps=1)
+    assert np.degrees(float(result["worst_case"].item())) == pytest.approx(0.044402, abs=5e-7)
+    run = prepare(mechanism)
+    (measure,) = named(mechanism, ["rotation:D"], run.values)
+    loads = result["sensitivity"].values[0, 0, :2, :2, 0]
+    best = [_largest_change(run, measure, sign, sign * loads) for sign in (1, -1)]
+    assert np.degrees(max(best)) == pytest.approx(0.044448, abs=5e-7)
+    assert np.degrees(np.mean(best)) == pytest.approx(0.044402, abs=5e-7)
+
+
+def _largest_change(run: Run, measure: trunnion.analysis.measures.Measure, sign: int, towards: np.ndarray) -> float:
+    """Over the directions of both offsets, each at the wall, by an optimiser."""
+
+    def lost(angles: np.ndarray) -> float:
+        ends = [(2e-5 * np.cos(angle), 2e-5 * np.sin(angle)) for angle in angles]
+        names = ("1.x", "1.y", "2.x", "2.y")
+        offsets = {f"seats.D.{name}": np.asarray(n) for name, n in zip(names, np.ravel(ends), strict=True)}
+        return -sign * float(changes(run, measure, offsets, NOW).item())
+
+    start = np.arctan2(towards[:, 1], towards[:, 0]) + 0.2
+    found = optimize.minimize(lost, start, method="Nelder-Mead", options={"xatol": 1e-6, "fatol": 1e-14})
+    return -float(found.fun)
+
+
+def test_ends_and_dimensions_of_a_play_scatter_by_one_rule() -> None:
+    """Uniform in an interval, a disc, a ball: ρ²/3, ρ²/4, ρ²/5 for a unit load; by samples too."""
+    rng = np.random.default_rng(5)
+    for count in (1, 2, 3):
+        direction = rng.normal(size=count)
+        points = rng.normal(size=(400_000, count))
+        points *= (rng.uniform(size=400_000) ** (1 / count) / np.linalg.norm(points, axis=1))[:, None]
+        expected = variance([tuple(direction)], [0.3])
+        assert expected == pytest.approx(0.09 * direction @ direction / (count + 2), rel=1e-12)
+        assert np.var(0.3 * points @ direction) == pytest.approx(expected, rel=0.01)
+
+
+# ---- virtual load, derivatives, brute force -------------------------------------------------------------------
+
+
+def _agree(run: Run, names: list[str], time: np.ndarray) -> None:
+    """The unit load says what the derivatives through the closure say, at all ends of all joints."""
+    known = plays(run.system, run.values)
+    walk = forward(run.system, run.values, run.chosen.assembly, time)
+    seen = 0
+    for measure in named(run.system.mechanism, names, run.values):
+        loads, slopes = by_virtual_load(walk, measure, known), by_duals(run, measure, known, time, FrictionMethod())
+        scale = max(1.0, *(float(np.nanmax(np.abs(n), initial=0)) for one in slopes.values() for q in one for n in q))
+        for name in known:
+            for load, slope in zip(loads[name], slopes[name], strict=True):
+                for one, other in zip(load, slope, strict=True):
+                    one = np.broadcast_to(one, time.shape)
+                    seen += int(np.count_nonzero(np.isfinite(one)))
+                    np.testing.assert_allclose(one, other, rtol=0, atol=1e-9 * scale, err_msg=f"{measure.name} {name}")
+    assert seen > 0
+
+
+@pytest.mark.parametrize("name", mechanisms.MODELS)
+def test_virtual_load_equals_derivatives_in_the_plane(name: str) -> None:
+    """Dyads, general groups, gear pairs, drivers: the same to rounding for every measure."""
+    run = prepare(with_play(mechanisms.model(mechanisms.MODELS[name]())))
+    _agree(run, measures_of(run), run.cycle.times(5) + 1e-3)
+
+
+@pytest.mark.parametrize("name", [name for name in mechanisms_space.MODELS if name != "platform on six legs"])
+def test_virtual_load_equals_derivatives_in_space(name: str) -> None:
+    """All pairs; every seventh measure, to save time."""
+    run = prepare(with_play(mechanisms_space.MODELS[name]().data, float_=1e-5))
+    _agree(run, measures_of(run)[::7], run.cycle.times(3) + 1e-4)
+
+
+def test_virtual_load_equals_derivatives_of_the_cardan_joint() -> None:
+    """A loop with errors of length and angle: the closed form of two cylindrical links."""
+    run = prepare(with_play(mechanisms_space.cardan()))
+    names = ["rotation:output", "slide:output", "cross.pin-1.y", "angle:output-shaft.z", "slide:pin-1"]
+    _agree(run, names, run.cycle.times(5) + 1e-4)
+
+
+def test_misaligned_holes_and_offset_bearings() -> None:
+    """The ends lie about the middle of the bearing, in the frame of the hole as it leans."""
+    data = rssr().data()
+    data["joints"]["D"] |= {"misalignment": {"tilt": "2 deg", "towards": "30 deg", "offset": "0.3 mm"}}
+    data["joints"]["D"]["pin"] |= {"offset": "7 mm", "end_float": "0.1 mm"}
+    run = prepare(trunnion.Mechanism(**data))
+    _agree(run, ["rotation:D", "rocker.C.x", "angle:rocker.y"], run.cycle.times(4))
+
+
+BRUTE = {
+    "four-bar": (mechanisms.MODELS["four-bar"], ["rotation:D", "coupler.E.x"]),
+    "slider-crank, guide": (mechanisms.MODELS["slider-crank"], ["slide:C", "piston.H.y", "angle:piston"]),
+    "class III": (mechanisms.MODELS["class III"], None),
+    "geared five-bar": (mechanisms.MODELS["geared five-bar"], None),
+    "RSSR, balls": (lambda: mechanisms_space.MODELS["RSSR"]().data, ["rotation:D", "link-3.grip.x"]),
+    "RCCC": (lambda: mechanisms_space.MODELS["RCCC"]().data, ["slide:D", "link-2.grip.y"]),
+    "PSUR, guide in space": (lambda: mechanisms_space.MODELS["PSUR"]().data, ["link-2.grip.x"]),
+    "Cardan": (mechanisms_space.cardan, ["rotation:output", "slide:output"]),
+}
+
+
+@pytest.mark.parametrize("name", BRUTE)
+def test_worst_case_is_reached_and_not_passed_but_by_second_order(name: str) -> None:
+    """Pins pressed by Qᵢ change y by Σ ρ|Qᵢ|, anywhere else by less; what is missing falls with the square of ρ."""
+    make, names = BRUTE[name]
+    missed = []
+    for clearance in (4e-5, 2e-5):
+        run = prepare(with_play(make(), clearance, 2 * clearance))
+        known, time = plays(run.system, run.values), run.cycle.times(7)[2:3]
+        walk = forward(run.system, run.values, run.chosen.assembly, time)
+        chosen = measures_of(run)[-4:] if names is None else names
+        rng, worst = np.random.default_rng(3), 0.0
+        for measure in named(run.system.mechanism, chosen, run.values):
+            loads = by_virtual_load(walk, measure, known)
+            most = sum(float(np.ravel(worst_case(loads[joint], play.radii))[0]) for joint, play in known.items())
+            pressed = {
+                joint: [pressed_to(load, float(r)) for load, r in zip(loads[joint], play.radii, strict=True)]
+                for joint, play in known.items()
+            }
+            there = float(changes(run, measure, offsets_of(known, pressed), time).item())
+            worst = max(worst, abs(there - most))
+            assert there == pytest.approx(most, rel=0.02)
+            anywhere = {}
+            for joint, play in known.items():
+                ends = []
+                for end, radius in zip(play.model.ends, play.radii, strict=True):
+                    places = rng.normal(size=(len(end), 300, 1))
+                    ends.append(tuple(radius * places / np.linalg.norm(places, axis=0)))
+                anywhere[joint] = ends
+            found = changes(run, measure, offsets_of(known, anywhere), time)
+            assert np.nanmax(np.abs(found)) <= 1.02 * most
+        missed.append(worst)
+    assert missed[1] < 0.3 * missed[0]
+
+
+def test_effort_with_friction_against_brute_force() -> None:
+    """Drive torque of a slider-crank with friction and mass: derivatives through the settled friction."""
+    run = prepare(with_play(mechanisms.model(mechanisms.slider_crank(), friction=0.1), 1e-5))
+    known, time = plays(run.system, run.values), run.cycle.times(8)[1:2] + 0.01
+    (measure,) = named(run.system.mechanism, ["effort:A"], run.values)
+    slopes = by_duals(run, measure, known, time, FrictionMethod())
+    base = float(run.solve(time).efforts["A"].item())
+    for joint, play in known.items():
+        most = float(worst_case(slopes[joint], play.radii).item())
+        pressed = [pressed_to(load, float(r)) for load, r in zip(slopes[joint], play.radii, strict=True)]
+        back = run.at(time, offsets_of(known, {joint: pressed}))
+        assert float(back.efforts["A"].item()) - base == pytest.approx(most, rel=2e-3)
+
+
+def test_end_float() -> None:
+    """A rocker that can shift along its axis by half the float either way, against brute force."""
+    mechanism = rssr(clearance=1e-9, float_=1e-4)
+    run = prepare(mechanism)
+    result = trunnion.play(mechanism, ["rotation:D"], steps=1)
+    (measure,) = named(mechanism, ["rotation:D"], run.values)
+    brute = float(changes(run, measure, {"seats.D.3.z": np.asarray(5e-5)}, NOW).item())
+    assert float(result["sensitivity"].values[0, 0, 2, 2, 0]) * 5e-5 == pytest.approx(brute, rel=1e-3)
+    assert float(result["worst_case"].item()) == pytest.approx(abs(brute), rel=1e-3)
+    # a ball shifted along the axis by e acts as a change of s₄
+    assert float(result["sensitivity"].values[0, 0, 2, 2, 0]) == pytest.approx(-6.11075, abs=1e-4)
+
+
+# ---- the result -----------------------------------------------------------------------------------------------
+
+
+def test_totals_and_attributes() -> None:
+    mechanism = trunnion.read(EXAMPLES / "toleranced-slider-crank.yaml")
+    result = trunnion.play(mechanism, steps=36)
+    assert list(result["measure"].values) == ["stroke-position", "drive-torque"]
+    assert json.loads(result.attrs["measure_units"]) == ["m", "N m"]
+    parts = result["worst_case"]
+    np.testing.assert_allclose(result["worst_case_total"], parts.sum("joint"), rtol=1e-12)
+    np.testing.assert_allclose(result["rss"], np.sqrt((parts**2).sum("joint")), rtol=1e-12)
+    np.testing.assert_allclose(result["deviation_total"] ** 2, (result["deviation"] ** 2).sum("joint"), rtol=1e-12)
+    ideal = trunnion.analyse(mechanism, 36)
+    place = ideal["point_position"].sel(point="piston.Q", axis="x")
+    np.testing.assert_allclose(result["value"].values[0], place.values, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(result["value"].values[1], ideal["drive_effort"].values[0], rtol=1e-9)
+    assert any("stroke-position, worst case" in row["label"] for row in json.loads(result.attrs["summary"]))
+
+
+def test_angles_gain_whole_turns() -> None:
+    result = trunnion.play(four_bar("C"), ["rotation:A", "angle:crank"], steps=90)
+    np.testing.assert_allclose(np.diff(result["value"].values, axis=1), 2 * np.pi / 90, rtol=1e-9)
+    assert np.all(result["worst_case"].values < 1e-15)  # the driver holds it, and its own pin has no play
+
+
+def test_driven_joints_have_play_too() -> None:
+    """The pin of the driver moves the crank's point B as it moves itself."""
+    result = trunnion.play(four_bar("A"), ["crank.B.x"], steps=8)
+    np.testing.assert_allclose(result["worst_case"].values, 2e-5, rtol=1e-9)
+
+
+def test_limit() -> None:
+    data = four_bar("C").data() | {"measures": {"swing": {"rotation": "D", "limit": "0.01 deg"}}}
+    result = trunnion.play(trunnion.Mechanism(**data), steps=72)
+    (finding,) = [row for row in json.loads(result.attrs["findings"]) if row["where"] == "measures.swing.limit"]
+    assert finding["severity"] == "error"
+    assert "the limit is 0.01 deg" in finding["what"]
+    data["measures"]["swing"]["limit"] = "1 deg"
+    assert not json.loads(trunnion.play(trunnion.Mechanism(**data), steps=72).attrs["findings"])
+
+
+def test_dead_centres_have_no_answer_and_say_so() -> None:
+    data = four_bar("C").data()
+    data["links"]["crank"]["points"]["B"] = ["65 mm", 0]  # no crank any more
+    result = trunnion.play(trunnion.Mechanism(**data), steps=360)
+    out = result["status"].values >= Status.SINGULAR
+    assert 10 < out.sum() < 350
+    assert np.array_equal(np.isnan(result["worst_case"].values[0, 0]), out)
+    assert any("cannot be assembled" in row["what"] for row in json.loads(result.attrs["findings"]))
+    result = trunnion.play(trunnion.Mechanism(**data), steps=36000)
+    sound = result["status"].values < Status.NEAR_SINGULAR
+    told = json.loads(result.attrs["summary"])[0]["value"]  # close to a dead centre first order says little
+    assert told == np.max(result["worst_case_total"].values[0, sound])
+    assert told < 0.5 * np.nanmax(result["worst_case_total"].values)
+
+
+@pytest.mark.parametrize(
+    ("measure", "what"),
+    [
+        ("nothing", "is no measure"),
+        ("rotation:Q", "no joint 'Q'"),
+        ("slide:D", "no slide"),
+        ("angle:rod", "no link 'rod'"),
+        ("angle:rocker.z", "no point"),
+        ("effort:D", "no driver 'D'"),
+        ("rocker.X.x", "no point 'rocker.X'"),
+        ("rocker.C.z", "no z"),
+        ("rocker.C", "is no measure"),
+    ],
+)
+def test_measures_that_mean_nothing(measure: str, what: str) -> None:
+    with pytest.raises(MechanismError, match=what):
+        trunnion.play(four_bar("C"), [measure], steps=4)
+
+
+def test_what_is_missing_is_said() -> None:
+    data = four_bar("C").data()
+    del data["joints"]["C"]["pin"]["clearance"]
+    with pytest.raises(MechanismError, match="no joint states a clearance"):
+        trunnion.play(trunnion.Mechanism(**data), steps=4)
+    arm = {"links": {"ground": {"points": {"A": [0, 0]}}, "arm": {"points": {"A": [0, 0], "P": [1, 0]}}}}
+    arm["joints"] = {"A": {"type": "revolute", "links": ["ground", "arm"], "pin": {"radius": 0.1, "clearance": 1e-4}}}  # type: ignore[dict-item]
+    mechanism = trunnion.Mechanism(trunnion=1, **arm, drivers={"A": {"speed": 1.0}})
+    with pytest.raises(MechanismError, match="no joint to the ground is an output"):
+        trunnion.play(mechanism, steps=4)
+    assert trunnion.play(mechanism, ["arm.P.y"], steps=4)["worst_case"].values == pytest.approx(1e-4)
+
+
+def test_redundant_constraints_make_it_a_bound() -> None:
+    mechanism = trunnion.read(EXAMPLES / "fourbar-in-space.yaml")
+    if mechanism.over_constraint == "refuse":
+        mechanism = trunnion.Mechanism(**{**mechanism.data(), "over_constraint": "minimum-norm"})
+    result = trunnion.play(with_play(mechanism.data()), steps=12)
+    assert any("upper bound" in row["what"] for row in json.loads(result.attrs["findings"]))
+
+
+def test_play_at_the_teeth_is_told_of() -> None:
+    result = trunnion.play(with_play(mechanisms.model(mechanisms.geared_five_bar())), ["effort:A"], steps=12)
+    assert any("between the teeth" in row["what"] for row in json.loads(result.attrs["findings"]))

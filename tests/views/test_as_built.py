@@ -250,6 +250,9 @@ def test_a_jump_is_a_step_far_above_its_neighbours():
     cut_x, cut_y = broken(x, small, 60.0)
     assert np.flatnonzero(np.isnan(cut_y)).tolist() == [3]
     assert cut_x[3] == 2.5
+    halfway = np.array([0.0, 1, 2, 20, 40, 41, 42, 43])  # a jump that a position without contact lies inside of
+    assert not np.isnan(broken(x, halfway, 60.0)[1]).any()
+    assert np.flatnonzero(np.isnan(broken(x, halfway, 60.0, np.array([3]))[1])).tolist() == [3, 5]
 
 
 def test_the_scene_of_the_result_tells_the_plays(cardan):

@@ -265,25 +265,26 @@ def plot(
     image: Annotated[str, typer.Option("--format", help="png, svg or pdf, for a folder of plots.")] = "png",
 ) -> None:
     """Figures: drive torque, friction power, reactions, polar diagram, mechanism with coupler curve."""
-    from trunnion.views.plots import PLOTS, save
+    from trunnion.views.error_plot import with_worst_case
+    from trunnion.views.plots import PLOTS, drawable, save
 
-    kinds = kind or list(PLOTS)
-    unknown = [name for name in kinds if name not in PLOTS]
+    unknown = [name for name in kind or [] if name not in PLOTS]
     if unknown:
         raise MechanismError(Finding(f"there is no plot '{unknown[0]}'", "--kind", f"use one of {', '.join(PLOTS)}"))
     single = out.suffix.lower() in IMAGES
-    if single and len(kinds) > 1:
-        remedy = "name a folder, or one --kind"
-        raise MechanismError(Finding(f"{len(kinds)} plots do not fit one file", str(out), remedy))
+    if single and len(kind or PLOTS) > 1:
+        what = f"{len(kind or PLOTS)} plots do not fit one file"
+        raise MechanismError(Finding(what, str(out), "name a folder, or one --kind"))
     mechanism = _mechanism(file, set_, table, friction)
     with _lines_of(file):
         result = _run(mechanism, steps, None)
     ideal = _ideal(mechanism, steps, None)
     if not single:
         _folder(out)
-    for name in kinds:
+    shown = with_worst_case(result, mechanism) if "error" in (kind or PLOTS) else result
+    for name, figure in [(name, PLOTS[name](shown, ideal)) for name in kind or drawable(result)]:
         path = out if single else out / f"{name}.{image.lstrip('.')}"
-        save(PLOTS[name](result, ideal), path)
+        save(figure, path)
         wrote(path)
     said = [finding for finding in findings_of(result) if finding.severity is not Severity.NOTE]
     say(_placed(said, file, ["assembly"]))

@@ -234,8 +234,9 @@ def figures(sweep: xr.Dataset) -> dict[str, tuple[str, NDArray[Any]]]:
         rows = figure.transpose(..., *swept).values.reshape(-1, int(np.prod(shape)))
         if not subject:
             flat[key] = (unit, rows[0])
+        own = efforts if subject == "driver" else json.loads(figure.attrs.get("member_units", "[]"))
         for i, member in enumerate(sweep[subject].values if subject else ()):
-            flat[f"{member}.{key.removeprefix('drive_')}"] = (efforts[i] if subject == "driver" else unit, rows[i])
+            flat[f"{member}.{key.removeprefix('drive_')}"] = (own[i] if own else unit, rows[i])
     flat["status"] = ("", np.array([status.name.lower() for status in Status])[flat["status"][1]])
     return flat
 

@@ -35,7 +35,7 @@ __all__ = [
 ]
 
 IMAGES = (".png", ".svg", ".pdf")
-PLOT_KINDS = "torque, friction-power, reactions, polar, power, mechanism or motion"  # views.plots.PLOTS, not loaded yet
+PLOT_KINDS = "torque, friction-power, reactions, polar, power, mechanism, motion, error, seat or beta"  # of views.plots
 
 File = Annotated[Path, typer.Argument(help="Model file: YAML, JSON or TOML.", show_default=False)]
 Steps = Annotated[int, typer.Option("--steps", help="Equally spaced positions over the turn or range.")]

@@ -73,6 +73,12 @@ def cardan() -> Any:
     return np.transpose(found[1:])
 
 
+def lean(one: Outcome) -> float:
+    """Most that pin-1 leans in its hole, from the offsets of its ends: tan α = |c₂ − c₁|/H."""
+    ends = one.result["seat_offset"].sel(joint="pin-1", axis=["x", "y"]).transpose("end", "axis", "position").values
+    return float(np.arctan(np.linalg.norm(ends[1] - ends[0], axis=0).max() / 0.01))
+
+
 def lead(output: Any) -> float:
     """How far the output runs ahead of and behind the input over the turn."""
     return float(np.ptp(np.unwrap(output) - np.arange(STEPS) * 2 * np.pi / STEPS))
@@ -169,6 +175,15 @@ ENTRIES = {
         expected=lambda: lead(cardan()[2]),
         source="closing the four matrices of the loop with SciPy's root finder",
         tolerance=1e-11,
+    ),
+    "pezzuti-cardan-as-built": Entry(
+        says="Most that pin-1 leans in its hole",
+        unit="rad",
+        found=lean,
+        expected=lambda: float(np.arctan(2 * 0.01 / 10)),
+        source="the closed form tan α = 2 ρ/H of a pin whose ends are pressed to opposite sides of its hole",
+        tolerance=1e-7,
+        figures=("mechanism", "seat"),
     ),
     "pezzuti-cardan-10mm": Entry(
         says="Travel of pin-1 along its axis over the turn, which only the errors cause",

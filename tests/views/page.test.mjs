@@ -87,13 +87,47 @@ globalThis.document = Object.assign(new Element("document"), {
 
 const { start } = await import("../../src/trunnion/views/web/report.js");
 const scene = JSON.parse(readFileSync(process.argv[2], "utf8"));
-const places = Object.fromEntries(["stage", "charts", "polars"].map((name) => [name, new Element(name)]));
+const places = Object.fromEntries(["stage", "charts", "polars", "seats"].map((name) => [name, new Element(name)]));
 const crank = start(scene, places);
 for (let index = 0; index < scene.count; index += 1) crank.go(index);
 const classes = (name) => (element) => element.attributes.class?.split(" ").includes(name);
+const built = scene.built ? enlarged() : null;
 const space = scene.space === "spatial" && scene.solids.length ? steered() : null;
 for (const name of ["beforeprint", "afterprint"]) events[name].forEach((act) => act());
 const seen = (place, name) => places[place].find(classes(name)).length;
+
+/** What a scene with errors shows of them, at several magnifications through all positions; ends at 1. */
+function enlarged() {
+  const slider = places.stage.find(classes("magnification"))[0];
+  const found = {};
+  for (const power of [3, 2, 0]) {
+    slider.value = String(power);
+    slider.listeners.input();
+    for (let index = 0; index < scene.count; index += 1) crank.go(index);
+    crank.go(0);
+    const move = (element) => /translate\(([-\d.]+),([-\d.]+)\)/.exec(element.attributes.transform).slice(1).map(Number);
+    found[10 ** power] = {
+      said: places.stage.find(classes("errors")).map((element) => element.textContent),
+      output: places.stage.find(classes("factor")).map((element) => element.textContent),
+      ideal: places.stage.find(classes("ideal")).length,
+      rails: places.stage.find(classes("rail")).map((element) => element.attributes.d),
+      pins: places.stage.find(classes("joint")).filter((element) => element.children.some((child) => child?.children?.[0]?.attributes?.class === "pin" || child?.name === "circle")).length,
+      apart: places.stage.find(classes("pin")).map((pin) => move(pin)),
+      holes: places.stage.find(classes("joint")).flatMap((one) => one.children.filter((child) => child.name === "circle" && child.attributes.class !== "pin" && one.attributes.transform).map((child) => [...move(one), Number(child.attributes.r)])),
+      painted,
+    };
+  }
+  const buttons = places.stage.find((element) => element.name === "button" && /^× \d+$/.test(element.textContent));
+  const seats = places.seats.find(classes("seat"));
+  return {
+    at: found,
+    presets: buttons.map((button) => button.textContent),
+    seats: seats.map((seat) => seat.find(classes("title"))[0].textContent),
+    remarks: seats.map((seat) => seat.find(classes("remark"))[0].textContent),
+    lost: places.charts.find(classes("lost")).length,
+    titles: places.charts.find(classes("title")).map((element) => element.textContent),
+  };
+}
 
 /** Everything in a spatial scene switched on, turned, shifted and zoomed: what is then seen. */
 function steered() {
@@ -131,6 +165,7 @@ function steered() {
 console.log(
   JSON.stringify({
     space,
+    built,
     charts: seen("charts", "chart"),
     polars: seen("polars", "polar"),
     loads: seen("stage", "load"),

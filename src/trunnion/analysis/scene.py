@@ -13,6 +13,7 @@ from trunnion.algebra.namespace import Number
 from trunnion.algebra.rigid import Frame
 from trunnion.analysis.kinematics import start
 from trunnion.analysis.loads import Stated
+from trunnion.analysis.shifts import hole, play_of
 from trunnion.analysis.system import System, Values, rubbing
 
 __all__ = ["DRAWN", "pitch_circles", "planar", "spatial"]
@@ -40,7 +41,11 @@ def spatial(system: System, values: Values, times: NDArray[np.float64], useful: 
         joints[name]["frames"] = [_plain(frame) for frame in frames]
     spinning = [spin for module in system.plan.modules for spin in module.spinning]
     passive = [{"link": link, "joints": [a, b]} for link, a, b in spinning]
-    common = _common(system, values, times, useful)
+    plays = _plays(system, values)
+    for name, play in plays.items():
+        second: Any = elements[system.joints[name][1][1], name]
+        play["hole"] = _plain(hole(second, values, name))
+    common = {**_common(system, values, times, useful), "plays": plays}
     return {**common, "space": "spatial", "joints": joints, "gears": {}, "passive": passive}
 
 
@@ -70,7 +75,33 @@ def _common(system: System, values: Values, times: NDArray[np.float64], useful: 
             name: {"between": spring.between and list(spring.between), "joint": spring.joint}
             for name, spring in mechanism.springs.items()
         },
+        "plays": _plays(system, values),
     }
+
+
+def _plays(system: System, values: Values) -> dict[str, dict[str, Any]]:
+    """The play of every joint with a seat, m: what has it, to either side, along the axis, length H, pin's radius."""
+    found: dict[str, dict[str, Any]] = {}
+    for name in system.mechanism.seated:
+        play = play_of(system.mechanism.space, system.joints[name][0], values, name)
+        if play is None:
+            continue
+        axial = play.model.axial
+        kind = "ball" if len(play.model.ends[0]) == 3 else play.model.size[0] if play.model.size else "pin"
+        found[name] = {
+            "kind": kind,
+            "clearance": _float(next(one for i, one in enumerate(play.radii) if i not in axial)),
+            "float": _float(play.radii[axial[0]]) if axial else 0.0,
+            "length": _float(play.length) if play.model.size else None,
+            "radius": _float(values.get(f"joints.{name}.pin.radius")),
+        }
+    return found
+
+
+def _float(number: Number | None) -> float | None:
+    """A number for JSON; None of what is not stated."""
+    value = None if number is None else float(np.ravel(primal(number))[0])
+    return value if value is not None and np.isfinite(value) else None
 
 
 def pitch_circles(system: System, values: Values, name: str) -> list[dict[str, Any]]:

@@ -1,7 +1,8 @@
 """How the figures of a cycle change with one or two of the mechanism's numbers.
 
 Every point of the grid is a mechanism of its own, prepared and run as `analyse` does; its cycle comes to one number of
-each of FIGURES. A point with a position without an answer has no figures of the cycle but its status.
+each of FIGURES. A point with a position without an answer has no figures of the cycle but its status, and the
+efficiency of the ideal mechanism if that has an answer everywhere.
 """
 
 from __future__ import annotations
@@ -46,15 +47,19 @@ Over = Mapping[str, Values | tuple[float | str, float | str, int]]
 
 @dataclass(frozen=True)
 class Figure:
-    """A number of a cycle: dimensions before the swept names, unit, long name."""
+    """A number of a cycle: dimensions before the swept names, unit, long name; part: "errors" of those that only
+    mechanisms with errors have.
+    """
 
     dims: tuple[str, ...]
     units: str
     long_name: str
+    part: str = ""
 
 
 FIGURES: dict[str, Figure] = {
     "efficiency": Figure((), "1", "useful work over drive work of the cycle"),
+    "efficiency_ideal": Figure((), "1", "efficiency of the mechanism without errors", "errors"),
     "drive_effort_min": Figure(("driver",), "N m", "least drive effort"),
     "drive_effort_max": Figure(("driver",), "N m", "largest drive effort"),
     "drive_effort_rms": Figure(("driver",), "N m", "root mean square of the drive effort"),
@@ -62,6 +67,9 @@ FIGURES: dict[str, Figure] = {
     "useful_power_mean": Figure((), "W", "mean power taken by the useful loads"),
     "friction_power_mean": Figure((), "W", "mean power lost to friction"),
     "reaction_max": Figure(("joint",), "N", "largest reaction"),
+    "transmission_error_max": Figure(
+        ("joint",), "rad", "largest error of the joint's rotation, of a prismatic joint its slide", "errors"
+    ),
     "locking_margin": Figure((), "1", "least multiple of the friction at which a position locks, ∞ if beyond 10"),
     "without_answer": Figure((), "1", "positions without an answer"),
     "status": Figure((), "1", "code of the gravest status of a position; see the attribute flag_meanings"),
@@ -124,11 +132,13 @@ def sweep(
     said: dict[tuple[str, str], list[Finding]] = {}
     method = method or FrictionMethod()
     run: Run | None = None
+    erring = False
     for done, index in enumerate(np.ndindex(shape), 1):
         with _named(swept, index):
             run = prepare(mechanism.with_values(_at(swept, index)))
             if run.determinacy is not None:
                 run.determinacy.refuse()
+            erring = erring or run.erring
             for name, value in figures(run, steps, method).items():
                 arrays[name][(Ellipsis, *index)] = value
             for finding in _model_findings(run):
@@ -137,6 +147,7 @@ def sweep(
             progress(done)
     assert run is not None  # a grid has a point
     found = [*_answers(swept, arrays), *_shared(said, int(np.prod(shape)))]
+    arrays = {name: array for name, array in arrays.items() if erring or not FIGURES[name].part}
     return _dataset(mechanism, run, swept, labels, arrays, found, steps, method)
 
 
@@ -146,17 +157,25 @@ def figures(run: Run, steps: int, method: FrictionMethod) -> dict[str, Any]:
     arrays, cycle = found.arrays, run.cycle
     status = arrays["status"]
     missing = int(np.count_nonzero(status >= Status.NOT_CONVERGED))
-    told = {
+    told: dict[str, Any] = {
         "locking_margin": float(np.min(arrays["locking_margin"])),
         "status": int(np.max(status)),
         "without_answer": missing,
     }
+    if found.ideal:
+        told["efficiency_ideal"] = efficiency(found.ideal, cycle)
     if missing:
         return told
     sound = sound_positions(status)
     kept = sound if len(sound) else np.arange(len(status))
     effort = arrays["drive_effort"]
     size = np.sqrt(np.sum(arrays["reaction_force"] ** 2, axis=1))
+    if found.ideal:
+        turned, slid = (np.abs(arrays[f"joint_{what}_error"][:, kept]) for what in ("rotation", "slide"))
+        slides = np.array([kind == "prismatic" for kind, _ in run.system.joints.values()])
+        told["transmission_error_max"] = np.where(slides, np.max(slid, axis=1), np.max(turned, axis=1))
+    else:  # beside points with errors
+        told |= {"efficiency_ideal": efficiency(arrays, cycle), "transmission_error_max": 0.0}
     return told | {
         "efficiency": efficiency(arrays, cycle),
         "drive_effort_min": np.min(effort[:, kept], axis=1),
@@ -345,9 +364,13 @@ def _dataset(
 
     names = tuple(one.name for one in swept)
     variables = {
-        name: xr.Variable((*one.dims, *names), arrays[name], {"units": one.units, "long_name": one.long_name})
-        for name, one in FIGURES.items()
-    }
+        name: xr.Variable((*FIGURES[name].dims, *names), array,
+                          {"units": FIGURES[name].units, "long_name": FIGURES[name].long_name})
+        for name, array in arrays.items()
+    }  # fmt: skip
+    if "transmission_error_max" in variables:
+        units = ["m" if kind == "prismatic" else "rad" for kind, _ in run.system.joints.values()]
+        variables["transmission_error_max"].attrs["member_units"] = json.dumps(units)
     coordinates = {
         one.name: xr.Variable(one.name, one.values, {
             "units": one.unit, "long_name": one.path, "written_unit": one.written, "written_factor": one.factor,

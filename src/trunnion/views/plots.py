@@ -17,6 +17,7 @@ from matplotlib.lines import Line2D
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.output import whole
 from trunnion.views import space_figure, space_plots
+from trunnion.views.as_built import has
 from trunnion.views.cycle import (
     Abscissa,
     Array,
@@ -30,6 +31,7 @@ from trunnion.views.cycle import (
     usual_peak,
 )
 from trunnion.views.drawing import draw, picture
+from trunnion.views.error_plot import error
 from trunnion.views.figures import (
     INK,
     MUTED,
@@ -47,6 +49,8 @@ from trunnion.views.figures import (
 )  # fmt: skip
 from trunnion.views.lettering import plain
 from trunnion.views.quantities import prefixed, quantity
+from trunnion.views.seat_curves import beta, described
+from trunnion.views.seat_plot import seat
 from trunnion.views.space import is_spatial, without_noise
 
 if TYPE_CHECKING:
@@ -55,7 +59,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 __all__ = [
-    "PLOTS", "check_figure", "friction_power", "mechanism", "motion", "polar", "power", "reactions", "save", "torque",
+    "PLOTS", "check_figure", "drawable", "friction_power", "mechanism", "motion", "polar", "power", "reactions", "save",
+    "torque",
 ]  # fmt: skip
 
 FORMATS = ("png", "svg", "pdf")
@@ -383,7 +388,21 @@ PLOTS: dict[str, Callable[[xr.Dataset, xr.Dataset | None], Figure]] = {
     "power": power,
     "mechanism": mechanism,
     "motion": motion,
+    "error": error,
+    "seat": seat,
+    "beta": beta,
 }
+# whether a result has what a figure needs that not all results have
+READY: dict[str, Callable[[xr.Dataset], bool]] = {
+    "error": lambda result: has(result, "errors"),
+    "seat": lambda result: has(result, "seats"),
+    "beta": described,
+}
+
+
+def drawable(result: xr.Dataset) -> list[str]:
+    """The kinds of figures that a result has something for."""
+    return [name for name in PLOTS if name not in READY or READY[name](result)]
 
 
 def check_figure(path: Path) -> str:

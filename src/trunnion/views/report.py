@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from trunnion.views.built_tables import error_rows, loss_rows
 from trunnion.views.bundle import bundle, web_text
 from trunnion.views.cycle import abscissa, attribute, column, intervals, names
 from trunnion.views.quantities import number, quantity
@@ -59,6 +60,8 @@ def report(result: xr.Dataset, ideal: xr.Dataset | None = None) -> str:
         "summary": _summary(result),
         "findings": [row for row in found if row["severity"] != "note"],
         "notes": [row for row in found if row["severity"] == "note"],
+        "errors": error_rows(result), "losses": loss_rows(result),
+        "seats": bool(shown["built"] and shown["built"]["seats"]),
         "balance": _balance(result), "inputs": _inputs(result),
         "references": [line for line in str(result.attrs.get("references", "")).splitlines() if line.strip()],
         "version": result.attrs.get("trunnion_version", ""), "model_hash": result.attrs.get("model_hash", ""),

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.views.as_built import losses
+from trunnion.views.built_scene import built
 from trunnion.views.cycle import abscissa, attribute, column, intervals, layout, names, numbers, series
 from trunnion.views.space import is_spatial, without_noise
 from trunnion.views.space_scene import space_scene
@@ -63,8 +65,16 @@ def scene(result: xr.Dataset, ideal: xr.Dataset | None = None, max_positions: in
         "drivers": _drivers(kept, other, stated),
         "sums": {name: series(column(kept, name)) for name in SUMS if name in kept},
         "efficiency": _single(result, "efficiency"),
+        "built": built(kept, _lost(result, count, int(picked.size))),
     }  # fmt: skip
     return shown | space_scene(kept) if is_spatial(result) else shown
+
+
+def _lost(result: xr.Dataset, count: int, kept: int) -> list[int]:
+    """The shown positions that are nearest to those at which a joint loses contact."""
+    stride = -(-count // max(kept, 1))
+    found = {int(index) // stride for places in losses(result).values() for index in places}
+    return sorted(found)
 
 
 def _picked(count: int, most: int) -> NDArray[np.intp]:

@@ -11,6 +11,7 @@ from matplotlib.colors import Normalize
 
 from trunnion.errors import Status
 from trunnion.views.cycle import Array, usual_peak
+from trunnion.views.error_plot import LOST
 from trunnion.views.figures import INK, MUTED, SHADE, dress, frame_peak, legend, new, style_of
 from trunnion.views.lettering import plain
 from trunnion.views.quantities import prefixed
@@ -23,17 +24,23 @@ if TYPE_CHECKING:
 
 __all__ = ["figure"]
 
+# of the mechanism without errors
+IDEAL: dict[str, Any] = {"color": INK, "linestyle": (0, (4, 2)), "linewidth": 1.0, "markersize": 2.2}
 MOST_NAMED = 8  # curves that are told apart by a legend; more by a scale of colours
 
 
 def figure(result: xr.Dataset, measure: str = "efficiency") -> Figure:
-    """A figure of the cycle over the first name, one curve for each value of the second; no answer in grey."""
+    """A figure of the cycle over the first name, one curve for each value of the second; no answer in grey.
+
+    Of a mechanism with errors beside that of the ideal one, if the sweep has it.
+    """
     over, *others = scales(result)
     unit, values = grid(result, measure)
     values = np.where(np.isfinite(values), values, np.nan)  # a margin beyond the last that is looked for
     order = np.argsort(over.values, kind="stable")
     x, y, status = over.values[order], values[order], statuses(result)[order]
-    scope = usual_peak(y)
+    ideal = grid(result, f"{measure}_ideal")[1][order] if f"{measure}_ideal" in result else None
+    scope = usual_peak(y, ideal)
     factor, shown = prefixed(scope, unit)
     title = measure.replace("_", " ")
     head = title if "." in title else title.capitalize()  # a joint's name stays as it is
@@ -45,14 +52,20 @@ def figure(result: xr.Dataset, measure: str = "efficiency") -> Figure:
     count = y.shape[1]
     for k in range(count):
         look = style_of(k) if count <= MOST_NAMED else {"color": _colour(other, k)}
-        label = None if other is None else plain(f"{other.name} = {other.say(k)}")
+        label = "as built" if ideal is not None else None
+        label = label if other is None else plain(f"{other.name} = {other.say(k)}")
         _curve(axes, x, y[:, k] * factor, label, look)
-    known = y[np.isfinite(y)]
+        if ideal is not None:
+            name = "ideal" if other is None else "ideal, dashed"
+            _curve(axes, x, ideal[:, k] * factor, None if k else name, {**look, **IDEAL})
+    _lost(axes, x, y * factor, status)
+    both = y if ideal is None else np.append(y, ideal)
+    known = both[np.isfinite(both)]
     frame_peak(axes, float(np.abs(known).max(initial=0.0)), scope, factor, unit)
     axes.set_xlim(*_ends(x))
     if not known.size:
         axes.set_yticks([])
-    if other is not None and count <= MOST_NAMED:
+    if count <= MOST_NAMED:
         legend(axes)
     elif other is not None:
         bar = sheet.colorbar(_colours(other), ax=axes, pad=0.02, aspect=30)
@@ -73,11 +86,19 @@ def _colour(other: Scale | None, index: int) -> Any:
 def _curve(axes: Axes, x: Array, y: Array, label: str | None, look: dict[str, Any]) -> None:
     """One curve; few points are marked, and those beside a gap with a cross."""
     marks: dict[str, Any] = {"marker": "o", "markersize": 3.5} if x.size <= 40 else {}
-    axes.plot(x, y, label=label, linewidth=1.6, **marks, **look)
+    axes.plot(x, y, label=label, **{"linewidth": 1.6, **marks, **look})
     known = np.isfinite(y)
     ends = known & (np.append(False, ~known[:-1]) | np.append(~known[1:], False))
     if ends.any():
         axes.plot(x[ends], y[ends], "x", markersize=7, color=look["color"], markeredgewidth=1.6, zorder=4)
+
+
+def _lost(axes: Axes, x: Array, y: Array, status: Array) -> None:
+    """Rings around points of whose cycle a position loses contact: what stands there is not to be built on."""
+    rows, columns = np.nonzero((status == Status.CONTACT_LOST) & np.isfinite(y))
+    if rows.size:
+        axes.plot(x[rows], y[rows, columns], "o", markersize=8, color=LOST, markerfacecolor="none", markeredgewidth=1.2,
+                  label="contact lost at some position", zorder=4)  # fmt: skip
 
 
 def _ends(x: Array) -> tuple[float, float]:

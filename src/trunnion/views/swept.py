@@ -77,7 +77,11 @@ def check_measure(name: str, mechanism: Mechanism) -> None:
 def grid(result: xr.Dataset, name: str) -> tuple[str, Array]:
     """Unit and values, (first name, second name), of a figure."""
     shape = [result.sizes[one] for one in json.loads(result.attrs["swept"])]
-    unit, values = figures(result)[name]
+    found = figures(result)
+    if name not in found:
+        what = f"no mechanism of the sweep has errors: there is no figure '{name}'"
+        raise MechanismError(Finding(what, "--measure", "state errors, a misalignment or a seat: loaded"))
+    unit, values = found[name]
     return unit, np.asarray(values, float).reshape(shape[0], -1)
 
 
@@ -108,7 +112,8 @@ def _thinned(count: int, most: int) -> list[int]:
 def _list(result: xr.Dataset, measure: str, over: Scale) -> tuple[list[str], list[list[str]], int]:
     found = figures(result)
     efforts = [name for name in found if name.endswith(".effort_max")]
-    shown = list(dict.fromkeys([measure, "efficiency", *efforts, "friction_power_mean", "locking_margin"]))
+    ideal = [name for name in ("efficiency_ideal",) if name in found]
+    shown = list(dict.fromkeys([measure, "efficiency", *ideal, *efforts, "friction_power_mean", "locking_margin"]))
     picked, status = _thinned(len(over.values), MOST_ROWS), statuses(result)[:, 0]
     titles = [f"{name.replace('_', ' ')} [{found[name][0]}]".removesuffix(" [1]") for name in shown]
     words = [_word(int(code)) for code in status]
@@ -122,7 +127,10 @@ def _list(result: xr.Dataset, measure: str, over: Scale) -> tuple[list[str], lis
 
 def _word(code: int) -> str:
     """What a table says of a point that has no figures, or not quite sound ones."""
-    return cause(code) if code >= Status.NOT_CONVERGED else "near singular" if code == Status.NEAR_SINGULAR else ""
+    if code >= Status.NOT_CONVERGED:
+        return cause(code)
+    milder = {int(Status.NEAR_SINGULAR): "near singular", int(Status.CONTACT_LOST): "contact lost"}
+    return milder.get(code, "")
 
 
 def _number(value: float) -> str:

@@ -8,10 +8,11 @@ const MARGIN = { top: 8, right: 14, bottom: 40, left: 58 };
 
 /**
  * A chart of `series` [{label, values, kind, quiet}] in one unit; `kind` is a class that colours the curve.
+ * `breaks` of a series are positions that no line leads to, `marks` positions that are marked in all of the chart.
  * `band` {low, high, kind, label} is filled. `limits` caps the vertical axis, `note` is a remark below it.
  * `pick(index, firm)` is called when the reader points.
  */
-export function lineChart(scene, { title, unit, series, band = null, limits = null, note = "", pick }) {
+export function lineChart(scene, { title, unit, series, band = null, limits = null, note = "", marks = [], pick }) {
   const columns = series.map((one) => one.values);
   const scope = limits ? peak(limits) : usualPeak(...columns);
   const scale = prefixed(scope, unit);
@@ -38,6 +39,7 @@ export function lineChart(scene, { title, unit, series, band = null, limits = nu
     scale,
     series,
     band,
+    marks,
     limits: cut ? [-scope, scope] : limits,
     title,
     frame: null,
@@ -102,7 +104,7 @@ function draw(chart, width) {
     height: bottom - MARGIN.top + 4,
   };
   const curves = series.map((one) =>
-    svg("path", { class: `curve ${one.kind}`, d: curvePath(scene, frame, one.values, scale.factor) }),
+    svg("path", { class: `curve ${one.kind}`, d: curvePath(scene, frame, one.values, scale.factor, one.breaks) }),
   );
   const silent = extent(series.map((one) => one.values)) === null;
   const bars = band ? svg("path", { class: `band ${band.kind}`, d: bandPath(chart, band) }) : null;
@@ -112,6 +114,7 @@ function draw(chart, width) {
       { viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": describe(chart) },
       ...shading(chart, frame),
       ...axes(scene.abscissa, frame, [x0, x1], [y0, y1]),
+      ...chart.marks.map((index) => mark(frame, scene.abscissa.values[index])),
       clipped(box, ...curves, bars),
       chart.cursor,
       ...chart.dots,
@@ -119,6 +122,11 @@ function draw(chart, width) {
     ),
   );
   moveCursor(chart);
+}
+
+/** A dotted line up through the chart. */
+function mark(frame, value) {
+  return svg("line", { class: "lost", x1: frame.x(value), x2: frame.x(value), y1: MARGIN.top, y2: frame.bottom });
 }
 
 function centre({ x, y, width, height }) {
@@ -200,7 +208,7 @@ function shading(chart, frame) {
 }
 
 /** The path of a curve, broken where there is no value, led on to the first value over a closed turn. */
-export function curvePath(scene, frame, values, factor) {
+export function curvePath(scene, frame, values, factor, breaks = []) {
   const { abscissa } = scene;
   const count = abscissa.values.length;
   let path = "";
@@ -214,6 +222,7 @@ export function curvePath(scene, frame, values, factor) {
     }
     const y = frame.y(value * factor);
     if ((y < 0 && last > frame.height) || (y > frame.height && last < 0)) pen = "M"; // through infinity, not through the frame
+    if (breaks.includes(index % count)) pen = "M";
     last = y;
     const x = abscissa.values[index % count] + (index === count ? abscissa.period : 0);
     path += `${pen}${frame.x(x).toFixed(1)},${y.toFixed(1)}`;

@@ -1,6 +1,7 @@
 // The mechanism as SVG: ground, links as bodies, joints, coupler curves, loads, reaction vectors.
 
 import { arrow, longest } from "./arrow.js";
+import { leaning, magnified, play, seatOf, told } from "./built.js";
 import { at, bounds, cause, guide, hull, magnitude, peak, place, quantile, solved, usualPeak } from "./data.js";
 import { html, onWidth, set, svg } from "./dom.js";
 import { roundBelow, short, stated } from "./format.js";
@@ -22,10 +23,12 @@ export function mechanismView(scene, kinds) {
     message.textContent = "The mechanism could not be assembled at any position.";
     message.hidden = false;
     element.classList.add("empty");
-    return { element, show() {}, reactions() {} };
+    return { element, show() {}, reactions() {}, magnify() {} };
   }
   const view = {
-    scene,
+    scene: magnified(scene, 1),
+    built: scene,
+    ideal: magnified(scene, 0),
     kinds,
     box,
     stage,
@@ -39,9 +42,13 @@ export function mechanismView(scene, kinds) {
   view.peak = usualPeak(forces);
   view.towers = view.peak < peak(forces); // a few vectors leave the picture whatever the scale
   view.usual = Math.max(quantile(forces, 0.9), view.peak / 2); // long vectors stay in sight, common ones legible
-  onWidth(stage, (width) => build(view, width), 490);
+  onWidth(stage, (width) => build(fit(view, width)), 490);
   return {
     element,
+    magnify(factor) {
+      view.scene = magnified(scene, factor);
+      if (view.frame) build(view);
+    },
     show(index) {
       view.index = index;
       pose(view);
@@ -73,18 +80,21 @@ function framed({ box }, width, margin) {
 function fit(view, width) {
   for (const growth of [1, 1.3, 1.6]) {
     view.frame = framed(view, width, growth * Math.min(MARGIN, width * 0.12));
-    view.fitting = fitting(view);
-    if (view.towers || view.peak * view.fitting > 0.18 * Math.min(width, view.frame.height)) return;
+    view.fitting = fitting({ ...view, scene: view.built });
+    if (view.towers || view.peak * view.fitting > 0.18 * Math.min(width, view.frame.height)) break;
   }
+  return view;
 }
 
-function build(view, width) {
-  const { scene } = view;
-  fit(view, width);
+function build(view) {
+  const { scene, frame } = view;
+  const apart = scene.factor > 1 ? scene.links.filter((link) => !link.ground) : [];
   view.parts = {
+    ideal: apart.map((link) => ({ link, node: svg("path", { class: "ideal" }) })),
     bodies: scene.links.filter((link) => !link.ground).map((link) => body(link, scene)),
     slots: slotsOf(scene, (link) => tint(link, scene)),
-    joints: scene.joints.map((one) => joint(one, scene)),
+    joints: scene.joints.map((one) => joint(one, scene, frame)),
+    rails: scene.joints.filter((one) => one.type === "prismatic" && play(scene, one.name)).map(rails),
     points: scene.links
       .filter((link) => !link.ground)
       .flatMap((link) => link.free.map((key) => freePoint(key, link.name))),
@@ -107,8 +117,10 @@ function build(view, width) {
     {},
     ...view.parts.bodies.map((one) => one.node),
     ...view.parts.slots.map((one) => one.node),
+    ...view.parts.ideal.map((one) => one.node),
     ...view.parts.gears.map((one) => one.node),
     ...view.parts.points.map((one) => one.node),
+    ...view.parts.rails.map((one) => one.node),
     ...view.parts.joints.map((one) => one.node),
     ...view.parts.springs.map((one) => one.node),
     ...view.parts.drives,
@@ -119,7 +131,7 @@ function build(view, width) {
   view.stage.replaceChildren(
     svg(
       "svg",
-      { viewBox: `0 0 ${width} ${Math.round(view.frame.height)}`, role: "img", "aria-label": `Mechanism: ${scene.name}` },
+      { viewBox: `0 0 ${frame.width} ${Math.round(frame.height)}`, role: "img", "aria-label": `Mechanism: ${scene.name}` },
       ...ground(view),
       ...tracks(view),
       view.moving,
@@ -157,7 +169,10 @@ function ground(view) {
         ? Array.from({ length: scene.count }, (_, index) => place(scene, one.at, index)).filter(Boolean)
         : [];
       if (!spots.length) return null;
-      return one.type === "prismatic" ? rail(frame, spots, guide(scene, one, 0)) : support(frame, spots[0]);
+      const own = scene.built && [one.on, one.at].find((key) => key === `${fixed}.${one.name}`);
+      const base = (own && place(scene, own, 0)) || spots[0]; // a pin off the middle of its hole does not move the ground
+      if (one.type !== "prismatic") return support(frame, base);
+      return rail(frame, base, spots, guide(scene, one, 0), play(scene, one.name) * frame.scale);
     })
     .filter(Boolean);
 }
@@ -172,14 +187,16 @@ function support(frame, spot) {
   );
 }
 
-function rail(frame, spots, angle) {
+/** `apart`: px by which the play widens the guide to either side. */
+function rail(frame, base, spots, angle, apart) {
   const [ux, uy] = [Math.cos(angle), Math.sin(angle)];
   const along = spots.map(([x, y]) => x * ux + y * uy);
   const [low, high] = [Math.min(...along), Math.max(...along)];
-  const shift = (low + high) / 2 - along[0];
-  const [x, y] = frame.to([spots[0][0] + shift * ux, spots[0][1] + shift * uy]);
+  const shift = (low + high) / 2 - (base[0] * ux + base[1] * uy);
+  const [x, y] = frame.to([base[0] + shift * ux, base[1] + shift * uy]);
   const half = ((high - low) / 2) * frame.scale + 26;
-  return svg("g", { class: "ground" }, hatching(x + 11 * uy, y + 11 * ux, -angle, half));
+  const gap = 11 + apart;
+  return svg("g", { class: "ground" }, hatching(x + gap * uy, y + gap * ux, -angle, half));
 }
 
 /** A line with hatching on its far side, around (x, y), turned by `angle` (screen sense, rad). */
@@ -234,7 +251,8 @@ function body(link, scene) {
   return { link, parts, node: svg("g", { class: "body" }, svg("title", {}, link.name), ...parts) };
 }
 
-function joint(one, scene) {
+/** The symbol of a joint; of one with a seat the hole and, in it, the pin. */
+function joint(one, scene, frame) {
   const grounded = scene.links.some((link) => link.ground && one.links.includes(link.name));
   const beside = one.type === "prismatic" ? [26, -13] : grounded ? [-19, 15] : [-11, -10]; // clear of bearing and block
   const node = svg(
@@ -242,10 +260,24 @@ function joint(one, scene) {
     { class: "joint" },
     svg("title", {}, one.name),
     one.type === "prismatic"
-      ? svg("rect", { x: -17, y: -10, width: 34, height: 20, rx: 1.5 })
-      : svg("circle", { r: 5 }),
+      ? svg("rect", { ...block(one, scene, frame), y: -10, height: 20, rx: 1.5 })
+      : svg("circle", { r: (5 + play(scene, one.name) * frame.scale).toFixed(1) }),
   );
+  const pin = one.type !== "prismatic" && play(scene, one.name) ? svg("circle", { class: "pin", r: 5 }) : null;
+  if (pin) return { joint: one, pin, beside, label: svg("text", { class: "name" }, short(one.name)), hole: node, node: svg("g", {}, node, svg("g", { class: "joint" }, pin)) };
   return { joint: one, node, beside, label: svg("text", { class: "name" }, short(one.name)) };
+}
+
+/** Where a block begins and how long it is: as long as the guide holds it, if that is known. */
+function block(one, scene, frame) {
+  const length = seatOf(scene.built, one.name)?.length;
+  const width = length ? Math.max(length * frame.scale, 8) : 34;
+  return { x: (-width / 2).toFixed(1), width: width.toFixed(1) };
+}
+
+/** The walls of a guide with play. */
+function rails(one) {
+  return { joint: one, node: svg("path", { class: "rail" }) };
 }
 
 function freePoint(key, link) {
@@ -273,6 +305,10 @@ function scales(view) {
     parts.push(svg("path", { class: "reaction reference", d: arrow(x, y, force * view.perNewton, 0) }));
     parts.push(svg("text", { x: x + force * view.perNewton + 8, y, dy: "0.32em" }, `reaction ${stated(force, "N")}`));
   }
+  if (view.scene.built) {
+    const text = `errors × ${told(view.scene.factor)}${view.scene.factor > 1 ? ", ideal dashed" : ""}`;
+    parts.push(svg("text", { class: "errors", x: 14, y: 16 }, text));
+  }
   view.key.replaceChildren(...parts);
 }
 
@@ -290,7 +326,9 @@ function pose(view) {
   view.moving.setAttribute("class", answered ? "moving" : "moving without-answer");
   view.message.hidden = answered;
   view.message.textContent = answered ? "" : cause(scene, index);
+  parts.ideal.forEach((one) => poseIdeal(view, one));
   parts.bodies.forEach((one) => poseBody(view, one));
+  parts.rails.forEach((one) => poseRails(view, one));
   parts.slots.forEach((one) => poseSlot(one, scene, frame, view.posed));
   parts.points.forEach((one) => moveTo(one.node, spotOf(view, one.key)));
   parts.joints.forEach((one) => poseJoint(view, one));
@@ -329,15 +367,45 @@ function moveTo(node, spot, angle = 0) {
 }
 
 function poseBody(view, { link, parts }) {
-  const spots = spotsOf(view, link.points);
-  const corners = hull(spots).map(([x, y]) => `${x.toFixed(1)},${y.toFixed(1)}`);
-  const path = corners.length ? `M${corners.join("L")}${corners.length > 2 ? "Z" : ""}` : "";
+  const path = closedPath(spotsOf(view, link.points));
   parts.forEach((part) => part.setAttribute("d", path));
+}
+
+/** The hull of some spots as a path. */
+function closedPath(spots) {
+  const corners = hull(spots).map(([x, y]) => `${x.toFixed(1)},${y.toFixed(1)}`);
+  return corners.length ? `M${corners.join("L")}${corners.length > 2 ? "Z" : ""}` : "";
+}
+
+/** The outline of a link where the ideal mechanism has it. */
+function poseIdeal({ ideal, frame, posed }, { link, node }) {
+  const spots = link.points.map((key) => place(ideal, key, posed)).filter(Boolean);
+  node.setAttribute("d", closedPath(spots.map(frame.to)));
+}
+
+/** Both walls of a guide, as far apart as the block is high and the play wide. */
+function poseRails({ scene, frame, posed }, { joint: one, node }) {
+  const [on, at_] = [place(scene, one.on, posed), place(scene, one.at, posed)];
+  if (!on || !at_) return set(node, { d: "" });
+  const angle = guide(scene, one, posed);
+  const [ux, uy] = [Math.cos(angle), -Math.sin(angle)];
+  const along = ((at_[0] - on[0]) * Math.cos(angle) + (at_[1] - on[1]) * Math.sin(angle)) * frame.scale;
+  const half = Math.max(((seatOf(scene.built, one.name)?.length ?? 0) / 2) * frame.scale, 17) + 14;
+  const gap = 10 + play(scene, one.name) * frame.scale;
+  const [x, y] = frame.to(on);
+  const wall = (side) => {
+    const end = (far) => `${(x + far * ux - side * uy).toFixed(1)},${(y + far * uy + side * ux).toFixed(1)}`;
+    return `M${end(along - half)}L${end(along + half)}`;
+  };
+  return set(node, { d: wall(gap) + wall(-gap) });
 }
 
 function poseJoint(view, one) {
   const spot = spotOf(view, one.joint.at);
-  moveTo(one.node, spot, one.joint.type === "prismatic" ? guide(view.scene, one.joint, view.posed) : 0);
+  const slides = one.joint.type === "prismatic";
+  const angle = slides ? guide(view.scene, one.joint, view.posed) + leaning(view.scene, one.joint, view.posed) : 0;
+  moveTo(one.hole ?? one.node, spot, angle);
+  if (one.pin) moveTo(one.pin, spotOf(view, one.joint.on));
   moveTo(one.label, spot && [spot[0] + one.beside[0], spot[1] + one.beside[1]]);
 }
 

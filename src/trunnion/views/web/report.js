@@ -1,5 +1,6 @@
 // The report page: reads the scene out of the document, builds the views, and lets the crank move them all.
 
+import { magnifier } from "./built.js";
 import { lineChart } from "./chart.js";
 import { at, full, magnitude, peak, solved, state, total, usualPeak } from "./data.js";
 import { html, svg } from "./dom.js";
@@ -7,6 +8,7 @@ import { fixed, quantity } from "./format.js";
 import { mechanismView } from "./mechanism.js";
 import { listenToKeys, player } from "./player.js";
 import { polarChart } from "./polar.js";
+import { seatCharts } from "./seat.js";
 import { spaceView } from "./space.js";
 
 /** Class that colours the n-th joint's curves and vectors; after six the dash changes. */
@@ -51,6 +53,28 @@ function charts(scene, kinds, pick) {
         series: [{ label: "efficiency", values, kind: "k2" }],
       }),
     );
+  }
+  return [...list, ...errorCharts(scene, kinds, pick)];
+}
+
+/** Errors of the worst points and of the outputs, and how the pins lie; dotted where a pin loses contact. */
+function errorCharts(scene, kinds, pick) {
+  const { built, count } = scene;
+  if (!built) return [];
+  const marks = built.lost;
+  const note = marks.length ? "Dotted: a pin loses contact." : "";
+  const list = [];
+  if (built.worst.length) {
+    const series = built.worst.map(({ label, values }, order) => ({ label, values: full(values, count), kind: kindOf(order) }));
+    list.push(lineChart(scene, { title: "Errors of place, largest", unit: "m", series, marks, note, pick }));
+  }
+  for (const { label, unit, values } of built.outputs)
+    list.push(lineChart(scene, { title: `Transmission error, ${label}`, unit, marks, note, pick, series: [{ label: "error", values: full(values, count), kind: "k0" }] })); // prettier-ignore
+  for (const [sign, title] of [["β", "β, between the seats of the ends"], ["ξ", "ξ, direction of the seats"]]) {
+    const series = built.angles
+      .filter((one) => one.sign === sign)
+      .map(({ joint, values, breaks }) => ({ label: joint, values: full(values, count), breaks, kind: kinds.get(joint) }));
+    if (series.length) list.push(lineChart(scene, { title, unit: "°", series, marks, note, pick }));
   }
   return list;
 }
@@ -208,7 +232,9 @@ export function start(scene, places) {
     else if (!crank.playing()) crank.go(index);
   };
   const curves = charts(scene, kinds, pick);
-  views.push(...curves, polarPanel(scene, kinds, pick, places.polars));
+  const seats = places.seats ? seatCharts(scene, kinds) : [];
+  places.seats?.append(...seats.map((chart) => chart.element));
+  views.push(...curves, ...seats, polarPanel(scene, kinds, pick, places.polars));
   const hint = html(
     "p",
     { class: "hint" },
@@ -217,8 +243,9 @@ export function start(scene, places) {
       (scene.apart ? " Joints on one spot are drawn apart along their axes; between them the scale does not hold." : ""),
   );
   const vectors = vectorControls(scene, kinds, mechanism);
+  const errors = scene.built ? magnifier(scene.built, html, (factor) => mechanism.magnify(factor)) : null;
   places.stage.append(
-    ...[mechanism.element, crank.element, figures.element, vectors, mechanism.controls, hint].filter(Boolean),
+    ...[mechanism.element, crank.element, errors, figures.element, vectors, mechanism.controls, hint].filter(Boolean),
   );
   places.charts.append(...curves.map((chart) => chart.element));
   listenToKeys(document, crank);
@@ -230,5 +257,5 @@ if (globalThis.document) {
   const find = (id) => document.getElementById(id);
   const data = find("scene");
   if (data)
-    start(JSON.parse(data.textContent), { stage: find("stage"), charts: find("charts"), polars: find("polars") });
+    start(JSON.parse(data.textContent), { stage: find("stage"), charts: find("charts"), polars: find("polars"), seats: find("seats") });
 }

@@ -1,6 +1,7 @@
 // The mechanism in space: bodies on a canvas, over them as SVG names, axes, loads, reactions and scales. Drag turns it.
 
 import { arrow, longest } from "./arrow.js";
+import { magnified, told } from "./built.js";
 import { looking, steer } from "./camera.js";
 import { at, cause, magnitude, peak, quantile, solved, usualPeak } from "./data.js";
 import { html, onWidth, set, svg } from "./dom.js";
@@ -15,7 +16,7 @@ const SHARP = 2; // canvas pixels for one of the page, at least: it is printed t
 const LINE = 0.75; // half length of an axis, share of the size
 const FAR = 1.5; // a screw axis farther from the middle than this many sizes is not drawn
 const LOAD = 44; // length of a load, px
-const ON_PAPER = { ink: "#1b1f24", muted: "#5a636e", ground: "#9aa3ad", joint: "#f7f8fa",
+const ON_PAPER = { ink: "#1b1f24", muted: "#5a636e", ideal: "#c3c9d1", ground: "#9aa3ad", joint: "#f7f8fa",
   kinds: ["#0072b2", "#d55e00", "#009e73", "#b8578f", "#b97900", "#3b95cc"] }; // prettier-ignore
 
 /** What may be shown beside bodies and reactions: label, and whether it is at the start. */
@@ -37,12 +38,13 @@ export function spaceView(scene, kinds) {
     message.textContent = "The mechanism could not be assembled at any position.";
     message.hidden = false;
     element.classList.add("empty");
-    return { element, controls: null, show() {}, reactions() {} };
+    return { element, controls: null, show() {}, reactions() {}, magnify() {} };
   }
   const forces = scene.joints.flatMap((joint) => magnitude(joint.reaction, scene.count));
   const moments = scene.joints.flatMap((joint) => magnitude(joint.moment, scene.count));
   const view = {
-    scene,
+    scene: magnified(scene, 1),
+    ideal: magnified(scene, 0),
     kinds,
     stage,
     message,
@@ -51,13 +53,11 @@ export function spaceView(scene, kinds) {
     factor: 1,
     shown: new Set(scene.joints.map((joint) => joint.name)),
     extras: new Set(Object.keys(EXTRAS).filter((name) => EXTRAS[name][1])),
-    links: new Map(scene.links.map((link) => [link.name, link])),
-    bodies: scene.solids.map((solid) => ({ solid, meshes: meshes(solid, scene.size) })),
     usual: { force: usual(forces), moment: usual(moments) },
     camera: first(scene),
     queued: 0,
   };
-  view.tracks = scene.free.map((point) => track(scene, view.links.get(point.link), point));
+  embody(view);
   prepare(view);
   onWidth(stage, (width) => build(view, width), 490);
   steer(stage, { get: () => view.camera, put: (camera) => turn(view, camera), home: () => first(scene) });
@@ -65,6 +65,11 @@ export function spaceView(scene, kinds) {
   return {
     element,
     controls: controls(view),
+    magnify(factor) {
+      view.scene = magnified(scene, factor);
+      embody(view);
+      turn(view, view.camera);
+    },
     show(index) {
       view.index = index;
       pose(view);
@@ -75,6 +80,14 @@ export function spaceView(scene, kinds) {
       pose(view);
     },
   };
+}
+
+/** Links, bodies and tracks of the scene as its errors are magnified now. */
+function embody(view) {
+  const { scene } = view;
+  view.links = new Map(scene.links.map((link) => [link.name, link]));
+  view.bodies = scene.solids.map((solid) => ({ solid, meshes: meshes(solid, scene.size) }));
+  view.tracks = scene.free.map((point) => track(scene, view.links.get(point.link), point));
 }
 
 /** A magnitude that arrows are scaled by: long ones stay in sight, common ones legible. */
@@ -106,7 +119,7 @@ function prepare(view) {
 function recolour(view, paper) {
   const style = paper ? null : globalThis.getComputedStyle?.(view.stage);
   const of = (name, plain) => style?.getPropertyValue(`--${name}`).trim() || plain;
-  const colours = { ink: of("ink", ON_PAPER.ink), muted: of("muted", ON_PAPER.muted) };
+  const colours = { ink: of("ink", ON_PAPER.ink), muted: of("muted", ON_PAPER.muted), ideal: of("strong", ON_PAPER.ideal) };
   colours[""] = shades(of("joint", ON_PAPER.joint));
   let order = 0;
   for (const link of view.scene.links) {
@@ -254,10 +267,22 @@ function paintBodies(view) {
     }
     for (const mesh of two) pieces.push(...seen(mesh, solid.paint, pose, project));
   }
+  if (scene.factor > 1) pieces.push(...outline(view));
   if (view.extras.has("tracks"))
     for (const one of view.tracks) if (!one.still) pieces.push(...stroke(one.places, colours.ink, 1.4, project));
   context.clearRect(0, 0, frame.width, frame.height);
   paint(context, pieces, colours);
+}
+
+/** The middle lines of the bodies where the ideal mechanism has them. */
+function outline({ ideal, posed, colours, project }) {
+  const poses = new Map(ideal.links.map((link) => [link.name, link.ground ? null : poseOf(link, posed)]));
+  return ideal.solids.flatMap(({ kind, link, points }) => {
+    const pose = poses.get(link);
+    if (!pose || kind !== "rod") return [];
+    const places = points.map((point) => plus(apply(pose.turn, point), pose.place));
+    return stroke(places, colours.ideal, 3, project);
+  });
 }
 
 /** A line through a place along a direction, both in the global frame, as an SVG path. */
@@ -427,6 +452,10 @@ function key(view) {
   };
   reference(view.perUnit.force, "N", "reaction", false);
   if (view.extras.has("moments")) reference(view.perUnit.moment, "N m", "moment", true);
+  if (scene.built) {
+    const text = `errors × ${told(scene.factor)}${scene.factor > 1 ? ", ideal as pale lines" : ""}`;
+    parts.push(svg("text", { class: "errors", x: 14, y: 18 }, text));
+  }
   return [svg("g", { class: "key" }, ...parts)];
 }
 

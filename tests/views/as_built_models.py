@@ -1,0 +1,50 @@
+"""Mechanisms with errors for the views: seats that follow the load, one that is given, errors of dimensions."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+import trunnion
+from trunnion import Mechanism
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+FOUR_BAR = """
+trunnion: 1
+name: Four-bar with one loose pin
+space: planar
+dimensions: {AB: 30 mm, BC: 90 mm, CD: 70 mm, AD: 100 mm}
+links:
+  ground: {points: {A: [0, 0], D: [AD, 0]}}
+  crank: {points: {A: [0, 0], B: [AB, 0]}}
+  coupler: {points: {B: [0, 0], C: [BC, 0]}}
+  rocker: {points: {D: [0, 0], C: [CD, 0]}}
+joints:
+  A: {type: revolute, links: [ground, crank]}
+  B: {type: revolute, links: [crank, coupler], pin: {clearance: 0.02 mm}, seat: {xi: 30 deg}}
+  C: {type: revolute, links: [coupler, rocker]}
+  D: {type: revolute, links: [ground, rocker]}
+drivers: {A: {speed: 10 rad/s}}
+loads: {brake: {joint: D, resisting_torque: 2 N m, useful: true}}
+assembly: {C: [0.09, 0.06]}
+"""
+
+
+def four_bar_model(**errors: str) -> Mechanism:
+    """The four-bar with its pin B at ξ = 30°, and with errors of dimensions."""
+    stated = "".join(f"\n  {name}: {value}" for name, value in errors.items())
+    return Mechanism.model_validate(yaml.safe_load(FOUR_BAR + (f"errors:{stated}\n" if stated else "")))
+
+
+def four_bar(steps: int = 72, **errors: str) -> Any:
+    """The same analysed."""
+    return trunnion.analyse(four_bar_model(**errors), steps)
+
+
+def loaded(example: str, steps: int = 72, **values: Any) -> Any:
+    """An example with every pin where its load presses it."""
+    mechanism = Mechanism.read(EXAMPLES / f"{example}.yaml")
+    return trunnion.analyse(mechanism.with_values({"joint_defaults.seat": "loaded"} | values), steps)

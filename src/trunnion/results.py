@@ -99,7 +99,7 @@ VARIABLES: dict[str, Variable] = {
         ("joint",), "rad/(N s)", "rate of turn of the reaction over its size (Earles and Wu)", part="seats"
     ),
     "seat_rounds": Variable((), "1", "rounds to settle seats and reactions", part="seats"),
-    "seat_change": Variable((), "1", "change of a seat in the last round, of its clearance", part="seats"),
+    "seat_change": Variable((), "1", "change of a seat that one more round would make, of its clearance", part="seats"),
     "point_error": Variable(("point", "axis"), "m", "place of the point against the ideal mechanism", part="errors"),
     "link_error": Variable(("link",), "rad", "angle of the link against the ideal mechanism", part="errors"),
     "joint_rotation_error": Variable(

@@ -15,7 +15,7 @@ from trunnion import results
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.nested import flat
 from trunnion.analysis import account, contact_loss, diagnosis
-from trunnion.analysis.asbuilt import fill_errors, fill_seats
+from trunnion.analysis.asbuilt import COMPARED, fill_errors, fill_seats
 from trunnion.analysis.branches import Chosen, choose
 from trunnion.analysis.bristles import History, histories
 from trunnion.analysis.engine import build
@@ -279,7 +279,9 @@ def _fill_as_built(
     part, quick = time[window], replace(method, margin_up_to=0.0)
     labels = run.system.engine.labels(run.system)
     seen = lanes(part, run.cycle) if run.seats else Lanes(part, np.arange(len(part)), 0)
-    scratch = results.allocate(labels, len(seen.times), run.system.engine.absent(run.system))
+    scratch = results.allocate(
+        labels, len(seen.times), run.system.engine.absent(run.system), wanted={*IDEAL, *COMPARED}
+    )
     meant = run.ideal(seen.times, quick)
     _fill(scratch, meant, seen.times, slice(0, len(seen.times)))
     own = slice(int(seen.own[0]), int(seen.own[-1]) + 1)

@@ -1,8 +1,9 @@
 """What the build of the pages adds to their text, so that no table or picture can drift from the code.
 
 - `<!-- generated: NAME -->` in a page becomes the table of that name, made from the code's own tables.
-- `figures/MODEL/KIND.svg` and `figures/MODEL/report.html` are drawn when a page refers to them. KIND is a plot, `assemblies`
-  or `assemble`; MODEL is a file of `examples/`, a block of a page titled `MODEL.yaml`, or an entry of `VARIANTS`.
+- `figures/MODEL/KIND.svg` and `figures/MODEL/report.html` are drawn when a page refers to them. KIND is a plot,
+  `assemblies` or `assemble`; MODEL is a file of `examples/`, a block of a page titled `MODEL.yaml`, or an entry of
+  `VARIANTS`.
 - `figures/sweeps/NAME.svg`, `figures/plays/NAME.svg` and `figures/assembles/NAME.svg` are drawn by the command of a
   page, `trunnion sweep … --out NAME.svg` and so on.
 - The gallery is made of the examples and of `tests/gallery/facts.py`; see `gallery_page.py`.

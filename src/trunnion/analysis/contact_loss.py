@@ -102,6 +102,8 @@ def _earles_wu(force: NDArray[np.float64], time: NDArray[np.float64], periodic: 
 
 def _least_loaded(forces: NDArray[np.float64], rows: Sequence[int]) -> NDArray[np.intp]:
     """Of the joints with loaded seats that whose end bears least, at each of some positions."""
+    if not len(rows) or not forces.shape[-1]:
+        return np.zeros(0, np.intp)
     sizes = np.sqrt(np.sum(forces[rows] ** 2, axis=2))
     least = np.argmin(np.nan_to_num(np.min(np.where(np.isfinite(sizes), sizes, np.inf), axis=1)), axis=0)
     return np.array([rows[k] for k in least], np.intp)

@@ -265,6 +265,7 @@ def plot(
     image: Annotated[str, typer.Option("--format", help="png, svg or pdf, for a folder of plots.")] = "png",
 ) -> None:
     """Figures: drive torque, friction power, reactions, polar diagram, mechanism with coupler curve."""
+    from trunnion.views.error_plot import with_worst_case
     from trunnion.views.plots import PLOTS, drawable, save
 
     unknown = [name for name in kind or [] if name not in PLOTS]
@@ -280,7 +281,8 @@ def plot(
     ideal = _ideal(mechanism, steps, None)
     if not single:
         _folder(out)
-    for name, figure in [(name, PLOTS[name](result, ideal)) for name in kind or drawable(result)]:
+    shown = with_worst_case(result, mechanism) if "error" in (kind or PLOTS) else result
+    for name, figure in [(name, PLOTS[name](shown, ideal)) for name in kind or drawable(result)]:
         path = out if single else out / f"{name}.{image.lstrip('.')}"
         save(figure, path)
         wrote(path)

@@ -6,7 +6,7 @@ component (of a quaternion: w, x, y, z), driver, spring (only of a mechanism tha
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -99,7 +99,7 @@ VARIABLES: dict[str, Variable] = {
         ("joint",), "rad/(N s)", "rate of turn of the reaction over its size (Earles and Wu)", part="seats"
     ),
     "seat_rounds": Variable((), "1", "rounds to settle seats and reactions", part="seats"),
-    "seat_change": Variable((), "1", "change of a seat in the last round, of its clearance", part="seats"),
+    "seat_change": Variable((), "1", "change of a seat that one more round would make, of its clearance", part="seats"),
     "point_error": Variable(("point", "axis"), "m", "place of the point against the ideal mechanism", part="errors"),
     "link_error": Variable(("link",), "rad", "angle of the link against the ideal mechanism", part="errors"),
     "joint_rotation_error": Variable(
@@ -144,11 +144,16 @@ def _space(labels: Labels) -> str:
 
 
 def allocate(
-    labels: Labels, positions: int, absent: Sequence[str] = (), parts: Sequence[str] = ()
+    labels: Labels,
+    positions: int,
+    absent: Sequence[str] = (),
+    parts: Sequence[str] = (),
+    wanted: Collection[str] | None = None,
 ) -> dict[str, NDArray[np.float64]]:
     """Arrays for every variable, to be filled, position last; those in `absent` are zero and take no memory.
 
-    parts: of those variables that not every result has.
+    parts: of those variables that not every result has. wanted: what will be read, all if not given; of the others
+    every entry is one cell, so that filling them costs next to nothing.
     """
     arrays: dict[str, NDArray[np.float64]] = {}
     for name, variable in variables(_space(labels)).items():
@@ -159,6 +164,9 @@ def allocate(
         shape = (*(len(labels[dim]) for dim in variable.dims), positions)
         if name in absent:
             arrays[name] = np.broadcast_to(np.zeros(()), shape)
+        elif wanted is not None and name not in wanted:
+            cell = np.zeros(1, INTEGERS.get(name, np.float64))
+            arrays[name] = np.lib.stride_tricks.as_strided(cell, shape, (0,) * len(shape))
         else:
             # zeroed pages take no memory until something is written: rows of the ground never are
             arrays[name] = np.zeros(shape, INTEGERS.get(name, np.float64))

@@ -22,6 +22,7 @@ from reference.maximal_space import Array, Data, Drive, Frame
 from reference.seat_oracle import FourBar, Link, Linkage, SliderCrank
 from reference.seat_oracle_space import settle
 from trunnion.analysis.analyse import Run
+from trunnion.analysis.seating import loads_of
 from trunnion.errors import Status
 
 LINKAGES: dict[str, tuple[Any, type[Linkage]]] = {
@@ -76,16 +77,17 @@ def test_seats_reactions_and_places(name: str, friction: float) -> None:
     assert set(result.status.values) <= {int(Status.SOLVED)}
     run = trunnion.prepare(trunnion.Mechanism(trunnion=1, **data))
     back = run.at(result.time.values, offsets_of(run, result))
+    held_loads = {seat.joint: loads_of(back, seat) for seat in run.seats}
     for i in range(steps):
         settled = oracle.settle(float(result.joint_rotation.sel(joint="A").values[i]))
         for joint, ends in settled.offsets.items():
             found = result.seat_offset.sel(joint=joint).values[:, :, i]
-            loads = result.end_force.sel(joint=joint).values[:, :, i]
+            loads = held_loads[joint]
             for end, (c, q) in enumerate(zip(ends, settled.loads[joint], strict=True)):
                 pin = len(ends) == 1
                 place = complex(*found[end, :2]) if pin else found[end, 1]
                 assert abs(place - c) < 2e-6 * oracle.clearance(joint)
-                load = complex(*loads[end, :2]) if pin else loads[end, 1]
+                load = complex(*(part[i] for part in loads[end])) if pin else loads[end][0][i]
                 assert abs(load - q) < (1e-3 if friction else 1e-6) * abs(q) + 1e-8
         for link, motion in settled.links.items():
             turned = float(result.link_angle.sel(link=link).values[i]) - motion.angle

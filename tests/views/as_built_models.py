@@ -33,12 +33,15 @@ assembly: {C: [0.09, 0.06]}
 """
 
 
-def four_bar(steps: int = 72, **errors: str) -> Any:
+def four_bar_model(**errors: str) -> Mechanism:
     """The four-bar with its pin B at ξ = 30°, and with errors of dimensions."""
     stated = "".join(f"\n  {name}: {value}" for name, value in errors.items())
-    return trunnion.analyse(
-        Mechanism.model_validate(yaml.safe_load(FOUR_BAR + (f"errors:{stated}\n" if stated else ""))), steps
-    )
+    return Mechanism.model_validate(yaml.safe_load(FOUR_BAR + (f"errors:{stated}\n" if stated else "")))
+
+
+def four_bar(steps: int = 72, **errors: str) -> Any:
+    """The same analysed."""
+    return trunnion.analyse(four_bar_model(**errors), steps)
 
 
 def loaded(example: str, steps: int = 72, **values: Any) -> Any:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from as_built_models import EXAMPLES, four_bar, loaded
+from as_built_models import EXAMPLES, four_bar, four_bar_model, loaded
 from matplotlib.collections import LineCollection
 from matplotlib.patches import Circle
 
 import trunnion
 from trunnion.errors import MechanismError, Status
 from trunnion.views.as_built import angle_scale, broken, continued, losses, outputs, seated, worst_points
-from trunnion.views.error_plot import error
+from trunnion.views.error_plot import error, with_worst_case
 from trunnion.views.plots import PLOTS, READY, drawable, save
 from trunnion.views.seat_plot import FACTORS, PIN
 from trunnion.views.sweep import figure as sweep_figure
@@ -79,16 +79,32 @@ def test_errors_are_those_of_the_result(slider):
 
 def test_the_transmission_error_of_a_four_bar_is_in_minutes_of_arc_with_its_worst_case():
     """One pin with 0.02 mm: at 60° of crank angle the output errs by at most 0.017902°."""
-    result = four_bar()
+    result = with_worst_case(four_bar(), four_bar_model())
     wrong = result.joint_rotation_error.sel(joint="D").values
-    bound = np.full(result.sizes["position"], np.radians(0.017902))
-    figure = error(result, None, {"D": bound})
-    axes = figure.axes[1]
+    axes = error(result).axes[1]
     assert "rotation [arcmin]" in axes.get_ylabel()
     assert _label(axes, "D").get_ydata()[:-1] == pytest.approx(60 * np.degrees(wrong))
-    (band,) = [one for one in axes.collections if one.get_label() == "worst case of the play, D"]
-    assert band.get_paths()[0].vertices[:, 1].max() == pytest.approx(60 * 0.017902)
+    (band,) = [one for one in axes.collections if one.get_label() == "worst case of the play"]
+    x, y = band.get_paths()[0].vertices.T
+    at = y[np.isclose(x, 60.0)]
+    assert [at.min(), at.max()] == pytest.approx([-60 * 0.017902, 60 * 0.017902], rel=1e-4)
     assert abs(wrong[12]) <= np.radians(0.017902)
+
+
+def test_the_band_lies_about_the_error_of_the_dimensions():
+    """A crank 0.1 mm too long: without play it errs by the middle of the band, with any seat it stays inside."""
+    result = with_worst_case(four_bar(AB="0.1 mm"), four_bar_model(AB="0.1 mm"))
+    centre, reach = (result[f"transmission_{name}"].sel(joint="D").values for name in ("centre", "reach"))
+    free = trunnion.analyse(four_bar_model(AB="0.1 mm").with_values({"B.pin.clearance": 0}), 72)
+    assert centre == pytest.approx(free.joint_rotation_error.sel(joint="D").values, abs=1e-12)
+    assert (np.abs(result.joint_rotation_error.sel(joint="D").values - centre) <= reach * (1 + 1e-3)).all()
+    assert np.isnan(result["transmission_centre"].sel(joint="B")).all()
+
+
+def test_without_play_there_is_no_band(plain):
+    assert with_worst_case(plain, four_bar_model()) is plain
+    model = four_bar_model(AB="0.1 mm").with_values({"B.pin.clearance": 0})
+    assert "transmission_reach" not in with_worst_case(trunnion.analyse(model, 12), model)
 
 
 def test_worst_points_are_those_and_each_once():
@@ -234,6 +250,9 @@ def test_a_jump_is_a_step_far_above_its_neighbours():
     cut_x, cut_y = broken(x, small, 60.0)
     assert np.flatnonzero(np.isnan(cut_y)).tolist() == [3]
     assert cut_x[3] == 2.5
+    halfway = np.array([0.0, 1, 2, 20, 40, 41, 42, 43])  # a jump that a position without contact lies inside of
+    assert not np.isnan(broken(x, halfway, 60.0)[1]).any()
+    assert np.flatnonzero(np.isnan(broken(x, halfway, 60.0, np.array([3]))[1])).tolist() == [3, 5]
 
 
 def test_the_scene_of_the_result_tells_the_plays(cardan):

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.namespace import Number
 
-__all__ = ["each", "flat", "replaced"]
+__all__ = ["each", "flat", "replaced", "zipped"]
 
 _Nested = TypeVar("_Nested")
 
@@ -25,6 +25,19 @@ def _each(value: Any, change: Callable[[Number], Number]) -> Any:
         return change(value)
     parts = [_each(one, change) for one in value]
     return type(value)(*parts) if hasattr(value, "_fields") else tuple(parts)
+
+
+def zipped(change: Callable[..., Number], first: _Nested, *others: Any) -> _Nested:
+    """A tuple of tuples like the first, each number from those at its place in all."""
+    return _zipped(change, first, *others)  # type: ignore[no-any-return]
+
+
+def _zipped(change: Callable[..., Number], *values: Any) -> Any:
+    first = values[0]
+    if not isinstance(first, tuple):
+        return change(*values)
+    parts = [_zipped(change, *one) for one in zip(*values, strict=True)]
+    return type(first)(*parts) if hasattr(first, "_fields") else tuple(parts)
 
 
 def flat(value: Any) -> Iterator[Number]:

@@ -15,16 +15,17 @@ from trunnion import results
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.nested import flat
 from trunnion.analysis import account, contact_loss, diagnosis
-from trunnion.analysis.asbuilt import fill_errors, fill_seats
+from trunnion.analysis.asbuilt import COMPARED, fill_errors, fill_seats
 from trunnion.analysis.branches import Chosen, choose
 from trunnion.analysis.bristles import History, histories
 from trunnion.analysis.engine import build
 from trunnion.analysis.friction import FrictionMethod
-from trunnion.analysis.kinematics import Forward, forward
+from trunnion.analysis.kinematics import Forward, Travel, forward
 from trunnion.analysis.kinetostatics import Backward, Given, Sense, solve
-from trunnion.analysis.seating import Lanes, Seat, lanes, seats, settle
+from trunnion.analysis.seating import Seat, seats, settle
 from trunnion.analysis.space.determinacy import Determinacy
 from trunnion.analysis.system import COMMON_TURNS, Cycle, System, Values, sticking
+from trunnion.analysis.travel import Lanes, lanes
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.groups.gear import rotation
 from trunnion.model.mechanism import Mechanism
@@ -84,10 +85,10 @@ class Run:
         past: Mapping[str, History],
         method: FrictionMethod | None,
         zero_slip: Mapping[str, Sense] | None = None,
-        rates: Mapping[str, Number] | None = None,
+        travel: Mapping[str, Travel] | None = None,
     ) -> Backward:
         deflections = {joint: history.at(time) for joint, history in past.items()}
-        given = Given(zero_slip or {}, deflections, rates or {})
+        given = Given(zero_slip or {}, deflections, travel or {})
         return solve(self.system, values, self.chosen.assembly, time, method, given)
 
     def at(
@@ -96,10 +97,10 @@ class Run:
         offsets: Mapping[str, Number],
         method: FrictionMethod | None = None,
         zero_slip: Mapping[str, Sense] | None = None,
-        rates: Mapping[str, Number] | None = None,
+        travel: Mapping[str, Travel] | None = None,
     ) -> Backward:
-        """Motion and forces at the given times (s) with the pins at offsets in their holes, which change at rates."""
-        return self._solve(time, {**self.values, **offsets}, self._past, method, zero_slip, rates)
+        """Motion and forces at the given times (s) with the pins at offsets in their holes, as they travel there."""
+        return self._solve(time, {**self.values, **offsets}, self._past, method, zero_slip, travel)
 
     def ideal(self, time: Number, method: FrictionMethod | None = None) -> Backward:
         """Motion and forces at the given times (s) without errors and with every pin in the middle of its hole."""
@@ -277,8 +278,10 @@ def _fill_as_built(
     """One chunk of a mechanism with errors beside the ideal one."""
     part, quick = time[window], replace(method, margin_up_to=0.0)
     labels = run.system.engine.labels(run.system)
-    seen = lanes(part, run.cycle) if run.seats else Lanes(part, *[np.arange(len(part))] * 3)
-    scratch = results.allocate(labels, len(seen.times), run.system.engine.absent(run.system))
+    seen = lanes(part, run.cycle) if run.seats else Lanes(part, np.arange(len(part)), 0)
+    scratch = results.allocate(
+        labels, len(seen.times), run.system.engine.absent(run.system), wanted={*IDEAL, *COMPARED}
+    )
     meant = run.ideal(seen.times, quick)
     _fill(scratch, meant, seen.times, slice(0, len(seen.times)))
     own = slice(int(seen.own[0]), int(seen.own[-1]) + 1)

@@ -20,11 +20,20 @@ if TYPE_CHECKING:
     from trunnion.analysis.analyse import Run
     from trunnion.analysis.system import Dial
 
-__all__ = ["fill_errors", "fill_seats", "summary_rows"]
+__all__ = ["COMPARED", "fill_errors", "fill_seats", "summary_rows"]
 
 Arrays = dict[str, NDArray[np.float64]]
 Vector = Sequence[Number]
 AXES = "xyz"
+DIFFERENCES = {
+    "point_error": "point_position",
+    "joint_slide_error": "joint_slide",
+    "reaction_force_change": "reaction_force",
+    "drive_effort_change": "drive_effort",
+    "friction_power_change": "friction_power",
+}
+# what of the ideal mechanism is read
+COMPARED = {*DIFFERENCES.values(), "link_angle", "link_rotation", "joint_rotation"}
 
 
 def fill_seats(arrays: Arrays, found: Sequence[Seat], seated: Seated, window: slice) -> None:
@@ -113,13 +122,7 @@ def fill_errors(arrays: Arrays, ideal: Arrays, joints: Sequence[tuple[int, int]]
 
     joints: numbers of the links of every joint.
     """
-    for name, of in (
-        ("point_error", "point_position"),
-        ("joint_slide_error", "joint_slide"),
-        ("reaction_force_change", "reaction_force"),
-        ("drive_effort_change", "drive_effort"),
-        ("friction_power_change", "friction_power"),
-    ):
+    for name, of in DIFFERENCES.items():
         arrays[name][..., window] = arrays[of][..., window] - ideal[of]
     if "link_angle" in arrays:
         turned = wrapped(arrays["link_angle"][:, window] - ideal["link_angle"])

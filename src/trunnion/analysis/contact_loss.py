@@ -11,14 +11,14 @@ on. It is empirical, and has a unit.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.analysis.seating import NO_LOAD, ROUNDS, TOLERANCE, Seat
+from trunnion.analysis.seating import NO_LOAD, ROUNDS, TOLERANCE, Seat, loads_of
 from trunnion.analysis.system import Dial
 from trunnion.errors import Finding, Severity, Status
 
@@ -29,6 +29,8 @@ __all__ = ["EARLES_WU", "Loss", "find", "findings"]
 
 EARLES_WU = 1.0  # rad/(N s)
 NEAR = 0.1  # of the largest load: as near to zero as a load passes that turns round between two positions
+CLOSE = 20_000  # positions of a cycle that are near enough to tell a passage through zero from a quick turn
+PARTS = 96  # into which a wider step, and a quarter of it on either side, is parted
 MOST_PLACES = 6  # named in one finding
 
 Arrays = dict[str, NDArray[np.float64]]
@@ -64,7 +66,7 @@ def find(arrays: Arrays, run: Run, time: NDArray[np.float64]) -> list[Loss]:
     least = _least_loaded(arrays["end_force"][..., late], [joints.index(one.joint) for one in loaded])
     for seat in loaded:
         i = joints.index(seat.joint)
-        loss = _of_joint(seat, arrays["end_force"][i], run.cycle.periodic, largest)
+        loss = _of_joint(run, seat, arrays["end_force"][i], time, largest)
         turns = any(len(end) > 1 for end in seat.play.model.ends)
         loss = replace(loss, unsettled=late[least == i], turns=turns)
         if loss.places or len(loss.unsettled) or not loss.loaded:
@@ -109,32 +111,49 @@ def _least_loaded(forces: NDArray[np.float64], rows: Sequence[int]) -> NDArray[n
     return np.array([rows[k] for k in least], np.intp)
 
 
-def _of_joint(seat: Seat, forces: NDArray[np.float64], periodic: bool, largest: float) -> Loss:
+def _of_joint(run: Run, seat: Seat, forces: NDArray[np.float64], time: NDArray[np.float64], largest: float) -> Loss:
     """Where the load of an end of one joint passes through zero."""
     places: list[tuple[float, int]] = []
     least, peak = np.inf, 0.0
     loads = list(_end_loads(seat, forces))
-    top = max((float(np.nanmax(_size(load), initial=0.0)) for _, load, _ in loads), default=0.0)
+    top = max((float(np.nanmax(_size(load), initial=0.0)) for _, load in loads), default=0.0)
     if top <= NO_LOAD * largest:
         return Loss(seat.joint, [], 0.0, top, np.zeros(0, np.intp), loaded=False)
-    for end, load, axial in loads:
+    for number, load in loads:
         own = float(np.nanmax(_size(load), initial=0.0))
-        if own <= NO_LOAD * largest or (axial and own <= NO_LOAD * top):
+        if own <= NO_LOAD * largest:
             continue  # nothing ever presses this end
-        for place, size in _passages(load, own, periodic):
-            places.append((place, end))
+        for place, size in _seen(run, seat, number, _passages(load, own, run.cycle.periodic), time, own):
+            places.append((place, min(int(seat.play.model.ends[number][0][0]), 2)))
             least = min(least, size)
         peak = max(peak, own)
     return Loss(seat.joint, sorted(places), least, peak, np.zeros(0, np.intp))
 
 
-def _end_loads(seat: Seat, forces: NDArray[np.float64]) -> Iterator[tuple[int, NDArray[np.float64], bool]]:
-    """(number of the end, its load (component, position), whether it is axial) of every end that can move at all."""
+def _seen(
+    run: Run, seat: Seat, number: int, found: Iterable[tuple[float, float]], time: NDArray[np.float64], peak: float
+) -> Iterator[tuple[float, float]]:
+    """Those passages through zero that are still there when looked at closely, by the loads without play between."""
+    step = time[1] - time[0] if len(time) > 1 else 0.0
+    if step <= run.cycle.duration / CLOSE:
+        yield from found
+        return
+    for place, _ in found:
+        from_ = np.floor(place) - 0.25
+        times = time[0] + step * (from_ + np.arange(PARTS + 1) * (1.5 / PARTS))
+        times = times if run.cycle.periodic else np.clip(times, 0.0, run.cycle.duration)
+        load = np.array([np.broadcast_to(part, times.shape) for part in loads_of(run.ideal(times), seat)[number]])
+        for fine, size in _passages(load, peak, periodic=False):
+            yield from_ + fine * (1.5 / PARTS), size
+
+
+def _end_loads(seat: Seat, forces: NDArray[np.float64]) -> Iterator[tuple[int, NDArray[np.float64]]]:
+    """(number, load (component, position)) of every end that can move at all."""
     for number, (end, radius) in enumerate(zip(seat.play.model.ends, seat.play.radii, strict=True)):
         if np.any(np.asarray(radius) > 0):
             place = min(int(end[0][0]), 2) - 1
             rows = ["xyz".index(key.split(".")[1]) for key in end]
-            yield place + 1, forces[place][rows], number in seat.play.model.axial
+            yield number, forces[place][rows]
 
 
 def _size(load: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -76,7 +76,7 @@ def _fill_slide(arrays: Arrays, back: Backward, i: int, window: slice) -> None:
     first, second = walk.system.joints[name][1]
     one, two = walk.element(first, name), walk.element(second, name)
     dx, dy = two.x - one.x, two.y - one.y
-    w, base, end = walk.held(first).w, walk.acceleration(first, name), walk.acceleration(second, name)
+    w, base, end = walk.motions[first].twist.w, walk.acceleration(first, name), walk.acceleration(second, name)
     carried = accelerated(base, w, dx, dy)
     arrays["joint_slide"][i, window] = one.c * dx + one.s * dy
     arrays["joint_slide_velocity"][i, window] = back.slips[name].speed

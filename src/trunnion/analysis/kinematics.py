@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -11,10 +12,11 @@ import numpy as np
 
 from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number
+from trunnion.algebra.nested import zipped
 from trunnion.analysis.system import Place, System, Values, driven_coordinates
 from trunnion.groups.planar import Acceleration, Frame, Twist, accelerated, compose, moved, point
 
-__all__ = ["Assembly", "Forward", "Motion", "PointMotion", "forward", "pose_of"]
+__all__ = ["Assembly", "Forward", "Motion", "PointMotion", "Travel", "forward", "pose_of", "rate_of", "start"]
 
 Assembly = Sequence[Any]  # per module: ±1 for a closed form, a `branches.Track` for a general group, None for a driver
 
@@ -25,6 +27,13 @@ class Motion(NamedTuple):
     frame: Frame
     twist: Twist
     acceleration: Acceleration
+
+
+class Travel(NamedTuple):
+    """What the travel of seats adds to the velocity of a link, and the link's whole acceleration; None: as if held."""
+
+    twist: Any
+    acceleration: Any = None
 
 
 class PointMotion(NamedTuple):
@@ -54,7 +63,6 @@ class Forward:
     poses: list[Any] = field(default_factory=list)
     assembly: list[Any] = field(default_factory=list)
     _elements: dict[tuple[str, str], Any] = field(default_factory=dict)
-    _held: dict[str, Any] = field(default_factory=dict)
 
     def element(self, link: str, joint: str) -> Any:
         """Global frame of a joint's element on a link."""
@@ -106,7 +114,7 @@ class Forward:
     def acceleration(self, link: str, joint: str) -> Acceleration:
         """Acceleration of the element."""
         motion = self.motions[link]
-        return accelerated(motion.acceleration, self.held(link).w, *self.arm(link, joint))
+        return accelerated(motion.acceleration, motion.twist.w, *self.arm(link, joint))
 
     def point(self, link: str, name: str) -> PointMotion:
         """Motion of a named point of a link."""
@@ -119,7 +127,7 @@ class Forward:
         place = point(frame, x, y)
         arm = place[0] - frame.x, place[1] - frame.y
         velocity = moved(twist, *arm)
-        second = accelerated(acceleration, self.held(link).w, *arm)
+        second = accelerated(acceleration, twist.w, *arm)
         return PointMotion(place, (velocity.x, velocity.y), (second.x, second.y))
 
     def placed(self, frame: Any, link: str, name: str) -> tuple[Number, ...]:
@@ -162,19 +170,18 @@ class Forward:
         link = place.links[i]
         return self.element(link, place.joint) if place.outer[i] else self.local[link, place.joint]
 
-    def held(self, link: str) -> Any:
-        """Velocity of a link with its pins held in their seats: what accelerations go with."""
-        return self._held.get(link, self.motions[link].twist)
-
-    def carried(self, frames: Mapping[str, Any]) -> None:
-        """Add to the velocity of every link what the ε parts of its frame say: that of seats which travel."""
-        self._held.update({link: motion.twist for link, motion in self.motions.items()})
-        for link, frame in frames.items():
+    def carried(self, travel: Mapping[str, Travel]) -> None:
+        """Let the links also move as the seats of their pins travel."""
+        for link, own in travel.items():
             motion = self.motions[link]
-            spin = primal(frame.c) * rate_of(frame.s) - primal(frame.s) * rate_of(frame.c)
-            x, y, w = motion.twist
-            travel = Twist(x + rate_of(frame.x), y + rate_of(frame.y), w + spin)
-            self.motions[link] = motion._replace(twist=travel)
+            twist = zipped(operator.add, motion.twist, own.twist)
+            acceleration = motion.acceleration if own.acceleration is None else own.acceleration
+            self.motions[link] = motion._replace(twist=twist, acceleration=acceleration)
+
+    def frame_rate(self, frame: Any) -> Any:
+        """Twist of a link whose frame has the rates of its numbers as ε parts."""
+        spin = primal(frame.c) * rate_of(frame.s) - primal(frame.s) * rate_of(frame.c)
+        return Twist(rate_of(frame.x), rate_of(frame.y), spin)
 
     def take(self, number: int, pose: Any, time: Number) -> None:
         """Add the motion of one module, whose pose is known."""
@@ -221,40 +228,21 @@ def pose_of(walk: Forward, number: int, assembly: Any, time: Number) -> Any:
 
 
 def forward(
-    system: System, values: Values, assembly: Assembly, time: Number, rates: Mapping[str, Number] | None = None
+    system: System, values: Values, assembly: Assembly, time: Number, travel: Mapping[str, Travel] | None = None
 ) -> Forward:
     """Walk the plan forward at the given times (s).
 
-    NaN from the first module that cannot be assembled onward, lane by lane. rates: of values that change along the way
-    beside the drive, as the seats of pins do, 1/s: the velocities of the links contain them, the accelerations do not.
+    NaN from the first module that cannot be assembled onward, lane by lane. travel: how the links also move, since the
+    seats of pins travel.
     """
     walk = start(system, values)
     walk.time = time
     with np.errstate(all="ignore"):
         for number in range(len(system.plan.modules)):
             walk.take(number, pose_of(walk, number, assembly[number], time), time)
-        if rates:
-            walk.carried(_travelling(system, {**values, **_seeded(values, rates)}, assembly, time))
+        if travel:
+            walk.carried(travel)
     return walk
-
-
-def _seeded(values: Values, rates: Mapping[str, Number]) -> dict[str, Number]:
-    return {path: Dual(values[path], rate) for path, rate in rates.items()}
-
-
-def _travelling(system: System, values: Values, assembly: Assembly, time: Number) -> dict[str, Any]:
-    """Frames of all links, with ε parts from those of the values: poses alone."""
-    walk = start(system, values)
-    walk.time = time
-    found: dict[str, Any] = {}
-    still = walk.motions[system.mechanism.fixed_link]
-    for number, module in enumerate(system.plan.modules):
-        pose = pose_of(walk, number, assembly[number], time)
-        for link, frame in zip(module.links, pose.frames, strict=True):
-            found[link] = frame
-            walk.motions[link] = still._replace(frame=frame)
-        walk.poses.append(pose)
-    return found
 
 
 def rate_of(number: Number) -> Number:

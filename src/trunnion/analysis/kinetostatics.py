@@ -11,7 +11,7 @@ import numpy as np
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.analysis.friction import Contact, FrictionMethod, Settled, settle
-from trunnion.analysis.kinematics import Assembly, Forward, forward
+from trunnion.analysis.kinematics import Assembly, Forward, Travel, forward
 from trunnion.analysis.loads import Action, Slip, SpringState, springs, stated_loads
 from trunnion.analysis.system import Place, System, Values, law_of
 from trunnion.groups.gear import Action as GearAction
@@ -36,13 +36,13 @@ class Given:
 
     zero_slip: sign of the slip to take where the relative speed is zero, one for each contact of the joint or one for
     all; 0 if not stated. deflections: of the bristles
-    of laws that have them, m, in the sense of the slip; that of steady sliding if not stated. seat_rates: how fast the
-    seats among the values (`seats.JOINT.1.x` …) travel, m/s.
+    of laws that have them, m, in the sense of the slip; that of steady sliding if not stated. travel: how links also
+    move since the seats among the values (`seats.JOINT.1.x` …) change along the way.
     """
 
     zero_slip: Mapping[str, Sense] = field(default_factory=dict)
     deflections: Mapping[str, Number] = field(default_factory=dict)
-    seat_rates: Mapping[str, Number] = field(default_factory=dict)
+    travel: Mapping[str, Travel] = field(default_factory=dict)
 
 
 def sense_of(zero_slip: Mapping[str, Sense], joint: str, contact: int = 0) -> float:
@@ -118,7 +118,7 @@ def solve(
     given: what is known of the joints beside the motion.
     """
     given = given or Given()
-    walk = forward(system, values, assembly, time, given.seat_rates)
+    walk = forward(system, values, assembly, time, given.travel)
     with np.errstate(all="ignore"):
         found: Backward = system.engine.backward(walk, method or FrictionMethod(), given)
     return found
@@ -127,7 +127,7 @@ def solve(
 def backward(walk: Forward, method: FrictionMethod, given: Given) -> Backward:
     """Reactions and friction of every module, last module first."""
     system = walk.system
-    back = Backward(walk, dict.fromkeys(system.mechanism.links, ZERO_LOAD), travels=bool(given.seat_rates))
+    back = Backward(walk, dict.fromkeys(system.mechanism.links, ZERO_LOAD), travels=bool(given.travel))
     for name in system.joints:
         back.slips[name] = _slip(walk, name)
     _add_body_loads(back)

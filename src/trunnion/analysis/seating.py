@@ -21,20 +21,22 @@ from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.nested import flat
 from trunnion.analysis.friction import FrictionMethod
+from trunnion.analysis.kinematics import Travel
 from trunnion.analysis.kinetostatics import Backward
 from trunnion.analysis.shifts import Play, play_of
-from trunnion.analysis.system import Cycle, System, Values, rubbing
+from trunnion.analysis.system import System, Values, rubbing
+from trunnion.analysis.travel import Lanes, part_of, travel
 from trunnion.joints.clearance import described, pressed, turned_by_friction
 
 if TYPE_CHECKING:
     from trunnion.analysis.analyse import Run
 
-__all__ = ["ROUNDS", "Lanes", "Seat", "Seated", "lanes", "loads_of", "seats", "settle"]
+__all__ = ["ROUNDS", "TOLERANCE", "Seat", "Seated", "loads_of", "seats", "settle"]
 
 ROUNDS = 10  # most of the iteration
-FINE = 720  # positions of a cycle whose neighbours are near enough to tell how fast a seat travels
+SLUGGISH = 0.1  # of the change before: rounds that gain less than this are helped
 SLOW = 0.01  # of its largest speed: below it the travel of the seats may turn the slip of a joint round
-TOLERANCE = 1e-6  # change of a seat, of its clearance; the next one is as much smaller again
+TOLERANCE = 1e-6  # change of a seat that one more round would make, of its clearance
 NO_LOAD = 1e-9  # of the largest reaction of a position: a load below it is rounding and presses nothing anywhere
 
 Vector = tuple[Number, ...]
@@ -53,7 +55,7 @@ class Seated:
     """What the positions of one walk came to with their pins in their seats.
 
     offsets: by the names of `shifts` (`seats.JOINT.1.x`), m; loads: of the pin on each end of its hole, N, by joint;
-    rounds: of the iteration; change: of the seats in the last round, of their clearances; turning: positions at which a
+    rounds: of the iteration; change: that one more round would make, of the clearances; turning: positions at which a
     joint with friction is about to turn round.
     """
 
@@ -134,37 +136,11 @@ def _share(back: Backward, joint: str) -> Number | None:
     return np.abs(primal(slope * turning)) / contact.parameters.get("pair_factor", 1.0)
 
 
-class Lanes(NamedTuple):
-    """The times (s) that are looked at for some positions: their own, and those before and after, for differences."""
-
-    times: NDArray[np.float64]
-    own: NDArray[np.intp]
-    before: NDArray[np.intp]
-    after: NDArray[np.intp]
-
-
-def lanes(time: NDArray[np.float64], cycle: Cycle) -> Lanes:
-    """The positions with their neighbours; finer ones where the positions are far apart or alone."""
-    count, step = len(time), cycle.duration / FINE
-    apart = np.diff(time)
-    if count > 2 and np.all(apart > 0) and np.max(apart) <= 2 * step:
-        times = _within(np.concatenate([[2 * time[0] - time[1]], time, [2 * time[-1] - time[-2]]]), cycle)
-        own = np.arange(1, count + 1)
-        return Lanes(times, own, own - 1, own + 1)
-    times = _within(np.concatenate([time - step, time, time + step]), cycle)
-    own = np.arange(count, 2 * count)
-    return Lanes(times, own, own - count, own + count)
-
-
-def _within(times: NDArray[np.float64], cycle: Cycle) -> NDArray[np.float64]:
-    """Times that the drivers know: on a cycle that ends none before its start or after its end."""
-    return times if cycle.periodic else np.clip(times, 0.0, cycle.duration)
-
-
 def settle(run: Run, seen: Lanes, method: FrictionMethod, start: Backward) -> Seated:
     """The positions of some lanes with every pin in its seat.
 
-    start: motion and reactions of the ideal mechanism at the times of all lanes; the first guess.
+    start: motion and reactions of the ideal mechanism at the times of all lanes; the first guess. The seats are
+    those of the loads with the pins held; the travel of the seats comes with the last walk.
     """
     quick, time = replace(method, margin_up_to=0.0), seen.times[seen.own]
     offsets = _next(run, start, len(seen.times))
@@ -172,20 +148,13 @@ def settle(run: Run, seen: Lanes, method: FrictionMethod, start: Backward) -> Se
     loaded = any(seat.given is None for seat in run.seats)
     turning = _slow(run.system, start)[seen.own]
     if loaded:
-        _iterate(run, seen.times, quick, offsets, rounds, change, np.sqrt(TOLERANCE))
-    rates = _rates(run, seen, offsets, start)
+        _iterate(run, seen.times, quick, offsets, rounds, change, np.arange(len(seen.times)))
+    moving = travel(run, seen, offsets, start)
     mine = {path: numbers[seen.own] for path, numbers in offsets.items()}
     rounds, change = rounds[seen.own], change[seen.own]
     if loaded:  # where a joint turns round, the travel of the seats decides the sense of its friction
-        _iterate(run, time, quick, mine, rounds, change, TOLERANCE, np.flatnonzero(turning), rates)
-    back = run.at(time, mine, method, rates=rates)
-    if loaded:  # this walk shows whether the seats have settled
-        rounds += rounds < ROUNDS
-        change = _change(run.seats, mine, _next(run, back, len(time)), np.arange(len(time)))
-        left = np.flatnonzero((change > TOLERANCE) & (rounds < ROUNDS))
-        if len(left):
-            _iterate(run, time, quick, mine, rounds, change, TOLERANCE, left, rates)
-            back = run.at(time, mine, method, rates=rates)
+        _iterate(run, time, quick, mine, rounds, change, np.flatnonzero(turning & (rounds < ROUNDS)), moving)
+    back = run.at(time, mine, method, travel=moving)
     return Seated(back, mine, _loads(run, back), rounds, change, turning)
 
 
@@ -205,56 +174,45 @@ def _iterate(
     offsets: dict[str, NDArray[np.float64]],
     rounds: NDArray[np.intp],
     change: NDArray[np.float64],
-    enough: float,
-    left: NDArray[np.intp] | None = None,
-    rates: Mapping[str, NDArray[np.float64]] | None = None,
+    left: NDArray[np.intp],
+    moving: Mapping[str, Travel] | None = None,
 ) -> None:
-    """Seats and reactions in turn, in place, until the positions have settled or had their rounds.
+    """Seats and reactions in turn, in place, until the positions `left` have settled or had their rounds.
 
-    enough: change at which to end; the next one is about its square. left: positions, all if not given.
+    A round gains about as much as the one before it, so `change`, what one more round would change, is known from
+    two. Where rounds gain little the step is extrapolated from the last two (Anderson's method with one step of
+    memory, D. G. Anderson, J. ACM 12 (1965) 547-560, doi:10.1145/321296.321305).
     """
-    left = np.arange(len(time)) if left is None else left[rounds[left] < ROUNDS]
+    paths = list(offsets)
+    before = after = np.zeros((len(paths), 0))
+    last = np.full(len(left), np.inf)
     while len(left):
         part = {path: numbers[left] for path, numbers in offsets.items()}
-        found = run.at(time[left], part, method, rates={path: rate[left] for path, rate in (rates or {}).items()})
+        found = run.at(time[left], part, method, travel=part_of(moving, left) if moving else None)
         wanted = _next(run, found, len(left))
         rounds[left] += 1
-        change[left] = _change(run.seats, offsets, wanted, left)
-        moved = change[left] > (TOLERANCE if enough == TOLERANCE else 0.0)
-        for path, numbers in wanted.items():
-            offsets[path][left[moved]] = numbers[moved]
-        left = left[(change[left] > enough) & (rounds[left] < ROUNDS)]
+        now = _change(run.seats, part, wanted)
+        change[left] = now * np.where(last > 0, np.minimum(now / np.where(last > 0, last, 1.0), 1.0), 1.0)
+        change[left] = np.where(np.isfinite(last), change[left], now)
+        here, there = (np.array([one[path] for path in paths]) for one in (part, wanted))
+        following = there
+        if after.size:
+            following = np.where(now > SLUGGISH * last, _extrapolated(before, after, here, there), there)
+        for path, numbers in zip(paths, following, strict=True):
+            offsets[path][left] = numbers
+        open_ = (change[left] > TOLERANCE) & (rounds[left] < ROUNDS)
+        before, after, last, left = here[:, open_], there[:, open_], now[open_], left[open_]
 
 
-def _rates(
-    run: Run, seen: Lanes, offsets: Mapping[str, NDArray[np.float64]], start: Backward
-) -> dict[str, NDArray[np.float64]]:
-    """How fast the seats travel, m/s, by central differences; 0 where one jumps, and where nothing moves.
-
-    Where a joint with friction turns round between the neighbours of a position its seat jumps by twice atan μ:
-    there the difference is taken on the side of the position. So it is 0 where a seat turns by more than a right angle.
-    """
-    one, two = _alike(run.system, seen, start)
-    span = seen.times[two] - seen.times[one]
-    found: dict[str, NDArray[np.float64]] = {}
-    for seat in run.seats:
-        for end in seat.play.model.ends:
-            paths = [f"seats.{seat.joint}.{key}" for key in end]
-            was, is_ = ([offsets[path][side] for path in paths] for side in (one, two))
-            smooth = (functools.reduce(operator.add, (a * b for a, b in zip(was, is_, strict=True))) > 0) & (span > 0)
-            for path, a, b in zip(paths, was, is_, strict=True):
-                found[path] = np.where(smooth, (b - a) / np.where(span > 0, span, 1.0), 0.0)
-    return {path: rate for path, rate in found.items() if np.any(rate)}
-
-
-def _alike(system: System, seen: Lanes, start: Backward) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Lanes before and after each position, or the position itself where a friction has another sense on that side."""
-    before, after = seen.before.copy(), seen.after.copy()
-    for joint in rubbing(system):
-        sense = np.broadcast_to(np.sign(primal(start.slips[joint].speed)), seen.times.shape)
-        before = np.where(sense[before] == sense[seen.own], before, seen.own)
-        after = np.where(sense[after] == sense[seen.own], after, seen.own)
-    return before, after
+def _extrapolated(
+    before: NDArray[np.float64], after: NDArray[np.float64], here: NDArray[np.float64], there: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """The seats to which two rounds, before → after and here → there, lead if the map between is a straight one."""
+    step, last = there - here, after - before
+    turn = step - last
+    square = np.sum(turn * turn, axis=0)
+    share = np.sum(step * turn, axis=0) / np.where(square > 0, square, np.inf)
+    return np.asarray(there - share * (there - after))
 
 
 def _loads(run: Run, back: Backward) -> dict[str, list[Vector]]:
@@ -286,14 +244,14 @@ def _force(reaction: Any) -> tuple[Number, ...]:
 
 
 def _change(
-    found: Sequence[Seat], before: Mapping[str, Number], after: Mapping[str, Number], lanes: NDArray[np.intp]
+    found: Sequence[Seat], before: Mapping[str, NDArray[np.float64]], after: Mapping[str, NDArray[np.float64]]
 ) -> NDArray[np.float64]:
     """Largest way of a pin from seat to seat, of the radius of its end."""
-    worst = np.zeros(len(lanes))
+    worst: Number = 0.0
     for seat in found:
         for end, radius in zip(seat.play.model.ends, seat.play.radii, strict=True):
             paths = [f"seats.{seat.joint}.{key}" for key in end]
-            square = functools.reduce(operator.add, ((after[path] - before[path][lanes]) ** 2 for path in paths))
+            square = functools.reduce(operator.add, ((after[path] - before[path]) ** 2 for path in paths))
             size = np.asarray(primal(radius), float)
             worst = np.maximum(worst, np.sqrt(square) / np.where(size > 0, size, 1.0))
-    return worst
+    return np.asarray(worst)

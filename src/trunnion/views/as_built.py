@@ -14,13 +14,14 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
-    "JUMP", "Output", "Seats", "angle_scale", "broken", "has", "jumps", "losses", "need", "outputs", "point_errors",
-    "seated", "worst_points",
+    "JUMP", "NOWHERE", "Output", "Seats", "angle_scale", "broken", "has", "jumps", "losses", "need", "outputs",
+    "point_errors", "seated", "worst_points",
 ]  # fmt: skip
 
 JUMP = np.pi / 3  # a seat that turns by more from one position to the next is taken to have jumped
 SUDDEN = 6.0  # times the step before or after: a jump
 LEAST = 0.1  # of the largest error of place: points below it are not among the worst
+NOWHERE = np.zeros(0, np.intp)
 ALIKE = 1e-3  # of the largest: two curves nearer than this are one
 REMEDIES = {
     "errors": "state errors, a misalignment, or a seat: loaded (--set joint_defaults.seat=loaded)",
@@ -176,14 +177,17 @@ def continued(beta: Array, xi: Array) -> tuple[Array, Array]:
     return beta + 2 * np.pi * turns, turned - 2 * np.pi * np.ceil((turned - np.pi) / (2 * np.pi))
 
 
-def jumps(y: Array, jump: float) -> NDArray[np.intp]:
-    """Positions before which a curve jumps: by more than `jump`, or by far more than on either side."""
+def jumps(y: Array, jump: float, lost: NDArray[np.intp] = NOWHERE) -> NDArray[np.intp]:
+    """Positions before which a curve jumps: by more than `jump`, by far more than on either side, or where contact is
+    lost.
+    """
     step = np.abs(np.diff(y))
     beside = np.nan_to_num(np.maximum(np.append(0.0, step[:-1]), np.append(step[1:], 0.0)))
-    return np.flatnonzero((step > jump) | (step > SUDDEN * beside + jump / 20)) + 1
+    near = np.isin(np.arange(step.size), [lost - 1, lost])
+    return np.flatnonzero((step > jump) | (step > np.where(near, 0.0, SUDDEN * beside) + jump / 20)) + 1
 
 
-def broken(x: Array, y: Array, jump: float) -> tuple[Array, Array]:
+def broken(x: Array, y: Array, jump: float, lost: NDArray[np.intp] = NOWHERE) -> tuple[Array, Array]:
     """A curve with a NaN wherever it jumps, so that no line crosses the jump."""
-    after = jumps(y, jump)
+    after = jumps(y, jump, lost)
     return np.insert(x, after, (x[after - 1] + x[after]) / 2), np.insert(y, after, np.nan)

@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from trunnion.views.as_built import (
     JUMP,
@@ -51,7 +52,7 @@ def built(result: xr.Dataset, lost: list[int]) -> dict[str, Any] | None:
         "outputs": _outputs(result),
         "lost": lost,
         "seats": [_seat(one) for one in seated(result)],
-        "angles": _angles(result),
+        "angles": _angles(result, np.array(lost, np.intp)),
     }
 
 
@@ -172,7 +173,7 @@ def _seat(one: Seats) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _angles(result: xr.Dataset) -> list[dict[str, Any]]:
+def _angles(result: xr.Dataset, lost: NDArray[np.intp]) -> list[dict[str, Any]]:
     """β and ξ of the pins, °, with the positions before which they jump; offsets of the guides of the plane."""
     closed = abscissa(result).closed
     rows = []
@@ -183,6 +184,6 @@ def _angles(result: xr.Dataset) -> list[dict[str, Any]]:
         for sign, values in zip("βξ", np.degrees(continued(both[0], both[1])), strict=True):
             if sign == "ξ" or len(one.offsets) == 2:
                 round_ = np.append(values, values[0]) if closed else values
-                cuts = [int(index) % values.size for index in jumps(round_, float(np.degrees(JUMP)))]
+                cuts = [int(index) % values.size for index in jumps(round_, float(np.degrees(JUMP)), lost)]
                 rows.append({"sign": sign, "joint": one.joint, "values": _series(values), "breaks": cuts})
     return rows

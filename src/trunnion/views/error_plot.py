@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from trunnion.views.as_built import Output, angle_scale, losses, need, outputs, point_errors, worst_points
-from trunnion.views.cycle import Abscissa, Array, abscissa, thin, usual_peak
+from trunnion.analysis.play import play
+from trunnion.errors import MechanismError
+from trunnion.views.as_built import Output, angle_scale, has, losses, need, outputs, point_errors, worst_points
+from trunnion.views.cycle import Abscissa, Array, abscissa, column, names, thin, usual_peak
 from trunnion.views.figures import SHADE, along, curve, frame_peak, legend, new, shade, style_of
+from trunnion.views.lettering import plain
 from trunnion.views.quantities import prefixed
 
 if TYPE_CHECKING:
@@ -17,15 +19,47 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["LOST", "error", "mark_losses"]
+    from trunnion.model.mechanism import Mechanism
+
+__all__ = ["LOST", "error", "mark_losses", "with_worst_case"]
 
 LOST = "#a1260d"  # the colour of what goes wrong, beside those of the curves
 
 
-def error(result: xr.Dataset, ideal: xr.Dataset | None = None, worst_case: Mapping[str, Array] | None = None) -> Figure:
+def with_worst_case(result: xr.Dataset, mechanism: Mechanism) -> xr.Dataset:
+    """The result with the band in which the play of all joints holds the error of each output, if there is any play.
+
+    `transmission_centre` and `transmission_reach` (joint, position), rad or m, NaN of joints that are no outputs: the
+    error with every pin in the middle of its hole, and the most that all plays can add to it, to first order.
+    """
+    found = outputs(result) if has(result, "errors") else []
+    if not found:
+        return result
+    measures = [f"{'slide' if one.unit == 'm' else 'rotation'}:{one.joint}" for one in found]
+    try:
+        free = play(mechanism, measures, result.sizes["position"])
+    except MechanismError:  # no joint has a play
+        return result
+    joints = names(result, "joint")
+    centre, reach = (np.full((len(joints), result.sizes["position"]), np.nan) for _ in range(2))
+    for one, measure in zip(found, measures, strict=True):
+        told = column(result, f"joint_{measure.split(':')[0]}", joint=one.joint)
+        middle, most = (column(free, name, measure=measure) for name in ("value", "worst_case_total"))
+        if told is None or middle is None or most is None:
+            continue
+        apart = middle - told
+        turns = 2 * np.pi * np.round(apart / (2 * np.pi)) if one.unit == "rad" else 0.0
+        centre[joints.index(one.joint)], reach[joints.index(one.joint)] = one.error + apart - turns, most
+    if not np.nanmax(reach, initial=0.0) > 0:
+        return result
+    dims = ("joint", "position")
+    return result.assign(transmission_centre=(dims, centre), transmission_reach=(dims, reach))
+
+
+def error(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
     """Errors against the mechanism without any: of the worst points, and of the joints of the ground, over the drive.
 
-    worst_case: by joint, (position,) in rad or m: the most that the play of all joints can do to it, drawn as a band.
+    The band of the worst case is drawn if the result has it; see `with_worst_case`.
     """
     need(result, "errors", "error")
     over, found = abscissa(result), outputs(result)
@@ -34,7 +68,7 @@ def error(result: xr.Dataset, ideal: xr.Dataset | None = None, worst_case: Mappi
     panels = figure.subplots(1 + len(kinds), 1, sharex=True, squeeze=False)[:, 0]
     _places(panels[0], result, over)
     for axes, kind in zip(panels[1:], kinds, strict=True):
-        _transmission(axes, result, over, [one for one in found if one.unit == kind], worst_case or {})
+        _transmission(axes, result, over, [one for one in found if one.unit == kind])
     for axes in panels:
         mark_losses(axes, result, over)
         told = axes.get_legend_handles_labels()[1]
@@ -54,10 +88,7 @@ def _places(axes: Axes, result: xr.Dataset, over: Abscissa) -> None:
     along(axes, over, f"error of place [{unit or 'm'}]")
     shade(axes, result, over)
     if every:
-        top = np.max(list(every.values()), axis=0)
-        x = over.values
-        if over.closed:
-            top, x = np.append(top, top[0]), np.append(x, x[0] + over.period)
+        top, x = _closed(over, np.max(list(every.values()), axis=0)), _closed(over, over.values, over.period)
         picked = thin(top)
         axes.fill_between(x[picked], 0, top[picked] * factor, color=SHADE, linewidth=0, zorder=1)
     for index, (key, size) in enumerate(worst.items()):
@@ -66,25 +97,39 @@ def _places(axes: Axes, result: xr.Dataset, over: Abscissa) -> None:
     frame_peak(axes, most, scope, factor, "m")
 
 
-def _transmission(
-    axes: Axes, result: xr.Dataset, over: Abscissa, found: list[Output], worst_case: Mapping[str, Array]
-) -> None:
+def _transmission(axes: Axes, result: xr.Dataset, over: Abscissa, found: list[Output]) -> None:
     """Errors of one unit, each with its worst case if that is known."""
-    bounds = [worst_case[one.joint] for one in found if one.joint in worst_case]
-    scope = usual_peak(*[one.error for one in found], *bounds)
+    bands = {one.joint: _band(result, one.joint) for one in found}
+    edges = [edge for band in bands.values() for edge in band]
+    scope = usual_peak(*[one.error for one in found], *edges)
     factor, unit = angle_scale(scope) if found[0].unit == "rad" else prefixed(scope, "m")
     noun = "rotation" if found[0].unit == "rad" else "slide"
     along(axes, over, f"transmission error,\n{noun} [{unit}]")
     shade(axes, result, over)
     for index, one in enumerate(found):
         look = style_of(index)
-        if one.joint in worst_case:
-            bound = worst_case[one.joint] * factor
-            axes.fill_between(over.values, -bound, bound, color=look["color"], alpha=0.15, linewidth=0,
-                              label=f"worst case of the play, {one.joint}")  # fmt: skip
+        if bands[one.joint]:
+            low, high = (_closed(over, edge * factor) for edge in bands[one.joint])
+            label = f"worst case of the play{f', {one.joint}' if len(found) > 1 else ''}"
+            x = _closed(over, over.values, over.period)
+            axes.fill_between(x, low, high, color=look["color"], alpha=0.15, linewidth=0, label=plain(label))
         curve(axes, over, one.error * factor, one.joint, **look)
     axes.margins(y=0.08)
-    frame_peak(axes, float(np.nanmax([np.nanmax(np.abs(one.error)) for one in found])), scope, factor, found[0].unit)
+    most = max(float(np.nanmax(np.abs(values))) for values in [*(one.error for one in found), *edges])
+    frame_peak(axes, most, scope, factor, found[0].unit)
+
+
+def _band(result: xr.Dataset, joint: str) -> list[Array]:
+    """Lower and upper edge of what the play can do to an output; nothing if it is not known."""
+    centre, reach = (column(result, f"transmission_{name}", joint=joint) for name in ("centre", "reach"))
+    if centre is None or reach is None or not np.isfinite(centre + reach).any():
+        return []
+    return [centre - reach, centre + reach]
+
+
+def _closed(over: Abscissa, values: Array, more: float = 0.0) -> Array:
+    """The values, over a whole turn led on to the first."""
+    return np.append(values, values[0] + more) if over.closed else values
 
 
 def mark_losses(axes: Axes, result: xr.Dataset, over: Abscissa) -> None:

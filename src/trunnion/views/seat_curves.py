@@ -11,7 +11,7 @@ from matplotlib.ticker import MultipleLocator
 from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.views.as_built import JUMP, Seats, broken, continued, losses, need, seated
+from trunnion.views.as_built import JUMP, NOWHERE, Seats, broken, continued, losses, need, seated
 from trunnion.views.cycle import Abscissa, Array, abscissa, column, names
 from trunnion.views.error_plot import LOST
 from trunnion.views.figures import PALETTE, along, curve, legend, new, shade, style_of
@@ -64,7 +64,7 @@ def beta(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
         along(axes, over, panel.title)
         shade(axes, result, over)
         for one in panel.curves:
-            _draw(axes, over, panel, one)
+            _draw(axes, over, panel, one, np.concatenate([NOWHERE, *lost.values()]))
         _cross(axes, over, panel, lost)
         if panel.angles:
             _ticks(axes)
@@ -114,11 +114,11 @@ def _panels(result: xr.Dataset) -> list[Panel]:
     return panels
 
 
-def _draw(axes: Axes, over: Abscissa, panel: Panel, one: Curve) -> None:
+def _draw(axes: Axes, over: Abscissa, panel: Panel, one: Curve, lost: NDArray[np.intp]) -> None:
     x, y = over.values, one.values
     if over.closed:
         x, y = np.append(x, x[0] + over.period), np.append(y, y[0])
-    cut_x, cut_y = broken(x, y, panel.jump)
+    cut_x, cut_y = broken(x, y, panel.jump, lost)
     curve(axes, replace(over, values=cut_x, closed=False), cut_y, one.label, **one.look)
 
 

@@ -71,7 +71,7 @@ def backward(walk: SpatialWalk, method: FrictionMethod, given: Given) -> Spatial
     """Reactions and friction of every module, last module first."""
     system = walk.system
     loads: dict[str, Any] = dict.fromkeys(system.mechanism.effective_links, ZERO)
-    back = SpatialBackward(walk, loads, travels=bool(given.seat_rates))
+    back = SpatialBackward(walk, loads, travels=bool(given.travel))
     for name in system.joints:
         back.slips[name] = _slip(walk, name)
     _add_body_loads(back)
@@ -111,7 +111,7 @@ def _add_body_loads(back: SpatialBackward) -> None:
         centre = walk.at(link, walk.space.centre(values, link))
         frame, twist, second = walk.motions[link]
         force = scaled(mass, tuple(g - a for g, a in zip(gravity, centre.acceleration, strict=True)))
-        moment = NULL if tensor is None else scaled(-1.0, _spin_rate(frame, tensor, walk.held(link).u, second.u))
+        moment = NULL if tensor is None else scaled(-1.0, _spin_rate(frame, tensor, twist.u, second.u))
         load = about(force, moment, centre.place)
         back.body_power = back.body_power + power(load, twist)
         back.loads[link] = added(back.loads[link], load)

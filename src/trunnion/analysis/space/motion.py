@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple, cast
@@ -17,7 +16,6 @@ from trunnion.algebra.rigid import (
     ZERO,
     Frame,
     Screw,
-    added,
     compose,
     minus,
     moment_at,
@@ -112,9 +110,8 @@ class SpatialWalk(Forward):
         """Motion of the point of a link with local coordinates, m: v = v₀ + ω × p, a = a₀ + ω̇ × p + ω × v."""
         frame, twist, second = self.motions[link]
         place = point_of(frame, local)
-        held = self.held(link)
-        curving = cross(held.u, moment_at(held, place))
-        return SpatialPoint(place, moment_at(twist, place), plus(moment_at(second, place), curving))
+        velocity = moment_at(twist, place)
+        return SpatialPoint(place, velocity, plus(moment_at(second, place), cross(twist.u, velocity)))
 
     def placed(self, frame: Any, link: str, name: str) -> tuple[Number, ...]:
         """Place of a named point of a link, or of its element of a joint, if the link lies in a frame."""
@@ -159,8 +156,8 @@ class SpatialWalk(Forward):
         """θ̈ and s̈ of a joint on one axis: with ẑ carried by the first link, (ẑ · V)˙ = ẑ · V̇ + (Ω × ẑ) · V."""
         (first, second_link), two = self.system.joints[joint][1], self.element(self.system.joints[joint][1][1], joint)
         one, other = self.motions[first], self.motions[second_link]
-        base = self.held(first)
-        relative, rate = minus(self.held(second_link), base), minus(other.acceleration, one.acceleration)
+        base = one.twist
+        relative, rate = self.against(joint), minus(other.acceleration, one.acceleration)
         carried = cross(base.u, two.z)
         at = moment_at(relative, two.place)
         speed = moment_at(base, two.place)  # the point of the axis moves along with the first link
@@ -176,16 +173,12 @@ class SpatialWalk(Forward):
         way = namespace(lever, lead).sqrt(lever * lever + lead * lead)
         return way * turn, way * turn_rate
 
-    def carried(self, frames: Mapping[str, Any]) -> None:
-        """Add to the twist of every link what the ε parts of its frame say: ω = ½ Σ e × ė, v of the origin p."""
-        self._held.update({link: motion.twist for link, motion in self.motions.items()})
-        for link, frame in frames.items():
-            motion = self.motions[link]
-            parts = [(each(axis, primal), each(axis, rate_of)) for axis in frame]
-            (x, dx), (y, dy), (z, dz), (place, rate) = parts
-            spin = scaled(0.5, plus(plus(cross(x, dx), cross(y, dy)), cross(z, dz)))
-            travel = Screw(spin, vector_minus(rate, cross(spin, place)))
-            self.motions[link] = motion._replace(twist=added(motion.twist, travel))
+    def frame_rate(self, frame: Any) -> Screw:
+        """Twist of a link whose frame has rates as ε parts: ω = ½ Σ e × ė, and the velocity of its origin p."""
+        parts = [(each(axis, primal), each(axis, rate_of)) for axis in frame]
+        (x, dx), (y, dy), (z, dz), (place, rate) = parts
+        spin = scaled(0.5, plus(plus(cross(x, dx), cross(y, dy)), cross(z, dz)))
+        return Screw(spin, vector_minus(rate, cross(spin, place)))
 
     def _pair(self, place: Place) -> Any:
         return Element(self._side(place, 0), self._side(place, 1), self.space.lead(self.values, place.joint))

@@ -41,6 +41,7 @@ EXAMPLES = ROOT / "examples"
 VARIANTS: dict[str, tuple[str, dict[str, float | str]]] = {
     "long-crank": ("durango-fourbar", {"AB": "2.6 m"}),
     "press-long-guide": ("press", {"S.guide.length": "150 mm"}),
+    "lever-loaded": ("lever", {"joint_defaults.seat": "loaded"}),
 }
 
 

@@ -229,10 +229,11 @@ def test_errors_are_as_built_less_ideal() -> None:
 # ---- seats that travel ----------------------------------------------------------------------------------------
 
 
-def test_velocities_contain_the_way_of_the_seats() -> None:
+def test_velocities_and_accelerations_contain_the_way_of_the_seats() -> None:
     """The crank hangs ρ below its pin all the turn: its bearing stands still. With the seat held it would go round."""
     result = crank(seat="loaded")
     for position in range(4):
         near(at(result, "point_error", position=position), [0, -RHO])
         near(at(result, "point_velocity", position=position), [0, 0], 1e-4)  # of ω ρ
+        near(at(result, "point_acceleration", position=position), [0, 0], 1e-3)  # of ω² ρ
     assert float(np.max(np.abs(result["friction_power"]))) < 1e-4 * WEIGHT * RHO

@@ -195,6 +195,9 @@ def _unit(text: str) -> str:
     return re.sub(r"\^([0-9])", lambda found: "⁰¹²³⁴⁵⁶⁷⁸⁹"[int(found[1])], text).replace(" ", " ")
 
 
+PARTS = {"": "", "seats": "with a seat", "errors": "with an error"}
+
+
 def results_table() -> str:
     """Every variable of a result, in the plane and in space: one row where it is the same in both."""
     from trunnion.results import variables
@@ -206,8 +209,10 @@ def results_table() -> str:
         if len(forms) == 2 and forms[0][1] == forms[1][1]:
             forms = [("", forms[0][1])]
         for where, one in forms:
-            rows.append((_code(name), where, ", ".join((*one.dims, "position")), _unit(one.units), one.long_name))
+            there = ", ".join(word for word in (where, PARTS[one.part]) if word)
+            rows.append((_code(name), there, ", ".join((*one.dims, "position")), _unit(one.units), one.long_name))
     rows.append((_code("efficiency"), "", "", "1", "useful work over drive work of the cycle"))
+    rows.append((_code("efficiency_ideal"), PARTS["errors"], "", "1", "efficiency of the mechanism without errors"))
     return _rows(("variable", "only in", "dimensions", "unit", "meaning"), rows)
 
 

@@ -28,7 +28,7 @@ def wanted() -> set[tuple[str, str, str]]:
     """The drawings and reports that the page refers to: model, kind, suffix."""
     entries = facts().ENTRIES.items()
     return {(name, kind, "svg") for name, entry in entries for kind in entry.figures} | {
-        (name, "report", "html") for name, _ in entries
+        (name, "report", "html") for name, entry in entries if entry.report
     }
 
 
@@ -52,7 +52,7 @@ def _entry(name: str, entry: Any) -> str:
     mechanism = trunnion.read(EXAMPLES / f"{name}.yaml")
     result = trunnion.analyse(mechanism, STEPS)
     drawings = [f"![{_alt(kind)}](figures/{name}/{kind}.svg)" for kind in entry.figures]
-    report = f"figures/{name}/report.html"
+    report = f" · [report](figures/{name}/report.html)" if entry.report else ""
     parts = [
         f"### {mechanism.name}",
         " ".join(mechanism.notes.split()),
@@ -61,7 +61,7 @@ def _entry(name: str, entry: Any) -> str:
         "</div>",
         _checked(entry, Outcome(mechanism, result)),
         *_sources(mechanism),
-        f"`{result.attrs['formula']}` · [{name}.yaml](examples/{name}.yaml) · [report]({report})",
+        f"`{result.attrs['formula']}` · [{name}.yaml](examples/{name}.yaml){report}",
     ]
     return "\n\n".join(parts)
 
@@ -79,7 +79,8 @@ def _refused(name: str) -> str:
 
 
 def _alt(kind: str) -> str:
-    return "Mechanism with the paths of its points" if kind == "mechanism" else kind.replace("-", " ").capitalize()
+    told = {"mechanism": "Mechanism with the paths of its points", "assemble": "Clearance that it takes to assemble"}
+    return told.get(kind, kind.replace("-", " ").capitalize())
 
 
 def _sources(mechanism: Any) -> list[str]:

@@ -1,8 +1,9 @@
 """What the build of the pages adds to their text, so that no table or picture can drift from the code.
 
 - `<!-- generated: NAME -->` in a page becomes the table of that name, made from the code's own tables.
-- `figures/MODEL/KIND.svg` and `figures/MODEL/report.html` are drawn when a page refers to them. KIND is a plot or
-  `assemblies`; MODEL is a file of `examples/`, a block of a page titled `MODEL.yaml`, or an entry of `VARIANTS`.
+- `figures/MODEL/KIND.svg` and `figures/MODEL/report.html` are drawn when a page refers to them. KIND is a plot,
+  `assemblies` or `assemble`; MODEL is a file of `examples/`, a block of a page titled `MODEL.yaml`, or an entry of
+  `VARIANTS`.
 - `figures/sweeps/NAME.svg`, `figures/plays/NAME.svg` and `figures/assembles/NAME.svg` are drawn by the command of a
   page, `trunnion sweep … --out NAME.svg` and so on.
 - The gallery is made of the examples and of `tests/gallery/facts.py`; see `gallery_page.py`.
@@ -40,6 +41,7 @@ EXAMPLES = ROOT / "examples"
 VARIANTS: dict[str, tuple[str, dict[str, float | str]]] = {
     "long-crank": ("durango-fourbar", {"AB": "2.6 m"}),
     "press-long-guide": ("press", {"S.guide.length": "150 mm"}),
+    "lever-loaded": ("lever", {"joint_defaults.seat": "loaded"}),
 }
 
 
@@ -106,8 +108,9 @@ def models_of(pages: Any) -> dict[str, str]:
 
 def _drawn(model: str, models: dict[str, str], kinds: list[str], steps: int, report: bool) -> dict[str, bytes]:
     """The figures of a model, and its report, by file name."""
-    from trunnion import analyse, read
+    from trunnion import analyse, assemble, read
     from trunnion import report as page
+    from trunnion.views import fit
     from trunnion.views.assemblies import ways
     from trunnion.views.plots import PLOTS, save
 
@@ -120,10 +123,15 @@ def _drawn(model: str, models: dict[str, str], kinds: list[str], steps: int, rep
         file.write_text(models[base], encoding="utf-8")
         mechanism = read(file)
         mechanism = mechanism.with_values(values) if values else mechanism
-        result, ideal = analyse(mechanism, steps), analyse(mechanism.with_friction("off"), steps)
+        draw: dict[str, Callable[[], Any]] = {
+            "assemblies": lambda: ways(mechanism),
+            "assemble": lambda: fit.figure(assemble(mechanism)),
+        }
+        if report or any(kind not in draw for kind in kinds):
+            result, ideal = analyse(mechanism, steps), analyse(mechanism.with_friction("off"), steps)
         for kind in kinds:
             path = Path(folder) / f"{kind}.svg"
-            save(ways(mechanism) if kind == "assemblies" else PLOTS[kind](result, ideal), path)
+            save(draw[kind]() if kind in draw else PLOTS[kind](result, ideal), path)
             drawn[path.name] = path.read_bytes()
         if report:
             drawn["report.html"] = page(result, ideal).encode()
@@ -187,6 +195,9 @@ def _unit(text: str) -> str:
     return re.sub(r"\^([0-9])", lambda found: "⁰¹²³⁴⁵⁶⁷⁸⁹"[int(found[1])], text).replace(" ", " ")
 
 
+PARTS = {"": "", "seats": "with a seat", "errors": "with an error"}
+
+
 def results_table() -> str:
     """Every variable of a result, in the plane and in space: one row where it is the same in both."""
     from trunnion.results import variables
@@ -198,8 +209,10 @@ def results_table() -> str:
         if len(forms) == 2 and forms[0][1] == forms[1][1]:
             forms = [("", forms[0][1])]
         for where, one in forms:
-            rows.append((_code(name), where, ", ".join((*one.dims, "position")), _unit(one.units), one.long_name))
+            there = ", ".join(word for word in (where, PARTS[one.part]) if word)
+            rows.append((_code(name), there, ", ".join((*one.dims, "position")), _unit(one.units), one.long_name))
     rows.append((_code("efficiency"), "", "", "1", "useful work over drive work of the cycle"))
+    rows.append((_code("efficiency_ideal"), PARTS["errors"], "", "1", "efficiency of the mechanism without errors"))
     return _rows(("variable", "only in", "dimensions", "unit", "meaning"), rows)
 
 

@@ -218,7 +218,11 @@ def linkages(console: Console, rounds: int) -> list[tuple[str, bool]]:
     with console.status("spatial linkage"):
         table, in_space = spatial.fill(rounds)
     console.print(table)
-    limits: list[tuple[str, bool]] = groups.verdicts(found) + spatial.verdicts(in_space)
+    seats = import_module("benchmarks.seats")
+    with console.status("loaded seats"):
+        table, seated = seats.fill(rounds)
+    console.print(table)
+    limits: list[tuple[str, bool]] = groups.verdicts(found) + spatial.verdicts(in_space) + seats.verdicts(seated)
     return limits
 
 

@@ -149,9 +149,10 @@ def settle(run: Run, seen: Lanes, method: FrictionMethod, start: Backward) -> Se
     loaded = any(seat.given is None for seat in run.seats)
     turning = _slow(run.system, start)[seen.own]
     senses = np.zeros((len(rubbing(run.system)), len(seen.times)))
+    held = None
     if loaded:
-        _iterate(run, seen.times, quick, offsets, rounds, change, np.arange(len(seen.times)), senses)
-    moving = travel(run, seen, offsets, start)
+        held = _iterate(run, seen.times, quick, offsets, rounds, change, np.arange(len(seen.times)), senses)
+    moving = travel(run, seen, offsets, start, held)
     mine = {path: numbers[seen.own] for path, numbers in offsets.items()}
     rounds, change = rounds[seen.own], change[seen.own]
     if loaded:  # where a joint turns round, the travel of the seats decides the sense of its friction
@@ -183,10 +184,11 @@ def _iterate(
     left: NDArray[np.intp],
     senses: NDArray[np.float64],
     moving: Mapping[str, Travel] | None = None,
-) -> None:
+) -> Backward | None:
     """Seats and reactions in turn, in place, until the positions `left` have settled or had their rounds.
 
-    senses: of the slips of the joints with friction in the last round, kept too.
+    senses: of the slips of the joints with friction in the last round, kept too. Returns the last round of all
+    positions.
 
     A round gains about as much as the one before it, so `change`, what one more round would change, is known from
     two; of the first alone, that took the pin into its seat, it is its square with a margin. Where rounds gain
@@ -196,9 +198,11 @@ def _iterate(
     paths = list(offsets)
     before = after = np.zeros((len(paths), 0))
     last = np.full(len(left), 1 / MARGIN)
+    whole: Backward | None = None
     while len(left):
         part = {path: numbers[left] for path, numbers in offsets.items()}
         found = run.at(time[left], part, method, travel=part_of(moving, left) if moving else None)
+        whole = found if len(left) == len(time) else whole
         wanted = _next(run, found, len(left))
         senses[:, left] = _senses(found)
         rounds[left] += 1
@@ -213,6 +217,7 @@ def _iterate(
             offsets[path][left] = numbers
         open_ = (change[left] > TOLERANCE) & (rounds[left] < ROUNDS)
         before, after, last, left = here[:, open_], there[:, open_], now[open_], left[open_]
+    return whole
 
 
 def _senses(found: Backward) -> NDArray[np.float64]:

@@ -72,11 +72,14 @@ def _within(times: NDArray[np.float64], cycle: Cycle) -> NDArray[np.float64]:
     return times if cycle.periodic else np.clip(times, 0.0, cycle.duration)
 
 
-def travel(run: Run, seen: Lanes, offsets: Mapping[str, NDArray[np.float64]], start: Backward) -> dict[str, Travel]:
+def travel(
+    run: Run, seen: Lanes, offsets: Mapping[str, NDArray[np.float64]], start: Backward, held: Backward | None = None
+) -> dict[str, Travel]:
     """How every link also moves at the positions of the lanes.
 
-    offsets: of the pins at all lanes; start: the ideal mechanism there. Accelerations are told only between lanes
-    where all seats travel evenly; else the links have those of pins that are held.
+    offsets: of the pins at all lanes; start: the ideal mechanism there; held: a walk there with pins held near these
+    offsets, if there was one. Accelerations are told only between lanes where all seats travel evenly; else the links
+    have those of pins that are held.
     """
     rates, even = _rates(run, seen, offsets)
     if not rates:
@@ -85,7 +88,8 @@ def travel(run: Run, seen: Lanes, offsets: Mapping[str, NDArray[np.float64]], st
     values = {**run.values, **inside}
     time = seen.times[seen.inner]
     with np.errstate(all="ignore"):
-        held = kinematics.forward(run.system, values, run.chosen.assembly, time)
+        lain = {**run.values, **offsets}
+        walk = held.walk if held else kinematics.forward(run.system, lain, run.chosen.assembly, seen.times)
         seeded = {**values, **{path: Dual(inside[path], rate) for path, rate in rates.items()}}
         added = _travelling(run, seeded, time)
     own = seen.own - seen.step
@@ -94,11 +98,13 @@ def travel(run: Run, seen: Lanes, offsets: Mapping[str, NDArray[np.float64]], st
     there = span > 0
     found: dict[str, Travel] = {}
     for link, extra in added.items():
-        meant, motion = start.walk.motions[link], held.motions[link]
-        play = zipped(lambda a, b, c: a + b - sliced(c, seen.inner), motion.twist, extra, meant.twist)
+        meant, motion = start.walk.motions[link], walk.motions[link]
+        play = zipped(
+            lambda a, b, c: sliced(a, seen.inner) + b - sliced(c, seen.inner), motion.twist, extra, meant.twist
+        )
         change = each(play, functools.partial(_difference, one=one, two=two, span=np.where(there, span, 1.0)))
         second = zipped(
-            lambda a, b, c: np.where(there, sliced(a, seen.own) + b, sliced(c, own)),
+            lambda a, b, c: np.where(there, sliced(a, seen.own) + b, sliced(c, seen.own)),
             meant.acceleration, change, motion.acceleration,
         )  # fmt: skip
         found[link] = Travel(each(extra, lambda number: sliced(number, own)), second)

@@ -13,7 +13,7 @@ the sign of the rate of the second link against the first.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -209,6 +209,21 @@ class Linkage:
                 return Settled(offsets, loads, links, found, friction, rounds)
             offsets = wanted
         raise AssertionError(f"the seats do not settle: {change:.2g} of the clearance")
+
+    def travelling(self, theta: float, step: float = 2e-3) -> Settled:
+        """A position with the whole motion of its links: differences of fourth order of their settled places."""
+        five = [self.settle(theta + k * step) for k in (-2, -1, 0, 1, 2)]
+        links = {}
+        for name in five[2].links:
+            places = np.array([one.links[name].place for one in five])
+            angles = np.unwrap([one.links[name].angle for one in five])
+            first = np.array([1, -8, 0, 8, -1]) / (12 * step) * self.speed
+            second = np.array([-1, 16, -30, 16, -1]) / (12 * step**2) * self.speed**2
+            links[name] = Link(
+                places[2], first @ places, second @ places, float(angles[2]), first @ angles, second @ angles
+            )
+        found, friction = self.balance(links, five[2].offsets)
+        return replace(five[2], links=links, solution=found, friction=friction)
 
     def crank(self, theta: float, offsets: Offsets) -> Link:
         """The driven link: its hole at A, moved by its seat, about the ground's pin."""

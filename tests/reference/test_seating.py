@@ -239,7 +239,6 @@ def test_guide_whose_ends_change_sides() -> None:
     assert len(lost) <= 2 * sum(np.sum(np.diff(side) != 0) + 1 for side in sides)
 
 
-@pytest.mark.xfail(strict=True, reason="what lies between two positions is taken from the line between their loads")
 def test_a_load_that_turns_quickly_does_not_jump() -> None:
     """Degree by degree the load of the rod's pin stays above 5 % of its peak and the seat follows; 15° apart too."""
     fine = analysed(loaded("slider-crank"), 360)
@@ -254,9 +253,9 @@ def test_a_load_that_turns_quickly_does_not_jump() -> None:
 @pytest.mark.parametrize("friction", [0.0, 0.12])
 @pytest.mark.parametrize("name", LINKAGES)
 def test_power_of_the_settled_linkage(name: str, friction: float) -> None:
-    """Drive, loads and inertia against what the joints lose, to rounding; a joint without friction loses nothing.
+    """Drive, loads and inertia against what the joints lose, to rounding; a joint without friction loses O(ρ²).
 
-    The way of a seat is along the wall, its load is across: what is left of their product is the differences' own.
+    The way of a seat is along the wall, its load is across but for the inertia of that way, which is another ρ.
     """
     result = analysed(loaded(name, friction), 120)
     scale = float(np.max(np.abs(result.drive_power.values)))
@@ -265,10 +264,11 @@ def test_power_of_the_settled_linkage(name: str, friction: float) -> None:
     if friction:
         assert np.all(lost > -1e-4 * scale)
     else:
-        assert np.max(np.abs(lost)) < 1e-4 * scale
+        less = analysed(loaded(name, friction, 5e-5), 120).friction_power.values
+        assert np.max(np.abs(lost)) < 5e-4 * scale
+        assert np.max(np.abs(less)) < np.max(np.abs(lost)) / 10
 
 
-@pytest.mark.xfail(strict=True, reason="inertia forces leave out the acceleration of the seats' way: O(ρ) of the work")
 @pytest.mark.parametrize("name", LINKAGES)
 def test_a_cycle_without_friction_takes_no_work(name: str) -> None:
     """Constant forces and periodic motion: the mean drive power is that lost; to 1 % of the largest change of power."""
@@ -280,16 +280,19 @@ def test_a_cycle_without_friction_takes_no_work(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", LINKAGES)
-def test_reactions_of_a_result_are_those_of_its_seats(name: str) -> None:
-    """The forces that `analyse` writes are those of the oracle at the same seats, to 1e-8."""
-    data = loaded(name)
-    result, oracle = analysed(data, 24), LINKAGES[name][1](data)
-    for i, theta in enumerate(result.joint_rotation.sel(joint="A").values):
-        settled = oracle.settle(float(theta))
-        size = max(np.hypot(*force) for force in settled.solution.force.values())
-        for joint, force in settled.solution.force.items():
-            written = result.reaction_force.sel(joint=joint).values[:, i]
-            np.testing.assert_allclose(written, force, rtol=0, atol=1e-8 * size)
+def test_reactions_of_a_result_are_those_of_the_whole_motion(name: str) -> None:
+    """Inertia by the accelerations of the settled places: as the oracle's, to what differences of 1/720 turn leave."""
+    for rho in (1e-4, 2.5e-5):
+        data = loaded(name, rho=rho)
+        result, oracle = analysed(data, 24), LINKAGES[name][1](data)
+        miss = changed = 0.0
+        for i, theta in enumerate(result.joint_rotation.sel(joint="A").values):
+            whole = oracle.travelling(float(theta))
+            for joint, force in whole.solution.force.items():
+                written = result.reaction_force.sel(joint=joint).values[:, i]
+                miss = max(miss, float(np.hypot(*(written - force))))
+                changed = max(changed, float(np.hypot(*result.reaction_force_change.sel(joint=joint).values[:, i])))
+        assert miss < 0.02 * changed
 
 
 def test_velocities_contain_the_way_of_the_seats() -> None:
@@ -382,8 +385,9 @@ def test_rssr_with_play_in_all_joints(friction: float) -> None:
             np.testing.assert_allclose(found, ends, rtol=0, atol=2e-6 * 2e-5)
             force = [float(np.ravel(n)[0]) for n in back.reactions[joint].u]
             np.testing.assert_allclose(force, settled.solution.force[joint], rtol=0, atol=1e-7 * size)
-            written = result.reaction_force.sel(joint=joint).values[:, i]  # with the slip of seats that travel
-            np.testing.assert_allclose(written, force, rtol=0, atol=(5e-4 if friction else 1e-7) * size)
+            written = result.reaction_force.sel(joint=joint).values[:, i]
+            # with the slip and the inertia of seats that travel
+            np.testing.assert_allclose(written, force, rtol=0, atol=5e-3 * size)
 
 
 def test_cardan_with_play_in_all_joints() -> None:

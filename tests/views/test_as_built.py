@@ -173,7 +173,7 @@ def test_ends_stand_side_by_side_and_their_pins_touch_the_wall(cardan):
         circles = [patch for patch in axes.patches if isinstance(patch, Circle)]
         hole = next(one for one in circles if one.get_radius() == pytest.approx((1 + PIN) * 10))
         for pin in (one for one in circles if one.get_radius() == pytest.approx(PIN * 10)):
-            assert np.hypot(*pin.center) + pin.get_radius() == pytest.approx(hole.get_radius(), rel=1e-6), name
+            assert np.hypot(*pin.center) + pin.get_radius() == pytest.approx(hole.get_radius(), rel=1e-4), name
 
 
 def test_the_locus_has_the_offsets_and_no_jump(slider):

@@ -14,6 +14,7 @@ from test_report import Page
 import trunnion
 from trunnion import Mechanism, analyse
 from trunnion.analysis.assemblies import Choice, Way
+from trunnion.errors import Status
 from trunnion.export import save as write
 from trunnion.views.assemblies import ways
 from trunnion.views.plots import PLOTS, save
@@ -32,9 +33,11 @@ def results():
     for name in SPATIAL:
         mechanism = Mechanism.read(EXAMPLES / f"{name}.yaml")
         try:
-            found[name] = analyse(mechanism, 24)
+            result = analyse(mechanism, 24)
         except trunnion.MechanismError:  # one that is there to be refused
             continue
+        if (result["status"] < Status.NOT_CONVERGED).any():  # not one whose errors only its plays take up
+            found[name] = result
     assert len(found) >= 8
     return found
 
@@ -55,6 +58,8 @@ def test_poses_and_frames_put_the_joints_where_the_points_are(results):
             for side, link in enumerate(one["links"]):
                 track = result["point_position"].sel(point=f"{link}.{joint}").transpose("axis", "position").values
                 assert shown.at(joint, side) == pytest.approx(track, abs=1e-9 * size, nan_ok=True), (name, joint)
+            if joint in shown.stated["plays"]:  # its pin does not lie in the middle of its hole
+                continue
             if one["type"] in ("revolute", "cylindrical", "helical", "prismatic"):
                 both = shown.axis(joint, 0), shown.axis(joint, 1)
                 assert both[0] == pytest.approx(both[1], abs=1e-9, nan_ok=True), (name, joint)

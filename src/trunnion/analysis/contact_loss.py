@@ -33,6 +33,7 @@ CLOSE = 20_000  # positions of a cycle that are near enough to tell a passage th
 PARTS = 96  # into which a wider step, and a quarter of it on either side, is parted
 MOST_PLACES = 6  # named in one finding
 
+NOWHERE = np.zeros(0, np.intp)
 Arrays = dict[str, NDArray[np.float64]]
 
 
@@ -41,8 +42,9 @@ class Loss:
     """Loss of contact of one joint: where (position, whole and fraction), at which end, least load there, N, largest
     load, N.
 
-    unsettled: positions whose seats did not settle; loaded: whether anything presses it at all; turns: whether its
-    load has a direction that can turn, as that of a guide has not.
+    unsettled: positions whose seats did not settle; lifted: where the inertia of the pin's own way outdoes its load;
+    loaded: whether anything presses it at all; turns: whether its load has a direction that can turn, as that of a
+    guide has not.
     """
 
     joint: str
@@ -50,6 +52,7 @@ class Loss:
     least: float
     peak: float
     unsettled: NDArray[np.intp]
+    lifted: NDArray[np.intp]
     loaded: bool = True
     turns: bool = True
 
@@ -68,15 +71,24 @@ def find(arrays: Arrays, run: Run, time: NDArray[np.float64]) -> list[Loss]:
         i = joints.index(seat.joint)
         loss = _of_joint(run, seat, arrays["end_force"][i], time, largest)
         turns = any(len(end) > 1 for end in seat.play.model.ends)
-        loss = replace(loss, unsettled=late[least == i], turns=turns)
-        if loss.places or len(loss.unsettled) or not loss.loaded:
+        lifted = _lifted(arrays["end_force"][i], arrays["seat_offset"][i]) if loss.loaded else NOWHERE
+        loss = replace(loss, unsettled=late[least == i], lifted=lifted, turns=turns)
+        if loss.places or len(loss.unsettled) or len(lifted) or not loss.loaded:
             found.append(loss)
         lost = np.array([round(place) % len(time) for place, _ in loss.places], np.intp)
-        arrays["contact_lost"][i, np.union1d(lost, loss.unsettled).astype(np.intp)] = 1
+        for where in (lost, loss.unsettled, lifted):
+            arrays["contact_lost"][i, where] = 1
     anywhere = np.any(arrays["contact_lost"] > 0, axis=0)
     status = arrays["status"]
     np.maximum(status, np.where(anywhere, status.dtype.type(Status.CONTACT_LOST), status.dtype.type(0)), out=status)
     return found
+
+
+def _lifted(forces: NDArray[np.float64], offsets: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Positions at which the load of an end points away from the wall that its pin lies at."""
+    across = np.sum(forces * offsets, axis=1)
+    size = np.sqrt(np.sum(forces**2, axis=1) * np.sum(offsets**2, axis=1))
+    return np.flatnonzero(np.any(across < -1e-6 * size, axis=0))
 
 
 def _numbers(arrays: Arrays, run: Run, time: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -92,9 +104,9 @@ def _earles_wu(force: NDArray[np.float64], time: NDArray[np.float64], periodic: 
     if len(time) < 3:
         return np.full((len(force), len(time)), np.nan)
     step = time[1] - time[0]
-    around = np.concatenate([force[..., -1:], force, force[..., :1]], axis=-1) if periodic else force
-    rate = np.gradient(around, step, axis=-1)
-    rate = rate[..., 1:-1] if periodic else rate
+    rate = (np.roll(force, -1, axis=-1) - np.roll(force, 1, axis=-1)) / (2 * step)
+    if not periodic:
+        rate[..., 0], rate[..., -1] = (force[..., 1] - force[..., 0]) / step, (force[..., -1] - force[..., -2]) / step
     size = np.sum(force * force, axis=1)
     along = np.sum(force * rate, axis=1)
     with np.errstate(all="ignore"):
@@ -105,7 +117,7 @@ def _earles_wu(force: NDArray[np.float64], time: NDArray[np.float64], periodic: 
 def _least_loaded(forces: NDArray[np.float64], rows: Sequence[int]) -> NDArray[np.intp]:
     """Of the joints with loaded seats that whose end bears least, at each of some positions."""
     if not len(rows) or not forces.shape[-1]:
-        return np.zeros(0, np.intp)
+        return NOWHERE
     sizes = np.sqrt(np.sum(forces[rows] ** 2, axis=2))
     least = np.argmin(np.nan_to_num(np.min(np.where(np.isfinite(sizes), sizes, np.inf), axis=1)), axis=0)
     return np.array([rows[k] for k in least], np.intp)
@@ -118,7 +130,7 @@ def _of_joint(run: Run, seat: Seat, forces: NDArray[np.float64], time: NDArray[n
     loads = list(_end_loads(seat, forces))
     top = max((float(np.nanmax(_size(load), initial=0.0)) for _, load in loads), default=0.0)
     if top <= NO_LOAD * largest:
-        return Loss(seat.joint, [], 0.0, top, np.zeros(0, np.intp), loaded=False)
+        return Loss(seat.joint, [], 0.0, top, NOWHERE, NOWHERE, loaded=False)
     for number, load in loads:
         own = float(np.nanmax(_size(load), initial=0.0))
         if own <= NO_LOAD * largest:
@@ -127,7 +139,7 @@ def _of_joint(run: Run, seat: Seat, forces: NDArray[np.float64], time: NDArray[n
             places.append((place, min(int(seat.play.model.ends[number][0][0]), 2)))
             least = min(least, size)
         peak = max(peak, own)
-    return Loss(seat.joint, sorted(places), least, peak, np.zeros(0, np.intp))
+    return Loss(seat.joint, sorted(places), least, peak, NOWHERE, NOWHERE)
 
 
 def _seen(
@@ -196,6 +208,12 @@ def findings(found: Sequence[Loss], arrays: Arrays, joints: Sequence[str], dial:
         if loss.places:
             remedy = _number(arrays, joints.index(loss.joint), dial) if loss.turns else "expect impact there"
             told.append(Finding(_lost(loss, dial), where, remedy, Severity.WARNING))
+        if len(loss.lifted):
+            what = (
+                f"its pin lifts off the wall {dial.intervals(loss.lifted)}: its seat turns so fast that the inertia of "
+            )
+            what += "its way outdoes the load"
+            told.append(Finding(what, where, "forces there are those of a pin that stays", Severity.WARNING))
         if len(loss.unsettled):
             worst = float(np.nanmax(arrays["seat_change"][loss.unsettled]))
             what = f"its seat did not settle in {ROUNDS} rounds {dial.intervals(loss.unsettled)}: it still changes by "

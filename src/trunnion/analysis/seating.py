@@ -12,7 +12,7 @@ import functools
 import operator
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 __all__ = ["ROUNDS", "TOLERANCE", "Seat", "Seated", "loads_of", "seats", "settle"]
 
 ROUNDS = 10  # most of the iteration
+MARGIN = 50.0  # by which a second round may gain less than the first
 SLUGGISH = 0.1  # of the change before: rounds that gain less than this are helped
 SLOW = 0.01  # of its largest speed: below it the travel of the seats may turn the slip of a joint round
 TOLERANCE = 1e-6  # change of a seat that one more round would make, of its clearance
@@ -147,13 +148,18 @@ def settle(run: Run, seen: Lanes, method: FrictionMethod, start: Backward) -> Se
     rounds, change = np.zeros(len(seen.times), np.intp), np.zeros(len(seen.times))
     loaded = any(seat.given is None for seat in run.seats)
     turning = _slow(run.system, start)[seen.own]
+    senses = np.zeros((len(rubbing(run.system)), len(seen.times)))
     if loaded:
-        _iterate(run, seen.times, quick, offsets, rounds, change, np.arange(len(seen.times)))
+        _iterate(run, seen.times, quick, offsets, rounds, change, np.arange(len(seen.times)), senses)
     moving = travel(run, seen, offsets, start)
     mine = {path: numbers[seen.own] for path, numbers in offsets.items()}
     rounds, change = rounds[seen.own], change[seen.own]
     if loaded:  # where a joint turns round, the travel of the seats decides the sense of its friction
-        _iterate(run, time, quick, mine, rounds, change, np.flatnonzero(turning & (rounds < ROUNDS)), moving)
+        left = np.flatnonzero(turning & (rounds < ROUNDS)) if moving else np.zeros(0, np.intp)
+        turned = run.at(time[left], {path: numbers[left] for path, numbers in mine.items()}, quick,
+                        travel=part_of(moving, left))  # fmt: skip
+        left = left[np.any(_senses(turned) != senses[:, seen.own[left]], axis=0)]
+        _iterate(run, time, quick, mine, rounds, change, left, senses[:, seen.own], moving)
     back = run.at(time, mine, method, travel=moving)
     return Seated(back, mine, _loads(run, back), rounds, change, turning)
 
@@ -175,33 +181,47 @@ def _iterate(
     rounds: NDArray[np.intp],
     change: NDArray[np.float64],
     left: NDArray[np.intp],
+    senses: NDArray[np.float64],
     moving: Mapping[str, Travel] | None = None,
 ) -> None:
     """Seats and reactions in turn, in place, until the positions `left` have settled or had their rounds.
 
+    senses: of the slips of the joints with friction in the last round, kept too.
+
     A round gains about as much as the one before it, so `change`, what one more round would change, is known from
-    two. Where rounds gain little the step is extrapolated from the last two (Anderson's method with one step of
-    memory, D. G. Anderson, J. ACM 12 (1965) 547-560, doi:10.1145/321296.321305).
+    two; of the first alone, that took the pin into its seat, it is its square with a margin. Where rounds gain
+    little the step is extrapolated from the last two (Anderson's method with one step of memory, D. G. Anderson, J.
+    ACM 12 (1965) 547-560, doi:10.1145/321296.321305).
     """
     paths = list(offsets)
     before = after = np.zeros((len(paths), 0))
-    last = np.full(len(left), np.inf)
+    last = np.full(len(left), 1 / MARGIN)
     while len(left):
         part = {path: numbers[left] for path, numbers in offsets.items()}
         found = run.at(time[left], part, method, travel=part_of(moving, left) if moving else None)
         wanted = _next(run, found, len(left))
+        senses[:, left] = _senses(found)
         rounds[left] += 1
         now = _change(run.seats, part, wanted)
-        change[left] = now * np.where(last > 0, np.minimum(now / np.where(last > 0, last, 1.0), 1.0), 1.0)
-        change[left] = np.where(np.isfinite(last), change[left], now)
+        change[left] = now * np.minimum(now / np.where(last > 0, last, 1.0), 1.0)
         here, there = (np.array([one[path] for path in paths]) for one in (part, wanted))
         following = there
         if after.size:
-            following = np.where(now > SLUGGISH * last, _extrapolated(before, after, here, there), there)
+            ahead = _at_the_wall(run.seats, paths, _extrapolated(before, after, here, there), there)
+            following = np.where(now > SLUGGISH * last, ahead, there)
         for path, numbers in zip(paths, following, strict=True):
             offsets[path][left] = numbers
         open_ = (change[left] > TOLERANCE) & (rounds[left] < ROUNDS)
         before, after, last, left = here[:, open_], there[:, open_], now[open_], left[open_]
+
+
+def _senses(found: Backward) -> NDArray[np.float64]:
+    """Sense of the slip of every joint with friction at each position."""
+    shape = np.shape(found.walk.time)
+    names = rubbing(found.walk.system)
+    return np.array([np.broadcast_to(np.sign(primal(found.slips[name].speed)), shape) for name in names]).reshape(
+        len(names), *shape
+    )
 
 
 def _extrapolated(
@@ -215,6 +235,19 @@ def _extrapolated(
     return np.asarray(there - share * (there - after))
 
 
+def _at_the_wall(
+    found: Sequence[Seat], paths: Sequence[str], ahead: NDArray[np.float64], there: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Extrapolated offsets with the lengths that pins pressed to the wall have."""
+    row = {path: i for i, path in enumerate(paths)}
+    for seat in found:
+        for end in seat.play.model.ends:
+            rows = [row[f"seats.{seat.joint}.{key}"] for key in end]
+            size, wanted = (np.sqrt(np.sum(one[rows] ** 2, axis=0)) for one in (ahead, there))
+            ahead[rows] = np.where(size > 0, ahead[rows] * (wanted / np.where(size > 0, size, 1.0)), there[rows])
+    return ahead
+
+
 def _loads(run: Run, back: Backward) -> dict[str, list[Vector]]:
     return {seat.joint: loads_of(back, seat) for seat in run.seats}
 
@@ -226,21 +259,18 @@ def _next(run: Run, back: Backward, count: int) -> dict[str, NDArray[np.float64]
     for seat in run.seats:
         offsets = seat.given if seat.given is not None else _pressed(back, seat, loads_of(back, seat), least)
         for path, number in seat.play.model.paths(f"seats.{seat.joint}", offsets).items():
+            offset = np.array(np.broadcast_to(primal(number), (count,)), float)
             # where the load is not known (locked, not assembled) the pin is left in the middle
-            found[path] = np.nan_to_num(np.array(np.broadcast_to(np.asarray(primal(number), float), (count,))))
+            offset[~np.isfinite(offset)] = 0.0
+            found[path] = offset
     return found
 
 
 def _largest_reaction(back: Backward) -> Number:
-    """Largest force in any joint, N."""
-    sizes = (np.hypot.reduce([np.abs(primal(part)) for part in _force(one)]) for one in back.reactions.values())
-    return functools.reduce(np.fmax, sizes, 0.0)
-
-
-def _force(reaction: Any) -> tuple[Number, ...]:
-    parts = tuple(np.asarray(number, float) for number in flat(tuple(reaction)))
-    force = parts[: 2 if len(parts) == 3 else 3]
-    return tuple(np.broadcast_arrays(*force))
+    """Largest component of a force in any joint, N."""
+    count = back.walk.system.mechanism.coordinates
+    parts = (np.abs(primal(part)) for one in back.reactions.values() for part in tuple(flat(tuple(one)))[:count])
+    return functools.reduce(np.fmax, parts, 0.0)
 
 
 def _change(

@@ -11,26 +11,27 @@ small as well.
 from __future__ import annotations
 
 import functools
-import operator
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.dual import Dual, primal
+from trunnion.algebra.dual import Dual
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.nested import each, zipped
 from trunnion.analysis import kinematics
 from trunnion.analysis.kinematics import Travel
 from trunnion.analysis.kinetostatics import Backward
-from trunnion.analysis.system import Cycle, System, rubbing
+from trunnion.analysis.system import Cycle
 
 if TYPE_CHECKING:
     from trunnion.analysis.analyse import Run
 
 __all__ = ["Lanes", "lanes", "part_of", "travel"]
 
+BEND = 0.005  # rad: change of the angle that a seat turns from one lane to the next; more is no even turning
+QUICK = 0.1  # rad from one lane to the next, likewise
 FINE = 720  # positions of a cycle whose neighbours are near enough for differences, and no nearer than that
 
 Lane = NDArray[np.intp]
@@ -74,11 +75,10 @@ def _within(times: NDArray[np.float64], cycle: Cycle) -> NDArray[np.float64]:
 def travel(run: Run, seen: Lanes, offsets: Mapping[str, NDArray[np.float64]], start: Backward) -> dict[str, Travel]:
     """How every link also moves at the positions of the lanes.
 
-    offsets: of the pins at all lanes; start: the ideal mechanism there. Where a seat jumps, or a joint with friction
-    turns round and the seats of all with it, differences are taken on the side of the position; where neither side
-    has any, the pins are held.
+    offsets: of the pins at all lanes; start: the ideal mechanism there. Accelerations are told only between lanes
+    where all seats travel evenly; else the links have those of pins that are held.
     """
-    rates, even = _rates(run, seen, offsets, start)
+    rates, even = _rates(run, seen, offsets)
     if not rates:
         return {}
     inside = {path: numbers[seen.inner] for path, numbers in offsets.items()}
@@ -131,39 +131,41 @@ def _travelling(run: Run, values: Mapping[str, Number], time: NDArray[np.float64
 
 
 def _rates(
-    run: Run, seen: Lanes, offsets: Mapping[str, NDArray[np.float64]], start: Backward
+    run: Run, seen: Lanes, offsets: Mapping[str, NDArray[np.float64]]
 ) -> tuple[dict[str, NDArray[np.float64]], NDArray[np.bool_]]:
-    """How fast the seats travel at the inner lanes, m/s, and at which of them by differences to both sides.
+    """How fast the seats travel at the inner lanes, m/s, and at which of them all seats do so evenly.
 
-    0 where a seat turns by more than a right angle: it jumps. So it does, by twice atan μ, where a friction has another
-    sense: there the difference is taken on the side of the lane.
+    A seat that jumps, since its load turns round or a friction does, or that turns too quickly for differences,
+    bends by more than BEND from a lane to the next and the one after. There the rate is taken on the side on which
+    all turn least, and is 0 where that is more than QUICK.
     """
     inner = np.arange(len(seen.times))[seen.inner]
-    one, two = _alike(run.system, inner, seen, start)
-    span = seen.times[two] - seen.times[one]
-    smooth = span > 0
+    before, after = inner - seen.step, inner + seen.step
     ends = [[f"seats.{seat.joint}.{key}" for key in end] for seat in run.seats for end in seat.play.model.ends]
+    bend = back = ahead = np.zeros(len(inner))
     for paths in ends:
-        products = (offsets[path][one] * offsets[path][two] for path in paths)
-        still = functools.reduce(operator.and_, (offsets[path][one] == offsets[path][two] for path in paths))
-        smooth = smooth & (still | (functools.reduce(operator.add, products) > 0))
+        size = np.sqrt(sum(offsets[path][inner] ** 2 for path in paths))
+        scale = 1 / np.where(size > 0, size, np.inf)
+        was, is_, will = ([offsets[path][side] for path in paths] for side in (before, inner, after))
+        back = np.maximum(back, scale * _apart(was, is_))
+        ahead = np.maximum(ahead, scale * _apart(is_, will))
+        middle = [0.5 * (a + b) for a, b in zip(was, will, strict=True)]
+        bend = np.maximum(bend, 2 * scale * _apart(middle, is_))
+    even = bend <= BEND
+    one = np.where(even | (back <= ahead), before, inner)
+    two = np.where(even | (back > ahead), after, inner)
+    span = seen.times[two] - seen.times[one]
+    still = (span <= 0) | (~even & (np.minimum(back, ahead) > QUICK))
     found = {
-        path: np.where(smooth, (offsets[path][two] - offsets[path][one]) / np.where(span > 0, span, 1.0), 0.0)
+        path: np.where(still, 0.0, (offsets[path][two] - offsets[path][one]) / np.where(still, 1.0, span))
         for paths in ends
         for path in paths
     }
-    even = smooth & (one != inner) & (two != inner)
-    return {path: rate for path, rate in found.items() if np.any(rate)}, even
+    return {path: rate for path, rate in found.items() if np.any(rate)}, even & (span > 0)
 
 
-def _alike(system: System, inner: Lane, seen: Lanes, start: Backward) -> tuple[Lane, Lane]:
-    """Lanes before and after each inner lane, or that itself where a friction has another sense on that side."""
-    before, after = inner - seen.step, inner + seen.step
-    for joint in rubbing(system):
-        sense = np.broadcast_to(np.sign(primal(start.slips[joint].speed)), seen.times.shape)
-        before = np.where(sense[before] == sense[inner], before, inner)
-        after = np.where(sense[after] == sense[inner], after, inner)
-    return before, after
+def _apart(one: Sequence[NDArray[np.float64]], two: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+    return np.asarray(np.sqrt(sum((a - b) ** 2 for a, b in zip(one, two, strict=True))))
 
 
 def _pairs(even: NDArray[np.bool_], own: Lane, step: int) -> tuple[Lane, Lane]:

@@ -6,8 +6,6 @@ Exit status: 0 fine, 1 findings (cannot be assembled somewhere, locks, dead cent
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -28,17 +26,17 @@ from trunnion.options import (
     Over,
     Report,
     Rounds,
+    Seats,
     Set,
     Steps,
     TableFile,
     UnitsRow,
     over,
     points,
-    setting,
-    table_file,
 )
 from trunnion.terminal import bar, console, findings_of, say, show_figures, show_rows, wrote
 from trunnion.verbs.assemble import assemble
+from trunnion.verbs.model import exit_status, lines_of, placed, stated
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -81,8 +79,8 @@ def check(
         from trunnion.views.plots import check_figure
 
         check_figure(assemblies)
-    mechanism = _mechanism(file, set_, table, friction)
-    with _lines_of(file):
+    mechanism = stated(file, set_, table, friction)
+    with lines_of(file):
         found = inspect(mechanism)
     rank = "not known: no position can be assembled" if found.rank_mobility is None else str(found.rank_mobility)
     out = console()
@@ -102,14 +100,14 @@ def check(
                 out.print(f"    {line}", markup=False, highlight=False, soft_wrap=True)
     for pair in found.gears:
         out.print(f"gears    {gear_line(pair)}", markup=False, highlight=False, soft_wrap=True)
-    say(_placed(found.findings, file, ["assembly"]))
+    say(placed(found.findings, file, ["assembly"]))
     if assemblies:
         from trunnion.views.assemblies import ways as drawings
         from trunnion.views.plots import save
 
         save(drawings(mechanism, found.choices), assemblies)
         wrote(assemblies)
-    raise typer.Exit(_status(found.findings))
+    raise typer.Exit(exit_status(found.findings))
 
 
 @app.command()
@@ -119,6 +117,7 @@ def analyse(
     set_: Set = None,
     table: TableFile = None,
     friction: FrictionLaw = None,
+    seat: Seats = None,
     method: Method = "newton",
     criterion: Criterion = None,
     iterations: Rounds = 200,
@@ -133,8 +132,8 @@ def analyse(
 
     for path in out or []:
         check_format(path)
-    mechanism = _mechanism(file, set_, table, friction)
-    with _lines_of(file):
+    mechanism = stated(file, set_, table, friction, seat)
+    with lines_of(file):
         result = _run(mechanism, steps, _method(method, criterion, iterations))
     for path in out or []:
         save(result, path, units_row)
@@ -143,7 +142,7 @@ def analyse(
     _summary(result, file)
     for path in [*(out or []), *([report] if report else [])]:
         wrote(path)
-    raise typer.Exit(_status(findings_of(result)))
+    raise typer.Exit(exit_status(findings_of(result)))
 
 
 @app.command()
@@ -158,8 +157,8 @@ def design(
     """Transmission angles, dead centres, range, Grashof type, shaking force, balance, flywheel, motor."""
     from trunnion.analysis.design import report_rows
 
-    mechanism = _mechanism(file, set_, table, friction)
-    with _lines_of(file):
+    mechanism = stated(file, set_, table, friction)
+    with lines_of(file):
         rows = report_rows(mechanism, steps, fluctuation)
     show_figures(mechanism.name or str(file), rows)
 
@@ -172,13 +171,13 @@ def locking(
     from trunnion.analysis.analyse import prepare
     from trunnion.analysis.locking import look, report_rows
 
-    mechanism = _mechanism(file, set_, table, friction)
-    with _lines_of(file):
+    mechanism = stated(file, set_, table, friction)
+    with lines_of(file):
         run = prepare(mechanism)
         found = look(run, steps)
     show_figures(mechanism.name or str(file), report_rows(run, found))
-    say(_placed(findings_of(found), file, ["assembly"]))
-    raise typer.Exit(_status(findings_of(found)))
+    say(placed(findings_of(found), file, ["assembly"]))
+    raise typer.Exit(exit_status(findings_of(found)))
 
 
 app.command()(assemble)
@@ -193,6 +192,7 @@ def sweep(
     set_: Set = None,
     table: TableFile = None,
     friction: FrictionLaw = None,
+    seat: Seats = None,
     out: Out = None,
     units_row: UnitsRow = False,
 ) -> None:
@@ -206,9 +206,9 @@ def sweep(
     grid = over(over_)
     drawn = [path for path in out or [] if path.suffix.lower() in IMAGES]
     check_files(out or [])
-    mechanism = _mechanism(file, set_, table, friction)
+    mechanism = stated(file, set_, table, friction, seat)
     check_measure(measure, mechanism)
-    with _lines_of(file), bar("points", points(grid)) as progress:
+    with lines_of(file), bar("points", points(grid)) as progress:
         result = run(mechanism, grid, steps, progress=progress)
     for path in out or []:
         if path in drawn:
@@ -223,10 +223,10 @@ def sweep(
     show_rows(f"{mechanism.name or file}\n{name}", head, rows)
     if left_out:
         console().print(f"{left_out:,} points more; --out FILE.csv has all", markup=False, highlight=False)
-    say(_placed(findings_of(result), file, ["assembly"]))
+    say(placed(findings_of(result), file, ["assembly"]))
     for path in out or []:
         wrote(path)
-    raise typer.Exit(_status(findings_of(result)))
+    raise typer.Exit(exit_status(findings_of(result)))
 
 
 @app.command()
@@ -245,12 +245,12 @@ def play(
     from trunnion.verbs.play import check_files, show
 
     check_files(out or [])
-    mechanism = _mechanism(file, set_, table, friction)
-    with _lines_of(file):
+    mechanism = stated(file, set_, table, friction)
+    with lines_of(file):
         result = run(mechanism, measure, steps)
     show(mechanism, result, out or [], units_row)
-    say(_placed(findings_of(result), file, ["measures", "joints"]))
-    raise typer.Exit(_status(findings_of(result)))
+    say(placed(findings_of(result), file, ["measures", "joints"]))
+    raise typer.Exit(exit_status(findings_of(result)))
 
 
 @app.command()
@@ -262,6 +262,7 @@ def plot(
     set_: Set = None,
     table: TableFile = None,
     friction: FrictionLaw = None,
+    seat: Seats = None,
     image: Annotated[str, typer.Option("--format", help="png, svg or pdf, for a folder of plots.")] = "png",
 ) -> None:
     """Figures: drive torque, friction power, reactions, polar diagram, mechanism with coupler curve."""
@@ -275,8 +276,8 @@ def plot(
     if single and len(kind or PLOTS) > 1:
         what = f"{len(kind or PLOTS)} plots do not fit one file"
         raise MechanismError(Finding(what, str(out), "name a folder, or one --kind"))
-    mechanism = _mechanism(file, set_, table, friction)
-    with _lines_of(file):
+    mechanism = stated(file, set_, table, friction, seat)
+    with lines_of(file):
         result = _run(mechanism, steps, None)
     ideal = _ideal(mechanism, steps, None)
     if not single:
@@ -287,8 +288,8 @@ def plot(
         save(figure, path)
         wrote(path)
     said = [finding for finding in findings_of(result) if finding.severity is not Severity.NOTE]
-    say(_placed(said, file, ["assembly"]))
-    raise typer.Exit(_status(findings_of(result)))
+    say(placed(said, file, ["assembly"]))
+    raise typer.Exit(exit_status(findings_of(result)))
 
 
 @app.command()
@@ -299,6 +300,7 @@ def report(
     set_: Set = None,
     table: TableFile = None,
     friction: FrictionLaw = None,
+    seat: Seats = None,
     method: Method = "newton",
     criterion: Criterion = None,
     iterations: Rounds = 200,
@@ -307,12 +309,12 @@ def report(
     if out.suffix.lower() not in (".html", ".htm"):
         what = f"a report is HTML, '{out.name}' is not"
         raise MechanismError(Finding(what, "--out", "write a .html file and print it"))
-    mechanism = _mechanism(file, set_, table, friction)
-    with _lines_of(file):
+    mechanism = stated(file, set_, table, friction, seat)
+    with lines_of(file):
         result = _run(mechanism, steps, _method(method, criterion, iterations))
     _write_report(mechanism, result, out)
     wrote(out)
-    raise typer.Exit(_status(findings_of(result)))
+    raise typer.Exit(exit_status(findings_of(result)))
 
 
 @app.command()
@@ -412,16 +414,6 @@ def main() -> None:
 # ---- shared by the verbs --------------------------------------------------------------------------------------
 
 
-def _mechanism(file: Path, settings: list[str] | None, tables: list[str] | None, friction: str | None) -> Mechanism:
-    """The model with the options `--table`, `--set` and `--friction` applied, in this order."""
-    from trunnion.model.file import read_mechanism
-
-    mechanism = read_mechanism(file, dict(table_file(text) for text in tables or ()))
-    if settings:
-        mechanism = mechanism.with_values(dict(setting(text) for text in settings))
-    return mechanism.with_friction(friction) if friction else mechanism
-
-
 def _method(name: str, criterion: float | None, iterations: int) -> FrictionMethod:
     from trunnion.analysis.friction import method_named
 
@@ -457,30 +449,7 @@ def _summary(result: xr.Dataset, file: Path) -> None:
     import json
 
     show_figures(f"{result.attrs['name']}\n{result.attrs['formula']}", json.loads(result.attrs["summary"]))
-    say(_placed(findings_of(result), file, ["assembly"]))
-
-
-@contextmanager
-def _lines_of(file: Path) -> Iterator[None]:
-    """Findings about the model bear the line of its file also where the analysis finds them."""
-    try:
-        yield
-    except MechanismError as error:
-        raise MechanismError(_placed(error.findings, file)) from None
-
-
-def _placed(findings: Iterable[Finding], file: Path, sections: Iterable[str] = ()) -> list[Finding]:
-    """Findings with the line of the model file, if it can be read."""
-    from trunnion.model.file import placed
-
-    try:
-        return placed(findings, file, sections)
-    except MechanismError:  # the file itself is what the findings are about
-        return list(findings)
-
-
-def _status(findings: Any) -> int:
-    return 1 if any(finding.severity is Severity.ERROR for finding in findings) else 0
+    say(placed(findings_of(result), file, ["assembly"]))
 
 
 def _examples() -> dict[str, Path]:

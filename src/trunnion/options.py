@@ -24,6 +24,7 @@ __all__ = [
     "Over",
     "Report",
     "Rounds",
+    "Seats",
     "Set",
     "Steps",
     "TableFile",
@@ -49,6 +50,10 @@ TableFile = Annotated[
 ]
 FrictionLaw = Annotated[
     str | None, typer.Option("--friction", help="off, or a friction law for all joints with friction.")
+]
+Seats = Annotated[
+    str | None,
+    typer.Option("--seat", help="loaded or free: how the pins of all joints with play lie in their holes."),
 ]
 Method = Annotated[str, typer.Option("--method", help="newton, or successive-approximation (Durango et al., 2010).")]
 Criterion = Annotated[

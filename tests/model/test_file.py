@@ -28,7 +28,9 @@ FindingsOf = Callable[..., tuple[Finding, ...]]
 @pytest.mark.parametrize("extension", ["yaml", "json"])
 def test_examples_are_read_and_written_without_loss(example: Path, extension: str, tmp_path: Path) -> None:
     mechanism = read_mechanism(example)
-    assert not check_model(mechanism)
+    # the pins of Pezzuti et al. are shorter than their diameter, which counts where they lean in their holes
+    short = example.stem == "pezzuti-cardan-as-built"
+    assert all(short and "less than its diameter" in finding.what for finding in check_model(mechanism))
     copy = tmp_path / f"copy.{extension}"
     mechanism.write(copy)
     again = Mechanism.read(copy)

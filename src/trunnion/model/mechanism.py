@@ -333,6 +333,16 @@ class Mechanism(Part):
                 holder["friction"] = {"law": law, **{key: value for key, value in stated.items() if key in keep}}
         return Mechanism(**data)
 
+    def with_seats(self, seat: str) -> Mechanism:
+        """The mechanism with one seating for all joints with play: "loaded" or "free"; MechanismError for another."""
+        if seat not in ("loaded", "free"):
+            what = f"'{seat}' is no seating of all joints"
+            raise MechanismError(Finding(what, remedy="give loaded or free; state single seats in the model"))
+        data = self.data()
+        for holder in (*data.get("joints", {}).values(), *data.get("loop", [])):
+            holder.pop("seat", None)
+        return Mechanism(**{**data, "joint_defaults": {**data.get("joint_defaults", {}), "seat": seat}})
+
     def data(self) -> dict[str, Any]:
         """The model as plain mappings, lists, numbers and texts: what was stated, as it was written."""
         return {"trunnion": self.trunnion, **self.model_dump(mode="json", exclude_unset=True)}

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from trunnion.errors import Finding, MechanismError, Severity
-from trunnion.options import setting
 from trunnion.terminal import bar, findings_of, say, show_figures, wrote
+from trunnion.verbs.model import exit_status, lines_of, placed, stated
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -47,20 +45,14 @@ def assemble(
     """Whether it goes together with axes out of line: needed share of the clearances, smallest clearance."""
     from trunnion.analysis.assemblability import assemble as run
     from trunnion.export import check_format, save
-    from trunnion.model.file import read_mechanism
 
     drawn = [path for path in out or [] if path.suffix.lower() in IMAGES]
     for path in out or []:
         if path not in drawn:
             check_format(path, IMAGES)
-    mechanism = read_mechanism(file)
-    if set_:
-        mechanism = mechanism.with_values(dict(setting(text) for text in set_))
-    try:
-        with bar("positions", steps, least=1000) as progress:
-            result = run(mechanism, steps, uniform.value, progress)
-    except MechanismError as error:
-        raise MechanismError(_placed(error.findings, file)) from None
+    mechanism = stated(file, set_)
+    with lines_of(file), bar("positions", steps, least=1000) as progress:
+        result = run(mechanism, steps, uniform.value, progress)
     for path in out or []:
         if path in drawn:
             _draw(result, path)
@@ -68,10 +60,10 @@ def assemble(
             save(result, path, units_row)
     show_figures(f"{result.attrs['name'] or file}\n{result.attrs['formula']}", json.loads(result.attrs["summary"]))
     findings = findings_of(result)
-    say(_placed(findings, file))
+    say(placed(findings, file, ["assembly"]))
     for path in out or []:
         wrote(path)
-    raise typer.Exit(1 if any(one.severity is Severity.ERROR for one in findings) else 0)
+    raise typer.Exit(exit_status(findings))
 
 
 def _draw(result: xr.Dataset, path: Path) -> None:
@@ -79,10 +71,3 @@ def _draw(result: xr.Dataset, path: Path) -> None:
     from trunnion.views.plots import save
 
     save(figure(result), path)
-
-
-def _placed(findings: Iterable[Finding], file: Path) -> list[Finding]:
-    """Findings with the line of the model file."""
-    from trunnion.model.file import placed
-
-    return placed(findings, file, ["assembly"])

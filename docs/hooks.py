@@ -317,6 +317,7 @@ def motion_table() -> str:
 
 def pairs_table() -> str:
     """Every pair of the model file: where it exists and what it needs."""
+    from trunnion.joints.clearance import CLEARANCE_MODELS
     from trunnion.joints.pairs import PAIRS
     from trunnion.model.contact import contact_lacks, has_guide, has_pin, motions
     from trunnion.model.parts import Joint
@@ -330,8 +331,12 @@ def pairs_table() -> str:
         moves = MOVES.get(name) or " and ".join(motions(name))
         driven = motions(name)[0] if one.drivable else "no"
         plane = "yes" if one.planar else "no"
-        rows.append((_code(name), one.symbol, one.count, moves, plane, where[one.needs_axis], driven, rubs))
-    head = ("`type`", "letter", "freedoms", "motion", "in the plane", "needs an `axis`", "driven", "friction needs")
+        play = {("planar", "spatial"): "yes", ("spatial",): "in space", (): "no"}[
+            tuple(space for space, models in CLEARANCE_MODELS.items() if name in models)
+        ]
+        rows.append((_code(name), one.symbol, one.count, moves, plane, where[one.needs_axis], driven, rubs, play))
+    head = ("`type`", "letter", "freedoms", "motion", "in the plane", "needs an `axis`", "driven", "friction needs",
+            "play")  # fmt: skip
     return _rows(head, rows)
 
 

@@ -70,7 +70,7 @@ def beta(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
             _ticks(axes)
         else:
             axes.margins(y=0.12)
-        if len(panel.curves) == 1:
+        if len(panel.curves) == 1 and not lost:  # else the legend says whose it is
             axes.set_title(plain(panel.curves[0].label), fontsize=8.5, loc="left")
     for axes in grid[:-1]:
         axes.set_xlabel("")

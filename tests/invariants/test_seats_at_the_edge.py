@@ -69,3 +69,14 @@ def test_where_no_force_is_known_nothing_is_said_of_what_presses() -> None:
     result = analyse(model, steps=12)
     assert np.all(result["status"] == 5)
     assert not told(result, "no load presses its pin")
+
+
+def test_a_shaft_that_fits_but_for_its_end_float() -> None:
+    """It lies at one end or the other, by its thrust."""
+    values: dict[str, float | str] = {"D.pin.hole_radius": "10 mm", "D.pin.end_float": "0.1 mm"}
+    result = analyse(changed("rssr-with-play", values), steps=36)
+    offset, force = (result[name].sel(joint="D", end="1") for name in ("seat_offset", "end_force"))
+    assert np.all(offset.sel(axis=["x", "y"]) == 0)
+    away = np.abs(force.sel(axis="z")) > 0.5  # N: from where the thrust turns round
+    assert np.allclose(offset.sel(axis="z")[away], 5e-5 * np.sign(force.sel(axis="z"))[away], rtol=0, atol=1e-12)
+    assert np.any(result["point_error"] != 0)

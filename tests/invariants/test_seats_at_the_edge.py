@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 import xarray as xr
 
-from trunnion import Mechanism, analyse, read
+from trunnion import Mechanism, MechanismError, analyse, read
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -80,3 +81,11 @@ def test_a_shaft_that_fits_but_for_its_end_float() -> None:
     away = np.abs(force.sel(axis="z")) > 0.5  # N: from where the thrust turns round
     assert np.allclose(offset.sel(axis="z")[away], 5e-5 * np.sign(force.sel(axis="z"))[away], rtol=0, atol=1e-12)
     assert np.any(result["point_error"] != 0)
+
+
+def test_a_fit_that_cannot_be_read_is_the_only_finding() -> None:
+    data = read(EXAMPLES / "fourbar-with-play.yaml").data()
+    data["joint_defaults"]["pin"] = {"fit": "12 H7/g6"}
+    with pytest.raises(MechanismError) as raised:
+        Mechanism(**data)
+    assert [one.where for one in raised.value.findings] == ["joint_defaults.pin.fit"]

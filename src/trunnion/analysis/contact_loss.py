@@ -141,7 +141,7 @@ def _of_joint(run: Run, seat: Seat, forces: NDArray[np.float64], time: NDArray[n
         if own <= NO_LOAD * largest:
             continue  # nothing ever presses this end
         end = int(seat.play.model.ends[number][0][0]) if len(seat.play.model.ends) > 1 else 0
-        seen = _seen(run, seat, number, _passages(load, own, run.cycle.periodic), time, own)
+        seen = _seen(run, seat, number, load, time, own)
         for place, size in _once(seen, len(time), run.cycle.periodic):
             places.append((place, end))
             if size / own < least / peak:
@@ -150,19 +150,22 @@ def _of_joint(run: Run, seat: Seat, forces: NDArray[np.float64], time: NDArray[n
 
 
 def _seen(
-    run: Run, seat: Seat, number: int, found: Iterable[tuple[float, float]], time: NDArray[np.float64], peak: float
+    run: Run, seat: Seat, number: int, load: NDArray[np.float64], time: NDArray[np.float64], peak: float
 ) -> Iterator[tuple[float, float]]:
-    """Those passages through zero that are still there when looked at closely, by the loads without play between."""
+    """Passages of a load near zero; between wide steps those that are there when looked at closely, without play.
+
+    How near a load comes to zero from one position to the next is not known of wide steps, only that it turns round.
+    """
     step = time[1] - time[0] if len(time) > 1 else 0.0
     if step <= run.cycle.duration / CLOSE:
-        yield from found
+        yield from _passages(load, peak, run.cycle.periodic)
         return
-    for place, _ in found:
+    for place, _ in _passages(load, peak, run.cycle.periodic, near=np.inf):
         from_ = np.floor(place) - 0.25
         times = time[0] + step * (from_ + np.arange(PARTS + 1) * FINE)
         times = times if run.cycle.periodic else np.clip(times, 0.0, run.cycle.duration)
-        load = np.array([np.broadcast_to(part, times.shape) for part in loads_of(run.ideal(times), seat)[number]])
-        for fine, size in _passages(load, peak, periodic=False):
+        close = np.array([np.broadcast_to(part, times.shape) for part in loads_of(run.ideal(times), seat)[number]])
+        for fine, size in _passages(close, peak, periodic=False):
             yield from_ + fine * FINE, size
 
 
@@ -189,15 +192,20 @@ def _size(load: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(np.sqrt(np.sum(load * load, axis=0)))
 
 
-def _passages(load: NDArray[np.float64], peak: float, periodic: bool) -> Iterator[tuple[float, float]]:
-    """(position with its fraction, least load) wherever a load turns round near zero, or is zero."""
+def _passages(
+    load: NDArray[np.float64], peak: float, periodic: bool, near: float = NEAR
+) -> Iterator[tuple[float, float]]:
+    """(position with its fraction, least load) wherever a load turns round near zero, or is zero.
+
+    near: how near, of the peak.
+    """
     after = np.roll(load, -1, axis=1)
     step = after - load
     square = np.sum(step * step, axis=0)
     with np.errstate(all="ignore"):
         share = np.clip(-np.sum(load * step, axis=0) / square, 0.0, 1.0)
     nearest = _size(load + share * step)
-    turns = (np.sum(load * after, axis=0) < 0) & (nearest <= NEAR * peak)
+    turns = (np.sum(load * after, axis=0) < 0) & (nearest <= near * peak)
     if not periodic and len(turns):
         turns[-1] = False
     nothing = _size(load) <= NO_LOAD * peak

@@ -190,6 +190,14 @@ def model_notes(mechanism: Mechanism) -> list[Finding]:
     if points:
         what = f"{', '.join(points)} have a mass but no inertia: they are taken as point masses at their centres"
         notes.append(Finding(what, "links", "state inertia: …", Severity.NOTE))
+    tight = [
+        name
+        for name, joint in mechanism.effective_joints.items()
+        if joint.seat not in (None, "free") and name not in mechanism.seated and clearance(values, name) is not None
+    ]
+    if tight:
+        what = f"{', '.join(tight)} have a seat but no play at their nominal sizes: the joints are ideal"
+        notes.append(Finding(what, "joints", "analyse with --set fits=maximum for the widest", Severity.NOTE))
     if playing:
         what = f"the pins of {', '.join(playing)} are taken to lie in the middle of their play"
         remedy = "state seat: loaded, or analyse with --seat loaded; the play verb tells what the play can do"

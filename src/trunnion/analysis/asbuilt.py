@@ -48,6 +48,7 @@ def fill_seats(arrays: Arrays, found: Sequence[Seat], seated: Seated, window: sl
         _describe(arrays, i, window, walk, seat)
         _fill_contacts(arrays, i, window, walk, seat)
     arrays["seat_rounds"][window] = seated.rounds
+    arrays["seat_travel"][window] = seated.told
     arrays["seat_change"][window] = seated.change
 
 

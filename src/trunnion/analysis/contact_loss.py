@@ -111,7 +111,8 @@ def _earles_wu(force: NDArray[np.float64], time: NDArray[np.float64], periodic: 
     along = np.sum(force * rate, axis=1)
     with np.errstate(all="ignore"):
         across = np.sqrt(np.maximum(np.sum(rate * rate, axis=1) - along**2 / size, 0.0))
-        return np.where(size > 0, across / size, np.nan)
+        jumps = np.sum(np.roll(force, -1, axis=-1) * np.roll(force, 1, axis=-1), axis=1) < 0  # no rate tells that
+        return np.where((size > 0) & ~jumps, across / size, np.nan)
 
 
 def _least_loaded(forces: NDArray[np.float64], rows: Sequence[int]) -> NDArray[np.intp]:
@@ -198,6 +199,11 @@ def findings(found: Sequence[Loss], arrays: Arrays, joints: Sequence[str], dial:
         worst = float(np.nanmax(arrays["seat_change"][stuck]))
         what = f"a joint with friction turns round while its pin travels {dial.intervals(stuck)}: its friction may act "
         what += f"either way, and a seat changes by up to {worst:.2g} of its clearance with it"
+        told.append(Finding(what, "joints", severity=Severity.NOTE))
+    held = np.flatnonzero((arrays["seat_travel"] == 0) & (arrays["status"] < Status.CONTACT_LOST))
+    if len(held):
+        what = f"the seats turn too fast to tell how they travel {dial.intervals(held)}: velocities and accelerations "
+        what += "there are those of pins held in their seats"
         told.append(Finding(what, "joints", severity=Severity.NOTE))
     for loss in found:
         where = f"joints.{loss.joint}"

@@ -57,7 +57,7 @@ class Seated:
 
     offsets: by the names of `shifts` (`seats.JOINT.1.x`), m; loads: of the pin on each end of its hole, N, by joint;
     rounds: of the iteration; change: that one more round would make, of the clearances; turning: positions at which a
-    joint with friction is about to turn round.
+    joint with friction is about to turn round; told: at which the accelerations contain the travel of the seats.
     """
 
     back: Backward
@@ -66,6 +66,7 @@ class Seated:
     rounds: NDArray[np.intp]
     change: NDArray[np.float64]
     turning: NDArray[np.bool_]
+    told: NDArray[np.bool_]
 
     @property
     def sticks(self) -> NDArray[np.bool_]:
@@ -125,7 +126,9 @@ def _pressed(back: Backward, seat: Seat, loads: Sequence[Vector], least: Number)
 
 
 def _share(back: Backward, joint: str) -> Number | None:
-    """Friction force about the axis over the normal force at a contact of a joint; None without friction.
+    """Friction force about the axis, against the slip, over the normal force at a contact; None without friction.
+
+    Negative where it drives, as bristles do that have not yet bent round after a reversal.
 
     The coefficient itself: a pair factor stands for a spread contact, whose resultant is turned by atan μ all the
     same.
@@ -134,7 +137,7 @@ def _share(back: Backward, joint: str) -> Number | None:
         return None
     contact, turning = back.turning[joint]
     slope = contact.law.function(1.0, contact.slip, **contact.parameters)
-    return np.abs(primal(slope * turning)) / contact.parameters.get("pair_factor", 1.0)
+    return -primal(slope * turning) * np.sign(primal(contact.slip)) / contact.parameters.get("pair_factor", 1.0)
 
 
 def settle(run: Run, seen: Lanes, method: FrictionMethod, start: Backward) -> Seated:
@@ -152,7 +155,7 @@ def settle(run: Run, seen: Lanes, method: FrictionMethod, start: Backward) -> Se
     held = None
     if loaded:
         held = _iterate(run, seen.times, quick, offsets, rounds, change, np.arange(len(seen.times)), senses)
-    moving = travel(run, seen, offsets, start, held)
+    moving, told = travel(run, seen, offsets, start, held)
     mine = {path: numbers[seen.own] for path, numbers in offsets.items()}
     rounds, change = rounds[seen.own], change[seen.own]
     if loaded:  # where a joint turns round, the travel of the seats decides the sense of its friction
@@ -162,7 +165,7 @@ def settle(run: Run, seen: Lanes, method: FrictionMethod, start: Backward) -> Se
         left = left[np.any(_senses(turned) != senses[:, seen.own[left]], axis=0)]
         _iterate(run, time, quick, mine, rounds, change, left, senses[:, seen.own], moving)
     back = run.at(time, mine, method, travel=moving)
-    return Seated(back, mine, _loads(run, back), rounds, change, turning)
+    return Seated(back, mine, _loads(run, back), rounds, change, turning, told)
 
 
 def _slow(system: System, start: Backward) -> NDArray[np.bool_]:

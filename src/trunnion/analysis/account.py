@@ -317,8 +317,11 @@ def _finite(value: float | None) -> float | None:
 
 
 def sound_positions(status: NDArray[Any]) -> NDArray[np.intp]:
-    """Positions whose figures can be relied on: solved; those with a zero speed only if there are no others."""
-    best = np.flatnonzero(status == Status.SOLVED)
+    """Positions whose figures can be relied on: solved; those with a zero speed only if there are no others.
+
+    Where a pin loses contact motion and forces are those of its seat there, as elsewhere.
+    """
+    best = np.flatnonzero((status == Status.SOLVED) | (status == Status.CONTACT_LOST))
     return best if len(best) else np.flatnonzero(status == Status.ZERO_SLIP)
 
 

@@ -302,7 +302,7 @@ def _fill_as_built(
         array[..., window] = scratch[name]
     if run.seats:
         seated = settle(run, seen, method, meant)
-        causes.note_seats(seated.offsets)
+        causes.note_seats(seated.offsets, seated.sticks, window.start)
         _fill(arrays, seated.back, part, window, causes)
         fill_seats(arrays, run.seats, seated, window)
         status = arrays["status"][window]

@@ -194,12 +194,6 @@ def findings(found: Sequence[Loss], arrays: Arrays, joints: Sequence[str], dial:
     told: list[Finding] = []
     if "seat_change" not in arrays:
         return told
-    stuck = np.flatnonzero((arrays["seat_change"] > TOLERANCE) & (arrays["status"] == Status.ZERO_SLIP))
-    if len(stuck):
-        worst = float(np.nanmax(arrays["seat_change"][stuck]))
-        what = f"a joint with friction turns round while its pin travels {dial.intervals(stuck)}: its friction may act "
-        what += f"either way, and a seat changes by up to {worst:.2g} of its clearance with it"
-        told.append(Finding(what, "joints", severity=Severity.NOTE))
     held = np.flatnonzero((arrays["seat_travel"] == 0) & (arrays["status"] < Status.CONTACT_LOST))
     if len(held):
         what = f"the seats turn too fast to tell how they travel {dial.intervals(held)}: velocities and accelerations "
@@ -232,7 +226,7 @@ def _lost(loss: Loss, dial: Dial) -> str:
     shown = [f"{_at(dial, place)}{f' (end {end})' if end else ''}" for place, end in loss.places[:MOST_PLACES]]
     more = len(loss.places) - MOST_PLACES
     text = ", ".join(shown) + (f" and {more} more" if more > 0 else "")
-    head = f"its pin loses contact at {text}: the load comes down to {loss.least:.3g} of {loss.peak:.3g} N, turns round"
+    head = f"its pin loses contact at {text}: the load comes down to {loss.least:.3g} of {loss.peak:.4g} N, turns round"
     return f"{head} and the seat would jump"
 
 

@@ -56,8 +56,9 @@ class Seated:
     """What the positions of one walk came to with their pins in their seats.
 
     offsets: by the names of `shifts` (`seats.JOINT.1.x`), m; loads: of the pin on each end of its hole, N, by joint;
-    rounds: of the iteration; change: that one more round would make, of the clearances; turning: positions at which a
-    joint with friction is about to turn round; told: at which the accelerations contain the travel of the seats.
+    rounds: of the iteration; change: that one more round would make, of the clearances; sticks: positions
+    at which only the travel of the seats decides the sense of a friction, the joint itself being all but at rest;
+    told: at which the accelerations contain the travel of the seats.
     """
 
     back: Backward
@@ -65,16 +66,8 @@ class Seated:
     loads: dict[str, list[Vector]]
     rounds: NDArray[np.intp]
     change: NDArray[np.float64]
-    turning: NDArray[np.bool_]
+    sticks: NDArray[np.bool_]
     told: NDArray[np.bool_]
-
-    @property
-    def sticks(self) -> NDArray[np.bool_]:
-        """Positions whose seats do not come to rest since a joint turns round there: either sense turns it back.
-
-        The pin travels across its hole while the joint itself is at rest, and its friction is an interval.
-        """
-        return (self.change > TOLERANCE) & self.turning
 
 
 def seats(system: System, values: Values) -> list[Seat]:
@@ -150,7 +143,7 @@ def settle(run: Run, seen: Lanes, method: FrictionMethod, start: Backward) -> Se
     offsets = _next(run, start, len(seen.times))
     rounds, change = np.zeros(len(seen.times), np.intp), np.zeros(len(seen.times))
     loaded = any(seat.given is None for seat in run.seats)
-    turning = _slow(run.system, start)[seen.own]
+    sticks = np.zeros(len(time), bool)
     senses = np.zeros((len(rubbing(run.system)), len(seen.times)))
     held = None
     if loaded:
@@ -159,13 +152,15 @@ def settle(run: Run, seen: Lanes, method: FrictionMethod, start: Backward) -> Se
     mine = {path: numbers[seen.own] for path, numbers in offsets.items()}
     rounds, change = rounds[seen.own], change[seen.own]
     if loaded:  # where a joint turns round, the travel of the seats decides the sense of its friction
-        left = np.flatnonzero(turning & (rounds < ROUNDS)) if moving else np.zeros(0, np.intp)
+        turning = _slow(run.system, start)[seen.own] & (rounds < ROUNDS)
+        left = np.flatnonzero(turning) if moving else np.zeros(0, np.intp)
         turned = run.at(time[left], {path: numbers[left] for path, numbers in mine.items()}, quick,
                         travel=part_of(moving, left))  # fmt: skip
         left = left[np.any(_senses(turned) != senses[:, seen.own[left]], axis=0)]
+        sticks[left] = True
         _iterate(run, time, quick, mine, rounds, change, left, senses[:, seen.own], moving)
     back = run.at(time, mine, method, travel=moving)
-    return Seated(back, mine, _loads(run, back), rounds, change, turning, told)
+    return Seated(back, mine, _loads(run, back), rounds, change, sticks, told)
 
 
 def _slow(system: System, start: Backward) -> NDArray[np.bool_]:

@@ -32,7 +32,7 @@ __all__ = ["Lanes", "lanes", "part_of", "travel"]
 
 BEND = 0.005  # rad: change of the angle that a seat turns from one lane to the next; more is no even turning
 QUICK = 0.1  # rad from one lane to the next, likewise
-FINE = 720  # positions of a cycle whose neighbours are near enough for differences, and no nearer than that
+FINE = 1440  # positions of a cycle whose neighbours are near enough for differences, and no nearer than that
 
 Lane = NDArray[np.intp]
 

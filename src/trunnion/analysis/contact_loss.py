@@ -31,7 +31,9 @@ EARLES_WU = 1.0  # rad/(N s)
 NEAR = 0.1  # of the largest load: as near to zero as a load passes that turns round between two positions
 CLOSE = 20_000  # positions of a cycle that are near enough to tell a passage through zero from a quick turn
 PARTS = 96  # into which a wider step, and a quarter of it on either side, is parted
+FINE = 1.5 / PARTS  # of a step
 MOST_PLACES = 6  # named in one finding
+ENDS = ("", " (end 1)", " (end 2)", " (along its axis)")
 
 NOWHERE = np.zeros(0, np.intp)
 Arrays = dict[str, NDArray[np.float64]]
@@ -39,8 +41,8 @@ Arrays = dict[str, NDArray[np.float64]]
 
 @dataclass(frozen=True)
 class Loss:
-    """Loss of contact of one joint: where (position, whole and fraction), at which end, least load there, N, largest
-    load, N.
+    """Loss of contact of one joint: where (position, whole and fraction), at which end (1, 2, 3 along the axis, 0 of a
+    play that has one end), least load there, N, largest load of that end, N.
 
     unsettled: positions whose seats did not settle; lifted: where the inertia of the pin's own way outdoes its load;
     loaded: whether anything presses it at all; turns: whether its load has a direction that can turn, as that of a
@@ -63,8 +65,10 @@ def find(arrays: Arrays, run: Run, time: NDArray[np.float64]) -> list[Loss]:
     joints = list(run.system.joints)
     arrays["contact_loss_number"][:] = _numbers(arrays, run, time)
     largest = float(np.nanmax(np.abs(arrays["reaction_force"]), initial=0.0))
-    # where a joint turns round, the sense of its friction is what does not settle
-    late = np.flatnonzero((arrays["seat_change"] > TOLERANCE) & (arrays["status"] != Status.ZERO_SLIP))
+    # where a joint turns round, the sense of its friction is what does not settle; where forces have no answer, nothing
+    status = arrays["status"]
+    open_ = (status < Status.NOT_CONVERGED) & (status != Status.ZERO_SLIP)
+    late = np.flatnonzero((arrays["seat_change"] > TOLERANCE) & open_)
     loaded = [seat for seat in run.seats if seat.given is None]
     least = _least_loaded(arrays["end_force"][..., late], [joints.index(one.joint) for one in loaded])
     for seat in loaded:
@@ -75,11 +79,11 @@ def find(arrays: Arrays, run: Run, time: NDArray[np.float64]) -> list[Loss]:
         loss = replace(loss, unsettled=late[least == i], lifted=lifted, turns=turns)
         if loss.places or len(loss.unsettled) or len(lifted) or not loss.loaded:
             found.append(loss)
-        lost = np.array([round(place) % len(time) for place, _ in loss.places], np.intp)
+        lost = np.array([round(place) for place, _ in loss.places], np.intp)
+        lost = lost % len(time) if run.cycle.periodic else np.clip(lost, 0, len(time) - 1)
         for where in (lost, loss.unsettled, lifted):
             arrays["contact_lost"][i, where] = 1
     anywhere = np.any(arrays["contact_lost"] > 0, axis=0)
-    status = arrays["status"]
     np.maximum(status, np.where(anywhere, status.dtype.type(Status.CONTACT_LOST), status.dtype.type(0)), out=status)
     return found
 
@@ -127,19 +131,22 @@ def _least_loaded(forces: NDArray[np.float64], rows: Sequence[int]) -> NDArray[n
 def _of_joint(run: Run, seat: Seat, forces: NDArray[np.float64], time: NDArray[np.float64], largest: float) -> Loss:
     """Where the load of an end of one joint passes through zero."""
     places: list[tuple[float, int]] = []
-    least, peak = np.inf, 0.0
+    least, peak = np.inf, 1.0
     loads = list(_end_loads(seat, forces))
+    known = any(np.any(np.isfinite(load)) for _, load in loads)
     top = max((float(np.nanmax(_size(load), initial=0.0)) for _, load in loads), default=0.0)
-    if top <= NO_LOAD * largest:
+    if known and top <= NO_LOAD * largest:
         return Loss(seat.joint, [], 0.0, top, NOWHERE, NOWHERE, loaded=False)
     for number, load in loads:
         own = float(np.nanmax(_size(load), initial=0.0))
         if own <= NO_LOAD * largest:
             continue  # nothing ever presses this end
-        for place, size in _seen(run, seat, number, _passages(load, own, run.cycle.periodic), time, own):
-            places.append((place, min(int(seat.play.model.ends[number][0][0]), 2)))
-            least = min(least, size)
-        peak = max(peak, own)
+        end = int(seat.play.model.ends[number][0][0]) if len(seat.play.model.ends) > 1 else 0
+        seen = _seen(run, seat, number, _passages(load, own, run.cycle.periodic), time, own)
+        for place, size in _once(seen, len(time), run.cycle.periodic):
+            places.append((place, end))
+            if size / own < least / peak:
+                least, peak = size, own
     return Loss(seat.joint, sorted(places), least, peak, NOWHERE, NOWHERE)
 
 
@@ -153,20 +160,30 @@ def _seen(
         return
     for place, _ in found:
         from_ = np.floor(place) - 0.25
-        times = time[0] + step * (from_ + np.arange(PARTS + 1) * (1.5 / PARTS))
+        times = time[0] + step * (from_ + np.arange(PARTS + 1) * FINE)
         times = times if run.cycle.periodic else np.clip(times, 0.0, run.cycle.duration)
         load = np.array([np.broadcast_to(part, times.shape) for part in loads_of(run.ideal(times), seat)[number]])
         for fine, size in _passages(load, peak, periodic=False):
-            yield from_ + fine * (1.5 / PARTS), size
+            yield from_ + fine * FINE, size
+
+
+def _once(found: Iterable[tuple[float, float]], count: int, periodic: bool) -> Iterator[tuple[float, float]]:
+    """Each passage once: one near a position is seen from both sides of it, over a turn also from its other end."""
+    places = sorted((place % count if periodic else place, size) for place, size in found)
+    for k, (place, size) in enumerate(places):
+        before = places[k - 1][0] if k else places[-1][0] - count if periodic and len(places) > 1 else -np.inf
+        if place - before > 0.5 * FINE:
+            yield place, size
 
 
 def _end_loads(seat: Seat, forces: NDArray[np.float64]) -> Iterator[tuple[int, NDArray[np.float64]]]:
     """(number, load (component, position)) of every end that can move at all."""
     for number, (end, radius) in enumerate(zip(seat.play.model.ends, seat.play.radii, strict=True)):
         if np.any(np.asarray(radius) > 0):
-            place = min(int(end[0][0]), 2) - 1
+            place = int(end[0][0])
             rows = ["xyz".index(key.split(".")[1]) for key in end]
-            yield number, forces[place][rows]
+            # what is along the axis stands by halves with either end
+            yield number, forces[place - 1][rows] if place < 3 else forces[0][rows] + forces[1][rows]
 
 
 def _size(load: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -223,11 +240,22 @@ def findings(found: Sequence[Loss], arrays: Arrays, joints: Sequence[str], dial:
 
 
 def _lost(loss: Loss, dial: Dial) -> str:
-    shown = [f"{_at(dial, place)}{f' (end {end})' if end else ''}" for place, end in loss.places[:MOST_PLACES]]
-    more = len(loss.places) - MOST_PLACES
-    text = ", ".join(shown) + (f" and {more} more" if more > 0 else "")
-    head = f"its pin loses contact at {text}: the load comes down to {loss.least:.3g} of {loss.peak:.4g} N, turns round"
+    shown = [text for _, text in sorted(_told(loss.places, dial))]
+    more = len(shown) - MOST_PLACES
+    text = ", ".join(shown[:MOST_PLACES]) + (f" and {more} more" if more > 0 else "")
+    head = f"its pin loses contact {text}: the load comes down to {loss.least:.3g} of {loss.peak:.4g} N, turns round"
     return f"{head} and the seat would jump"
+
+
+def _told(places: Sequence[tuple[float, int]], dial: Dial) -> Iterator[tuple[float, str]]:
+    """Where, and in words, of every passage; those of an end without a load for a while are one."""
+    for end, name in enumerate(ENDS):
+        own = np.array(sorted(place for place, one in places if one == end))
+        for run in np.split(own, np.flatnonzero(np.diff(own) > 1.5) + 1):
+            if len(run) > MOST_PLACES:
+                yield run[0], f"between {_at(dial, run[0])} and {_at(dial, run[-1])}{name}"
+            else:
+                yield from ((place, f"at {_at(dial, place)}{name}") for place in run)
 
 
 def _number(arrays: Arrays, i: int, dial: Dial) -> str:

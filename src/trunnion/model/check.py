@@ -64,7 +64,9 @@ def _looks_spatial(mechanism: Mechanism) -> bool:
 
 
 def _speaks_of(finding: Finding, name: str) -> bool:
-    return f"'{name}'" in finding.what or name in finding.where.split(".")
+    """Whether a finding is about an entry, or asks for it."""
+    asks = f"state {name}: {{" in finding.remedy
+    return f"'{name}'" in finding.what or name in finding.where.split(".") or asks
 
 
 def _quantities(mechanism: Mechanism, unreadable: set[str]) -> Iterator[Finding]:

@@ -16,7 +16,7 @@ from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.model.check import check_model
-from trunnion.model.contact import play
+from trunnion.model.contact import has_play, play
 from trunnion.model.findings import repair, schema_findings
 from trunnion.model.merge import FitChoice, merge_joint
 from trunnion.model.names import nearest
@@ -198,12 +198,16 @@ class Mechanism(Part):
     @cached_property
     def seated(self) -> Mapping[str, Literal["loaded"] | Seat]:
         """How the pin lies in its hole, of every joint that has a play and a seat other than free."""
-        numbers = self.parameter_set.nominal
         return {
             name: joint.seat
             for name, joint in self.effective_joints.items()
-            if joint.seat is not None and joint.seat != "free" and play(joint, name, numbers) > 0
+            if joint.seat is not None and joint.seat != "free" and has_play(joint) and self._moves(name, joint)
         }
+
+    def _moves(self, name: str, joint: Joint) -> bool:
+        """Whether a play is more than 0, across the axis or along it."""
+        numbers = self.parameter_set.nominal
+        return bool(play(joint, name, numbers) > 0 or numbers.get(f"joints.{name}.pin.end_float", 0.0) > 0)
 
     @cached_property
     def has_errors(self) -> bool:

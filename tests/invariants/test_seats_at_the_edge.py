@@ -1,0 +1,91 @@
+"""Seats where there is little to seat: no load for a while, locked, two positions, forces that have no answer."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from trunnion import Mechanism, MechanismError, analyse, read
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+def changed(name: str, values: dict[str, float | str]) -> Mechanism:
+    return read(EXAMPLES / f"{name}.yaml").with_values(values)
+
+
+def told(result: xr.Dataset, what: str) -> list[dict[str, Any]]:
+    return [one for one in json.loads(result.attrs["findings"]) if what in one["what"]]
+
+
+def test_a_passage_is_told_once_however_few_the_positions() -> None:
+    """35.66° is 0.198 of two positions a turn: seen before the first and after the second."""
+    result = analyse(read(EXAMPLES / "fourbar-with-play.yaml"), steps=2)
+    (finding,) = told(result, "loses contact")
+    assert finding["what"].startswith("its pin loses contact at 35.12°, at 223.5°: ")
+
+
+def test_the_end_float_is_no_end_of_the_pin() -> None:
+    """Its passages are told as those along the axis; what is least is compared with the largest of the same end."""
+    result = analyse(changed("rssr-with-play", {"D.pin.end_float": "0.1 mm"}), steps=36)
+    (finding,) = told(result, "loses contact")
+    assert finding["what"].count("at 200.8° (along its axis)") == 1
+    axial = np.abs(result["end_force"].sel(joint="D", axis="z")).max().item()
+    assert f"0 of {2 * axial:.3g} N" in finding["what"]  # each end has half of it
+
+
+def test_a_stretch_without_load_is_one_loss_of_contact() -> None:
+    """The massless compressor has no pressure from 40° to 180°: nothing presses there."""
+    data = read(EXAMPLES / "slider-crank.yaml").data()
+    data["gravity"] = [0, 0]
+    for link in data["links"].values():
+        for key in ("mass", "centre", "inertia"):
+            link.pop(key, None)
+    data["joint_defaults"] = {"pin": {"clearance": "10 um"}, "seat": "loaded"}
+    result = analyse(Mechanism(**data), steps=360)
+    lost = np.flatnonzero(result["contact_lost"].sel(joint="P"))
+    assert np.array_equal(lost, np.arange(40, 181))
+    assert np.all(result["seat_offset"].sel(joint="P", end="1", axis=["x", "y"]).isel(position=slice(41, 180)) == 0)
+    findings = told(result, "loses contact")
+    assert [one["where"] for one in findings] == ["joints.O", "joints.P", "joints.Q"]
+    assert all(one["what"].startswith("its pin loses contact between 40° and 180°: ") for one in findings)
+
+
+def test_nothing_is_said_of_contact_where_it_is_locked() -> None:
+    result = analyse(changed("fourbar-with-play", {"joint_defaults.friction.coefficient": 5}), steps=60)
+    locked = result["status"].values >= 4
+    assert np.any(locked)
+    assert not np.any(result["contact_lost"].values[:, locked])
+    assert not told(result, "did not settle")
+
+
+def test_where_no_force_is_known_nothing_is_said_of_what_presses() -> None:
+    """With pins of 10 mm the Cardan joint locks at every position."""
+    model = changed("pezzuti-cardan-as-built", {"bearing": "10 mm"})
+    result = analyse(model, steps=12)
+    assert np.all(result["status"] == 5)
+    assert not told(result, "no load presses its pin")
+
+
+def test_a_shaft_that_fits_but_for_its_end_float() -> None:
+    """It lies at one end or the other, by its thrust."""
+    values: dict[str, float | str] = {"D.pin.hole_radius": "10 mm", "D.pin.end_float": "0.1 mm"}
+    result = analyse(changed("rssr-with-play", values), steps=36)
+    offset, force = (result[name].sel(joint="D", end="1") for name in ("seat_offset", "end_force"))
+    assert np.all(offset.sel(axis=["x", "y"]) == 0)
+    away = np.abs(force.sel(axis="z")) > 0.5  # N: from where the thrust turns round
+    assert np.allclose(offset.sel(axis="z")[away], 5e-5 * np.sign(force.sel(axis="z"))[away], rtol=0, atol=1e-12)
+    assert np.any(result["point_error"] != 0)
+
+
+def test_a_fit_that_cannot_be_read_is_the_only_finding() -> None:
+    data = read(EXAMPLES / "fourbar-with-play.yaml").data()
+    data["joint_defaults"]["pin"] = {"fit": "12 H7/g6"}
+    with pytest.raises(MechanismError) as raised:
+        Mechanism(**data)
+    assert [one.where for one in raised.value.findings] == ["joint_defaults.pin.fit"]

@@ -71,7 +71,7 @@ def fill_power(
 ) -> None:
     """Power of drivers, loads, springs and friction, and what is left over: their sum with inertia and gravity."""
     walk = back.walk
-    total: Number = back.body_power
+    total: Number = back.body_power + back.gear_power
     for power in back.load_powers.values():
         total = total + power
     for i, name in enumerate(walk.system.joints):

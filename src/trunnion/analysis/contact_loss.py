@@ -58,6 +58,11 @@ class Loss:
     loaded: bool = True
     turns: bool = True
 
+    @property
+    def part(self) -> str:
+        """What lies in the hole."""
+        return "pin" if self.turns else "slider"
+
 
 def find(arrays: Arrays, run: Run, time: NDArray[np.float64]) -> list[Loss]:
     """Losses of contact of every joint that its load seats; written into `contact_lost` and the status."""
@@ -219,7 +224,7 @@ def findings(found: Sequence[Loss], arrays: Arrays, joints: Sequence[str], dial:
     for loss in found:
         where = f"joints.{loss.joint}"
         if not loss.loaded:
-            what = "no load presses its pin: it is taken to lie in the middle of its hole"
+            what = f"no load presses its {loss.part}: it is taken to lie in the middle of its hole"
             told.append(Finding(what, where, "give the seat, or leave it free", Severity.NOTE))
             continue
         if loss.places:
@@ -227,10 +232,10 @@ def findings(found: Sequence[Loss], arrays: Arrays, joints: Sequence[str], dial:
             told.append(Finding(_lost(loss, dial), where, remedy, Severity.WARNING))
         if len(loss.lifted):
             what = (
-                f"its pin lifts off the wall {dial.intervals(loss.lifted)}: its seat turns so fast that the inertia of "
+                f"its {loss.part} lifts off the wall {dial.intervals(loss.lifted)}: the inertia of its travel across "
             )
-            what += "its way outdoes the load"
-            told.append(Finding(what, where, "forces there are those of a pin that stays", Severity.WARNING))
+            what += "the hole outweighs the load"
+            told.append(Finding(what, where, "forces there are those of one that stays", Severity.WARNING))
         if len(loss.unsettled):
             worst = float(np.nanmax(arrays["seat_change"][loss.unsettled]))
             what = f"its seat did not settle in {ROUNDS} rounds {dial.intervals(loss.unsettled)}: it still changes by "
@@ -243,8 +248,8 @@ def _lost(loss: Loss, dial: Dial) -> str:
     shown = [text for _, text in sorted(_told(loss.places, dial))]
     more = len(shown) - MOST_PLACES
     text = ", ".join(shown[:MOST_PLACES]) + (f" and {more} more" if more > 0 else "")
-    head = f"its pin loses contact {text}: the load comes down to {loss.least:.3g} of {loss.peak:.4g} N, turns round"
-    return f"{head} and the seat would jump"
+    head = f"its {loss.part} loses contact {text}: the load comes down to {loss.least:.3g} of {loss.peak:.4g} N, turns"
+    return f"{head} round and the seat would jump"
 
 
 def _told(places: Sequence[tuple[float, int]], dial: Dial) -> Iterator[tuple[float, str]]:

@@ -268,10 +268,8 @@ def _number(arrays: Arrays, i: int, dial: Dial) -> str:
     if not np.any(np.isfinite(numbers)):
         return "expect impact there"
     top = int(np.nanargmax(numbers))
-    return (
-        f"expect impact: the reaction turns at up to {numbers[top]:.3g} rad/(N s) at {dial.at(top)}, "
-        f"impact is likely from {EARLES_WU:g} (Earles and Wu)"
-    )
+    rest = f"elsewhere its reaction turns at up to {numbers[top]:.3g} rad/(N s), at {dial.at(top)}"
+    return f"expect impact there; {rest} (impact is likely from {EARLES_WU:g}: Earles and Wu)"
 
 
 def _at(dial: Dial, place: float) -> str:

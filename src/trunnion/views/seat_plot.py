@@ -31,9 +31,9 @@ __all__ = ["seat"]
 
 PIN = 1.1  # radius of the pin as drawn, of the clearance
 WALL = 0.25  # thickness of the hole's wall as drawn
-ARROW = 0.7  # length of the largest load
+ARROW = 0.8  # length of the largest load
 ROOM = 1.0 + PIN + ARROW  # half width of a diagram without its labels
-BESIDE = 0.3  # in; room for labels around it
+BESIDE = 0.26  # in; room for labels around it
 NEAR = 0.07  # in; tips that are nearer share a label
 DEEP = 2.4  # half height of that of a guide
 FACTORS = (
@@ -205,7 +205,7 @@ def _disc(axes: Axes, cell: Cell, hue: Hue) -> None:
             tips[index] = tip
     _say(axes, cell, tips, rho / hue.inch, hue.over)
     ticks = [-rho, 0.0, rho]
-    axes.set_xticks(ticks, [_tick(tick) for tick in ticks])
+    axes.set_xticks(ticks, [_tick(-rho), "", _tick(rho)])  # 0 has no room beside them in a small hole
     axes.set_yticks(ticks, [_tick(tick) for tick in ticks])
     if cell.seats.along > 0:
         slack = cell.seats.offsets[cell.end, 2] * factor
@@ -297,6 +297,11 @@ def _say(axes: Axes, cell: Cell, tips: dict[int, Array], inch: float, over: Absc
         else:
             groups.append([index])
     shown: list[tuple[Array, Array]] = []  # middle and half size of every label
+    mean = np.sum(list(tips.values()), axis=0) if tips else np.zeros(2)
+    # in their order around the hole, so that moving one aside puts it past no other
+    groups.sort(
+        key=lambda group: np.arctan2(mean[0] * tips[group[0]][1] - mean[1] * tips[group[0]][0], mean @ tips[group[0]])
+    )
     for index, *more in groups:
         way = cell.force[:, index] / np.hypot(*cell.force[:, index])
         words = [over.say(one) for one in (index, *more)]
@@ -310,7 +315,10 @@ def _say(axes: Axes, cell: Cell, tips: dict[int, Array], inch: float, over: Absc
         place = next(free, middle)
         shown.append((place, half))
         text = ("\n" if stacked else ", ").join(words)
-        axes.text(*place, text, fontsize=7.5, color=INK, ha="center", va="center", zorder=7, linespacing=1.1)
+        said = axes.text(
+            place[0], place[1], text, fontsize=7.5, color=INK, ha="center", va="center", zorder=7, linespacing=1.1
+        )
+        said.set_in_layout(False)  # its place is in the diagram: it asks for no room
 
 
 def _guide(axes: Axes, cell: Cell, hue: Hue) -> None:

@@ -208,18 +208,16 @@ def findings(found: Sequence[Loss], arrays: Arrays, joints: Sequence[str], dial:
     for loss in found:
         where = f"joints.{loss.joint}"
         if not loss.loaded:
-            what = "no load presses its pin: it is taken to lie in the middle of its hole"
+            what = "no load presses it to a wall: it is taken to lie in the middle of its play"
             told.append(Finding(what, where, "give the seat, or leave it free", Severity.NOTE))
             continue
         if loss.places:
             remedy = _number(arrays, joints.index(loss.joint), dial) if loss.turns else "expect impact there"
             told.append(Finding(_lost(loss, dial), where, remedy, Severity.WARNING))
         if len(loss.lifted):
-            what = (
-                f"its pin lifts off the wall {dial.intervals(loss.lifted)}: its seat turns so fast that the inertia of "
-            )
+            what = f"it lifts off the wall {dial.intervals(loss.lifted)}: its seat turns so fast that the inertia of "
             what += "its way outdoes the load"
-            told.append(Finding(what, where, "forces there are those of a pin that stays", Severity.WARNING))
+            told.append(Finding(what, where, "forces there are those of a seat that stays", Severity.WARNING))
         if len(loss.unsettled):
             worst = float(np.nanmax(arrays["seat_change"][loss.unsettled]))
             what = f"its seat did not settle in {ROUNDS} rounds {dial.intervals(loss.unsettled)}: it still changes by "
@@ -232,7 +230,7 @@ def _lost(loss: Loss, dial: Dial) -> str:
     shown = [f"{_at(dial, place)}{f' (end {end})' if end else ''}" for place, end in loss.places[:MOST_PLACES]]
     more = len(loss.places) - MOST_PLACES
     text = ", ".join(shown) + (f" and {more} more" if more > 0 else "")
-    head = f"its pin loses contact at {text}: the load comes down to {loss.least:.3g} of {loss.peak:.3g} N, turns round"
+    head = f"it loses contact at {text}: the load comes down to {loss.least:.3g} of {loss.peak:.3g} N, turns round"
     return f"{head} and the seat would jump"
 
 

@@ -437,9 +437,10 @@ def _ideal(mechanism: Mechanism, steps: int, method: FrictionMethod | None) -> x
 
 def _write_report(mechanism: Mechanism, result: xr.Dataset, path: Path) -> None:
     from trunnion.output import whole
+    from trunnion.views.error_plot import with_worst_case
     from trunnion.views.report import report as page
 
-    text = page(result, _ideal(mechanism, result.sizes["position"], None))
+    text = page(with_worst_case(result, mechanism), _ideal(mechanism, result.sizes["position"], None))
     with whole(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
 

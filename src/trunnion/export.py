@@ -5,12 +5,12 @@ CSV (and Parquet) have one row a position and flat columns: `time`, `<joint>.rot
 `power_useful`, `status` and so on, in SI; the other formats hold the whole Dataset. In space also z, and
 `<joint>.reaction_moment_x|y|z`, `<joint>.friction_force`, `<link>.x|y|z`, `<link>.rotation_w|x|y|z`,
 `<link>.angular_velocity_x|y|z`. Of a mechanism with errors also `<joint>.rotation_error`, `<joint>.slide_error`,
-`<link>.<point>.error_x|y`; of pins in their seats `<joint>.seat_1_x` …, `<joint>.end_force_1_x` …,
-`<joint>.contact_1_x` …, `<joint>.seat_beta`, `<joint>.seat_xi`, `<joint>.seat_xi_pin`, `<joint>.contact_lost`. A
-sweep has one row a point of its grid: the swept numbers by the names they were given, then `efficiency`,
-`<driver>.effort_max`, `<joint>.reaction_max`, …, `status`. The play of joints has `drive`, `<measure>`,
-`<measure>.worst_case`, `<measure>.rss`, `<measure>.deviation`, `<measure>.<joint>.worst_case`, …. What
-`assemble` finds has one row a position: `<driver>.coordinate`, `needed_share`, `needed_clearance`, …,
+`<link>.<point>.error_x|y`, `<joint>.reaction_change_x|y`, `<driver>.effort_change`; of pins in their seats
+`<joint>.seat_1_x` …, `<joint>.end_force_1_x` …, `<joint>.contact_1_x` …, `<joint>.seat_beta`, `<joint>.seat_xi`,
+`<joint>.seat_xi_pin`, `<joint>.contact_lost`. A sweep has one row a point of its grid: the swept numbers by the names
+they were given, then `efficiency`, `<driver>.effort_max`, `<joint>.reaction_max`, …, `status`. The play of joints has
+`drive`, `<measure>`, `<measure>.worst_case`, `<measure>.rss`, `<measure>.deviation`, `<measure>.<joint>.worst_case`,
+…. What `assemble` finds has one row a position: `<driver>.coordinate`, `needed_share`, `needed_clearance`, …,
 `<joint>.uniform_1_x` of end 1, …, `status`.
 """
 
@@ -156,6 +156,8 @@ def _errors_of_joint(result: xr.Dataset, i: int, joint: str, kind: str) -> list[
         found.append(_column(result, "joint_rotation_error", f"{joint}.rotation_error", (i,)))
     if "joint_slide_error" in result and kind in SLIDING:
         found.append(_column(result, "joint_slide_error", f"{joint}.slide_error", (i,)))
+    if "reaction_force_change" in result:
+        found += _vector(result, "reaction_force_change", f"{joint}.reaction_change_", i)
     if "seat_offset" not in result or not np.any(np.isfinite(result["seat_offset"].values[i])):
         return found
     for end, name in enumerate(result["end"].values):
@@ -195,6 +197,9 @@ def _drivers(result: xr.Dataset) -> list[Column]:
     ):
         for end in ("", "_lower", "_upper"):
             name, _, values = _column(result, f"drive_effort{end}", f"{driver}.effort{end}", (i,))
+            found.append((name, unit, values))
+        if "drive_effort_change" in result:
+            name, _, values = _column(result, "drive_effort_change", f"{driver}.effort_change", (i,))
             found.append((name, unit, values))
     return found
 

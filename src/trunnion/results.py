@@ -98,6 +98,9 @@ VARIABLES: dict[str, Variable] = {
     "contact_loss_number": Variable(
         ("joint",), "rad/(N s)", "rate of turn of the reaction over its size (Earles and Wu)", part="seats"
     ),
+    "seat_travel": Variable(
+        (), "1", "1 where the velocities and accelerations contain the travel of the seats", part="seats"
+    ),
     "seat_rounds": Variable((), "1", "rounds to settle seats and reactions", part="seats"),
     "seat_change": Variable((), "1", "change of a seat that one more round would make, of its clearance", part="seats"),
     "point_error": Variable(("point", "axis"), "m", "place of the point against the ideal mechanism", part="errors"),
@@ -126,7 +129,13 @@ IN_SPACE = {
         ("link", "axis"), "rad", "rotation vector of the link against the ideal mechanism", part="errors"
     ),
 }
-INTEGERS = {"status": np.int8, "friction_iterations": np.int32, "contact_lost": np.int8, "seat_rounds": np.int32}
+INTEGERS = {
+    "status": np.int8,
+    "friction_iterations": np.int32,
+    "contact_lost": np.int8,
+    "seat_rounds": np.int32,
+    "seat_travel": np.int8,
+}
 # the same array until something sets them apart
 SAME_AS = {"drive_effort_lower": "drive_effort", "drive_effort_upper": "drive_effort"}
 

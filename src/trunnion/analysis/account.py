@@ -71,7 +71,7 @@ def fill_power(
 ) -> None:
     """Power of drivers, loads, springs and friction, and what is left over: their sum with inertia and gravity."""
     walk = back.walk
-    total: Number = back.body_power
+    total: Number = back.body_power + back.gear_power
     for power in back.load_powers.values():
         total = total + power
     for i, name in enumerate(walk.system.joints):
@@ -190,6 +190,14 @@ def model_notes(mechanism: Mechanism) -> list[Finding]:
     if points:
         what = f"{', '.join(points)} have a mass but no inertia: they are taken as point masses at their centres"
         notes.append(Finding(what, "links", "state inertia: …", Severity.NOTE))
+    tight = [
+        name
+        for name, joint in mechanism.effective_joints.items()
+        if joint.seat not in (None, "free") and name not in mechanism.seated and clearance(values, name) is not None
+    ]
+    if tight:
+        what = f"{', '.join(tight)} have a seat but no play at their nominal sizes: the joints are ideal"
+        notes.append(Finding(what, "joints", "analyse with --set fits=maximum for the widest", Severity.NOTE))
     if playing:
         what = f"the pins of {', '.join(playing)} are taken to lie in the middle of their play"
         remedy = "state seat: loaded, or analyse with --seat loaded; the play verb tells what the play can do"
@@ -309,8 +317,11 @@ def _finite(value: float | None) -> float | None:
 
 
 def sound_positions(status: NDArray[Any]) -> NDArray[np.intp]:
-    """Positions whose figures can be relied on: solved; those with a zero speed only if there are no others."""
-    best = np.flatnonzero(status == Status.SOLVED)
+    """Positions whose figures can be relied on: solved; those with a zero speed only if there are no others.
+
+    Where a pin loses contact motion and forces are those of its seat there, as elsewhere.
+    """
+    best = np.flatnonzero((status == Status.SOLVED) | (status == Status.CONTACT_LOST))
     return best if len(best) else np.flatnonzero(status == Status.ZERO_SLIP)
 
 

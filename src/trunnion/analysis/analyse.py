@@ -241,6 +241,7 @@ def positions(
 ) -> Positions:
     """The numbers of every variable of `results` at equally spaced positions, their statuses and causes."""
     check_steps(steps)
+    _refuse_seats(run)
     method = replace(method or FrictionMethod(), margin_up_to=account.MARGIN)
     steps = steps if run.cycle.duration > 0 else 1
     time = run.cycle.times(steps)
@@ -261,6 +262,17 @@ def positions(
     losses = contact_loss.find(arrays, run, time) if run.seats else []
     run.system.engine.unwrap(arrays, run.system, run.values, time)
     return Positions(arrays, labels, time, method, causes, ideal, losses)
+
+
+def _refuse_seats(run: Run) -> None:
+    """MechanismError where pins lie in seats of a module that closes with special dimensions only."""
+    seated = {seat.joint for seat in run.seats}
+    for module in run.system.plan.modules:
+        names = [name for name in module.joints if name in seated]
+        if module.redundant and names:
+            what = f"the links {', '.join(module.links)} are over-constrained: seats by loads do not close them"
+            remedy = "analyse it with --seat free; `trunnion assemble` tells what its play takes up"
+            raise MechanismError(Finding(what, f"joints.{names[0]}.seat", remedy))
 
 
 IDEAL = ("drive_power", "useful_power", "status")  # what the efficiency of the ideal mechanism is made of
@@ -290,7 +302,7 @@ def _fill_as_built(
         array[..., window] = scratch[name]
     if run.seats:
         seated = settle(run, seen, method, meant)
-        causes.note_seats(seated.offsets)
+        causes.note_seats(seated.offsets, seated.sticks, window.start)
         _fill(arrays, seated.back, part, window, causes)
         fill_seats(arrays, run.seats, seated, window)
         status = arrays["status"][window]

@@ -48,6 +48,7 @@ def fill_seats(arrays: Arrays, found: Sequence[Seat], seated: Seated, window: sl
         _describe(arrays, i, window, walk, seat)
         _fill_contacts(arrays, i, window, walk, seat)
     arrays["seat_rounds"][window] = seated.rounds
+    arrays["seat_travel"][window] = seated.told
     arrays["seat_change"][window] = seated.change
 
 
@@ -162,5 +163,12 @@ def summary_rows(run: Run, arrays: Mapping[str, NDArray[np.float64]], dial: Dial
                 at = int(np.nanargmax(error))
                 label = f"transmission error of {joint}, largest, at {dial.at(at)}"
                 yield {"label": label, "value": float(error[at]), "unit": unit}
+    for i, joint in enumerate(run.system.mechanism.drivers):
+        change = arrays["drive_effort_change"][i]
+        if np.any(np.isfinite(change)):
+            at = int(np.nanargmax(np.abs(change)))
+            kind, unit = ("torque", "N m") if run.system.turns(joint) else ("force", "N")
+            label = f"change of the drive {kind} of {joint} by the errors, largest, at {dial.at(at)}"
+            yield {"label": label, "value": float(change[at]), "unit": unit}
     if run.seats:
         yield {"label": "seat iterations, most", "value": int(np.max(arrays["seat_rounds"])), "unit": "1"}

@@ -43,6 +43,7 @@ class Causes:
     _singular: dict[int, list[Positions]] = field(default_factory=dict)
     _undefined: dict[str, list[Positions]] = field(default_factory=dict)
     _seats: dict[str, list[NDArray[np.float64]]] = field(default_factory=dict)
+    _stuck: list[Positions] = field(default_factory=list)
 
     def note(self, back: Backward, status: NDArray[np.int8], offset: int) -> None:
         """Look at one chunk, whose first position has the number `offset`."""
@@ -67,10 +68,15 @@ class Causes:
                 if len(locked):
                     self._locked.setdefault(number, []).append((locked + offset, share[locked]))
 
-    def note_seats(self, offsets: Mapping[str, NDArray[np.float64]]) -> None:
-        """Keep where the pins of one chunk lie."""
+    def note_seats(self, offsets: Mapping[str, NDArray[np.float64]], sticks: NDArray[np.bool_], offset: int) -> None:
+        """Keep where the pins of one chunk lie, and where joints stick while pins travel."""
+        self._stuck.append(np.flatnonzero(sticks) + offset)
         for path, numbers in offsets.items():
             self._seats.setdefault(path, []).append(numbers)
+
+    def stuck(self) -> Positions:
+        """Positions at which only the travel of seats decides the sense of a friction."""
+        return np.concatenate(self._stuck) if self._stuck else np.zeros(0, np.intp)
 
     def seats(self) -> dict[str, NDArray[np.float64]]:
         """Offsets of the pins at all positions, by the names of `shifts`."""
@@ -148,6 +154,11 @@ def findings(
 ) -> list[Finding]:
     """One finding for each cause. efforts: least and largest effort and unit of every driver."""
     found = [_not_assembled(causes, dial, part) for part in causes.open_modules().values()]
+    stuck = causes.stuck()
+    stuck = stuck[status[stuck] == Status.ZERO_SLIP]
+    if len(stuck):
+        what = f"a joint with friction turns round while its pin travels {dial.intervals(stuck)}: its friction may act "
+        found.append(Finding(f"{what}either way, and its seat with it", "joints", severity=Severity.NOTE))
     for number, singular in causes.singular().items():
         module = causes.system.plan.modules[number]
         kind = "dead centre (singular position)" if module.rank == CLASS_TWO else "singular position"

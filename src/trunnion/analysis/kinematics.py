@@ -183,6 +183,10 @@ class Forward:
         spin = primal(frame.c) * rate_of(frame.s) - primal(frame.s) * rate_of(frame.c)
         return Twist(rate_of(frame.x), rate_of(frame.y), spin)
 
+    def unspun(self, number: int, pose: Any, twists: Mapping[str, Any]) -> dict[str, Any]:
+        """Twists of a module's links with a free spin, without what they spin: none in the plane."""
+        return {}
+
     def take(self, number: int, pose: Any, time: Number) -> None:
         """Add the motion of one module, whose pose is known."""
         system = self.system

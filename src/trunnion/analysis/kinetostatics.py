@@ -66,7 +66,8 @@ class Backward:
     not included; friction: torque (N m) or force along the slide (N) on the second link; settled: per module;
     undefined: where each load or spring (by path) has no value; turning: of joints that rub and turn, the contact and
     the share of its friction that acts about the axis; travels: whether seats do, so that a joint also loses what its
-    load does on the way of its pin; passed: power that each joint passes on to its links in all.
+    load does on the way of its pin; passed: power that each joint passes on to its links in all;
+    gear_power: of all gear pairs, whose wheels then move apart.
     """
 
     walk: Forward
@@ -84,6 +85,7 @@ class Backward:
     turning: dict[str, tuple[Contact, Number]] = field(default_factory=dict)
     travels: bool = False
     passed: dict[str, Number] = field(default_factory=dict)
+    gear_power: Number = 0.0
 
     def friction_power(self, joint: str) -> Number:
         """Power lost in a joint, W."""
@@ -390,7 +392,19 @@ def _record_gear(back: Backward, number: int, i: int, name: str, torque: Number,
         back.gears[name] = GearLoad(-torque * pose.ratios[i], (-force[0], -force[1]))
     else:
         back.gears[name] = GearLoad(torque, force)
+    if back.travels:
+        back.gear_power = back.gear_power + _power_of(back, number, done)
     _push(back, number, done)
+
+
+def _power_of(back: Backward, number: int, done: Sequence[GearAction]) -> Number:
+    """Power of a gear pair on the way of its wheels' centres, W; without travel of their pins there is none."""
+    walk, power = back.walk, 0.0
+    for joint, side, wrench, at in done:
+        frame, twist, _ = walk.motions[walk.system.places[number][joint].links[side]]
+        v = moved(twist, at.x - frame.x, at.y - frame.y)
+        power = power + wrench.x * v.x + wrench.y * v.y + wrench.m * v.w
+    return power
 
 
 def _push(back: Backward, number: int, done: Sequence[GearAction]) -> None:

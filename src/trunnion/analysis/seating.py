@@ -56,8 +56,9 @@ class Seated:
     """What the positions of one walk came to with their pins in their seats.
 
     offsets: by the names of `shifts` (`seats.JOINT.1.x`), m; loads: of the pin on each end of its hole, N, by joint;
-    rounds: of the iteration; change: that one more round would make, of the clearances; turning: positions at which a
-    joint with friction is about to turn round.
+    rounds: of the iteration; change: that one more round would make, of the clearances; sticks: positions
+    at which only the travel of the seats decides the sense of a friction, the joint itself being all but at rest;
+    told: at which the accelerations contain the travel of the seats.
     """
 
     back: Backward
@@ -65,15 +66,8 @@ class Seated:
     loads: dict[str, list[Vector]]
     rounds: NDArray[np.intp]
     change: NDArray[np.float64]
-    turning: NDArray[np.bool_]
-
-    @property
-    def sticks(self) -> NDArray[np.bool_]:
-        """Positions whose seats do not come to rest since a joint turns round there: either sense turns it back.
-
-        The pin travels across its hole while the joint itself is at rest, and its friction is an interval.
-        """
-        return (self.change > TOLERANCE) & self.turning
+    sticks: NDArray[np.bool_]
+    told: NDArray[np.bool_]
 
 
 def seats(system: System, values: Values) -> list[Seat]:
@@ -125,7 +119,9 @@ def _pressed(back: Backward, seat: Seat, loads: Sequence[Vector], least: Number)
 
 
 def _share(back: Backward, joint: str) -> Number | None:
-    """Friction force about the axis over the normal force at a contact of a joint; None without friction.
+    """Friction force about the axis, against the slip, over the normal force at a contact; None without friction.
+
+    Negative where it drives, as bristles do that have not yet bent round after a reversal.
 
     The coefficient itself: a pair factor stands for a spread contact, whose resultant is turned by atan μ all the
     same.
@@ -134,7 +130,7 @@ def _share(back: Backward, joint: str) -> Number | None:
         return None
     contact, turning = back.turning[joint]
     slope = contact.law.function(1.0, contact.slip, **contact.parameters)
-    return np.abs(primal(slope * turning)) / contact.parameters.get("pair_factor", 1.0)
+    return -primal(slope * turning) * np.sign(primal(contact.slip)) / contact.parameters.get("pair_factor", 1.0)
 
 
 def settle(run: Run, seen: Lanes, method: FrictionMethod, start: Backward) -> Seated:
@@ -147,22 +143,24 @@ def settle(run: Run, seen: Lanes, method: FrictionMethod, start: Backward) -> Se
     offsets = _next(run, start, len(seen.times))
     rounds, change = np.zeros(len(seen.times), np.intp), np.zeros(len(seen.times))
     loaded = any(seat.given is None for seat in run.seats)
-    turning = _slow(run.system, start)[seen.own]
+    sticks = np.zeros(len(time), bool)
     senses = np.zeros((len(rubbing(run.system)), len(seen.times)))
     held = None
     if loaded:
         held = _iterate(run, seen.times, quick, offsets, rounds, change, np.arange(len(seen.times)), senses)
-    moving = travel(run, seen, offsets, start, held)
+    moving, told = travel(run, seen, offsets, start, held)
     mine = {path: numbers[seen.own] for path, numbers in offsets.items()}
     rounds, change = rounds[seen.own], change[seen.own]
     if loaded:  # where a joint turns round, the travel of the seats decides the sense of its friction
-        left = np.flatnonzero(turning & (rounds < ROUNDS)) if moving else np.zeros(0, np.intp)
+        turning = _slow(run.system, start)[seen.own] & (rounds < ROUNDS)
+        left = np.flatnonzero(turning) if moving else np.zeros(0, np.intp)
         turned = run.at(time[left], {path: numbers[left] for path, numbers in mine.items()}, quick,
                         travel=part_of(moving, left))  # fmt: skip
         left = left[np.any(_senses(turned) != senses[:, seen.own[left]], axis=0)]
+        sticks[left] = True
         _iterate(run, time, quick, mine, rounds, change, left, senses[:, seen.own], moving)
     back = run.at(time, mine, method, travel=moving)
-    return Seated(back, mine, _loads(run, back), rounds, change, turning)
+    return Seated(back, mine, _loads(run, back), rounds, change, sticks, told)
 
 
 def _slow(system: System, start: Backward) -> NDArray[np.bool_]:

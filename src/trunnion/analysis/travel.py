@@ -32,7 +32,7 @@ __all__ = ["Lanes", "lanes", "part_of", "travel"]
 
 BEND = 0.005  # rad: change of the angle that a seat turns from one lane to the next; more is no even turning
 QUICK = 0.1  # rad from one lane to the next, likewise
-FINE = 720  # positions of a cycle whose neighbours are near enough for differences, and no nearer than that
+FINE = 1440  # positions of a cycle whose neighbours are near enough for differences, and no nearer than that
 
 Lane = NDArray[np.intp]
 
@@ -59,7 +59,7 @@ def lanes(time: NDArray[np.float64], cycle: Cycle) -> Lanes:
     count, near = len(time), cycle.duration / FINE
     apart = (time[-1] - time[0]) / (count - 1) if count > 1 else 0.0
     step = max(1, round(near / apart)) if apart > 0 else 0
-    if 0 < apart <= 2 * near and count > step:
+    if 0 < apart <= 1.5 * near and count > step:
         around = apart * np.arange(1, 2 * step + 1)
         times = np.concatenate([time[0] - around[::-1], time, time[-1] + around])
         return Lanes(_within(times, cycle), 2 * step + np.arange(count), step)
@@ -74,8 +74,8 @@ def _within(times: NDArray[np.float64], cycle: Cycle) -> NDArray[np.float64]:
 
 def travel(
     run: Run, seen: Lanes, offsets: Mapping[str, NDArray[np.float64]], start: Backward, held: Backward | None = None
-) -> dict[str, Travel]:
-    """How every link also moves at the positions of the lanes.
+) -> tuple[dict[str, Travel], NDArray[np.bool_]]:
+    """How every link also moves at the positions of the lanes, and at which of them accelerations tell it.
 
     offsets: of the pins at all lanes; start: the ideal mechanism there; held: a walk there with pins held near these
     offsets, if there was one. Accelerations are told only between lanes where all seats travel evenly; else the links
@@ -83,7 +83,7 @@ def travel(
     """
     rates, even = _rates(run, seen, offsets)
     if not rates:
-        return {}
+        return {}, np.ones(len(seen.own), bool)
     inside = {path: numbers[seen.inner] for path, numbers in offsets.items()}
     values = {**run.values, **inside}
     time = seen.times[seen.inner]
@@ -108,7 +108,7 @@ def travel(
             meant.acceleration, change, motion.acceleration,
         )  # fmt: skip
         found[link] = Travel(each(extra, lambda number: sliced(number, own)), second)
-    return found
+    return found, there
 
 
 def sliced(number: Number, lanes: Any) -> Number:
@@ -132,6 +132,7 @@ def _travelling(run: Run, values: Mapping[str, Number], time: NDArray[np.float64
         for link, frame in zip(module.links, pose.frames, strict=True):
             found[link] = walk.frame_rate(frame)
             walk.motions[link] = still._replace(frame=frame)
+        found.update(walk.unspun(number, pose, found))
         walk.poses.append(pose)
     return found
 

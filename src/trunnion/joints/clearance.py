@@ -242,9 +242,10 @@ def worst_case(loads: Sequence[Vector], radii: Sequence[Number]) -> Number:
 def turned_by_friction(load: Vector, friction: Number, spin: Vector) -> Vector:
     """The normal part of a load on the hole that friction shares: the seat's direction, of the length of the load.
 
-    friction: friction force over normal force, at least 0; spin: angular velocity of the hole against the pin in the
-    hole's frame, about z of a pin (ω,), a vector of a ball; only its direction counts, and with spin 0 nothing turns.
-    With Q = N (n − μ t), t the direction in which the hole slips at the contact n: n is Q turned by atan μ along t.
+    friction: friction force against the slip over normal force; spin: angular velocity of the hole against the pin
+    in the hole's frame, about z of a pin (ω,), a vector of a ball; only its direction counts, and with spin 0
+    nothing turns. With Q = N (n − μ t), t the direction in which the hole slips at the contact n: n is Q turned by
+    atan μ along t.
     """
     if len(load) == 2:
         slope = friction * namespace(spin[-1]).sign(spin[-1])

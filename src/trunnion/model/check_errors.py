@@ -19,8 +19,10 @@ from trunnion.model.parameters import ParameterSet, entries, nominal_dimensions
 if TYPE_CHECKING:
     from trunnion.model.mechanism import Mechanism
 
-__all__ = ["errors", "joint_errors", "play_values"]
+__all__ = ["error_sizes", "errors", "joint_errors", "play_values"]
 
+WILD = 0.1  # of a length: an error above it is more likely a slip of the unit
+LEANING = np.radians(2)  # of a tilt, likewise
 STEEPEST = np.pi / 4  # of a tilt: beyond it is another design, and more likely a slip of the unit
 MEASURABLE = 1e-9  # m: half a millionth of a millimetre of interference is rounding
 
@@ -171,6 +173,19 @@ def _defaults(mechanism: Mechanism) -> Iterator[Finding]:
 # ---- numbers --------------------------------------------------------------------------------------------------
 
 
+def error_sizes(numbers: ParameterSet) -> Iterator[Finding]:
+    """Errors so large that their unit is in doubt."""
+    for path in numbers.entries:
+        target = path.removeprefix(ERRORS)
+        if target == path or target not in numbers.nominal or path not in numbers.nominal:
+            continue
+        error = float(numbers.nominal[path])
+        meant = float(numbers.nominal[target]) - error
+        if np.abs(error) > WILD * np.abs(meant) > 0:
+            what = f"is {error:g} (SI), {100 * np.abs(error / meant):.3g} % of the {meant:g} that are meant"
+            yield Finding(what, path, "check its unit: a plain number is SI", Severity.WARNING)
+
+
 def play_values(mechanism: Mechanism, name: str, numbers: ParameterSet) -> Iterator[Finding]:
     """Signs and sizes of a joint's misalignment, seat and play, and what they make doubtful."""
     joint, where, values = mechanism.effective_joints[name], f"joints.{name}", numbers.nominal
@@ -178,6 +193,9 @@ def play_values(mechanism: Mechanism, name: str, numbers: ParameterSet) -> Itera
     if np.abs(tilt) > STEEPEST:
         what = f"is {np.degrees(tilt):.4g} deg, an error of at most 45 deg is meant"
         yield Finding(what, f"{where}.misalignment.tilt", "check its unit; turn the axis of the point instead")
+    elif np.abs(tilt) > LEANING:
+        what = f"is {np.degrees(tilt):.4g} deg, more than a misalignment usually is"
+        yield Finding(what, f"{where}.misalignment.tilt", "a plain number is in radians", Severity.WARNING)
     beta = values.get(f"{where}.seat.beta", 0.0)
     if np.abs(beta) > np.pi * (1 + 1e-12):
         what = f"is {np.degrees(beta):.4g} deg, the ends of a pin lie at most 180 deg apart"
@@ -198,7 +216,7 @@ def _play_sign(mechanism: Mechanism, name: str, joint: Joint, numbers: Parameter
     """A nominal play below zero, which no seat can lie in and which radii as stated must not have."""
     where, values = f"joints.{name}", numbers.nominal
     pin = joint.pin
-    if pin is None or pin.clearance is not None or has_guide(joint.type):
+    if pin is None or pin.clearance is not None or has_guide(joint.type) or pin.hole_radius is None:
         return  # a negative clearance is found with the other lengths
     radius, hole = values[f"{where}.pin.radius"], values[f"{where}.pin.hole_radius"]
     if not hole < radius:
@@ -237,8 +255,9 @@ def _play_size(mechanism: Mechanism, name: str, joint: Joint, values: Mapping[st
         return
     place = f"{where}.pin"
     side, distance, link = _shortest_side(mechanism, name, joint, values)
-    if rho > 0.01 * distance:
-        what = f"a play of {_mm(rho)} is {100 * rho / distance:.2g} % of the {_mm(distance)} from '{name}' to '{side}'"
+    crossing = distance <= values.get(f"{where}.pin.radius", 0.0)  # axes that all but meet: that is no lever
+    if rho > 0.01 * distance and not crossing:
+        what = f"a play of {_mm(rho)} is {100 * rho / distance:.3g} % of the {_mm(distance)} from '{name}' to '{side}'"
         remedy = f"above 1 % of a side of the link '{link}' small-play figures are rough: check its unit"
         yield Finding(what, place, remedy, Severity.WARNING)
     if mechanism.space == "planar" or joint.type == "spherical":

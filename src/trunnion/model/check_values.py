@@ -11,7 +11,7 @@ import numpy as np
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, Severity
 from trunnion.joints.friction import FRICTION_LAWS, LawParameter
-from trunnion.model.check_errors import play_values
+from trunnion.model.check_errors import error_sizes, play_values
 from trunnion.model.check_gears import gear_values
 from trunnion.model.check_loads import spring_values, table_values
 from trunnion.model.check_space import direction_values, pitch_values
@@ -56,6 +56,7 @@ def check_values(mechanism: Mechanism, numbers: ParameterSet) -> Iterator[Findin
         yield from play_values(mechanism, name, numbers)
     for name in mechanism.drivers:
         yield from _driver(mechanism, name, values)
+    yield from error_sizes(numbers)
     yield from gear_values(mechanism, values)
     yield from table_values(mechanism, values)
     yield from spring_values(mechanism, values)

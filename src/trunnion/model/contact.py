@@ -51,13 +51,20 @@ def has_play(joint: Joint) -> bool:
     if has_guide(joint.type):
         return joint.guide is not None and joint.guide.clearance is not None
     pin = joint.pin
-    return pin is not None and (pin.clearance is not None or (pin.radius is not None and pin.hole_radius is not None))
+    if pin is None:
+        return False
+    return (
+        pin.clearance is not None
+        or pin.end_float is not None
+        or (pin.radius is not None and pin.hole_radius is not None)
+    )
 
 
 def play(joint: Joint, name: str, values: Mapping[str, Number]) -> Number:
     """How far each end of a joint's pin, slider or ball can lie from the middle of its hole, m; 0 without a play.
 
-    The radial clearance, that between the radii where none is stated, and the cylindricity. values: by path.
+    The radial clearance, that between the radii where none is stated, and the cylindricity; of a pin with neither half
+    its end float. values: by path.
     """
     if not has_play(joint):
         return 0.0
@@ -65,5 +72,7 @@ def play(joint: Joint, name: str, values: Mapping[str, Number]) -> Number:
         return values[f"joints.{name}.guide.clearance"]
     pin = f"joints.{name}.pin"
     stated = values.get(f"{pin}.clearance")
-    clearance = values[f"{pin}.hole_radius"] - values[f"{pin}.radius"] if stated is None else stated
-    return clearance + values.get(f"{pin}.cylindricity", 0.0)
+    if stated is None and f"{pin}.hole_radius" in values and f"{pin}.radius" in values:
+        stated = values[f"{pin}.hole_radius"] - values[f"{pin}.radius"]
+    across = 0.0 if stated is None else stated + values.get(f"{pin}.cylindricity", 0.0)
+    return across if across != 0 else 0.5 * values.get(f"{pin}.end_float", 0.0)

@@ -269,7 +269,7 @@ class Mechanism(Part):
         """Where a choice among words stands; None if the name is of a number."""
         if name in ("over_constraint", "fits"):
             return (name,)
-        for choice in ("friction.model", "seat"):
+        for choice in ("friction.model", "seat", "pin.fit"):
             holder = self._holder(name.removesuffix(f".{choice}")) if name.endswith(f".{choice}") else None
             if holder:
                 return (*holder, *choice.split("."))

@@ -156,12 +156,17 @@ def _drawn(shown: Space, link: str, point: str, place: Array) -> list[float]:
 
 
 def _outputs(result: xr.Dataset) -> list[dict[str, Any]]:
-    """Transmission errors in the unit they are read in: µm as metres, small angles in minutes or seconds of arc."""
+    """Transmission errors in the unit they are read in: µm as metres, small angles in minutes or seconds of arc; the
+    band of the worst case of the play if the result has it.
+    """
     rows = []
     for one in outputs(result):
-        peak = float(np.nanmax(np.abs(one.error), initial=0.0))
+        centre, reach = (column(result, f"transmission_{name}", joint=one.joint) for name in ("centre", "reach"))
+        band = [] if centre is None or reach is None else [centre - reach, centre + reach]
+        peak = max(float(np.nanmax(np.abs(values), initial=0.0)) for values in [one.error, *band])
         factor, unit = angle_scale(peak) if one.unit == "rad" else (1.0, "m")
-        rows.append({"label": one.label, "unit": unit, "values": _series(one.error * factor)})
+        worst = {side: _series(edge * factor) for side, edge in zip(("low", "high"), band, strict=False)}
+        rows.append({"label": one.label, "unit": unit, "values": _series(one.error * factor), "worst": worst or None})
     return rows
 
 

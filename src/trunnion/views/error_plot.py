@@ -9,8 +9,8 @@ import numpy as np
 from trunnion.analysis.play import play
 from trunnion.errors import MechanismError
 from trunnion.views.as_built import Output, angle_scale, has, losses, need, outputs, point_errors, worst_points
-from trunnion.views.cycle import Abscissa, Array, abscissa, column, names, thin, usual_peak
-from trunnion.views.figures import SHADE, along, curve, frame_peak, legend, new, shade, style_of
+from trunnion.views.cycle import Abscissa, Array, abscissa, column, names, usual_peak
+from trunnion.views.figures import along, curve, frame_peak, legend, new, shade, style_of
 from trunnion.views.lettering import plain
 from trunnion.views.quantities import prefixed
 
@@ -81,16 +81,12 @@ def error(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
 
 
 def _places(axes: Axes, result: xr.Dataset, over: Abscissa) -> None:
-    """Sizes of the errors of place of the worst points, over the greatest of all points."""
+    """Sizes of the errors of place of the worst points."""
     every, worst = point_errors(result), worst_points(result)
     scope = usual_peak(*every.values())
     factor, unit = prefixed(scope, "m")
     along(axes, over, f"error of place [{unit or 'm'}]")
     shade(axes, result, over)
-    if every:
-        top, x = _closed(over, np.max(list(every.values()), axis=0)), _closed(over, over.values, over.period)
-        picked = thin(top)
-        axes.fill_between(x[picked], 0, top[picked] * factor, color=SHADE, linewidth=0, zorder=1)
     for index, (key, size) in enumerate(worst.items()):
         curve(axes, over, size * factor, key, **style_of(index))
     most = max((float(np.nanmax(size)) for size in every.values()), default=0.0)

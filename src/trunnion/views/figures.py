@@ -159,10 +159,12 @@ def square(axes: Axes, most: float, shown: float, factor: float, unit: str) -> N
     _outside(axes, most, unit)
 
 
-def legend(axes: Axes, most: int = 6, room: int = 90) -> None:
-    """A legend in rows above the axes, where it hides no curve; room: characters that a row holds."""
+def legend(axes: Axes, most: int = 6, room: int = 90, least: int = 2) -> None:
+    """A legend in rows above the axes, where it hides no curve; room: characters that a row holds; none of fewer than
+    `least` entries.
+    """
     handles, labels = axes.get_legend_handles_labels()
-    if len(handles) < 2:
+    if len(handles) < least:
         return
     fits = sum(map(len, labels)) + 7 * len(labels) <= room  # with the line samples
     columns = len(labels) if fits else max(1, min(most, (room + 10) // (max(map(len, labels)) + 7)))

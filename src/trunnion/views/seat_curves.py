@@ -27,6 +27,7 @@ __all__ = ["beta", "described"]
 
 # two curves that often coincide: one broad and pale, one thin and dashed over it
 ENDS: tuple[dict[str, Any], ...] = ({"linewidth": 4.0, "alpha": 0.4}, {"linewidth": 1.4, "linestyle": (0, (5, 2))})
+NARROW = 20.0  # °; angles that vary by less are shown without the rest of the turn
 
 
 class Curve(NamedTuple):
@@ -67,7 +68,7 @@ def beta(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
             _draw(axes, over, panel, one, np.concatenate([NOWHERE, *lost.values()]))
         _cross(axes, over, panel, lost)
         if panel.angles:
-            _ticks(axes)
+            _ticks(axes, panel.curves)
         else:
             axes.margins(y=0.12)
         if len(panel.curves) == 1 and not lost:  # else the legend says whose it is
@@ -119,6 +120,8 @@ def _draw(axes: Axes, over: Abscissa, panel: Panel, one: Curve, lost: NDArray[np
     if over.closed:
         x, y = np.append(x, x[0] + over.period), np.append(y, y[0])
     cut_x, cut_y = broken(x, y, panel.jump, lost)
+    if over.closed and np.isnan(cut_y[-2]):  # a jump on closing: the last point is the first once more
+        cut_x, cut_y = cut_x[:-2], cut_y[:-2]
     curve(axes, replace(over, values=cut_x, closed=False), cut_y, one.label, **one.look)
 
 
@@ -134,10 +137,14 @@ def _cross(axes: Axes, over: Abscissa, panel: Panel, lost: Mapping[str, NDArray[
             label = None
 
 
-def _ticks(axes: Axes) -> None:
-    """Angles at round values."""
+def _ticks(axes: Axes, curves: list[Curve]) -> None:
+    """Angles at round values; where all of them stay near one angle far from 0, the axis shows what varies."""
+    known = np.concatenate([one.values[np.isfinite(one.values)] for one in curves])
+    if known.size and np.ptp(known) < NARROW:
+        margin = max(0.12 * float(np.ptp(known)), 0.5)
+        axes.set_ylim(float(known.min()) - margin, float(known.max()) + margin)
     low, high = axes.get_ylim()
     span = high - low
-    step = next((one for one in (1, 5, 10, 15, 30, 45) if span / one <= 8), 90)
+    step = next((one for one in (1, 2, 5, 10, 15, 30, 45) if span / one <= 8), 90)
     if span > 4:
         axes.yaxis.set_major_locator(MultipleLocator(step))

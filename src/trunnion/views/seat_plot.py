@@ -31,12 +31,38 @@ __all__ = ["seat"]
 
 PIN = 1.1  # radius of the pin as drawn, of the clearance
 WALL = 0.25  # thickness of the hole's wall as drawn
-ARROW = 0.9  # length of the largest load
-ROOM = PIN + 1.0 + ARROW + 0.7  # half width of a diagram
+ARROW = 0.8  # length of the largest load
+ROOM = 1.0 + PIN + ARROW  # half width of a diagram without its labels
+BESIDE = 0.26  # in; room for labels around it
+NEAR = 0.07  # in; tips that are nearer share a label
 DEEP = 2.4  # half height of that of a guide
-FACTORS = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0)
-ALIKE = 4.0  # clearances that differ by less share one magnification
+FACTORS = (
+    1.0,
+    1.1,
+    1.2,
+    1.3,
+    1.4,
+    1.5,
+    1.6,
+    1.8,
+    2.0,
+    2.2,
+    2.5,
+    2.8,
+    3.0,
+    3.2,
+    3.5,
+    4.0,
+    4.5,
+    5.0,
+    5.5,
+    6.0,
+    7.0,
+    8.0,
+    9.0,
+)
 INCH = 0.0254
+ALONG = (-0.75, -0.4, 0.4, 0.75)  # where the labels of a guide stand, clear of where its bars cross
 LONGEST = 16  # signs of a link's name
 # round the turn and back to the first colour; from the palette of the curves
 TURN = LinearSegmentedColormap.from_list("turn", [PALETTE[k] for k in (0, 2, 4, 1, 3, 0)])
@@ -91,7 +117,7 @@ def seat(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
     square = (width - 1.2) / across - 0.62  # in; what labels leave of a column
     figure = new("Seats of the pins in their holes", result, 0.55 + rows * (square + 1.05), width)
     grid = figure.subplots(rows, across, squeeze=False)
-    hue = _hue(over, square / (2 * ROOM))
+    hue = _hue(over, (square / 2 - BESIDE) / ROOM)
     for axes in grid.ravel()[len(cells) :]:
         axes.set_visible(False)
     for axes, cell in zip(grid.ravel(), cells, strict=False):
@@ -170,13 +196,16 @@ def _disc(axes: Axes, cell: Cell, hue: Hue) -> None:
     axes.plot([0], [0], "+", color=MUTED, markersize=7, markeredgewidth=0.9, zorder=2)
     known = np.asarray(np.isfinite(offset).all(axis=0))
     _locus(axes, offset, hue, 1.0 * rho)
-    shown: list[Array] = []
+    tips: dict[int, Array] = {}
     for index in _marked(hue.over, known):
         colour = hue.of(hue.over.values[index])
         _pin(axes, cell, offset[:, index], rho, colour)
-        _load(axes, cell, index, rho, factor, colour, hue, shown)
+        tip = _load(axes, cell, index, rho, factor, colour)
+        if tip is not None:
+            tips[index] = tip
+    _say(axes, cell, tips, rho / hue.inch, hue.over)
     ticks = [-rho, 0.0, rho]
-    axes.set_xticks(ticks, [_tick(tick) for tick in ticks])
+    axes.set_xticks(ticks, [_tick(-rho), "", _tick(rho)])  # 0 has no room beside them in a small hole
     axes.set_yticks(ticks, [_tick(tick) for tick in ticks])
     if cell.seats.along > 0:
         slack = cell.seats.offsets[cell.end, 2] * factor
@@ -241,25 +270,55 @@ def _locus(axes: Axes, offset: Array, hue: Hue, jump: float) -> None:
     axes.scatter(offset[0, alone], offset[1, alone], c=hue.of(x[alone]), s=14, zorder=3, linewidths=0)
 
 
-def _load(
-    axes: Axes, cell: Cell, index: int, rho: float, factor: float, colour: Any, hue: Hue, shown: list[Array]
-) -> None:
-    """The load on the hole at a position, outwards from where the pin touches it, with the position at its tip."""
+def _load(axes: Axes, cell: Cell, index: int, rho: float, factor: float, colour: Any) -> Array | None:
+    """The load on the hole at a position, outwards from where the pin touches it; its tip, None of one too small."""
     force, place = cell.force[:, index], cell.offset[:, index] * factor
-    size = float(np.hypot(*force))
-    if not size > 0.02 * cell.peak:
-        return
+    if not np.hypot(*force) > 0.02 * cell.peak:
+        return None
     way = np.hypot(*place)
     start = place * (1 + PIN * rho / way) if way > 1e-9 * rho else place
-    tip = start + force / cell.peak * ARROW * rho
+    tip = np.asarray(start + force / cell.peak * ARROW * rho)
     arrow = {"arrowstyle": "-|>", "color": colour, "linewidth": 1.5, "shrinkA": 0, "shrinkB": 0, "mutation_scale": 9}
     axes.annotate("", xy=(tip[0], tip[1]), xytext=(start[0], start[1]), arrowprops=arrow, zorder=6)
-    beyond = tip + force / size * np.array([0.16, 0.1]) / hue.inch * rho
-    room = np.array([0.3, 0.11]) / hue.inch * rho  # of a label
-    if any((np.abs(beyond - other) < room).all() for other in shown):
-        return
-    shown.append(beyond)
-    axes.text(beyond[0], beyond[1], hue.over.say(index), fontsize=7.5, color=INK, ha="center", va="center", zorder=7)
+    return tip
+
+
+def _say(axes: Axes, cell: Cell, tips: dict[int, Array], inch: float, over: Abscissa) -> None:
+    """The positions beyond the tips of their loads, moved aside from one another; tips that coincide share a label.
+
+    inch: on paper, in the units of the axes.
+    """
+    groups: list[list[int]] = []
+    for index, tip in tips.items():
+        near = (group for group in groups if np.hypot(*(tips[group[0]] - tip)) < NEAR * inch)
+        group = next(near, None)
+        if group:
+            group.append(index)
+        else:
+            groups.append([index])
+    shown: list[tuple[Array, Array]] = []  # middle and half size of every label
+    mean = np.sum(list(tips.values()), axis=0) if tips else np.zeros(2)
+    # in their order around the hole, so that moving one aside puts it past no other
+    groups.sort(
+        key=lambda group: np.arctan2(mean[0] * tips[group[0]][1] - mean[1] * tips[group[0]][0], mean @ tips[group[0]])
+    )
+    for index, *more in groups:
+        way = cell.force[:, index] / np.hypot(*cell.force[:, index])
+        words = [over.say(one) for one in (index, *more)]
+        stacked = abs(way[0]) > abs(way[1])
+        wide = max(map(len, words)) if stacked else sum(map(len, words)) + 2 * len(more)
+        half = np.array([0.034 * wide, 0.065 * (len(words) if stacked else 1)]) * inch
+        middle = tips[index] + way * (half + 0.045 * inch)
+        aside = 0.04 * inch * np.array([-way[1], way[0]])
+        places = (middle + sign * step * aside for step in range(16) for sign in (1, -1))
+        free = (at for at in places if not any((np.abs(at - one) < half + size).all() for one, size in shown))
+        place = next(free, middle)
+        shown.append((place, half))
+        text = ("\n" if stacked else ", ").join(words)
+        said = axes.text(
+            place[0], place[1], text, fontsize=7.5, color=INK, ha="center", va="center", zorder=7, linespacing=1.1
+        )
+        said.set_in_layout(False)  # its place is in the diagram: it asks for no room
 
 
 def _guide(axes: Axes, cell: Cell, hue: Hue) -> None:
@@ -287,7 +346,7 @@ def _guide(axes: Axes, cell: Cell, hue: Hue) -> None:
                 x, tip = side * half, float(ends[end, index]) + force / cell.peak * 0.8 * rho
                 arrow = {"arrowstyle": "-|>", "color": colour, "linewidth": 1.5, "shrinkA": 0, "shrinkB": 0}
                 axes.annotate("", xy=(x, tip), xytext=(x, float(ends[end, index])), arrowprops=arrow, zorder=6)
-        along = (-0.6 + 0.4 * order) * half
+        along = ALONG[order] * half
         middle = float(np.interp(along, [-half, half], ends[:, index]))
         look: dict[str, Any] = {
             "textcoords": "offset points",
@@ -295,6 +354,7 @@ def _guide(axes: Axes, cell: Cell, hue: Hue) -> None:
             "color": INK,
             "ha": "center",
             "zorder": 7,
+            "bbox": {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.6},
         }
         axes.annotate(hue.over.say(index), (along, middle), xytext=(0, 5), **look)
     axes.set_xlim(-1.2 * half, 1.2 * half)
@@ -305,26 +365,23 @@ def _guide(axes: Axes, cell: Cell, hue: Hue) -> None:
 
 
 def _magnify(figure: Figure, drawn: list[tuple[Axes, Cell]]) -> None:
-    """Give every diagram a round magnification, all the same one where their clearances allow it, and say it."""
+    """Give every diagram the largest round magnification that it has room for, and say it."""
     if not drawn:
         return
-    clearances = [cell.seats.clearance for _, cell in drawn]
-    shared = max(clearances) < ALIKE * min(clearances)
-    rooms = [(DEEP if cell.seats.planar_guide else ROOM) * cell.seats.clearance for _, cell in drawn]
-    for (axes, cell), half in zip(drawn, rooms, strict=True):
+    for axes, cell in drawn:
         _name(axes, cell)
         axes.set_title("× 1000", fontsize=8.5, loc="right")  # as high as what will stand there
-        _limit(axes, cell, half)
+        _limit(axes, cell, ROOM * cell.seats.clearance)
     for _ in range(2):  # only then is it known how wide they are on paper
         figure.draw_without_rendering()
     figure.set_layout_engine("none")  # and so they stay
-    sizes = [axes.get_window_extent().height / figure.dpi * INCH for axes, _ in drawn]
-    free = [size / (2 * half) for size, half in zip(sizes, rooms, strict=True)]
-    for (axes, cell), size, most in zip(drawn, sizes, free, strict=True):
-        factor = _round_below(min(free) if shared else most)
+    for axes, cell in drawn:
+        size = axes.get_window_extent().height / figure.dpi * INCH
+        guide = cell.seats.planar_guide
+        most = size / (2 * DEEP) if guide else (size / 2 - BESIDE * INCH) / ROOM
+        factor = _round_below(most / cell.seats.clearance)
         _limit(axes, cell, 0.5 * size / factor)
-        across = "across " if cell.seats.planar_guide else ""
-        axes.set_title(f"{across}× {number(factor, 2)}", fontsize=8.5, color=MUTED, loc="right")
+        axes.set_title(f"{'across ' if guide else ''}× {number(factor, 2)}", fontsize=8.5, color=MUTED, loc="right")
 
 
 def _round_below(value: float) -> float:

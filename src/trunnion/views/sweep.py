@@ -10,12 +10,13 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 
 from trunnion.errors import Status
+from trunnion.views.as_built import angle_scale
 from trunnion.views.cycle import Array, usual_peak
 from trunnion.views.error_plot import LOST
 from trunnion.views.figures import INK, MUTED, SHADE, dress, frame_peak, legend, new, style_of
 from trunnion.views.lettering import plain
 from trunnion.views.quantities import prefixed
-from trunnion.views.swept import Scale, cause, grid, scales, statuses
+from trunnion.views.swept import Scale, cause, grid, meaning, scales, statuses
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -26,6 +27,7 @@ __all__ = ["figure"]
 
 # of the mechanism without errors
 IDEAL: dict[str, Any] = {"color": INK, "linestyle": (0, (4, 2)), "linewidth": 1.0, "markersize": 2.2}
+SIGNS = {"um": "µm", "deg": "°"}
 MOST_NAMED = 8  # curves that are told apart by a legend; more by a scale of colours
 
 
@@ -41,19 +43,19 @@ def figure(result: xr.Dataset, measure: str = "efficiency") -> Figure:
     x, y, status = over.values[order], values[order], statuses(result)[order]
     ideal = grid(result, f"{measure}_ideal")[1][order] if f"{measure}_ideal" in result else None
     scope = usual_peak(y, ideal)
-    factor, shown = prefixed(scope, unit)
-    title = measure.replace("_", " ")
-    head = title if "." in title else title.capitalize()  # a joint's name stays as it is
-    sheet = new(f"{head} over {over.name}", result)
+    factor, shown = angle_scale(scope) if unit == "rad" else prefixed(scope, unit)
+    title = meaning(measure, unit)
+    sheet = new(f"{title[:1].upper()}{title[1:]} over {over.name}", result)
     axes = sheet.subplots()
-    dress(axes, plain(over.title), plain(f"{title} [{shown}]" if shown else title))
+    dress(axes, plain(_axis(over)), plain(f"{title} [{shown}]" if shown else title))
     _shade(axes, x, status)
     other = others[0] if others else None
     count = y.shape[1]
     for k in range(count):
         look = style_of(k) if count <= MOST_NAMED else {"color": _colour(other, k)}
         label = "as built" if ideal is not None else None
-        label = label if other is None else plain(f"{other.name} = {other.say(k)}")
+        if other is not None:  # many are told apart by the scale of colours
+            label = plain(f"{other.name} = {other.say(k)}") if count <= MOST_NAMED else None
         _curve(axes, x, y[:, k] * factor, label, look)
         if ideal is not None:
             name = "ideal" if other is None else "ideal, dashed"
@@ -65,13 +67,17 @@ def figure(result: xr.Dataset, measure: str = "efficiency") -> Figure:
     axes.set_xlim(*_ends(x))
     if not known.size:
         axes.set_yticks([])
-    if count <= MOST_NAMED:
-        legend(axes)
-    elif other is not None:
+    legend(axes, least=1)
+    if count > MOST_NAMED and other is not None:
         bar = sheet.colorbar(_colours(other), ax=axes, pad=0.02, aspect=30)
-        bar.set_label(plain(other.title), fontsize=9, color=INK)
+        bar.set_label(plain(_axis(other)), fontsize=9, color=INK)
         bar.ax.tick_params(labelsize=8.5, colors=MUTED, labelcolor=INK)
     return sheet
+
+
+def _axis(scale: Scale) -> str:
+    """The swept name with its unit as it is read: µm for um, ° for deg."""
+    return scale._replace(unit=SIGNS.get(scale.unit, scale.unit)).title
 
 
 def _colours(other: Scale) -> ScalarMappable:

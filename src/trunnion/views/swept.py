@@ -20,7 +20,7 @@ from trunnion.views.cycle import Array
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Scale", "cause", "check_measure", "grid", "scales", "statuses", "table"]
+__all__ = ["Scale", "cause", "check_measure", "grid", "meaning", "scales", "statuses", "table"]
 
 MOST_ROWS, MOST_COLUMNS = 40, 8  # of a table
 CAUSES = {
@@ -83,6 +83,17 @@ def grid(result: xr.Dataset, name: str) -> tuple[str, Array]:
         raise MechanismError(Finding(what, "--measure", "state errors, a misalignment or a seat: loaded"))
     unit, values = found[name]
     return unit, np.asarray(values, float).reshape(shape[0], -1)
+
+
+def meaning(name: str, unit: str) -> str:
+    """A figure in words: "largest reaction of B"; of a whole cycle what it is called."""
+    member, _, key = name.rpartition(".")
+    told = FIGURES.get(key) or FIGURES.get(f"drive_{key}")
+    if told is None or not told.dims:
+        return name.replace("_", " ")
+    if key == "transmission_error_max":
+        return f"largest error of the {'slide' if unit == 'm' else 'rotation'} of {member}"
+    return f"{told.long_name} of {member}"
 
 
 def statuses(result: xr.Dataset) -> Array:

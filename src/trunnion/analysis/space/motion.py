@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple, cast
@@ -179,6 +180,16 @@ class SpatialWalk(Forward):
         (x, dx), (y, dy), (z, dz), (place, rate) = parts
         spin = scaled(0.5, plus(plus(cross(x, dx), cross(y, dy)), cross(z, dz)))
         return Screw(spin, vector_minus(rate, cross(spin, place)))
+
+    def unspun(self, number: int, pose: Any, twists: Mapping[str, Any]) -> dict[str, Any]:
+        """Twists of a module's links with a free spin, without what they spin about the line of their joints."""
+        group, found = self.space.groups[number], {}
+        for (link, _, _), (_, a, b) in zip(self.space.plan.modules[number].spinning, group.spinning, strict=True):
+            elements = each(pose.elements, primal)
+            axis = group.spin_axis(elements, a, b)
+            line = Screw(axis, cross(elements[a].second.place, axis))
+            found[link] = minus(twists[link], times(dot(axis, twists[link].u), line))
+        return found
 
     def _pair(self, place: Place) -> Any:
         return Element(self._side(place, 0), self._side(place, 1), self.space.lead(self.values, place.joint))

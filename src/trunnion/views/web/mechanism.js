@@ -18,7 +18,7 @@ export function mechanismView(scene, kinds) {
   const stage = html("div", { class: "stage" });
   const message = html("p", { class: "message", hidden: true });
   const element = html("div", { class: "mechanism" }, stage, message);
-  const box = bounds(scene);
+  const box = surround(scene, 1);
   if (!box) {
     message.textContent = "The mechanism could not be assembled at any position.";
     message.hidden = false;
@@ -47,7 +47,8 @@ export function mechanismView(scene, kinds) {
     element,
     magnify(factor) {
       view.scene = magnified(scene, factor);
-      if (view.frame) build(view);
+      view.box = surround(scene, factor);
+      if (view.frame) build(fit(view, view.frame.width));
     },
     show(index) {
       view.index = index;
@@ -60,6 +61,31 @@ export function mechanismView(scene, kinds) {
       pose(view);
     },
   };
+}
+
+/** The box around the whole motion with its errors `factor` times as large, its blocks with their walls, and the ideal
+ * mechanism beside it; null if nothing was ever assembled. */
+function surround(scene, factor) {
+  const drawn = magnified(scene, factor);
+  const shown = factor > 1 ? [drawn, magnified(scene, 0)] : [drawn];
+  const boxes = shown.map(bounds);
+  if (boxes.includes(null)) return null;
+  let [left, low, right, high] = [Infinity, Infinity, -Infinity, -Infinity];
+  const add = (x0, y0, x1, y1) => {
+    [left, low, right, high] = [Math.min(left, x0), Math.min(low, y0), Math.max(right, x1), Math.max(high, y1)];
+  };
+  for (const { x, y, width, height } of boxes) add(x, y, x + width, y + height);
+  for (const one of drawn.joints.filter(({ type }) => type === "prismatic")) {
+    const half = (seatOf(drawn.built, one.name)?.length ?? 0) / 2;
+    for (let index = 0; half && index < drawn.count; index += 1) {
+      const spot = place(drawn, one.at, index);
+      const angle = spot ? guide(drawn, one, index) : null;
+      if (angle === null) continue;
+      const [x, y] = [Math.abs(half * Math.cos(angle)), Math.abs(half * Math.sin(angle))];
+      add(spot[0] - x, spot[1] - y, spot[0] + x, spot[1] + y);
+    }
+  }
+  return { x: left, y: low, width: right - left, height: high - low };
 }
 
 /** Where the mechanism lies in the picture; `margin` px around it are for labels and arrows. */

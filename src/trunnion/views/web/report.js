@@ -57,19 +57,19 @@ function charts(scene, kinds, pick) {
   return [...list, ...errorCharts(scene, kinds, pick)];
 }
 
-/** Errors of the worst points and of the outputs, and how the pins lie; dotted where a pin loses contact. */
+/** Errors of the worst points and of the outputs, and how the pins lie; dotted where a joint loses contact. */
 function errorCharts(scene, kinds, pick) {
   const { built, count } = scene;
   if (!built) return [];
   const marks = built.lost;
-  const note = marks.length ? "Dotted: a pin loses contact." : "";
+  const note = marks.length ? "Dotted: a joint loses contact." : "";
   const list = [];
   if (built.worst.length) {
     const series = built.worst.map(({ label, values }, order) => ({ label, values: full(values, count), kind: kindOf(order) }));
     list.push(lineChart(scene, { title: "Errors of place, largest", unit: "m", series, marks, note, pick }));
   }
-  for (const { label, unit, values } of built.outputs)
-    list.push(lineChart(scene, { title: `Transmission error, ${label}`, unit, marks, note, pick, series: [{ label: "error", values: full(values, count), kind: "k0" }] })); // prettier-ignore
+  for (const { label, unit, values, worst } of built.outputs)
+    list.push(lineChart(scene, { title: `Transmission error, ${label}`, unit, marks, band: worst && { low: full(worst.low, count), high: full(worst.high, count), kind: "k0", label: "worst case of the play" }, note, pick, series: [{ label: "error", values: full(values, count), kind: "k0" }] })); // prettier-ignore
   for (const [sign, title] of [["β", "β, between the seats of the ends"], ["ξ", "ξ, direction of the seats"]]) {
     const series = built.angles
       .filter((one) => one.sign === sign)

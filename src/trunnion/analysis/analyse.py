@@ -459,7 +459,10 @@ def _widen(
     """Widen the interval by what the friction of one joint can do with either sign."""
     offsets = {path: numbers[positions] for path, numbers in seated.items()}
     ends = [run.at(time, offsets, method, {joint: sign}).efforts for sign in run.system.senses(joint)]
+    # with pins held in both, so that what their travel adds to the effort is none of the interval
+    middle = run.at(time, offsets, method).efforts if offsets else None
     for i, name in enumerate(run.system.mechanism.drivers):
-        changes = [np.broadcast_to(end[name], time.shape) - effort[i, positions] for end in ends]
+        own = effort[i, positions] if middle is None else middle[name]
+        changes = [np.broadcast_to(end[name] - own, time.shape) for end in ends]
         lower[i, positions] += np.minimum(0.0, np.min(changes, axis=0))
         upper[i, positions] += np.maximum(0.0, np.max(changes, axis=0))

@@ -45,6 +45,9 @@ def errors(mechanism: Mechanism) -> Iterator[Finding]:
             one = error.findings[0]
             yield Finding(one.what, where, one.remedy)
             continue
+        if path.startswith("drivers."):
+            what = "an error of a driver makes the ideal mechanism run at other times, and nothing can be compared"
+            yield Finding(what, where, "change the driver itself")
         if path in first:
             what = f"'{name}' and '{first[path]}' are the same number"
             yield Finding(what, where, "keep one of them")

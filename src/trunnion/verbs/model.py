@@ -31,7 +31,7 @@ def stated(
         mechanism = mechanism.with_values(dict(setting(text) for text in settings))
     if friction:
         mechanism = mechanism.with_friction(friction)
-    return mechanism.with_seats(seat) if seat else mechanism
+    return mechanism if seat is None else mechanism.with_seats(seat)
 
 
 @contextmanager

@@ -6,6 +6,7 @@
   `VARIANTS`.
 - `figures/sweeps/NAME.svg`, `figures/plays/NAME.svg` and `figures/assembles/NAME.svg` are drawn by the command of a
   page, `trunnion sweep … --out NAME.svg` and so on.
+- The line that says that a page has no tables in the repository is left out.
 - The gallery is made of the examples and of `tests/gallery/facts.py`; see `gallery_page.py`.
 - `$x$` and `$$x$$` become MathML, which browsers set without any script.
 """
@@ -177,6 +178,7 @@ def on_page_markdown(markdown: str, **_: Any) -> str:
             raise PluginError(f"there is no generated table '{name}'; known: {', '.join(TABLES)}")
         return TABLES[name](argument) if argument else TABLES[name]()
 
+    markdown = re.sub(r"^> In the repository the tables .*\n\n", "", markdown, flags=re.M)  # not so in the built pages
     return re.sub(r"<!-- generated: (.+?) -->", table, markdown)
 
 

@@ -319,7 +319,13 @@ def test_the_end_float_of_the_defaults_is_for_revolute_joints() -> None:
 
 
 def test_choices_are_refused_with_those_there_are() -> None:
-    assert "is none of 'free' or 'loaded'" in refusal(PLAYING, {"joints.A.seat": "lose"})
+    told = refusal(PLAYING, {"joints.A.seat": "tight"})
+    assert (
+        "joints.A.seat: 'tight' is none of 'free' or 'loaded' — write free or loaded, or a group of angles {beta"
+        in told
+    )
+    told = refusal(PLAYING, {"errors.crnk": "1 mm"})
+    assert "errors.crnk: there is no number named 'crnk' — did you mean 'crank'?" in told
     assert "'minimum', 'mean' or 'maximum'" in refusal(PLAYING, {"fits": "meen"})
     data = PLAYING.data()
     data["joints"]["A"]["seat"] = {}

@@ -324,7 +324,8 @@ def test_stated_clearances_enough_and_not() -> None:
     (told,) = json.loads(short.attrs["findings"])
     assert told["severity"] == "error"
     assert "between 125° and 310° of A" in told["what"]
-    assert f"{1e6 * need:.5g} um" in told["remedy"]
+    assert 1e6 * need == pytest.approx(14.3451, rel=1e-6)
+    assert "14.346 um" in told["remedy"]  # rounded up
 
 
 def test_a_joint_without_play_has_no_offset() -> None:
@@ -352,12 +353,57 @@ def test_no_play_is_stated() -> None:
     assert told["what"].startswith(
         "no play is stated: the loops stay open by up to 0.3898 mm and 0.2° at every position"
     )
-    assert "the same in the pins A, B, C, D, is 14.345 um" in told["remedy"]
+    assert "the same in the pins A, B, C, D, is 14.346 um" in told["remedy"]
     unsized = four_bar({"B": LEAN})
     for joint in unsized["joints"].values():
         del joint["pin"]["length"]
     with pytest.raises(trunnion.MechanismError, match="depends on its length, which is not stated — state length or"):
         solved(unsized)
+
+
+def told_of(clearance: str) -> tuple[str, str, dict[str, Any]]:
+    """What is said of the misaligned four-bar, whose need is the same everywhere, with a clearance of all pins."""
+    model = trunnion.read("examples/misaligned-fourbar.yaml").with_values({"joint_defaults.pin.clearance": clearance})
+    found = solved(model, 12)
+    (told,) = json.loads(found.attrs["findings"])
+    return told["what"], told["remedy"], {row["label"]: row["value"] for row in json.loads(found.attrs["summary"])}
+
+
+def test_close_to_the_limit_the_share_is_told_from_one() -> None:
+    what, remedy, _ = told_of("8.726 um")
+    assert (
+        what
+        == "the stated clearances do not close the loops at every position: it takes 1.0001 times as much everywhere"
+    )
+    assert remedy == "the smallest radial clearance, the same in the pins A, B, C, D, is 8.7267 um, needed everywhere"
+    _, _, rows = told_of("8.72664 um")
+    assert rows["needed share of the stated clearances"] == "1.000001"
+    what, _, rows = told_of("8.7267 um")  # what the remedy says suffices
+    assert what == "the stated clearances take up the errors: 0.99999 of them is needed, everywhere"
+    assert rows["  at"] == "everywhere"
+
+
+def test_a_clearance_of_none_and_lengths_of_rounding() -> None:
+    what, _, rows = told_of("0 mm")
+    assert what == (
+        "the stated play cannot close the loops, however large (a clearance of 0 is none): they stay open by up to "
+        "0.2° at every position"
+    )
+    assert "loops open without play, length" not in rows
+    (told,) = json.loads(solved(four_bar({"B": LEAN}, {"A": {"clearance": 0.0}}), 4).attrs["findings"])
+    assert told["what"].startswith(
+        "a stated clearance of 0 is no play: the loops stay open by up to 0.3898 mm and 0.2°"
+    )
+
+
+def test_check_says_that_it_goes_together_by_its_play_only() -> None:
+    told = "\n".join(map(str, trunnion.check(trunnion.read("examples/misaligned-fourbar.yaml"), 12).findings))
+    assert (
+        "with their errors they go together only by their play, if at all: they cannot be analysed as rigid parts"
+        in told
+    )
+    assert "`trunnion assemble FILE`" in told
+    assert not any(words in told for words in ("seat: loaded", "check the lengths", "remove a driver"))
 
 
 def test_part_is_the_derivative() -> None:

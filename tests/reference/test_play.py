@@ -250,7 +250,9 @@ def test_limit() -> None:
     assert finding["severity"] == "error"
     assert "the limit is 0.01 deg" in finding["what"]
     data["measures"]["swing"]["limit"] = "1 deg"
-    assert not json.loads(trunnion.play(trunnion.Mechanism(**data), steps=72).attrs["findings"])
+    (finding,) = json.loads(trunnion.play(trunnion.Mechanism(**data), steps=72).attrs["findings"])
+    assert (finding["severity"], finding["where"]) == ("note", "measures.swing.limit")
+    assert finding["what"].endswith("the limit is 1 deg: it is kept")
 
 
 def test_dead_centres_have_no_answer_and_say_so() -> None:

@@ -121,7 +121,7 @@ def finish(run: Run, found_positions: Positions) -> xr.Dataset:
     near = _near_locking(run, arrays, time, method)
     left_open = run.determinacy.findings() if run.determinacy else []
     found = [
-        *model_notes(mechanism),
+        *model_notes(mechanism, run.system),
         *run.chosen.findings,
         *left_open,
         *_over_the_cycle(run, arrays, causes, time, near),
@@ -170,7 +170,7 @@ def finding_row(finding: Finding) -> dict[str, str]:
     }
 
 
-def model_notes(mechanism: Mechanism) -> list[Finding]:
+def model_notes(mechanism: Mechanism, system: System) -> list[Finding]:
     """What the model says that this analysis leaves out, and warnings about the data."""
     notes = [finding for finding in check_model(mechanism) if finding.severity is not Severity.ERROR]
     values = mechanism.parameters()
@@ -200,7 +200,12 @@ def model_notes(mechanism: Mechanism) -> list[Finding]:
         notes.append(Finding(what, "joints", "analyse with --set fits=maximum for the widest", Severity.NOTE))
     if playing:
         what = f"the pins of {', '.join(playing)} are taken to lie in the middle of their play"
-        remedy = "state seat: loaded, or analyse with --seat loaded; the play verb tells what the play can do"
+        # no seats are taken where links are over-constrained
+        held = {name for module in system.plan.modules if module.redundant for name in module.joints}
+        remedy = "the play verb tells what the play can do; `trunnion assemble FILE` whether the links go together"
+        if seatable := [name for name in playing if name not in held]:
+            of = f" of {', '.join(seatable)}" if len(seatable) < len(playing) else ", or analyse with --seat loaded"
+            remedy = f"state seat: loaded{of}; the play verb tells what the play can do"
         notes.append(Finding(what, "joints", remedy, Severity.NOTE))
     return notes
 

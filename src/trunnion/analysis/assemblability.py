@@ -37,6 +37,7 @@ __all__ = ["FIGURES", "Fit", "assemble", "assembled"]
 
 Array = NDArray[np.float64]
 Uniform = Literal["pins", "all"]
+ROUNDING = 1e-9  # rad, or of the size: an opening below it beside a larger one of the other kind is none
 CLOSE = 0.9  # of the largest need: maxima between the positions are looked for beside those above it
 MOST_TOPS = 4
 BETWEEN, NARROWED = 9, 5  # points in the interval around a maximum, and how often it is narrowed to a quarter
@@ -151,9 +152,9 @@ class Study:
         result = Result(self.system, self.values, time, list(self.findings))
         even = [end for end, evened in zip(self.pins, self.evened, strict=True) if evened]
         result.of, result.pins = ", ".join(dict.fromkeys(end.joint for end in even)), all(end.pin for end in even)
-        result.played = bool(self.stated)
-        arrays, there = result.arrays, self._open(result)
-        if not np.any(arrays["open_angle"][there] + arrays["open_length"][there] > 0):
+        result.played, result.nil = bool(self.stated), _nil(self.system, self.values)
+        arrays, (there, opened) = result.arrays, self._open(result)
+        if not np.any(opened):
             return self._fitting(result, there)
         _check_lengths(self.system, self.values, self.pins)
         shares, needs = self.solve(time, stated=True), self.solve(time, stated=False)
@@ -184,8 +185,11 @@ class Study:
         result.tell()
         return result
 
-    def _open(self, result: Result) -> NDArray[np.bool_]:
-        """How far the loops are open where they are so least without play, in angle and in length; where they exist."""
+    def _open(self, result: Result) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """How far the loops are open where they are so least without play, in angle and in length.
+
+        Returns where they exist, and where they are open.
+        """
         time = result.time
         loops, none = Loops.of(self.system, self.values, (), time), np.zeros((len(time), 0))
         with np.errstate(all="ignore"):
@@ -193,8 +197,9 @@ class Study:
             rows = loops.linear(q, none).gap[:, : 6 * len(loops.group.chords)].reshape(len(time), -1, 2, 3)
         rows = np.where((gap <= CLOSED)[:, None, None, None], 0.0, rows)  # rounding
         sizes = np.max(np.linalg.norm(rows, axis=-1), axis=1)
+        sizes[(sizes < ROUNDING) & (sizes < np.max(sizes, axis=1, keepdims=True))] = 0.0
         result.arrays["open_angle"], result.arrays["open_length"] = sizes[:, 0], sizes[:, 1] * loops.size
-        return np.isfinite(gap)
+        return np.isfinite(gap), gap > CLOSED
 
     def _place(self, found: Found, ends: Sequence[End], offsets: Array, parts: Array) -> None:
         """Offsets and parts of the ends at their places in the result."""
@@ -228,6 +233,12 @@ class Study:
             most, reach = np.maximum(most, better), reach / 4
         top = int(np.argmax(most))
         return float(most[top]), float(best[top])
+
+
+def _nil(system: SpatialSystem, values: Values) -> bool:
+    """Whether any joint states a clearance of 0."""
+    stated = (shifts.clearance(values, name) for name in system.joints)
+    return any(one is not None and np.all(primal(one) == 0) for one in stated)
 
 
 def _worst(one: Found, other: Found, of: Callable[[Found], Array]) -> Array:

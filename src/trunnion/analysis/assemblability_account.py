@@ -23,6 +23,8 @@ __all__ = ["ENOUGH", "FIGURES", "Fit", "Result", "labels"]
 
 Array = NDArray[np.float64]
 ENOUGH = 1 + 1e-9  # of the stated clearances: all of it is enough
+EVERYWHERE = "everywhere"
+SAME = 1e-6  # of a need: one that varies by less has no place
 TOLD = 0.05  # a joint's part in the need that is worth telling
 SOURCE = (
     "P. J. Goulart and Y. Chen, Clarabel: an interior-point solver for conic programs with quadratic objectives, "
@@ -91,7 +93,7 @@ class Result:
     """What was found, at times, s: arrays by the names of FIGURES, and what there is to say.
 
     share, clearance: the largest needs of the cycle, each with its time; of: joints whose clearance is looked for;
-    pins: whether they are pins alone; played: whether any play is stated.
+    pins: whether they are pins alone; played: whether any play is stated; nil: whether a clearance of 0 is.
     """
 
     system: System
@@ -104,6 +106,7 @@ class Result:
     of: str = ""
     pins: bool = True
     played: bool = False
+    nil: bool = False
 
     def __post_init__(self) -> None:
         sizes = {"position": len(self.time), **{dim: len(names) for dim, names in labels(self.system).items()}}
@@ -120,6 +123,18 @@ class Result:
         dial = self.system.dial(self.values, np.array([time]))
         return f"{dial.at(0)} of {dial.of}" if dial.of else dial.at(0)
 
+    def _place(self, most: tuple[float, float], needs: NDArray[Any]) -> str:
+        """Where the largest need, with its time, is among those of the positions: everywhere, if it is one number."""
+        need, time = most
+        same = len(needs) > 1 and bool(np.all(np.isfinite(needs))) and need - float(np.min(needs)) <= SAME * need
+        return EVERYWHERE if same else f"at {self.where(time)}"
+
+    def _share_place(self) -> str:
+        return self._place(self.share, self.arrays["needed_share"])
+
+    def _need_place(self) -> str:
+        return self._place(self.clearance, self.arrays["needed_clearance"])
+
     # ---- what there is to say -------------------------------------------------------------------------------
 
     def tell(self) -> None:
@@ -134,10 +149,10 @@ class Result:
             self._say(f"{Fit.UNSETTLED.text} {self._intervals(unsettled)}", "joints", remedy)
         if len(self.findings) > count or not self.of:
             return
-        share, at = self.share
+        share = self.share[0]
         what = "the axes fit: the loops close without any clearance"
         if share > 0:
-            what = f"the stated clearances take up the errors: {share:.4g} of them is needed, at {self.where(at)}"
+            what = f"the stated clearances take up the errors: {_share(share)} of them is needed, {self._share_place()}"
         self._say(what, "joints", "", Severity.NOTE)
 
     def _say(self, what: str, where: str, remedy: str, severity: Severity = Severity.ERROR) -> None:
@@ -156,10 +171,12 @@ class Result:
         (share, at), short = self.share, np.flatnonzero(self.arrays["status"] == Fit.SHORT)
         what = "the stated clearances do not close the loops"
         if len(short):
-            what = f"{what} {self._intervals(short)}: at {self.where(at)} it takes {share:.4g} times as much"
+            place, takes = self._share_place(), f"it takes {_share(share)} times as much"
+            takes = f"{takes} {place}" if place == EVERYWHERE else f"{place} {takes}"
+            what = f"{what} {self._intervals(short)}: {takes}"
             self._say(what, "joints", self._remedy())
         elif np.isfinite(share) and share > ENOUGH:  # between the positions
-            what = f"{what} near {self.where(at)}: it takes {share:.6g} times as much"
+            what = f"{what} near {self.where(at)}: it takes {_share(share)} times as much"
             self._say(what, "joints", self._remedy())
 
     def _rigid(self) -> None:
@@ -167,27 +184,27 @@ class Result:
         if not len(places):
             return
         angle, length = (float(np.nanmax(self.arrays[name])) for name in ("open_angle", "open_length"))
-        by = f"{1e3 * length:.4g} mm and {np.degrees(angle):.4g}° {self._intervals(places)}"
-        none = (
-            "the stated play cannot close the loops, however large: they"
-            if self.played
-            else "no play is stated: the loops"
-        )
+        sizes = [f"{1e3 * length:.4g} mm"] * (length > 0) + [f"{np.degrees(angle):.4g}°"] * (angle > 0)
+        by = f"{' and '.join(sizes)} {self._intervals(places)}"
+        none = "a stated clearance of 0 is no play: the loops" if self.nil else "no play is stated: the loops"
+        if self.played:
+            zero = " (a clearance of 0 is none)" if self.nil else ""
+            none = f"the stated play cannot close the loops, however large{zero}: they"
         self._say(f"{none} stay open by up to {by}", "joints", self._remedy())
 
     def _remedy(self) -> str:
-        need, at = self.clearance
+        need = self.clearance[0]
         if not np.isfinite(need):
             return "give pins a clearance, those that nothing lets move along their axis an end float; or mend the axes"
-        size = f"{1e3 * need:.5g} mm" if need >= 1e-4 else f"{1e6 * need:.5g} um"
+        size = f"{_enough(1e3 * need)} mm" if need >= 1e-4 else f"{_enough(1e6 * need)} um"
         pins = "the pins " if self.pins else ""
-        return f"the smallest radial clearance, the same in {pins}{self.of}, is {size}, needed at {self.where(at)}"
+        return f"the smallest radial clearance, the same in {pins}{self.of}, is {size}, needed {self._need_place()}"
 
     # ---- figures --------------------------------------------------------------------------------------------
 
     def summary(self) -> list[dict[str, Any]]:
         """The figures one looks at first."""
-        (share, share_at), (need, need_at) = self.share, self.clearance
+        share, need = self.share[0], self.clearance[0]
         if not self.of:
             return [_row("smallest clearance that is needed", 0.0, "mm")]
         angle, length = (float(np.nanmax(self.arrays[name], initial=0.0)) for name in ("open_angle", "open_length"))
@@ -195,12 +212,17 @@ class Result:
             _row("loops open without play, angle", float(np.degrees(angle)), "deg"),
             _row("loops open without play, length", 1e3 * length, "mm"),
         ]
+        if angle > 0 or length > 0:
+            rows = [row for row in rows if row["value"] > 0]
         if self.played:
-            rows.append(_row("needed share of the stated clearances", "∞" if np.isinf(share) else _number(share), "1"))
-            rows += [_row("  at", self.where(share_at), "")] if 0 < share < np.inf else []
+            # what six digits show as 1 is told by as many as it takes
+            told = _share(share) if f"{share:.6g}" == "1" or np.isinf(share) else _number(share)
+            rows.append(_row("needed share of the stated clearances", told, "1"))
+            rows += [_row("  at", self._share_place().removeprefix("at "), "")] if 0 < share < np.inf else []
         rows.append(_row(f"smallest clearance, the same in {self.of}", _number(1e3 * need), "mm"))
         if 0 < need < np.inf:
-            rows += [_row("  at", self.where(need_at), ""), _row("  part of each joint's clearance", self._parts(), "")]
+            rows.append(_row("  at", self._need_place().removeprefix("at "), ""))
+            rows.append(_row("  part of each joint's clearance", self._parts(), ""))
         return rows
 
     def _parts(self) -> str:
@@ -245,6 +267,20 @@ class Result:
 
 def _row(label: str, value: float | str | None, unit: str) -> dict[str, Any]:
     return {"label": label, "value": value, "unit": unit}
+
+
+def _share(share: float) -> str:
+    """Four digits, or as many as it takes to tell it from 1; ∞."""
+    if np.isinf(share):
+        return "∞"
+    told = (f"{share:.{digits}g}" for digits in range(4, 11))
+    return next((text for text in told if float(text) != 1), "1")
+
+
+def _enough(size: float) -> str:
+    """Five digits, rounded up: the number that is written suffices."""
+    step = 10.0 ** (np.floor(np.log10(size)) - 4)
+    return f"{np.ceil(size / step * (1 - 1e-12)) * step:.5g}" if size > 0 else "0"
 
 
 def _number(value: float) -> float | None:

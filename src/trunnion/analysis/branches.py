@@ -225,7 +225,10 @@ def _anew(module: Module, dial: Dial, positions: Positions) -> Finding:
 def _never(system: System, module: Module) -> Finding:
     what = f"links {', '.join(module.links)} cannot be assembled anywhere along the cycle"
     remedy = "check the lengths, or give a better assembly hint"
-    if module.redundant:
+    if module.redundant and system.mechanism.has_errors:
+        what = f"links {', '.join(module.links)} with their errors do not close as rigid parts anywhere along the cycle"
+        remedy = "if they go together it is by their play only: `trunnion assemble FILE` tells how much that takes"
+    elif module.redundant:
         plan, drivers = system.plan, len(system.mechanism.drivers)
         spins = f" ({len(plan.passive)} of it spins of a link alone)" if plan.passive else ""
         what += f"; the mobility is {plan.mobility} by Grübler's formula{spins} and the number of drivers {drivers}"

@@ -208,9 +208,9 @@ def _not_assembled(causes: Causes, dial: Dial, part: _Open) -> Finding:
             remedy = "its joints constrain more than they free, so it closes with special dimensions only: check them, "
             remedy += "or let joints slide or tilt (cylindrical, spherical)"
             if causes.system.mechanism.has_errors:
-                remedy = (
-                    "its errors may fit into the play of its pins: `trunnion assemble` tells, and how much that takes"
-                )
+                why = "are over-constrained, and with their errors they go together only by their play, if at all: "
+                why += "they cannot be analysed as rigid parts"
+                remedy = "`trunnion assemble FILE` tells whether they go together, and how much play that takes"
         return Finding(f"{head}: these links {why}", where, remedy)
     told = [
         f"{text} by up to {_length(float(np.nanmax(figure)))}"

@@ -239,7 +239,7 @@ def _put(effect: Effect, i: int, loads: Loads, window: slice, known: NDArray[np.
 
 def _model_findings(run: Run, effect: Effect) -> Iterator[Finding]:
     mechanism = run.system.mechanism
-    yield from (one for one in model_notes(mechanism) if one.severity is not Severity.NOTE)
+    yield from (one for one in model_notes(mechanism, run.system) if one.severity is not Severity.NOTE)
     yield from run.chosen.findings
     if run.determinacy is not None:
         yield from run.determinacy.findings()
@@ -251,7 +251,7 @@ def _model_findings(run: Run, effect: Effect) -> Iterator[Finding]:
     if run.seats:
         what = f"play is counted from the middle of the holes: the seats of {', '.join(one.joint for one in run.seats)}"
         yield Finding(f"{what} are not taken", "joints", "analyse takes them", Severity.NOTE)
-    yield from _over_limits(run, effect)
+    yield from _limits(run, effect)
     dial = run.system.dial(run.values, effect.time)
     for code in Status:
         where = np.flatnonzero(effect.status == code)
@@ -293,15 +293,20 @@ def _spinning(run: Run, measures: Sequence[Measure]) -> Iterator[Finding]:
                 yield Finding(what, f"measures.{measure.name}", "measure one of these points", Severity.WARNING)
 
 
-def _over_limits(run: Run, effect: Effect) -> Iterator[Finding]:
-    """Measures whose worst case is above their limit."""
+def _limits(run: Run, effect: Effect) -> Iterator[Finding]:
+    """Measures whose worst case is above their limit, and those that keep theirs."""
     dial = run.system.dial(run.values, effect.time)
     for measure, total in zip(effect.measures, relied_on(effect.total, effect.status), strict=True):
-        over = np.flatnonzero(total > np.nan if measure.limit is None else total > measure.limit)
+        if measure.limit is None or not np.any(np.isfinite(total)):
+            continue
+        over, where = np.flatnonzero(total > measure.limit), f"measures.{measure.name}.limit"
+        unit = measure.unit(run.system)
+        factor, shown = (180 / np.pi, "deg") if unit == "rad" else (1e3, "mm") if unit == "m" else (1.0, unit)
+        top = int(np.nanargmax(total))
+        what = f"the worst case is {factor * total[top]:.4g} {shown} at {dial.at(top)}, the limit is "
+        what += f"{factor * measure.limit:.4g} {shown}"
         if len(over):
-            unit = measure.unit(run.system)
-            factor, shown = (180 / np.pi, "deg") if unit == "rad" else (1e3, "mm") if unit == "m" else (1.0, unit)
-            top = int(np.nanargmax(total))
-            what = f"the worst case is {factor * total[top]:.4g} {shown} at {dial.at(top)}, the limit is "
-            what += f"{factor * (measure.limit or 0.0):.4g} {shown}; it is above {dial.intervals(over)}"
-            yield Finding(what, f"measures.{measure.name}.limit", "tighten the joints with the largest share")
+            what += f"; it is above {dial.intervals(over)}"
+            yield Finding(what, where, "tighten the joints with the largest share")
+        else:
+            yield Finding(f"{what}: it is kept", where, severity=Severity.NOTE)

@@ -315,7 +315,7 @@ def _named(swept: Sequence[Swept], index: tuple[int, ...]) -> Iterator[None]:
 
 
 def _model_findings(run: Run) -> Iterator[Finding]:
-    yield from model_notes(run.system.mechanism)
+    yield from model_notes(run.system.mechanism, run.system)
     yield from run.chosen.findings
     if run.determinacy is not None:
         yield from run.determinacy.findings()

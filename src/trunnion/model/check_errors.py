@@ -221,6 +221,8 @@ def _play_sign(mechanism: Mechanism, name: str, joint: Joint, numbers: Parameter
     pin = joint.pin
     if pin is None or pin.clearance is not None or has_guide(joint.type) or pin.hole_radius is None:
         return  # a negative clearance is found with the other lengths
+    if f"{where}.pin.hole_radius" not in values:  # a play along the axis alone
+        return
     radius, hole = values[f"{where}.pin.radius"], values[f"{where}.pin.hole_radius"]
     if not hole < radius:
         return

@@ -30,7 +30,6 @@ _MEANINGS: Mapping[str, tuple[str, str]] = {
     "model_type": ("is not a group of entries", "write a group {{key: value}} or indented lines key: value"),
     "too_short": ("has {actual_length} entries, at least {min_length} are needed", "give them all"),
     "too_long": ("has more than the {max_length} entries it can have", "remove what is too much"),
-    "literal_error": ("is none of {expected}", "write one of {expected}"),
 }
 
 
@@ -62,6 +61,11 @@ def _finding(error: ErrorDetails, model: type[BaseModel], data: Mapping[str, Any
         remedy = "write way-1, way-2, … as `check` lists them"
     elif kind == "literal_error" and key == "trunnion":
         what, remedy = f"the file is of version {error['input']!r}, this program reads 1", "write trunnion: 1"
+    elif kind == "literal_error":
+        wrong = f"'{error['input'][:40]}' " if isinstance(error["input"], str) else ""
+        what, remedy = f"{wrong}is none of {context['expected']}", f"write one of {context['expected']}"
+        if key == "seat":
+            remedy = "write free or loaded, or a group of angles {beta: …, xi: …}; of a ball {direction: [x, y, z]}"
     elif kind in _MEANINGS:
         what, remedy = (text.format(**{"key": key, **context}) for text in _MEANINGS[kind])
     else:

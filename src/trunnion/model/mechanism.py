@@ -6,6 +6,7 @@ import hashlib
 import json
 import os
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Annotated, Any, Literal, Self
@@ -279,7 +280,10 @@ class Mechanism(Part):
         """Path and place of the error of a number, or of a number of a joint, that the file may state and does not."""
         if name.startswith("errors."):
             named = name.removeprefix("errors.")
-            return f"errors.{self.parameter_set.resolve(named)}", ("errors", named)
+            try:
+                return f"errors.{self.parameter_set.resolve(named)}", ("errors", named)
+            except MechanismError as error:
+                raise MechanismError([replace(one, where=name) for one in error.findings]) from None
         for part, kind in _JOINT_PARTS.items():
             before, found, rest = name.rpartition(f".{part}.")
             holder = self._holder(before) if found else None

@@ -69,6 +69,7 @@ def find(arrays: Arrays, run: Run, time: NDArray[np.float64]) -> list[Loss]:
     found: list[Loss] = []
     joints = list(run.system.joints)
     arrays["contact_loss_number"][:] = _numbers(arrays, run, time)
+    arrays["contact_loss_number"][:, arrays["status"] == Status.ZERO_SLIP] = np.nan  # friction jumps there
     largest = float(np.nanmax(np.abs(arrays["reaction_force"]), initial=0.0))
     # where a joint turns round, the sense of its friction is what does not settle; where forces have no answer, nothing
     status = arrays["status"]
@@ -120,7 +121,10 @@ def _earles_wu(force: NDArray[np.float64], time: NDArray[np.float64], periodic: 
     along = np.sum(force * rate, axis=1)
     with np.errstate(all="ignore"):
         across = np.sqrt(np.maximum(np.sum(rate * rate, axis=1) - along**2 / size, 0.0))
-        jumps = np.sum(np.roll(force, -1, axis=-1) * np.roll(force, 1, axis=-1), axis=1) < 0  # no rate tells that
+        # no rate tells a jump, of the load or of a friction: there the second difference is no smaller than the first
+        before, after = np.roll(force, 1, axis=-1), np.roll(force, -1, axis=-1)
+        bends = np.sum((after - 2 * force + before) ** 2, axis=1) > 0.25 * np.sum((after - before) ** 2, axis=1)
+        jumps = (np.sum(after * before, axis=1) < 0) | bends
         return np.where((size > 0) & ~jumps, across / size, np.nan)
 
 

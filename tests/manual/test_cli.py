@@ -9,46 +9,21 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
 
 import pandas as pd
 import pytest
 import xarray as xr
 
-from trunnion import cli
+from manual.conftest import Run
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 FOUR_BAR = EXAMPLES / "durango-fourbar.yaml"
 
 
-class Outcome(NamedTuple):
-    code: int
-    out: str
-    err: str
-
-
-Run = Callable[..., Outcome]
-
-
 @pytest.fixture
-def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Run:
-    """The program, in this process, in an empty folder."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "140")
-
-    def call(*arguments: object) -> Outcome:
-        monkeypatch.setattr(sys, "argv", ["trunnion", *map(str, arguments)])
-        capsys.readouterr()
-        code = 0
-        try:
-            cli.main()
-        except SystemExit as stop:
-            code = int(stop.code or 0)
-        out, err = capsys.readouterr()
-        assert "Traceback" not in err + out
-        return Outcome(code, out, err)
-
-    return call
+def run(program: Run) -> Run:
+    """The program."""
+    return program
 
 
 def model(tmp_path: Path, change: Callable[[str], str], name: str = "model.yaml") -> Path:

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import csv
+import functools
 import json
 import re
-import sys
-from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
@@ -16,20 +14,11 @@ import pytest
 import xarray as xr
 
 import trunnion
-from trunnion import cli
+from manual.conftest import Run
 from trunnion.views.fit import figure
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / "examples"
-
-
-class Outcome(NamedTuple):
-    code: int
-    out: str
-    err: str
-
-
-Run = Callable[..., Outcome]
 
 
 @pytest.fixture
@@ -44,24 +33,10 @@ def model(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Run:
-    """The verb, in this process, in a folder of its own."""
-    monkeypatch.chdir(tmp_path)
+def run(program: Run, monkeypatch: pytest.MonkeyPatch) -> Run:
+    """The verb."""
     monkeypatch.setenv("COLUMNS", "160")
-
-    def call(*arguments: object) -> Outcome:
-        monkeypatch.setattr(sys, "argv", ["trunnion", "assemble", *map(str, arguments)])
-        capsys.readouterr()
-        code = 0
-        try:
-            cli.main()
-        except SystemExit as stop:
-            code = int(stop.code or 0)
-        out, err = capsys.readouterr()
-        assert "Traceback" not in err + out
-        return Outcome(code, out, err)
-
-    return call
+    return functools.partial(program, "assemble")
 
 
 def read(path: Path) -> list[dict[str, str]]:

@@ -8,15 +8,15 @@ import pandas as pd
 import pytest
 import xarray as xr
 
-from manual.test_cli import EXAMPLES, Run, run
+from manual.conftest import Run
+from manual.test_cli import EXAMPLES
 
-__all__ = ["run"]
 SLIDER, FOUR_BAR = EXAMPLES / "toleranced-slider-crank.yaml", EXAMPLES / "fourbar-with-play.yaml"
 
 
-def test_seats_of_all_joints_by_an_option(run: Run, tmp_path: Path) -> None:
+def test_seats_of_all_joints_by_an_option(program: Run, tmp_path: Path) -> None:
     """--seat loaded gives seats, errors and what they cost; free is the mechanism with its pins in the middle."""
-    done = run("analyse", SLIDER, "--seat", "loaded", "--out", tmp_path / "a.csv", "--out", tmp_path / "a.nc")
+    done = program("analyse", SLIDER, "--seat", "loaded", "--out", tmp_path / "a.csv", "--out", tmp_path / "a.nc")
     assert done.code == 0
     assert "transmission error of S" in done.out
     assert "seat iterations" in done.out
@@ -28,33 +28,33 @@ def test_seats_of_all_joints_by_an_option(run: Run, tmp_path: Path) -> None:
     assert size.to_numpy() == pytest.approx(17e-6, rel=1e-9)  # 16 H7/f7: 16 to 52 µm wide
     with xr.open_dataset(tmp_path / "a.nc") as whole:
         assert whole.seat_offset.dims == ("joint", "end", "axis", "position")
-    free = run("analyse", FOUR_BAR, "--seat", "free", "--out", tmp_path / "b.csv")
+    free = program("analyse", FOUR_BAR, "--seat", "free", "--out", tmp_path / "b.csv")
     assert "P.seat_1_x" not in pd.read_csv(tmp_path / "b.csv")
     assert "taken to lie in the middle of their play" in free.err + free.out
 
 
-def test_a_seating_that_is_none(run: Run) -> None:
-    done = run("analyse", SLIDER, "--seat", "tight")
+def test_a_seating_that_is_none(program: Run) -> None:
+    done = program("analyse", SLIDER, "--seat", "tight")
     assert done.code == 2
     assert "loaded or free" in done.err + done.out
 
 
-def test_errors_and_misalignment_by_name(run: Run, tmp_path: Path) -> None:
+def test_errors_and_misalignment_by_name(program: Run, tmp_path: Path) -> None:
     """Any number off nominal, any axis off: the result is told against the ideal mechanism."""
-    run("analyse", FOUR_BAR, "--seat", "free", "--set", "errors.coupler=0.1mm", "--out", tmp_path / "a.nc")
+    program("analyse", FOUR_BAR, "--seat", "free", "--set", "errors.coupler=0.1mm", "--out", tmp_path / "a.nc")
     with xr.open_dataset(tmp_path / "a.nc") as found:
         assert float(abs(found.joint_rotation_error.sel(joint="D")).max()) > 1e-3
         assert "seat_offset" not in found
-    done = run("analyse", EXAMPLES / "rssr.yaml", "--set", "A.misalignment.tilt=0.1deg", "--out", tmp_path / "b.nc")
+    done = program("analyse", EXAMPLES / "rssr.yaml", "--set", "A.misalignment.tilt=0.1deg", "--out", tmp_path / "b.nc")
     assert done.code in (0, 1)
     with xr.open_dataset(tmp_path / "b.nc") as found:
         assert float(abs(found.link_error).max()) > 1e-4
 
 
-def test_what_play_does_and_whether_it_assembles(run: Run) -> None:
-    done = run("play", FOUR_BAR)
+def test_what_play_does_and_whether_it_assembles(program: Run) -> None:
+    done = program("play", FOUR_BAR)
     assert done.code == 0
     assert "worst case" in done.out
-    done = run("assemble", EXAMPLES / "misaligned-fourbar.yaml", "--steps", 24)
+    done = program("assemble", EXAMPLES / "misaligned-fourbar.yaml", "--steps", 24)
     assert done.code == 0
     assert "smallest clearance" in done.out

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import sys
-from collections.abc import Callable
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -14,33 +12,22 @@ import pytest
 import xarray as xr
 
 import trunnion
+from manual.conftest import Outcome, Run
 from played import four_bar
-from trunnion import cli
 from trunnion.model.file import write_mechanism
 from trunnion.views.play import figure, tables
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 SLIDER = EXAMPLES / "toleranced-slider-crank.yaml"
-Run = Callable[..., tuple[int, str, str]]
 
 
 @pytest.fixture
-def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Run:
-    """The verb, in this process, in an empty folder."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "140")
+def run(program: Run) -> Run:
+    """The verb; a thin space is a space."""
 
-    def call(*arguments: object) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["trunnion", "play", *map(str, arguments)])
-        capsys.readouterr()
-        code = 0
-        try:
-            cli.main()
-        except SystemExit as stop:
-            code = int(stop.code or 0)
-        out, err = (text.replace("\u00a0", " ") for text in capsys.readouterr())
-        assert "Traceback" not in err + out
-        return code, out, err
+    def call(*arguments: object) -> Outcome:
+        done = program("play", *arguments)
+        return Outcome(done.code, *(text.replace("\u00a0", " ") for text in done[1:]))
 
     return call
 

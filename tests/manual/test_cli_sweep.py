@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import csv
-import sys
-from collections.abc import Callable
+import functools
 from pathlib import Path
-from typing import NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
@@ -14,7 +12,7 @@ import pytest
 import xarray as xr
 
 import trunnion
-from trunnion import cli
+from manual.conftest import Run
 from trunnion.views import sweep as view
 from trunnion.views.swept import table
 
@@ -23,34 +21,10 @@ FOUR_BAR = EXAMPLES / "durango-fourbar.yaml"
 SLIDER = EXAMPLES / "inverted-slider-crank.yaml"
 
 
-class Outcome(NamedTuple):
-    code: int
-    out: str
-    err: str
-
-
-Run = Callable[..., Outcome]
-
-
 @pytest.fixture
-def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Run:
-    """The verb, in this process, in an empty folder."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "140")
-
-    def call(*arguments: object) -> Outcome:
-        monkeypatch.setattr(sys, "argv", ["trunnion", "sweep", *map(str, arguments)])
-        capsys.readouterr()
-        code = 0
-        try:
-            cli.main()
-        except SystemExit as stop:
-            code = int(stop.code or 0)
-        out, err = capsys.readouterr()
-        assert "Traceback" not in err + out
-        return Outcome(code, out, err)
-
-    return call
+def run(program: Run) -> Run:
+    """The verb."""
+    return functools.partial(program, "sweep")
 
 
 def rows(path: Path) -> list[dict[str, str]]:

@@ -18,11 +18,11 @@ from trunnion.analysis.kinematics import start
 from trunnion.analysis.kinetostatics import Backward
 from trunnion.analysis.loads import Stated
 from trunnion.analysis.scene import DRAWN
-from trunnion.analysis.shifts import clearance
 from trunnion.analysis.system import Cycle, Dial, System, rubbing
 from trunnion.errors import Finding, Severity, Status
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.model.check import check_model
+from trunnion.model.contact import clearance
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.quantity import Quantity
 from trunnion.model.units import KINDS, Dimension, si_unit
@@ -177,7 +177,7 @@ def model_notes(mechanism: Mechanism, system: System) -> list[Finding]:
     playing = [
         name
         for name, joint in mechanism.effective_joints.items()
-        if name not in mechanism.seated and clearance(values, name) is not None
+        if name not in mechanism.seated and clearance(name, values) is not None
     ]
     bodies = {name: link for name, link in mechanism.effective_links.items() if name != mechanism.fixed_link}
     heavy = [name for name, link in bodies.items() if link.mass.source != 0]
@@ -193,7 +193,7 @@ def model_notes(mechanism: Mechanism, system: System) -> list[Finding]:
     tight = [
         name
         for name, joint in mechanism.effective_joints.items()
-        if joint.seat not in (None, "free") and name not in mechanism.seated and clearance(values, name) is not None
+        if joint.seat not in (None, "free") and name not in mechanism.seated and clearance(name, values) is not None
     ]
     if tight:
         what = f"{', '.join(tight)} have a seat but no play at their nominal sizes: the joints are ideal"

@@ -12,9 +12,9 @@ from trunnion.algebra.namespace import Number
 from trunnion.algebra.rigid import point_of
 from trunnion.analysis.kinematics import Forward
 from trunnion.analysis.seating import Seat, Seated
-from trunnion.analysis.shifts import clearance
 from trunnion.groups.planar import point
 from trunnion.joints.clearance import describing
+from trunnion.model.contact import clearance
 
 if TYPE_CHECKING:
     from trunnion.analysis.analyse import Run
@@ -88,7 +88,7 @@ def _describe(arrays: Arrays, i: int, window: slice, walk: Forward, seat: Seat) 
 def _fill_contacts(arrays: Arrays, i: int, window: slice, walk: Forward, seat: Seat) -> None:
     """B₁ and B₂: on the wall of the hole in the direction of the offset; of a guide the ends of its axis."""
     frame = walk.hole(seat.joint)
-    own = clearance(walk.values, seat.joint)
+    own = clearance(seat.joint, walk.values)
     radius = walk.values.get(f"joints.{seat.joint}.pin.radius", np.nan) + (own if own is not None else 0.0)
     spatial = walk.system.mechanism.space == "spatial"
     guide = seat.play.model.size is not None and seat.play.model.size[0] == "guide"

@@ -28,6 +28,7 @@ from trunnion.analysis.space.system import SpatialSystem
 from trunnion.analysis.system import Cycle, System, Values
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.joints.clearance import CLEARANCE_MODELS
+from trunnion.model.contact import clearance
 from trunnion.model.mechanism import Mechanism
 
 if TYPE_CHECKING:
@@ -237,7 +238,7 @@ class Study:
 
 def _nil(system: SpatialSystem, values: Values) -> bool:
     """Whether any joint states a clearance of 0."""
-    stated = (shifts.clearance(values, name) for name in system.joints)
+    stated = (clearance(name, values) for name in system.joints)
     return any(one is not None and np.all(primal(one) == 0) for one in stated)
 
 

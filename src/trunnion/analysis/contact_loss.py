@@ -113,16 +113,15 @@ def _earles_wu(force: NDArray[np.float64], time: NDArray[np.float64], periodic: 
     """|F × Ḟ|/|F|³, rad/(N s), of every joint, by central differences over the positions; NaN of a single one."""
     if len(time) < 3:
         return np.full((len(force), len(time)), np.nan)
-    step = time[1] - time[0]
-    rate = (np.roll(force, -1, axis=-1) - np.roll(force, 1, axis=-1)) / (2 * step)
-    if not periodic:
-        rate[..., 0], rate[..., -1] = (force[..., 1] - force[..., 0]) / step, (force[..., -1] - force[..., -2]) / step
+    before, after = np.roll(force, 1, axis=-1), np.roll(force, -1, axis=-1)
+    if not periodic:  # the ends have no rate
+        before[..., 0] = after[..., -1] = np.nan
+    rate = (after - before) / (2 * (time[1] - time[0]))
     size = np.sum(force * force, axis=1)
     along = np.sum(force * rate, axis=1)
     with np.errstate(all="ignore"):
         across = np.sqrt(np.maximum(np.sum(rate * rate, axis=1) - along**2 / size, 0.0))
         # no rate tells a jump, of the load or of a friction: there the second difference is no smaller than the first
-        before, after = np.roll(force, 1, axis=-1), np.roll(force, -1, axis=-1)
         bends = np.sum((after - 2 * force + before) ** 2, axis=1) > 0.25 * np.sum((after - before) ** 2, axis=1)
         jumps = (np.sum(after * before, axis=1) < 0) | bends
         return np.where((size > 0) & ~jumps, across / size, np.nan)

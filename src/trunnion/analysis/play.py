@@ -39,6 +39,7 @@ from trunnion.analysis.space.motion import SpatialWalk
 from trunnion.analysis.system import System, Values
 from trunnion.errors import Finding, MechanismError, Severity, Status
 from trunnion.joints.clearance import CLEARANCE_MODELS, Vector, worst_case
+from trunnion.model.contact import clearance
 from trunnion.model.mechanism import Mechanism
 
 if TYPE_CHECKING:
@@ -266,7 +267,7 @@ def _left_out(run: Run, known: Mapping[str, Play]) -> Iterator[Finding]:
     stated = [
         name
         for name, (kind, _) in run.system.joints.items()
-        if kind not in models and shifts.clearance(run.values, name) is not None
+        if kind not in models and clearance(name, run.values) is not None
     ]
     if stated:
         kinds = ", ".join(f"{name} is {run.system.joints[name][0]}" for name in stated)

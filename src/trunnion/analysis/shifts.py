@@ -18,8 +18,9 @@ from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.space import plus, scaled
 from trunnion.groups import planar
 from trunnion.joints.clearance import CLEARANCE_MODELS, ClearanceModel, leaning
+from trunnion.model.contact import clearance
 
-__all__ = ["Play", "clearance", "hole", "misaligned", "misaligned_planar", "play_of", "seated", "seated_planar"]
+__all__ = ["Play", "hole", "misaligned", "misaligned_planar", "play_of", "seated", "seated_planar"]
 
 Values = Mapping[str, Number]
 
@@ -32,21 +33,10 @@ class Play(NamedTuple):
     length: Number
 
 
-def clearance(values: Values, joint: str) -> Number | None:
-    """Radial clearance R − r of a pin, or the play of a guide to either side, m; None if none is stated."""
-    for part in ("pin", "guide"):
-        path = f"joints.{joint}.{part}"
-        if f"{path}.clearance" in values:
-            return values[f"{path}.clearance"]
-        if f"{path}.hole_radius" in values and f"{path}.radius" in values:
-            return values[f"{path}.hole_radius"] - values[f"{path}.radius"]
-    return None
-
-
 def play_of(space: str, kind: str, values: Values, joint: str) -> Play | None:
     """The play that a joint states; None if it has none, or of a kind that has no model of it."""
     model = CLEARANCE_MODELS[space].get(kind)
-    own = clearance(values, joint)
+    own = clearance(joint, values)
     path = f"joints.{joint}"
     floats = values.get(f"{path}.pin.end_float", 0.0) if model and model.axial else 0.0
     if model is None or (own is None and np.all(primal(floats) == 0)):

@@ -9,6 +9,7 @@ import numpy as np
 
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.joints.clearance import ellipse_error
 from trunnion.joints.fits import FitLimits, fit
 from trunnion.model.contact import PLAY_PAIRS, has_guide, has_pin, has_play, play
 from trunnion.model.joint_parts import Joint, Pin, Seat
@@ -269,8 +270,8 @@ def _play_size(mechanism: Mechanism, name: str, joint: Joint, values: Mapping[st
         return
     radius = float(values.get(f"{where}.pin.radius", np.nan))
     length = float(values.get(f"{where}.pin.length", values.get(f"{where}.pin.bearing", np.nan)))
-    error = 2 * radius * rho / length**2 if length > 0 else np.nan
-    if error > 0.01:  # at beta = pi; it falls with sin⁴(beta/2)
+    error = ellipse_error(rho, radius, length) if length > 0 else np.nan  # at β = π
+    if error > 0.01:
         what = f"taking the hole for a circle where a leaning pin cuts an ellipse errs by up to {100 * error:.2g} %"
         remedy = f"of the play {_mm(rho)}, by 2 r play / length²; a longer pin or a smaller play keeps it below 1 %"
         yield Finding(what, place, remedy, Severity.WARNING)

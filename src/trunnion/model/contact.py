@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from trunnion.algebra.namespace import Number
 from trunnion.model.joint_parts import Joint, freedoms
 
-__all__ = ["PLAY_PAIRS", "contact_lacks", "has_guide", "has_pin", "has_play", "motions", "play"]
+__all__ = ["PLAY_PAIRS", "clearance", "contact_lacks", "has_guide", "has_pin", "has_play", "motions", "play"]
 
 PLAY_PAIRS = ("revolute", "prismatic", "cylindrical", "spherical")  # those whose play is modelled
 
@@ -60,6 +60,20 @@ def has_play(joint: Joint) -> bool:
     )
 
 
+def clearance(name: str, values: Mapping[str, Number]) -> Number | None:
+    """Radial clearance R − r of a joint's pin, or play of its guide to either side, m; None if none is stated.
+
+    values: by path.
+    """
+    for part in ("pin", "guide"):
+        path = f"joints.{name}.{part}"
+        if f"{path}.clearance" in values:
+            return values[f"{path}.clearance"]
+        if f"{path}.hole_radius" in values and f"{path}.radius" in values:
+            return values[f"{path}.hole_radius"] - values[f"{path}.radius"]
+    return None
+
+
 def play(joint: Joint, name: str, values: Mapping[str, Number]) -> Number:
     """How far each end of a joint's pin, slider or ball can lie from the middle of its hole, m; 0 without a play.
 
@@ -70,9 +84,6 @@ def play(joint: Joint, name: str, values: Mapping[str, Number]) -> Number:
         return 0.0
     if has_guide(joint.type):
         return values[f"joints.{name}.guide.clearance"]
-    pin = f"joints.{name}.pin"
-    stated = values.get(f"{pin}.clearance")
-    if stated is None and f"{pin}.hole_radius" in values and f"{pin}.radius" in values:
-        stated = values[f"{pin}.hole_radius"] - values[f"{pin}.radius"]
+    pin, stated = f"joints.{name}.pin", clearance(name, values)
     across = 0.0 if stated is None else stated + values.get(f"{pin}.cylindricity", 0.0)
     return across if across != 0 else 0.5 * values.get(f"{pin}.end_float", 0.0)

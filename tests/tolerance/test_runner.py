@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 import multiprocessing
-import os
 import pickle
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
 
 from toy_job import ToyJob
+from toy_programs import ENVIRONMENT, POSIX, interrupted
 from trunnion import Finding, MechanismError
 from trunnion.analysis.tolerance.ranges import Pace, Plan, count, gaps
 from trunnion.analysis.tolerance.runner import run
-
-TESTS = Path(__file__).resolve().parents[1]
-POSIX = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 
 
 def test_one_process_gives_the_blocks_in_order() -> None:
@@ -122,41 +118,6 @@ def test_ctrl_c_keeps_what_is_done(jobs: int, tmp_path: Path) -> None:
     assert not rest.stopped
 
 
-SCRIPT = """
-import sys
-from toy_job import ToyJob
-from trunnion.analysis.tolerance.runner import run
-
-if __name__ == "__main__":
-    job = ToyJob(blocks=400, pause=0.02)
-    tell = lambda samples: print(samples, flush=True)
-    jobs, cluster, path = int(sys.argv[1]), sys.argv[2] or None, sys.argv[3]
-    done = run(job, jobs=jobs, chunk=500, cluster=cluster, checkpoint=path, progress=tell)
-    print("stopped" if done.stopped else "whole", done.tally.blocks[0][0] == 0)
-"""
-
-
-def interrupted(folder: Path, jobs: int, cluster: str) -> tuple[list[str], str]:
-    """Lines and complaints of a program that is sent a Ctrl-C, with all its processes, in mid-run."""
-    script = folder / "script.py"
-    script.write_text(SCRIPT)
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(TESTS), str(TESTS.parent / "src")])}
-    command = [sys.executable, "-W", "error", str(script), str(jobs), cluster, str(folder / "run.npz")]
-    pipe = subprocess.PIPE
-    with subprocess.Popen(
-        command, stdout=pipe, stderr=pipe, text=True, env=environment, start_new_session=True
-    ) as program:
-        assert program.stdout is not None
-        assert program.stderr is not None
-        lines = [program.stdout.readline().strip() for _ in range(8)]
-        time.sleep(0.1)
-        os.killpg(program.pid, signal.SIGINT)  # as a terminal does it: to the workers too
-        lines += program.stdout.read().split("\n")
-        complaints = program.stderr.read()
-        assert program.wait() == 0
-    return [line for line in lines if line], complaints
-
-
 @POSIX
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_ctrl_c_from_the_terminal_is_quiet(jobs: int, tmp_path: Path) -> None:
@@ -172,8 +133,7 @@ def test_a_script_without_a_guard_is_told_so(tmp_path: Path) -> None:
     script.write_text(
         "from toy_job import ToyJob\nfrom trunnion.analysis.tolerance.runner import run\nrun(ToyJob(), jobs=2)\n"
     )
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(TESTS), str(TESTS.parent / "src")])}
-    ended = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, env=environment, check=False)
+    ended = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, env=ENVIRONMENT, check=False)
     assert ended.returncode == 1
     assert "MechanismError: error: worker processes end before they have begun (exit status 1)" in ended.stderr
     assert "if __name__ == '__main__':" in ended.stderr

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import Dual, derivative, primal
-from trunnion.algebra.namespace import Number
+from trunnion.algebra.namespace import Number, namespace
 from trunnion.analysis.tolerance.inputs import Inputs
 from trunnion.model.tolerances import Tolerance
 
@@ -67,32 +67,32 @@ class Effects:
         at: what is not nominal there, as `corner` gives it.
         """
         at = at or {}
-        nominal = self.inputs.run.values
-        mechanism = self.inputs.run.system.mechanism
         about = {path: value for path, value in at.items() if not path.startswith(SHARE)}
-        rims = self.rims(mechanism.parameters(about) if about else nominal, at)
-        paths = dict.fromkeys([*about, *(path for row in self.rows for path in (*row.real, row.seed) if path)])
+        moved = dict.fromkeys([*about, *(path for row in self.rows for path in (*row.real, row.seed) if path)])
         overrides: dict[str, Number] = {}
-        seats: dict[str, Number] = dict(rims)
-        for path in paths:
-            start = float(np.ravel(primal(about.get(path, rims.get(path, nominal.get(path, 0.0)))))[0])
+        seats: dict[str, Number] = {}
+        for path in moved:
+            start = float(np.ravel(primal(about.get(path, self.inputs.run.values.get(path, 0.0))))[0])
             real = np.array([[row.real.get(path, start)] for row in self.rows])
             number = Dual(real, np.array([[1.0 if row.seed == path else 0.0] for row in self.rows]))
             (seats if path.startswith("seats.") else overrides)[path] = number
-        values = mechanism.parameters(overrides)
+        values = self.inputs.run.system.mechanism.parameters(overrides)
         for joint in self.inputs.held:
             values.update(self.inputs.seat(joint, values))
+        for path, offset in self._rims(values, at).items():
+            seats[path] = seats.get(path, 0.0) + offset
         return {**values, **seats}
 
-    def rims(self, values: Mapping[str, Number], at: Mapping[str, Number]) -> dict[str, Number]:
+    def _rims(self, values: Mapping[str, Number], at: Mapping[str, float]) -> dict[str, Number]:
         """Offsets of pins of which `at` says where in their holes they lie, as shares of the radius."""
         found: dict[str, Number] = {}
         for joint in self.inputs.loose if any(path.startswith(SHARE) for path in at) else ():
             play = self.inputs.play(joint, values)
             assert play is not None
             for end, radius in zip(play.model.ends, play.radii, strict=True):
+                room = namespace(radius).maximum(radius, 0.0)
                 for key in end:
-                    found[f"seats.{joint}.{key}"] = np.maximum(radius, 0.0) * at.get(f"{SHARE}{joint}.{key}", 0.0)
+                    found[f"seats.{joint}.{key}"] = room * at.get(f"{SHARE}{joint}.{key}", 0.0)
         return found
 
     def slopes(self, number: Number, shape: tuple[int, ...]) -> tuple[Array, Array]:
@@ -174,6 +174,20 @@ class Effects:
     def deviations(self) -> tuple[Array, Array]:
         """Standard deviation and mean deviation of every toleranced number, SI."""
         return self.inputs.population.deviations, self.inputs.population.means
+
+    def numbers(self) -> dict[str, Array]:
+        """Of every parameter: nominal value, limits of its deviation, standard deviation and mean; of a clearance the
+        radius, 0 and the play, and the standard deviation of an offset along one axis."""
+        rows = [
+            (self.nominal(i), one.lower, one.upper, self.deviations[0][i], self.deviations[1][i])
+            for i, one in enumerate(self.inputs.tolerances)
+        ]
+        for joint in self.inputs.loose:
+            most, square = self._rooms[joint][0]
+            count = len(self.inputs.ends(joint)[0])
+            rows.append((most, 0.0, most, float(np.sqrt(square / (count + 2))), 0.0))
+        keys = ("nominal", "lower", "upper", "deviation", "shift")
+        return dict(zip(keys, np.array(rows).reshape(-1, len(keys)).T, strict=True))
 
     @cached_property
     def weights(self) -> Array:

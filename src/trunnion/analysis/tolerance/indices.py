@@ -81,9 +81,9 @@ def indices(sampler: Sampler, samples: int, seed: int, progress: Callable[[int],
         found = sobol_indices(func=parts_of, n=base)
         spread = found.bootstrap(confidence_level=0.95, n_resamples=BOOTSTRAPS)
     first, total = spread.first_order.confidence_interval, spread.total_order.confidence_interval
-    return Indices(
-        found.first_order, first.low, first.high, found.total_order, total.low, total.high, base, lost
-    )
+    shape = len(y_one), len(parts)  # of one measure scipy leaves out the axis
+    arrays = (found.first_order, first.low, first.high, found.total_order, total.low, total.high)
+    return Indices(*(np.reshape(array, shape) for array in arrays), base, lost)
 
 
 def _filled(y: Array) -> Array:

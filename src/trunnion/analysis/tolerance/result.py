@@ -50,6 +50,7 @@ class Outcome:
     job: Sampling | None = None
     tally: Tally | None = None
     indices: Indices | None = None
+    stopped: bool = False
 
 
 M, P, MP, MPOS = ("measure",), ("parameter",), ("measure", "parameter"), ("measure", "position")
@@ -173,6 +174,7 @@ def dataset(outcome: Outcome, told: Sequence[Finding]) -> xr.Dataset:
         "drive_unit": dial.unit.strip(),
         "periodic": int(found.run.cycle.periodic),
         "steps": found.steps,
+        "stopped": int(outcome.stopped),
         "summary": json.dumps(summary(outcome, counted, units, dial), ensure_ascii=False),
         "findings": json.dumps(
             [finding_row(finding) for finding in [*findings_of(outcome, counted), *told]], ensure_ascii=False

@@ -23,7 +23,6 @@ from trunnion.analysis.measure_positions import Plan, plan
 from trunnion.analysis.measures import Measure
 from trunnion.analysis.tolerance.inputs import Inputs, inputs_of
 from trunnion.analysis.tolerance.kernel import Kernel, NumpyKernel, kernel_of, references
-from trunnion.analysis.tolerance.ranges import union
 from trunnion.errors import Status
 from trunnion.model.mechanism import Mechanism
 from trunnion.statistics.histogram import Bins, count
@@ -61,7 +60,14 @@ class Tally:
     def blocks(self) -> Sequence[tuple[int, int]]:
         """The blocks done, as ranges."""
         size = self.per_replicate
-        return union([(i * size + low, i * size + high) for i, tree in enumerate(self.trees) for low, high in tree.ranges])
+        found: list[tuple[int, int]] = []
+        for i, tree in enumerate(self.trees):
+            for low, high in tree.ranges:
+                if found and found[-1][1] == i * size + low:
+                    found[-1] = (found[-1][0], i * size + high)
+                else:
+                    found.append((i * size + low, i * size + high))
+        return found
 
     def merge(self, other: Self) -> Self:
         """The tally of both; integers add up, moments merge in the fixed order of the tree."""

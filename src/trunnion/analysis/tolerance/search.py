@@ -28,19 +28,24 @@ Objective = Callable[[Mapping[str, Number], Effects], tuple[Array, Array]]
 
 
 class Corner(NamedTuple):
-    """The largest (least) figure found, the numbers there by path, and how many batches it took."""
+    """The largest (least) figure found, the numbers there by path, and how many batches it took.
+
+    assembles: whether the corner that first order names has an answer.
+    """
 
     value: float
     at: dict[str, float]
     rounds: int
+    assembles: bool = True
 
 
 def search(effects: Effects, objective: Objective, start: Mapping[str, float], sign: float) -> Corner:
     """The corner with the largest figure (sign 1) or the least (−1), from that of first order."""
-    at, best = dict(start), Corner(np.nan, dict(start), 0)
+    at, best, assembles = dict(start), Corner(np.nan, dict(start), 0), True
     for rounds in range(1, MOST_ROUNDS + 1):
         real, slope = objective(effects.values(at), effects)
         best = _better(best, Corner(float(real[0]), at, rounds), sign)
+        assembles = assembles and (rounds > 1 or bool(np.isfinite(real[0])))
         if not np.all(np.isfinite(slope)):
             break
         turned = effects.corner(real, slope, sign)
@@ -60,7 +65,7 @@ def search(effects: Effects, objective: Objective, start: Mapping[str, float], s
         if found is best:
             break
         best = found
-    return best
+    return best._replace(assembles=assembles)
 
 
 def _flips(effects: Effects, at: Mapping[str, float]) -> list[dict[str, float]]:

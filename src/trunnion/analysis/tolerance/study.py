@@ -178,18 +178,21 @@ def tolerance(
     tally: Tally | None = None
     shares: Indices | None = None
     notes: list[Finding] = []
+    stopped = False
     if method is not None:
         job = found.sampling(method, samples, seed, engine)
-        ran = runner.run(job, jobs=jobs, chunk=chunk, cluster=cluster, checkpoint=checkpoint, resume=resume, progress=progress)
-        tally = ran.tally
+        ran = runner.run(
+            job, jobs=jobs, chunk=chunk, cluster=cluster, checkpoint=checkpoint, resume=resume, progress=progress
+        )
+        tally, stopped = ran.tally, ran.stopped
         notes += ran.notes
-        if ran.stopped:
+        if stopped:
             what = f"stopped before the end: {done_of(job, tally):,} of {job.samples:,} samples"
             notes.append(Finding(what, "samples", "go on with --resume", Severity.WARNING))
     if "sobol" in methods:
         own = found.sampling("quasi-monte-carlo", samples, seed)
         shares = indices(found.sampler(own), samples, seed)
-    return dataset(Outcome(found, tuple(methods), worst, job, tally, shares), [*found.told, *notes])
+    return dataset(Outcome(found, tuple(methods), worst, job, tally, shares, stopped), [*found.told, *notes])
 
 
 def done_of(job: Sampling, tally: Tally) -> int:

@@ -258,8 +258,9 @@ def _read(text: str) -> Stated | None:
 
 def _measure(name: str, stated: Stated, values: Values) -> Measure:
     kind = next(key for key in SUBJECTS if getattr(stated, key) is not None)
-    limit = values.get(f"measures.{name}.limit")
-    return Measure(name, kind, getattr(stated, kind), stated.axis or "", None if limit is None else float(limit))
+    limits = [values.get(f"measures.{name}.limit.{end}") for end in ("lower", "upper")]
+    stated_limits = [abs(float(one)) for one in limits if one is not None]
+    return Measure(name, kind, getattr(stated, kind), stated.axis or "", min(stated_limits, default=None))
 
 
 def outputs(system: System) -> list[Measure]:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from trunnion.errors import Finding, MechanismError, Severity
-from trunnion.options import setting, named_file
+from trunnion.options import named_file, setting
 
 if TYPE_CHECKING:
     from trunnion.model.mechanism import Mechanism

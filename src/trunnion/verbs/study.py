@@ -29,7 +29,7 @@ def tolerance(
         list[str] | None,
         typer.Option(
             "--method",
-            help="linear, worst-case, monte-carlo, quasi-monte-carlo or sobol. Repeatable; the first three if not given.",
+            help="linear, worst-case, monte-carlo, quasi-monte-carlo, sobol. Repeatable; the first three if not given.",
             show_default=False,
         ),
     ] = None,
@@ -43,7 +43,7 @@ def tolerance(
     chunk: Annotated[
         int | None, typer.Option("--chunk", help="Samples handed out at a time; about a second's.", show_default=False)
     ] = None,
-    engine: Annotated[str, typer.Option("--engine", help="numpy, or jax: compiled, for large batches and GPUs.")] = "numpy",
+    engine: Annotated[str, typer.Option("--engine", help="numpy, or jax: compiled, for large batches.")] = "numpy",
     cluster: Annotated[
         str | None,
         typer.Option("--cluster", help="Address of a Dask scheduler, or local.", show_default=False),
@@ -61,14 +61,17 @@ def tolerance(
     ] = None,
     kind: Annotated[
         list[str] | None,
-        typer.Option("--kind", help="Figures drawn: histogram, contributions, envelope, convergence or sobol. Repeatable."),
+        typer.Option(
+            "--kind", help="Of the figures: histogram, contributions, envelope, convergence, sobol. Repeatable."
+        ),
     ] = None,
     out: Out = None,
     report: Report = None,
     units_row: UnitsRow = False,
 ) -> None:
     """What tolerances and plays do to measures: worst case, RSS, scatter, yield, contributions."""
-    from trunnion.analysis.tolerance.study import DEFAULT_METHODS, SAMPLINGS
+    from trunnion.analysis.tolerance.sampling import METHODS as SAMPLINGS
+    from trunnion.analysis.tolerance.study import DEFAULT_METHODS
     from trunnion.analysis.tolerance.study import tolerance as run
     from trunnion.verbs.tolerance import check_files, show
 

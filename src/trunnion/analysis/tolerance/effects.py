@@ -112,7 +112,8 @@ class Effects:
             return found
         if i < len(self.inputs.tolerances) and self._tolerance(i).distribution == "direction":
             return np.full(slope.shape[1:], np.nan)
-        return np.sum([_size(load) for load in self._loads(i, real, slope)], axis=0)
+        sizes: Array = np.sum([_size(load) for load in self._loads(i, real, slope)], axis=0)
+        return sizes
 
     def spread(self, real: Array, slope: Array) -> Spread:
         """What first order makes of every parameter."""
@@ -295,4 +296,3 @@ def effects_of(inputs: Inputs) -> Effects:
 def _size(load: Sequence[Array]) -> Array:
     square: Array = np.sum([np.asarray(part) ** 2 for part in load], axis=0)
     return np.sqrt(square)
-

@@ -83,7 +83,8 @@ def indices(sampler: Sampler, samples: int, seed: int, progress: Callable[[int],
     first, total = spread.first_order.confidence_interval, spread.total_order.confidence_interval
     shape = len(y_one), len(parts)  # of one measure scipy leaves out the axis
     arrays = (found.first_order, first.low, first.high, found.total_order, total.low, total.high)
-    return Indices(*(np.reshape(array, shape) for array in arrays), base, lost)
+    one, one_low, one_high, all_, all_low, all_high = (np.reshape(array, shape) for array in arrays)
+    return Indices(one, one_low, one_high, all_, all_low, all_high, base, lost)
 
 
 def _filled(y: Array) -> Array:

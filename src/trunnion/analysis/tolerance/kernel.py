@@ -21,7 +21,7 @@ from trunnion.analysis.measure_figures import Reference, known, reference
 from trunnion.analysis.measure_positions import Plan
 from trunnion.analysis.measures import Measure
 from trunnion.analysis.tolerance.inputs import Inputs
-from trunnion.errors import Finding, MechanismError, Status
+from trunnion.errors import Finding, MechanismError
 
 __all__ = ["Kernel", "NumpyKernel", "kernel_of", "references"]
 

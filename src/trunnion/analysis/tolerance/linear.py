@@ -140,9 +140,7 @@ def _scalar(known: Reference, effects: Effects, course: Course, parts: Sequence[
     return effects.slopes(number, (len(known.window.index),))
 
 
-def _worst(
-    measure: Measure, effects: Effects, real: Array, slope: Array, total: Total
-) -> tuple[int, Array, Array]:
+def _worst(measure: Measure, effects: Effects, real: Array, slope: Array, total: Total) -> tuple[int, Array, Array]:
     """Where the worst case is largest, and the figure and its derivatives there."""
     zero = np.zeros(len(real))
     if measure.rule == "peak-to-peak":

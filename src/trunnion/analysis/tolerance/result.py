@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -14,10 +14,9 @@ from trunnion import __version__
 from trunnion.analysis.account import finding_row, references
 from trunnion.analysis.measures import MEASURES
 from trunnion.analysis.tolerance.indices import Indices
-from trunnion.analysis.tolerance.linear import Of
 from trunnion.analysis.tolerance.said import findings_of, summary
-from trunnion.analysis.tolerance.sampled import QUANTILES, Sampled, sampled
-from trunnion.analysis.tolerance.sampling import CAUSES, Sampling, Tally
+from trunnion.analysis.tolerance.sampled import QUANTILES, sampled
+from trunnion.analysis.tolerance.sampling import Sampling, Tally
 from trunnion.analysis.tolerance.search import Corner
 from trunnion.analysis.tolerance.study import Study
 from trunnion.errors import Finding, Status
@@ -167,8 +166,12 @@ def dataset(outcome: Outcome, told: Sequence[Finding]) -> xr.Dataset:
         "measure_units": json.dumps(units),
         "measure_texts": json.dumps([text_of(measure) for measure in found.measures], ensure_ascii=False),
         "parameter_units": json.dumps(parameter_units),
-        "distributions": json.dumps([*(one.distribution for one in found.inputs.tolerances), *("play" for _ in found.inputs.loose)]),
-        "limits": json.dumps([None if m.lower is None and m.upper is None else [m.lower, m.upper] for m in found.measures]),
+        "distributions": json.dumps(
+            [*(one.distribution for one in found.inputs.tolerances), *("play" for _ in found.inputs.loose)]
+        ),
+        "limits": json.dumps(
+            [None if (m.lower, m.upper) == (None, None) else [m.lower, m.upper] for m in found.measures]
+        ),
         "bounds": json.dumps([[m.at_least, m.at_most] for m in found.measures]),
         "drive": dial.of,
         "drive_unit": dial.unit.strip(),
@@ -186,7 +189,8 @@ def dataset(outcome: Outcome, told: Sequence[Finding]) -> xr.Dataset:
 def text_of(measure: Any) -> str:
     """What a measure is, in words."""
     kind = MEASURES[measure.kind].long_name
-    subject = f" {measure.subject}" if measure.subject not in ("mechanism", "cycle", "instant") else f" ({measure.subject})"
+    whole = measure.subject in ("mechanism", "cycle", "instant")
+    subject = f" ({measure.subject})" if whole else f" {measure.subject}"
     axis = f", {measure.axis}" if measure.axis else ""
     rule = {
         "deviation": ", largest deviation from nominal", "value": " at a position", "line": "", "ratio": "",
@@ -270,5 +274,3 @@ def _shares(outcome: Outcome) -> dict[str, Any]:
         "first_order": one.first, "first_order_low": one.first_low, "first_order_high": one.first_high,
         "total_order": one.total, "total_order_low": one.total_low, "total_order_high": one.total_high,
     }  # fmt: skip
-
-

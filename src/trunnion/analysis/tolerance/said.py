@@ -41,7 +41,8 @@ def _of_measure(
     name = of.measure.name
     if of.measure.rule != "deviation":
         yield {"label": f"{name}, nominal", "value": of.reference.figure, "unit": unit}
-    at = f", at {dial.at(of.reference.window.index[of.place])}" if of.place >= 0 and outcome.study.run.cycle.duration else ""
+    placed = of.place >= 0 and outcome.study.run.cycle.duration > 0
+    at = f", at {dial.at(of.reference.window.index[of.place])}" if placed else ""
     lower, upper, rss, _, deviation = (float(part) for part in of.total)
     yield {"label": f"{name}, worst case, linear{at}", "value": max(-lower, upper), "unit": unit}
     if outcome.worst is not None:
@@ -136,7 +137,7 @@ def _samples(outcome: Outcome, counted: Sampled) -> Iterator[Finding]:
     failed, done = counted.arrays["failed"], counted.done
     for code in range(CAUSES):
         if failed[code]:
-            text = Status(code).text if code < CAUSES - 1 else "a figure does not exist"
+            text = list(Status)[code].text if code < CAUSES - 1 else "a figure does not exist"
             what = f"{int(failed[code]):,} of {done:,} samples ({failed[code] / done:.2%}) have no answer: {text}"
             yield Finding(what, "tolerances", "they count as outside every limit; moments are of the others")
     for i, measure in enumerate(outcome.study.measures):

@@ -57,7 +57,8 @@ def sampled(job: Sampling, tally: Tally, study: Study) -> Sampled:
         "edge": job.bins.edges(),
     }
     ends = _replicated(totals, count) if replicated else _independent(figures, done)
-    arrays |= {f"{key}_{end}": array for key, pair in ends.items() for end, array in zip(("low", "high"), pair, strict=True)}
+    for key, (low, high) in ends.items():
+        arrays |= {f"{key}_low": low, f"{key}_high": high}
     arrays |= _quantiles(job, tally, figures, replicated)
     arrays |= _yields(totals, passes, done, count, replicated)
     arrays |= _capability(job, study, figures)

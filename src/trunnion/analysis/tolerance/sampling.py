@@ -248,8 +248,8 @@ class Sampler:
             lost = np.any(np.isnan(found), axis=0)
             tally.histogram[replicate] += count(found, self.job.bins)
             for i, curve in enumerate(curves):
-                width = curve.shape[-1]
-                tally.band[i, :width] += count(np.broadcast_to(curve, (found.shape[1], width)).T, self.job.curve_bins(i))
+                whole = np.broadcast_to(curve, (found.shape[1], curve.shape[-1]))
+                tally.band[i, : whole.shape[1]] += count(whole.T, self.job.curve_bins(i))
             if np.any(lost):
                 gravest = np.max(status, axis=-1)[lost]
                 cause = np.where(gravest >= Status.NOT_CONVERGED, gravest, CAUSES - 1)

@@ -157,8 +157,8 @@ def tolerance(
 ) -> xr.Dataset:
     """What the tolerances and plays of a mechanism do to measures: limits, scatter, yield, and what each contributes.
 
-    measures: names of the model's, or as on the command line (`measures.named`); all of the model if not given, or, where
-    it states none, rotation and slide of every joint to the ground that is not driven. methods: of METHODS. samples:
+    measures: names of the model's, or as on the command line (`measures.named`); all of the model if not given, or,
+    where it states none, rotation and slide of every joint to the ground that is not driven. methods: of METHODS. samples:
     of the sampling method, and of the variance-based indices; seed: of its random numbers. steps: positions of a whole
     cycle; at: the place (driver coordinate or time) at which measures without a place or figure of their own are taken.
     jobs, chunk, cluster, checkpoint, resume, progress: see `runner.run`. engine: numpy, or jax (an extra).
@@ -201,10 +201,12 @@ def done_of(job: Sampling, tally: Tally) -> int:
 
 
 def _check(methods: Sequence[str], samples: int, seed: int) -> None:
-    findings = []
-    for method in methods:
-        if method not in METHODS:
-            findings.append(Finding(f"there is no method '{method}'", "method", f"use {', '.join(METHODS)}"))
+    known = ", ".join(METHODS)
+    findings = [
+        Finding(f"there is no method '{method}'", "method", f"use {known}")
+        for method in methods
+        if method not in METHODS
+    ]
     if sum(method in SAMPLINGS for method in methods) > 1:
         findings.append(Finding("two sampling methods at once", "method", f"take one of {' and '.join(SAMPLINGS)}"))
     if not 1 <= samples <= MOST_SAMPLES:

@@ -208,7 +208,7 @@ def _at(coefficients: Sequence[Number], spots: Sequence[Array], at: Number) -> t
     value: Number = coefficients[-1]
     slope: Number = 0.0 * value
     second: Number = 0.0 * value
-    for coefficient, spot in zip(coefficients[-2::-1], spots[len(coefficients) - 2 :: -1], strict=True):
+    for coefficient, spot in zip(coefficients[:-1][::-1], spots[: len(coefficients) - 1][::-1], strict=True):
         way = at - spot
         second = second * way + 2 * slope
         slope = slope * way + value

@@ -168,6 +168,10 @@ class Measure:
                 total = total + (load.x * twist.x + load.y * twist.y + load.m * twist.w)
         return total
 
+    def rate_of_course(self, walk: Forward) -> Number | None:
+        """Rate of a course that is an angle, rad/s; None of others."""
+        return self.coordinate(walk.system).rate(walk) if self.turning(walk.system) else None
+
 
 @dataclass(frozen=True)
 class MotionKind:

@@ -24,7 +24,7 @@ from trunnion.model.cost_parts import Process
 from trunnion.model.findings import repair, schema_findings
 from trunnion.model.merge import FitChoice, merge_joint
 from trunnion.model.names import nearest
-from trunnion.model.parameters import Location, ParameterSet, nominal_dimensions
+from trunnion.model.parameters import LIMITS, Location, ParameterSet, nominal_dimensions
 from trunnion.model.parts import (
     Correlation,
     Cost,
@@ -277,7 +277,8 @@ class Mechanism(Part):
         """The mechanism with some entries replaced, by names as in `parameters`; texts are read as in a file.
 
         So are the choices `over_constraint`, `fits`, `joint_defaults.friction.model`, `joint_defaults.seat` and the
-        last two of a joint. Sizes, seat and misalignment of a joint and the error of a number need not be stated yet.
+        last two of a joint. Sizes, seat and misalignment of a joint and the error of a number need not be stated yet, nor
+        a tolerance: `tolerances.AB`, and `tolerances.AB.cp` for a key of it. `measures.NAME.limit` is one text.
         """
         data = self.data()
         for name, value in values.items():
@@ -296,10 +297,13 @@ class Mechanism(Part):
 
     def _location(self, name: str) -> Location:
         """Where what a name means stands, or would stand; MechanismError if it means nothing."""
-        choice = self._choice(name)
+        choice = self._choice(name) or self._limits(name)
         if choice:
             return choice
         entry = self.parameter_set.entries.get(self.path_of(name))
+        if entry and entry.location[-1] in LIMITS:
+            remedy = f"set {entry.where}, as ±0.1 deg or +0.2/-0.1 deg"
+            raise MechanismError(Finding("a limit is stated with the other", name, remedy))
         if entry:
             return entry.location
         found = self._unstated(name)
@@ -315,6 +319,25 @@ class Mechanism(Part):
             if holder:
                 return (*holder, *choice.split("."))
         return None
+
+    def _limits(self, name: str) -> Location | None:
+        """Where the limits of a measure or of a tolerance, or another key of a tolerance, stand; None if not meant."""
+        section, _, rest = name.partition(".")
+        if section == "measures" and rest.removesuffix(".limit") in self.measures and rest.endswith(".limit"):
+            return (section, rest.removesuffix(".limit"), "limit")
+        if section != "tolerances":
+            return None
+        of, _, key = rest.rpartition(".")
+        if key not in Variation.model_fields or not of:
+            of, key = rest, "limits"
+        try:
+            path = self.parameter_set.resolve(of)
+        except MechanismError as error:
+            raise MechanismError([replace(one, where=name) for one in error.findings]) from None
+        stated = (one for one in self.variations if self.parameter_set.resolve(one) == path)
+        of = next(stated, of)
+        short = key == "limits" and (of not in self.variations or self.variations[of].model_fields_set == {"limits"})
+        return (section, of) if short else (section, of, key)
 
     def _unstated(self, name: str) -> tuple[str, Location] | None:
         """Path and place of the error of a number, or of a number of a joint, that the file may state and does not."""
@@ -420,6 +443,7 @@ def _assign(data: dict[str, Any], location: Location, value: float | str | Quant
         if following == "at" and isinstance(holder[key], list):
             holder[key] = {"at": holder[key]}
         elif isinstance(following, str) and not isinstance(holder[key], dict):
-            holder[key] = {} if key == "seat" else {"coefficient": holder[key]}  # the short form of friction
+            short = {"limits": holder[key]} if location[0] == "tolerances" else {"coefficient": holder[key]}
+            holder[key] = {} if key == "seat" else short  # the short form, of tolerances and of friction
         holder = holder[key]
     holder[location[-1]] = value

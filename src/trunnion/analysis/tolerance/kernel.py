@@ -23,9 +23,10 @@ from trunnion.analysis.measures import Measure
 from trunnion.analysis.tolerance.inputs import Inputs
 from trunnion.errors import Finding, MechanismError
 
-__all__ = ["Kernel", "NumpyKernel", "kernel_of", "references"]
+__all__ = ["Courses", "Kernel", "NumpyKernel", "batch_of", "kernel_of", "references"]
 
 
+AT_ONCE = 10_000  # numbers in an array
 Courses = dict[str, tuple[Number, ...]]
 
 
@@ -41,7 +42,7 @@ class NumpyKernel:
 
     run: Run
     measures: Sequence[Measure]
-    friction: FrictionMethod = FrictionMethod()
+    friction: FrictionMethod
 
     @cached_property
     def forces(self) -> bool:
@@ -75,6 +76,11 @@ class NumpyKernel:
     def _course(self, measure: Measure, found: Backward | Forward, status: NDArray[np.int8]) -> tuple[Number, ...]:
         there = known(measure, status)
         return tuple(_where(there, part) for part in measure.curve(found))
+
+
+def batch_of(engine: str, positions: int) -> int:
+    """Samples that an engine takes best at a time: of NumPy in arrays that stay in cache."""
+    return max(1, AT_ONCE // positions)
 
 
 def kernel_of(engine: str, run: Run, measures: Sequence[Measure], friction: FrictionMethod) -> Kernel:

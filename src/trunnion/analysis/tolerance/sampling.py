@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 from trunnion import __version__
 from trunnion.analysis.analyse import prepare
 from trunnion.analysis.friction import FrictionMethod
-from trunnion.analysis.measure_figures import Reference, figure, kept, shown
+from trunnion.analysis.measure_figures import Reference, judged
 from trunnion.analysis.measure_positions import Plan, plan
 from trunnion.analysis.measures import Measure
 from trunnion.analysis.tolerance.inputs import Inputs, inputs_of
-from trunnion.analysis.tolerance.kernel import Kernel, NumpyKernel, kernel_of, references
+from trunnion.analysis.tolerance.kernel import Courses, Kernel, NumpyKernel, batch_of, kernel_of, references
 from trunnion.errors import Status
 from trunnion.model.mechanism import Mechanism
 from trunnion.statistics.histogram import Bins, count
@@ -36,7 +36,8 @@ Counts = NDArray[np.int64]
 Method = Literal["monte-carlo", "quasi-monte-carlo"]
 METHODS: tuple[Method, ...] = ("monte-carlo", "quasi-monte-carlo")
 
-AT_ONCE = 10_000  # numbers in an array of one block: it stays in cache
+BATCHES = 8  # of the kernel in a block, so that summing up costs little beside the analysis
+MOST = 2048  # samples in a block, so that few of them show how figures converge
 REPLICATES = 8  # independent scramblings, whose spread is the error
 CAUSES = len(Status) + 1  # by status; the last: a figure that does not exist, such as a dead centre out of range
 BAND = {"fineness": 4, "octaves": 8}  # of the histograms at every position
@@ -121,7 +122,7 @@ class Sampling:
     @cached_property
     def block_size(self) -> int:
         """Samples in a block."""
-        most = max(1, at_once(self.engine) // self.positions)
+        most = max(1, min(BATCHES * batch_of(self.engine, self.positions), MOST))
         if self.method == "monte-carlo":
             return most
         return min(1 << (most.bit_length() - 1), self._points)
@@ -194,9 +195,9 @@ class Sampling:
         return Sampler(self, inputs, places, kernel_of(self.engine, run, self.measures, self.friction), known)
 
 
-def at_once(engine: str) -> int:
-    """Numbers in an array of one block."""
-    return AT_ONCE if engine == "numpy" else 64 * AT_ONCE
+def _joined(parts: Sequence[tuple[Array, ...]]) -> tuple[Array, ...]:
+    """The courses of batches, one after the other."""
+    return tuple(np.concatenate(part) for part in zip(*parts, strict=True))
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,16 +224,23 @@ class Sampler:
 
     def figures(self, u: Array) -> tuple[Array, Array, list[Array], NDArray[np.int8]]:
         """Of samples drawn: figures and whether they conform, (measure, sample), curves, status (sample, position)."""
-        values = self.inputs.values(u)
-        count = u.shape[1]
-        courses, status = self.kernel.courses(values, self.plan.moved(values))
+        count, batch = u.shape[1], batch_of(self.job.engine, self.job.positions)
+        parts = [self._courses(u[:, low : low + batch]) for low in range(0, count, batch)]
+        courses = {name: _joined([part[name] for part, _ in parts]) for name in parts[0][0]}
+        status = np.concatenate([part for _, part in parts])
         found, passed, curves = np.empty((len(self.job.measures), count)), np.empty((len(self.job.measures), count)), []
         for i, measure in enumerate(self.job.measures):
             course, known = courses[measure.name], self.nominal[measure.name]
-            found[i] = figure(course, known)
-            passed[i] = kept(course, known, found[i])
-            curves.append(shown(course, known))
+            found[i], passed[i], curve = judged(course, known)
+            curves.append(curve)
         return found, passed, curves, status
+
+    def _courses(self, u: Array) -> tuple[Courses, NDArray[np.int8]]:
+        """Courses of a batch, each part (sample, position)."""
+        values = self.inputs.values(u)
+        courses, status = self.kernel.courses(values, self.plan.moved(values))
+        full = status.shape
+        return {name: tuple(np.broadcast_to(part, full) for part in course) for name, course in courses.items()}, status
 
     def evaluate(self, first: int, last: int) -> Tally:
         """The tally of blocks first, …, last − 1."""

@@ -132,6 +132,8 @@ def study(
         listed = ", ".join(one.name for one in found)
         what = f"no measure is stated: {listed} taken, joints to the ground without a driver"
         told.append(Finding(what, "measures", remedy, Severity.NOTE))
+    if run.cycle.duration <= 0:  # there is one position
+        found = [replace(one, statistic="value") if one.rule == "deviation" else one for one in found]
     if at is not None:
         found = [placed(mechanism, one, at) for one in found]
     return Study(run, inputs, tuple(found), steps, friction or FrictionMethod(), tuple(told))
@@ -158,12 +160,12 @@ def tolerance(
     """What the tolerances and plays of a mechanism do to measures: limits, scatter, yield, and what each contributes.
 
     measures: names of the model's, or as on the command line (`measures.named`); all of the model if not given, or,
-    where it states none, rotation and slide of every joint to the ground that is not driven. methods: of METHODS. samples:
-    of the sampling method, and of the variance-based indices; seed: of its random numbers. steps: positions of a whole
+    where it states none, rotation and slide of every joint to the ground that is not driven. methods: of METHODS.
+    samples: of the sampling method, and of the variance-based indices; seed: of its random numbers. steps: positions of a whole
     cycle; at: the place (driver coordinate or time) at which measures without a place or figure of their own are taken.
     jobs, chunk, cluster, checkpoint, resume, progress: see `runner.run`. engine: numpy, or jax (an extra).
     Returns a Dataset over (measure, parameter, position, …) of `result.VARIABLES`; SI, each measure in its own unit.
-    Method: exact first derivatives by dual numbers; the worst corner of the tolerance box found on the mechanism itself;
+    Method: exact first derivatives by dual numbers; the worst corner of the tolerances found on the mechanism itself;
     Monte Carlo or scrambled Sobol points through the whole analysis; Sobol' indices. Samples that have no answer are
     counted, and are outside every limit.
     Raises MechanismError if nothing varies, for an unknown measure or method, or as `analyse` does.

@@ -182,7 +182,8 @@ def test_few_samples(method: str, samples: int) -> None:
 def test_few_positions(steps: int) -> None:
     measures = {
         "angle": {"angle": "rocker"}, "stroke": {"stroke": "D"}, "line": {"straightness": "coupler.C"},
-        "path": {"path_error": "coupler.C"}, "peak": {"effort": "A", "as": "maximum"}, "rms": {"effort": "A", "as": "rms"},
+        "path": {"path_error": "coupler.C"}, "peak": {"effort": "A", "as": "maximum"},
+        "rms": {"effort": "A", "as": "rms"},
     }  # fmt: skip
     result = trunnion.tolerance(fourbar(loaded=True, measures=measures), methods=ALL, samples=40, steps=steps)
     assert result.sizes["position"] == steps

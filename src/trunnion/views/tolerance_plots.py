@@ -23,7 +23,8 @@ __all__ = ["convergence", "envelope", "histogram", "outer"]
 WITHIN, BEYOND, LIMIT = PALETTE[0], PALETTE[1], "#a1260d"
 LIMITED: dict[str, Any] = {"color": LIMIT, "linewidth": 1.3, "linestyle": (0, (1, 1.5))}
 FEWEST, BARS = 20, 60  # of a histogram
-CORE = 2e-4  # share of the samples at either end that does not decide how far the picture goes
+CORE = 0.01  # share of the samples at either end beyond those
+FAR = 1.5  # of their width, beyond which none decides how far the picture goes
 READABLE = 0.02  # of nominal: a spread below it is drawn as a deviation
 Z95 = 1.959963984540054
 
@@ -67,14 +68,14 @@ def _beyond(passed: float, low: float, high: float) -> str:
 
 
 def _core(counts: Array, edges: Array) -> tuple[float, float]:
-    """Where nearly all samples lie."""
-    total = np.append(0.0, np.cumsum(counts))
-    if not total[-1] > 0:
+    """Where the samples lie, without what lies far beyond nearly all of them."""
+    filled = np.flatnonzero(counts)
+    if not filled.size:
         return float(edges[0]), float(edges[-1])
-    spare = CORE * total[-1]
-    first = int(np.searchsorted(total, spare, side="right")) - 1
-    last = int(np.searchsorted(total, total[-1] - spare, side="left"))
-    return float(edges[max(first, 0)]), float(edges[min(last, len(edges) - 1)])
+    ends, total = edges[[filled[0], filled[-1] + 1]], np.append(0.0, np.cumsum(counts))
+    low, high = np.interp([CORE * total[-1], (1 - CORE) * total[-1]], total, edges)
+    room = FAR * (high - low)
+    return max(float(ends[0]), low - room), min(float(ends[1]), high + room)
 
 
 def _window(read: Reading, low: float, high: float) -> tuple[float, float]:
@@ -149,10 +150,13 @@ def _left_out(axes: Axes, read: Reading, low: float, high: float) -> None:
     outside = int(counts[(edges[1:] <= low) | (edges[:-1] >= high)].sum())
     if not outside:
         return
-    text = f"{outside:,} sample{'s' if outside > 1 else ''} outside, {read.say(read.value('least'))} to "
+    least, most = read.value("least"), read.value("most")
+    ends = [text for text, there in ((f"down to {read.say(least)}", least < low), (f"up to {read.say(most)}", most > high))
+            if there]  # fmt: skip
+    text = f"{outside:,} sample{'s' if outside > 1 else ''} outside, {' and '.join(ends)}"
     box = {"boxstyle": "round,pad=0.2", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
-    axes.text(0.99, 0.97, text + read.say(read.value("most")), transform=axes.transAxes, ha="right", va="top",
-              fontsize=8, color=MUTED, bbox=box, zorder=4)  # fmt: skip
+    axes.text(0.99, 0.97, text, transform=axes.transAxes, ha="right", va="top", fontsize=8, color=MUTED, bbox=box,
+              zorder=4)  # fmt: skip
 
 
 # ---- envelope -----------------------------------------------------------------------------------------------------

@@ -304,7 +304,7 @@ def overall(result: xr.Dataset) -> list[Table]:
     ends = [float(result[f"yield_all{end}"].values) for end in ("", "_low", "_high")]
     if math.isnan(ends[0]):
         return []
-    return [Table("all limits together", ["", "yield"], [["", share_interval(*ends)]])]
+    return [Table("all limits together", ["", "yield"], [["kept", share_interval(*ends)]])]
 
 
 def inputs(result: xr.Dataset) -> Table:

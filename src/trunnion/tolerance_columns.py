@@ -65,12 +65,13 @@ def _measures(result: xr.Dataset) -> Flat:
         for k, name in enumerate(ends):
             column = [np.nan if pair is None or pair[k] is None else float(pair[k]) for pair in stated]
             found += [(name, "", np.array(column))] if column else []
-    for key, one in result.data_vars.items():
+    for variable, one in result.data_vars.items():
+        key = str(variable)
         if one.dims == ("measure",):
-            found.append((str(key), "1" if _is_share(str(key)) else "", np.asarray(one.values)))
+            found.append((key, "1" if _is_share(key) else "", np.asarray(one.values)))
         elif one.dims == ("measure", "quantile"):
             levels = result["quantile"].values
-            stem = str(key).replace("quantile_value", "quantile")
+            stem = key.replace("quantile_value", "quantile")
             found += [(f"{stem}_{level:g}", "", one.values[:, k]) for k, level in enumerate(levels)]
     return found
 
@@ -79,9 +80,9 @@ def _parameters(result: xr.Dataset) -> Flat:
     """One row a toleranced number; what is of a measure is `<measure>.sensitivity`, …."""
     found: Flat = [("parameter", "", np.array(_names(result, "parameter")))]
     found.append(("unit", "", np.array([str(unit) for unit in json.loads(result.attrs["parameter_units"])])))
-    for key, one in result.data_vars.items():
+    for variable, one in result.data_vars.items():
         if one.dims == ("parameter",):
-            found.append((str(key).removeprefix("parameter_"), "", np.asarray(one.values)))
+            found.append((str(variable).removeprefix("parameter_"), "", np.asarray(one.values)))
     for i, measure in enumerate(_names(result, "measure")):
         for key in (key for key in BY_MEASURE if key in result):
             found.append((f"{measure}.{key}", "1" if _is_share(key) else "", result[key].values[i]))

@@ -151,8 +151,8 @@ def _left_out(axes: Axes, read: Reading, low: float, high: float) -> None:
     if not outside:
         return
     least, most = read.value("least"), read.value("most")
-    ends = [text for text, there in ((f"down to {read.say(least)}", least < low), (f"up to {read.say(most)}", most > high))
-            if there]  # fmt: skip
+    ends = [f"down to {read.say(least)}"] if least < low else []
+    ends += [f"up to {read.say(most)}"] if most > high else []
     text = f"{outside:,} sample{'s' if outside > 1 else ''} outside, {' and '.join(ends)}"
     box = {"boxstyle": "round,pad=0.2", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
     axes.text(0.99, 0.97, text, transform=axes.transAxes, ha="right", va="top", fontsize=8, color=MUTED, bbox=box,

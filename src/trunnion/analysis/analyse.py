@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion import results
+from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.nested import flat
 from trunnion.analysis import account, contact_loss, diagnosis
@@ -362,7 +363,7 @@ def pose_status(walk: Forward, shape: tuple[int, ...]) -> NDArray[np.int8]:
     for group, pose in zip(walk.system.groups, walk.poses, strict=True):
         for frame in pose.frames:
             placed = placed & np.isfinite(_sum(flat(frame)))
-        condition = np.maximum(condition, group.condition(pose))
+        condition = np.maximum(condition, primal(group.condition(pose)))
     status = np.where(condition > NEAR_SINGULAR, np.int8(Status.NEAR_SINGULAR), np.int8(Status.SOLVED))
     status = np.where(condition <= SINGULAR, status, np.int8(Status.SINGULAR))
     status = np.where(placed, status, np.int8(Status.NOT_ASSEMBLED))
@@ -376,7 +377,8 @@ def _sum_of_forces(back: Backward) -> Number:
 
 
 def _sum(numbers: Iterable[Number]) -> Number:
-    return functools.reduce(operator.add, numbers, 0.0)
+    """Without derivatives: whether it is finite is what is asked for."""
+    return functools.reduce(operator.add, (primal(number) for number in numbers), 0.0)
 
 
 def _fill_settled(arrays: Arrays, back: Backward, window: slice) -> None:

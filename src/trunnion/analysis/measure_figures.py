@@ -32,7 +32,7 @@ from trunnion.analysis.measures import MEASURES, Measure
 from trunnion.analysis.system import FEWEST, System
 from trunnion.errors import Status
 
-__all__ = ["RULES", "Course", "Reference", "figure", "kept", "known", "reference", "shown", "span"]
+__all__ = ["RULES", "Course", "Reference", "figure", "judged", "kept", "known", "reference", "shown", "span"]
 
 Array = NDArray[np.float64]
 TURN = 2 * np.pi
@@ -228,18 +228,39 @@ def span(curve: Sequence[Number], nominal: Reference) -> tuple[Number, Number]:
 
 def kept(curve: Sequence[Number], nominal: Reference, figures: Number | None = None) -> NDArray[np.bool_]:
     """Whether each sample is within the limits and bounds of the measure; not where its figure is NaN."""
-    measure = nominal.measure
     figures = primal(figure(curve, nominal) if figures is None else figures)
+    if nominal.measure.rule != "deviation":
+        return _within(nominal.measure, figures, figures - nominal.figure, figures - nominal.figure)
+    least, most = span(curve, nominal)
+    return _within(nominal.measure, figures, primal(least), primal(most))
+
+
+def _within(measure: Measure, figures: Array, least: Array, most: Array) -> NDArray[np.bool_]:
+    """least, most: signed deviations from the nominal mechanism."""
     good = np.isfinite(figures)
-    if measure.lower is not None or measure.upper is not None:
-        least, most = span(curve, nominal)
-        good &= primal(least) >= (-np.inf if measure.lower is None else measure.lower)
-        good &= primal(most) <= (np.inf if measure.upper is None else measure.upper)
+    if measure.lower is not None:
+        good &= least >= measure.lower
+    if measure.upper is not None:
+        good &= most <= measure.upper
     if measure.at_least is not None:
         good &= figures >= measure.at_least
     if measure.at_most is not None:
         good &= figures <= measure.at_most
     return np.asarray(good)
+
+
+def judged(curve: Sequence[Number], nominal: Reference) -> tuple[Number, NDArray[np.bool_], Number]:
+    """`figure`, `kept` and `shown` of plain numbers at once, each piece worked out once."""
+    measure = nominal.measure
+    if measure.rule != "deviation":
+        figures = figure(curve, nominal)
+        return figures, kept(curve, nominal, figures), shown(curve, nominal)
+    with np.errstate(all="ignore"):
+        change = _single(nominal, _parts(curve, nominal))
+        course = _course(nominal, change)
+        least, most = -course.largest(-1.0).value, course.largest().value
+    figures = np.maximum(most, -least)
+    return figures, _within(measure, figures, least, most), change
 
 
 def known(measure: Measure, status: NDArray[np.int8]) -> NDArray[np.bool_]:

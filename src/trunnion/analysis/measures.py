@@ -424,23 +424,20 @@ def _measure(name: str, stated: Stated, values: Values, mechanism: Mechanism) ->
     kind = next(key for key in SUBJECTS if getattr(stated, key) is not None)
     path = f"measures.{name}"
 
-    def number(*keys: str) -> float | None:
-        found = next((values[f"{path}.{key}"] for key in keys if f"{path}.{key}" in values), None)
+    def number(key: str) -> float | None:
+        found = values.get(f"{path}.{key}")
         return None if found is None else float(np.ravel(primal(found))[0])
 
-    lower, upper = number("limit.lower"), number("limit.upper")
-    either = number("limit")
-    if either is not None:
-        lower, upper = -either, either
-    over = number("over.from", "over.0"), number("over.to", "over.1")
-    places = [f"{path}.{key}" for key in ("at", "over.from", "over.0") if f"{path}.{key}" in values]
+    over = number("over.from"), number("over.to")
+    places = [f"{path}.{key}" for key in ("at", "over.from") if f"{path}.{key}" in values]
     kinds = mechanism.parameter_kinds()
     return Measure(
-        name, kind, getattr(stated, kind), stated.axis or "", lower, upper, number("at_least"), number("at_most"),
+        name, kind, getattr(stated, kind), stated.axis or "",
+        number("limit.lower"), number("limit.upper"), number("at_least"), number("at_most"),
         at=number("at"),
         over=None if over[0] is None or over[1] is None else (over[0], over[1]),
         timed=any(kinds[place].unit == "s" for place in places),
-        statistic=getattr(stated, "statistic", None) or "",
+        statistic=stated.statistic or "",
     )  # fmt: skip
 
 

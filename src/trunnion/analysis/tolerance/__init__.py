@@ -1,0 +1,1 @@
+"""Tolerances: what a tolerated mechanism does, sample by sample, on one core or many."""

@@ -21,7 +21,6 @@ from trunnion.analysis.analyse import Run, prepare
 from trunnion.analysis.measure_figures import figure, kept, known, shown, span
 from trunnion.analysis.measure_positions import plan
 from trunnion.analysis.measures import MEASURES, STATISTICS, Measure, coordinate_unit, named
-from trunnion.model.parts import Measure as Stated
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 R, L, E = 0.3, 1.0, 0.1  # crank, rod, offset of the guide
@@ -493,15 +492,48 @@ def test_places_that_are_not(driver: Any, measure: Measure, expected: str) -> No
         plan(press(**driver), [measure], 36)
 
 
-@pytest.mark.skipif("statistic" not in Stated.model_fields, reason="the model file has no statistic yet")
 def test_names(crank: Run) -> None:
-    mechanism = crank.system.mechanism
-    read = named(mechanism, ["maximum:effort:A", "rms:piston.P.x", "rotation:P", "effort:A"], crank.values)
-    assert [(one.kind, one.subject, one.axis, one.rule) for one in read] == [
-        ("effort", "A", "", "maximum"), ("point", "piston.P", "x", "rms"), ("rotation", "P", "", "deviation"),
-        ("effort", "A", "", "deviation"),
-    ]  # fmt: skip
-    for wrong in ("maximum:A", "sum:effort:A", "effort", "piston.P", "maximum:effort:Q"):
+    """On the command line: kinds, axes, statistics before them, and none of what means nothing."""
+    forms = {
+        "effort:A": ("effort", "A", "", "deviation"),
+        "maximum:effort:A": ("effort", "A", "", "maximum"),
+        "rms:piston.P.x": ("point", "piston.P", "x", "rms"),
+        "reaction:P": ("reaction", "P", "", "deviation"),
+        "peak-to-peak:reaction:P.y": ("reaction", "P", "y", "peak-to-peak"),
+        "efficiency:cycle": ("efficiency", "cycle", "", "ratio"),
+        "minimum:efficiency:instant": ("efficiency", "instant", "", "minimum"),
+        "locking_margin:mechanism": ("locking_margin", "mechanism", "", "minimum"),
+        "path_error:piston.P": ("path_error", "piston.P", "", "maximum"),
+        "straightness:rod.P": ("straightness", "rod.P", "", "line"),
+        "stroke:C": ("stroke", "C", "", "peak-to-peak"),
+        "dead_centre:C": ("dead_centre", "C", "", "dead centre"),
+        "place-of-minimum:dead_centre:C": ("dead_centre", "C", "", "dead centre, least"),
+        "transmission_error:C": ("transmission_error", "C", "", "deviation"),
+    }
+    read = named(crank.system.mechanism, forms, crank.values)
+    assert {one.name: (one.kind, one.subject, one.axis, one.rule) for one in read} == forms
+    wrong = (
+        "maximum:A",
+        "sum:effort:A",
+        "effort",
+        "piston.P",
+        "maximum:effort:Q",
+        "efficiency:A",
+        "piston.P.x:maximum",
+    )
+    for name in wrong:
         with pytest.raises(MechanismError):
-            named(mechanism, [wrong], crank.values)
+            named(crank.system.mechanism, [name], crank.values)
     assert coordinate_unit(crank.system, crank.values) == "rad"
+
+
+def test_play_is_of_some_measures_only() -> None:
+    """Those of the model that it does not know are left out with a note, asked for they are refused."""
+    data = trunnion.read(EXAMPLES / "fourbar-with-play.yaml").data()
+    data["measures"] = {"turn": {"rotation": "D", "limit": "0.1 deg"}, "swing": {"stroke": "D", "limit": "0.1 deg"}}
+    mechanism = Mechanism(**data)
+    result = trunnion.play(mechanism, steps=12)
+    assert list(result["measure"].values) == ["turn"]
+    assert any("which swing is none of: left out" in one["what"] for one in json.loads(result.attrs["findings"]))
+    with pytest.raises(MechanismError, match="which swing is none of"):
+        trunnion.play(mechanism, ["swing"], steps=12)

@@ -170,7 +170,7 @@ def _tops(real: Array, periodic: bool) -> tuple[Positions, Positions]:
     high = rising[:, :-1] & ~rising[:, 1:]
     highest = np.argmax(real, axis=1)
     high[np.arange(len(real)), highest] = True
-    rows, tops = np.nonzero(high)
+    rows, tops = np.divmod(np.flatnonzero(high), real.shape[1])
     if len(rows) == len(real):
         return rows, tops
     last = real.shape[1] - 1

@@ -258,9 +258,9 @@ def judged(curve: Sequence[Number], nominal: Reference) -> tuple[Number, NDArray
     with np.errstate(all="ignore"):
         change = _single(nominal, _parts(curve, nominal))
         course = _course(nominal, change)
-        least, most = -course.largest(-1.0).value, course.largest().value
-    figures = np.maximum(most, -least)
-    return figures, _within(measure, figures, least, most), change
+        above, below = course.both()
+    figures = np.maximum(above, below)
+    return figures, _within(measure, figures, -below, above), change
 
 
 def known(measure: Measure, status: NDArray[np.int8]) -> NDArray[np.bool_]:

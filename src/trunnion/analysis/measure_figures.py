@@ -26,7 +26,7 @@ from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.analysis.extremes import Extreme, Grid, largest, shape_of
 from trunnion.analysis.fill import unwrap_row
-from trunnion.analysis.measure_lines import distances, total
+from trunnion.analysis.measure_lines import distances, total, turn
 from trunnion.analysis.measure_positions import Window
 from trunnion.analysis.measures import MEASURES, Measure
 from trunnion.analysis.system import FEWEST, System
@@ -134,13 +134,18 @@ def _net(power: Number, course: Course) -> Number:
 
 @dataclass(frozen=True)
 class Reference:
-    """A measure of the nominal mechanism. parts: its course, (position,) each, angles without jumps; turns: what an
-    angle gains in a period, rad; figure: its figure, 0 for what is a deviation by itself."""
+    """A measure of the nominal mechanism.
+
+    parts: its course, (position,) each, angles without jumps; turning: whether it is an angle; attitude: whether it is
+    the turn of a link in space; turns: what an angle gains in a period, rad; figure: its figure, 0 for what is a
+    deviation by itself.
+    """
 
     measure: Measure
     window: Window
     positions: int
     turning: bool
+    attitude: bool
     parts: tuple[Array, ...]
     turns: float = 0.0
     figure: float = 0.0
@@ -148,7 +153,7 @@ class Reference:
     @property
     def against(self) -> bool:
         """Whether the course is taken less that of the nominal mechanism."""
-        return MEASURES[self.measure.kind].against or self.measure.rule == "deviation"
+        return MEASURES[self.measure.kind].against or self.attitude or self.measure.rule == "deviation"
 
     @property
     def opened(self) -> bool:
@@ -179,7 +184,7 @@ def reference(
         rates = None if rate is None else _row(window.of(primal(rate), positions), len(window.index))
         followed, turns = _followed(parts[0], window, rates)
         parts = (followed,)
-    found = Reference(measure, window, positions, turning, parts, turns)
+    found = Reference(measure, window, positions, turning, measure.of_attitude(system), parts, turns)
     own = 0.0 if measure.rule == "deviation" else float(np.ravel(_figure(found, parts))[0])
     return replace(found, figure=own)
 
@@ -294,6 +299,8 @@ def _single(nominal: Reference, parts: Sequence[Number]) -> Number:
         for part, meant in zip(parts, nominal.parts, strict=True):
             square = square + (part - meant) * (part - meant)
         return namespace(square).sqrt(square)
+    if nominal.attitude:
+        return turn(parts, nominal.parts, nominal.measure.axis)
     return parts[0] - nominal.parts[0] if nominal.against else parts[0]
 
 

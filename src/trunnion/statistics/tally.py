@@ -157,7 +157,7 @@ class Sums:
 class Tree(Generic[P]):
     """Payloads of blocks in a dyadic tree: node (level, index) holds the blocks [index 2^level, (index + 1) 2^level).
 
-    Trees are values: `merge` gives a new one. nodes: the widest nodes whose blocks are all there, by (level, index);
+    `merge` gives a new tree, `add` puts into this one. nodes: the widest whose blocks are all there, by (level, index);
     prefixes: payload of the first 2^level blocks by level, kept as they come up, for how a figure converges.
     """
 

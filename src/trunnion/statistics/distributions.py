@@ -117,7 +117,7 @@ def _triangular_quantile(u: Floats, lower: float, upper: float, options: Options
     u, mode, width = np.asarray(u), _mode(lower, upper, options), upper - lower
     left = lower + np.sqrt(u * (width * (mode - lower)))
     right = upper - np.sqrt((1 - u) * (width * (upper - mode)))
-    return np.where(u * width < mode - lower, left, right)
+    return np.clip(np.where(u * width < mode - lower, left, right), lower, upper)
 
 
 def _triangular_cdf(x: Floats, lower: float, upper: float, options: Options) -> Floats:
@@ -200,12 +200,19 @@ def _truncated_moments(lower: float, upper: float, options: Options) -> tuple[fl
     peak = min(b, 0.0)
     reach = math.sqrt(peak * peak + 80)
     start, end = max(a, -reach), min(b, reach)
-    nodes, weights = np.polynomial.legendre.leggauss(120)
+    nodes, weights = _gauss(120)
     z = (start + end) / 2 + (end - start) / 2 * nodes
     weights = weights * np.exp((peak - z) * (peak + z) / 2)
     weights /= weights.sum()
     middle = float(weights @ z)
     return mean + sign * sigma * middle, sigma * sigma * float(weights @ (z - middle) ** 2)
+
+
+@lru_cache(maxsize=1)
+def _gauss(number: int) -> tuple[Floats, Floats]:
+    """Nodes and weights of Gauss-Legendre quadrature on −1 ... 1."""
+    nodes, weights = np.polynomial.legendre.leggauss(number)
+    return nodes, weights
 
 
 # ---- beta -----------------------------------------------------------------------------------------------------
@@ -218,14 +225,15 @@ def _shapes(options: Options) -> tuple[float, float]:
 def _beta_quantile(u: Floats, lower: float, upper: float, options: Options) -> Floats:
     """lower + w x, x = I⁻¹(u; α, β), from a table of ln(x/(1 − x)) over Φ⁻¹(u): I⁻¹ costs fifty times as much.
 
-    Cubic between entries 1/128 apart with the exact slope: x and 1 − x are true to about 1e-10 of their value.
+    Cubic between entries 1/128 apart with the exact slope: x and 1 − x are true to about 1e-10 of their value. What is
+    rarer than 2⁻⁶⁰ is taken as that.
     """
-    shapes, u = _shapes(options), np.asarray(u, dtype=np.float64)
+    shapes, u = _shapes(options), np.maximum(u, 2.0**-60)
     table = _beta_table(*shapes)
-    score = (special.ndtri(u) + _REACH) * _DENSITY
-    if table is None or np.any((score < 0) | (score >= 2 * _REACH * _DENSITY)):
+    if table is None:
         odds = _beta_odds(u, *shapes)
     else:
+        score = (special.ndtri(u) + _REACH) * _DENSITY
         place = score.astype(np.intp)
         part = score - place
         c0, c1, c2, c3 = table[:, place]

@@ -101,7 +101,8 @@ class Moments:
 
 def moments_of(values: Any, axis: int = -1) -> Moments:
     """Moments along the axis of the samples, the last; NaN are left out (and not in the count)."""
-    x = np.moveaxis(np.asarray(values, dtype=np.float64), axis, -1)
+    # In one order in memory, so that sums are taken in one order too.
+    x = np.ascontiguousarray(np.moveaxis(np.asarray(values, dtype=np.float64), axis, -1))
     there = ~np.isnan(x)
     if there.all():
         count: Any = np.full(x.shape[:-1], float(x.shape[-1]))

@@ -8,6 +8,7 @@ does not depend on a library's logarithm. (Buckets by the bits of the number: as
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -84,7 +85,7 @@ def count(values: Any, bins: Bins, axis: int = -1) -> Counts:
         x = np.where(missing, 0.0, x)
     index = bins.index(x)
     figures = index.shape[:-1]
-    index = index.reshape(-1, index.shape[-1])
+    index = index.reshape(math.prod(figures), index.shape[-1])
     index += (np.arange(len(index), dtype=np.int64) * bins.number)[:, None]
     chosen = index[~missing.reshape(index.shape)] if gaps else index.ravel()
     counts = np.bincount(chosen, minlength=len(index) * bins.number)
@@ -111,7 +112,7 @@ def quantile(counts: Counts, bins: Bins, q: Any, least: Any = -np.inf, most: Any
         part = np.clip((rank - reached[place] + values[place]) / np.maximum(values[place], 1), 0.0, 1.0)
         left, right = edges[row, place], edges[row, place + 1]
         found[row] = np.clip(left + part * (right - left), low[row], high[row])
-    return np.where(np.isnan(q), np.nan, found.reshape(*counts.shape[:-1], *q.shape))
+    return np.where(np.isnan(q), np.nan, found.reshape((*counts.shape[:-1], *q.shape)))
 
 
 def cdf(counts: Counts, bins: Bins, x: Any) -> Floats:
@@ -124,4 +125,4 @@ def cdf(counts: Counts, bins: Bins, x: Any) -> Floats:
         reached = np.concatenate([[0.0], np.cumsum(values)])
         if reached[-1] > 0:
             found[row] = np.interp(x.ravel(), edges[row], reached) / reached[-1]
-    return found.reshape(*counts.shape[:-1], *x.shape)
+    return found.reshape((*counts.shape[:-1], *x.shape))

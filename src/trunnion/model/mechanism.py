@@ -277,8 +277,8 @@ class Mechanism(Part):
         """The mechanism with some entries replaced, by names as in `parameters`; texts are read as in a file.
 
         So are the choices `over_constraint`, `fits`, `joint_defaults.friction.model`, `joint_defaults.seat` and the
-        last two of a joint. Sizes, seat and misalignment of a joint and the error of a number need not be stated yet, nor
-        a tolerance: `tolerances.AB`, and `tolerances.AB.cp` for a key of it. `measures.NAME.limit` is one text.
+        last two of a joint. Sizes, seat and misalignment of a joint, the error of a number and its tolerance, such as
+        `tolerances.AB` or one key of it, `tolerances.AB.cp`, need not be stated yet. `measures.NAME.limit` is one text.
         """
         data = self.data()
         for name, value in values.items():

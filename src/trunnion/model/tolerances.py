@@ -287,8 +287,7 @@ def _limits_text(middle: float, half: float, kind: Kind) -> str:
 def kept(mechanism: Mechanism, data: Mapping[str, Any]) -> dict[str, Any]:
     """Plain data made of that of a mechanism, without errors, tolerances and costs of numbers that it no longer has.
 
-    So a mechanism without friction has no tolerance of a coefficient. Names that meant nothing before stay, as do all
-    in data that is no mechanism: both are findings.
+    So a mechanism without friction has no tolerance of a coefficient. MechanismError if the data make no mechanism.
     """
     named = [key for key in ("errors", "tolerances", "costs") if data.get(key)]
     if not named:

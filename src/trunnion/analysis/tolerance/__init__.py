@@ -1,0 +1,1 @@
+"""Tolerances: what matters, what yields, what to buy."""

@@ -1,1 +1,1 @@
-"""Random numbers, their statistics, and what a tolerance costs: on plain numbers, without a model."""
+"""Random numbers, running sums and intervals: what a study of tolerances counts with. It knows no mechanism."""

@@ -89,18 +89,20 @@ def sides(problem: Problem) -> Sides:
     linear = np.concatenate([(worst + drift)[keep[0]], (worst - drift)[keep[1]]])
     both = np.concatenate([spread[keep[0]], spread[keep[1]]])
     rooms = np.concatenate([room[0, keep[0]], room[1, keep[1]]])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        alone = np.where((linear >= 0).all(axis=1)[:, None], rooms[:, None] / (linear + least * np.abs(both)), np.inf)
+    rising = np.min(linear, axis=1, initial=0.0) >= 0
+    with np.errstate(divide="ignore", invalid="ignore"):  # no effect, no bound; no room is told before it is used
+        alone = np.where(rising[:, None], rooms[:, None] / (linear + least * np.abs(both)), np.inf)
+        linear, both = linear / rooms[:, None], both / rooms[:, None]
         pair = ((effects.upper - effects.lower) / 2)[:, None] / half
     bounds = np.concatenate([alone, pair])
     return Sides(
-        linear / rooms[:, None],
-        both / rooms[:, None],
+        linear,
+        both,
         factor,
         np.concatenate([np.flatnonzero(keep[0]), np.flatnonzero(keep[1])]),
         rooms,
         np.min(np.where(np.isnan(bounds), np.inf, bounds), axis=0, initial=np.inf),
-        factor is None and bool((linear >= 0).all()),
+        factor is None and bool(np.all(rising)),
     )
 
 

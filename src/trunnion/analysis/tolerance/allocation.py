@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from trunnion.errors import Finding, MechanismError
 from trunnion.statistics.costs import Cost
 
-__all__ = ["CRITERIA", "Answer", "Contribution", "Criterion", "Effects", "Option", "Problem"]
+__all__ = ["CRITERIA", "Answer", "Contribution", "Criterion", "Effects", "Option", "Problem", "Sampled", "Trial"]
 
 Array = NDArray[np.float64]
 Criterion = Literal["worst-case", "rss", "yield"]
@@ -74,8 +74,9 @@ class Effects:
 
     lower, upper: limits of the deviation from the nominal, (row,), infinite where there is none; offset: deviation of
     the middle of the tolerances, (row,). worst: |∂y/∂p|, of a clearance |Q₁| + |Q₂|; half: what RSS squares, worst if
-    None; deviation, mean: standard deviation and mean, half/3 and 0 if None; signs of half and deviation matter with
-    correlation only, (contribution, contribution). labels: names of the rows for messages.
+    None; deviation, mean: standard deviation and mean, half/3 and 0 if None; correlation: (contribution,
+    contribution). half and deviation are signed: that matters with correlation, and for a yield.
+    labels: names of the rows for messages.
     """
 
     worst: Array
@@ -166,6 +167,22 @@ class Problem:
         return np.asarray(np.max(np.where(np.isinf(room), 0.0, share), axis=0), float)
 
 
+class Sampled(NamedTuple):
+    """A yield that was sampled, with its interval."""
+
+    share: float
+    low: float
+    high: float
+
+
+class Trial(NamedTuple):
+    """One allocation that was sampled on the way to a yield."""
+
+    z: float
+    cost: float
+    sampled: Sampled
+
+
 @dataclass(frozen=True)
 class Answer:
     """Half widths to buy, or why there are none (`findings` with an error, NaN).
@@ -174,7 +191,9 @@ class Answer:
     bound: no allocation costs less than this; gap: cost minus bound, a share of the cost that tolerances change.
     residual: of the optimality conditions, relative; proven: whether the gap proves a global optimum.
     price: what one more unit (rad, m, …) of a row's room would save, (row,); NaN for a discrete choice.
-    active: rows that limit; used: share of its room each row takes.
+    active: rows that limit; used: share of its room each row takes. rounds: of the solver.
+    Of a yield: expected, of normal deviations, linearly; sampled, by `verify`; trials: all that were sampled. There the
+    optimum is that of the same z in every row; other margins in some rows might cost a little less.
     """
 
     problem: Problem
@@ -189,6 +208,9 @@ class Answer:
     price: Array = field(default_factory=lambda: np.zeros(0))
     findings: tuple[Finding, ...] = ()
     rounds: int = 0
+    expected: float = np.nan
+    sampled: Sampled | None = None
+    trials: tuple[Trial, ...] = ()
 
     @property
     def found(self) -> bool:

@@ -22,8 +22,8 @@ __all__ = ["settled", "solved"]
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
 SOUND = ("Solved", "AlmostSolved", "InsufficientProgress")
-FINE = 1e-10
-CLOSE = 1e-6  # an answer that goes into Newton's method
+FINE = 1e-9
+CLOSE = 1e-4  # an answer that goes into Newton's method; the proof is of what comes out
 BROKEN = 1e-7  # of a limit: a row to add
 AT_ONCE = 16  # rows added in one round
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from trunnion.analysis.tolerance.allocation import PROVEN, Answer, Problem, none, shortfall
 from trunnion.analysis.tolerance.cones import settled
-from trunnion.analysis.tolerance.newton import Point, polished
+from trunnion.analysis.tolerance.interior import Point, polished
 from trunnion.analysis.tolerance.sides import sides
 from trunnion.analysis.tolerance.task import Task, task_of
 from trunnion.errors import Finding, Severity
@@ -21,6 +21,8 @@ from trunnion.errors import Finding, Severity
 __all__ = ["allocate_continuous", "minimise"]
 
 Array = NDArray[np.float64]
+ACTIVE = 1e-6  # of the largest multiplier: a side to begin Newton's method with
+NEAR = 1e-3  # of the first units: the least unit to try again with
 
 
 def allocate_continuous(problem: Problem) -> Answer:
@@ -91,6 +93,17 @@ def minimise(task: Task) -> Point | None:
     found = settled(task)
     if found is None:
         return None
-    u, rows, weights, rounds = found
-    active = weights > 1e-7 * np.max(weights, initial=0.0)
+    point = _polished(task, *found)
+    if point.gap > PROVEN:  # again, with all unknowns near 1
+        unit = task.unit * np.maximum(point.u, NEAR)
+        again = replace(task, unit=unit)
+        found = settled(again)
+        if found is not None:
+            other = _polished(again, *found)
+            point = min(point, replace(other, u=other.u * unit / task.unit), key=lambda one: one.gap)
+    return point
+
+
+def _polished(task: Task, u: Array, rows: NDArray[np.intp], weights: Array, rounds: int) -> Point:
+    active = weights > ACTIVE * np.max(weights, initial=0.0)
     return replace(polished(task, u, rows[active], weights[active]), rounds=rounds)

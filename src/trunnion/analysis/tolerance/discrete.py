@@ -23,7 +23,7 @@ from scipy.optimize import Bounds, LinearConstraint, milp
 
 from trunnion.analysis.tolerance.allocation import ALLOWED, PROVEN, Answer, Contribution, Problem, none, shortfall
 from trunnion.analysis.tolerance.continuous import allocate_continuous, minimise, unbounded
-from trunnion.analysis.tolerance.newton import Point
+from trunnion.analysis.tolerance.interior import Point
 from trunnion.analysis.tolerance.sides import Sides, sides
 from trunnion.analysis.tolerance.task import Task, task_of
 from trunnion.errors import Finding, Severity

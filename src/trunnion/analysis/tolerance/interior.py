@@ -30,6 +30,7 @@ MOST = 200  # sides looked at
 BEYOND = 1e-12  # of a limit: a side that is broken
 NOTHING = 1e-13  # of the cost: a multiplier that is left of the method
 SAME = 1e-11  # of the upper bound: at the lower bound
+STAY = 1e-3  # of an unknown is kept in any step: costs may be infinite at 0
 FRACTION = 0.995  # of the way to where a slack or multiplier would be 0
 
 
@@ -76,7 +77,7 @@ def point_of(task: Task, u: Array, rows: Rows, weights: Array) -> Point:
     slope, jacobian = task.slope(u), _jacobian(task, t, rows)
     over = task.sides.value(t, rows) - 1
     lagrange = slope + weights @ jacobian
-    scale = float(np.sum(np.abs(slope * u))) or 1.0
+    scale = task.scale(u)
     rise = np.where(lagrange > 0, lagrange * (task.low - u), lagrange * (task.high - u))
     largest = float(np.max(np.abs(slope), initial=0.0)) or 1.0
     room = np.where(lagrange > 0, u - task.low, task.high - u) / np.maximum(task.high - task.low, 1e-300)
@@ -124,7 +125,7 @@ def _led(task: Task, u: Array, rows: Rows, weights: Array) -> Point:
     """The path of the method from a point near the optimum; the point of least gap on it."""
     gap = task.high - task.low
     u = np.clip(u, task.low + np.minimum(CLEAR * np.maximum(u, CLEAR), 0.4 * gap), task.high - CLEAR * gap)
-    scale = float(np.sum(np.abs(task.slope(u) * u))) or 1.0
+    scale = task.scale(u)
     state = _State(task, u, rows, scale)
     slack = np.maximum(-state.over, CLEAR)
     slack[len(rows) :] = -state.over[len(rows) :]
@@ -140,7 +141,7 @@ def _led(task: Task, u: Array, rows: Rows, weights: Array) -> Point:
         target = (ahead / aim) ** 3 * aim if aim > 0 else 0.0
         move = _step(state, bend, slack, lamda, np.full(len(slack), target) - move[1] * move[2])
         reach = _reach(slack, lamda, move, max(FRACTION, 1 - aim))
-        u = u + reach * move[0]
+        u = np.maximum(u + reach * move[0], STAY * u)
         slack, lamda = np.maximum(slack + reach * move[1], LEAST), np.maximum(lamda + reach * move[2], LEAST)
         state = _State(task, u, rows, scale)
         point = point_of(task, u, rows, lamda[: len(rows)] * scale)

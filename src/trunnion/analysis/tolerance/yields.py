@@ -143,7 +143,7 @@ def _sampled(answer: Answer, target: float, solve: Callable[[Problem], Answer], 
             if sampled.low <= target <= sampled.high:
                 break
             short = sampled.high < target
-            step = float(np.clip(_score(target) - _score(sampled.share), -STEP, STEP))
+            step = _correction(trials, target)
         else:
             short, step = False, np.nan
         low, high = (z, high) if short else (low, z)
@@ -163,6 +163,14 @@ def _sampled(answer: Answer, target: float, solve: Callable[[Problem], Answer], 
     what = f"the best yield that was sampled is {share:.6g}, not {target:g}"
     doubt = Finding(what, "yield", "allow narrower tolerances, widen a limit or ask for less", Severity.WARNING)
     return replace(best, trials=tuple(trials), findings=(*best.findings, doubt))
+
+
+def _correction(trials: list[Trial], target: float) -> float:
+    """Change of z by the line through the last two trials, or from 0 through the one: scores are nearly linear in z."""
+    z, score = trials[-1].z, _score(trials[-1].sampled.share)
+    z0, score0 = (trials[-2].z, _score(trials[-2].sampled.share)) if len(trials) > 1 else (0.0, 0.0)
+    rise = (score - score0) / (z - z0) if z != z0 else 1.0
+    return float(np.clip((_score(target) - score) / max(rise, 0.1), -STEP, STEP))
 
 
 def _score(share: float) -> float:

@@ -40,11 +40,12 @@ class Bins:
     def around(cls, centre: Any, deviation: Any, fineness: int = 7, octaves: int = 20) -> Self:
         """Bins for values expected about `centre` with a standard deviation of `deviation`.
 
-        Where that is 0 or not known (NaN) the scale is 1e-9 of the centre, or 1e-12: rounding falls into few bins.
+        Where that is 0 or not known (NaN, ∞) the scale is 1e-9 of the centre, or 1e-12: rounding falls into few bins.
         """
         centre = np.nan_to_num(np.asarray(centre, dtype=np.float64))
         deviation = np.nan_to_num(np.asarray(deviation, dtype=np.float64), posinf=0.0)
-        return cls(centre, np.maximum(deviation, np.maximum(1e-9 * np.abs(centre), 1e-12)), fineness, octaves)
+        unknown = np.maximum(1e-9 * np.abs(centre), 1e-12)
+        return cls(centre, np.where(deviation > 0, deviation, unknown), fineness, octaves)
 
     @property
     def half(self) -> int:

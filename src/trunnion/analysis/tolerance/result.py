@@ -107,7 +107,9 @@ VARIABLES: dict[str, Variable] = {
     "failed": Variable(("cause",), "1", "samples without an answer, by the gravest status of their positions"),
     "histogram": Variable(("measure", "bin"), "1", "samples in a bin"),
     "edge": Variable(("measure", "edge"), "", "edges of the bins; those at the ends stand for all beyond"),
-    "band": Variable(("measure", "quantile", "position"), "", "value of the course that this share does not exceed"),
+    "band": Variable(
+        ("measure", "quantile", "position"), "", "deviation of the course from nominal that this share does not exceed"
+    ),
     "convergence_samples": Variable(("size",), "1", "first so many samples"),
     "convergence_mean": Variable(("measure", "size"), "", "mean of the first samples"),
     "convergence_deviation": Variable(("measure", "size"), "", "standard deviation of the first samples"),

@@ -90,7 +90,7 @@ def unmet(problem: Problem, task: Task) -> Finding | None:
 
 def minimise(task: Task) -> Point | None:
     """The point of least cost of a task whose limits can be kept; None if it was not found."""
-    found = settled(task)
+    found = settled(task) or _inside(task)
     if found is None:
         return None
     point = _polished(task, *found)
@@ -102,6 +102,16 @@ def minimise(task: Task) -> Point | None:
             other = _polished(again, *found)
             point = min(point, replace(other, u=other.u * unit / task.unit), key=lambda one: one.gap)
     return point
+
+
+def _inside(task: Task) -> tuple[Array, NDArray[np.intp], Array, int] | None:
+    """A point within the limits to begin with, should the solver of cones not come to an end."""
+    for halved in range(60):
+        u = np.clip(task.low + 0.5**halved, task.low, task.high)
+        value = task.sides.value(task.tolerances(u))
+        if np.max(value, initial=0.0) < 1:
+            return u, np.argsort(-value)[:1], np.zeros(1), 0
+    return None
 
 
 def _polished(task: Task, u: Array, rows: NDArray[np.intp], weights: Array, rounds: int) -> Point:

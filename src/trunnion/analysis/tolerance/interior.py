@@ -27,10 +27,12 @@ ENOUGH = 1e-14  # gap at which there is nothing left to gain
 CLEAR = 1e-3  # of an unknown: how far from its bounds the method begins
 NEAR = 0.9  # of a limit: sides above it are looked at
 MOST = 200  # sides looked at
+AT_ONCE = 16  # broken sides added at once
 BEYOND = 1e-12  # of a limit: a side that is broken
 NOTHING = 1e-13  # of the cost: a multiplier that is left of the method
 SAME = 1e-11  # of the upper bound: at the lower bound
 STAY = 1e-3  # of an unknown is kept in any step: costs may be infinite at 0
+HALVINGS = 12  # of a step that leads away
 FRACTION = 0.995  # of the way to where a slack or multiplier would be 0
 
 
@@ -68,7 +70,9 @@ def polished(task: Task, u: Array, rows: Rows, weights: Array) -> Point:
             u = u if np.isfinite(task.cost(u)) else point.u
             kept = point_of(task, _kept(task, u), point.rows, weights)
             return min(best, kept, key=lambda one: one.gap)
-        rows, weights = np.append(rows, np.argmax(over)), np.append(point.weights, 0.0)
+        broken = np.argsort(-over, kind="stable")[:AT_ONCE]
+        broken = broken[over[broken] > BEYOND]
+        rows, weights = np.append(rows, broken), np.append(point.weights, np.zeros(len(broken)))
 
 
 def point_of(task: Task, u: Array, rows: Rows, weights: Array) -> Point:
@@ -141,9 +145,16 @@ def _led(task: Task, u: Array, rows: Rows, weights: Array) -> Point:
         target = (ahead / aim) ** 3 * aim if aim > 0 else 0.0
         move = _step(state, bend, slack, lamda, np.full(len(slack), target) - move[1] * move[2])
         reach = _reach(slack, lamda, move, max(FRACTION, 1 - aim))
-        u = np.maximum(u + reach * move[0], STAY * u)
-        slack, lamda = np.maximum(slack + reach * move[1], LEAST), np.maximum(lamda + reach * move[2], LEAST)
-        state = _State(task, u, rows, scale)
+        missed = _missed(state, slack, lamda, target)
+        for _ in range(HALVINGS):
+            ahead_u = np.maximum(u + reach * move[0], STAY * u)
+            ahead_s = np.maximum(slack + reach * move[1], LEAST)
+            ahead_l = np.maximum(lamda + reach * move[2], LEAST)
+            ahead_state = _State(task, ahead_u, rows, scale)
+            if _missed(ahead_state, ahead_s, ahead_l, target) <= max(missed, 1e-9):
+                break
+            reach /= 2
+        u, slack, lamda, state = ahead_u, ahead_s, ahead_l, ahead_state
         point = point_of(task, u, rows, lamda[: len(rows)] * scale)
         broken = point.residual > 1 or not np.all(np.isfinite(u))
         if not broken and (best is None or max(point.gap, point.residual) < max(best.gap, best.residual)):
@@ -164,6 +175,12 @@ def _step(state: _State, bend: Array, slack: Array, lamda: Array, target: Array)
     found = np.linalg.solve(matrix, np.concatenate([first, second]))
     du, dl = found[:count], found[count:]
     return du, -(state.over + slack) - state.jacobian @ du, dl
+
+
+def _missed(state: _State, slack: Array, lamda: Array, target: float) -> float:
+    """How far the conditions with slack · multiplier = target are from being met."""
+    first, second = state.slope + lamda @ state.jacobian, state.over + slack
+    return float(np.sqrt(first @ first + second @ second + np.sum((slack * lamda - target) ** 2)))
 
 
 def _reach(slack: Array, lamda: Array, move: tuple[Array, Array, Array], fraction: float) -> float:

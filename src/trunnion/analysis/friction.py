@@ -23,8 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra import linalg
-from trunnion.algebra.dual import Dual, primal
-from trunnion.algebra.namespace import Number
+from trunnion.algebra.dual import depth, primal
+from trunnion.algebra.namespace import Number, apart
 from trunnion.algebra.nested import replaced
 from trunnion.analysis import continuation
 from trunnion.errors import Finding, MechanismError
@@ -308,10 +308,10 @@ def _newton(problem: Problem, method: FrictionMethod) -> Settled:
     inverse: list[list[Number]] = []
     change: Number = np.inf
     rounds: Number = 0
-    done: Number = False
+    done: Number = np.False_
     renew = True
     for _ in range(method.limit):
-        rounds = rounds + ~np.asarray(done)
+        rounds = rounds + ~done
         if renew:
             rows = real.map_derivative(state)
             inverse = linalg.quick_inverse(identity_minus(rows))
@@ -324,17 +324,17 @@ def _newton(problem: Problem, method: FrictionMethod) -> Settled:
             break
         renew = bool(np.any((change > 0.01 * previous) & ~done))
     shares: Number = 1.0
-    if not np.all(certain):
+    if apart(~certain):
         forces, shares = _follow(real, forces, ~certain)
         state = real.state(forces)
         done = np.where(certain, done, shares >= 1.0)
         rows = real.map_derivative(state)
         inverse = linalg.quick_inverse(identity_minus(rows))
-    depth = _depth(problem)
-    if depth:  # the ε parts need the matrix of the solution, not that of the way there
+    levels = _depth(problem)
+    if levels:  # the ε parts need the matrix of the solution, not that of the way there
         rows = real.map_derivative(state)
         inverse = linalg.quick_inverse(identity_minus(rows))
-    for _ in range(depth):
+    for _ in range(levels):
         forces = _corrected(problem, problem.state(forces), forces, inverse)
         state = problem.state(forces)
     contraction = _largest([_total([np.abs(entry) for entry in row]) for row in rows])
@@ -370,10 +370,10 @@ def _successive(problem: Problem, method: FrictionMethod) -> Settled:
     state = problem.state(forces)
     change: Number = np.inf
     previous: Number = np.inf
-    done: Number = False
+    done: Number = np.False_
     rounds: Number = 0
     for _ in range(method.limit):
-        rounds = rounds + ~np.asarray(done)
+        rounds = rounds + ~done
         forces = problem.target(state.normals)
         before, state = state, problem.state(forces)
         previous, change = change, _changed(state, before)
@@ -487,7 +487,7 @@ def _largest(values: Sequence[Number]) -> Number:
 
 def _depth(problem: Problem) -> int:
     """Levels of ε among the inputs: each costs one Newton step at the solution."""
-    return max((n.depth for n in problem.numbers() if isinstance(n, Dual)), default=0)
+    return depth(problem.numbers())
 
 
 def _primal(problem: Problem) -> Problem:

@@ -162,6 +162,19 @@ class Traced:
 _OF_ALL_LANES: dict[Any, bool] = {np.any: True, np.all: False}
 
 
+TAKEN_FOR_CHEAP = ("sin", "cos")
+
+
+def _once(found: Any) -> Any:
+    """The same number, computed in one place only.
+
+    XLA holds sines for as cheap as sums and repeats them in every loop that uses them; a quotient it keeps. The
+    divisor is 1, which XLA cannot know, and NaN where the number is.
+    """
+    jnp = _jnp()
+    return found / jnp.where(found == found, 1.0, jnp.nan)
+
+
 class _Functions:
     """The functions of jax.numpy, by NumPy's names, on `Traced` numbers."""
 
@@ -173,7 +186,8 @@ class _Functions:
 
         @functools.wraps(apply)
         def function(*args: Any, **options: Any) -> Any:
-            return _dressed(apply(*bare(args), **{key: bare(value) for key, value in options.items()}))
+            found = apply(*bare(args), **{key: bare(value) for key, value in options.items()})
+            return _dressed(_once(found) if name in TAKEN_FOR_CHEAP else found)
 
         setattr(self, name, function)
         return function

@@ -23,9 +23,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra import linalg
-from trunnion.algebra.dual import depth, primal
-from trunnion.algebra.namespace import Number, apart
+from trunnion.algebra.dual import Dual, primal
+from trunnion.algebra.namespace import Number
 from trunnion.algebra.nested import replaced
+from trunnion.algebra.traced import Traced
 from trunnion.analysis import continuation
 from trunnion.errors import Finding, MechanismError
 from trunnion.groups.planar import is_zero, less
@@ -45,6 +46,8 @@ __all__ = [
 ]
 
 DOUBTFUL_ROUNDS = 20  # of Newton's method, where no certificate says that it ends at the solution that is looked for
+
+COMPILED_ROUNDS = 3  # of Newton's method where the numbers have no values to tell when to end
 
 Method = Literal["newton", "successive-approximation"]
 
@@ -152,7 +155,9 @@ def settle(
     problem = Problem(contacts, start, influence)
     if method.name == "successive-approximation":
         return _successive(problem, method)
-    return _at_once(problem) if problem.one_way else _newton(problem, method)
+    if problem.one_way:
+        return _at_once(problem)
+    return _unrolled(problem, method) if problem.compiled else _newton(problem, method)
 
 
 def _with_own(contact: Contact, column: list[Reaction]) -> list[Reaction]:
@@ -208,6 +213,11 @@ class Problem:
         shape = np.broadcast_shapes(np.shape(lanes), *(np.shape(number) for number in self.numbers()))
         chosen = np.broadcast_to(lanes, shape)
         return self.mapped(lambda number: np.broadcast_to(np.asarray(number, float), shape)[chosen]), chosen
+
+    @property
+    def compiled(self) -> bool:
+        """Whether its numbers have no values yet."""
+        return any(isinstance(number, Traced) for number in self.numbers())
 
     @cached_property
     def felt(self) -> list[Felt]:
@@ -324,23 +334,46 @@ def _newton(problem: Problem, method: FrictionMethod) -> Settled:
             break
         renew = bool(np.any((change > 0.01 * previous) & ~done))
     shares: Number = 1.0
-    if apart(~certain):
+    if not np.all(certain):
         forces, shares = _follow(real, forces, ~certain)
         state = real.state(forces)
         done = np.where(certain, done, shares >= 1.0)
         rows = real.map_derivative(state)
         inverse = linalg.quick_inverse(identity_minus(rows))
-    levels = _depth(problem)
-    if levels:  # the ε parts need the matrix of the solution, not that of the way there
+    depth = _depth(problem)
+    if depth:  # the ε parts need the matrix of the solution, not that of the way there
         rows = real.map_derivative(state)
         inverse = linalg.quick_inverse(identity_minus(rows))
-    for _ in range(levels):
+    for _ in range(depth):
         forces = _corrected(problem, problem.state(forces), forces, inverse)
         state = problem.state(forces)
     contraction = _largest([_total([np.abs(entry) for entry in row]) for row in rows])
     margin = _margin(real, bound, method.margin_up_to)
     reactions = problem.reactions(forces, state)
     return Settled(reactions, forces, rounds, change, contraction, done, shares, margin, certain, real)
+
+
+def _unrolled(problem: Problem, method: FrictionMethod) -> Settled:
+    """Newton with a fixed number of rounds, for numbers that are compiled; the last one carries the derivatives.
+
+    Lanes that need more, and those without the certificate, are for whoever compiles to compute again.
+    """
+    real = _primal(problem)
+    forces: list[Number] = [0.0] * len(real.contacts)
+    state = real.state(forces)
+    bound = np.where(np.isfinite(_peak(state.normals)), real.bound(), 0.0)
+    certain = ~(bound >= 1.0)
+    inverse = linalg.quick_inverse(identity_minus(real.map_derivative(state)))
+    for _ in range(COMPILED_ROUNDS - 1):
+        forces = _corrected(real, state, forces, inverse)
+        state = real.state(forces)
+        inverse = linalg.quick_inverse(identity_minus(real.map_derivative(state)))
+    forces = _corrected(problem, problem.state(forces), forces, inverse)
+    before, state = state, problem.state(forces)
+    change = _changed(state, before)
+    done = certain & ~(change > method.tolerance(state.normals))
+    reactions = problem.reactions(forces, state)
+    return Settled(reactions, forces, COMPILED_ROUNDS, change, 0.0, done, 1.0, np.inf, certain, real)
 
 
 def _at_once(problem: Problem) -> Settled:
@@ -487,9 +520,9 @@ def _largest(values: Sequence[Number]) -> Number:
 
 def _depth(problem: Problem) -> int:
     """Levels of ε among the inputs: each costs one Newton step at the solution."""
-    return depth(problem.numbers())
+    return max((n.depth for n in problem.numbers() if isinstance(n, Dual)), default=0)
 
 
 def _primal(problem: Problem) -> Problem:
-    """The problem without its dual parts."""
-    return problem.mapped(primal) if _depth(problem) else problem
+    """The problem without derivatives."""
+    return problem.mapped(primal) if _depth(problem) or problem.compiled else problem

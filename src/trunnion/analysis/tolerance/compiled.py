@@ -12,7 +12,7 @@ import contextlib
 import os
 import sys
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import replace
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -41,8 +41,7 @@ __all__ = ["CompiledKernel", "Figure"]
 
 Array = NDArray[np.float64]
 Figure = Callable[[Backward], Number]  # one number of every position, of the motion (`back.walk`) or of the forces
-ROUNDS = 4  # of Newton's method for friction; lanes that need more are computed again
-BATCH = {"cpu": 1 << 16, "gpu": 1 << 22}  # configurations at a time, by platform
+BATCH = {"cpu": 1 << 13, "gpu": 1 << 22}  # configurations at a time, by platform: on a CPU they stay in its cache
 BORDER = 0.99 * NEAR_SINGULAR  # condition from which NumPy decides what a position is
 
 
@@ -58,17 +57,23 @@ class CompiledKernel:
     """Curves of measures over samples and positions, compiled once for each set of numbers that vary.
 
     run: the prepared mechanism; figures: by name, what to read off each walk; forces: whether one of them needs more
-    than the motion. Raises MechanismError if JAX is not installed, or the mechanism has what only NumPy does.
+    than the motion; threads: batches at a time, by default one for each core. Raises MechanismError if JAX is not installed, or the mechanism has what only NumPy does.
     """
 
     def __init__(
-        self, run: Run, figures: Mapping[str, Figure], forces: bool = True, method: FrictionMethod | None = None
+        self,
+        run: Run,
+        figures: Mapping[str, Figure],
+        forces: bool = True,
+        method: FrictionMethod | None = None,
+        threads: int | None = None,
     ) -> None:
         self.run = run
         self.figures = dict(figures)
         self.forces = forces
         self.method = method or FrictionMethod()
         self._jax = _imported()
+        self.threads = threads or (os.cpu_count() or 1 if self.platform == "cpu" else 1)
         self.again = 0  # lanes that NumPy computed again, so far
         self._functions: dict[Any, Callable[..., _Compiled]] = {}
 
@@ -91,14 +96,19 @@ class CompiledKernel:
         doubtful = np.empty(shape, bool)
         rows = max(1, min(samples, BATCH.get(self.platform, BATCH["gpu"]) // shape[1]))
         function = self.function(values)
-        with self._wide():
-            for low in range(0, samples, rows):
-                part = slice(low, low + rows)
+
+        def fill(low: int) -> None:
+            part = slice(low, low + rows)
+            with self._wide():
                 found = function(*_batch(arrays, time, samples, part, rows))
                 for name, curve in found.curves.items():
                     curves[name][part] = curve[: samples - low]
                 status[part] = found.status[: samples - low]
                 doubtful[part] = found.doubtful[: samples - low]
+
+        fill(0)  # alone: it may have to be compiled first
+        with ThreadPoolExecutor(self.threads) as pool:
+            list(pool.map(fill, range(rows, samples, rows)))
         self._again(values, time, curves, status, doubtful)
         return curves, status
 
@@ -118,7 +128,7 @@ class CompiledKernel:
             values = {**constants, **{path: Traced(array) for path, array in arrays.items()}}
             shape = np.broadcast_shapes(np.shape(time), *(array.shape for array in arrays.values()))
             with np.errstate(all="ignore"):
-                back = self._back(values, Traced(time), replace(self.method, limit=ROUNDS))
+                back = self._back(values, Traced(time), self.method)
                 status = status_number(back) if self.forces else pose_status_number(back.walk)
                 doubtful = (status != Status.SOLVED) | (worst_condition(back.walk) > BORDER)
                 for settled in back.settled:

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["Traced", "Untraceable", "bare"]
+__all__ = ["Traced", "Untraceable", "bare", "eliminated", "looped"]
 
 
 class Untraceable(TypeError):
@@ -194,3 +194,44 @@ class _Functions:
 
 
 functions: Any = _Functions()
+
+
+# ---- what is written down once instead of again and again -----------------------------------------------------------
+
+
+def looped(step: Callable[[list[Any]], list[Any]], start: Sequence[Any], rounds: int) -> list[Any]:
+    """step(… step(start)), with the step compiled once. start, and what a step makes of it: lists of numbers."""
+    import jax
+
+    def body(_: Any, numbers: list[Any]) -> list[Any]:
+        return [_jnp().asarray(bare(one), float) for one in step([Traced(one) for one in numbers])]
+
+    state = [_jnp().asarray(bare(one), float) for one in start]
+    for _ in range(2):  # in the shape that it comes to: that of all lanes
+        shapes = jax.eval_shape(body, 0, state)
+        state = [_jnp().broadcast_to(one, shape.shape) for one, shape in zip(state, shapes, strict=True)]
+    return [Traced(one) for one in jax.lax.fori_loop(0, rounds, body, state)]
+
+
+def eliminated(rows: Sequence[Sequence[Any]]) -> tuple[list[list[Any]], Any]:
+    """X of A X = B from the rows of (A, B), n × (n + m), by Gauss and Jordan with row pivoting in every lane; det A.
+
+    On the stacked entries: as many operations are written down for any number of them.
+    """
+    jnp = _jnp()
+    entries = [[jnp.asarray(bare(entry), float) for entry in row] for row in rows]
+    shape = np.broadcast_shapes(*(entry.shape for row in entries for entry in row))
+    table = jnp.stack([jnp.stack([jnp.broadcast_to(entry, shape) for entry in row]) for row in entries])
+    n = len(rows)
+    number = np.arange(n).reshape(n, *([1] * len(shape)))
+    determinant = jnp.ones(shape)
+    for k in range(n):
+        best = jnp.argmax(jnp.where(number < k, -1.0, jnp.abs(table[:, k])), axis=0)
+        chosen = (number == best)[:, None]
+        pivot = jnp.sum(jnp.where(chosen, table, 0.0), axis=0)
+        table = jnp.where(chosen, table[k], table)  # what stood in its place goes where it was
+        determinant = determinant * jnp.where(best == k, pivot[k], -pivot[k])
+        pivot = pivot / pivot[k]
+        reduced = table - table[:, k : k + 1] * pivot
+        table = jnp.where((number == k)[:, None], pivot, reduced)
+    return [[Traced(table[i, j]) for i in range(n)] for j in range(n, len(rows[0]))], Traced(determinant)

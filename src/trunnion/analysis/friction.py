@@ -24,9 +24,8 @@ from numpy.typing import NDArray
 
 from trunnion.algebra import linalg
 from trunnion.algebra.dual import Dual, primal
-from trunnion.algebra.namespace import Number
+from trunnion.algebra.namespace import Number, compiled
 from trunnion.algebra.nested import replaced
-from trunnion.algebra.traced import Traced
 from trunnion.analysis import continuation
 from trunnion.errors import Finding, MechanismError
 from trunnion.groups.planar import is_zero, less
@@ -214,10 +213,10 @@ class Problem:
         chosen = np.broadcast_to(lanes, shape)
         return self.mapped(lambda number: np.broadcast_to(np.asarray(number, float), shape)[chosen]), chosen
 
-    @property
+    @cached_property
     def compiled(self) -> bool:
         """Whether its numbers have no values yet."""
-        return any(isinstance(number, Traced) for number in self.numbers())
+        return compiled(self.numbers())
 
     @cached_property
     def felt(self) -> list[Felt]:
@@ -363,17 +362,20 @@ def _unrolled(problem: Problem, method: FrictionMethod) -> Settled:
     state = real.state(forces)
     bound = np.where(np.isfinite(_peak(state.normals)), real.bound(), 0.0)
     certain = ~(bound >= 1.0)
-    inverse = linalg.quick_inverse(identity_minus(real.map_derivative(state)))
     for _ in range(COMPILED_ROUNDS - 1):
-        forces = _corrected(real, state, forces, inverse)
+        forces = _corrected(real, state, forces, _matrix(real, state))
         state = real.state(forces)
-        inverse = linalg.quick_inverse(identity_minus(real.map_derivative(state)))
-    forces = _corrected(problem, problem.state(forces), forces, inverse)
+    forces = _corrected(problem, problem.state(forces), forces, _matrix(real, state))
     before, state = state, problem.state(forces)
     change = _changed(state, before)
     done = certain & ~(change > method.tolerance(state.normals))
     reactions = problem.reactions(forces, state)
     return Settled(reactions, forces, COMPILED_ROUNDS, change, 0.0, done, 1.0, np.inf, certain, real)
+
+
+def _matrix(problem: Problem, state: State) -> list[list[Number]]:
+    """(1 − A)⁻¹ at a state."""
+    return linalg.quick_inverse(identity_minus(problem.map_derivative(state)))
 
 
 def _at_once(problem: Problem) -> Settled:

@@ -450,7 +450,8 @@ def public_names() -> str:
 # ---- the model file -------------------------------------------------------------------------------------------
 
 SECTIONS = ("Link", "Point", "PolarPoint", "InertiaTensor", "Joint", "Pin", "Guide", "Friction", "JointDefaults",
-            "Misalignment", "Seat", "LoopJoint", "Driver", "Load", "Measure")  # fmt: skip
+            "Misalignment", "Seat", "LoopJoint", "Driver", "Load", "Measure", "Variation", "VariationDefaults",
+            "Correlation", "Cost", "CostOption")  # fmt: skip
 
 
 def meanings() -> dict[str, dict[str, str]]:
@@ -461,7 +462,7 @@ def meanings() -> dict[str, dict[str, str]]:
 def section(name: str) -> str:
     """The keys of one section: what each takes, its default, its meaning."""
     told = meanings()[name]
-    fields = _class(name).model_fields
+    fields = {field.alias or key: field for key, field in _class(name).model_fields.items()}
     stray = set(told) ^ set(fields)
     if stray:
         raise PluginError(f"docs/meanings.yaml, {name}: {', '.join(sorted(stray))} is told or stated, not both")

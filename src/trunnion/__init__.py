@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from trunnion.analysis.locking import locking
     from trunnion.analysis.play import play
     from trunnion.analysis.sweep import sweep
+    from trunnion.analysis.tolerance.study import tolerance
     from trunnion.errors import Finding, MechanismError, Status
     from trunnion.export import save
     from trunnion.model.file import read_mechanism as read
@@ -42,6 +43,7 @@ _PLACES = {
     "report": "trunnion.views.report",
     "save": "trunnion.export",
     "sweep": "trunnion.analysis.sweep",
+    "tolerance": "trunnion.analysis.tolerance.study",
 }
 _ELSEWHERE = {"read": "read_mechanism"}
 _MODULES = {"dual": "trunnion.dual"}
@@ -64,6 +66,7 @@ __all__ = [
     "report",
     "save",
     "sweep",
+    "tolerance",
 ]
 
 

@@ -57,6 +57,10 @@ class MechanismError(ValueError):
         self.findings: tuple[Finding, ...] = (findings,) if isinstance(findings, Finding) else tuple(findings)
         super().__init__("\n".join(str(finding) for finding in self.findings))
 
+    def __reduce__(self) -> tuple[type[MechanismError], tuple[tuple[Finding, ...]]]:
+        """Pickled with its findings, so that it can come from another process."""
+        return type(self), (self.findings,)
+
 
 class Status(IntEnum):
     """What a position came to, in rising order of severity; from `NOT_CONVERGED` on the forces are NaN."""

@@ -29,10 +29,10 @@ __all__ = [
     "Steps",
     "TableFile",
     "UnitsRow",
+    "named_file",
     "over",
     "points",
     "setting",
-    "table_file",
 ]
 
 IMAGES = (".png", ".svg", ".pdf")
@@ -137,9 +137,9 @@ def points(grid: Mapping[str, Any]) -> int:
     return math.prod(values[2] if isinstance(values, tuple) else len(values) for values in grid.values())
 
 
-def table_file(text: str) -> tuple[str, str]:
+def named_file(text: str, option: str = "--table") -> tuple[str, str]:
     """A name and its file from `name=file`."""
     name, _, path = (part.strip() for part in text.partition("="))
     if not name or not path:
-        raise MechanismError(Finding(f"'{text}' names no file", "--table", "write NAME=FILE, e.g. A=motion.csv"))
+        raise MechanismError(Finding(f"'{text}' names no file", option, "write NAME=FILE, e.g. A=motion.csv"))
     return name, path

@@ -1,8 +1,9 @@
-"""Measures: numbers that follow from the motion of a mechanism, or from the efforts of its drivers.
+"""Measures: numbers that follow from the motion of a mechanism, or from its forces.
 
-`MEASURES` is the vocabulary of what a measure of the motion may be: a coordinate of a point, the angle of a link, the
-rotation or the slide of a joint. Each knows its value y at a walk and its unit loads: what does the work 1 on a unit of
-y. Under them alone, the drivers at rest, the reactions say what every small displacement in a joint does to y.
+`MEASURES` is the vocabulary, one entry a kind. Each knows its course: the one or more numbers, position by position,
+that its figure is made of (`measure_figures`). A coordinate of a point, the angle of a link, the rotation or the slide
+of a joint also know their unit loads: what does the work 1 on a unit of them. Under these alone, the drivers at rest,
+the reactions say what every small displacement in a joint does to the measure.
 """
 
 from __future__ import annotations
@@ -11,12 +12,17 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any, cast
 
+import numpy as np
+from pydantic import ValidationError
+
 from trunnion.algebra import rigid
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.rigid import Screw
 from trunnion.algebra.space import Vector3, cross, dot
+from trunnion.analysis import measure_courses as courses
 from trunnion.analysis.kinematics import Forward
+from trunnion.analysis.kinetostatics import Backward
 from trunnion.analysis.space.motion import SpatialWalk
 from trunnion.analysis.system import System, Values
 from trunnion.errors import Finding, MechanismError
@@ -27,38 +33,125 @@ from trunnion.model.contact import motions
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.parts import Measure as Stated
 
-__all__ = ["MEASURES", "Measure", "MeasureKind", "named", "outputs"]
+__all__ = [
+    "MEASURES",
+    "MOTIONS",
+    "STATISTICS",
+    "Measure",
+    "MeasureKind",
+    "MotionKind",
+    "coordinate_unit",
+    "named",
+    "outputs",
+]
 
 AXES = ("x", "y", "z")
+OF_JOINT = "of the joint"
+STATISTICS = (
+    *("value", "maximum", "minimum", "peak-to-peak", "mean", "rms", "largest"),
+    *("place-of-maximum", "place-of-minimum"),
+)
 NULL: Vector3 = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
 class Measure:
-    """One number to watch. kind: an entry of MEASURES, or "effort"; subject: link.point, link, joint or driver;
-    axis: of a coordinate, or the global axis that a link in space turns about; limit: allowed deviation, SI.
+    """One number to watch, its figure and its limits; SI.
+
+    kind: an entry of MEASURES; subject: link.point, link, joint or driver, "cycle" or "instant" of the efficiency;
+    axis: of a coordinate or a force, or the global axis that a link in space turns about. lower, upper: allowed signed
+    deviations of the figure from that of the nominal mechanism; at_least, at_most: bounds of the figure itself.
+    at, over: coordinate of the first driver, or time if `timed`; statistic: `as` of the model, "" for what the kind
+    itself makes of its course (`rule`).
     """
 
     name: str
     kind: str
     subject: str
     axis: str = ""
-    limit: float | None = None
+    lower: float | None = None
+    upper: float | None = None
+    at_least: float | None = None
+    at_most: float | None = None
+    at: float | None = None
+    over: tuple[float, float] | None = None
+    timed: bool = False
+    statistic: str = ""
+
+    @property
+    def limit(self) -> float | None:
+        """The deviation allowed to either side at every position; None where a limit is of one place or one figure."""
+        of_every_position = self.at is None and self.over is None and not self.statistic
+        if not of_every_position or self.lower is None or self.upper is None:
+            return None
+        return max(0.0, min(-self.lower, self.upper))
 
     @property
     def of_motion(self) -> bool:
-        """Whether the motion alone decides it."""
-        return self.kind in MEASURES
+        """Whether the motion alone decides it: its course takes a walk forward."""
+        return not MEASURES[self.kind].of_forces
+
+    @property
+    def wants_margin(self) -> bool:
+        """Whether the forces must be solved with `FrictionMethod(margin_up_to=MARGIN)`."""
+        return self.kind == "locking_margin"
+
+    @property
+    def rule(self) -> str:
+        """What makes the figure of the course: an entry of `measure_figures.RULES`."""
+        own = MEASURES[self.kind].rule
+        if own == "ratio" and self.subject != "cycle":
+            own = "deviation"
+        if own == "dead centre":
+            return "dead centre, least" if self.statistic == "place-of-minimum" else own
+        if own in ("line", "ratio"):
+            return own
+        return self.statistic or ("value" if self.at is not None else own)
 
     def unit(self, system: System) -> str:
-        """SI unit."""
-        if self.of_motion:
-            return MEASURES[self.kind].unit
-        return "N m" if system.turns(self.subject) else "N"
+        """SI unit of the course."""
+        unit = MEASURES[self.kind].unit
+        if unit == "N m":
+            return "N m" if system.turns(self.subject) else "N"
+        return ("rad" if system.turns(self.subject) else "m") if unit == OF_JOINT else unit
+
+    def figure_unit(self, system: System, values: Values) -> str:
+        """SI unit of the figure: of a place that of the first driver's coordinate, s where this names no position."""
+        return coordinate_unit(system, values) if self.of_place else self.unit(system)
+
+    @property
+    def of_place(self) -> bool:
+        """Whether the figure is a place in the cycle."""
+        return self.rule.startswith(("place", "dead"))
+
+    def turning(self, system: System) -> bool:
+        """Whether the course is an angle, which may gain whole turns."""
+        return self.unit(system) == "rad" and not self.of_attitude(system)
+
+    def of_attitude(self, system: System) -> bool:
+        """Whether it is the turn of a link in space from where it lies in the nominal mechanism."""
+        return self.kind == "angle" and system.mechanism.space == "spatial"
+
+    def curve(self, back: Backward | Forward) -> tuple[Number, ...]:
+        """The course: one number or more, each to broadcast to (sample, position); SI, angles in (−π, π].
+
+        back: a `Backward`, or a `Forward` where `of_motion`. Of a point its coordinates, of the efficiency of the cycle
+        useful and drive power, of the angle of a link in space the three axes of its frame.
+        Floats, arrays or dual numbers, as the values were.
+        """
+        walk = back if isinstance(back, Forward) else back.walk
+        of = MEASURES[self.kind]
+        return of.curve(self, cast(Any, back if of.of_forces else walk))
+
+    def coordinate(self, system: System) -> Measure:
+        """The rotation or slide of a joint that a stroke, a dead centre or a transmission error is of."""
+        if MEASURES[self.kind].unit != OF_JOINT:
+            return self
+        return Measure(self.name, "rotation" if system.turns(self.subject) else "slide", self.subject)
 
     def value(self, walk: Forward) -> Number:
         """The measure of the motion, m or rad; the turn of a link in space is from where it lies without errors: 0."""
-        kind = MEASURES[self.kind]
+        kind = MOTIONS[self.kind]
         return kind.value_in_space(self, walk) if isinstance(walk, SpatialWalk) else kind.value(self, walk)
 
     def loads(self, walk: Forward) -> dict[str, Any]:
@@ -66,7 +159,7 @@ class Measure:
 
         They are equal and opposite on the two links of a joint.
         """
-        kind = MEASURES[self.kind]
+        kind = MOTIONS[self.kind]
         return kind.loads_in_space(self, walk) if isinstance(walk, SpatialWalk) else kind.loads(self, walk)
 
     def rate(self, walk: Forward) -> Number:
@@ -80,23 +173,35 @@ class Measure:
                 total = total + (load.x * twist.x + load.y * twist.y + load.m * twist.w)
         return total
 
+    def rate_of_course(self, walk: Forward) -> Number | None:
+        """Rate of a course that is an angle, rad/s; None of others."""
+        return self.coordinate(walk.system).rate(walk) if self.turning(walk.system) else None
+
 
 @dataclass(frozen=True)
-class MeasureKind:
-    """A number of the motion: its unit, and for the plane and for space its value and the unit loads that go with it.
+class MotionKind:
+    """A number of the motion with unit loads: for the plane and for space its value and the loads that go with it."""
 
-    turns: whether it is an angle that may gain whole turns.
-    """
-
-    unit: str
     value: Callable[[Measure, Forward], Number]
     loads: Callable[[Measure, Forward], dict[str, Any]]
     value_in_space: Callable[[Measure, SpatialWalk], Number]
     loads_in_space: Callable[[Measure, SpatialWalk], dict[str, Any]]
 
-    @property
-    def turns(self) -> bool:
-        return self.unit == "rad"
+
+@dataclass(frozen=True)
+class MeasureKind:
+    """What a measure may be. unit: SI, of the course ("N m": or N, by the driver; "of the joint": rad or m).
+
+    curve: the course, of a `Backward` if `of_forces`, else of a `Forward`; rule: what makes the figure of it where no
+    statistic is stated; against: whether the course is compared to that of the nominal mechanism, position by position.
+    """
+
+    unit: str
+    long_name: str
+    curve: Callable[[Measure, Any], tuple[Number, ...]]
+    rule: str = "deviation"
+    of_forces: bool = False
+    against: bool = False
 
 
 # ---- in the plane ---------------------------------------------------------------------------------------------
@@ -205,21 +310,86 @@ def _pull_in_space(measure: Measure, walk: SpatialWalk) -> dict[str, Any]:
     return _both(walk, joint, rigid.about(second.z, NULL, second.place))
 
 
-MEASURES: dict[str, MeasureKind] = {
-    "point": MeasureKind("m", _coordinate, _push, _coordinate, _push_in_space),
-    "angle": MeasureKind("rad", _angle, _turn, _angle_in_space, _turn_in_space),
-    "rotation": MeasureKind("rad", _rotation, _twist, _rotation_in_space, _twist_in_space),
-    "slide": MeasureKind("m", _slide, _pull, _slide_in_space, _pull_in_space),
+MOTIONS: dict[str, MotionKind] = {
+    "point": MotionKind(_coordinate, _push, _coordinate, _push_in_space),
+    "angle": MotionKind(_angle, _turn, _angle_in_space, _turn_in_space),
+    "rotation": MotionKind(_rotation, _twist, _rotation_in_space, _twist_in_space),
+    "slide": MotionKind(_slide, _pull, _slide_in_space, _pull_in_space),
 }
 
 
+# ---- all kinds ------------------------------------------------------------------------------------------------
+
+
+def _value(measure: Measure, walk: Forward) -> tuple[Number, ...]:
+    """The number of the motion itself, or the coordinate of the joint it is about."""
+    return (measure.coordinate(walk.system).value(walk),)
+
+
+def _attitude(measure: Measure, walk: Forward) -> tuple[Number, ...]:
+    """The angle of a link; in space the axes of its frame, nine numbers."""
+    if not isinstance(walk, SpatialWalk):
+        return (measure.value(walk),)
+    return tuple(number for axis in walk.motions[measure.subject].frame[:3] for number in axis)
+
+
+def _place(measure: Measure, walk: Forward) -> tuple[Number, ...]:
+    return courses.place(measure.subject, walk)
+
+
+def _effort(measure: Measure, back: Backward) -> tuple[Number, ...]:
+    return courses.effort(measure.subject, back)
+
+
+def _reaction(measure: Measure, back: Backward) -> tuple[Number, ...]:
+    return courses.reaction(measure.subject, measure.axis, back)
+
+
+def _efficiency(measure: Measure, back: Backward) -> tuple[Number, ...]:
+    return courses.efficiency(measure.subject, back)
+
+
+def _margin(measure: Measure, back: Backward) -> tuple[Number, ...]:
+    return courses.locking_margin(back)
+
+
+MEASURES: dict[str, MeasureKind] = {
+    "point": MeasureKind("m", "coordinate of a point", _value),
+    "path_error": MeasureKind("m", "distance of a point from its nominal place", _place, "maximum", against=True),
+    "straightness": MeasureKind("m", "straightness of the path of a point", _place, "line"),
+    "angle": MeasureKind("rad", "angle of a link", _attitude),
+    "rotation": MeasureKind("rad", "rotation of a joint", _value),
+    "slide": MeasureKind("m", "slide of a joint", _value),
+    "transmission_error": MeasureKind(OF_JOINT, "transmission error of a joint", _value, against=True),
+    "stroke": MeasureKind(OF_JOINT, "stroke of a joint", _value, "peak-to-peak"),
+    "dead_centre": MeasureKind(OF_JOINT, "dead centre of a joint", _value, "dead centre"),
+    "effort": MeasureKind("N m", "effort of a driver", _effort, of_forces=True),
+    "reaction": MeasureKind("N", "reaction in a joint", _reaction, of_forces=True),
+    "efficiency": MeasureKind("1", "efficiency", _efficiency, "ratio", of_forces=True),
+    "locking_margin": MeasureKind("1", "locking margin", _margin, "minimum", of_forces=True),
+}
+
+
+def coordinate_unit(system: System, values: Values) -> str:
+    """Unit of what names positions: rad or m, the coordinate of the first driver if it runs one way, else s."""
+    first = next(iter(system.mechanism.drivers), None)
+    if first is None or not system.span(values, first).one_way:
+        return "s"
+    return "rad" if system.turns(first) else "m"
+
+
 # ---- by name --------------------------------------------------------------------------------------------------
+
+FORMS = "[STATISTIC:]link.point.x, angle:link, rotation:joint, slide:joint, effort:driver or KIND:NAME"
 
 
 def named(mechanism: Mechanism, names: Iterable[str], values: Values) -> list[Measure]:
     """Measures by their names in the model, or written as they are.
 
-    `link.point.x`, `angle:link` (in space `angle:link.x`), `rotation:joint`, `slide:joint`, `effort:driver`.
+    `link.point.x`, `angle:link` (in space `angle:link.x`), `rotation:joint`, `slide:joint`, `effort:driver`,
+    `reaction:joint` or `reaction:joint.x`, `efficiency:cycle`, `efficiency:instant`, `locking_margin:mechanism`,
+    `path_error:link.point`, `straightness:link.point`, `stroke:joint`, `dead_centre:joint`, `transmission_error:joint`;
+    before any of them a statistic: `maximum:effort:A`, `rms:link.point.x`.
     Raises MechanismError for a name that means nothing.
     """
     found, findings = [], []
@@ -229,12 +399,11 @@ def named(mechanism: Mechanism, names: Iterable[str], values: Values) -> list[Me
             stated = _read(name)
             findings += [] if stated is None else list(check_measure(mechanism, stated, f"--measure {name}"))
         if stated is None:
-            forms = "link.point.x, angle:link, rotation:joint, slide:joint or effort:driver"
-            known = f"the model's measures are {', '.join(mechanism.measures)}" if mechanism.measures else ""
-            what = f"'{name}' is no measure"
-            findings.append(Finding(what, "--measure", f"write {forms}" + (f"; {known}" if known else "")))
+            known = f"; the model's measures are {', '.join(mechanism.measures)}" if mechanism.measures else ""
+            kinds = f"; KIND: {', '.join(SUBJECTS[1:])}; STATISTIC: {', '.join(STATISTICS)}"
+            findings.append(Finding(f"'{name}' is no measure", "--measure", f"write {FORMS}{known}{kinds}"))
         else:
-            found.append(_measure(name, stated, values))
+            found.append(_measure(name, stated, values, mechanism))
     if findings:
         raise MechanismError(findings)
     return found
@@ -242,24 +411,46 @@ def named(mechanism: Mechanism, names: Iterable[str], values: Values) -> list[Me
 
 def _read(text: str) -> Stated | None:
     """A measure as it is written on the command line; None if it is none."""
+    head, colon, rest = text.partition(":")
+    statistic: dict[str, Any] = {}
+    if colon and head in STATISTICS:
+        statistic, text = {"as": head}, rest
     kind, colon, subject = text.partition(":")
     data: dict[str, Any] = {}
     if colon and kind in SUBJECTS and kind != "point":
         data[kind] = subject
-        link, _, axis = subject.rpartition(".")
-        if kind == "angle" and link and axis in AXES:
-            data = {"angle": link, "axis": axis}
-    else:
+        owner, _, axis = subject.rpartition(".")
+        if kind in ("angle", "reaction") and owner and axis in AXES:
+            data = {kind: owner, "axis": axis}
+    elif not colon:
         point, _, axis = text.rpartition(".")
         if "." in point and axis in AXES:
             data = {"point": point, "axis": axis}
-    return Stated(**data) if data else None
+    try:
+        return Stated(**data, **statistic) if data else None
+    except ValidationError:  # such as an efficiency of something
+        return None
 
 
-def _measure(name: str, stated: Stated, values: Values) -> Measure:
+def _measure(name: str, stated: Stated, values: Values, mechanism: Mechanism) -> Measure:
     kind = next(key for key in SUBJECTS if getattr(stated, key) is not None)
-    limit = values.get(f"measures.{name}.limit")
-    return Measure(name, kind, getattr(stated, kind), stated.axis or "", None if limit is None else float(limit))
+    path = f"measures.{name}"
+
+    def number(key: str) -> float | None:
+        found = values.get(f"{path}.{key}")
+        return None if found is None else float(np.ravel(primal(found))[0])
+
+    over = number("over.from"), number("over.to")
+    places = [f"{path}.{key}" for key in ("at", "over.from") if f"{path}.{key}" in values]
+    kinds = mechanism.parameter_kinds()
+    return Measure(
+        name, kind, getattr(stated, kind), stated.axis or "",
+        number("limit.lower"), number("limit.upper"), number("at_least"), number("at_most"),
+        at=number("at"),
+        over=None if over[0] is None or over[1] is None else (over[0], over[1]),
+        timed=any(kinds[place].unit == "s" for place in places),
+        statistic=stated.statistic or "",
+    )  # fmt: skip
 
 
 def outputs(system: System) -> list[Measure]:

@@ -31,7 +31,7 @@ from trunnion.analysis.analyse import Run, check_steps, pose_status, prepare, st
 from trunnion.analysis.fill import unwrap_row
 from trunnion.analysis.friction import FrictionMethod
 from trunnion.analysis.kinematics import Forward, forward
-from trunnion.analysis.measures import MEASURES, Measure, named, outputs
+from trunnion.analysis.measures import MOTIONS, Measure, named, outputs
 from trunnion.analysis.play_result import dataset, relied_on
 from trunnion.analysis.shifts import Play
 from trunnion.analysis.space import forces
@@ -147,11 +147,18 @@ def play(mechanism: Mechanism, measures: Sequence[str] | None = None, steps: int
 
 
 def _measures(run: Run, names: Sequence[str] | None) -> tuple[list[Measure], list[Finding]]:
-    """The measures asked for; a note where they are chosen because none is stated."""
+    """The measures asked for; notes where they are chosen because none is stated, or some are left out."""
     mechanism = run.system.mechanism
-    names = list(mechanism.measures) if names is None else names
-    if names:
-        return named(mechanism, names, run.values), []
+    found = named(mechanism, mechanism.measures if names is None else names, run.values)
+    others = [one.name for one in found if one.kind not in (*MOTIONS, "effort")]
+    what = f"play is known of measures {', '.join(MOTIONS)} and effort, which {', '.join(others)} is none of"
+    remedy = "`trunnion tolerance` knows the others"
+    if others and names is not None:
+        raise MechanismError(Finding(what, "measures", remedy))
+    told = [Finding(f"{what}: left out", "measures", remedy, Severity.NOTE)] if others else []
+    found = [one for one in found if one.name not in others]
+    if found:
+        return found, told
     found = outputs(run.system)
     remedy = "state measures: in the model, or give --measure link.point.x"
     if not found:
@@ -159,7 +166,7 @@ def _measures(run: Run, names: Sequence[str] | None) -> tuple[list[Measure], lis
             Finding("no measure is stated, and no joint to the ground is an output", "measures", remedy)
         )
     what = f"no measure is stated: {', '.join(one.name for one in found)} taken, joints to the ground without a driver"
-    return found, [Finding(what, "measures", remedy, Severity.NOTE)]
+    return found, [Finding(what, "measures", remedy, Severity.NOTE), *told]
 
 
 def _check(known: Mapping[str, Play]) -> None:
@@ -193,7 +200,7 @@ def _over_the_cycle(run: Run, measures: Sequence[Measure], known: Mapping[str, P
             _fill(effect, rates, window)
     step = float(time[1] - time[0]) if steps > 1 else 0.0
     for i, measure in enumerate(measures):
-        if measure.of_motion and MEASURES[measure.kind].turns:
+        if measure.turning(run.system):
             unwrap_row(effect.value[i], rates[i], step)
     return effect
 

@@ -77,11 +77,11 @@ def seats(system: System, values: Values) -> list[Seat]:
     for joint, stated in system.mechanism.seated.items():
         play = play_of(space, system.joints[joint][0], values, joint)
         if play is not None:
-            found.append(Seat(joint, play, _given(values, joint, play) if not isinstance(stated, str) else None))
+            found.append(Seat(joint, play, given_offsets(values, joint, play) if not isinstance(stated, str) else None))
     return found
 
 
-def _given(values: Values, joint: str, play: Play) -> list[Vector]:
+def given_offsets(values: Values, joint: str, play: Play) -> list[Vector]:
     """Offsets of a seat that is stated: by β and ξ of a pin, of a guide from its normal, by a direction of a ball."""
     path = f"joints.{joint}.seat"
     found: list[Vector] = []

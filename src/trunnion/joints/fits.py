@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from trunnion.errors import Finding, MechanismError
 
-__all__ = ["GRADES", "HOLES", "SHAFTS", "FitLimits", "fit", "limits"]
+__all__ = ["GRADES", "HOLES", "SHAFTS", "FitLimits", "fit", "limits", "standard_tolerance"]
 
 # Ranges of nominal size, mm: each begins above the entry before and includes its own. The steps between are for
 # letters whose deviation changes faster with the size.
@@ -122,6 +122,12 @@ def fit(size: float, hole: str, shaft: str) -> FitLimits:
 def limits(size: float, tolerance_class: str) -> tuple[float, float]:
     """Lower and upper deviation, m, of a class such as H7 (a hole) or g6 (a shaft) at a nominal diameter, m."""
     return _metres(_deviations(size, tolerance_class))
+
+
+def standard_tolerance(size: float, grade: int) -> float:
+    """Width, m, of the tolerance of an IT grade at a nominal size, m: the whole, from limit to limit."""
+    lower, upper = limits(size, f"js{grade}")
+    return upper - lower
 
 
 def _metre(micrometres: float) -> float:

@@ -15,11 +15,13 @@ from trunnion.errors import Finding, Severity
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.joints.motion import MOTION_LAWS
 from trunnion.joints.pairs import PAIRS
+from trunnion.model.check_costs import cost_names, cost_values
 from trunnion.model.check_errors import errors, joint_errors
 from trunnion.model.check_gears import gears
 from trunnion.model.check_loads import motion_dimensions, springs, tables, unknown_name
-from trunnion.model.check_measures import check_measure, point_exists
+from trunnion.model.check_measures import check_measure, measure_values, point_exists
 from trunnion.model.check_space import contact, coordinates, driven, loop, pitch, resisted, space
+from trunnion.model.check_tolerances import stated_entries, tolerance_names, tolerance_values
 from trunnion.model.check_values import check_values
 from trunnion.model.contact import motions
 from trunnion.model.expression import MOTION, RESERVED
@@ -49,10 +51,12 @@ def check_model(mechanism: Mechanism, lost: Collection[str] = ()) -> list[Findin
     findings += [] if lost else _absent(mechanism)
     findings += [*loop(mechanism), *gears(mechanism), *_drivers(mechanism), *_loads(mechanism)]
     findings += [*errors(mechanism), *joint_errors(mechanism)]
-    findings += [*springs(mechanism), *_others(mechanism)]
+    findings += [*springs(mechanism), *_others(mechanism), *_tolerances(mechanism)]
     numbers = ParameterSet(mechanism, unreadable) if unreadable else mechanism.parameter_set
     with np.errstate(all="ignore"):  # absurd numbers may overflow in a check; they are still only numbers
         findings += check_values(mechanism, numbers)
+        findings += measure_values(mechanism, numbers)
+        findings += [*tolerance_values(mechanism, numbers), *cost_values(mechanism, numbers)]
     findings = list(dict.fromkeys(findings))  # a default that several joints share is found once
     return [finding for finding in findings if not any(_speaks_of(finding, name) for name in lost)]
 
@@ -76,7 +80,8 @@ def _quantities(mechanism: Mechanism, unreadable: set[str]) -> Iterator[Finding]
     yield from tables(mechanism, known)
     moving = {**motion_dimensions(mechanism, known), **known}
     used: set[str] = set()
-    for entry in entries(mechanism):
+    found = entries(mechanism)
+    for entry in (*found, *stated_entries(mechanism, found)):
         names = entry.quantity.names
         used.update(names)
         if entry.quantity is UNREADABLE:
@@ -327,6 +332,13 @@ def _joint_load(mechanism: Mechanism, load: Load, where: str) -> Iterator[Findin
     for key, freedom in (("resisting_torque", "rotation"), ("resisting_force", "slide")):
         if getattr(load, key) is not None:
             yield from resisted(joints[load.joint], key, freedom, where)
+
+
+def _tolerances(mechanism: Mechanism) -> Iterator[Finding]:
+    """What tolerances and costs name, and what they lack."""
+    if mechanism.variations or mechanism.correlations or "tolerance_defaults" in mechanism.model_fields_set:
+        yield from tolerance_names(mechanism, entries(mechanism))
+    yield from cost_names(mechanism)
 
 
 def _others(mechanism: Mechanism) -> Iterator[Finding]:

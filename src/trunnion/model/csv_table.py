@@ -18,12 +18,13 @@ from typing import Any, NamedTuple
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.joints.pairs import PAIRS
+from trunnion.model.expression import literal
 from trunnion.model.names import nearest
 from trunnion.model.quantity import Quantity
 from trunnion.model.text import read_text
 from trunnion.model.units import ANY, KINDS, Kind, UnitError, dimension_text, unit
 
-__all__ = ["Points", "TableFiles", "place_findings", "with_points"]
+__all__ = ["Points", "TableFiles", "column", "place_findings", "with_points"]
 
 TableFiles = Mapping[str, str | os.PathLike[str]]  # file by name of a driver or table
 
@@ -159,15 +160,45 @@ def _points(path: Path, where: str, kinds: tuple[Kind, Kind]) -> Points:
     return Points(where, str(path), points, [line for line, _ in numbers])
 
 
-def _rows(text: str) -> tuple[str, list[Row]]:
-    """The separator, and the lines with their cells; the first has two."""
+def column(path: Path, kind: Kind) -> list[float]:
+    """The numbers of a file that has one column, SI; MechanismError with file and line of every finding.
+
+    A header may state the unit as in a table; numbers may have a decimal comma.
+    """
+    try:
+        text = read_text(path, "a list of deviations", MAX_BYTES, "write a deviation in each line, such as 0.012")
+        lines = _lines(text, "sample", "a deviation in each line", "take a part, drawn by lot")
+        rows = [(number, [line.strip().rstrip(";,\t").strip(' "')]) for number, line in lines]
+        unit_text, numbers = "", rows
+        if not _number(rows[0][1][0], ";"):
+            unit_text, numbers = _units(rows[0], (kind,))[0], rows[1:]
+        if len(numbers) < 2:
+            what = f"has {len(numbers) or 'no'} row{'s' * (not numbers)} of numbers, a sample needs two"
+            raise MechanismError(Finding(what, remedy="add deviations, one a line", line=rows[-1][0]))
+        findings = list(_unreadable(numbers, ";", 1))
+        if findings:
+            raise MechanismError(_few(findings))
+    except MechanismError as error:
+        raise MechanismError([finding.at(str(path), finding.line) for finding in error.findings]) from None
+    return [literal(_number(cells[0], ";"), unit_text).value for _, cells in numbers]
+
+
+def _lines(text: str, noun: str, rows: str, fewer: str) -> list[tuple[int, str]]:
+    """The lines with something in them but remarks, with their numbers. rows: what to write; fewer: if too many."""
     stated = [(number, line) for number, line in enumerate(io.StringIO(text, newline=None), start=1)
               if line.strip() and not line.lstrip().startswith("#")]  # fmt: skip
     if not stated:
-        raise MechanismError(Finding("has nothing but remarks", remedy="write a row for each point", line=1))
+        raise MechanismError(Finding("has nothing but remarks", remedy=f"write {rows}", line=1))
     if len(stated) > MAX_ROWS + 1:
-        what = f"has {len(stated)} rows, a table at most {MAX_ROWS}"
-        raise MechanismError(Finding(what, remedy="thin them out: what lies between the points is interpolated"))
+        raise MechanismError(Finding(f"has {len(stated)} rows, a {noun} at most {MAX_ROWS}", remedy=fewer))
+    return stated
+
+
+def _rows(text: str) -> tuple[str, list[Row]]:
+    """The separator, and the lines with their cells; the first has two."""
+    stated = _lines(
+        text, "table", "a row for each point", "thin them out: what lies between the points is interpolated"
+    )
     separator = next((one for one in ";\t" if one in stated[0][1]), ",")
     try:
         rows = [(number, _cells(line, separator)) for number, line in stated]
@@ -203,10 +234,10 @@ def _value(cell: str, separator: str, unit_text: str) -> float | str:
     return f"{number} {unit_text}" if unit_text else float(number)
 
 
-def _unreadable(rows: Sequence[Row], separator: str) -> Iterator[Finding]:
-    """What is no pair of numbers."""
+def _unreadable(rows: Sequence[Row], separator: str, columns: int = 2) -> Iterator[Finding]:
+    """What is no pair of numbers, or no number in a single column."""
     for line, cells in rows:
-        if len(cells) != 2:
+        if len(cells) != columns:
             what = f"has {len(cells)} cell{'s' * (len(cells) > 1)}, the rows before have two"
             yield Finding(what, remedy="write two numbers", line=line)
             continue
@@ -216,7 +247,7 @@ def _unreadable(rows: Sequence[Row], separator: str) -> Iterator[Finding]:
                 yield Finding(what, remedy="write a number such as 12.5 or 1.25e1, units in the header", line=line)
 
 
-def _units(header: Row, kinds: tuple[Kind, Kind]) -> list[str]:
+def _units(header: Row, kinds: Sequence[Kind]) -> list[str]:
     """The units of a header, empty where there is none; MechanismError if they are not those of the columns."""
     line, cells = header
     found, findings = [], []

@@ -101,14 +101,15 @@ def _fields(model: type[BaseModel], location: tuple[int | str, ...]) -> list[str
     reached: list[Any] = [model]
     for part in location:
         reached = [below for annotation in reached for below in _below(annotation, part)]
-    return [field for one in reached if _is_part(one) for field in one.model_fields]
+    return [field.alias or key for one in reached if _is_part(one) for key, field in one.model_fields.items()]
 
 
 def _below(annotation: Any, part: int | str) -> Iterator[type[BaseModel]]:
     """The model classes, or containers of them, that an annotation has under a key."""
     if _is_part(annotation):
-        field = annotation.model_fields.get(str(part))
-        yield from _classes(field.annotation) if field else ()
+        fields = annotation.model_fields.items()
+        for field in (field for key, field in fields if (field.alias or key) == part):
+            yield from _classes(field.annotation)
     else:
         yield from _classes(typing.get_args(annotation)[1 if _origin(annotation) is Mapping else 0])
 

@@ -11,6 +11,8 @@ from functools import cached_property
 from itertools import pairwise
 from typing import Annotated, Any, Literal, Self
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, ValidationError
 
 from trunnion.algebra.namespace import Number
@@ -18,11 +20,14 @@ from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.model.check import check_model
 from trunnion.model.contact import has_play, play
+from trunnion.model.cost_parts import Process
 from trunnion.model.findings import repair, schema_findings
 from trunnion.model.merge import FitChoice, merge_joint
 from trunnion.model.names import nearest
-from trunnion.model.parameters import Location, ParameterSet, nominal_dimensions
+from trunnion.model.parameters import LIMITS, Location, ParameterSet, nominal_dimensions
 from trunnion.model.parts import (
+    Correlation,
+    Cost,
     Driver,
     Gear,
     Guide,
@@ -40,8 +45,13 @@ from trunnion.model.parts import (
     Seat,
     Spring,
     Table,
+    Variation,
+    VariationDefaults,
 )
+from trunnion.model.prices import Price, prices
 from trunnion.model.quantity import Acceleration, AnyQuantity, Quantity
+from trunnion.model.samples import with_samples
+from trunnion.model.tolerances import Tolerance, correlation, kept, tolerated, with_tolerances, written_limits
 from trunnion.model.units import Kind
 
 __all__ = ["Mechanism"]
@@ -78,6 +88,11 @@ class Mechanism(Part):
     springs: Mapping[Name, Spring] = {}
     assembly: Mapping[str, Hint] = {}
     measures: Mapping[Name, Measure] = {}
+    variations: Annotated[Mapping[str, Variation], Field(alias="tolerances")] = {}
+    tolerance_defaults: VariationDefaults = VariationDefaults()
+    correlations: tuple[Correlation, ...] = ()
+    costs: Mapping[str, Cost] = {}
+    processes: Mapping[Name, Process] = {}
     references: tuple[str, ...] = ()
     notes: str = ""
 
@@ -94,7 +109,8 @@ class Mechanism(Part):
                 super().__init__(**mended)
             except ValidationError:
                 raise MechanismError(findings) from None
-            if lost & type(self).model_fields.keys():  # a whole section: the rest would speak of nothing else
+            sections = {one.alias or name for name, one in type(self).model_fields.items()}
+            if lost & sections:  # a whole section: the rest would speak of nothing else
                 raise MechanismError(findings) from None
         found = check_model(self, lost)
         findings += [finding for finding in found if finding.severity is Severity.ERROR]
@@ -182,15 +198,18 @@ class Mechanism(Part):
         """The numbers of the mechanism, compiled once."""
         return ParameterSet(self)
 
-    def parameters(self, overrides: Mapping[str, Number] | None = None) -> dict[str, Number]:
+    def parameters(
+        self, overrides: Mapping[str, Number] | None = None, deviations: Mapping[str, Number] | None = None
+    ) -> dict[str, Number]:
         """Every number in SI by path, such as `links.crank.mass`.
 
         overrides: values by path or by an ending that is unique (`AB`, `crank.mass`): floats, arrays (sample, 1)
         or dual numbers; what depends on them follows. MechanismError names the nearest if a name is unknown.
         A load that is an expression of the motion is no number: it is there only if an override makes it one.
         Numbers with an error are as built, nominal and deviation; an override of such a number replaces the sum.
+        deviations: what is added, by names as in overrides; a number that depends on others still follows them.
         """
-        return self.parameter_set.evaluate(overrides)
+        return self.parameter_set.evaluate(overrides, deviations)
 
     def ideal_parameters(self, overrides: Mapping[str, Number] | None = None) -> dict[str, Number]:
         """Every number as `parameters` gives it, without errors and with every axis where it belongs."""
@@ -225,19 +244,41 @@ class Mechanism(Part):
 
         A tolerance in `joint_defaults` is one of each joint that has it: the joints vary independently.
         """
-        found = self.parameter_set.entries.values()
-        own = [entry for entry in found if not entry.path.startswith("joint_defaults.")]
-        return {
-            entry.path: entry.quantity.tolerance
-            for entry in own
-            if entry.quantity.tolerance and (not entry.alias or entry.alias.startswith("joint_defaults."))
-        }
+        return written_limits(self.parameter_set)
+
+    def tolerated(self) -> list[Tolerance]:
+        """Every number that varies, in the order of `parameters`: those of `tolerances`, and those stated with ±."""
+        return tolerated(self)
+
+    def correlation(self) -> NDArray[np.float64]:
+        """Correlation of the normal scores of the numbers of `tolerated`, in their order."""
+        return correlation(self)
+
+    def prices(self) -> list[Price]:
+        """What tolerances and plays cost, by path, as stated in `costs`; in the order of the file."""
+        return prices(self)
+
+    def with_tolerances(self, half_widths: Mapping[str, float]) -> Mechanism:
+        """The mechanism with other tolerances: half widths in SI by name, each about the middle of its limits.
+
+        The clearance of a joint, `joints.B.clearance`, is replaced itself, SI.
+        """
+        return Mechanism(**with_tolerances(self, half_widths))
+
+    def with_samples(self, name: str, path: str | os.PathLike[str]) -> Mechanism:
+        """The mechanism with a number that varies as measured: deviations in the one column of a CSV file.
+
+        The unit stands in brackets in a header, `deviation [mm]`; without one they are SI. MechanismError with file
+        and line of what cannot be read.
+        """
+        return Mechanism(**with_samples(self, name, path))
 
     def with_values(self, values: Mapping[str, float | str]) -> Mechanism:
         """The mechanism with some entries replaced, by names as in `parameters`; texts are read as in a file.
 
         So are the choices `over_constraint`, `fits`, `joint_defaults.friction.model`, `joint_defaults.seat` and the
-        last two of a joint. Sizes, seat and misalignment of a joint and the error of a number need not be stated yet.
+        last two of a joint. Sizes, seat and misalignment of a joint, the error of a number and its tolerance, such as
+        `tolerances.AB` or one key of it, `tolerances.AB.cp`, need not be stated yet. `measures.NAME.limit` is one text.
         """
         data = self.data()
         for name, value in values.items():
@@ -256,10 +297,13 @@ class Mechanism(Part):
 
     def _location(self, name: str) -> Location:
         """Where what a name means stands, or would stand; MechanismError if it means nothing."""
-        choice = self._choice(name)
+        choice = self._choice(name) or self._limits(name)
         if choice:
             return choice
         entry = self.parameter_set.entries.get(self.path_of(name))
+        if entry and entry.location[-1] in LIMITS:
+            remedy = f"set {entry.where}, as ±0.1 deg or +0.2/-0.1 deg"
+            raise MechanismError(Finding("a limit is stated with the other", name, remedy))
         if entry:
             return entry.location
         found = self._unstated(name)
@@ -275,6 +319,25 @@ class Mechanism(Part):
             if holder:
                 return (*holder, *choice.split("."))
         return None
+
+    def _limits(self, name: str) -> Location | None:
+        """Where the limits of a measure or of a tolerance, or another key of a tolerance, stand; None if not meant."""
+        section, _, rest = name.partition(".")
+        if section == "measures" and rest.removesuffix(".limit") in self.measures and rest.endswith(".limit"):
+            return (section, rest.removesuffix(".limit"), "limit")
+        if section != "tolerances":
+            return None
+        of, _, key = rest.rpartition(".")
+        if key not in Variation.model_fields or not of:
+            of, key = rest, "limits"
+        try:
+            path = self.parameter_set.resolve(of)
+        except MechanismError as error:
+            raise MechanismError([replace(one, where=name) for one in error.findings]) from None
+        stated = (one for one in self.variations if self.parameter_set.resolve(one) == path)
+        of = next(stated, of)
+        short = key == "limits" and (of not in self.variations or self.variations[of].model_fields_set == {"limits"})
+        return (section, of) if short else (section, of, key)
 
     def _unstated(self, name: str) -> tuple[str, Location] | None:
         """Path and place of the error of a number, or of a number of a joint, that the file may state and does not."""
@@ -318,7 +381,7 @@ class Mechanism(Part):
 
         data, read = with_points(self.data(), {name: path})
         try:
-            return Mechanism(**data)
+            return Mechanism(**kept(self, data))
         except MechanismError as error:
             raise MechanismError(place_findings(error.findings, read)) from None
 
@@ -339,7 +402,7 @@ class Mechanism(Part):
                 stated = stated if isinstance(stated, dict) else {"coefficient": stated}
                 keep = {"model", *FRICTION_LAWS[law].parameters}
                 holder["friction"] = {"law": law, **{key: value for key, value in stated.items() if key in keep}}
-        return Mechanism(**data)
+        return Mechanism(**kept(self, data))
 
     def with_seats(self, seat: str) -> Mechanism:
         """The mechanism with one seating for all joints with play: "loaded" or "free"; MechanismError for another."""
@@ -349,16 +412,16 @@ class Mechanism(Part):
         data = self.data()
         for holder in (*data.get("joints", {}).values(), *data.get("loop", [])):
             holder.pop("seat", None)
-        return Mechanism(**{**data, "joint_defaults": {**data.get("joint_defaults", {}), "seat": seat}})
+        return Mechanism(**kept(self, {**data, "joint_defaults": {**data.get("joint_defaults", {}), "seat": seat}}))
 
     def data(self) -> dict[str, Any]:
         """The model as plain mappings, lists, numbers and texts: what was stated, as it was written."""
-        return {"trunnion": self.trunnion, **self.model_dump(mode="json", exclude_unset=True)}
+        return {"trunnion": self.trunnion, **self.model_dump(mode="json", exclude_unset=True, by_alias=True)}
 
     @property
     def digest(self) -> str:
         """Hash of the content, 16 hexadecimal digits: equal mechanisms have equal digests."""
-        text = json.dumps(_canonical(self.model_dump(mode="json")), sort_keys=True)
+        text = json.dumps(_canonical(self.model_dump(mode="json", by_alias=True)), sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
@@ -380,6 +443,7 @@ def _assign(data: dict[str, Any], location: Location, value: float | str | Quant
         if following == "at" and isinstance(holder[key], list):
             holder[key] = {"at": holder[key]}
         elif isinstance(following, str) and not isinstance(holder[key], dict):
-            holder[key] = {} if key == "seat" else {"coefficient": holder[key]}  # the short form of friction
+            short = {"limits": holder[key]} if location[0] == "tolerances" else {"coefficient": holder[key]}
+            holder[key] = {} if key == "seat" else short  # the short form, of tolerances and of friction
         holder = holder[key]
     holder[location[-1]] = value

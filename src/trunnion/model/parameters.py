@@ -20,6 +20,8 @@ from trunnion.algebra.namespace import Number
 from trunnion.errors import MechanismError
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.model.expression import MOTION
+from trunnion.model.limits import Limits
+from trunnion.model.measure_kinds import drive_kind, figure_kind, place_kind
 from trunnion.model.merge import DEFAULT_LAW
 from trunnion.model.parameter_names import ERRORS, ParameterNames
 from trunnion.model.parts import (
@@ -27,7 +29,6 @@ from trunnion.model.parts import (
     Friction,
     Gear,
     Joint,
-    Measure,
     Point,
     Spring,
     freedoms,
@@ -38,9 +39,20 @@ from trunnion.model.units import ANY, KINDS, Dimension, Kind, UnitError, si_unit
 if TYPE_CHECKING:
     from trunnion.model.mechanism import Mechanism
 
-__all__ = ["Entry", "ParameterSet", "dimension_errors", "entries", "evaluation_order", "nominal_dimensions"]
+__all__ = [
+    "LIMITS",
+    "Entry",
+    "ParameterSet",
+    "dimension_errors",
+    "dimension_kinds",
+    "entries",
+    "evaluation_order",
+    "measured",
+    "nominal_dimensions",
+]
 
 Location = tuple[str | int, ...]
+LIMITS = ("lower", "upper")
 
 
 @dataclass(frozen=True)
@@ -69,8 +81,10 @@ class Entry:
 
     @property
     def where(self) -> str:
-        """Where a finding about it points: to a deviation as it was written, not by the full path."""
-        return f"{ERRORS}{self.location[1]}" if self.path.startswith(ERRORS) else self.path
+        """Where a finding about it points: to a deviation as it was written, to both limits as to one."""
+        if self.path.startswith(ERRORS):
+            return f"{ERRORS}{self.location[1]}"
+        return self.path.rpartition(".")[0] if self.location[-1] in LIMITS else self.path
 
 
 def entries(mechanism: Mechanism) -> list[Entry]:
@@ -83,7 +97,7 @@ def entries(mechanism: Mechanism) -> list[Entry]:
         return found
     names = ParameterNames(entry.path for entry in found)
     kinds = {entry.path: entry.kind for entry in found}
-    measured = _dimension_kinds(mechanism)
+    measured = dimension_kinds(mechanism)
     errors: dict[str, Entry] = {}
     for name, quantity in mechanism.errors.items():
         with suppress(MechanismError):  # a finding of its own
@@ -130,6 +144,9 @@ def _walk(value: object, path: str, location: Location) -> Iterator[Entry]:
     match value:
         case Quantity():
             yield Entry(path, location, value, value.kind)
+        case Limits():
+            for key in LIMITS:
+                yield from _walk(getattr(value, key), f"{path}.{key}", (*location, key))
         case BaseModel():
             extra = value.parameters.items() if isinstance(value, Friction) else ()
             for key, item in (*((key, getattr(value, key)) for key in type(value).model_fields), *extra):
@@ -143,7 +160,8 @@ def _walk(value: object, path: str, location: Location) -> Iterator[Entry]:
                 yield from _walk(item, f"{path}.{item_name(location, index)}", (*location, index))
 
 
-_LISTS = ("points", "references", "links", "joints", "between", "loop")  # of anything but coordinates
+# of anything but coordinates
+_LISTS = ("points", "references", "links", "joints", "between", "loop", "correlations", "of", "values")
 
 
 def item_name(location: Location, index: int) -> str:
@@ -153,7 +171,7 @@ def item_name(location: Location, index: int) -> str:
     row = len(location) > 1 and location[-2] == "points" and isinstance(location[-1], int)
     if row and location[0] == "tables":
         return ("at", "value")[index] if index < 2 else str(index)
-    names = ("time", "coordinate") if row else ("from", "to") if location[-1] == "range" else ("x", "y", "z")
+    names = ("time", "coordinate") if row else ("from", "to") if location[-1] in ("range", "over") else ("x", "y", "z")
     return names[index] if index < len(names) else str(index)
 
 
@@ -201,8 +219,7 @@ def _narrow(mechanism: Mechanism, section: str, name: str, entry: Entry) -> Kind
     """The kind that the place of an entry leaves of several: a slide is driven at a speed, a rotation at rad/s."""
     joint = mechanism.effective_joints.get(name)
     if section == "measures":
-        measure = mechanism.measures[name]
-        return _measure_kind(mechanism, measure)
+        return _measure_kind(mechanism, name, entry)
     if section == "tables":
         return _table_kind(mechanism, name) if entry.location[-1] == 0 else ANY
     if section == "springs":
@@ -217,10 +234,7 @@ def _narrow(mechanism: Mechanism, section: str, name: str, entry: Entry) -> Kind
 
 def _table_kind(mechanism: Mechanism, name: str) -> Kind:
     """What the first column of a table measures: a time, or the coordinate of the first driver."""
-    if mechanism.tables[name].over == "time":
-        return KINDS["time"]
-    joint = mechanism.effective_joints.get(next(iter(mechanism.drivers), ""))
-    return KINDS["length" if joint and "rotation" not in freedoms(joint.type) else "angle"]
+    return KINDS["time"] if mechanism.tables[name].over == "time" else drive_kind(mechanism)
 
 
 def _spring_kind(mechanism: Mechanism, spring: Spring, entry: Entry) -> Kind:
@@ -235,11 +249,12 @@ def _spring_kind(mechanism: Mechanism, spring: Spring, entry: Entry) -> Kind:
     return entry.kind
 
 
-def _measure_kind(mechanism: Mechanism, measure: Measure) -> Kind:
-    if measure.effort is None:
-        return KINDS["length" if measure.angle is None and measure.rotation is None else "angle"]
-    joint = mechanism.effective_joints.get(measure.effort)
-    return KINDS["force" if joint and "rotation" not in freedoms(joint.type) else "moment"]
+def _measure_kind(mechanism: Mechanism, name: str, entry: Entry) -> Kind:
+    """Of a position that of the drive or a time, else what the measure gives."""
+    if entry.location[2] not in ("at", "over"):
+        return figure_kind(mechanism, mechanism.measures[name])
+    kinds = dimension_kinds(mechanism) if entry.quantity.names else {}
+    return place_kind(mechanism, entry.quantity, {name: one.dimensions[0] for name, one in kinds.items()})
 
 
 def evaluation_order(
@@ -268,7 +283,7 @@ def dimension_errors(found: Iterable[Entry]) -> dict[str, Quantity]:
     return {one.path.removeprefix(before): one.quantity for one in found if one.path.startswith(before)}
 
 
-def _dimension_kinds(mechanism: Mechanism) -> dict[str, Kind]:
+def dimension_kinds(mechanism: Mechanism) -> dict[str, Kind]:
     """What each dimension measures, as far as its value tells."""
     known: dict[str, Dimension | None] = {}
     for name in evaluation_order(mechanism.dimensions)[0]:
@@ -280,6 +295,14 @@ def _dimension_kinds(mechanism: Mechanism) -> dict[str, Kind]:
         for name, one in known.items()
         if one is not None
     }
+
+
+def measured(mechanism: Mechanism, found: Iterable[Entry]) -> dict[str, Kind]:
+    """What each number measures, by path: of a dimension, as far as its value tells."""
+    of_dimensions = {f"dimensions.{name}": kind for name, kind in dimension_kinds(mechanism).items()}
+    kinds = {entry.path: of_dimensions.get(entry.path, entry.kind) for entry in found}
+    deviations = {path: kinds.get(path.removeprefix(ERRORS)) for path in kinds if path.startswith(ERRORS)}
+    return {**kinds, **{path: kind for path, kind in deviations.items() if kind}}
 
 
 def nominal_dimensions(mechanism: Mechanism) -> dict[str, Number]:
@@ -334,21 +357,34 @@ class ParameterSet:
         """Every number as `evaluate` gives it, without errors."""
         return self.evaluate({**(overrides or {}), **self._ideal})
 
-    def evaluate(self, overrides: Mapping[str, Number] | None = None) -> dict[str, Number]:
-        """Every number in SI by path, some replaced; MechanismError if a name is unknown or not unique."""
+    @property
+    def dimension_values(self) -> Mapping[str, Number]:
+        """Nominal values of the dimensions by name."""
+        return self._nominal_names
+
+    def evaluate(
+        self, overrides: Mapping[str, Number] | None = None, deviations: Mapping[str, Number] | None = None
+    ) -> dict[str, Number]:
+        """Every number in SI by path, some replaced; MechanismError if a name is unknown or not unique.
+
+        deviations: what is added to some, by name. A number that follows from others goes on to do so, unlike one
+        that is replaced; what depends on it has the sum.
+        """
         values = dict(self.nominal)
-        if not overrides:
+        if not overrides and not deviations:
             return values
-        changed = {self.resolve(name): value for name, value in overrides.items()}
-        values.update(changed)
+        changed = {self.resolve(name): value for name, value in (overrides or {}).items()}
+        added = {self.resolve(name): value for name, value in (deviations or {}).items()}
         names = dict(self._nominal_names)
-        names.update(
-            {path.partition(".")[2]: value for path, value in changed.items() if path.startswith("dimensions.")}
-        )
-        touched = set(changed)
+        for path in {**changed, **added}:
+            value = changed[path] if path in changed else values[path]
+            _put(path, value + added[path] if path in added else value, values, names)
+        touched = {*changed, *added}
         for entry in self._dependent:
             if entry.path not in changed and not touched.isdisjoint(entry.depends):
                 self._evaluate(entry, values, names)
+                if entry.path in added:
+                    _put(entry.path, values[entry.path] + added[entry.path], values, names)
                 touched.add(entry.path)
         return values
 
@@ -366,14 +402,19 @@ class ParameterSet:
             value = entry.quantity.evaluate(names)
         if entry.error:
             value = value + values[entry.error]
-        values[entry.path] = value
-        section, _, name = entry.path.partition(".")
-        if section == "dimensions":
-            names[name] = value
+        _put(entry.path, value, values, names)
 
     def resolve(self, name: str) -> str:
         """The path that a name means: a path, a dimension, or an ending that only one path has."""
         return self.names.resolve(name)
+
+
+def _put(path: str, value: Number, values: dict[str, Number], names: dict[str, Number]) -> None:
+    """A value at its path, and by its name if it is a dimension."""
+    values[path] = value
+    section, _, name = path.partition(".")
+    if section == "dimensions":
+        names[name] = value
 
 
 def _is_error(path: str) -> bool:

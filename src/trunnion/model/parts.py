@@ -23,6 +23,7 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
 from trunnion.joints.motion import MOTION_LAWS, MotionLaw
+from trunnion.model.cost_parts import Cost, CostOption
 from trunnion.model.joint_parts import (
     FRICTION_MODELS,
     JOINT_TYPES,
@@ -37,6 +38,7 @@ from trunnion.model.joint_parts import (
     Seat,
     freedoms,
 )
+from trunnion.model.measure_parts import Measure
 from trunnion.model.part import FORMS, Direction, Name, Part, Position, forms, known, shape
 from trunnion.model.quantity import (
     Angle,
@@ -55,12 +57,16 @@ from trunnion.model.quantity import (
     Stiffness,
     Time,
 )
+from trunnion.model.tolerance_parts import Correlation, Variation, VariationDefaults
 from trunnion.model.units import KINDS
 
 __all__ = [
     "FORMS",
     "FRICTION_MODELS",
     "JOINT_TYPES",
+    "Correlation",
+    "Cost",
+    "CostOption",
     "Driver",
     "Fit",
     "Friction",
@@ -83,6 +89,8 @@ __all__ = [
     "Seat",
     "Spring",
     "Table",
+    "Variation",
+    "VariationDefaults",
     "freedoms",
 ]
 
@@ -269,18 +277,6 @@ class Gear(Part):
         """With the usual pressure angle if it has teeth and states none."""
         usual = Quantity.read("20 deg", KINDS["angle"]) if self.teeth else None
         return self if self.pressure_angle else self.model_copy(update={"pressure_angle": usual})
-
-
-class Measure(Part):
-    """A number to watch: a coordinate of a point, rotation or slide of a joint, angle of a link, effort of a driver."""
-
-    point: str | None = None
-    axis: Literal["x", "y", "z"] | None = None
-    effort: str | None = None
-    angle: str | None = None
-    rotation: str | None = None
-    slide: str | None = None
-    limit: AnyQuantity | None = None
 
 
 _WAY = re.compile(r"^way-[1-9][0-9]{0,3}$")

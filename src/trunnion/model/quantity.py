@@ -38,6 +38,7 @@ __all__ = [
     "Rate",
     "Stiffness",
     "Time",
+    "term",
 ]
 
 _SYMMETRIC = re.compile(r"^(.*?)\s*(?:±|\+/-|\+-)\s*(.*)$", re.DOTALL)
@@ -157,7 +158,7 @@ def _split(text: str, kind: Kind) -> tuple[str, tuple[float, float] | None]:
         main, parts = found[1], [found[2], found[3]]
     else:
         return text, None
-    terms = [_term(part) for part in parts]
+    terms = [term(part) for part in parts]
     value = LITERAL.fullmatch(main.strip().lstrip("-+ "))
     unit_of_value = value["unit"] or "" if value else ""
     unit = next((one for _, one in reversed(terms) if one), unit_of_value)
@@ -187,7 +188,7 @@ def _split(text: str, kind: Kind) -> tuple[str, tuple[float, float] | None]:
     return main, (min(deviations), max(deviations))
 
 
-def _term(text: str) -> tuple[str, str]:
+def term(text: str) -> tuple[str, str]:
     """Number (with its sign) and unit of one side of a tolerance."""
     stripped = text.strip()
     sign = stripped[:1] if stripped[:1] in ("-", "+") else ""

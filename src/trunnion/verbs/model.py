@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from trunnion.errors import Finding, MechanismError, Severity
-from trunnion.options import setting, table_file
+from trunnion.options import named_file, setting
 
 if TYPE_CHECKING:
     from trunnion.model.mechanism import Mechanism
@@ -26,7 +26,7 @@ def stated(
     """The model with the options `--table`, `--set`, `--friction` and `--seat` applied, in this order."""
     from trunnion.model.file import read_mechanism
 
-    mechanism = read_mechanism(file, dict(table_file(text) for text in tables or ()))
+    mechanism = read_mechanism(file, dict(named_file(text) for text in tables or ()))
     if settings:
         mechanism = mechanism.with_values(dict(setting(text) for text in settings))
     if friction:

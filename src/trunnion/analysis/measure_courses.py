@@ -1,0 +1,61 @@
+"""What measures of the forces, and those of points that have several numbers, are made of: their courses."""
+
+from __future__ import annotations
+
+import functools
+from typing import Any
+
+import numpy as np
+
+from trunnion.algebra.namespace import Number, namespace
+from trunnion.analysis.account import MARGIN, useful_loads
+from trunnion.analysis.kinematics import Forward
+from trunnion.analysis.kinetostatics import Backward
+
+__all__ = ["efficiency", "effort", "locking_margin", "place", "reaction"]
+
+
+def place(subject: str, walk: Forward) -> tuple[Number, ...]:
+    """Coordinates of a point, m: two in the plane, three in space."""
+    link, point = subject.split(".")
+    return tuple(walk.point(link, point).place)
+
+
+def effort(subject: str, back: Backward) -> tuple[Number, ...]:
+    """Torque or force of a driver, N m or N."""
+    return (back.efforts[subject],)
+
+
+def reaction(subject: str, axis: str, back: Backward) -> tuple[Number, ...]:
+    """Force in a joint without friction and drive effort, N: one component in global axes, or its magnitude.
+
+    Its magnitude has no derivative where it is 0.
+    """
+    found: Any = back.reactions[subject]
+    force = (found.x, found.y) if hasattr(found, "x") else found.u
+    if axis:
+        return (force["xyz".index(axis)],)
+    square: Number = 0.0
+    for part in force:
+        square = square + part * part
+    return (namespace(square).sqrt(square),)
+
+
+def efficiency(subject: str, back: Backward) -> tuple[Number, ...]:
+    """Useful and drive power, W; of an instant their ratio, NaN where the drivers put no power in."""
+    walk = back.walk
+    useful: Number = 0.0
+    driven: Number = 0.0
+    for name in useful_loads(walk.system.mechanism):
+        useful = useful - back.load_powers[name]
+    for name in walk.system.mechanism.drivers:
+        driven = driven + back.efforts[name] * walk.rate(name)
+    if subject == "cycle":
+        return useful, driven
+    xp = namespace(driven)
+    return (useful / xp.where(driven > 0, driven, np.nan),)
+
+
+def locking_margin(back: Backward) -> tuple[Number, ...]:
+    """Multiple of the friction at which a module locks, MARGIN where it does not up to there; without derivatives."""
+    return (functools.reduce(np.minimum, (one.margin for one in back.settled), MARGIN),)

@@ -1,0 +1,103 @@
+"""What the runner asks of the work it spreads: a job cut into numbered blocks, and the tally of some of them.
+
+The answer of a run is one tally. It has to be the same to the last bit however the blocks were grouped, wherever and
+in whatever order they were done, so `Tally.merge` must not depend on the order: integers are added, and sums of floats
+are kept as nodes of a fixed binary tree over the blocks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Generic, Protocol, Self, TypeVar
+
+from numpy.typing import NDArray
+
+__all__ = ["Blocks", "Crew", "Job", "Part", "Prepared", "Tally"]
+
+Blocks = tuple[int, int]  # blocks first, first + 1, …, last - 1
+
+
+class Tally(Protocol):
+    """What is kept of the blocks done; its size does not grow with their number."""
+
+    @property
+    def blocks(self) -> Sequence[Blocks]:
+        """The blocks done: sorted, disjoint, none adjacent."""
+
+    def merge(self, other: Self) -> Self:
+        """The tally of the blocks of both; neither changes."""
+
+    def to_arrays(self) -> dict[str, NDArray[Any]]:
+        """Everything, as arrays of numbers by name (no objects), for a file."""
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, NDArray[Any]]) -> Self:
+        """The inverse of `to_arrays`, to the last bit."""
+
+
+T = TypeVar("T", bound=Tally)
+T_co = TypeVar("T_co", bound=Tally, covariant=True)
+
+
+class Prepared(Protocol[T_co]):
+    """A job ready to run in this process: compiled, allocated; it need not be picklable."""
+
+    def evaluate(self, first: int, last: int) -> T_co:
+        """The tally of blocks first, …, last - 1."""
+
+
+class Job(Protocol[T_co]):
+    """The whole task, picklable: it is sent once to every worker, and prepared there."""
+
+    @property
+    def blocks(self) -> int:
+        """Number of blocks; fixed by the job alone, never by the workers."""
+
+    @property
+    def block_size(self) -> int:
+        """Samples in a block (the last may have fewer)."""
+
+    @property
+    def samples(self) -> int:
+        """Samples in all blocks."""
+
+    def identity(self) -> Mapping[str, Any]:
+        """All that the bits of the answer depend on, as JSON can write it: model, seed, method, block size, …"""
+
+    def empty(self) -> T_co:
+        """The tally of no blocks."""
+
+    def prepare(self) -> Prepared[T_co]:
+        """What evaluates blocks; called once in every process."""
+
+
+@dataclass(frozen=True)
+class Part(Generic[T_co]):
+    """Blocks done, the seconds they took where they were done, their tally, and `fingerprint` of that machine."""
+
+    blocks: Blocks
+    seconds: float
+    tally: T_co
+    arithmetic: str
+
+
+class Crew(Protocol[T_co]):
+    """Who does the blocks: this process, processes of this machine, or a cluster."""
+
+    @property
+    def workers(self) -> int:
+        """How many blocks can be under way at the same time."""
+
+    @property
+    def room(self) -> int:
+        """How many more ranges may be given now: bounded, whatever the length of the run."""
+
+    def give(self, blocks: Blocks) -> None:
+        """Have these blocks done; again if who does them dies."""
+
+    def wait(self) -> Sequence[Part[T_co]]:
+        """Parts that have become ready since; may be none after a while. KeyboardInterrupt may be raised inside."""
+
+    def close(self, finished: bool) -> None:
+        """Let everybody go; at once, if not everything given was finished."""

@@ -1,0 +1,147 @@
+"""What a study of tolerances says in words: its summary, and its findings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from trunnion.analysis.account import model_notes
+from trunnion.analysis.measures import Measure
+from trunnion.analysis.tolerance.sampling import CAUSES
+from trunnion.errors import Finding, Severity, Status
+
+if TYPE_CHECKING:
+    from trunnion.analysis.tolerance.linear import Of
+    from trunnion.analysis.tolerance.result import Outcome
+    from trunnion.analysis.tolerance.sampled import Sampled
+
+__all__ = ["findings_of", "summary"]
+
+FAR_OFF = 0.2  # between first order and what is found, of which it is said
+
+
+def summary(outcome: Outcome, counted: Sampled | None, units: Sequence[str], dial: Any) -> list[dict[str, Any]]:
+    """Of each measure: nominal figure, worst case, RSS, scatter, yield, and what contributes most."""
+    rows: list[dict[str, Any]] = []
+    for i, (of, unit) in enumerate(zip(outcome.study.linear.measures, units, strict=True)):
+        rows += _of_measure(outcome, counted, i, of, unit, dial)
+    if counted is not None and len(units) > 1:
+        rows.append({"label": "yield, all measures", "value": counted.arrays["yield_all"], "unit": "1"})
+    if counted is not None:
+        rows.append({"label": "samples", "value": counted.done, "unit": "1"})
+        rows.append({"label": "samples without an answer", "value": int(np.sum(counted.arrays["failed"])), "unit": "1"})
+    return [{**row, "value": _plain(row["value"])} for row in rows]
+
+
+def _of_measure(
+    outcome: Outcome, counted: Sampled | None, i: int, of: Of, unit: str, dial: Any
+) -> Iterator[dict[str, Any]]:
+    name = of.measure.name
+    if of.measure.rule != "deviation":
+        yield {"label": f"{name}, nominal", "value": of.reference.figure, "unit": unit}
+    placed = of.place >= 0 and outcome.study.run.cycle.duration > 0
+    at = f", at {dial.at(of.reference.window.index[of.place])}" if placed else ""
+    lower, upper, rss, _, deviation = (float(part) for part in of.total)
+    yield {"label": f"{name}, worst case, linear{at}", "value": max(-lower, upper), "unit": unit}
+    if outcome.worst is not None:
+        for key, corner in zip(("least", "largest"), outcome.worst[i], strict=True):
+            yield {"label": f"{name}, {key} deviation found", "value": corner.value, "unit": unit}
+    yield {"label": f"{name}, RSS{at}", "value": rss, "unit": unit}
+    yield {"label": f"{name}, standard deviation, linear{at}", "value": deviation, "unit": unit}
+    if counted is not None:
+        arrays = counted.arrays
+        yield {"label": f"{name}, mean of samples", "value": arrays["mean"][i], "unit": unit}
+        yield {"label": f"{name}, standard deviation of samples", "value": arrays["deviation"][i], "unit": unit}
+        if limited(of.measure):
+            yield {"label": f"{name}, yield", "value": arrays["yield"][i], "unit": "1"}
+            yield {"label": f"{name}, yield, least by the 95 % interval", "value": arrays["yield_low"][i], "unit": "1"}
+            yield {"label": f"{name}, C_pk", "value": arrays["cpk"][i], "unit": "1"}
+    halves = np.nan_to_num(of.spread.half)
+    if np.sum(halves**2) > 0:
+        top = int(np.argmax(halves))
+        share = float(halves[top] ** 2 / np.sum(halves**2))
+        label = f"{name}, largest contribution, {outcome.study.inputs.names[top]}, share of RSS²"
+        yield {"label": label, "value": share, "unit": "1"}
+
+
+def _plain(value: Any) -> float | None:
+    number = None if value is None else float(value)
+    return number if number is not None and np.isfinite(number) else None
+
+
+def limited(measure: Measure) -> bool:
+    """Whether a measure has a limit or a bound."""
+    return any(one is not None for one in (measure.lower, measure.upper, measure.at_least, measure.at_most))
+
+
+def findings_of(outcome: Outcome, counted: Sampled | None) -> Iterator[Finding]:
+    """What is doubtful, beside what the model itself has to say."""
+    study = outcome.study
+    mechanism = study.run.system.mechanism
+    yield from (one for one in model_notes(mechanism, study.run.system) if one.severity is not Severity.NOTE)
+    yield from study.run.chosen.findings
+    if study.run.determinacy is not None:
+        yield from study.run.determinacy.findings()
+    loaded = [seat.joint for seat in study.run.seats if seat.given is None]
+    if loaded:
+        what = f"pins lie anywhere in their holes: seats by loads of {', '.join(loaded)} are not taken"
+        yield Finding(what, "joints", "analyse takes them", Severity.NOTE)
+    yield from _nominal(outcome)
+    for of in study.linear.measures:
+        yield from _first_order(outcome, of)
+    if counted is not None:
+        yield from _samples(outcome, counted)
+    if outcome.indices is not None and outcome.indices.lost:
+        what = f"{outcome.indices.lost:,} samples of the variance-based indices have no answer and count as the mean"
+        yield Finding(what, "", "narrower tolerances, or a place where all go together", Severity.WARNING)
+
+
+def _nominal(outcome: Outcome) -> Iterator[Finding]:
+    """Positions at which the nominal mechanism has no answer, or none to rely on."""
+    study = outcome.study
+    dial = study.run.system.dial(study.run.values, study.plan.times)
+    status = study.linear.status
+    for code in Status:
+        where = np.flatnonzero(status == code)
+        if code >= Status.NOT_CONVERGED and len(where):
+            yield Finding(f"nominal: {code.text} {dial.intervals(where)}", "", "nothing is known there")
+        elif code == Status.NEAR_SINGULAR and len(where):
+            what = f"close to a dead centre {dial.intervals(where)}: first order says little there"
+            yield Finding(what, "", "rely on the samples there", Severity.WARNING)
+
+
+def _first_order(outcome: Outcome, of: Of) -> Iterator[Finding]:
+    """A measure of which first order knows nothing, or whose worst case found is another."""
+    name, lower, upper = of.measure.name, float(of.total[0]), float(of.total[1])
+    if not np.isfinite(upper):
+        what = f"{name}: first order has no answer"
+        yield Finding(what, f"measures.{name}", "rely on the samples", Severity.WARNING)
+        return
+    if outcome.worst is None:
+        return
+    i = [one.measure for one in outcome.study.linear.measures].index(of.measure)
+    least, most = outcome.worst[i]
+    for end, corner in (("least", least), ("largest", most)):
+        if not corner.assembles:
+            what = f"{name}: at the linear corner of the {end} deviation the mechanism has no answer"
+            yield Finding(what, f"measures.{name}", "the tolerances let it not go together there", Severity.WARNING)
+    size, found = max(-lower, upper), max(-least.value, most.value)
+    if np.isfinite(found) and abs(found - size) > FAR_OFF * max(size, found) and max(size, found) > 0:
+        what = f"{name}: the worst case found is {found / size if size else np.inf:.2f} times that of first order"
+        yield Finding(what, f"measures.{name}", "rely on the one found, and on samples", Severity.NOTE)
+
+
+def _samples(outcome: Outcome, counted: Sampled) -> Iterator[Finding]:
+    failed, done = counted.arrays["failed"], counted.done
+    for code in range(CAUSES):
+        if failed[code]:
+            text = list(Status)[code].text if code < CAUSES - 1 else "a figure does not exist"
+            what = f"{int(failed[code]):,} of {done:,} samples ({failed[code] / done:.2%}) have no answer: {text}"
+            yield Finding(what, "tolerances", "they count as outside every limit; moments are of the others")
+    for i, measure in enumerate(outcome.study.measures):
+        if limited(measure) and counted.arrays["yield"][i] < 1:
+            share, low, high = (float(counted.arrays[key][i]) for key in ("yield", "yield_low", "yield_high"))
+            what = f"{measure.name}: {share:.4%} of the samples keep the limits (95 % interval {low:.4%} to {high:.4%})"
+            yield Finding(what, f"measures.{measure.name}", "`allocate` finds tolerances that do", Severity.NOTE)

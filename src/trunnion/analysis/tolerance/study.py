@@ -1,0 +1,232 @@
+"""The question of tolerances: what the scatter of a mechanism's numbers does to measures, and which of them does it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from trunnion.analysis.analyse import Run, check_steps, prepare
+from trunnion.analysis.friction import FrictionMethod
+from trunnion.analysis.measure_figures import Reference
+from trunnion.analysis.measure_positions import Plan, plan
+from trunnion.analysis.measures import Measure, named, outputs
+from trunnion.analysis.tolerance import runner
+from trunnion.analysis.tolerance.effects import Effects, effects_of
+from trunnion.analysis.tolerance.indices import Indices, indices
+from trunnion.analysis.tolerance.inputs import Inputs, inputs_of
+from trunnion.analysis.tolerance.kernel import NumpyKernel, references
+from trunnion.analysis.tolerance.linear import Linear, linear, searched
+from trunnion.analysis.tolerance.sampling import METHODS as SAMPLINGS
+from trunnion.analysis.tolerance.sampling import Sampler, Sampling, Tally
+from trunnion.analysis.tolerance.search import Corner
+from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.model.mechanism import Mechanism
+from trunnion.model.quantity import Quantity
+from trunnion.model.units import UnitError, si_unit
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["DEFAULT_METHODS", "METHODS", "Study", "study", "tolerance"]
+
+METHODS = ("linear", "worst-case", *SAMPLINGS, "sobol")
+DEFAULT_METHODS = ("linear", "worst-case", "monte-carlo")
+DEFAULT_SAMPLES = 10_000
+MOST_SAMPLES = 10**15
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """A mechanism whose numbers vary, with what is measured, made ready: evaluate it by any method.
+
+    told: what there is to say of the choice of measures.
+    """
+
+    run: Run
+    inputs: Inputs
+    measures: tuple[Measure, ...]
+    steps: int
+    friction: FrictionMethod
+    told: tuple[Finding, ...] = ()
+
+    @cached_property
+    def plan(self) -> Plan:
+        """The positions that the measures need."""
+        return plan(self.run, self.measures, self.steps)
+
+    @cached_property
+    def kernel(self) -> NumpyKernel:
+        return NumpyKernel(self.run, self.measures, self.friction)
+
+    @cached_property
+    def effects(self) -> Effects:
+        """Rows of the batch that first order takes."""
+        return effects_of(self.inputs)
+
+    @cached_property
+    def references(self) -> dict[str, Reference]:
+        """The measures of the nominal mechanism."""
+        return references(self.kernel, self.plan, self.inputs)
+
+    @cached_property
+    def linear(self) -> Linear:
+        """First order of every measure."""
+        return linear(self.kernel, self.plan, self.effects, self.references)
+
+    def worst(self) -> list[tuple[Corner, Corner]]:
+        """Least and largest deviation of every measure on the mechanism itself."""
+        return [searched(self.kernel, self.linear, of) for of in self.linear.measures]
+
+    def sampling(self, method: Any, samples: int, seed: int, engine: str = "numpy") -> Sampling:
+        """The run of a sampling method."""
+        spread, curves = [], []
+        for of in self.linear.measures:
+            known = of.reference
+            centre = known.figure + _finite(of.total[3])
+            spread.append((centre, _finite(of.total[4])))
+            middle = 0.0 * of.curve if known.measure.rule == "deviation" else of.curve
+            curves.append((np.nan_to_num(middle), np.nan_to_num(of.curve_total[4])))
+        model = self.run.system.mechanism.data()
+        return Sampling(
+            model, self.measures, self.steps, method, samples, seed, engine, self.friction, len(self.plan.times),
+            tuple(spread), tuple(curves),
+        )  # fmt: skip
+
+    def sampler(self, job: Sampling) -> Sampler:
+        """What draws and analyses blocks, in this process."""
+        return job.prepare()
+
+
+def _finite(number: Any) -> float:
+    return float(np.nan_to_num(number, posinf=0.0, neginf=0.0))
+
+
+def study(
+    mechanism: Mechanism,
+    measures: Sequence[str] | None = None,
+    steps: int = 360,
+    at: float | str | None = None,
+    friction: FrictionMethod | None = None,
+) -> Study:
+    """A study of a mechanism. Raises MechanismError as `tolerance` does."""
+    check_steps(steps)
+    run = prepare(mechanism)
+    if run.determinacy is not None:
+        run.determinacy.refuse()
+    inputs = inputs_of(run)
+    names = list(mechanism.measures) if measures is None else list(measures)
+    told: list[Finding] = []
+    if names:
+        found = named(mechanism, names, run.values)
+    else:
+        found = outputs(run.system)
+        remedy = "state measures: in the model, or give --measure link.point.x"
+        if not found:
+            what = "no measure is stated, and no joint to the ground is an output"
+            raise MechanismError(Finding(what, "measures", remedy))
+        listed = ", ".join(one.name for one in found)
+        what = f"no measure is stated: {listed} taken, joints to the ground without a driver"
+        told.append(Finding(what, "measures", remedy, Severity.NOTE))
+    if run.cycle.duration <= 0:  # there is one position
+        found = [replace(one, statistic="value") if one.rule == "deviation" else one for one in found]
+    if at is not None:
+        found = [placed(mechanism, one, at) for one in found]
+    return Study(run, inputs, tuple(found), steps, friction or FrictionMethod(), tuple(told))
+
+
+def tolerance(
+    mechanism: Mechanism,
+    measures: Sequence[str] | None = None,
+    methods: Sequence[str] = DEFAULT_METHODS,
+    samples: int = DEFAULT_SAMPLES,
+    seed: int = 1,
+    steps: int = 360,
+    at: float | str | None = None,
+    *,
+    friction: FrictionMethod | None = None,
+    jobs: int | None = 1,
+    chunk: int | None = None,
+    engine: str = "numpy",
+    cluster: str | None = None,
+    checkpoint: str | os.PathLike[str] | None = None,
+    resume: bool = False,
+    progress: Callable[[int], None] | None = None,
+) -> xr.Dataset:
+    """What the tolerances and plays of a mechanism do to measures: limits, scatter, yield, and what each contributes.
+
+    measures: names of the model's, or as on the command line (`measures.named`); all of the model if not given, or,
+    where it states none, rotation and slide of every joint to the ground that is not driven. methods: of METHODS.
+    samples: of the sampling method, and of the variance-based indices; seed: of its random numbers. steps: positions of
+    a whole cycle; at: the place (driver coordinate or time) at which measures without a place or figure of their own are taken.
+    jobs, chunk, cluster, checkpoint, resume, progress: see `runner.run`. engine: numpy, or jax (an extra).
+    Returns a Dataset over (measure, parameter, position, …) of `result.VARIABLES`; SI, each measure in its own unit.
+    Method: exact first derivatives by dual numbers; the worst corner of the tolerances found on the mechanism itself;
+    Monte Carlo or scrambled Sobol points through the whole analysis; Sobol' indices. Samples that have no answer are
+    counted, and are outside every limit.
+    Raises MechanismError if nothing varies, for an unknown measure or method, or as `analyse` does.
+    """
+    from trunnion.analysis.tolerance.result import Outcome, dataset
+
+    _check(methods, samples, seed)
+    found = study(mechanism, measures, steps, at, friction)
+    worst = found.worst() if "worst-case" in methods else None
+    method = next((one for one in methods if one in SAMPLINGS), None)
+    job: Sampling | None = None
+    tally: Tally | None = None
+    shares: Indices | None = None
+    notes: list[Finding] = []
+    stopped = False
+    if method is not None:
+        job = found.sampling(method, samples, seed, engine)
+        ran = runner.run(
+            job, jobs=jobs, chunk=chunk, cluster=cluster, checkpoint=checkpoint, resume=resume, progress=progress
+        )
+        tally, stopped = ran.tally, ran.stopped
+        notes += ran.notes
+        if stopped:
+            what = f"stopped before the end: {done_of(job, tally):,} of {job.samples:,} samples"
+            notes.append(Finding(what, "samples", "go on with --resume", Severity.WARNING))
+    if "sobol" in methods:
+        own = found.sampling("quasi-monte-carlo", samples, seed)
+        shares = indices(found.sampler(own), samples, seed)
+    return dataset(Outcome(found, tuple(methods), worst, job, tally, shares, stopped), [*found.told, *notes])
+
+
+def done_of(job: Sampling, tally: Tally) -> int:
+    """Samples in a tally."""
+    return int(sum(np.max(total.count) for tree in tally.trees if (total := tree.total()) is not None))
+
+
+def _check(methods: Sequence[str], samples: int, seed: int) -> None:
+    known = ", ".join(METHODS)
+    findings = [
+        Finding(f"there is no method '{method}'", "method", f"use {known}")
+        for method in methods
+        if method not in METHODS
+    ]
+    if sum(method in SAMPLINGS for method in methods) > 1:
+        findings.append(Finding("two sampling methods at once", "method", f"take one of {' and '.join(SAMPLINGS)}"))
+    if not 1 <= samples <= MOST_SAMPLES:
+        remedy = f"give a number from 1 to {MOST_SAMPLES:,}, or leave the sampling methods out"
+        findings.append(Finding(f"{samples} samples", "samples", remedy))
+    if not 0 <= seed < 1 << 63:
+        findings.append(Finding(f"a seed of {seed}", "seed", "give a whole number from 0"))
+    if findings:
+        raise MechanismError(findings)
+
+
+def placed(mechanism: Mechanism, measure: Measure, at: float | str) -> Measure:
+    """A measure taken at a place if it has none of its own and no figure of a whole course."""
+    if measure.at is not None or measure.over is not None or measure.statistic or measure.rule not in ("deviation",):
+        return measure
+    try:
+        quantity = Quantity.read(at)
+        value = float(quantity.evaluate())
+    except UnitError as error:
+        raise MechanismError(Finding(f"'{at}' is no place: {error.what}", "at", "write 60deg, 20mm or 0.1s")) from None
+    return replace(measure, at=value, timed=si_unit(quantity.check({})) == "s")

@@ -1,0 +1,311 @@
+"""Which numbers of a mechanism vary, within which limits and how: `tolerances`, `tolerance_defaults`, `correlations`.
+
+A name is one that `--set` takes. One of `joint_defaults` means the number of each joint that has it; those vary
+independently. A number that is stated with ± or by a fit varies too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from itertools import combinations
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.algebra.namespace import Number
+from trunnion.errors import Finding, MechanismError
+from trunnion.model.limits import Limits
+from trunnion.model.parameters import Entry, ParameterSet, measured
+from trunnion.model.quantity import Quantity
+from trunnion.model.tolerance_parts import DISTRIBUTIONS, Variation
+from trunnion.model.units import KINDS, Kind
+
+if TYPE_CHECKING:
+    from trunnion.model.mechanism import Mechanism
+
+__all__ = [
+    "Tolerance",
+    "clearance_of",
+    "correlation",
+    "followers",
+    "kept",
+    "may_vary",
+    "named_paths",
+    "tolerated",
+    "towards",
+    "variations",
+    "with_tolerances",
+    "written_limits",
+]
+
+DEFAULTS = "joint_defaults."
+FULL_TURN = "direction"  # the distribution over all directions
+SHOWN_UNITS = {"length": ("mm", 1e3), "angle": ("deg", 180 / np.pi)}  # in which a tolerance is written
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """A number that varies.
+
+    path: of the number; nominal: its value as it stands, SI; lower, upper: signed deviations, SI; distribution: a key
+    of DISTRIBUTIONS; options: what it was told, SI, as far as stated: cp, cpk, shift, mode, alpha, beta, values (a
+    tuple); direction: path of the angle that goes with it, uniform over a full turn, or empty.
+    """
+
+    path: str
+    nominal: float
+    lower: float
+    upper: float
+    distribution: str = "normal"
+    options: Mapping[str, float | tuple[float, ...]] = field(default_factory=dict)
+    direction: str = ""
+
+    @property
+    def half_width(self) -> float:
+        """Half the distance of the limits."""
+        return (self.upper - self.lower) / 2
+
+    @property
+    def can_be_chosen(self) -> bool:
+        """Whether its limits are a choice: not where it varies as measured, or over a full turn."""
+        return "values" not in self.options and self.distribution != FULL_TURN
+
+
+def tolerated(mechanism: Mechanism, numbers: ParameterSet | None = None) -> list[Tolerance]:
+    """Every number that varies, in the order of the parameters.
+
+    numbers: those of the mechanism, where some of it could not be read.
+    """
+    numbers = numbers or mechanism.parameter_set
+    stated, found = variations(mechanism, numbers), written_limits(numbers)
+    return [
+        _tolerance(mechanism, numbers, entry, stated.get(path, ("", Variation()))[1], found.get(path))
+        for path, entry in numbers.entries.items()
+        if path in stated or (path in found and may_vary(entry))
+    ]
+
+
+def written_limits(numbers: ParameterSet) -> dict[str, tuple[float, float]]:
+    """(lower, upper) signed deviations, SI, of every number that is stated with them, by path.
+
+    Those in `joint_defaults` are of each joint that follows it.
+    """
+    return {
+        path: entry.quantity.tolerance
+        for path, entry in numbers.entries.items()
+        if entry.quantity.tolerance
+        and not path.startswith(DEFAULTS)
+        and (not entry.alias or entry.alias.startswith(DEFAULTS))
+    }
+
+
+def may_vary(entry: Entry) -> bool:
+    """Whether a number is one of the mechanism itself: not of its measures, nor of how it is first put together."""
+    return not entry.varies and entry.path.partition(".")[0] not in ("measures", "assembly")
+
+
+def variations(mechanism: Mechanism, numbers: ParameterSet) -> dict[str, tuple[str, Variation]]:
+    """Name and entry of `tolerances` by path; names that mean nothing are left out, as findings of their own."""
+    found: dict[str, tuple[str, Variation]] = {}
+    shared: dict[str, tuple[str, Variation]] = {}
+    for name, variation in mechanism.variations.items():
+        try:
+            path = numbers.resolve(name)
+        except MechanismError:
+            continue
+        of_all = path.startswith(DEFAULTS)
+        for one in followers(numbers, path) if of_all else [path]:
+            if may_vary(numbers.entries[one]):
+                (shared if of_all else found).setdefault(one, (name, variation))
+    return {**shared, **found}
+
+
+def followers(numbers: ParameterSet, path: str) -> list[str]:
+    """The paths that a name of `joint_defaults` means: those of the joints that follow it."""
+    return [entry.path for entry in numbers.entries.values() if entry.alias == path]
+
+
+def towards(path: str, numbers: ParameterSet) -> str:
+    """The angle of the direction in which a tilt or an offset of a misaligned axis points; empty for others."""
+    for key, angle in (("tilt", "towards"), ("offset", "offset_towards")):
+        before = path.removesuffix(f".misalignment.{key}")
+        if before != path and f"{before}.misalignment.{angle}" in numbers.entries:
+            return f"{before}.misalignment.{angle}"
+    return ""
+
+
+def _tolerance(
+    mechanism: Mechanism,
+    numbers: ParameterSet,
+    entry: Entry,
+    stated: Variation,
+    written: tuple[float, float] | None,
+) -> Tolerance:
+    """written: limits that stand with the number itself."""
+    distribution, options = _distribution(mechanism, stated)
+    values = {key: _value(option, numbers.dimension_values) for key, option in options.items()}
+    sample = values.get("values")
+    if stated.limits is not None:
+        lower, upper = (_number(one, numbers.dimension_values) for one in (stated.limits.lower, stated.limits.upper))
+    elif written is not None:
+        lower, upper = written
+    elif isinstance(sample, tuple):
+        lower, upper = min(sample), max(sample)
+    else:
+        lower, upper = (-np.pi, np.pi) if distribution == FULL_TURN else (np.nan, np.nan)
+    direction = towards(entry.path, numbers) if stated.direction else ""
+    nominal = float(numbers.nominal[entry.path])
+    return Tolerance(entry.path, nominal, lower, upper, distribution, values, direction)
+
+
+def _distribution(mechanism: Mechanism, stated: Variation) -> tuple[str, dict[str, Quantity | tuple[Quantity, ...]]]:
+    """Its name and what it is told; defaults are for what the distribution takes and the entry does not say."""
+    defaults = mechanism.tolerance_defaults
+    name = stated.distribution or defaults.distribution
+    options = {}
+    for key in DISTRIBUTIONS[name]:
+        own = getattr(stated, key)
+        # a default cpk is one beside the default cp
+        spoken = key == "cpk" and stated.cp is not None
+        value = own if own is not None or spoken else getattr(defaults, key, None)
+        if value is not None:
+            options[key] = value
+    return name, options
+
+
+def _value(option: Quantity | tuple[Quantity, ...], dimensions: Mapping[str, Number]) -> float | tuple[float, ...]:
+    if isinstance(option, tuple):
+        return tuple(_number(one, dimensions) for one in option)
+    return _number(option, dimensions)
+
+
+def _number(quantity: Quantity, dimensions: Mapping[str, Number]) -> float:
+    """The value; nan if it cannot be known, which is a finding of its own."""
+    return float(quantity.evaluate(dimensions)) if set(quantity.names) <= dimensions.keys() else np.nan
+
+
+# ---- correlation ----------------------------------------------------------------------------------------------
+
+
+def correlation(mechanism: Mechanism, numbers: ParameterSet | None = None) -> NDArray[np.float64]:
+    """The matrix of the correlations of all tolerated numbers, in the order of `tolerated`."""
+    numbers = numbers or mechanism.parameter_set
+    place = {one.path: index for index, one in enumerate(tolerated(mechanism, numbers))}
+    matrix = np.eye(len(place))
+    for stated in mechanism.correlations:
+        paths = [path for path in named_paths(numbers, stated.of) if path in place]
+        value = _number(stated.coefficient, numbers.dimension_values)
+        for one, other in combinations(dict.fromkeys(paths), 2):
+            matrix[place[one], place[other]] = matrix[place[other], place[one]] = value
+    return matrix
+
+
+def named_paths(numbers: ParameterSet, names: Iterable[str]) -> list[str]:
+    """The paths that names mean, those of `joint_defaults` as the numbers of the joints; unknown ones left out."""
+    found: list[str] = []
+    for name in names:
+        try:
+            path = numbers.resolve(name)
+        except MechanismError:
+            continue
+        found += followers(numbers, path) if path.startswith(DEFAULTS) else [path]
+    return found
+
+
+# ---- other tolerances -----------------------------------------------------------------------------------------
+
+
+def clearance_of(mechanism: Mechanism, name: str, numbers: ParameterSet | None = None) -> str:
+    """The path of the clearance that `joints.B.clearance` or `B.clearance` means, of pin or guide; empty if none.
+
+    The play of a joint is meant, and not a tolerance of the number that states it, which is `joints.B.pin.clearance`.
+    """
+    joint = name.removeprefix("joints.").removesuffix(".clearance")
+    if not name.endswith(".clearance") or joint not in mechanism.effective_joints:
+        return ""
+    known = (numbers or mechanism.parameter_set).entries
+    paths = [f"joints.{joint}.{part}.clearance" for part in ("pin", "guide")]
+    return next((path for path in paths if path in known), "")
+
+
+def with_tolerances(mechanism: Mechanism, half_widths: Mapping[str, float]) -> dict[str, Any]:
+    """Plain data of the mechanism with other half widths of tolerances, and other clearances, SI, by name."""
+    numbers = mechanism.parameter_set
+    kinds = measured(mechanism, numbers.entries.values())
+    known = {one.path: one for one in tolerated(mechanism)}
+    stated = variations(mechanism, numbers)
+    clearances: dict[str, float | str] = {}
+    entries: dict[str, Any] = {}
+    findings: list[Finding] = []
+    for name, half in half_widths.items():
+        if play := clearance_of(mechanism, name):
+            clearances[play] = _written(half, KINDS["length"])
+            continue
+        path = mechanism.path_of(name)
+        tolerance = known.get(path)
+        if tolerance is None or not tolerance.can_be_chosen:
+            what = "has no tolerance" if tolerance is None else "varies as measured or over a full turn"
+            findings.append(Finding(f"'{name}' {what}, none can be replaced", remedy="state limits in tolerances: {…}"))
+            continue
+        if not (np.isfinite(half) and half >= 0):
+            findings.append(Finding(f"a half width of {half:g} is none", path, "give a number of at least 0, SI"))
+            continue
+        key, variation = stated.get(path, ("", Variation()))
+        middle = (tolerance.lower + tolerance.upper) / 2
+        text = _limits_text(middle, half, kinds[path])
+        own = key if key and not numbers.resolve(key).startswith(DEFAULTS) else path
+        group = variation.model_copy(update={"limits": Limits.read(text)})
+        entries[own] = Variation(**{one: getattr(group, one) for one in {*variation.model_fields_set, "limits"}})
+    if findings:
+        raise MechanismError(findings)
+    data = (mechanism.with_values(clearances) if clearances else mechanism).data()
+    if entries:
+        written = {key: one.model_dump(mode="json", exclude_unset=True) for key, one in entries.items()}
+        data["tolerances"] = {**data.get("tolerances", {}), **written}
+    return data
+
+
+def _written(value: float, kind: Kind, sign: str = "") -> str:
+    """A value with its unit, to 12 digits."""
+    unit, factor = SHOWN_UNITS.get(kind.name, (kind.unit if kind.dimensions and kind.unit != "1" else "", 1.0))
+    return f"{value * factor:{sign}.12g} {unit}".strip()
+
+
+def _limits_text(middle: float, half: float, kind: Kind) -> str:
+    """Limits about a middle, as a file has them."""
+    if abs(middle) <= 1e-12 * half or (middle == 0 == half):
+        return f"±{_written(half, kind)}"
+    upper, lower = (_written(end, kind, "+") for end in (middle + half, middle - half))
+    return f"{upper}/{lower}"
+
+
+# ---- numbers that are no more ---------------------------------------------------------------------------------
+
+
+def kept(mechanism: Mechanism, data: Mapping[str, Any]) -> dict[str, Any]:
+    """Plain data made of that of a mechanism, without errors, tolerances and costs of numbers that it no longer has.
+
+    So a mechanism without friction has no tolerance of a coefficient. MechanismError if the data make no mechanism.
+    """
+    named = [key for key in ("errors", "tolerances", "costs") if data.get(key)]
+    if not named:
+        return dict(data)
+    bare = {key: value for key, value in data.items() if key not in (*named, "correlations", "processes")}
+    other = type(mechanism)(**bare)
+
+    def known(name: str) -> bool:
+        try:
+            return bool(clearance_of(other, name) or other.parameter_set.resolve(name.removeprefix("errors.")))
+        except MechanismError:
+            return False
+
+    rest = {key: {name: one for name, one in data[key].items() if known(name)} for key in named}
+    rows = [{**row, "of": [name for name in row["of"] if known(name)]} for row in data.get("correlations", ())]
+    together = [
+        row
+        for row, stated in zip(rows, data.get("correlations", ()), strict=True)
+        if row["of"] == stated["of"] or len(row["of"]) > 1
+    ]
+    return {**data, **rest, **({"correlations": together} if rows else {})}

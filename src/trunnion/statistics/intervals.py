@@ -1,0 +1,134 @@
+"""Confidence intervals: how far a figure from samples may be from the true one. All take arrays and broadcast.
+
+confidence: the chance that such an interval covers the true figure, 0.95 unless said. An interval is (low, high).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+
+__all__ = [
+    "by_replicates",
+    "of_deviation",
+    "of_mean",
+    "of_quantile",
+    "share",
+    "share_by_replicates",
+]
+
+Floats = NDArray[np.float64]
+Interval = tuple[Floats, Floats]
+
+
+def share(passed: Any, n: Any, confidence: float = 0.95) -> Interval:
+    """Interval of a chance of which `passed` in n independent trials came out, by Wilson's score. NaN for n = 0.
+
+    |p − p̂| = z √(p (1 − p)/n) solved for p; it stays in [0, 1] and has a width when all passed. Source: E. B. Wilson,
+    Probable inference, the law of succession, and statistical inference, J. Am. Stat. Assoc. 22 (1927) 209-212,
+    doi:10.1080/01621459.1927.10502953.
+    """
+    n = np.asarray(n, dtype=np.float64)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return _score(np.asarray(passed) / n, 1 / n, -special.ndtri((1 - confidence) / 2))
+
+
+def _score(estimate: Floats, unit: Floats, z: Any) -> Interval:
+    """Wilson's interval where the variance of the estimate is p (1 − p) · unit."""
+    w = z * z * unit
+    middle = (estimate + w / 2) / (1 + w)
+    half = np.sqrt(w * (estimate * (1 - estimate) + w / 4)) / (1 + w)
+    # At the ends middle and half are equal but for rounding.
+    low = np.where(estimate <= 0, 0.0, np.maximum(middle - half, 0.0))
+    high = np.where(estimate >= 1, 1.0, np.minimum(middle + half, 1.0))
+    nothing = np.isnan(estimate)
+    return np.where(nothing, np.nan, low), np.where(nothing, np.nan, high)
+
+
+def by_replicates(values: Any, confidence: float = 0.95, axis: int = -1) -> Interval:
+    """Interval of a mean from independent estimates of it along `axis`, by Student's t: mean ± t s/√R.
+
+    Source: Student, The probable error of a mean, Biometrika 6 (1908) 1-25, doi:10.1093/biomet/6.1.1. NaN for R < 2.
+    """
+    values = np.asarray(values, dtype=np.float64)
+    number = values.shape[axis]
+    if number < 2:
+        nothing = np.full(values.mean(axis=axis).shape, np.nan)
+        return nothing, nothing
+    mean = values.mean(axis=axis)
+    half = special.stdtrit(number - 1, (1 + confidence) / 2) * values.std(axis=axis, ddof=1) / np.sqrt(number)
+    return mean - half, mean + half
+
+
+def share_by_replicates(passed: Any, size: int, confidence: float = 0.95, axis: int = -1) -> Interval:
+    """Interval of a chance from the counts `passed` of R independent replicates of `size` points each.
+
+    Wilson's score with the variance that the replicates show and Student's t for z, so that it stays in [0, 1]; where
+    no count is near its ends it is `by_replicates` of the shares. Counts are whole, so their variance is taken as at
+    least 1/12; if all or none passed, it is `share` of all points as if they were independent, which is wider.
+    Where hardly any point failed, the counts are 0 or 1 and t alone covers far too seldom; this does not.
+    """
+    passed = np.asarray(passed, dtype=np.float64)
+    number = passed.shape[axis]
+    total = passed.sum(axis=axis)
+    plain = share(total, number * size, confidence)
+    if number < 2:
+        return plain
+    estimate = total / (number * size)
+    variance = np.maximum(passed.var(axis=axis, ddof=1), 1 / 12) / (number * size * size)
+    spread = estimate * (1 - estimate)
+    inside = spread > 0
+    t = special.stdtrit(number - 1, (1 + confidence) / 2)
+    low, high = _score(estimate, variance / np.where(inside, spread, 1.0), t)
+    return np.where(inside, low, plain[0]), np.where(inside, high, plain[1])
+
+
+def of_mean(mean: Any, deviation: Any, n: Any, confidence: float = 0.95) -> Interval:
+    """Interval of a mean of n independent values with sample standard deviation s: mean ± t s/√n. NaN for n < 2."""
+    n = np.asarray(n, dtype=np.float64)
+    enough = n > 1
+    number = np.where(enough, n, 2.0)
+    t = special.stdtrit(number - 1, (1 + confidence) / 2)
+    half = np.where(enough, t * np.asarray(deviation) / np.sqrt(number), np.nan)
+    return np.asarray(mean - half, dtype=np.float64), np.asarray(mean + half, dtype=np.float64)
+
+
+def of_deviation(deviation: Any, kurtosis: Any, n: Any, confidence: float = 0.95) -> Interval:
+    """Interval of a standard deviation from n independent values, of any distribution with the kurtosis given.
+
+    The variance of s² is σ⁴ (κ − (n − 3)/(n − 1))/n; ν s²/σ² is taken as chi-square with the ν of that variance,
+    ν = 2 n/(κ − (n − 3)/(n − 1)), which is n − 1 for a normal distribution (κ = 3). Approximate for small n.
+    Source of the variance: H. Cramér, Mathematical methods of statistics (1946), chapter 27. NaN for n < 4.
+    """
+    n, kurtosis = np.asarray(n, dtype=np.float64), np.asarray(kurtosis, dtype=np.float64)
+    enough = (n > 3) & ~np.isnan(kurtosis)
+    number = np.where(enough, n, 4.0)
+    freedom = 2 * number / np.maximum(np.where(enough, kurtosis, 3.0) - (number - 3) / (number - 1), 1e-12)
+    tails = [special.chdtri(freedom, p) for p in ((1 - confidence) / 2, (1 + confidence) / 2)]
+    low, high = (np.where(enough, np.asarray(deviation) * np.sqrt(freedom / tail), np.nan) for tail in tails)
+    return low, high
+
+
+def of_quantile(q: Any, n: Any, confidence: float = 0.95) -> Interval:
+    """Shares (low, high) of n independent values whose quantiles in the sample enclose the true quantile q.
+
+    The number of values below the true quantile is binomial (n, q), whatever the distribution: the interval is from
+    the lth to the uth smallest value, each tail at most (1 − confidence)/2. NaN where n is too small for one to exist.
+    Source: W. J. Conover, Practical nonparametric statistics, 3rd ed. (1999), section 3.2.
+    """
+    q, n = np.broadcast_arrays(np.asarray(q, dtype=np.float64), np.asarray(n, dtype=np.float64))
+    tail = (1 - confidence) / 2
+    number = np.maximum(n, 1)
+    low = _binomial_quantile(tail, number, q)
+    high = _binomial_quantile(1 - tail, number, q) + 1
+    return np.where((low >= 1) & (n > 0), low / number, np.nan), np.where((high <= n) & (n > 0), high / number, np.nan)
+
+
+def _binomial_quantile(p: float, n: Floats, q: Floats) -> Floats:
+    """Least k with P(X ≤ k) ≥ p for X binomial (n, q)."""
+    k = np.maximum(np.ceil(special.bdtrik(p, n, q)), 0.0)
+    before = np.maximum(k - 1, 0.0)
+    return np.asarray(np.where((k > 0) & (special.bdtr(before, n.astype(np.int64), q) >= p), before, k))

@@ -1,0 +1,92 @@
+"""`trunnion tolerance`: what tolerances and plays do to measures, and which of them does it."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from trunnion.options import File, FrictionLaw, Measures, Out, Report, Set, Steps, TableFile, UnitsRow, named_file
+from trunnion.terminal import bar, findings_of, say
+from trunnion.verbs.model import exit_status, lines_of, placed, stated
+
+__all__ = ["tolerance"]
+
+STOPPED = 130
+FEW = 2_000_000  # configurations up to which further processes cost more than they save
+
+
+def tolerance(
+    file: File,
+    measure: Measures = None,
+    at: Annotated[
+        str | None,
+        typer.Option("--at", help="Place of measures that state none: 60deg, 20mm, 0.1s.", show_default=False),
+    ] = None,
+    method: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--method",
+            help="linear, worst-case, monte-carlo, quasi-monte-carlo, sobol. Repeatable; the first three if not given.",
+            show_default=False,
+        ),
+    ] = None,
+    samples: Annotated[int, typer.Option("--samples", help="Random mechanisms.")] = 10_000,
+    seed: Annotated[int, typer.Option("--seed", help="Of the random numbers: the same seed, the same bits.")] = 1,
+    steps: Steps = 360,
+    jobs: Annotated[
+        int | None,
+        typer.Option("--jobs", help="Processes; one a core if not given and the work is worth it.", show_default=False),
+    ] = None,
+    chunk: Annotated[
+        int | None, typer.Option("--chunk", help="Samples handed out at a time; about a second's.", show_default=False)
+    ] = None,
+    engine: Annotated[str, typer.Option("--engine", help="numpy, or jax: compiled, for large batches.")] = "numpy",
+    cluster: Annotated[
+        str | None,
+        typer.Option("--cluster", help="Address of a Dask scheduler, or local.", show_default=False),
+    ] = None,
+    checkpoint: Annotated[
+        Path | None, typer.Option("--checkpoint", help="File that keeps what is done.", show_default=False)
+    ] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on from the checkpoint.")] = False,
+    set_: Set = None,
+    table: TableFile = None,
+    friction: FrictionLaw = None,
+    sample: Annotated[
+        list[str] | None,
+        typer.Option("--sample", help="NAME=FILE.csv: measured deviations of a number, one column. Repeatable."),
+    ] = None,
+    kind: Annotated[
+        str | None,
+        typer.Option("--kind", help="One figure alone: histogram, contributions, envelope, convergence or sobol."),
+    ] = None,
+    out: Out = None,
+    report: Report = None,
+    units_row: UnitsRow = False,
+) -> None:
+    """What tolerances and plays do to measures: worst case, RSS, scatter, yield, contributions."""
+    from trunnion.analysis.tolerance.sampling import METHODS as SAMPLINGS
+    from trunnion.analysis.tolerance.study import DEFAULT_METHODS
+    from trunnion.analysis.tolerance.study import tolerance as run
+    from trunnion.verbs.tolerance import check_files, show
+
+    check_files(out or [], report, kind)
+    mechanism = stated(file, set_, table, friction)
+    for text in sample or []:
+        mechanism = mechanism.with_samples(*named_file(text, "--sample"))
+    methods = tuple(method or DEFAULT_METHODS)
+    counted = samples if any(one in SAMPLINGS for one in methods) else 0
+    if jobs is None:
+        jobs = 1 if counted * steps < FEW and cluster is None else os.cpu_count() or 1
+    with lines_of(file), bar("samples", counted, least=1000) as progress:
+        result = run(
+            mechanism, measure, methods, samples, seed, steps, at, jobs=jobs, chunk=chunk, engine=engine,
+            cluster=cluster, checkpoint=checkpoint, resume=resume, progress=progress,
+        )  # fmt: skip
+    show(mechanism, result, out or [], units_row, kind, report)
+    findings = findings_of(result)
+    say(placed(findings, file, ["measures", "joints", "tolerances"]))
+    raise typer.Exit(STOPPED if result.attrs["stopped"] else exit_status(findings))

@@ -1,0 +1,569 @@
+"""Measures and their figures against closed forms, published values and the books of `analyse`."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy import optimize
+from scipy.spatial.transform import Rotation
+
+import trunnion
+from measured import courses, figures, references
+from mechanisms import DURANGO, build, four_bar, slider_crank
+from mechanisms_space import rssr
+from trunnion import Mechanism, MechanismError
+from trunnion.algebra.dual import Dual, derivative, primal
+from trunnion.analysis.account import MARGIN
+from trunnion.analysis.analyse import Run, prepare
+from trunnion.analysis.measure_figures import figure, kept, known, shown, span
+from trunnion.analysis.measure_positions import plan
+from trunnion.analysis.measures import MEASURES, STATISTICS, Measure, coordinate_unit, named
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+R, L, E = 0.3, 1.0, 0.1  # crank, rod, offset of the guide
+
+STROKE = Measure("stroke", "stroke", "C")
+FAR = Measure("far", "dead_centre", "C")
+NEAR = Measure("near", "dead_centre", "C", statistic="place-of-minimum")
+
+
+@pytest.fixture(scope="module")
+def crank() -> Run:
+    return prepare(build(slider_crank(R, L, E)))
+
+
+@pytest.fixture(scope="module")
+def durango() -> Run:
+    return prepare(trunnion.read(DURANGO))
+
+
+# ---- strokes and dead centres ---------------------------------------------------------------------------------
+
+
+def stroke_of(r: Any = R, length: Any = L, offset: Any = E) -> Any:
+    """From both positions in which crank and rod are in line."""
+    return np.sqrt((length + r) ** 2 - offset**2) - np.sqrt((length - r) ** 2 - offset**2)
+
+
+def far_of(r: Any = R, length: Any = L, offset: Any = E) -> Any:
+    return np.arcsin(offset / (length + r))
+
+
+def near_of(r: Any = R, length: Any = L, offset: Any = E) -> Any:
+    return np.pi + np.arcsin(offset / (length - r))
+
+
+def wrapped(angle: Any) -> Any:
+    return (np.asarray(angle) + np.pi) % (2 * np.pi) - np.pi
+
+
+SIZES = {"links.crank.points.B.x": 0, "links.rod.points.P.x": 1, "links.ground.points.C.y": 2}
+
+
+def test_stroke_and_dead_centres_of_a_slider_crank(crank: Run) -> None:
+    found = figures(crank, [STROKE, FAR, NEAR], 180)
+    assert found["stroke"] == pytest.approx(stroke_of(), abs=1e-13)
+    assert wrapped(found["far"] - far_of()) == pytest.approx(0, abs=1e-11)
+    assert wrapped(found["near"] - near_of()) == pytest.approx(0, abs=1e-9)
+
+
+def test_of_many_samples(crank: Run) -> None:
+    """The same closed forms with crank, rod and guide of every sample, and with driver speeds of their own."""
+    rng = np.random.default_rng(3)
+    r, length, offset = (n * (1 + 0.02 * rng.uniform(-1, 1, (50, 1))) for n in (R, L, E))
+    changes = dict(zip(SIZES, (r, length, offset), strict=True))
+    for speed in ({}, {"drivers.A.speed": -6.0 * (1 + 0.1 * rng.uniform(-1, 1, (50, 1)))}):
+        found = figures(crank, [STROKE, FAR, NEAR], 180, {**changes, **speed})
+        np.testing.assert_allclose(found["stroke"], stroke_of(r, length, offset)[:, 0], rtol=0, atol=1e-12)
+        np.testing.assert_allclose(wrapped(found["far"] - far_of(r, length, offset)[:, 0]), 0, atol=1e-10)
+        np.testing.assert_allclose(wrapped(found["near"] - near_of(r, length, offset)[:, 0]), 0, atol=1e-9)
+
+
+@pytest.mark.parametrize("path", SIZES)
+def test_derivatives_of_stroke_and_dead_centres(crank: Run, path: str) -> None:
+    """By dual numbers through the engine, the positions and the search for the extremes; against the closed forms."""
+    sizes: list[Any] = [R, L, E]
+    found = figures(crank, [STROKE, FAR, NEAR], 360, {path: Dual(sizes[SIZES[path]], 1.0)})
+    step = 1e-6
+    for name, formula in {"stroke": stroke_of, "far": far_of, "near": near_of}.items():
+        ends = []
+        for sign in (1, -1):
+            moved = list(sizes)
+            moved[SIZES[path]] += sign * step
+            ends.append(formula(*moved))
+        slope = (ends[0] - ends[1]) / (2 * step)
+        assert float(np.ravel(derivative(found[name]))[0]) == pytest.approx(slope, rel=2e-7, abs=1e-8)
+
+
+def test_dead_centres_of_the_four_bar(durango: Run) -> None:
+    """14.361511563° and 212.157208609°, known to all digits."""
+    most = Measure("most", "dead_centre", "D")
+    least = Measure("least", "dead_centre", "D", statistic="place-of-minimum")
+    for steps, close in ((360, 2e-8), (720, 2e-9)):
+        found = figures(durango, [most, least], steps)
+        assert np.degrees(found["most"]) % 360 == pytest.approx(212.157208609, abs=close)
+        assert np.degrees(found["least"]) % 360 == pytest.approx(14.361511563, abs=close)
+
+
+def test_dead_centre_outside_its_window(durango: Run) -> None:
+    """Told from the end of a range, where the motion goes on."""
+    inside = Measure("inside", "dead_centre", "D", over=(np.radians(180), np.radians(240)))
+    outside = Measure("outside", "dead_centre", "D", over=(np.radians(220), np.radians(300)))
+    place = Measure("place", "rotation", "D", over=outside.over, statistic="place-of-maximum")
+    found = figures(durango, [inside, outside, place], 360)
+    assert np.degrees(found["inside"]) == pytest.approx(212.157208609, abs=1e-7)
+    assert np.isnan(found["outside"])
+    assert np.degrees(found["place"]) == pytest.approx(220, abs=1e-9)
+
+
+def test_grid_does_not_show(crank: Run) -> None:
+    """A stroke keeps to seventh order whatever the number of positions and where they lie."""
+    errors = [abs(figures(crank, [STROKE], steps)["stroke"] - stroke_of()) for steps in range(60, 80)]
+    assert max(errors) < 1e-8  # a fifth of what three points would leave, 1e-5 without any search
+    finer = [abs(figures(crank, [STROKE], 2 * steps)["stroke"] - stroke_of()) for steps in range(60, 80)]
+    assert max(finer) < max(errors) / 60
+
+
+# ---- angles, places, deviations -------------------------------------------------------------------------------
+
+
+def test_rotation_over_whole_turns(durango: Run) -> None:
+    """The crank gains a turn, from the first position to the end of the cycle; a window from 300° to 60° is 120°."""
+    turn = Measure("turn", "rotation", "A", statistic="peak-to-peak")
+    third = Measure("third", "rotation", "A", over=(np.radians(300), np.radians(60)), statistic="peak-to-peak")
+    found = figures(durango, [turn, third], 90)
+    assert found["turn"] == pytest.approx(2 * np.pi, abs=1e-12)
+    assert found["third"] == pytest.approx(np.radians(120), abs=1e-12)
+
+
+def test_at_a_place(durango: Run) -> None:
+    """Only its own position is needed, and that exactly."""
+    at = Measure("at", "rotation", "D", at=np.radians(61.37))
+    time = Measure("time", "rotation", "D", at=0.0123, timed=True)
+    both = plan(durango, [at, time], 360)
+    assert len(both.times) == 2
+    exact = durango.solve(both.times).walk
+    want = dict.fromkeys(("c", "s"), exact.motions["rocker"].frame)
+    angles = np.arctan2(want["s"].s, want["c"].c)
+    moments = {name: int(window.index[0]) for name, window in both.windows.items()}
+    found = figures(durango, [at, time])
+    for name in ("at", "time"):
+        assert found[name] == pytest.approx(angles[moments[name]], abs=1e-14)
+    coordinate = durango.system.drive(durango.values, "A", both.times)[0]
+    assert coordinate[moments["at"]] == pytest.approx(np.radians(61.37), abs=1e-14)
+
+
+def test_deviation_and_path_error(crank: Run) -> None:
+    """A guide that is 1 mm higher: the piston goes up by it, its slide changes with the angle of the rod."""
+    raised = {"links.ground.points.C.y": np.array([[E + 1e-3], [E - 2e-3], [E]])}
+    path = Measure("path", "path_error", "piston.P")
+    height = Measure("height", "point", "piston.P", "y")
+    drift = Measure("drift", "point", "piston.P", "x")
+    error = Measure("error", "transmission_error", "C")
+    found = figures(crank, [path, height, drift, error], 180, raised)
+    np.testing.assert_allclose(found["height"], [1e-3, 2e-3, 0], rtol=0, atol=1e-15)
+    q = np.linspace(0, 2 * np.pi, 100_001)
+
+    def x(offset: float) -> Any:
+        return R * np.cos(q) + np.sqrt(L**2 - (offset - R * np.sin(q)) ** 2)
+
+    changes = [x(E + step) - x(E) for step in (1e-3, -2e-3, 0)]
+    np.testing.assert_allclose(found["drift"], [np.max(np.abs(n)) for n in changes], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(found["error"], found["drift"], rtol=0, atol=1e-14)
+    away = [np.max(np.hypot(n, step)) for n, step in zip(changes, (1e-3, -2e-3, 0), strict=True)]
+    np.testing.assert_allclose(found["path"], away, rtol=0, atol=1e-12)
+
+
+def test_angles_over_the_cut(durango: Run) -> None:
+    """Where an angle jumps from π to −π its deviation does not."""
+    data = four_bar()
+    for start in np.linspace(0, 2 * np.pi, 9):
+        data["drivers"] = {"A": {"speed": 2.0, "start": float(start)}}
+        run = prepare(build(data))
+        measures = [Measure(f"a{link}", "angle", link) for link in ("crank", "coupler", "rocker")]
+        found = figures(run, measures, 72, {"links.coupler.points.C.x": np.array([[0.9005], [0.8995]])})
+        assert max(np.max(number) for number in found.values()) < 2e-3
+        assert min(np.min(number) for name, number in found.items() if name != "acrank") > 1e-4
+
+
+# ---- straightness ---------------------------------------------------------------------------------------------
+
+
+def width(x: Any, y: Any) -> float:
+    """Of a path about its least-squares line, found by search."""
+
+    def squares(angle: float) -> float:
+        away = (y - np.mean(y)) * np.cos(angle) - (x - np.mean(x)) * np.sin(angle)
+        return float(np.sum(away**2))
+
+    best = optimize.minimize_scalar(squares, bracket=(-0.1, 0.1), options={"xtol": 1e-12}).x
+    return float(np.ptp((y - np.mean(y)) * np.cos(best) - (x - np.mean(x)) * np.sin(best)))
+
+
+def corner(b: Any, d: Any, bc: Any, cd: Any, side: float) -> Any:
+    """Where circles about two points of the complex plane meet."""
+    along = d - b
+    far = np.abs(along)
+    share = (bc**2 - cd**2 + far**2) / (2 * far)
+    return b + along / far * (share + 1j * side * np.sqrt(bc**2 - share**2))
+
+
+def test_straightness_of_hoeckens_line() -> None:
+    """Over the half turn of the crank in which it is nearly straight, by circles intersected at many places."""
+    run = prepare(trunnion.read(EXAMPLES / "hoecken.yaml"))
+    half = Measure("half", "straightness", "coupler.P", over=(np.pi / 2, 3 * np.pi / 2))
+    part = Measure("part", "straightness", "coupler.P", over=(np.radians(100), np.radians(233.3)))
+    found = figures(run, [half, part], 720)
+    for name, ends in {"half": (90, 270), "part": (100, 233.3)}.items():
+        b = 0.04 * np.exp(1j * np.radians(np.linspace(*ends, 200_001)))
+        point = b + 2 * (corner(b, 0.08, 0.1, 0.1, -1) - b)
+        assert found[name] == pytest.approx(width(point.real, point.imag), rel=2e-4)
+
+
+def test_straightness_of_chebyshevs_line() -> None:
+    """Its middle over the part of its path between both ends of the line; its driver is between two moving links."""
+    run = prepare(trunnion.read(EXAMPLES / "chebyshev-line.yaml"))
+    line = Measure("line", "straightness", "coupler.P", over=(np.radians(60), np.radians(180)))
+    found = figures(run, [line], 720)["line"]
+    turn = np.exp(1j * np.radians(np.linspace(60, 180, 200_001)))
+    arm = 5 + 2 * turn
+    c = corner(0j, 4, np.abs(arm), 5, 1)
+    point = 0.03 * (5 + turn) * c / arm
+    assert found == pytest.approx(width(point.real, point.imag), rel=1e-3)
+
+
+def test_straightness_of_a_circle_and_of_a_line(crank: Run) -> None:
+    """As wide as it is long; and the path of the piston, which is straight."""
+    pin = Measure("pin", "straightness", "crank.B")
+    piston = Measure("piston", "straightness", "piston.P")
+    found = figures(crank, [pin, piston], 90)
+    assert found["pin"] == pytest.approx(2 * R, rel=1e-6)
+    assert found["piston"] == pytest.approx(0, abs=1e-15)
+
+
+def test_derivative_of_a_straightness() -> None:
+    """By dual numbers and by two figures, in the plane and of the same mechanism in space."""
+    run = prepare(build(four_bar()))
+    path = "links.coupler.points.C.x"
+    line = Measure("line", "straightness", "coupler.E", over=(1.0, 2.5))
+    slope = float(np.ravel(derivative(figures(run, [line], 90, {path: Dual(0.9, 1.0)})["line"]))[0])
+    ends = figures(run, [line], 90, {path: np.array([[0.9 + 1e-6], [0.9 - 1e-6]])})["line"]
+    assert slope == pytest.approx((ends[0] - ends[1]) / 2e-6, rel=1e-6)
+
+
+def test_straightness_in_space() -> None:
+    """A path in a plane of space is as straight as in the plane, if it lies evenly about its line."""
+    run = prepare(trunnion.read(EXAMPLES / "fourbar-in-space.yaml"))
+    link, point = next(
+        (link, point) for link, point in run.system.points if link not in run.system.mechanism.fixed_link
+    )
+    for name in (f"{link}.{point}",):
+        found = figures(run, [Measure("line", "straightness", name)], 180)["line"]
+        times = run.cycle.times(180)
+        walk = run.solve(times).walk
+        xyz = np.array([np.broadcast_to(n, times.shape) for n in walk.point(link, point).place])
+        centred = xyz - xyz.mean(axis=1, keepdims=True)
+        along = np.linalg.svd(centred)[0][:, 0]
+        rest = centred - np.outer(along, along @ centred)
+        assert found == pytest.approx(2 * np.max(np.linalg.norm(rest, axis=0)), rel=1e-4)
+
+
+# ---- forces ---------------------------------------------------------------------------------------------------
+
+
+def loaded() -> Run:
+    """A slider-crank whose load does work."""
+    return prepare(trunnion.read(EXAMPLES / "offset-slider-crank.yaml"))
+
+
+def test_forces_are_those_of_the_analysis() -> None:
+    run = loaded()
+    mechanism, steps = run.system.mechanism, 360
+    result = trunnion.analyse(mechanism, steps)
+    driver, joint = next(iter(mechanism.drivers)), next(iter(run.system.joints))
+    effort, reaction = result["drive_effort"].values[0], result["reaction_force"].sel(joint=joint).values
+    size = np.hypot(*reaction[:2])
+    measures = [
+        Measure("most", "effort", driver, statistic="maximum"),
+        Measure("rms", "effort", driver, statistic="rms"),
+        Measure("mean", "effort", driver, statistic="mean"),
+        Measure("size", "reaction", joint, statistic="maximum"),
+        Measure("across", "reaction", joint, "y", statistic="largest"),
+        Measure("efficiency", "efficiency", "cycle"),
+        Measure("margin", "locking_margin", "mechanism"),
+        Measure("now", "efficiency", "instant", at=run.cycle.times(steps)[40], timed=True),
+    ]
+    found = figures(run, measures, steps)
+    assert found["rms"] == pytest.approx(np.sqrt(run.cycle.mean(effort**2)), rel=1e-12)
+    assert found["mean"] == pytest.approx(run.cycle.mean(effort), rel=1e-12)
+    for name, curve in {"most": effort, "size": size, "across": np.abs(reaction[1])}.items():
+        assert 0 <= found[name] - np.max(curve) < 2e-3 * np.ptp(curve)
+    rows = {row["label"]: row["value"] for row in json.loads(result.attrs["summary"])}
+    assert found["efficiency"] == pytest.approx(rows["efficiency of the cycle"], rel=1e-12)
+    least = np.nanmin(result["locking_margin"].values)
+    assert found["margin"] <= min(least, MARGIN) + 1e-12
+    assert found["now"] == pytest.approx(float(result["efficiency_instant"].values[40]), rel=1e-9, nan_ok=True)
+
+
+def test_forces_in_space() -> None:
+    """Efforts and reactions of an RSSR with friction are those of the analysis."""
+    run = prepare(Mechanism(**rssr(friction=0.1).data))
+    result = trunnion.analyse(run.system.mechanism, 36)
+    joint = next(iter(run.system.joints))
+    measures = [
+        Measure("z", "reaction", joint, "z", statistic="mean"),
+        Measure("size", "reaction", joint, statistic="mean"),
+    ]
+    found = figures(run, measures, 36)
+    reaction = result["reaction_force"].sel(joint=joint).values
+    assert found["z"] == pytest.approx(run.cycle.mean(reaction[2]), rel=1e-12)
+    assert found["size"] == pytest.approx(run.cycle.mean(np.linalg.norm(reaction, axis=0)), rel=1e-12)
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e-7])
+def test_turn_of_a_link_in_space(scale: float) -> None:
+    """About each global axis the component of the rotation vector from the nominal attitude, however far it is."""
+    run = prepare(Mechanism(**rssr().data))
+    link = next(name for name in run.system.mechanism.links if run.system.mechanism.drivers and "rocker" in name)
+    measures = [Measure(axis, "angle", link, axis, at=1.0) for axis in "xyz"]
+    path = next(path for path in run.values if path.startswith(f"links.{link}.points.") and run.values[path] > 0.01)
+    value = float(run.values[path])
+    changes = value * (1 + scale * np.array([[0.0], [0.01], [-0.1]]))
+    positions, _ = references(run, measures, 36)
+    found = figures(run, measures, 36, {path: changes})
+    walk = run.solve(positions.times, run.system.mechanism.parameters({path: changes})).walk
+    axes = np.array([[np.broadcast_to(n, (3, 1)) for n in axis] for axis in walk.motions[link].frame[:3]])
+    frames = np.moveaxis(axes[..., 0], 2, 0).swapaxes(1, 2)  # columns are the axes
+    for k in range(3):
+        vector = Rotation.from_matrix(frames[k] @ frames[0].T).as_rotvec()
+        turned = [float(found[axis][k]) for axis in "xyz"]
+        np.testing.assert_allclose(turned, vector, rtol=1e-7 if scale < 1 else 1e-10, atol=1e-14)
+    slopes = figures(run, measures, 36, {path: Dual(value, 1.0)})
+    for axis in "xyz":
+        step = 1e-6 * value
+        ends = figures(
+            run, [Measure(axis, "angle", link, axis, at=1.0)], 36, {path: value + np.array([[step], [-step]])}
+        )
+        slope = (ends[axis][0] - ends[axis][1]) / (2 * step)
+        assert float(np.ravel(derivative(slopes[axis]))[0]) == pytest.approx(slope, rel=1e-6, abs=1e-7)
+
+
+def test_derivative_of_a_peak_and_of_the_efficiency() -> None:
+    """By dual numbers and by two figures each."""
+    run = loaded()
+    driver = next(iter(run.system.mechanism.drivers))
+    measures = [
+        Measure("most", "effort", driver, statistic="maximum"),
+        Measure("where", "effort", driver, statistic="place-of-maximum"),
+        Measure("rms", "effort", driver, statistic="rms"),
+        Measure("efficiency", "efficiency", "cycle"),
+    ]
+    path = next(path for path in run.values if path.endswith(".mass") and run.values[path] > 0)
+    mass = float(run.values[path])
+    slopes = figures(run, measures, 720, {path: Dual(mass, 1.0)})
+    ends = figures(run, measures, 720, {path: mass * np.array([[1 + 1e-6], [1 - 1e-6]])})
+    for name, both in ends.items():
+        slope = (both[0] - both[1]) / (2e-6 * mass)
+        assert float(np.ravel(derivative(slopes[name]))[0]) == pytest.approx(slope, rel=1e-4, abs=1e-8), name
+
+
+# ---- every kind with every statistic --------------------------------------------------------------------------
+
+SUBJECTS = {
+    "point": ("piston.P", "x"), "path_error": ("piston.P", ""), "straightness": ("rod.P", ""), "angle": ("rod", ""),
+    "rotation": ("P", ""), "slide": ("C", ""), "transmission_error": ("C", ""), "stroke": ("C", ""),
+    "dead_centre": ("C", ""), "effort": ("A", ""), "reaction": ("P", ""), "efficiency": ("cycle", ""),
+    "locking_margin": ("mechanism", ""),
+}  # fmt: skip
+
+
+def every_measure() -> list[Measure]:
+    made = [
+        Measure(f"{kind} {statistic}", kind, *SUBJECTS[kind], statistic=statistic)
+        for kind in MEASURES
+        for statistic in ("", *STATISTICS)
+        if statistic != "value"
+    ]
+    return [*made, *(Measure(f"{kind} at", kind, *SUBJECTS[kind], at=1.0) for kind in MEASURES)]
+
+
+def test_every_kind_with_every_statistic(crank: Run) -> None:
+    """A figure, a picture and a unit for each; of samples and of dual numbers the same."""
+    measures = every_measure()
+    positions, nominal = references(crank, measures, 90)
+    paths = {"links.crank.points.B.x": R * np.array([[1.0], [1.001], [0.999]])}
+    many = courses(crank, positions, measures, paths)
+    slopes = courses(crank, positions, measures, {"links.crank.points.B.x": Dual(1.001 * R, 1.0)})
+    for one in measures:
+        reference = nominal[one.name]
+        found = figure(many[one.name], reference)
+        assert np.shape(found) == (3,), one.name
+        if one.kind != "efficiency" and "at" not in one.name:
+            assert np.all(np.isfinite(found)), one.name
+        np.testing.assert_allclose(found[0], reference.figure, rtol=1e-12, atol=1e-12, err_msg=one.name)
+        picture = np.broadcast_to(shown(many[one.name], reference), (3, len(reference.window.time)))
+        assert picture.shape[-1] == len(reference.window.index)
+        assert one.figure_unit(crank.system, crank.values) in ("m", "rad", "N", "N m", "1")
+        dual = figure(slopes[one.name], reference)
+        np.testing.assert_allclose(np.ravel(primal(dual))[0], found[1], rtol=1e-9, atol=1e-12, err_msg=one.name)
+        least, most = span(many[one.name], reference)
+        assert np.all((primal(least) <= primal(most)) | np.isnan(primal(most)))
+
+
+def test_limits_and_bounds(crank: Run) -> None:
+    """Signed limits of the deviation at all positions; bounds of the figure; no answer keeps none."""
+    raised = {"links.ground.points.C.y": E + np.array([[1e-3], [-1e-3], [3e-3], [5.0]])}
+    cases = {
+        (-2e-3, 2e-3): [True, True, False, False],
+        (-5e-4, 2e-3): [True, False, False, False],
+        (None, 5e-4): [False, True, False, False],
+    }
+    for (lower, upper), expected in cases.items():
+        height = Measure("height", "point", "piston.P", "y", lower, upper)
+        positions, nominal = references(crank, [height], 36)
+        curve = courses(crank, positions, [height], raised)["height"]
+        with np.errstate(all="ignore"):
+            walk = crank.solve(positions.times, crank.system.mechanism.parameters(raised)).walk
+        lost = ~np.isfinite(np.broadcast_to(walk.motions["rod"].frame.c, (4, 36)))
+        curve = (np.where(lost, np.nan, curve[0]),)
+        assert list(kept(curve, nominal["height"])) == expected
+    bound = Measure("stroke", "stroke", "C", at_least=stroke_of() - 1e-6, at_most=stroke_of() + 1e-6)
+    positions, nominal = references(crank, [bound], 90)
+    longer = {"links.crank.points.B.x": R + np.array([[0.0], [1e-6], [-1e-6]])}
+    assert list(kept(courses(crank, positions, [bound], longer)["stroke"], nominal["stroke"])) == [True, False, False]
+
+
+def test_known_by_status() -> None:
+    codes = np.array([code.value for code in trunnion.Status], np.int8)
+    motion, force = Measure("a", "angle", "rod"), Measure("T", "effort", "A")
+    margin = Measure("m", "locking_margin", "mechanism")
+    count = {one.kind: int(np.count_nonzero(known(one, codes))) for one in (motion, force, margin)}
+    assert count["effort"] < count["locking_margin"] < count["angle"] < len(codes)
+
+
+# ---- positions ------------------------------------------------------------------------------------------------
+
+
+def press(**driver: Any) -> Run:
+    data = slider_crank(R, L, E)
+    data["drivers"] = {"A": driver}
+    return prepare(build(data))
+
+
+RISE = {"law": "cycloidal", "range": [0.2, 2.4], "duration": 2.0, "returns": False}
+
+
+def test_place_of_a_law_that_is_not_steady() -> None:
+    """The time at which a rise has a coordinate, and the coordinate at which the slide is shortest."""
+    run = press(**{**RISE, "range": [2.0, 4.4]})
+    at = Measure("at", "rotation", "A", at=2.7)
+    near = Measure("near", "dead_centre", "C", statistic="place-of-minimum")
+    found = figures(run, [at, near], 360)
+    assert found["at"] == pytest.approx(2.7, abs=1e-13)
+    assert found["near"] == pytest.approx(near_of(), abs=1e-9)
+
+
+def test_positions_stay_with_speeds_and_starts() -> None:
+    """Samples whose driver runs at other speeds, from other places or over another time are at the same coordinates."""
+    rng = np.random.default_rng(1)
+    change = 1 + 0.1 * rng.uniform(-1, 1, (20, 1))
+    for driver, path, value in (
+        ({"speed": 3.0}, "drivers.A.speed", 3.0),
+        ({"speed": 3.0, "start": 0.4}, "drivers.A.start", 0.4),
+        (RISE, "drivers.A.duration", 2.0),
+    ):
+        run = press(**driver)
+        at = Measure("at", "rotation", "A", at=1.1)
+        grid = Measure("grid", "stroke", "C")
+        positions = plan(run, [at, grid], 36)
+        values = run.system.mechanism.parameters({path: value * change})
+        times = positions.moved(values)
+        assert np.shape(times) == (20, 37)
+        before = run.system.drive(run.values, "A", positions.times)[0]
+        np.testing.assert_allclose(
+            run.system.drive(values, "A", times)[0], np.broadcast_to(before, (20, 37)), atol=1e-12
+        )
+        slope = derivative(positions.moved(run.system.mechanism.parameters({path: Dual(value, 1.0)})))
+        ends = [positions.moved(run.system.mechanism.parameters({path: value + sign * 1e-6})) for sign in (1, -1)]
+        inner = slice(2, -2)
+        np.testing.assert_allclose(slope[inner], ((ends[0] - ends[1]) / 2e-6)[inner], rtol=1e-5, atol=1e-7)
+
+
+def test_no_other_positions_than_needed(durango: Run) -> None:
+    at = Measure("at", "rotation", "D", at=1.0)
+    over = Measure("over", "rotation", "D", over=(0.5, 1.0), statistic="rms")
+    whole = Measure("whole", "rotation", "D")
+    assert len(plan(durango, [at], 360).times) == 1
+    assert len(plan(durango, [whole], 360).times) == 360
+    both = plan(durango, [at, over, whole], 360)
+    assert len(both.times) == 362  # both ends of the window, one of which is the place too
+    assert len(both.windows["over"].index) < 40
+    turn = Measure("turn", "rotation", "D", over=(0.0, 2 * np.pi), statistic="rms")
+    assert plan(durango, [turn], 36).windows["turn"].period is not None
+
+
+@pytest.mark.parametrize(
+    ("driver", "measure", "expected"),
+    [
+        ({**RISE, "returns": True}, FAR, "a coordinate of 'A', which names no one position"),
+        (RISE, Measure("a", "slide", "C", at=3.0), "171.887 deg is outside the range of 'A', 11.4592 to 137.51 deg"),
+        (RISE, Measure("a", "slide", "C", at=3.0, timed=True), "3 s is not in the cycle, which takes 2 s"),
+        ({**RISE, "returns": True}, Measure("a", "slide", "C", at=1.0), "names no one position"),
+        ({"speed": 3.0}, Measure("a", "slide", "C", over=(0.0, 7.0)), "the window is 7 wide, the cycle 6.28319"),
+        (RISE, Measure("a", "slide", "C", over=(1.0, 1.0)), "the window is empty"),
+    ],
+)
+def test_places_that_are_not(driver: Any, measure: Measure, expected: str) -> None:
+    with pytest.raises(MechanismError, match=expected):
+        plan(press(**driver), [measure], 36)
+
+
+def test_names(crank: Run) -> None:
+    """On the command line: kinds, axes, statistics before them, and none of what means nothing."""
+    forms = {
+        "effort:A": ("effort", "A", "", "deviation"),
+        "maximum:effort:A": ("effort", "A", "", "maximum"),
+        "rms:piston.P.x": ("point", "piston.P", "x", "rms"),
+        "reaction:P": ("reaction", "P", "", "deviation"),
+        "peak-to-peak:reaction:P.y": ("reaction", "P", "y", "peak-to-peak"),
+        "efficiency:cycle": ("efficiency", "cycle", "", "ratio"),
+        "minimum:efficiency:instant": ("efficiency", "instant", "", "minimum"),
+        "locking_margin:mechanism": ("locking_margin", "mechanism", "", "minimum"),
+        "path_error:piston.P": ("path_error", "piston.P", "", "maximum"),
+        "straightness:rod.P": ("straightness", "rod.P", "", "line"),
+        "stroke:C": ("stroke", "C", "", "peak-to-peak"),
+        "dead_centre:C": ("dead_centre", "C", "", "dead centre"),
+        "place-of-minimum:dead_centre:C": ("dead_centre", "C", "", "dead centre, least"),
+        "transmission_error:C": ("transmission_error", "C", "", "deviation"),
+    }
+    read = named(crank.system.mechanism, forms, crank.values)
+    assert {one.name: (one.kind, one.subject, one.axis, one.rule) for one in read} == forms
+    wrong = (
+        "maximum:A",
+        "sum:effort:A",
+        "effort",
+        "piston.P",
+        "maximum:effort:Q",
+        "efficiency:A",
+        "piston.P.x:maximum",
+    )
+    for name in wrong:
+        with pytest.raises(MechanismError):
+            named(crank.system.mechanism, [name], crank.values)
+    assert coordinate_unit(crank.system, crank.values) == "rad"
+
+
+def test_play_is_of_some_measures_only() -> None:
+    """Those of the model that it does not know are left out with a note, asked for they are refused."""
+    data = trunnion.read(EXAMPLES / "fourbar-with-play.yaml").data()
+    data["measures"] = {"turn": {"rotation": "D", "limit": "0.1 deg"}, "swing": {"stroke": "D", "limit": "0.1 deg"}}
+    mechanism = Mechanism(**data)
+    result = trunnion.play(mechanism, steps=12)
+    assert list(result["measure"].values) == ["turn"]
+    assert any("which swing is none of: left out" in one["what"] for one in json.loads(result.attrs["findings"]))
+    with pytest.raises(MechanismError, match="which swing is none of"):
+        trunnion.play(mechanism, ["swing"], steps=12)

@@ -9,8 +9,8 @@ import re
 from xml.etree import ElementTree
 
 import pytest
+from stand_in_tolerances import CASES, odd_names, toleranced
 from test_report import Page
-from toleranced import CASES, odd_names, toleranced
 
 from trunnion.views.bundle import web_text
 from trunnion.views.tolerance import drawable, figure

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.patches import Rectangle
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from trunnion.views.cycle import Abscissa, Array
 from trunnion.views.figures import INK, MUTED, PALETTE, SHADE, along, curve, dress, legend
 from trunnion.views.lettering import plain
-from trunnion.views.toleranced import OUTER, Reading, share, share_interval
+from trunnion.views.toleranced import OUTER, Reading, failures, share, share_interval
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -46,7 +46,8 @@ def histogram(parent: FigureBase, read: Reading) -> None:
     lower, upper = (read.nominal + end - shift for end in read.room)
     if read.limited:
         inside = axes.stairs(counts, x, fill=True, color=WITHIN, zorder=2.1, label=f"within {share_interval(*told)}")
-        axes.stairs(counts, x, fill=True, color=BEYOND, zorder=2, label=f"beyond {_beyond(*told)}")
+        label = None if told[0] == 1.0 else f"{_lost(read)} {_beyond(*told)}"
+        axes.stairs(counts, x, fill=True, color=BEYOND, zorder=2, label=label)
         left = max(lower * read.factor, x[0]) if math.isfinite(lower) else x[0]
         right = min(upper * read.factor, x[-1]) if math.isfinite(upper) else x[-1]
         window = Rectangle((left, 0), max(right - left, 0.0), 2 * float(counts.max()), transform=axes.transData)
@@ -59,6 +60,11 @@ def histogram(parent: FigureBase, read: Reading) -> None:
     _lines(axes, read, shift)
     _left_out(axes, read, low, high)
     legend(axes, most=3)
+
+
+def _lost(read: Reading) -> str:
+    """What the yield leaves out."""
+    return "beyond, or failed," if any(count for _, count in failures(read.result)) else "beyond"
 
 
 def _beyond(passed: float, low: float, high: float) -> str:
@@ -259,6 +265,9 @@ def convergence(parent: FigureBase, read: Reading) -> None:
         _running(panels[2], size, 100 * values, 100 * low, 100 * high)
     for axes in panels:
         axes.set_xscale("log")
+        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if size[-1] < 50 * size[0] else (1.0,)))
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.0f}".replace(",", "\u202f")))
+        axes.xaxis.set_minor_formatter(NullFormatter())
         axes.yaxis.set_major_locator(MaxNLocator(nbins=4))
         axes.ticklabel_format(axis="y", useOffset=False)
     panels[-1].set_xlabel("samples", fontsize=9, color=INK)

@@ -22,7 +22,7 @@ from trunnion.analysis.tolerance.inputs import Inputs, inputs_of
 from trunnion.analysis.tolerance.kernel import NumpyKernel, references
 from trunnion.analysis.tolerance.linear import Linear, linear, searched
 from trunnion.analysis.tolerance.sampling import METHODS as SAMPLINGS
-from trunnion.analysis.tolerance.sampling import Sampler, Sampling, Tally
+from trunnion.analysis.tolerance.sampling import Sampler, Sampling, Tally, towards
 from trunnion.analysis.tolerance.search import Corner
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.model.mechanism import Mechanism
@@ -92,9 +92,13 @@ class Study:
             middle = 0.0 * of.curve if known.measure.rule == "deviation" else of.curve
             curves.append((np.nan_to_num(middle), np.nan_to_num(of.curve_total[4])))
         model = self.run.system.mechanism.data()
+        rotation = None
+        if method == "quasi-monte-carlo" and self.inputs.tolerances:
+            count = len(self.inputs.tolerances)
+            rotation = towards(np.array([self.effects.gradient(of.slope)[:count] for of in self.linear.measures]))
         return Sampling(
             model, self.measures, self.steps, method, samples, seed, engine, self.friction, len(self.plan.times),
-            tuple(spread), tuple(curves),
+            tuple(spread), tuple(curves), rotation,
         )  # fmt: skip
 
     def sampler(self, job: Sampling) -> Sampler:

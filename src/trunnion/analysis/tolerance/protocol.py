@@ -74,11 +74,12 @@ class Job(Protocol[T_co]):
 
 @dataclass(frozen=True)
 class Part(Generic[T_co]):
-    """Blocks done, the seconds they took where they were done, and their tally."""
+    """Blocks done, the seconds they took where they were done, their tally, and `fingerprint` of that machine."""
 
     blocks: Blocks
     seconds: float
     tally: T_co
+    arithmetic: str
 
 
 class Crew(Protocol[T_co]):

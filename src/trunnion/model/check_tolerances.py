@@ -238,9 +238,9 @@ def _correlations(mechanism: Mechanism, numbers: ParameterSet) -> Iterator[Findi
         if abs(value) > 1:
             sound = False
             yield Finding(f"is {value:g}", f"{where}.coefficient", "give a number from -1 to 1")
-        for path in (path for path in paths if path not in vary):
+        for name in (name for name in one.of if not vary.issuperset(named_paths(numbers, [name]))):
             sound = False
-            yield Finding(f"'{path}' has no tolerance", where, "state one in tolerances: {…}, or leave it out")
+            yield Finding(f"'{name}' has no tolerance", where, "state one in tolerances: {…}, or leave it out")
         if len(paths) < 2 and len(one.of) < 2:
             yield Finding("one number is correlated with nothing", where, "name two, as of: [AB, BC]")
         for pair in map(frozenset, combinations(paths, 2)):
@@ -253,7 +253,7 @@ def _correlations(mechanism: Mechanism, numbers: ParameterSet) -> Iterator[Findi
     if not sound:
         return
     matrix = correlation(mechanism, numbers)
-    if not np.isnan(matrix).any() and (least := float(np.linalg.eigvalsh(matrix)[0])) < -ROUNDING:
+    if matrix.size and not np.isnan(matrix).any() and (least := float(np.linalg.eigvalsh(matrix)[0])) < -ROUNDING:
         what = (
             f"these correlations contradict one another: the least eigenvalue of their matrix is {least:.3g}, below 0"
         )

@@ -11,11 +11,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from trunnion.algebra.dual import primal
-from trunnion.algebra.namespace import Number, namespace
+from trunnion.algebra.namespace import Number, compiled, namespace
+from trunnion.algebra.traced import eliminated
 
 __all__ = ["condition", "cross", "determinant", "dot", "inverse", "quick_inverse", "solve", "weighted"]
 
 Vector = tuple[Number, Number]
+UNROLLED = 2  # size up to which a system is written out entry by entry also where it is compiled
 
 
 def dot(a: Vector, b: Vector) -> Number:
@@ -46,6 +48,8 @@ def solve(matrix: Sequence[Sequence[Number]], *sides: Sequence[Number]) -> list[
     n = len(matrix)
     columns = n + len(sides)
     rows = [[*row, *(side[i] for side in sides)] for i, row in enumerate(matrix)]
+    if n > UNROLLED and compiled(entry for row in rows for entry in row):
+        return eliminated(rows)[0]
     xp = namespace(*(entry for row in rows for entry in row))
     rows = _quiet(rows)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
@@ -123,6 +127,8 @@ def determinant(matrix: Sequence[Sequence[Number]]) -> Number:
     """Determinant by elimination with row pivoting per lane; NaN or 0 where a lane is singular."""
     n = len(matrix)
     rows = [list(row) for row in matrix]
+    if n > UNROLLED and compiled(entry for row in rows for entry in row):
+        return eliminated(rows)[1]
     xp = namespace(*(entry for row in rows for entry in row))
     rows = _quiet(rows)
     product: Number = 1.0

@@ -149,13 +149,9 @@ def factor(correlation: Any) -> Floats:
 
 def mixed(scores: Floats, lower: Floats) -> Floats:
     """L z, summed in fixed order: a matrix product of a library may depend on the number of columns in its last bit."""
-    mixed = np.empty_like(scores)
-    for row, weights in enumerate(lower):
-        places = np.flatnonzero(weights)
-        total = weights[places[0]] * scores[places[0]] if places.size else np.zeros_like(scores[row])
-        for place in places[1:]:
-            total = total + weights[place] * scores[place]
-        mixed[row] = total
+    mixed = np.zeros_like(scores)
+    for place, score in enumerate(scores):
+        mixed[place:] += lower[place:, place, None] * score
     return mixed
 
 

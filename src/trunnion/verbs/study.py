@@ -60,10 +60,8 @@ def tolerance(
         typer.Option("--sample", help="NAME=FILE.csv: measured deviations of a number, one column. Repeatable."),
     ] = None,
     kind: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--kind", help="Of the figures: histogram, contributions, envelope, convergence, sobol. Repeatable."
-        ),
+        str | None,
+        typer.Option("--kind", help="One figure alone: histogram, contributions, envelope, convergence or sobol."),
     ] = None,
     out: Out = None,
     report: Report = None,
@@ -75,7 +73,7 @@ def tolerance(
     from trunnion.analysis.tolerance.study import tolerance as run
     from trunnion.verbs.tolerance import check_files, show
 
-    check_files(out or [], kind or [], report)
+    check_files(out or [], report, kind)
     mechanism = stated(file, set_, table, friction)
     for text in sample or []:
         mechanism = mechanism.with_samples(*named_file(text, "--sample"))
@@ -88,7 +86,7 @@ def tolerance(
             mechanism, measure, methods, samples, seed, steps, at, jobs=jobs, chunk=chunk, engine=engine,
             cluster=cluster, checkpoint=checkpoint, resume=resume, progress=progress,
         )  # fmt: skip
-    show(mechanism, result, out or [], kind or [], report, units_row)
+    show(mechanism, result, out or [], units_row, kind, report)
     findings = findings_of(result)
     say(placed(findings, file, ["measures", "joints", "tolerances"]))
     raise typer.Exit(STOPPED if result.attrs["stopped"] else exit_status(findings))

@@ -126,17 +126,14 @@ class Effects:
     def total(self, spread: Spread, slope: Array) -> tuple[Array, Array, Array, Array, Array]:
         """Least and largest deviation of a measure, RSS half width, shift of the mean and standard deviation.
 
-        Correlated tolerances make the standard deviation √(sᵀ C s); the worst case does not know of them.
+        Correlated tolerances make the standard deviation √(Sᵀ C S), C the covariance; the worst case does not know of
+        them.
         """
         variance = np.sum(spread.deviation**2, axis=0)
-        correlation, count = self.inputs.population.correlation, len(self.inputs.tolerances)
-        if not np.array_equal(correlation, np.eye(count)):
-            signed = [
-                spread.deviation[i] * (0.0 if self._is_zone(i) else np.sign(slope[self._own(i)[0]]))
-                for i in range(count)
-            ]
-            off = correlation - np.eye(count)
-            variance = variance + np.einsum("i...,ij,j...->...", np.array(signed), off, np.array(signed))
+        off = self._covariance
+        if np.any(off):
+            slopes = [0.0 * slope[0] if self._is_zone(i) else slope[self._own(i)[0]] for i in range(len(off))]
+            variance = variance + np.einsum("i...,ij,j...->...", np.array(slopes), off, np.array(slopes))
         return (
             np.sum(spread.lower, axis=0),
             np.sum(spread.upper, axis=0),
@@ -144,6 +141,12 @@ class Effects:
             np.sum(spread.shift, axis=0),
             np.sqrt(np.maximum(variance, 0.0)),
         )
+
+    @cached_property
+    def _covariance(self) -> Array:
+        """Covariance of the toleranced numbers, without their variances."""
+        covariance: Array = self.inputs.population.covariance()
+        return covariance - np.diag(np.diag(covariance))
 
     def corner(self, real: Array, slope: Array, sign: float) -> dict[str, float]:
         """Numbers that make a measure largest (sign 1) or least (−1), to first order; zones at their rim."""

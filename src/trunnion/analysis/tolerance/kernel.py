@@ -15,7 +15,7 @@ from trunnion.algebra.namespace import Number
 from trunnion.analysis.account import MARGIN
 from trunnion.analysis.analyse import Run, pose_status, status_of
 from trunnion.analysis.friction import FrictionMethod
-from trunnion.analysis.kinematics import Forward, forward
+from trunnion.analysis.kinematics import Forward, forward, posed
 from trunnion.analysis.kinetostatics import Backward
 from trunnion.analysis.measure_figures import Reference, known, reference
 from trunnion.analysis.measure_positions import Plan
@@ -59,7 +59,7 @@ class NumpyKernel:
         with np.errstate(all="ignore"):
             if self.forces:
                 return self.run.solve(time, values, self._method)
-            return forward(self.run.system, values, self.run.chosen.assembly, time)
+            return posed(self.run.system, values, self.run.chosen.assembly, time)
 
     def courses(self, values: Mapping[str, Number], time: Number) -> tuple[Courses, NDArray[np.int8]]:
         """Course of each measure by name, parts that broadcast to (sample, position), and the status of each.
@@ -96,8 +96,7 @@ def references(kernel: NumpyKernel, plan: Plan, inputs: Inputs) -> dict[str, Ref
     values = {**run.values}
     for joint in inputs.held:
         values.update(inputs.seat(joint, run.values))
-    found = kernel.solved(values, plan.times)
-    walk = found if isinstance(found, Forward) else found.walk
+    walk = forward(run.system, values, run.chosen.assembly, plan.times)
     courses, _ = kernel.courses(values, plan.times)
     system = run.system
     return {

@@ -195,7 +195,7 @@ def _slope_at(of: Of, effects: Effects, course: Course, sign: float) -> Array:
         return found
     moved = np.remainder(change[0] + np.pi, 2 * np.pi) - np.pi if of.reference.turning else change[0]
     if of.measure.rule == "peak-to-peak":
-        return slopes[0][:, int(np.nanargmax(moved))] - slopes[0][:, int(np.nanargmin(moved))]
+        between: Array = slopes[0][:, int(np.nanargmax(moved))] - slopes[0][:, int(np.nanargmin(moved))]
+        return between
     place = int(np.nanargmax(sign * moved)) if np.any(np.isfinite(moved)) else 0
-    found = slopes[0][:, place]
-    return found
+    return np.asarray(slopes[0][:, place])

@@ -104,7 +104,7 @@ class Sampling:
     """A whole run: which mechanism, what is measured where, how many samples and how they are drawn.
 
     model: plain data of the mechanism; spread: for each measure where its figures are expected, (centre, deviation),
-    and the same of its curve over its window, for the bins.
+    for the bins; curve_spread: nominal value and deviation of its curve over its window.
     """
 
     model: Mapping[str, Any]
@@ -183,8 +183,9 @@ class Sampling:
         return Bins.around(centres, deviations)
 
     def curve_bins(self, i: int) -> Bins:
-        """Bins of the curve of a measure at every position of its window."""
-        return Bins.around(*self.curve_spread[i], **BAND)
+        """Bins of the deviation of the curve of a measure from nominal at every position of its window."""
+        nominal, deviation = self.curve_spread[i]
+        return Bins.around(0.0 * nominal, deviation, **BAND)
 
     def prepare(self) -> Sampler:
         """The mechanism read and prepared; once in every process."""
@@ -256,7 +257,7 @@ class Sampler:
             lost = np.any(np.isnan(found), axis=0)
             tally.histogram[replicate] += count(found, self.job.bins)
             for i, curve in enumerate(curves):
-                whole = np.broadcast_to(curve, (found.shape[1], curve.shape[-1]))
+                whole = np.broadcast_to(curve, (found.shape[1], curve.shape[-1])) - self.job.curve_spread[i][0]
                 tally.band[i, : whole.shape[1]] += count(whole.T, self.job.curve_bins(i))
             if np.any(lost):
                 gravest = np.max(status, axis=-1)[lost]

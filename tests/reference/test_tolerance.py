@@ -1,0 +1,411 @@
+"""Tolerances to first order, worst cases and RSS: known numbers, closed forms of their own, derivatives, corners."""
+
+from __future__ import annotations
+
+import itertools
+import json
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy import stats
+
+import trunnion
+from mechanisms import Array, build, slider_crank
+from toleranced import (
+    CLUTCH,
+    FOURBAR,
+    RSSR,
+    SLIDER,
+    clutch,
+    clutch_angle,
+    fourbar,
+    fourbar_angle,
+    numbers,
+    rssr,
+    rssr_angle,
+    slider_place,
+    slopes,
+)  # fmt: skip
+from toleranced import slider_crank as sized_slider
+from trunnion import Mechanism
+
+FAST = ("linear", "worst-case")
+Case = tuple[Callable[..., Mechanism], Callable[..., Any], dict[str, float]]
+CASES: dict[str, Case] = {
+    "clutch": (clutch, clutch_angle, CLUTCH),
+    "four-bar": (fourbar, fourbar_angle, FOURBAR),
+    "slider-crank": (sized_slider, slider_place, SLIDER),
+    "RSSR": (rssr, rssr_angle, RSSR),
+}
+MM = 1e3  # of a derivative by a length, m⁻¹ in mm⁻¹
+
+
+def sensitivities(result: Any, measure: int = 0) -> dict[str, float]:
+    paths = [str(path) for path in result["parameter"].values]
+    return dict(zip(paths, result["sensitivity"].values[measure].tolist(), strict=True))
+
+
+@pytest.fixture(scope="module")
+def results() -> dict[str, Any]:
+    return {name: trunnion.tolerance(build_(), methods=FAST) for name, (build_, _, _) in CASES.items()}
+
+
+# ---- known numbers --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "factor", "known"),
+    [
+        ("clutch", 1 / MM, (-0.2078770, -0.4141963, 0.2063193)),
+        ("four-bar", 1 / MM, (0.013654, -0.013401, -0.015623, 0.006323)),
+        ("slider-crank", 1.0, (0.307945, 1.024295, 0.221766)),
+    ],
+)
+def test_sensitivities(results: dict[str, Any], name: str, factor: float, known: tuple[float, ...]) -> None:
+    """rad/mm and mm/mm, to the digits that are known."""
+    digits = max(len(f"{number}".partition(".")[2]) for number in known)
+    found = np.array(list(sensitivities(results[name]).values())) * factor
+    np.testing.assert_allclose(found, known, rtol=0, atol=0.51 * 10.0**-digits)
+
+
+def test_sensitivities_of_the_spatial_crank_rocker(results: dict[str, Any]) -> None:
+    found = np.array(list(sensitivities(results["RSSR"]).values()))
+    known = (-0.00714601, -0.01955441, 0.01187232, 0.01702515, 0.26229468, -0.00948836, 0.00611075)
+    scale = np.where([name == "alpha" for name in RSSR], 1.0, 1 / MM)
+    np.testing.assert_allclose(found * scale, known, rtol=0, atol=0.51e-8)
+    assert np.degrees(results["RSSR"]["nominal"].item()) == pytest.approx(73.843222, abs=5e-7)
+
+
+def test_angle_of_the_four_bar(results: dict[str, Any]) -> None:
+    assert np.degrees(results["four-bar"]["nominal"].item()) == pytest.approx(95.195700, abs=5e-7)
+
+
+def test_one_way_clutch(results: dict[str, Any]) -> None:
+    """φ = 7.0183898°, worst case 0.5340°, RSS 0.3167°, and from 6.4622° to 7.5333° on the mechanism itself."""
+    found = results["clutch"]
+    degrees = {name: np.degrees(found[name].item()) for name in ("nominal", "worst_case_upper", "rss")}
+    assert degrees["nominal"] == pytest.approx(7.0183898, abs=5e-8)
+    assert degrees["worst_case_upper"] == pytest.approx(0.5340, abs=5e-5)
+    assert degrees["rss"] == pytest.approx(0.3167, abs=5e-5)
+    assert found["worst_case_lower"].item() == -found["worst_case_upper"].item()
+    low, high = (np.degrees((found["nominal"] + found[f"searched_{end}"]).item()) for end in ("lower", "upper"))
+    assert low == pytest.approx(6.4622, abs=5e-5)
+    assert high == pytest.approx(7.5333, abs=5e-5)
+
+
+@pytest.mark.parametrize("joint", "ABCD")
+def test_clearance_of_the_four_bar(joint: str) -> None:
+    """0.02 mm in any joint turns the rocker by up to 0.017902°; ends uniform in the disc scatter by half of it."""
+    mechanism = fourbar(tolerances={}, joint_defaults={})
+    play = numbers(mechanism, {f"joints.{joint}.pin.radius": 5e-3, f"joints.{joint}.pin.clearance": 2e-5})
+    found = trunnion.tolerance(play, methods=FAST)
+    assert [str(name) for name in found["parameter"].values] == [f"joints.{joint}.clearance"]
+    assert np.degrees(found["worst_case_upper"].item()) == pytest.approx(0.017902, abs=5e-7)
+    assert found["sensitivity"].item() * 2e-5 == pytest.approx(found["worst_case_upper"].item(), rel=1e-12)
+    assert found["deviation_linear"].item() == pytest.approx(found["worst_case_upper"].item() / 2, rel=1e-12)
+    # the pins move the ends of the rods by 0.02 mm: as a rod that is longer or shorter
+    ends = [fourbar_angle(**(FOURBAR | {"l3": 0.09 + sign * 2e-5})) - fourbar_angle(**FOURBAR) for sign in (1, -1)]
+    if joint in "BC":
+        searched = found["searched_lower"].item(), found["searched_upper"].item()
+        assert searched == pytest.approx((min(ends), max(ends)), rel=1e-3)
+        assert max(np.abs(searched)) >= max(np.abs(ends)) * (1 - 1e-9)
+
+
+def test_clearance_of_the_spatial_crank_rocker() -> None:
+    """0.044402° by the formula, 0.044448° on the mechanism itself, the pin shifted and leaning in its hole."""
+    pin = {"radius": "10 mm", "hole_radius": "10.02 mm", "length": "20 mm"}
+    found = trunnion.tolerance(rssr(pin, {}), methods=FAST)
+    assert np.degrees(found["worst_case_upper"].item()) == pytest.approx(0.044402, abs=5e-7)
+    ends = np.degrees([-found["searched_lower"].item(), found["searched_upper"].item()])
+    assert max(ends) == pytest.approx(0.044448, abs=5e-7)
+    assert np.mean(ends) == pytest.approx(0.044402, abs=5e-7)
+
+
+# ---- against closed forms -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_derivatives_are_exact(results: dict[str, Any], name: str) -> None:
+    _, of, at = CASES[name]
+    found = sensitivities(results[name])
+    assert [path.removeprefix("dimensions.") for path in found] == list(at)
+    np.testing.assert_allclose(list(found.values()), slopes(of, at, 3e-5), rtol=1e-8, atol=1e-8)
+    assert results[name]["nominal"].item() == pytest.approx(of(**at), rel=1e-14)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_sums_of_first_order(results: dict[str, Any], name: str) -> None:
+    """|S| t of each, their sum, the root of the sum of their squares; shares that add up to one."""
+    result = results[name]
+    _, of, at = CASES[name]
+    widths = result["parameter_upper"].values
+    changes = np.abs(slopes(of, at, 3e-5)) * widths
+    np.testing.assert_allclose(result["contribution_worst_case"].values[0], changes, rtol=1e-8, atol=1e-15)
+    assert result["worst_case_upper"].item() == pytest.approx(np.sum(changes), rel=1e-8)
+    assert result["worst_case_lower"].item() == pytest.approx(-np.sum(changes), rel=1e-8)
+    assert result["rss"].item() == pytest.approx(np.linalg.norm(changes), rel=1e-8)
+    np.testing.assert_allclose(
+        result["contribution_rss"].values[0], changes**2 / np.sum(changes**2), rtol=1e-8, atol=1e-15
+    )
+    assert float(result["contribution_rss"].sum()) == pytest.approx(1, abs=1e-14)
+    assert float(result["contribution_variance"].sum()) == pytest.approx(1, abs=1e-14)
+    assert result["deviation_linear"].item() == pytest.approx(result["rss"].item() / 3, rel=1e-12)  # C_p = 1
+    assert result["shift_linear"].item() == 0
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_worst_corner(results: dict[str, Any], name: str) -> None:
+    """The best of all corners by the closed form; and run again there, it gives the number that was found."""
+    result = results[name]
+    _, of, at = CASES[name]
+    values, widths = np.array(list(at.values())), result["parameter_upper"].values
+    corners = [values + np.array(sign) * widths for sign in itertools.product((-1, 1), repeat=len(at))]
+    changes = [of(*corner) - of(*values) for corner in corners]
+    assert result["searched_upper"].item() == pytest.approx(max(changes), rel=1e-11)
+    assert result["searched_lower"].item() == pytest.approx(min(changes), rel=1e-11)
+    for end in ("lower", "upper"):
+        corner = result[f"corner_{end}"].values[0]
+        assert np.all(np.abs(np.abs(corner - values) - widths) < 1e-15)
+        assert of(*corner) - of(*values) == pytest.approx(result[f"searched_{end}"].item(), rel=1e-11)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_worst_corner_run_again(results: dict[str, Any], name: str) -> None:
+    """As a mechanism of its own, whose nominal figure is that of the corner."""
+    result, (build_, _, _) = results[name], CASES[name]
+    paths = [str(path) for path in result["parameter"].values]
+    for end in ("lower", "upper"):
+        corner = dict(zip(paths, result[f"corner_{end}"].values[0].tolist(), strict=True))
+        data = numbers(build_(), corner).data() | {"tolerances": {paths[0]: "±0 mm"}}
+        again = trunnion.tolerance(Mechanism(**data), methods=["linear"])
+        change = again["nominal"].item() - result["nominal"].item()
+        assert change == pytest.approx(result[f"searched_{end}"].item(), rel=1e-10)
+
+
+def test_over_the_whole_turn() -> None:
+    """A measure without a place: the course of derivatives, the place of the worst case, and what is found there."""
+    found = trunnion.tolerance(fourbar(measures={"angle": {"angle": "rocker"}}), methods=FAST, steps=72)
+    turn = np.radians(found["drive"].values)
+    steep = np.array([slopes(lambda i=i, **at: fourbar_angle(**at, crank=turn[i]), FOURBAR, 3e-5) for i in range(72)])
+    np.testing.assert_allclose(found["curve_sensitivity"].values[0], steep.T, rtol=1e-7, atol=1e-7)
+    worst = 5e-5 * np.sum(np.abs(steep), axis=1)
+    np.testing.assert_allclose(found["curve_worst_case_upper"].values[0], worst, rtol=1e-7)
+    np.testing.assert_allclose(found["curve_worst_case_lower"].values[0], -worst, rtol=1e-7)
+    np.testing.assert_allclose(found["curve_rss"].values[0], 5e-5 * np.linalg.norm(steep, axis=1), rtol=1e-7)
+    np.testing.assert_allclose(found["curve_deviation"].values[0], 5e-5 / 3 * np.linalg.norm(steep, axis=1), rtol=1e-7)
+    assert np.radians(found["place"].item()) == pytest.approx(turn[np.argmax(worst)])
+    assert found["worst_case_upper"].item() == pytest.approx(np.max(worst), rel=1e-7)
+    corners = [[v + s * 5e-5 for v, s in zip(FOURBAR.values(), sign, strict=True)]
+               for sign in itertools.product((-1, 1), repeat=4)]  # fmt: skip
+    many = np.linspace(0, 2 * np.pi, 3601)
+    nominal = fourbar_angle(*FOURBAR.values(), crank=many)
+    changes = [fourbar_angle(*corner, crank=many) - nominal for corner in corners]
+    assert found["searched_upper"].item() == pytest.approx(np.max(changes), rel=1e-6)
+    assert found["searched_lower"].item() == pytest.approx(np.min(changes), rel=1e-6)
+
+
+# ---- what a number's distribution makes of it -----------------------------------------------------------------
+
+T = 5e-5
+DISTRIBUTIONS: dict[str, tuple[dict[str, Any], Any]] = {
+    "normal": ({}, stats.norm(0, T / 3)),
+    "normal, cp": ({"cp": 1.5}, stats.norm(0, T / 4.5)),
+    "normal, cpk": ({"cp": 1.33, "cpk": 1.0}, stats.norm(T / 3 / 1.33 * 3 * 0.33, T / 3 / 1.33)),
+    "normal, shift": ({"cp": 1.33, "cpk": 1.0, "shift": "-0.01 mm"}, stats.norm(-1e-5, T / 3 / 1.33)),
+    "uniform": ({"distribution": "uniform"}, stats.uniform(-T, 2 * T)),
+    "triangular": ({"distribution": "triangular", "mode": "0.02 mm"}, stats.triang(0.7, -T, 2 * T)),
+    "truncated": ({"distribution": "truncated", "cp": 0.5}, stats.truncnorm(-1.5, 1.5, 0, T / 1.5)),
+    "beta": ({"distribution": "beta", "alpha": 2, "beta": 3}, stats.beta(2, 3, -T, 2 * T)),
+}
+
+
+@pytest.mark.parametrize("name", DISTRIBUTIONS)
+def test_moments_of_a_distribution(name: str) -> None:
+    """Mean and standard deviation carried by the derivative, against SciPy's distributions."""
+    keys, law = DISTRIBUTIONS[name]
+    mechanism = fourbar(tolerances={"l3": {"limits": "±0.05 mm"} | keys})
+    found = trunnion.tolerance(mechanism, methods=["linear"])
+    steep = slopes(fourbar_angle, FOURBAR, 3e-5)[2]
+    assert found["parameter_deviation"].item() == pytest.approx(law.std(), rel=1e-8)
+    assert found["parameter_shift"].item() == pytest.approx(law.mean(), rel=1e-9, abs=1e-18)
+    assert found["deviation_linear"].item() == pytest.approx(abs(steep) * law.std(), rel=1e-8)
+    assert found["shift_linear"].item() == pytest.approx(steep * law.mean(), rel=1e-8, abs=1e-15)
+
+
+def test_limits_to_one_side() -> None:
+    mechanism = fourbar(tolerances={"l2": "+0.04/-0.01 mm", "l4": "+0.03/+0.01 mm"})
+    found = trunnion.tolerance(mechanism, methods=FAST)
+    _, two, _, four = slopes(fourbar_angle, FOURBAR, 3e-5)
+    assert two < 0 < four
+    assert found["worst_case_upper"].item() == pytest.approx(-1e-5 * two + 3e-5 * four, rel=1e-8)
+    assert found["worst_case_lower"].item() == pytest.approx(4e-5 * two + 1e-5 * four, rel=1e-8)
+    assert found["rss"].item() == pytest.approx(np.hypot(2.5e-5 * two, 1e-5 * four), rel=1e-8)
+    assert found["shift_linear"].item() == pytest.approx(1.5e-5 * two + 2e-5 * four, rel=1e-8)
+    np.testing.assert_allclose(found["corner_upper"].values[0], [0.03 - 1e-5, 0.07 + 3e-5], rtol=1e-14)
+
+
+def test_measured_samples() -> None:
+    values = np.array([0.02, -0.01, 0.035, 0.0, 0.011]) * 1e-3
+    given = [f"{1e3 * value:.12g} mm" for value in values]
+    found = trunnion.tolerance(
+        fourbar(tolerances={"l3": {"distribution": "sample", "values": given}}), methods=["linear"]
+    )
+    steep = slopes(fourbar_angle, FOURBAR, 3e-5)[2]
+    assert found["shift_linear"].item() == pytest.approx(steep * values.mean(), rel=1e-8)
+    assert found["deviation_linear"].item() == pytest.approx(-steep * values.std(), rel=1e-8)
+
+
+@pytest.mark.parametrize("rho", [0.6, -0.9])
+def test_correlated_tolerances(rho: float) -> None:
+    """σ = √(sᵀ C s); and the scatter of own samples of the closed form."""
+    mechanism = fourbar(
+        correlations=[{"of": ["l1", "l3"], "coefficient": rho}, {"of": ["l2", "l4"], "coefficient": 0.3}]
+    )
+    found = trunnion.tolerance(mechanism, methods=["linear"])
+    matrix = np.eye(4)
+    matrix[0, 2] = matrix[2, 0] = rho
+    matrix[1, 3] = matrix[3, 1] = 0.3
+    covariance = (T / 3) ** 2 * matrix
+    steep = slopes(fourbar_angle, FOURBAR, 3e-5)
+    assert found["deviation_linear"].item() == pytest.approx(np.sqrt(steep @ covariance @ steep), rel=1e-8)
+    drawn = np.random.default_rng(2).multivariate_normal(list(FOURBAR.values()), covariance, 200_000)
+    assert np.std(fourbar_angle(*drawn.T)) == pytest.approx(found["deviation_linear"].item(), rel=0.01)
+
+
+# ---- friction, masses, loads ----------------------------------------------------------------------------------
+
+
+def pressed(law: Any = 0.1) -> Mechanism:
+    """A slider-crank with friction, whose load, masses and coefficients vary."""
+    data = slider_crank()
+    data["loads"]["work"] = {"joint": "C", "resisting_force": 40.0, "useful": True}
+    data["tolerances"] = {
+        "loads.gas.force.x": "±2 N",
+        "links.piston.mass": "±0.05 kg",
+        "links.rod.centre.x": "±1 mm",
+        "links.rod.inertia": "±1e-3 kg m^2",
+        "links.crank.points.B.x": "±0.2 mm",
+        "drivers.A.speed": "±0.05 rad/s",
+        "joints.P.friction.coefficient": "±0.02",
+        "joints.C.friction.coefficient": "±0.03",
+        "joints.B.pin.radius": "±0.1 mm",
+    }
+    data["measures"] = {
+        "effort": {"effort": "A", "at": "70 deg"},
+        "push": {"reaction": "C", "at": "200 deg"},
+        "rms": {"effort": "A", "as": "rms"},
+        "share": {"efficiency": "cycle"},
+        "peak": {"effort": "A", "as": "maximum"},
+    }
+    return build(data, friction=law)
+
+
+def books(mechanism: Mechanism) -> Array:
+    """Effort at 70°, reaction of the guide at 200°, r.m.s. effort, efficiency of the cycle, largest effort."""
+    found = trunnion.analyse(mechanism, 360)
+    effort = found["drive_effort"].values[0]
+    push = np.linalg.norm(found["reaction_force"].sel(joint="C").values, axis=0)
+    share = np.mean(found["useful_power"].values) / np.mean(found["drive_power"].values[0])
+    return np.array([effort[360 - 70], push[360 - 200], np.sqrt(np.mean(effort**2)), share, np.max(effort)])
+
+
+def test_derivatives_of_efforts_with_friction() -> None:
+    """Against central differences of mechanisms with other numbers, each analysed by itself."""
+    mechanism = pressed()
+    found = trunnion.tolerance(mechanism, methods=["linear"])
+    paths = [str(path) for path in found["parameter"].values]
+    assert len(paths) == 9
+    known = books(mechanism)
+    np.testing.assert_allclose(found["nominal"].values[:4], known[:4], rtol=1e-12)
+    assert found["nominal"].values[4] == pytest.approx(known[4], rel=1e-4)
+    for i, path in enumerate(paths):
+        value = found["parameter_nominal"].values[i]
+        step = 1e-4 * value
+        ends = [books(numbers(mechanism, {path: value + sign * step})) for sign in (1, -1)]
+        slope = (ends[0] - ends[1]) / (2 * step)
+        own = found["sensitivity"].values[:, i]
+        away = np.abs(own - slope) * abs(value) / np.abs(known)  # per unit of relative change
+        assert np.all(away < [1e-7, 1e-7, 1e-7, 1e-7, 5e-3]), (path, away)  # of a maximum, the grid shows
+    assert np.max(np.abs(found["sensitivity"].values), axis=0).min() > 0  # nothing is without effect
+
+
+# ---- errors with a direction, seats, fits ---------------------------------------------------------------------
+
+
+def test_run_out_of_any_direction() -> None:
+    """The hole of the coupler lies off by up to 0.02 mm, the direction in it as it comes: the coupler is longer or not."""
+    mechanism = fourbar(
+        tolerances={"joints.B.misalignment.offset": {"limits": "+0.02/0 mm", "direction": "uniform"}},
+        joints=fourbar().data()["joints"] | {"B": {**fourbar().data()["joints"]["B"], "misalignment": {"offset": 0.0}}},
+    )
+    found = trunnion.tolerance(mechanism, methods=FAST)
+    steep = abs(slopes(fourbar_angle, FOURBAR, 3e-5)[2])
+    assert found["worst_case_upper"].item() == pytest.approx(2e-5 * steep, rel=1e-8)
+    assert found["worst_case_lower"].item() == pytest.approx(-2e-5 * steep, rel=1e-8)
+    square = 1e-5**2 + (2e-5 / 6) ** 2  # E r², r normal about the middle
+    assert found["deviation_linear"].item() == pytest.approx(steep * np.sqrt(square / 2), rel=1e-8)
+    ends = [fourbar_angle(**(FOURBAR | {"l3": 0.09 + sign * 2e-5})) - fourbar_angle(**FOURBAR) for sign in (1, -1)]
+    assert found["searched_lower"].item() == pytest.approx(min(ends), rel=1e-4)
+    assert found["searched_upper"].item() == pytest.approx(max(ends), rel=1e-4)
+
+
+def seated(xi: str = "0 deg", clearance: str = "0.02 mm", **options: Any) -> Mechanism:
+    pin = {"radius": "5 mm", "clearance": clearance}
+    joint = {**fourbar().data()["joints"]["B"], "pin": pin, "seat": {"xi": xi}}
+    return fourbar(joints=fourbar().data()["joints"] | {"B": joint}, **options)
+
+
+def test_seat_at_any_angle() -> None:
+    """The pin lies at the wall of its hole, anywhere around."""
+    mechanism = seated(tolerances={"joints.B.seat.xi": {"distribution": "direction"}})
+    found = trunnion.tolerance(mechanism, methods=FAST)
+    assert [str(name) for name in found["parameter"].values] == ["joints.B.seat.xi"]
+    steep = abs(slopes(fourbar_angle, FOURBAR, 3e-5)[2])
+    # a finite circle, whose second harmonic is of second order in its radius
+    assert found["worst_case_upper"].item() == pytest.approx(2e-5 * steep, rel=1e-3)
+    assert found["deviation_linear"].item() == pytest.approx(2e-5 * steep / np.sqrt(2), rel=1e-3)
+
+
+def test_seat_that_is_given() -> None:
+    """No play to lie in, a circle of positions of the pin: the four-bar whose coupler is that much shorter."""
+    for xi, change in (("0 deg", -2e-5), ("180 deg", 2e-5)):
+        found = trunnion.tolerance(seated(xi), methods=["linear"])
+        shorter = fourbar_angle(**(FOURBAR | {"l3": 0.09 + change}))
+        assert found["nominal"].item() == pytest.approx(shorter, abs=1e-15)
+        assert list(found["parameter"].values) == [f"dimensions.l{i}" for i in (1, 2, 3, 4)]
+
+
+def test_play_of_a_fit() -> None:
+    """A hole and a pin with limits of their own: largest play, and E ρ² of both radii, in the worst case and the scatter."""
+    pin = {"radius": "4.99 mm ± 0.003 mm", "hole_radius": "5 mm ± 0.005 mm"}
+    joints = fourbar().data()["joints"]
+    found = trunnion.tolerance(fourbar(tolerances={}, joints=joints | {"C": {**joints["C"], "pin": pin}}), methods=FAST)
+    at = [str(name) for name in found["parameter"].values]
+    assert at == ["joints.C.pin.radius", "joints.C.pin.hole_radius", "joints.C.clearance"]
+    steep = abs(slopes(fourbar_angle, FOURBAR, 3e-5)[2])
+    load = found["sensitivity"].values[0, 2]
+    assert load == pytest.approx(steep, rel=1e-8)  # the same force in the coupler
+    assert found["worst_case_upper"].item() == pytest.approx(18e-6 * load, rel=1e-12)
+    square = 10e-6**2 + (3e-6 / 3) ** 2 + (5e-6 / 3) ** 2
+    assert found["deviation_linear"].item() == pytest.approx(load * np.sqrt(square / 4), rel=1e-12)
+    assert found["parameter_upper"].values[2] == pytest.approx(18e-6, rel=1e-12)
+
+
+# ---- names, places --------------------------------------------------------------------------------------------
+
+
+def test_at_moves_measures_without_a_place() -> None:
+    found = trunnion.tolerance(fourbar(measures={"angle": {"angle": "rocker"}}), methods=["linear"], at="60 deg")
+    known = trunnion.tolerance(fourbar(), methods=["linear"])
+    np.testing.assert_allclose(found["sensitivity"].values, known["sensitivity"].values, rtol=1e-13)
+    assert found["nominal"].item() == known["nominal"].item()
+
+
+def test_without_measures_outputs_are_taken() -> None:
+    found = trunnion.tolerance(fourbar(measures={}), methods=["linear"], at=np.pi / 3)
+    assert [str(name) for name in found["measure"].values] == ["rotation:D"]
+    assert "no measure is stated" in json.loads(found.attrs["findings"])[-1]["what"]
+    steep = slopes(fourbar_angle, FOURBAR, 3e-5)
+    np.testing.assert_allclose(found["sensitivity"].values[0], steep, rtol=1e-8)

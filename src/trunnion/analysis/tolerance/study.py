@@ -22,7 +22,7 @@ from trunnion.analysis.tolerance.inputs import Inputs, inputs_of
 from trunnion.analysis.tolerance.kernel import NumpyKernel, references
 from trunnion.analysis.tolerance.linear import Linear, linear, searched
 from trunnion.analysis.tolerance.sampling import METHODS as SAMPLINGS
-from trunnion.analysis.tolerance.sampling import Sampler, Sampling, Tally
+from trunnion.analysis.tolerance.sampling import Sampler, Sampling, Tally, towards
 from trunnion.analysis.tolerance.search import Corner
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.model.mechanism import Mechanism
@@ -92,9 +92,13 @@ class Study:
             middle = 0.0 * of.curve if known.measure.rule == "deviation" else of.curve
             curves.append((np.nan_to_num(middle), np.nan_to_num(of.curve_total[4])))
         model = self.run.system.mechanism.data()
+        rotation = None
+        if method == "quasi-monte-carlo" and self.inputs.tolerances:
+            count = len(self.inputs.tolerances)
+            rotation = towards(np.array([self.effects.gradient(of.slope)[:count] for of in self.linear.measures]))
         return Sampling(
             model, self.measures, self.steps, method, samples, seed, engine, self.friction, len(self.plan.times),
-            tuple(spread), tuple(curves),
+            tuple(spread), tuple(curves), rotation,
         )  # fmt: skip
 
     def sampler(self, job: Sampling) -> Sampler:
@@ -162,7 +166,7 @@ def tolerance(
     measures: names of the model's, or as on the command line (`measures.named`); all of the model if not given, or,
     where it states none, rotation and slide of every joint to the ground that is not driven. methods: of METHODS.
     samples: of the sampling method, and of the variance-based indices; seed: of its random numbers. steps: positions of
-    a whole cycle; at: the place (driver coordinate or time) at which measures without a place or figure of their own are taken.
+    a whole cycle; at: the place (driver coordinate or time) of measures that state neither a place nor a figure.
     jobs, chunk, cluster, checkpoint, resume, progress: see `runner.run`. engine: numpy, or jax (an extra).
     Returns a Dataset over (measure, parameter, position, …) of `result.VARIABLES`; SI, each measure in its own unit.
     Method: exact first derivatives by dual numbers; the worst corner of the tolerances found on the mechanism itself;

@@ -4,8 +4,8 @@
 - `figures/MODEL/KIND.svg` and `figures/MODEL/report.html` are drawn when a page refers to them. KIND is a plot,
   `assemblies` or `assemble`; MODEL is a file of `examples/`, a block of a page titled `MODEL.yaml`, or an entry of
   `VARIANTS`.
-- `figures/sweeps/NAME.svg`, `figures/plays/NAME.svg` and `figures/assembles/NAME.svg` are drawn by the command of a
-  page, `trunnion sweep … --out NAME.svg` and so on.
+- `figures/sweeps/NAME.svg`, `figures/plays/NAME.svg`, `figures/assembles/NAME.svg`, `figures/tolerances/NAME.svg` and
+  `figures/allocates/NAME.svg` are drawn by the command of a page, `trunnion sweep … --out NAME.svg` and so on.
 - The line that says that a page has no tables in the repository is left out.
 - The gallery is made of the examples and of `tests/gallery/facts.py`; see `gallery_page.py`.
 - `$x$` and `$$x$$` become MathML, which browsers set without any script.
@@ -37,6 +37,8 @@ from pydantic_core import PydanticUndefined
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
 EXAMPLES = ROOT / "examples"
+
+COMMANDS = ("sweeps", "plays", "assembles", "tolerances", "allocates")  # folders of figures that a command draws
 
 # model: (the model it is made from, what is replaced in it)
 VARIANTS: dict[str, tuple[str, dict[str, float | str]]] = {
@@ -79,7 +81,7 @@ def on_files(files: Files, config: Any) -> Files:
     """Draw what the pages refer to; put the examples and the schema beside them."""
     pages = {path: path.read_text("utf-8") for path in sorted(DOCS.rglob("*.md"))}
     told = {found for text in pages.values() for found in re.findall(r"figures/([\w-]+)/([\w-]+)\.(svg|html)", text)}
-    swept = {found for found in told if found[0] in ("sweeps", "plays", "assembles")}
+    swept = {found for found in told if found[0] in COMMANDS}
     told -= swept
     wanted = told | _gallery().wanted()
     models = models_of(pages.values())

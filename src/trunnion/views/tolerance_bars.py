@@ -71,11 +71,11 @@ def contributions(parent: FigureBase, read: Reading) -> None:
         worst.append(float(np.nansum([one.worst_share for one in rest])))
     place = np.arange(len(labels))
     dress(axes, "share [%]", "")
-    axes.barh(place - 0.17, 100 * np.array(rss), 0.4, color=PALETTE[0], label="variance (RSS²)", zorder=2)
+    axes.barh(place - 0.17, 100 * np.array(rss), 0.4, color=PALETTE[0], label="RSS²", zorder=2)
     axes.barh(place + 0.23, 100 * np.array(worst), 0.28, color=PALE, label="worst case", zorder=2)
     running = 100 * np.nancumsum(rss)
     axes.plot(running, place - 0.17, color=INK, linewidth=1.2, marker="o", markersize=3.5, zorder=3,
-              label="variance, added up")  # fmt: skip
+              label="RSS², added up")  # fmt: skip
     most = max(100.0, float(running.max(initial=0.0)))
     _frame(axes, labels, most)
     for y, part in zip(place, rss, strict=True):

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.patches import Rectangle
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from trunnion.views.cycle import Abscissa, Array
 from trunnion.views.figures import INK, MUTED, PALETTE, SHADE, along, curve, dress, legend
 from trunnion.views.lettering import plain
-from trunnion.views.toleranced import OUTER, Reading, share, share_interval
+from trunnion.views.toleranced import OUTER, Reading, failures, share, share_interval
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,7 +23,8 @@ __all__ = ["convergence", "envelope", "histogram", "outer"]
 WITHIN, BEYOND, LIMIT = PALETTE[0], PALETTE[1], "#a1260d"
 LIMITED: dict[str, Any] = {"color": LIMIT, "linewidth": 1.3, "linestyle": (0, (1, 1.5))}
 FEWEST, BARS = 20, 60  # of a histogram
-CORE = 2e-4  # share of the samples at either end that does not decide how far the picture goes
+CORE = 0.01  # share of the samples at either end beyond those
+FAR = 1.5  # of their width, beyond which none decides how far the picture goes
 READABLE = 0.02  # of nominal: a spread below it is drawn as a deviation
 Z95 = 1.959963984540054
 
@@ -45,7 +46,8 @@ def histogram(parent: FigureBase, read: Reading) -> None:
     lower, upper = (read.nominal + end - shift for end in read.room)
     if read.limited:
         inside = axes.stairs(counts, x, fill=True, color=WITHIN, zorder=2.1, label=f"within {share_interval(*told)}")
-        axes.stairs(counts, x, fill=True, color=BEYOND, zorder=2, label=f"beyond {_beyond(*told)}")
+        label = None if told[0] == 1.0 else f"{_lost(read)} {_beyond(*told)}"
+        axes.stairs(counts, x, fill=True, color=BEYOND, zorder=2, label=label)
         left = max(lower * read.factor, x[0]) if math.isfinite(lower) else x[0]
         right = min(upper * read.factor, x[-1]) if math.isfinite(upper) else x[-1]
         window = Rectangle((left, 0), max(right - left, 0.0), 2 * float(counts.max()), transform=axes.transData)
@@ -60,6 +62,11 @@ def histogram(parent: FigureBase, read: Reading) -> None:
     legend(axes, most=3)
 
 
+def _lost(read: Reading) -> str:
+    """What the yield leaves out."""
+    return "beyond, or failed," if any(count for _, count in failures(read.result)) else "beyond"
+
+
 def _beyond(passed: float, low: float, high: float) -> str:
     """The share that the limits leave out, with the digits of the yield."""
     digits = share_interval(passed, low, high).split("\u00a0")[0].partition(".")[2]
@@ -67,14 +74,14 @@ def _beyond(passed: float, low: float, high: float) -> str:
 
 
 def _core(counts: Array, edges: Array) -> tuple[float, float]:
-    """Where nearly all samples lie."""
-    total = np.append(0.0, np.cumsum(counts))
-    if not total[-1] > 0:
+    """Where the samples lie, without what lies far beyond nearly all of them."""
+    filled = np.flatnonzero(counts)
+    if not filled.size:
         return float(edges[0]), float(edges[-1])
-    spare = CORE * total[-1]
-    first = int(np.searchsorted(total, spare, side="right")) - 1
-    last = int(np.searchsorted(total, total[-1] - spare, side="left"))
-    return float(edges[max(first, 0)]), float(edges[min(last, len(edges) - 1)])
+    ends, total = edges[[filled[0], filled[-1] + 1]], np.append(0.0, np.cumsum(counts))
+    low, high = np.interp([CORE * total[-1], (1 - CORE) * total[-1]], total, edges)
+    room = FAR * (high - low)
+    return max(float(ends[0]), low - room), min(float(ends[1]), high + room)
 
 
 def _window(read: Reading, low: float, high: float) -> tuple[float, float]:
@@ -149,10 +156,13 @@ def _left_out(axes: Axes, read: Reading, low: float, high: float) -> None:
     outside = int(counts[(edges[1:] <= low) | (edges[:-1] >= high)].sum())
     if not outside:
         return
-    text = f"{outside:,} sample{'s' if outside > 1 else ''} outside, {read.say(read.value('least'))} to "
+    least, most = read.value("least"), read.value("most")
+    ends = [f"down to {read.say(least)}"] if least < low else []
+    ends += [f"up to {read.say(most)}"] if most > high else []
+    text = f"{outside:,} sample{'s' if outside > 1 else ''} outside, {' and '.join(ends)}"
     box = {"boxstyle": "round,pad=0.2", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
-    axes.text(0.99, 0.97, text + read.say(read.value("most")), transform=axes.transAxes, ha="right", va="top",
-              fontsize=8, color=MUTED, bbox=box, zorder=4)  # fmt: skip
+    axes.text(0.99, 0.97, text, transform=axes.transAxes, ha="right", va="top", fontsize=8, color=MUTED, bbox=box,
+              zorder=4)  # fmt: skip
 
 
 # ---- envelope -----------------------------------------------------------------------------------------------------
@@ -255,6 +265,9 @@ def convergence(parent: FigureBase, read: Reading) -> None:
         _running(panels[2], size, 100 * values, 100 * low, 100 * high)
     for axes in panels:
         axes.set_xscale("log")
+        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if size[-1] < 50 * size[0] else (1.0,)))
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.0f}".replace(",", "\u202f")))
+        axes.xaxis.set_minor_formatter(NullFormatter())
         axes.yaxis.set_major_locator(MaxNLocator(nbins=4))
         axes.ticklabel_format(axis="y", useOffset=False)
     panels[-1].set_xlabel("samples", fontsize=9, color=INK)

@@ -98,11 +98,11 @@ def _measure(result: xr.Dataset, read: Reading) -> Section:
     """What there is of one measure."""
     about = "; ".join(part for part in (read.text, f"limits {read.told_limits}" if read.limited else "") if part)
     pictures = [(f"{KINDS[kind].title} of {read.name}", figure(result, kind, [read.name])) for kind in drawable(read)]
-    told = [figures(read)._replace(title="")]
+    told = [figures(read)._replace(title="results")]
     if read.has("contribution_worst_case"):
-        told.append(contributions(read))
+        told.append(contributions(read, short=True))
     if read.has("total_order"):
-        told.append(indices(read))
+        told.append(indices(read, short=True))
     corner = corners(read)
     return Section(read.name, about, pictures, [*told, *([corner] if corner else [])])
 

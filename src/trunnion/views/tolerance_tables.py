@@ -30,6 +30,7 @@ __all__ = [
     "tables",
 ]
 
+APART = 5e-4  # two shares that differ by more have a column each
 LEAST, LEAST_INDEX = 1e-3, 5e-3  # shares below which a number has no row of its own in the terminal
 MOST = 20  # rows of contributions there
 
@@ -157,7 +158,7 @@ def _outer(read: Reading) -> Cells:
 
 def _yield(read: Reading) -> Cells:
     value, low, high = read.interval
-    if math.isnan(value):
+    if math.isnan(value) or not read.limited:
         return {}
     text = share_interval(value, low, high)
     told, _, ends = text.partition(" (")
@@ -193,18 +194,21 @@ def contributions(read: Reading, short: bool = False) -> Table:
     found = read.contributions
     kept = [one for one in found if max(_zero(one.rss_share), _zero(one.worst_share)) >= LEAST][:MOST] or found[:1]
     kept = kept if short and len(kept) < len(found) - 1 else found
+    apart = any(abs(one.variance_share - one.rss_share) > APART for one in kept)
     head = ["contribution", "tolerance", "sensitivity", "worst ±", "share", "of RSS²"]
+    head += ["of variance"] if apart else []
     rows = [
         [
             one.short if short else one.name, one.limits, _sensitivity(read, one), read.say(one.worst),
-            share(one.worst_share, 1), share(one.rss_share, 1),
+            share(one.worst_share, 1), share(one.rss_share, 1), *([share(one.variance_share, 1)] if apart else []),
         ]
         for one in kept
     ]  # fmt: skip
     rest = [one for one in found if one not in kept]
     if rest:
-        worst, rss = (float(np.nansum([getattr(one, key) for one in rest])) for key in ("worst_share", "rss_share"))
-        rows.append([f"{len(rest)} others", "", "", "", share(worst, 1), share(rss, 1)])
+        keys = ("worst_share", "rss_share", "variance_share")[: 2 + apart]
+        sums = (float(np.nansum([getattr(one, key) for one in rest])) for key in keys)
+        rows.append([f"{len(rest)} others", "", "", "", *(share(part, 1) for part in sums)])
     at = f" at {read.told_place}" if read.told_place else ""
     return Table(f"what contributes to {read.name}{at}", head, rows)
 
@@ -304,7 +308,7 @@ def overall(result: xr.Dataset) -> list[Table]:
     ends = [float(result[f"yield_all{end}"].values) for end in ("", "_low", "_high")]
     if math.isnan(ends[0]):
         return []
-    return [Table("all limits together", ["", "yield"], [["", share_interval(*ends)]])]
+    return [Table("all limits together", ["", "yield"], [["kept", share_interval(*ends)]])]
 
 
 def inputs(result: xr.Dataset) -> Table:

@@ -45,7 +45,7 @@ class Contribution:
     """What one toleranced number has in a measure, in SI; shares from 0 to 1, NaN where they are not known.
 
     name: its path; short: without the section, where that names one number only; limits: as in a drawing;
-    sensitivity: of the measure by the number.
+    sensitivity: of the measure by the number; rss_share: of the square of RSS, variance_share: of the variance.
     """
 
     name: str
@@ -56,6 +56,7 @@ class Contribution:
     worst: float
     worst_share: float
     rss_share: float
+    variance_share: float
 
 
 @dataclass(frozen=True)
@@ -161,7 +162,8 @@ class Reading:
             found.append(limits_text(lower * self.factor, upper * self.factor) + gap + self.label)
         for word, bound in zip(("at least", "at most"), self.bounds, strict=True):
             if math.isfinite(bound):
-                found.append(f"{word} {self.say(bound)}")
+                gap = "" if self.label in ("°", "") else "\u00a0"
+                found.append(f"{word} {_short(bound * self.factor)}{gap}{self.label}")
         return ", ".join(found)
 
     # ---- over the drive -------------------------------------------------------------------------------------------
@@ -221,17 +223,17 @@ class Reading:
         units = attribute(self.result, "parameter_units", [])
         paths = names(self.result, "parameter")
         empty = np.full(len(paths), np.nan)
-        worst, rss, slope, lower, upper = (
+        worst, rss, variance, slope, lower, upper = (
             self.row(key) if key in self.result else empty
-            for key in ("contribution_worst_case", "contribution_rss", "sensitivity", "parameter_lower",
-                        "parameter_upper")
+            for key in ("contribution_worst_case", "contribution_rss", "contribution_variance", "sensitivity",
+                        "parameter_lower", "parameter_upper")
         )  # fmt: skip
         total = float(np.nansum(worst))
         short = _without_section(paths)
         found = [
             Contribution(
                 path, short[j], unit, with_unit(lower[j], upper[j], unit), float(slope[j]), float(worst[j]),
-                float(worst[j]) / total if total > 0 else math.nan, float(rss[j]),
+                float(worst[j]) / total if total > 0 else math.nan, float(rss[j]), float(variance[j]),
             )
             for j, (path, unit) in enumerate(zip(paths, units, strict=True))
         ]  # fmt: skip
@@ -282,7 +284,7 @@ def limits_text(lower: float, upper: float) -> str:
 
 
 def _short(value: float) -> str:
-    return f"{value:.4g}".replace("inf", "∞").replace("-", "−")
+    return f"{value:.6g}".replace("inf", "∞").replace("-", "−")
 
 
 def _signed(value: float) -> str:
@@ -336,7 +338,9 @@ def failures(result: xr.Dataset) -> list[tuple[str, int]]:
     if "failed" not in result:
         return []
     counts = dict(zip(names(result, "cause"), np.asarray(result["failed"].values).astype(int).tolist(), strict=True))
-    rest = [(cause.replace("_", " "), count) for cause, count in counts.items() if cause != "all" and count]
+    rest = [
+        (cause.replace("_", " ").split(":")[0], count) for cause, count in counts.items() if cause != "all" and count
+    ]
     return [("all", counts.get("all", sum(count for _, count in rest))), *rest]
 
 

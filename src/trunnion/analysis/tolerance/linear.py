@@ -185,17 +185,21 @@ def _slope_at(of: Of, effects: Effects, course: Course, sign: float) -> Array:
     """Derivatives of the figure by rows, at a corner."""
     if not _by_position(of.measure):
         return effects.slopes(figure(course, of.reference), ())[1]
-    index = of.reference.window.index
-    slopes = np.array([part.dual[:, index] for part in course])
-    change = np.array([part.real[0, index] for part in course]) - np.array(of.reference.parts)
+    known = of.reference
     if of.measure.kind == "path_error":
+        slopes = np.array([part.dual[:, known.window.index] for part in course])
+        change = np.array([part.real[0, known.window.index] for part in course]) - np.array(known.parts)
         size = np.sqrt(np.sum(change**2, axis=0))
-        place = int(np.nanargmax(size)) if np.any(np.isfinite(size)) else 0
-        found: Array = sign * np.einsum("ar,a->r", slopes[:, :, place], change[:, place]) / (size[place] or 1.0)
-        return found
-    moved = np.remainder(change[0] + np.pi, 2 * np.pi) - np.pi if of.reference.turning else change[0]
+        place = _top(size)
+        along: Array = sign * np.einsum("ar,a->r", slopes[:, :, place], change[:, place]) / (size[place] or 1.0)
+        return along
+    real, slope = effects.slopes(shown(course, known), (len(known.window.index),))
     if of.measure.rule == "peak-to-peak":
-        between: Array = slopes[0][:, int(np.nanargmax(moved))] - slopes[0][:, int(np.nanargmin(moved))]
+        between: Array = slope[:, _top(real[0])] - slope[:, _top(-real[0])]
         return between
-    place = int(np.nanargmax(sign * moved)) if np.any(np.isfinite(moved)) else 0
-    return np.asarray(slopes[0][:, place])
+    return np.asarray(slope[:, _top(sign * real[0])])
+
+
+def _top(numbers: Array) -> int:
+    """Place of the largest; the first of none."""
+    return int(np.nanargmax(numbers)) if np.any(np.isfinite(numbers)) else 0

@@ -166,7 +166,7 @@ def tolerance(
     measures: names of the model's, or as on the command line (`measures.named`); all of the model if not given, or,
     where it states none, rotation and slide of every joint to the ground that is not driven. methods: of METHODS.
     samples: of the sampling method, and of the variance-based indices; seed: of its random numbers. steps: positions of
-    a whole cycle; at: the place (driver coordinate or time) at which measures without a place or figure of their own are taken.
+    a whole cycle; at: the place (driver coordinate or time) of measures that state neither a place nor a figure.
     jobs, chunk, cluster, checkpoint, resume, progress: see `runner.run`. engine: numpy, or jax (an extra).
     Returns a Dataset over (measure, parameter, position, …) of `result.VARIABLES`; SI, each measure in its own unit.
     Method: exact first derivatives by dual numbers; the worst corner of the tolerances found on the mechanism itself;

@@ -87,7 +87,11 @@ def toleranced(
     if sampled:
         drawn = _drawn(rng, slope, sigma, samples)
         found |= _of_samples(drawn, measures, failures, samples)
-        coordinates["cause"] = ["all", "not_assembled", "locked"]
+        coordinates["cause"] = [
+            "solved",
+            "cannot be assembled",
+            "locked by friction: no drive effort moves the mechanism",
+        ]
     if sobol:
         first = found["contribution_rss"][1][0]
         for name, share in (("first_order", first * 0.97), ("total_order", first * 1.01)):
@@ -136,7 +140,7 @@ def _of_samples(drawn, measures, failures, samples):
     }  # fmt: skip
     found = {name: (("measure",), [value] * measures) for name, value in numbers.items()}
     for end, by in (("", 0.0), ("_low", -0.003), ("_high", 0.003)):
-        found[f"quantile_value{end}"] = (("measure", "quantile"), [quantiles * (1 + by)] * measures)
+        found[f"quantile{end or '_value'}"] = (("measure", "quantile"), [quantiles * (1 + by)] * measures)
         found[f"yield_all{end}"] = ((), {"": share, "_low": low, "_high": high}[end])
     running = {
         "convergence_mean": [kept[:n].mean() for n in sizes],
@@ -148,7 +152,7 @@ def _of_samples(drawn, measures, failures, samples):
         "histogram": (("measure", "bin"), [counts] * measures),
         "edge": (("measure", "edge"), [edges] * measures),
         "band": (("measure", "quantile", "position"), [np.quantile(drawn, QUANTILES, axis=0)] * measures),
-        "failed": (("cause",), [failures, failures - failures // 3, failures // 3]),
+        "failed": (("cause",), [0, failures - failures // 3, failures // 3]),
         "samples": ((), samples),
         "convergence_samples": (("size",), sizes),
         **{name: (("measure", "size"), [values] * measures) for name, values in running.items()},
@@ -204,12 +208,12 @@ def at_one_position():
         result[name] = (("measure",), [base + spread[at]])
     sigma = float(result["deviation"].values[0])
     for end in ("", "_low", "_high"):
-        result[f"quantile_value{end}"] = (("measure", "quantile"), [base + sigma * norm.ppf(QUANTILES)])
+        result[f"quantile{end or '_value'}"] = (("measure", "quantile"), [base + sigma * norm.ppf(QUANTILES)])
     result["convergence_mean"] = result["convergence_mean"] + base - result["convergence_mean"][:, -1]
     result["worst_case_lower"] = -result["worst_case_upper"]
     result["searched_lower"] = -result["searched_upper"]
     result["cp"] = (("measure",), [0.15 / np.degrees(6 * sigma)])
-    result.attrs["limits"] = json.dumps([[-0.0009, 0.0017]])
+    result.attrs["limits"] = json.dumps([[np.radians(-0.05), np.radians(0.1)]])
     result.attrs["measure_texts"] = json.dumps(["angle of rocker at 60° of A"])
     return result.assign_coords(measure=["theta"])
 

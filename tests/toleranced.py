@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from mechanisms_parts import Data, prismatic, revolute, slide
 from trunnion import Mechanism
 from trunnion.analysis.tolerance.inputs import inputs_of
-from trunnion.analysis.tolerance.sampling import Sampler
+from trunnion.analysis.tolerance.sampling import Sampler, Sampling
 from trunnion.analysis.tolerance.study import Study, study
 
 __all__ = [
@@ -63,7 +63,7 @@ def link(points: Data, mass: float = 0.0, centre: Sequence[Any] = (0.0, 0.0), in
 
 
 def fourbar(tolerance: str = "±0.05 mm", loaded: bool = False, speed: float = 4.0, **options: Any) -> Mechanism:
-    """Ground, crank, coupler and rocker of 100, 30, 90 and 70 mm, on the open branch; with masses and a load, or not."""
+    """Ground, crank, coupler and rocker of 100, 30, 90 and 70 mm, open branch; loaded: with masses and a load."""
     weights = [(0.4, 0.012, 2e-4), (0.9, 0.04, 7e-4), (0.7, 0.03, 4e-4)] if loaded else [(0.0, 0.0, 0.0)] * 3
     bodies = [(mass, (centre, 0.004), inertia) for mass, centre, inertia in weights]
     data: Data = {
@@ -203,8 +203,14 @@ def many(mechanism: Mechanism, samples: int = 512, **options: Any) -> tuple[Stud
     return found, sampler(found, samples)
 
 
-def sampler(found: Study, samples: int = 512, method: str = "monte-carlo", seed: int = 1) -> Sampler:
-    return found.sampler(found.sampling(method, samples, seed))
+def sampler(found: Study, samples: int = 512, method: Any = "monte-carlo", seed: int = 1) -> Sampler:
+    """What draws samples of a study, without the first order that a run of it starts with."""
+    unknown = [(np.zeros(1), np.ones(1))] * len(found.measures)
+    job = Sampling(
+        found.run.system.mechanism.data(), found.measures, found.steps, method, samples, seed, "numpy", found.friction,
+        len(found.plan.times), ((0.0, 1.0),) * len(found.measures), tuple(unknown),
+    )  # fmt: skip
+    return Sampler(job, found.inputs, found.plan, found.kernel, found.references)
 
 
 def drawn(mechanism: Mechanism, u: Array) -> dict[str, Array]:
@@ -222,3 +228,36 @@ def numbers(mechanism: Mechanism, values: Mapping[str, float]) -> Mechanism:
     for key in ("tolerances", "correlations", "costs"):
         data.pop(key, None)
     return Mechanism(**data)
+
+
+LEFT = ("measures", "assembly", "errors", "gravity", "tables", "dimensions", "gears")
+
+
+def varied(data: Data, share: float = 1e-3, most: int = 14, seed: int = 3, **options: Any) -> Mechanism:
+    """A mechanism of plain data whose numbers vary by a share of their size: some of all, drawn at random."""
+    mechanism = Mechanism(**{"trunnion": 1, **copy.deepcopy(data), **options})
+    known = mechanism.parameter_set
+    may = [
+        path
+        for path, value in known.nominal.items()
+        if path.partition(".")[0] not in LEFT
+        and not known.entries[path].varies
+        and not path.startswith("joint_defaults")
+        and (not path.startswith("drivers") or (path.endswith(".speed") and len(mechanism.drivers) == 1))
+        and not path.endswith((".range.from", ".range.to", ".axis.x", ".axis.y", ".axis.z", ".start", "pair_factor"))
+        and ".x." not in path
+        and ".inertia" not in path
+        and abs(float(value)) > 1e-9
+    ]
+    rng = np.random.default_rng(seed)
+    chosen = [may[i] for i in sorted(rng.permutation(len(may))[:most])]
+    limits = {path: share * abs(float(known.nominal[path])) for path in chosen}
+    return Mechanism(**mechanism.data() | {"tolerances": limits})
+
+
+def alone(mechanism: Mechanism, values: Mapping[str, Any], i: int) -> Mechanism:
+    """Sample i of a batch as a mechanism of its own."""
+    paths = [one.path for one in mechanism.tolerated()] + [
+        one.direction for one in mechanism.tolerated() if one.direction
+    ]
+    return numbers(mechanism, {path: float(np.ravel(values[path])[i]) for path in paths})

@@ -72,7 +72,7 @@ class ToyJob:
     fatal: int = -1
     folder: Path | None = None
     fault: str = ""
-    model: dict[str, float] = field(default_factory=lambda: {"AB": 2.0})
+    model: dict[str, Any] = field(default_factory=lambda: {"AB": 2.0})
     block_size = 500
 
     @property

@@ -10,8 +10,8 @@ from allocations import bought, random_costs, rows
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from trunnion.analysis.tolerance.allocation import Criterion, Problem
-from trunnion.analysis.tolerance.solve import solve
+from trunnion.analysis.allocation.problem import Criterion, Problem
+from trunnion.analysis.allocation.solve import solve
 from trunnion.statistics.costs import Cost
 
 SEEDS = st.integers(0, 10**6)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.analysis.tolerance.allocation import Contribution, Criterion, Effects, Option, Problem
+from trunnion.analysis.allocation.problem import Contribution, Criterion, Effects, Option, Problem
 from trunnion.statistics.costs import Cost
 
 Array = NDArray[np.float64]

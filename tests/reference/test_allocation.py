@@ -11,8 +11,8 @@ from allocations import FOUR_BAR, bought, four_bar, random_costs, rocker_sensiti
 from numpy.typing import NDArray
 from scipy.optimize import NonlinearConstraint, minimize
 
-from trunnion.analysis.tolerance.allocation import Answer, Contribution, Criterion, Effects, Problem
-from trunnion.analysis.tolerance.solve import solve, trade_off
+from trunnion.analysis.allocation.problem import Answer, Contribution, Criterion, Effects, Problem
+from trunnion.analysis.allocation.solve import solve, trade_off
 from trunnion.errors import MechanismError
 from trunnion.statistics.costs import Cost
 

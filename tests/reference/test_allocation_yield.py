@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 from scipy.stats import multivariate_normal
 
-from trunnion.analysis.tolerance.allocation import Contribution, Problem
-from trunnion.analysis.tolerance.solve import solve, trade_off
-from trunnion.analysis.tolerance.yields import normal_yield
+from trunnion.analysis.allocation.problem import Contribution, Problem
+from trunnion.analysis.allocation.solve import solve, trade_off
+from trunnion.analysis.allocation.yields import normal_yield
 from trunnion.statistics.costs import Cost
 
 Array = NDArray[np.float64]

@@ -309,6 +309,20 @@ def test_forces_are_those_of_the_analysis() -> None:
     assert found["now"] == pytest.approx(float(result["efficiency_instant"].values[40]), rel=1e-9, nan_ok=True)
 
 
+def test_locking_margin() -> None:
+    """The least of the analysis to where it is looked for; no derivative, rather than a silent 0."""
+    run = prepare(build(slider_crank(R, L, E), friction=0.4, radius=0.08))
+    result = trunnion.locking(run.system.mechanism, 90)
+    least = float(np.nanmin(result["locking_margin"].values))
+    assert least < MARGIN
+    margin = Measure("margin", "locking_margin", "mechanism")
+    found = figures(run, [margin], 90)["margin"]
+    assert least * 0.99 < found <= least
+    slope = figures(run, [margin], 90, {"links.crank.points.B.x": Dual(R, 1.0)})["margin"]
+    assert np.isnan(np.ravel(derivative(slope))[0])
+    assert float(np.ravel(primal(slope))[0]) == pytest.approx(found, rel=1e-12)
+
+
 def test_forces_in_space() -> None:
     """Efforts and reactions of an RSSR with friction are those of the analysis."""
     run = prepare(Mechanism(**rssr(friction=0.1).data))

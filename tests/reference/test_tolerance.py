@@ -274,6 +274,32 @@ def test_correlated_tolerances(rho: float) -> None:
     assert np.std(fourbar_angle(*drawn.T)) == pytest.approx(found["deviation_linear"].item(), rel=0.01)
 
 
+def test_number_that_follows_another() -> None:
+    """The length of the coupler by a dimension, and where its pin is drilled from there: both move the pin."""
+    mechanism = fourbar(tolerances={"l3": "±0.05 mm", "links.coupler.points.C.x": "±0.01 mm"})
+    found = trunnion.tolerance(mechanism, methods=FAST)
+    steep = slopes(fourbar_angle, FOURBAR, 3e-5)[2]
+    np.testing.assert_allclose(found["sensitivity"].values[0], [steep, steep], rtol=1e-8)
+    assert found["worst_case_upper"].item() == pytest.approx(-6e-5 * steep, rel=1e-8)
+    least = fourbar_angle(**(FOURBAR | {"l3": 0.09 - 6e-5})) - fourbar_angle(**FOURBAR)
+    assert found["searched_upper"].item() == pytest.approx(least, rel=1e-11)
+
+
+def test_play_of_a_hole_that_follows_a_dimension() -> None:
+    """Radius of the hole by a dimension, both with limits: the largest play has both."""
+    pin = {"radius": "4.99 mm", "hole_radius": "bore"}
+    joints = fourbar().data()["joints"]
+    data = fourbar().data()["dimensions"] | {"bore": "5 mm ± 0.003 mm"}
+    found = trunnion.tolerance(
+        fourbar(
+            dimensions=data, tolerances={"joints.C.pin.hole_radius": "±0.005 mm"},
+            joints=joints | {"C": {**joints["C"], "pin": pin}},
+        ),
+        methods=["linear"],
+    )  # fmt: skip
+    assert found["parameter_upper"].values[-1] == pytest.approx(18e-6, rel=1e-12)
+
+
 # ---- friction, masses, loads ----------------------------------------------------------------------------------
 
 
@@ -335,7 +361,7 @@ def test_derivatives_of_efforts_with_friction() -> None:
 
 
 def test_run_out_of_any_direction() -> None:
-    """The hole of the coupler lies off by up to 0.02 mm, the direction in it as it comes: the coupler is longer or not."""
+    """The hole of the coupler lies off by up to 0.02 mm, to any side of it: the coupler is longer or shorter."""
     mechanism = fourbar(
         tolerances={"joints.B.misalignment.offset": {"limits": "+0.02/0 mm", "direction": "uniform"}},
         joints=fourbar().data()["joints"] | {"B": {**fourbar().data()["joints"]["B"], "misalignment": {"offset": 0.0}}},
@@ -378,7 +404,7 @@ def test_seat_that_is_given() -> None:
 
 
 def test_play_of_a_fit() -> None:
-    """A hole and a pin with limits of their own: largest play, and E ρ² of both radii, in the worst case and the scatter."""
+    """Hole and pin with limits of their own: the worst case has the largest play, the scatter E ρ² of both radii."""
     pin = {"radius": "4.99 mm ± 0.003 mm", "hole_radius": "5 mm ± 0.005 mm"}
     joints = fourbar().data()["joints"]
     found = trunnion.tolerance(fourbar(tolerances={}, joints=joints | {"C": {**joints["C"], "pin": pin}}), methods=FAST)

@@ -21,7 +21,7 @@ from trunnion.errors import MechanismError
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.model.expression import MOTION
 from trunnion.model.limits import Limits
-from trunnion.model.measure_kinds import drive_kind, figure_kind, place_kind
+from trunnion.model.measure_kinds import drive_kind, figure_kind, is_place, place_kind
 from trunnion.model.merge import DEFAULT_LAW
 from trunnion.model.parameter_names import ERRORS, ParameterNames
 from trunnion.model.parts import (
@@ -251,8 +251,9 @@ def _spring_kind(mechanism: Mechanism, spring: Spring, entry: Entry) -> Kind:
 
 def _measure_kind(mechanism: Mechanism, name: str, entry: Entry) -> Kind:
     """Of a position that of the drive or a time, else what the measure gives."""
-    if entry.location[2] not in ("at", "over"):
-        return figure_kind(mechanism, mechanism.measures[name])
+    measure = mechanism.measures[name]
+    if entry.location[2] not in ("at", "over") and not is_place(measure):
+        return figure_kind(mechanism, measure)
     kinds = dimension_kinds(mechanism) if entry.quantity.names else {}
     return place_kind(mechanism, entry.quantity, {name: one.dimensions[0] for name, one in kinds.items()})
 

@@ -27,8 +27,15 @@ SHARE = 0.02  # of the time at most goes into checkpoints
 HEAD, DONE, TALLY = "head", "done", "tally."  # names in the file
 
 
+def _plain(value: object) -> object:
+    if isinstance(value, (np.ndarray, np.generic)):
+        return value.tolist()
+    raise TypeError(f"{value!r} in the identity of a job has no JSON")
+
+
 def _hash(value: object) -> str:
-    return hashlib.sha256(json.dumps(value, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
+    text = json.dumps(value, sort_keys=True, separators=(",", ":"), default=_plain)
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def job_hash(job: Job[Any]) -> str:

@@ -63,7 +63,7 @@ class Job(Protocol[T_co]):
         """Samples in all blocks."""
 
     def identity(self) -> Mapping[str, Any]:
-        """All that the bits of the answer depend on, as JSON can write it: model, seed, method, block size, …"""
+        """All that the bits of the answer depend on; JSON or NumPy's `tolist` writes it: model, seed, block, …"""
 
     def empty(self) -> T_co:
         """The tally of no blocks."""

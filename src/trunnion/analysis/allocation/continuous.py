@@ -11,11 +11,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.analysis.tolerance.allocation import PROVEN, Answer, Problem, none, shortfall
-from trunnion.analysis.tolerance.cones import settled
-from trunnion.analysis.tolerance.interior import Point, polished
-from trunnion.analysis.tolerance.sides import sides
-from trunnion.analysis.tolerance.task import Task, task_of
+from trunnion.analysis.allocation.cones import settled
+from trunnion.analysis.allocation.interior import Point, polished
+from trunnion.analysis.allocation.problem import PROVEN, Answer, Problem, none, shortfall
+from trunnion.analysis.allocation.sides import sides
+from trunnion.analysis.allocation.task import Task, task_of
 from trunnion.errors import Finding, Severity
 
 __all__ = ["allocate_continuous", "minimise"]

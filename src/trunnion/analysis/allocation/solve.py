@@ -6,10 +6,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Literal
 
-from trunnion.analysis.tolerance.allocation import Answer, Problem
-from trunnion.analysis.tolerance.continuous import allocate_continuous
-from trunnion.analysis.tolerance.discrete import allocate_discrete
-from trunnion.analysis.tolerance.yields import Verify, meet
+from trunnion.analysis.allocation.continuous import allocate_continuous
+from trunnion.analysis.allocation.discrete import allocate_discrete
+from trunnion.analysis.allocation.problem import Answer, Problem
+from trunnion.analysis.allocation.yields import Verify, meet
 from trunnion.errors import Finding, MechanismError
 
 __all__ = ["CHOICES", "Choice", "solve", "trade_off"]

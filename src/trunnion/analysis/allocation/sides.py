@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.analysis.tolerance.allocation import Problem
+from trunnion.analysis.allocation.problem import Problem
 
 __all__ = ["Sides", "sides"]
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.special import chdtr, ndtr, ndtri
 
-from trunnion.analysis.tolerance.allocation import Answer, Problem, Sampled, Trial
+from trunnion.analysis.allocation.problem import Answer, Problem, Sampled, Trial
 from trunnion.errors import Finding, Severity
 from trunnion.statistics.streams import SobolStream, factor
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from trunnion.analysis.tolerance.task import Task
+from trunnion.analysis.allocation.task import Task
 from trunnion.statistics.costs import COST_MODELS
 
 __all__ = ["settled", "solved"]

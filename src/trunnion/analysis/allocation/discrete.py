@@ -21,11 +21,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import Bounds, LinearConstraint, milp
 
-from trunnion.analysis.tolerance.allocation import ALLOWED, PROVEN, Answer, Contribution, Problem, none, shortfall
-from trunnion.analysis.tolerance.continuous import allocate_continuous, minimise, unbounded
-from trunnion.analysis.tolerance.interior import Point
-from trunnion.analysis.tolerance.sides import Sides, sides
-from trunnion.analysis.tolerance.task import Task, task_of
+from trunnion.analysis.allocation.continuous import allocate_continuous, minimise, unbounded
+from trunnion.analysis.allocation.interior import Point
+from trunnion.analysis.allocation.problem import ALLOWED, PROVEN, Answer, Contribution, Problem, none, shortfall
+from trunnion.analysis.allocation.sides import Sides, sides
+from trunnion.analysis.allocation.task import Task, task_of
 from trunnion.errors import Finding, Severity
 
 __all__ = ["allocate_discrete"]

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.analysis.tolerance.allocation import Problem
-from trunnion.analysis.tolerance.sides import Sides
+from trunnion.analysis.allocation.problem import Problem
+from trunnion.analysis.allocation.sides import Sides
 from trunnion.statistics.costs import Cost
 
 __all__ = ["Task", "task_of"]

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.analysis.tolerance.task import Task
+from trunnion.analysis.allocation.task import Task
 
 __all__ = ["Point", "polished"]
 

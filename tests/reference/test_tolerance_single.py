@@ -1,0 +1,139 @@
+"""Samples analysed together in batches against each of them built as a mechanism of its own and analysed alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import mechanisms
+import mechanisms_space
+import trunnion
+from measured import references
+from mechanisms_parts import Data
+from toleranced import alone, sampler, varied
+from trunnion.analysis.account import MARGIN
+from trunnion.analysis.analyse import Run, prepare
+from trunnion.analysis.friction import FrictionMethod
+from trunnion.analysis.measure_figures import figure
+from trunnion.analysis.measure_positions import plan
+from trunnion.analysis.measures import coordinate_unit
+from trunnion.analysis.tolerance.study import study
+from trunnion.statistics.streams import uniforms
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+STEPS = 25
+
+
+def planar(name: str, **options: Any) -> Callable[[], Data]:
+    return lambda: mechanisms.model(mechanisms.MODELS[name](), **options)
+
+
+def spatial(name: str) -> Callable[[], Data]:
+    def data() -> Data:
+        found = mechanisms_space.MODELS[name]().data
+        return found | {"joint_defaults": {"friction": 0.05}}
+
+    return data
+
+
+def example(name: str) -> Callable[[], Data]:
+    def data() -> Data:
+        found = trunnion.read(EXAMPLES / f"{name}.yaml").data()
+        plain = {key: value for key, value in found.items() if key not in ("measures", "tolerances", "costs")}
+        sizes = found.get("dimensions", {}).items()
+        return plain | {"dimensions": {name: str(size).partition("±")[0] for name, size in sizes}}
+
+    return data
+
+
+def one_law(name: str) -> Callable[[], Data]:
+    return planar("slider-crank", friction=mechanisms.law_named(name))
+
+
+CASES: dict[str, Callable[[], Data]] = {
+    **{name: planar(name) for name in mechanisms.MODELS},
+    **{f"{name} friction": one_law(name) for name in ("stribeck", "brown-mcphee", "viscous", "dahl", "lugre")},
+    **{name: spatial(name) for name in ("RSSR", "RCCC", "RCSC, two drivers", "two loops in one group")},
+    "Cardan": mechanisms_space.cardan,
+    "lamp": example("spring-balanced-lamp"),
+    "Cardan's circles": example("cardan-gears"),
+    "press": example("toggle-press"),
+    "table": example("swash-plate-pump"),
+}
+
+
+def measures_of(run: Run) -> list[str]:
+    """Of every kind, as far as the mechanism has it."""
+    mechanism = run.system.mechanism
+    joints, driver = run.system.joints, next(iter(mechanism.drivers))
+    turning = [name for name, (kind, _) in joints.items() if kind == "revolute" and name not in mechanism.drivers]
+    sliding = [name for name, (kind, _) in joints.items() if kind in ("prismatic", "cylindrical")]
+    link, point = [one for one in run.system.points if one[0] != mechanism.fixed_link][-1]
+    found = [f"{statistic}:effort:{driver}" for statistic in ("maximum", "minimum", "rms", "mean", "largest")]
+    found += ["efficiency:cycle", f"effort:{driver}", f"path_error:{link}.{point}", f"straightness:{link}.{point}"]
+    found += [f"rms:path_error:{link}.{point}", f"{link}.{point}.x", f"maximum:{link}.{point}.y"]
+    for joint in turning[-1:] + sliding[:1]:
+        found += [f"transmission_error:{joint}", f"peak-to-peak:transmission_error:{joint}", f"stroke:{joint}"]
+        found += [f"reaction:{joint}", f"maximum:reaction:{joint}", f"mean:reaction:{joint}.x"]
+    for joint in turning[:1]:
+        found += [f"rotation:{joint}", f"peak-to-peak:rotation:{joint}"]
+        if coordinate_unit(run.system, run.values) != "s":  # where a driver dwells, a largest value has no one place
+            found += [f"place-of-maximum:rotation:{joint}"]
+    return found
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_batches_against_mechanisms_of_their_own(name: str) -> None:
+    """Every kind of measure and statistic: the same figure of each sample, or none for both."""
+    mechanism = varied(CASES[name](), most=6 if CASES[name]().get("space") == "spatial" else 12)
+    found = study(mechanism, measures_of(prepare(mechanism)), STEPS)
+    batch = sampler(found)
+    u = uniforms(11, 0, batch.inputs.dims, 2)
+    figures, _, _, status = batch.figures(u)
+    values = batch.inputs.values(u)
+    measures = found.measures
+    _, nominal = references(found.run, measures, STEPS)
+    seen = 0
+    for i in (1,) if mechanism.space == "spatial" else (0, 1):
+        run = prepare(alone(mechanism, values, i))
+        back = run.solve(plan(run, measures, STEPS).times, None, FrictionMethod(margin_up_to=MARGIN))
+        for k, measure in enumerate(measures):
+            own = float(np.ravel(figure(measure.curve(back), nominal[measure.name]))[0])
+            known = nominal[measure.name]
+            scale = max(abs(own), abs(known.figure), *(np.max(np.abs(part), initial=0.0) for part in known.parts))
+            assert figures[k, i] == pytest.approx(own, rel=1e-7, abs=1e-7 * scale + 1e-13, nan_ok=True), measure.name
+            seen += np.isfinite(own)
+    assert seen > len(measures) / 2
+    assert np.all(status < 7)
+
+
+SMOOTH = ("mean", "rms", "maximum", "minimum", "efficiency", "peak-to-peak", "stroke", "straightness")
+
+
+@pytest.mark.parametrize(
+    "name", ["four-bar", "class III", "geared five-bar", "Cardan", "lamp", "RCCC", "lugre friction"]
+)
+def test_derivatives_against_samples(name: str) -> None:
+    """∂y/∂p of figures that have a derivative: by dual numbers, and by samples on both sides."""
+    mechanism = varied(CASES[name](), most=5)
+    wanted = [one for one in measures_of(prepare(mechanism)) if one.startswith(SMOOTH) and "error" not in one]
+    if name == "geared five-bar":  # its point runs on a circle, which has no line
+        wanted = [one for one in wanted if not one.startswith("straightness")]
+    found = study(mechanism, wanted, STEPS)
+    batch = sampler(found)
+    count = len(found.inputs.tolerances)
+    shares = 0.5 + 1e-3 * np.eye(count)  # a number alone, to either side by a thousandth of its limits
+    u = np.concatenate([shares, 1 - shares], axis=1)
+    moves = np.array([np.ravel(batch.inputs.values(u)[one.path]) - one.nominal for one in found.inputs.tolerances])
+    figures = batch.figures(u)[0]
+    assert np.max(np.abs(moves)) > 0
+    for k, of in enumerate(found.linear.measures):
+        for i in range(count):
+            width = moves[i, i] - moves[i, count + i]
+            slope = (figures[k, i] - figures[k, count + i]) / width
+            size = max(np.abs(of.reference.figure), 1e-3) / abs(found.inputs.tolerances[i].nominal)
+            assert of.sensitivity[i] == pytest.approx(slope, rel=1e-4, abs=2e-4 * size), (of.measure.name, i)

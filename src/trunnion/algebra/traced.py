@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["Traced", "Untraceable", "bare", "eliminated", "looped"]
+__all__ = ["Traced", "Untraceable", "bare", "kept", "looped"]
 
 
 class Untraceable(TypeError):
@@ -162,17 +162,7 @@ class Traced:
 _OF_ALL_LANES: dict[Any, bool] = {np.any: True, np.all: False}
 
 
-TAKEN_FOR_CHEAP = ("sin", "cos")
-
-
-def _once(found: Any) -> Any:
-    """The same number, computed in one place only.
-
-    XLA holds sines for as cheap as sums and repeats them in every loop that uses them; a quotient it keeps. The
-    divisor is 1, which XLA cannot know, and NaN where the number is.
-    """
-    jnp = _jnp()
-    return found / jnp.where(found == found, 1.0, jnp.nan)
+TAKEN_FOR_CHEAP = ("sin", "cos")  # by XLA, which would repeat them
 
 
 class _Functions:
@@ -187,7 +177,7 @@ class _Functions:
         @functools.wraps(apply)
         def function(*args: Any, **options: Any) -> Any:
             found = apply(*bare(args), **{key: bare(value) for key, value in options.items()})
-            return _dressed(_once(found) if name in TAKEN_FOR_CHEAP else found)
+            return kept(_dressed(found)) if name in TAKEN_FOR_CHEAP else _dressed(found)
 
         setattr(self, name, function)
         return function
@@ -213,25 +203,14 @@ def looped(step: Callable[[list[Any]], list[Any]], start: Sequence[Any], rounds:
     return [Traced(one) for one in jax.lax.fori_loop(0, rounds, body, state)]
 
 
-def eliminated(rows: Sequence[Sequence[Any]]) -> tuple[list[list[Any]], Any]:
-    """X of A X = B from the rows of (A, B), n × (n + m), by Gauss and Jordan with row pivoting in every lane; det A.
+def kept(number: Any) -> Any:
+    """The number, computed in one place only where it is compiled.
 
-    On the stacked entries: as many operations are written down for any number of them.
+    XLA repeats cheap sums and products in every loop that uses them, and what these are made of again in those: a
+    number that many others are made of is better kept. A quotient is, for XLA; this one's divisor is 1, which XLA
+    cannot know, and NaN where the number is.
     """
-    jnp = _jnp()
-    entries = [[jnp.asarray(bare(entry), float) for entry in row] for row in rows]
-    shape = np.broadcast_shapes(*(entry.shape for row in entries for entry in row))
-    table = jnp.stack([jnp.stack([jnp.broadcast_to(entry, shape) for entry in row]) for row in entries])
-    n = len(rows)
-    number = np.arange(n).reshape(n, *([1] * len(shape)))
-    determinant = jnp.ones(shape)
-    for k in range(n):
-        best = jnp.argmax(jnp.where(number < k, -1.0, jnp.abs(table[:, k])), axis=0)
-        chosen = (number == best)[:, None]
-        pivot = jnp.sum(jnp.where(chosen, table, 0.0), axis=0)
-        table = jnp.where(chosen, table[k], table)  # what stood in its place goes where it was
-        determinant = determinant * jnp.where(best == k, pivot[k], -pivot[k])
-        pivot = pivot / pivot[k]
-        reduced = table - table[:, k : k + 1] * pivot
-        table = jnp.where((number == k)[:, None], pivot, reduced)
-    return [[Traced(table[i, j]) for i in range(n)] for j in range(n, len(rows[0]))], Traced(determinant)
+    if not isinstance(number, Traced):
+        return number
+    value, jnp = number.value, _jnp()
+    return Traced(value / jnp.where(value == value, 1.0, jnp.nan))

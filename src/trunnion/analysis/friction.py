@@ -374,8 +374,9 @@ def _unrolled(problem: Problem, method: FrictionMethod) -> Settled:
 
 
 def _matrix(problem: Problem, state: State) -> list[list[Number]]:
-    """(1 − A)⁻¹ at a state."""
-    return linalg.quick_inverse(identity_minus(problem.map_derivative(state)))
+    """(1 − A)⁻¹ at a state where the rows of |A| add up to less than 1: no pivots are needed."""
+    matrix = identity_minus(problem.map_derivative(state))
+    return linalg.quick_inverse(matrix) if len(matrix) <= 3 else linalg.inverse(matrix, pivoting=False)
 
 
 def _at_once(problem: Problem) -> Settled:

@@ -183,8 +183,9 @@ def envelope(parent: FigureBase, read: Reading) -> None:
     _bands(axes, over, read)
     if read.has("curve_rss"):
         rss = read.along(read.row("curve_rss"))
+        middle = read.along(read.row("curve_shift")) if read.has("curve_shift") else 0.0
         for k, sign in enumerate((1, -1)):
-            curve(axes, over, sign * rss, None if k else "RSS", color=INK, linewidth=1.1, linestyle=(0, (5, 2)))
+            curve(axes, over, middle + sign * rss, None if k else "RSS", color=INK, linewidth=1.1, linestyle=(0, (5, 2)))
     _corner(axes, over, read)
     limits = [one for one in read.limits if math.isfinite(one)] if read.nominal == 0 else []
     for k, one in enumerate(limits):

@@ -32,6 +32,7 @@ CRITERIA: dict[Criterion, str] = {
     "rss": "the root of the sum of squares keeps every limit",
     "yield": "the stated share of mechanisms keeps every limit",
 }
+SHOWN = {"rad": (180 / np.pi, "deg"), "m": (1e3, "mm")}
 ALLOWED = 1e-9  # of a limit: how far a row may lie beyond it
 PROVEN = 1e-9  # of the cost that tolerances change: a gap below it proves the optimum
 
@@ -76,7 +77,7 @@ class Effects:
     the middle of the tolerances, (row,). worst: |∂y/∂p|, of a clearance |Q₁| + |Q₂|; half: what RSS squares, worst if
     None; deviation, mean: standard deviation and mean, half/3 and 0 if None; correlation: (contribution,
     contribution). half and deviation are signed: that matters with correlation, and for a yield.
-    labels: names of the rows for messages.
+    labels, places, units: of the rows for messages: names, where in the cycle (" at 60°"), and SI units.
     """
 
     worst: Array
@@ -88,10 +89,21 @@ class Effects:
     offset: Array | None = None
     correlation: Array | None = None
     labels: tuple[str, ...] = ()
+    places: tuple[str, ...] = ()
+    units: tuple[str, ...] = ()
 
     def label(self, row: int) -> str:
         """Name of a row."""
         return self.labels[row] if self.labels else f"row {row + 1}"
+
+    def place(self, row: int) -> str:
+        """Where in the cycle a row is, with a blank before it; empty if it is at no one place."""
+        return self.places[row] if self.places else ""
+
+    def say(self, row: int, value: float) -> str:
+        """A deviation of a row with its sign and unit, angles in degrees, lengths in mm."""
+        factor, unit = SHOWN.get(self.units[row], (1.0, self.units[row])) if self.units else (1.0, "")
+        return f"{factor * value:+.6g} {unit}".removesuffix(" 1").rstrip()
 
     def spread(self) -> Array:
         """What RSS squares."""
@@ -273,9 +285,11 @@ def shortfall(problem: Problem, least: Array) -> Finding | None:
     kept = "which has no cost and stays as it is" if largest.fixed else "which is at its least"
     ratio = f", {over / limit:.3g} times the limit" if over * limit > 0 else ""
     many = int(np.sum(used > 1 + ALLOWED))
-    more = f"; {many} of {len(used)} rows are broken" if many > 1 else ""
+    rows = "positions" if effects.places else "rows"
+    more = f"; {many} of {len(used)} {rows} are beyond their limits" if many > 1 else ""
     return Finding(
-        f"no tolerances keep the limit {limit:+.6g}: with all at their least it takes {over:+.6g}{ratio}{more}",
+        f"no tolerances keep the limit {effects.say(row, limit)}: with all at their least it takes "
+        f"{effects.say(row, over)}{effects.place(row)}{ratio}{more}",
         effects.label(row),
         f"widen the limit, or narrow first '{largest.name}', {kept} and has the largest part",
     )

@@ -38,6 +38,7 @@ METHODS = ("linear", "worst-case", *SAMPLINGS, "sobol")
 DEFAULT_METHODS = ("linear", "worst-case", "monte-carlo")
 DEFAULT_SAMPLES = 10_000
 MOST_SAMPLES = 10**15
+FEW = 10_000_000  # configurations up to which further processes cost more than they save
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,7 +154,7 @@ def tolerance(
     at: float | str | None = None,
     *,
     friction: FrictionMethod | None = None,
-    jobs: int | None = 1,
+    jobs: int | None = None,
     chunk: int | None = None,
     engine: str = "numpy",
     cluster: str | None = None,
@@ -167,7 +168,7 @@ def tolerance(
     where it states none, rotation and slide of every joint to the ground that is not driven. methods: of METHODS.
     samples: of the sampling method, and of the variance-based indices; seed: of its random numbers. steps: positions of
     a whole cycle; at: the place (driver coordinate or time) of measures that state neither a place nor a figure.
-    jobs, chunk, cluster, checkpoint, resume, progress: see `runner.run`. engine: numpy, or jax (an extra).
+    jobs: processes, one a core if not given and worth it. chunk, cluster, checkpoint, resume, progress: `runner.run`. engine: numpy, or jax (an extra).
     Returns a Dataset over (measure, parameter, position, …) of `result.VARIABLES`; SI, each measure in its own unit.
     Method: exact first derivatives by dual numbers; the worst corner of the tolerances found on the mechanism itself;
     Monte Carlo or scrambled Sobol points through the whole analysis; Sobol' indices. Samples that have no answer are
@@ -187,6 +188,8 @@ def tolerance(
     stopped = False
     if method is not None:
         job = found.sampling(method, samples, seed, engine)
+        alone = job.samples * job.positions < FEW and cluster is None
+        jobs = 1 if jobs is None and (alone or engine != "numpy") else jobs
         ran = runner.run(
             job, jobs=jobs, chunk=chunk, cluster=cluster, checkpoint=checkpoint, resume=resume, progress=progress
         )

@@ -33,8 +33,8 @@ from trunnion.analysis.analyse import (
 )
 from trunnion.analysis.friction import FrictionMethod
 from trunnion.analysis.kinematics import forward
-from trunnion.analysis.kinetostatics import Backward, solve
-from trunnion.analysis.system import Values
+from trunnion.analysis.kinetostatics import Backward
+from trunnion.analysis.system import Values, law_of, rubbing
 from trunnion.errors import Finding, MechanismError, Status
 
 __all__ = ["CompiledKernel", "Figure"]
@@ -42,6 +42,7 @@ __all__ = ["CompiledKernel", "Figure"]
 Array = NDArray[np.float64]
 Figure = Callable[[Backward], Number]  # one number of every position, of the motion (`back.walk`) or of the forces
 BATCH = {"cpu": 1 << 13, "gpu": 1 << 22}  # configurations at a time, by platform: on a CPU they stay in its cache
+HOPELESS = 0.5  # share of doubtful lanes from which the rest is left to NumPy
 BORDER = 0.99 * NEAR_SINGULAR  # condition from which NumPy decides what a position is
 
 
@@ -73,6 +74,7 @@ class CompiledKernel:
         self.forces = forces
         self.method = method or FrictionMethod()
         self._jax = _imported()
+        _check(run)
         self.threads = threads or (os.cpu_count() or 1 if self.platform == "cpu" else 1)
         self.again = 0  # lanes that NumPy computed again, so far
         self._functions: dict[Any, Callable[..., _Compiled]] = {}
@@ -107,8 +109,11 @@ class CompiledKernel:
                 doubtful[part] = found.doubtful[: samples - low]
 
         fill(0)  # alone: it may have to be compiled first
-        with ThreadPoolExecutor(self.threads) as pool:
-            list(pool.map(fill, range(rows, samples, rows)))
+        if np.mean(doubtful[:rows]) > HOPELESS:
+            doubtful[rows:] = True  # as the rest would be: NumPy is quicker at once
+        else:
+            with ThreadPoolExecutor(self.threads) as pool:
+                list(pool.map(fill, range(rows, samples, rows)))
         self._again(values, time, curves, status, doubtful)
         return curves, status
 
@@ -138,12 +143,27 @@ class CompiledKernel:
 
         return compute
 
+    def gradient(
+        self, values: Values, time: Array, figure: str, reduce: Callable[[Any], Any]
+    ) -> dict[str, NDArray[np.float64]]:
+        """Derivatives of one number by every array among the values, each in its shape, by reverse differentiation.
+
+        reduce: makes that number of the figure's curve (sample, position), in JAX. Positions that are not plainly
+        solved are not computed again here: leave them out in `reduce`, or take a figure without them.
+        """
+        constants = {path: value for path, value in values.items() if not np.ndim(value)}
+        arrays = {path: np.asarray(value, float) for path, value in values.items() if np.ndim(value)}
+        pure = self.pure(constants)
+        with self._wide():
+            slopes = self._jax.grad(lambda varied: reduce(pure(varied, time).curves[figure]))(arrays)
+            return {path: np.asarray(slope) for path, slope in slopes.items()}
+
     def _back(self, values: Values, time: Number, method: FrictionMethod) -> Backward:
         """One walk, back again only where forces are asked for."""
         run = self.run
         try:
             if self.forces:
-                return solve(run.system, values, run.chosen.assembly, time, method)
+                return run.solve(time, values, method)
             return Backward(forward(run.system, values, run.chosen.assembly, time), {})
         except Untraceable as error:
             what = f"this mechanism is not compiled: {error}"
@@ -208,6 +228,19 @@ def _full(number: Number, shape: tuple[int, ...]) -> Any:
     import jax.numpy as jnp
 
     return jnp.broadcast_to(bare(number), shape)
+
+
+def _check(run: Run) -> None:
+    """MechanismError for what only NumPy does."""
+    remedy = "use the engine numpy"
+    for module in run.system.plan.modules:
+        if module.redundant:
+            what = f"the links {', '.join(module.links)} are over-constrained, which is solved by least squares"
+            raise MechanismError(Finding(f"{what}: that is not compiled", "engine", remedy))
+    for joint in rubbing(run.system):
+        if law_of(run.system, joint).relaxation is not None:
+            what = f"the friction of {joint} has a memory along the cycle: that is not compiled"
+            raise MechanismError(Finding(what, f"joints.{joint}.friction", remedy))
 
 
 # ---- JAX ------------------------------------------------------------------------------------------------------

@@ -123,7 +123,8 @@ class Sampling:
     @cached_property
     def block_size(self) -> int:
         """Samples in a block."""
-        most = max(1, min(BATCHES * batch_of(self.engine, self.positions), MOST))
+        batch = batch_of(self.engine, self.positions)
+        most = max(1, min(BATCHES * batch, MOST)) if self.engine == "numpy" else batch
         if self.method == "monte-carlo":
             return most
         return min(1 << (most.bit_length() - 1), self._points)

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 
 __all__ = ["DEFAULT_METHODS", "METHODS", "Study", "study", "tolerance"]
 
+ENGINES = ("numpy", "jax")
 METHODS = ("linear", "worst-case", *SAMPLINGS, "sobol")
 DEFAULT_METHODS = ("linear", "worst-case", "monte-carlo")
 DEFAULT_SAMPLES = 10_000
@@ -177,7 +178,7 @@ def tolerance(
     """
     from trunnion.analysis.tolerance.result import Outcome, dataset
 
-    _check(methods, samples, seed)
+    _check(methods, samples, seed, engine)
     found = study(mechanism, measures, steps, at, friction)
     worst = found.worst() if "worst-case" in methods else None
     method = next((one for one in methods if one in SAMPLINGS), None)
@@ -209,7 +210,7 @@ def done_of(job: Sampling, tally: Tally) -> int:
     return int(sum(np.max(total.count) for tree in tally.trees if (total := tree.total()) is not None))
 
 
-def _check(methods: Sequence[str], samples: int, seed: int) -> None:
+def _check(methods: Sequence[str], samples: int, seed: int, engine: str) -> None:
     known = ", ".join(METHODS)
     findings = [
         Finding(f"there is no method '{method}'", "method", f"use {known}")
@@ -221,6 +222,8 @@ def _check(methods: Sequence[str], samples: int, seed: int) -> None:
     if not 1 <= samples <= MOST_SAMPLES:
         remedy = f"give a number from 1 to {MOST_SAMPLES:,}, or leave the sampling methods out"
         findings.append(Finding(f"{samples} samples", "samples", remedy))
+    if engine not in ENGINES:
+        findings.append(Finding(f"there is no engine '{engine}'", "engine", f"use {' or '.join(ENGINES)}"))
     if not 0 <= seed < 1 << 63:
         findings.append(Finding(f"a seed of {seed}", "seed", "give a whole number from 0"))
     if findings:

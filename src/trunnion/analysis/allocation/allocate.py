@@ -109,7 +109,7 @@ def allocate(
     discrete, or auto: discrete where any cost is a list of processes or options. steps: positions of a whole cycle; at:
     the place of measures that state none. samples, seed: of the samples that verify it, none if 0; jobs: processes for
     them. curve: how many points of cost over accuracy, all limits being multiplied by 0.5 to 2.
-    exact: in the worst case, narrow limits until the worst case found on the mechanism keeps them, not first order only.
+    exact: take limits narrower until the worst case found on the mechanism keeps them, and not first order alone.
     Returns the Dataset of `tolerance` for the mechanism with the tolerances found (`half_widths`), and over
     (parameter), (measure), (offer) those of `result.VARIABLES`.
     Raises MechanismError if nothing has a cost, no measure a limit, or as `tolerance` does. That no tolerances keep the

@@ -79,8 +79,6 @@ def _searched(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:
     for k, of in enumerate(found.study.linear.measures):
         lower, upper = limits(of)
         low, high = float(known["searched_lower"][k]), float(known["searched_upper"][k])
-        if of.measure.rule != "deviation" and abs(of.reference.figure) == 0 and lower == -upper:
-            low = max(low, lower)  # a size
         shares = share_of(low, lower), share_of(high, upper)
         beyond = max(shares) - 1
         if not beyond > CLOSE:

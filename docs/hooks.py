@@ -4,8 +4,8 @@
 - `figures/MODEL/KIND.svg` and `figures/MODEL/report.html` are drawn when a page refers to them. KIND is a plot,
   `assemblies` or `assemble`; MODEL is a file of `examples/`, a block of a page titled `MODEL.yaml`, or an entry of
   `VARIANTS`.
-- `figures/sweeps/NAME.svg`, `figures/plays/NAME.svg` and `figures/assembles/NAME.svg` are drawn by the command of a
-  page, `trunnion sweep … --out NAME.svg` and so on.
+- `figures/sweeps/NAME.svg`, `figures/plays/NAME.svg`, `figures/assembles/NAME.svg`, `figures/tolerances/NAME.svg` and
+  `figures/allocates/NAME.svg` are drawn by the command of a page, `trunnion sweep … --out NAME.svg` and so on.
 - The line that says that a page has no tables in the repository is left out.
 - The gallery is made of the examples and of `tests/gallery/facts.py`; see `gallery_page.py`.
 - `$x$` and `$$x$$` become MathML, which browsers set without any script.
@@ -37,6 +37,8 @@ from pydantic_core import PydanticUndefined
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
 EXAMPLES = ROOT / "examples"
+
+COMMANDS = ("sweeps", "plays", "assembles", "tolerances", "allocates")  # folders of figures that a command draws
 
 # model: (the model it is made from, what is replaced in it)
 VARIANTS: dict[str, tuple[str, dict[str, float | str]]] = {
@@ -79,7 +81,7 @@ def on_files(files: Files, config: Any) -> Files:
     """Draw what the pages refer to; put the examples and the schema beside them."""
     pages = {path: path.read_text("utf-8") for path in sorted(DOCS.rglob("*.md"))}
     told = {found for text in pages.values() for found in re.findall(r"figures/([\w-]+)/([\w-]+)\.(svg|html)", text)}
-    swept = {found for found in told if found[0] in ("sweeps", "plays", "assembles")}
+    swept = {found for found in told if found[0] in COMMANDS}
     told -= swept
     wanted = told | _gallery().wanted()
     models = models_of(pages.values())
@@ -244,6 +246,74 @@ def plays_table() -> str:
         for name, one in VARIABLES.items()
     ]
     return _rows(("variable", "dimension", "unit", "meaning"), rows)
+
+
+def tolerances_table() -> str:
+    """Every variable of a tolerance analysis."""
+    from trunnion.analysis.tolerance.result import VARIABLES
+
+    told = {"": "of the measure", "parameter": "of the parameter", "ratio": "one by the other", "drive": "rad, m or s"}
+    rows = [
+        (_code(name), ", ".join(one.dims), told.get(one.units) or _unit(one.units), one.long_name)
+        for name, one in VARIABLES.items()
+    ]
+    return _rows(("variable", "dimensions", "unit", "meaning"), rows)
+
+
+def measures_table() -> str:
+    """Every kind of measure."""
+    from trunnion.analysis.measures import MEASURES
+
+    figures = {
+        "deviation": "largest deviation from nominal", "line": "width about its least-squares line",
+        "ratio": "over the cycle; of `instant` the largest deviation", "dead centre": "place where the joint turns back",
+    }  # fmt: skip
+    rows = [
+        (
+            _code(name),
+            {"N m": "N m or N", "of the joint": "rad or m"}.get(one.unit, one.unit),
+            "motion and forces" if one.of_forces else "motion",
+            figures.get(one.rule, one.rule),
+            one.long_name,
+        )
+        for name, one in MEASURES.items()
+    ]
+    return _rows(("subject", "unit", "needs", "figure if nothing is stated", "what"), rows)
+
+
+def distributions_table() -> str:
+    """Every distribution of a deviation."""
+    from trunnion.statistics.distributions import DISTRIBUTIONS
+
+    def option(name: str, default: float | None) -> str:
+        return _code(name) if default is None else f"{_code(name)} ({default:g})"
+
+    rows = [
+        (
+            _code(name),
+            ", ".join(option(*pair) for pair in one.parameters.items()),
+            "yes" if one.bounded else "no",
+            one.long_name,
+        )
+        for name, one in DISTRIBUTIONS.items()
+    ]
+    return _rows(("`distribution`", "takes (default)", "within its limits", "what"), rows)
+
+
+def costs_table() -> str:
+    """Every model of what a tolerance costs."""
+    from trunnion.statistics.costs import COST_MODELS
+
+    rows = [
+        (
+            _code(name),
+            _code(model.formula),
+            ", ".join(f"{_code(key)}: {one.meaning}" for key, one in model.parameters.items()),
+            model.source,
+        )
+        for name, model in COST_MODELS.items()
+    ]
+    return _rows(("`model`", "cost of the half width t", "parameters", "source"), rows)
 
 
 def assembling_table() -> str:
@@ -529,6 +599,10 @@ TABLES: dict[str, Callable[..., str]] = {
     "results": results_table,
     "sweeps": sweeps_table,
     "plays": plays_table,
+    "tolerances": tolerances_table,
+    "measures": measures_table,
+    "distributions": distributions_table,
+    "cost-models": costs_table,
     "assembling": assembling_table,
     "statuses": status_table,
     "laws": laws_table,

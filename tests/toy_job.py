@@ -7,12 +7,14 @@ import signal
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.analysis.tolerance.ranges import union
 from trunnion.errors import Finding, MechanismError
 
 Nodes = dict[tuple[int, int], float]
@@ -38,15 +40,10 @@ class ToyTally:
     blocks: tuple[tuple[int, int], ...]
 
     def merge(self, other: ToyTally) -> ToyTally:
-        joined: list[tuple[int, int]] = []
-        for first, last in sorted((*self.blocks, *other.blocks)):
-            if joined and first < joined[-1][1]:
-                raise AssertionError("a block was done twice")
-            if joined and first == joined[-1][1]:
-                joined[-1] = (joined[-1][0], last)
-            else:
-                joined.append((first, last))
-        return ToyTally(self.counts + other.counts, _closed(self.nodes | other.nodes), tuple(joined))
+        joined = union((*self.blocks, *other.blocks))
+        if any(one[1] > two[0] for one, two in pairwise(joined)):
+            raise AssertionError("a block was done twice")
+        return ToyTally(self.counts + other.counts, _closed(self.nodes | other.nodes), joined)
 
     def to_arrays(self) -> dict[str, NDArray[Any]]:
         return {
@@ -75,7 +72,7 @@ class ToyJob:
     fatal: int = -1
     folder: Path | None = None
     fault: str = ""
-    model: dict[str, float] = field(default_factory=lambda: {"AB": 2.0})
+    model: dict[str, Any] = field(default_factory=lambda: {"AB": 2.0})
     block_size = 500
 
     @property

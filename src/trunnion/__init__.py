@@ -12,6 +12,7 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from trunnion import dual
+    from trunnion.analysis.allocation.allocate import allocate
     from trunnion.analysis.analyse import analyse, prepare
     from trunnion.analysis.assemblability import assemble
     from trunnion.analysis.friction import FrictionMethod
@@ -33,6 +34,7 @@ _PLACES = {
     "MechanismError": "trunnion.errors",
     "Status": "trunnion.errors",
     "Check": "trunnion.analysis.inspect",
+    "allocate": "trunnion.analysis.allocation.allocate",
     "analyse": "trunnion.analysis.analyse",
     "assemble": "trunnion.analysis.assemblability",
     "check": "trunnion.analysis.inspect",
@@ -55,6 +57,7 @@ __all__ = [
     "Mechanism",
     "MechanismError",
     "Status",
+    "allocate",
     "analyse",
     "assemble",
     "check",

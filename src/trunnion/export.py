@@ -10,8 +10,9 @@ CSV (and Parquet) have one row a position and flat columns: `time`, `<joint>.rot
 `<joint>.seat_xi_pin`, `<joint>.contact_lost`. A sweep has one row a point of its grid: the swept numbers by the names
 they were given, then `efficiency`, `<driver>.effort_max`, `<joint>.reaction_max`, …, `status`. The play of joints has
 `drive`, `<measure>`, `<measure>.worst_case`, `<measure>.rss`, `<measure>.deviation`, `<measure>.<joint>.worst_case`,
-…. What `assemble` finds has one row a position: `<driver>.coordinate`, `needed_share`, `needed_clearance`, …,
-`<joint>.uniform_1_x` of end 1, …, `status`.
+…. Of tolerances the file's name says which table it holds: one row a measure, or of `x.parameters.csv` one a toleranced
+number, see `tolerance_columns`. What `assemble` finds has one row a position: `<driver>.coordinate`, `needed_share`,
+`needed_clearance`, …, `<joint>.uniform_1_x` of end 1, …, `status`.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.output import whole
+from trunnion.tolerance_columns import flat, is_tolerance, table_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -43,8 +45,10 @@ ROWS = 20_000  # written at a time, so that memory does not grow with the number
 Column = tuple[str, str, Callable[[slice], NDArray[Any]]]
 
 
-def columns(result: xr.Dataset) -> list[Column]:
-    """(name, unit, values of a window of rows) of every flat column."""
+def columns(result: xr.Dataset, table: str = "measures") -> list[Column]:
+    """(name, unit, values of a window of rows) of every flat column; table: which one, of a result of `tolerance`."""
+    if is_tolerance(result):
+        return [(name, unit, values.__getitem__) for name, unit, values in flat(result, table)]
     if "swept" in result.attrs:
         return [(name, unit, values.__getitem__) for name, (unit, values) in figures(result).items()]
     if "measure" in result.dims:
@@ -246,51 +250,56 @@ def figures(sweep: xr.Dataset) -> dict[str, tuple[str, NDArray[Any]]]:
     return flat
 
 
-def frames(result: xr.Dataset) -> Iterator[pd.DataFrame]:
+def frames(result: xr.Dataset, table: str = "measures") -> Iterator[pd.DataFrame]:
     """The flat columns, some rows at a time."""
     import pandas as pd
 
-    flat = columns(result)
-    rows = result.sizes.get("position") or int(
-        np.prod([result.sizes[name] for name in json.loads(result.attrs["swept"])])
-    )
-    for low in range(0, rows, ROWS):
+    found = columns(result, table)
+    for low in range(0, _count(result, found), ROWS):
         window = slice(low, low + ROWS)
-        yield pd.DataFrame({name: values(window) for name, _, values in flat})
+        yield pd.DataFrame({name: values(window) for name, _, values in found})
 
 
-def _csv(result: xr.Dataset, path: Path, units_row: bool) -> None:
+def _count(result: xr.Dataset, found: list[Column]) -> int:
+    """How many rows the columns have; one at least, so that their names are written."""
+    if is_tolerance(result):
+        return max(len(found[0][2](slice(None))), 1)
+    swept = json.loads(result.attrs.get("swept", "[]"))
+    return result.sizes.get("position") or int(np.prod([result.sizes[name] for name in swept]))
+
+
+def _csv(result: xr.Dataset, path: Path, units_row: bool, table: str) -> None:
     with path.open("w", encoding="utf-8", newline="") as file:
-        for number, frame in enumerate(frames(result)):
+        for number, frame in enumerate(frames(result, table)):
             if number == 0:
                 frame.head(0).to_csv(file, index=False)
                 if units_row:
                     import csv
 
-                    csv.writer(file, lineterminator="\n").writerow([unit for _, unit, _ in columns(result)])
+                    csv.writer(file, lineterminator="\n").writerow([unit for _, unit, _ in columns(result, table)])
             frame.to_csv(file, index=False, header=False)
 
 
-def _parquet(result: xr.Dataset, path: Path, units_row: bool) -> None:
+def _parquet(result: xr.Dataset, path: Path, units_row: bool, table: str) -> None:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     writer = None
-    for frame in frames(result):
-        table = pa.Table.from_pandas(frame, preserve_index=False)
-        writer = writer or pq.ParquetWriter(path, table.schema)
-        writer.write_table(table)
+    for frame in frames(result, table):
+        rows = pa.Table.from_pandas(frame, preserve_index=False)
+        writer = writer or pq.ParquetWriter(path, rows.schema)
+        writer.write_table(rows)
     if writer:
         writer.close()
 
 
-def _netcdf(result: xr.Dataset, path: Path, units_row: bool) -> None:
+def _netcdf(result: xr.Dataset, path: Path, units_row: bool, table: str) -> None:
     modern = all(importlib.util.find_spec(package) for package in ("h5netcdf", "h5py"))
     engine: Literal["h5netcdf", "scipy"] = "h5netcdf" if modern else "scipy"
     result.to_netcdf(path, engine=engine)
 
 
-def _zarr(result: xr.Dataset, path: Path, units_row: bool) -> None:
+def _zarr(result: xr.Dataset, path: Path, units_row: bool, table: str) -> None:
     path.unlink()  # a Zarr store is a folder
     try:
         result.to_zarr(path, zarr_format=2)  # version 3 has no stable text arrays yet
@@ -299,7 +308,7 @@ def _zarr(result: xr.Dataset, path: Path, units_row: bool) -> None:
         raise
 
 
-def _json(result: xr.Dataset, path: Path, units_row: bool) -> None:
+def _json(result: xr.Dataset, path: Path, units_row: bool, table: str) -> None:
     data = result.to_dict()
     for section in ("coords", "data_vars"):
         for entry in data[section].values():
@@ -315,7 +324,7 @@ def _plain(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-Writer = Callable[["xr.Dataset", Path, bool], None]
+Writer = Callable[["xr.Dataset", Path, bool, str], None]
 
 # extension: writer, the package it needs and the extra that brings it
 FORMATS: dict[str, tuple[Writer, str, str]] = {
@@ -352,4 +361,4 @@ def save(result: xr.Dataset, path: str | os.PathLike[str], units_row: bool = Fal
     if Path(path).suffix.lower() == ".zarr" and Path(path).is_dir():
         raise MechanismError(Finding("exists already", str(path), "remove it or choose another name"))
     with whole(path) as temporary:
-        writer(result, temporary, units_row)
+        writer(result, temporary, units_row, table_of(path, result))

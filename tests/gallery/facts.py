@@ -9,7 +9,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from gallery import benchmarks, drawing, four_bars, geared, presses, several_loops, sliders, spatial, with_errors
+from gallery import (
+    benchmarks,
+    drawing,
+    four_bars,
+    geared,
+    presses,
+    several_loops,
+    sliders,
+    spatial,
+    toleranced,
+    with_errors,
+)
 from gallery.entry import Entry
 
 __all__ = ["ENTRIES", "REFUSED", "SECTIONS"]
@@ -24,6 +35,7 @@ SECTIONS: Mapping[str, Mapping[str, Entry]] = {
     "Two drives, a large group, a benchmark": benchmarks.ENTRIES,
     "In space": spatial.ENTRIES,
     "With play and misaligned axes": with_errors.ENTRIES,
+    "With tolerances": toleranced.ENTRIES,
 }
 ENTRIES: Mapping[str, Entry] = {name: entry for section in SECTIONS.values() for name, entry in section.items()}
 

@@ -109,9 +109,9 @@ def seven_half_way() -> float:
 # ---- rssr, spherical-four-bar: one equation a cos ψ + b sin ψ = c ----------------------------------------------------
 
 
-def rocker_of_rssr(crank: float) -> float:
+def rocker_of_rssr(crank: float, *, a: float = 30e-3, b: float = 120e-3, c: float = 70e-3, d: float = 100e-3,
+                   s1: float = 10e-3, s4: float = 20e-3, alpha: float = np.pi / 3) -> float:  # fmt: skip
     """ψ from |A − B|² = b², A the ball of the crank, B that of the rocker."""
-    a, b, c, d, s1, s4, alpha = 30e-3, 120e-3, 70e-3, 100e-3, 10e-3, 20e-3, np.pi / 3
     axis, x = np.array([0.0, -np.sin(alpha), np.cos(alpha)]), np.array([1.0, 0.0, 0.0])
     ball = np.array([a * np.cos(crank), a * np.sin(crank), s1]) - np.array([d, 0.0, 0.0]) - s4 * axis
     return elliptic(

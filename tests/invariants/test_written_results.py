@@ -180,7 +180,7 @@ def test_a_failing_writer_leaves_nothing(
     if suffix != ".zarr":
         path.write_text("before")
 
-    def breaks(result: Any, path: Path, units_row: bool) -> None:
+    def breaks(result: Any, path: Path, units_row: bool, table: str) -> None:
         if path.exists():
             path.write_text("half")
         raise OSError(28, "No space left on device")
@@ -197,7 +197,7 @@ def test_a_failing_writer_leaves_nothing(
 
 
 def test_interrupted_while_writing(result: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupted(result: Any, path: Path, units_row: bool) -> None:
+    def interrupted(result: Any, path: Path, units_row: bool, table: str) -> None:
         path.write_text("half")
         raise KeyboardInterrupt
 

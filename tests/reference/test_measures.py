@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy import optimize
+from scipy.spatial.transform import Rotation
 
 import trunnion
 from measured import courses, figures, references
@@ -21,7 +22,6 @@ from trunnion.analysis.analyse import Run, prepare
 from trunnion.analysis.measure_figures import figure, kept, known, shown, span
 from trunnion.analysis.measure_positions import plan
 from trunnion.analysis.measures import MEASURES, STATISTICS, Measure, coordinate_unit, named
-from trunnion.model.parts import Measure as Stated
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 R, L, E = 0.3, 1.0, 0.1  # crank, rod, offset of the guide
@@ -309,6 +309,20 @@ def test_forces_are_those_of_the_analysis() -> None:
     assert found["now"] == pytest.approx(float(result["efficiency_instant"].values[40]), rel=1e-9, nan_ok=True)
 
 
+def test_locking_margin() -> None:
+    """The least of the analysis to where it is looked for; no derivative, rather than a silent 0."""
+    run = prepare(build(slider_crank(R, L, E), friction=0.4, radius=0.08))
+    result = trunnion.locking(run.system.mechanism, 90)
+    least = float(np.nanmin(result["locking_margin"].values))
+    assert least < MARGIN
+    margin = Measure("margin", "locking_margin", "mechanism")
+    found = figures(run, [margin], 90)["margin"]
+    assert least * 0.99 < found <= least
+    slope = figures(run, [margin], 90, {"links.crank.points.B.x": Dual(R, 1.0)})["margin"]
+    assert np.isnan(np.ravel(derivative(slope))[0])
+    assert float(np.ravel(primal(slope))[0]) == pytest.approx(found, rel=1e-12)
+
+
 def test_forces_in_space() -> None:
     """Efforts and reactions of an RSSR with friction are those of the analysis."""
     run = prepare(Mechanism(**rssr(friction=0.1).data))
@@ -322,6 +336,34 @@ def test_forces_in_space() -> None:
     reaction = result["reaction_force"].sel(joint=joint).values
     assert found["z"] == pytest.approx(run.cycle.mean(reaction[2]), rel=1e-12)
     assert found["size"] == pytest.approx(run.cycle.mean(np.linalg.norm(reaction, axis=0)), rel=1e-12)
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e-7])
+def test_turn_of_a_link_in_space(scale: float) -> None:
+    """About each global axis the component of the rotation vector from the nominal attitude, however far it is."""
+    run = prepare(Mechanism(**rssr().data))
+    link = next(name for name in run.system.mechanism.links if run.system.mechanism.drivers and "rocker" in name)
+    measures = [Measure(axis, "angle", link, axis, at=1.0) for axis in "xyz"]
+    path = next(path for path in run.values if path.startswith(f"links.{link}.points.") and run.values[path] > 0.01)
+    value = float(run.values[path])
+    changes = value * (1 + scale * np.array([[0.0], [0.01], [-0.1]]))
+    positions, _ = references(run, measures, 36)
+    found = figures(run, measures, 36, {path: changes})
+    walk = run.solve(positions.times, run.system.mechanism.parameters({path: changes})).walk
+    axes = np.array([[np.broadcast_to(n, (3, 1)) for n in axis] for axis in walk.motions[link].frame[:3]])
+    frames = np.moveaxis(axes[..., 0], 2, 0).swapaxes(1, 2)  # columns are the axes
+    for k in range(3):
+        vector = Rotation.from_matrix(frames[k] @ frames[0].T).as_rotvec()
+        turned = [float(found[axis][k]) for axis in "xyz"]
+        np.testing.assert_allclose(turned, vector, rtol=1e-7 if scale < 1 else 1e-10, atol=1e-14)
+    slopes = figures(run, measures, 36, {path: Dual(value, 1.0)})
+    for axis in "xyz":
+        step = 1e-6 * value
+        ends = figures(
+            run, [Measure(axis, "angle", link, axis, at=1.0)], 36, {path: value + np.array([[step], [-step]])}
+        )
+        slope = (ends[axis][0] - ends[axis][1]) / (2 * step)
+        assert float(np.ravel(derivative(slopes[axis]))[0]) == pytest.approx(slope, rel=1e-6, abs=1e-7)
 
 
 def test_derivative_of_a_peak_and_of_the_efficiency() -> None:
@@ -481,6 +523,7 @@ def test_no_other_positions_than_needed(durango: Run) -> None:
 @pytest.mark.parametrize(
     ("driver", "measure", "expected"),
     [
+        ({**RISE, "returns": True}, FAR, "a coordinate of 'A', which names no one position"),
         (RISE, Measure("a", "slide", "C", at=3.0), "171.887 deg is outside the range of 'A', 11.4592 to 137.51 deg"),
         (RISE, Measure("a", "slide", "C", at=3.0, timed=True), "3 s is not in the cycle, which takes 2 s"),
         ({**RISE, "returns": True}, Measure("a", "slide", "C", at=1.0), "names no one position"),
@@ -493,15 +536,48 @@ def test_places_that_are_not(driver: Any, measure: Measure, expected: str) -> No
         plan(press(**driver), [measure], 36)
 
 
-@pytest.mark.skipif("statistic" not in Stated.model_fields, reason="the model file has no statistic yet")
 def test_names(crank: Run) -> None:
-    mechanism = crank.system.mechanism
-    read = named(mechanism, ["maximum:effort:A", "rms:piston.P.x", "rotation:P", "effort:A"], crank.values)
-    assert [(one.kind, one.subject, one.axis, one.rule) for one in read] == [
-        ("effort", "A", "", "maximum"), ("point", "piston.P", "x", "rms"), ("rotation", "P", "", "deviation"),
-        ("effort", "A", "", "deviation"),
-    ]  # fmt: skip
-    for wrong in ("maximum:A", "sum:effort:A", "effort", "piston.P", "maximum:effort:Q"):
+    """On the command line: kinds, axes, statistics before them, and none of what means nothing."""
+    forms = {
+        "effort:A": ("effort", "A", "", "deviation"),
+        "maximum:effort:A": ("effort", "A", "", "maximum"),
+        "rms:piston.P.x": ("point", "piston.P", "x", "rms"),
+        "reaction:P": ("reaction", "P", "", "deviation"),
+        "peak-to-peak:reaction:P.y": ("reaction", "P", "y", "peak-to-peak"),
+        "efficiency:cycle": ("efficiency", "cycle", "", "ratio"),
+        "minimum:efficiency:instant": ("efficiency", "instant", "", "minimum"),
+        "locking_margin:mechanism": ("locking_margin", "mechanism", "", "minimum"),
+        "path_error:piston.P": ("path_error", "piston.P", "", "maximum"),
+        "straightness:rod.P": ("straightness", "rod.P", "", "line"),
+        "stroke:C": ("stroke", "C", "", "peak-to-peak"),
+        "dead_centre:C": ("dead_centre", "C", "", "dead centre"),
+        "place-of-minimum:dead_centre:C": ("dead_centre", "C", "", "dead centre, least"),
+        "transmission_error:C": ("transmission_error", "C", "", "deviation"),
+    }
+    read = named(crank.system.mechanism, forms, crank.values)
+    assert {one.name: (one.kind, one.subject, one.axis, one.rule) for one in read} == forms
+    wrong = (
+        "maximum:A",
+        "sum:effort:A",
+        "effort",
+        "piston.P",
+        "maximum:effort:Q",
+        "efficiency:A",
+        "piston.P.x:maximum",
+    )
+    for name in wrong:
         with pytest.raises(MechanismError):
-            named(mechanism, [wrong], crank.values)
+            named(crank.system.mechanism, [name], crank.values)
     assert coordinate_unit(crank.system, crank.values) == "rad"
+
+
+def test_play_is_of_some_measures_only() -> None:
+    """Those of the model that it does not know are left out with a note, asked for they are refused."""
+    data = trunnion.read(EXAMPLES / "fourbar-with-play.yaml").data()
+    data["measures"] = {"turn": {"rotation": "D", "limit": "0.1 deg"}, "swing": {"stroke": "D", "limit": "0.1 deg"}}
+    mechanism = Mechanism(**data)
+    result = trunnion.play(mechanism, steps=12)
+    assert list(result["measure"].values) == ["turn"]
+    assert any("which swing is none of: left out" in one["what"] for one in json.loads(result.attrs["findings"]))
+    with pytest.raises(MechanismError, match="which swing is none of"):
+        trunnion.play(mechanism, ["swing"], steps=12)

@@ -274,7 +274,6 @@ def test_correlated_tolerances(rho: float) -> None:
     assert np.std(fourbar_angle(*drawn.T)) == pytest.approx(found["deviation_linear"].item(), rel=0.01)
 
 
-@pytest.mark.xfail(strict=True, reason="a toleranced number that follows another is held")
 def test_number_that_follows_another() -> None:
     """The length of the coupler by a dimension, and where its pin is drilled from there: both move the pin."""
     mechanism = fourbar(tolerances={"l3": "±0.05 mm", "links.coupler.points.C.x": "±0.01 mm"})
@@ -286,7 +285,6 @@ def test_number_that_follows_another() -> None:
     assert found["searched_upper"].item() == pytest.approx(least, rel=1e-11)
 
 
-@pytest.mark.xfail(strict=True, reason="a toleranced number that follows another is held")
 def test_play_of_a_hole_that_follows_a_dimension() -> None:
     """Radius of the hole by a dimension, both with limits: the largest play has both."""
     pin = {"radius": "4.99 mm", "hole_radius": "bore"}

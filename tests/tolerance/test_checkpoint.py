@@ -153,4 +153,6 @@ def test_written_from_time_to_time(tmp_path: Path, monkeypatch: pytest.MonkeyPat
 def test_the_hash_is_of_the_job_alone() -> None:
     assert job_hash(ToyJob()) == job_hash(ToyJob(pause=1.0, folder=Path()))
     assert job_hash(ToyJob()) != job_hash(ToyJob(seed=2))
+    arrays = [ToyJob(model={"a": np.linspace(0.0, last, 2000)}) for last in (1.0, 1.0, 1.0 + 1e-12)]
+    assert job_hash(arrays[0]) == job_hash(arrays[1]) != job_hash(arrays[2])
     assert job_hash(ToyJob(model={"a": 1.0, "b": 2.0})) == job_hash(ToyJob(model={"b": 2.0, "a": 1.0}))

@@ -14,8 +14,10 @@ import pytest
 from toy_job import ToyJob
 from toy_programs import ENVIRONMENT, POSIX, interrupted
 from trunnion import Finding, MechanismError
-from trunnion.analysis.tolerance.ranges import Pace, Plan, count, gaps
+from trunnion.analysis.tolerance.checkpoint import Checkpoint
+from trunnion.analysis.tolerance.ranges import Pace, Plan, count, gaps, union
 from trunnion.analysis.tolerance.runner import run
+from trunnion.errors import Severity
 
 
 def test_one_process_gives_the_blocks_in_order() -> None:
@@ -71,6 +73,16 @@ def test_what_a_job_raises_arrives(jobs: int) -> None:
     with pytest.raises(ZeroDivisionError, match="block 5"):
         run(ToyJob(fault="evaluate"), jobs=jobs)
     assert not multiprocessing.active_children()
+
+
+def test_machines_of_several_kinds_are_told(tmp_path: Path) -> None:
+    path = tmp_path / "run.npz"
+    saved = Checkpoint(path, ToyJob())
+    saved.arithmetic.add("another")
+    saved.keep(ToyJob().prepare().evaluate(0, 10))
+    (note,) = run(ToyJob(), checkpoint=path, resume=True).notes
+    assert note.what.startswith("machines of 2 kinds took part")
+    assert note.severity == Severity.NOTE
 
 
 def test_findings_survive_pickling() -> None:
@@ -149,6 +161,7 @@ def test_gaps_and_plan() -> None:
     assert gaps([], 5) == [(0, 5)]
     assert gaps([(0, 5)], 5) == []
     assert gaps([(1, 2), (4, 5)], 7) == [(0, 1), (2, 4), (5, 7)]
+    assert union([(4, 5), (0, 2), (2, 3)]) == ((0, 3), (4, 5))
     plan = Plan([(1, 2), (4, 5)], 16)
     taken = []
     while plan.left:
@@ -174,5 +187,7 @@ def test_portions_follow_the_pace() -> None:
     assert pace.blocks(1000, 2) == 1  # nothing is known yet
     pace.seen(1, 0.01)
     assert pace.blocks(10**6, 2) == 100
+    assert pace.blocks(10**8, 1000) == 5000  # none comes more often than it can be merged
     assert pace.blocks(40, 2) == 10  # the end is shared out
+    assert pace.blocks(10, 2) == 6  # but not endlessly
     assert Pace(7, 1.0).blocks(1000, 2) == 7

@@ -11,13 +11,15 @@ a silent number.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
-__all__ = ["Dual", "derivative", "functions", "parts", "primal", "seed", "spatial"]
+from trunnion.algebra.traced import Traced
+
+__all__ = ["Dual", "depth", "derivative", "functions", "parts", "primal", "seed", "spatial"]
 
 
 class Dual:
@@ -128,10 +130,10 @@ class Dual:
 
 
 def primal(number: Any) -> Any:
-    """The number without any ε: its innermost real part."""
+    """The number without any ε: its innermost real part. A number that is compiled becomes a constant for derivatives."""
     while isinstance(number, Dual):
         number = number.real
-    return number
+    return number.held() if isinstance(number, Traced) else number
 
 
 def seed(number: Any) -> Dual:
@@ -160,6 +162,14 @@ def parts(number: Any) -> tuple[Any, Any]:
         return number.real, number.dual
     (real, dual), (real_slope, dual_slope) = parts(number.real), parts(number.dual)
     return Dual(real, real_slope), Dual(dual, dual_slope)
+
+
+def depth(numbers: Iterable[Any]) -> int:
+    """Steps of Newton's method at a solution that carry all derivatives of the numbers along: one for each level of ε.
+
+    Numbers that are compiled may be differentiated later, once.
+    """
+    return max((1 if isinstance(n, Traced) else _depth(n) for n in numbers), default=0)
 
 
 def _shape(number: Any) -> tuple[int, ...]:

@@ -12,6 +12,7 @@ import numpy as np
 
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
+from trunnion.algebra.traced import kept
 
 __all__ = ["condition", "cross", "determinant", "dot", "inverse", "quick_inverse", "solve", "weighted"]
 
@@ -37,11 +38,11 @@ def weighted(weights: Sequence[Number], values: Sequence[Number]) -> Number:
     return total
 
 
-def solve(matrix: Sequence[Sequence[Number]], *sides: Sequence[Number]) -> list[list[Number]]:
+def solve(matrix: Sequence[Sequence[Number]], *sides: Sequence[Number], pivoting: bool = True) -> list[list[Number]]:
     """Solutions x of A x = b for each right-hand side b in `sides`, by elimination with row pivoting per lane.
 
     matrix: n rows of n entries; sides: n entries each. Returns one list of n entries for each side.
-    A singular lane comes out non-finite (a zero pivot divides).
+    Without pivoting the diagonal must outweigh the rest of each row. A singular lane comes out non-finite (a zero pivot divides).
     """
     n = len(matrix)
     columns = n + len(sides)
@@ -50,11 +51,12 @@ def solve(matrix: Sequence[Sequence[Number]], *sides: Sequence[Number]) -> list[
     rows = _quiet(rows)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         for k in range(n - 1):
-            _pivot(rows, k, columns, xp)
+            if pivoting:
+                _pivot(rows, k, columns, xp)
             for i in range(k + 1, n):
                 factor = rows[i][k] / rows[k][k]
                 for j in range(k + 1, columns):
-                    rows[i][j] = rows[i][j] - factor * rows[k][j]
+                    rows[i][j] = kept(rows[i][j] - factor * rows[k][j])
         solutions: list[list[Number]] = []
         for column in range(n, columns):
             x: list[Number] = [0.0] * n
@@ -86,14 +88,15 @@ def _pivot(rows: list[list[Number]], k: int, columns: int, xp: Number) -> Number
             if everywhere:
                 rows[k][j], rows[i][j] = lower, upper
             else:
-                rows[k][j], rows[i][j] = xp.where(swap, lower, upper), xp.where(swap, upper, lower)
+                rows[k][j], rows[i][j] = kept(xp.where(swap, lower, upper)), xp.where(swap, upper, lower)
     return sign
 
 
-def inverse(matrix: Sequence[Sequence[Number]]) -> list[list[Number]]:
+def inverse(matrix: Sequence[Sequence[Number]], pivoting: bool = True) -> list[list[Number]]:
     """A⁻¹ as rows, by elimination with row pivoting per lane; non-finite where a lane is singular."""
     n = len(matrix)
-    columns = solve(matrix, *([1.0 if i == j else 0.0 for i in range(n)] for j in range(n)))
+    sides = ([1.0 if i == j else 0.0 for i in range(n)] for j in range(n))
+    columns = solve(matrix, *sides, pivoting=pivoting)
     return [[columns[j][i] for j in range(n)] for i in range(n)]
 
 
@@ -132,7 +135,7 @@ def determinant(matrix: Sequence[Sequence[Number]]) -> Number:
             for i in range(k + 1, n):
                 factor = rows[i][k] / rows[k][k]
                 for j in range(k + 1, n):
-                    rows[i][j] = rows[i][j] - factor * rows[k][j]
+                    rows[i][j] = kept(rows[i][j] - factor * rows[k][j])
     return product
 
 

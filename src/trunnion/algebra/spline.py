@@ -38,7 +38,7 @@ class Spline(NamedTuple):
         """The row of the table for the interval in which each place lies."""
         if self.table is not None:
             index = np.searchsorted(self.table[0], primal(place), side="right") - 1
-            return list(self.table[:, np.maximum(index, 0)])
+            return [namespace(index).take(row, np.maximum(index, 0)) for row in self.table]
         found = self._row(0)
         xp = namespace(place, *self.knots, *self.values)
         for k in range(1, len(self.knots) - 1):

@@ -339,35 +339,53 @@ def _fill(
 
 def status_of(back: Backward, shape: tuple[int, ...]) -> NDArray[np.int8]:
     """The gravest status of every position."""
-    walk = back.walk
-    status = pose_status(walk, shape)
-
-    def raise_to(code: Status, where: Number) -> None:
-        np.maximum(status, np.where(where, np.int8(code), np.int8(0)), out=status)
-
-    for name in sticking(walk.system):
-        raise_to(Status.ZERO_SLIP, back.slips[name].zero)
-    for settled in back.settled:
-        raise_to(Status.NOT_CONVERGED, ~np.asarray(settled.converged, bool))
-        raise_to(Status.LOCKED, np.asarray(settled.share) < 1.0)
-    raise_to(Status.NOT_CONVERGED, ~np.isfinite(_sum_of_forces(back)))
-    for undefined in back.undefined.values():
-        raise_to(Status.LOAD_UNDEFINED, undefined)
-    return status
+    return _of_shape(status_number(back), shape)
 
 
 def pose_status(walk: Forward, shape: tuple[int, ...]) -> NDArray[np.int8]:
     """The gravest status of every position that its motion alone decides."""
+    return _of_shape(pose_status_number(walk), shape)
+
+
+def _of_shape(status: Number, shape: tuple[int, ...]) -> NDArray[np.int8]:
+    return np.array(np.broadcast_to(status, shape), np.int8)
+
+
+def status_number(back: Backward) -> Number:
+    """The gravest status in whatever shape the numbers of the walk have."""
+    walk = back.walk
+    status = pose_status_number(walk)
+
+    def raised(code: Status, where: Number) -> Number:
+        return np.maximum(status, np.where(where, np.int8(code), np.int8(0)))
+
+    for name in sticking(walk.system):
+        status = raised(Status.ZERO_SLIP, back.slips[name].zero)
+    for settled in back.settled:
+        status = raised(Status.NOT_CONVERGED, np.logical_not(settled.converged))
+        status = raised(Status.LOCKED, np.less(settled.share, 1.0))
+    status = raised(Status.NOT_CONVERGED, ~np.isfinite(_sum_of_forces(back)))
+    for undefined in back.undefined.values():
+        status = raised(Status.LOAD_UNDEFINED, undefined)
+    return status
+
+
+def pose_status_number(walk: Forward) -> Number:
+    """The gravest status that the motion alone decides, in whatever shape its numbers have."""
     placed: Number = True
-    condition: Number = 1.0
-    for group, pose in zip(walk.system.groups, walk.poses, strict=True):
+    condition = worst_condition(walk)
+    for pose in walk.poses:
         for frame in pose.frames:
             placed = placed & np.isfinite(_sum(flat(frame)))
-        condition = np.maximum(condition, primal(group.condition(pose)))
     status = np.where(condition > NEAR_SINGULAR, np.int8(Status.NEAR_SINGULAR), np.int8(Status.SOLVED))
     status = np.where(condition <= SINGULAR, status, np.int8(Status.SINGULAR))
-    status = np.where(placed, status, np.int8(Status.NOT_ASSEMBLED))
-    return np.array(np.broadcast_to(status, shape), np.int8)
+    return np.where(placed, status, np.int8(Status.NOT_ASSEMBLED))
+
+
+def worst_condition(walk: Forward) -> Number:
+    """Largest condition of a module."""
+    parts = (primal(group.condition(pose)) for group, pose in zip(walk.system.groups, walk.poses, strict=True))
+    return functools.reduce(np.maximum, parts, 1.0)
 
 
 def _sum_of_forces(back: Backward) -> Number:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
-from trunnion.algebra.namespace import Number
+from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.nested import each
 from trunnion.analysis import change_points
 from trunnion.analysis.follow import Follower, assemblies, at, lane_of, limits
@@ -120,8 +120,10 @@ def _interpolated(times: Array, row: Array, moment: Array, near: NDArray[np.intp
     """Linear between the grid's neighbours; from the one that exists where the other does not."""
     if len(times) == 1:
         return np.broadcast_to(row[0], np.shape(moment))
-    before, after = row[near - 1], row[near]
-    share = (moment - times[near - 1]) / (times[near] - times[near - 1])
+    take = namespace(moment).take
+    before, after = take(row, near - 1), take(row, near)
+    start = take(times, near - 1)
+    share = (moment - start) / (take(times, near) - start)
     mixed: Array = before + share * (after - before)
     return np.where(np.isfinite(mixed), mixed, np.where(np.isfinite(before), before, after))
 

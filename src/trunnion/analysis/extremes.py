@@ -12,8 +12,9 @@ stayed (envelope theorem), and the place changes by −p′ of the dual part ove
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,40 +22,115 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number
 
-__all__ = ["Extreme", "largest", "shape_of"]
+__all__ = ["Extreme", "Grid", "largest", "shape_of"]
 
 POINTS, FEWER = 7, 5
 UNEVEN = 8.0  # times the least bend the largest one may have, for a polynomial to go through
-ROUNDS = 8  # of Newton's method, which starts within a step and ends at rounding after some four
+ROUNDS = 8  # of Newton's method, which ends at rounding after some three
+SETTLED = 1e-13  # of a step: the last step of Newton's method
+ALIKE = 1e-9  # of a step: grids of positions whose polynomials are made of the same numbers
 
 Array = NDArray[np.float64]
 Positions = NDArray[np.intp]
 
 
+class Stencils(NamedTuple):
+    """The nodes of the polynomial about each position, and what it is made of: powers of steps from that position.
+
+    nodes, laps: which positions, and in which period they lie, (position, node); step: mean distance of them,
+    (position,); reach: neighbours between which the polynomial counts, in steps, (2, position); kind: of the position
+    among those that lie alike, (position,). Maps of each kind take values at the nodes, (kind, …, node): whole, fewer:
+    to coefficients of powers; bends: to second differences; few: which of these FEWER nodes have.
+    """
+
+    nodes: Positions
+    laps: Positions
+    step: Array
+    reach: Array
+    kind: Positions
+    whole: Array
+    fewer: Array
+    bends: Array
+    few: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Positions of a curve: rising places; period: after which the curve repeats, if it does."""
+
+    at: Array
+    period: float | None = None
+
+    @cached_property
+    def weights(self) -> Array:
+        """Of the positions in a mean; their sum is 1. All alike over a period, by trapezoids over a range."""
+        count = len(self.at)
+        if count == 1 or self.period is not None:
+            return np.full(count, 1 / count)
+        weights: Array = np.convolve(np.diff(self.at), [0.5, 0.5]) / (self.at[-1] - self.at[0])
+        return weights
+
+    @cached_property
+    def stencils(self) -> Stencils:
+        """Polynomials about every position, made once."""
+        count, tops = len(self.at), np.arange(len(self.at))
+        points = min(POINTS, count)
+        if self.period is not None:
+            points -= 1 - points % 2
+            found = tops[:, None] + np.arange(points) - points // 2
+        else:
+            found = np.clip(tops - points // 2, 0, count - points)[:, None] + np.arange(points)
+        nodes, laps = found % count, found // count
+        places = self.at[nodes] + laps * (self.period or 0.0) - self.at[:, None]
+        step = (places[:, -1] - places[:, 0]) / max(points - 1, 1) if points > 1 else np.ones(count)
+        spots = places / step[:, None]
+        own = np.argmax(found == tops[:, None], axis=1)
+        reach = np.array([spots[tops, np.maximum(own - 1, 0)], spots[tops, np.minimum(own + 1, points - 1)]])
+        _, first, kind = np.unique(np.rint(spots / ALIKE), axis=0, return_index=True, return_inverse=True)
+        maps = [_maps(spots[k], int(own[k])) for k in first]
+        return Stencils(
+            nodes, laps, step, reach, kind.ravel(), *(np.array([one[k] for one in maps]) for k in range(4))
+        )  # fmt: skip
+
+
+def _maps(spots: Array, own: int) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
+    """Coefficients of a polynomial through all nodes and through FEWER about the top, second differences; see above."""
+    points = len(spots)
+    whole = np.asarray(np.linalg.inv(np.vander(spots, increasing=True)), float)
+    few = min(FEWER, points)
+    first = int(np.clip(own - few // 2, 0, points - few))
+    inner = slice(first, first + few)
+    fewer = np.zeros((points, points))
+    fewer[:few, inner] = np.linalg.inv(np.vander(spots[inner], increasing=True))
+    bends = np.zeros((max(points - 2, 0), points))
+    for k in range(len(bends)):
+        left, right = spots[k + 1] - spots[k], spots[k + 2] - spots[k + 1]
+        bends[k, k : k + 3] = 1 / left, -1 / left - 1 / right, 1 / right
+    index = np.arange(len(bends))
+    return whole, fewer, bends, (index >= first) & (index + 3 <= first + few)
+
+
 class Extreme(NamedTuple):
-    """The largest value of every lane and where it is. All but `nodes` broadcast over the lanes.
+    """The largest value of every lane and where it is.
 
     value; place: in the unit of the positions; inside: whether the curve is level there, at no end of its range.
-    nodes: positions that the polynomial goes through, (lane…, point); spots: theirs, from `origin` in steps of `step`;
-    spot: of the largest value, in the same way, with its derivatives; used: how many of the nodes it is made of, the
-    first ones, 0 where it is a position itself.
+    top: the position next to it; spot: how far from there it is, in steps, with its derivatives; used: how many nodes
+    its polynomial has, 0 where it is a position itself.
     """
 
     value: Number
     place: Number
     inside: NDArray[np.bool_]
-    nodes: Positions
-    laps: Positions
-    spots: Array
+    grid: Grid
+    top: Positions
     spot: Number
     used: Positions
 
     def of(self, values: Array, gain: float = 0.0) -> Number:
         """What another number of the positions is at the place; gain: by how much it grows in a period."""
-        known = values[self.nodes] + gain * self.laps
-        columns = [self.spots[..., k] for k in range(self.spots.shape[-1])]
-        coefficients = _divided([known[..., k] for k in range(len(columns))], columns, self.used)
-        return _at(coefficients, columns, self.spot)[0]
+        stencils = self.grid.stencils
+        known = values[stencils.nodes[self.top]] + gain * stencils.laps[self.top]
+        return _at(_coefficients(known, stencils, self.top, self.used), self.spot)[0]
 
 
 def shape_of(number: Number) -> tuple[int, ...]:
@@ -62,155 +138,118 @@ def shape_of(number: Number) -> tuple[int, ...]:
     return number.shape if isinstance(number, Dual) else np.shape(number)
 
 
-def largest(curve: Number, at: Array, period: float | None = None) -> Extreme:
-    """The largest value of a curve, (lane…, position), over its last axis.
-
-    at: rising places of the positions, (position,); period: after which the curve repeats, if it does.
-    Lanes with a NaN have NaN for an answer.
-    """
-    shape = shape_of(curve)
+def largest(curve: Number, grid: Grid) -> Extreme:
+    """The largest value of a curve, (lane…, position), over its last axis. Lanes with a NaN have NaN for an answer."""
+    shape, stencils = shape_of(curve), grid.stencils
     lanes = shape[:-1]
     real = np.broadcast_to(primal(curve), shape).reshape(-1, shape[-1])
-    sound = ~np.isnan(real).any(axis=1)
-    rows, tops = _tops(real, periodic=period is not None)
-    nodes, laps = _stencil(tops, len(at), periodic=period is not None)
-    places = at[nodes] + laps * (period or 0.0) - at[tops][:, None]
-    step = (places[:, -1] - places[:, 0]) / max(1, nodes.shape[1] - 1) if nodes.shape[1] > 1 else np.ones(len(tops))
-    spots = places / step[:, None]
-    own = np.argmax((nodes == tops[:, None]) & (laps == 0), axis=1)
-    even = _even(real[rows[:, None], nodes], spots)
-    reach = _neighbours(spots, own)
-    order = _nearest_first(own, nodes.shape[1])
-    nodes, laps, spots = (np.take_along_axis(one, order, axis=1) for one in (nodes, laps, spots))
-    spot, used, value = _refined(real[rows[:, None], nodes], real[rows, tops], spots, reach, even)
-    first = np.searchsorted(rows, np.arange(len(real)))
-    best = np.maximum.reduceat(np.where(np.isnan(value), -np.inf, value), first)
-    winners = np.flatnonzero(~(value < best[rows]))
-    chosen = winners[np.searchsorted(rows[winners], np.arange(len(real)))]
-
-    def lane(numbers: Any) -> Any:
-        return numbers[chosen].reshape(lanes + numbers.shape[1:])
-
-    nodes, laps, spots, spot, used = (lane(one) for one in (nodes, laps, spots, spot, used))
-    index = np.indices(lanes, sparse=True)
-    known = [curve[(*index, nodes[..., k])] for k in range(nodes.shape[-1])]
-    columns = [spots[..., k] for k in range(nodes.shape[-1])]
-    value, spot = _with_slopes(known, columns, spot, used)
-    gone = np.where(sound.reshape(lanes), 0.0, np.nan)
-    place = spot * lane(step) + lane(at[tops]) + gone
-    return Extreme(value + gone, place, used > 0, nodes, laps, spots, spot, used)
+    rows, tops = _tops(real, periodic=grid.period is not None)
+    spot, used, value = _refined(real[rows[:, None], stencils.nodes[tops]], real[rows, tops], stencils, tops)
+    if len(rows) > len(real):
+        chosen = _highest(rows, value, len(real))
+        tops, spot, used, value = tops[chosen], spot[chosen], used[chosen], value[chosen]
+    gone = np.where(np.isnan(real.sum(axis=1)), np.nan, 0.0).reshape(lanes)
+    moved: Number = spot.reshape(lanes)
+    top, used = tops.reshape(lanes), used.reshape(lanes)
+    found: Number = value.reshape(lanes)
+    if isinstance(curve, Dual):
+        known = curve[(*(n[..., None] for n in np.indices(lanes, sparse=True)), stencils.nodes[top])]
+        found, slope, second = _at(_coefficients(known, stencils, top, used), moved)
+        bend = np.where(used > 0, primal(second), -np.inf)
+        moved = moved - Dual(0.0 * moved, slope.dual) * (1.0 / bend)
+    place = moved * stencils.step[top] + grid.at[top] + gone
+    return Extreme(found + gone, place, used > 0, grid, top, moved, used)
 
 
 def _tops(real: Array, periodic: bool) -> tuple[Positions, Positions]:
     """Row and position of every value above its neighbours that may be the largest of its row; one a row at least."""
-    before, after = np.full_like(real, -np.inf), np.full_like(real, -np.inf)
-    before[:, 1:], after[:, :-1] = real[:, :-1], real[:, 1:]
-    if periodic:
-        before[:, 0], after[:, -1] = real[:, -1], real[:, 0]
-    high = (real >= before) & (real > after)
+    rising = np.empty((len(real), real.shape[1] + 1), bool)  # from the position before to that after each boundary
+    rising[:, 1:-1] = real[:, 1:] >= real[:, :-1]
+    rising[:, 0] = real[:, 0] >= real[:, -1] if periodic else True
+    rising[:, -1] = rising[:, 0] if periodic else False
+    high = rising[:, :-1] & ~rising[:, 1:]
     highest = np.argmax(real, axis=1)
-    every = np.arange(len(real))
-    high[every, highest] = True
-    rows, tops = np.nonzero(high)
-    middle, left, right = real[rows, tops], before[rows, tops], after[rows, tops]
-    bend = 2 * middle - np.where(np.isinf(left), right, left) - np.where(np.isinf(right), left, right)
-    # the top of a parabola through three points is no more than an eighth of their bend above the highest
-    near = ~(middle + bend / 4 < real[rows, highest[rows]])
+    high[np.arange(len(real)), highest] = True
+    rows, tops = np.divmod(np.flatnonzero(high), real.shape[1])
+    if len(rows) == len(real):
+        return rows, tops
+    last = real.shape[1] - 1
+    left = real[rows, tops - 1] if periodic else real[rows, np.maximum(tops - 1, 0)]
+    right = real[rows, (tops + 1) % (last + 1)] if periodic else real[rows, np.minimum(tops + 1, last)]
+    middle = real[rows, tops]
+    # the top of a parabola is no more than half the larger drop to its neighbours above the highest position
+    near = ~(middle + np.maximum(middle - left, middle - right) / 2 < real[rows, highest[rows]])
     return rows[near], tops[near]
 
 
-def _stencil(tops: Positions, count: int, periodic: bool) -> tuple[Positions, Positions]:
-    """Positions of each polynomial, and in which period they lie: those round the top, or the last ones of a range."""
-    points = min(POINTS, count)
-    if periodic:
-        points -= 1 - points % 2
-        found = tops[:, None] + np.arange(points) - points // 2
-        return found % count, found // count
-    first = np.clip(tops - points // 2, 0, count - points)
-    found = first[:, None] + np.arange(points)
-    return found, np.zeros_like(found)
+def _highest(rows: Positions, value: Array, count: int) -> Positions:
+    """Of all tops the highest of each row, the first of several."""
+    best = np.maximum.reduceat(np.where(np.isnan(value), -np.inf, value), np.searchsorted(rows, np.arange(count)))
+    winners = np.flatnonzero(~(value < best[rows]))
+    return winners[np.searchsorted(rows[winners], np.arange(count))]
 
 
-def _neighbours(spots: Array, own: Positions) -> tuple[Array, Array]:
-    """Places of the neighbours of each top, between which the polynomial counts; the top's own at an end."""
-    every, last = np.arange(len(own)), spots.shape[1] - 1
-    return spots[every, np.maximum(own - 1, 0)], spots[every, np.minimum(own + 1, last)]
-
-
-def _nearest_first(own: Positions, count: int) -> Positions:
-    """Order of the nodes: the FEWER ones round the top, then the others."""
-    if count <= FEWER:
-        return np.broadcast_to(np.arange(count), (len(own), count))
-    first = np.clip(own - FEWER // 2, 0, count - FEWER)[:, None]
-    every = np.arange(count)
-    outside = (every < first) | (every >= first + FEWER)
-    return np.argsort(outside, axis=1, kind="stable")
-
-
-def _even(known: Array, spots: Array) -> NDArray[np.bool_]:
-    """Where a curve bends down at all nodes, nowhere much more than elsewhere."""
-    slopes = np.diff(known, axis=1) / np.diff(spots, axis=1)
-    bends = np.diff(slopes, axis=1)
-    if not bends.shape[1]:
-        return np.zeros(len(known), bool)
-    most, least = np.min(bends, axis=1), np.max(bends, axis=1)
-    return np.asarray((least < 0) & (most >= UNEVEN * least))
-
-
-def _refined(
-    known: Array, value: Array, spots: Array, reach: tuple[Array, Array], even: NDArray[np.bool_]
-) -> tuple[Array, Positions, Array]:
-    """Place of the top of every curve, of how many nodes it is made, and its value; value: of the position."""
+def _refined(known: Array, value: Array, stencils: Stencils, tops: Positions) -> tuple[Array, Positions, Array]:
+    """Place of every top from its position, in steps; how many nodes make it; its value. value: of the position."""
     points = known.shape[1]
-    columns = [spots[:, k] for k in range(points)]
     spot, used = np.zeros(len(known)), np.zeros(len(known), np.intp)
-    tiers = [(points, even)] if points >= 3 else []
-    if points > FEWER:
-        tiers.append((FEWER, _even(known[:, :FEWER], spots[:, :FEWER])))
-    for count, fits in tiers:
-        coefficients = _divided([known[:, k] for k in range(count)], columns)
-        at = np.zeros(len(known))
-        for _ in range(ROUNDS):
-            _, slope, second = _at(coefficients, columns, at)
-            at = np.clip(at - slope / np.where(second < 0, second, -np.inf), *reach)
-        top, slope, second = _at(coefficients, columns, at)
-        level = (reach[0] < at) & (at < reach[1]) & (np.abs(slope) <= 1e-9 * np.abs(second)) & (second < 0)
-        good = (used == 0) & fits & level & (top >= value)
-        spot, used, value = np.where(good, at, spot), np.where(good, count, used), np.where(good, top, value)
+    if points < 3:
+        return spot, used, value
+    value, kind = value.copy(), stencils.kind[tops]
+    bends = np.einsum("cij,cj->ic", stencils.bends[kind], known)
+    todo = np.flatnonzero(_even(bends))
+    _newton(todo, (spot, used, value), stencils.whole[kind[todo]], known[todo], stencils.reach[:, tops[todo]])
+    if points > FEWER and np.any(used == 0):
+        bends = np.where(stencils.few[kind].T, bends, np.nan)
+        todo = np.flatnonzero((used == 0) & _even(bends))
+        _newton(todo, (spot, used, value), stencils.fewer[kind[todo]], known[todo], stencils.reach[:, tops[todo]])
+        used[todo[used[todo] > 0]] = FEWER
     return spot, used, value
 
 
-def _with_slopes(
-    known: Sequence[Number], columns: Sequence[Array], spot: Array, used: Positions
-) -> tuple[Number, Number]:
-    """Value and place of the top with their derivatives."""
-    value, slope, second = _at(_divided(known, columns, used), columns, spot)
-    if not isinstance(slope, Dual):
-        return value, spot
-    bend = np.where(used > 0, primal(second), -np.inf)
-    return value, spot - Dual(0.0 * spot, slope.dual) / bend
+def _even(bends: Array) -> NDArray[np.bool_]:
+    """Where a curve bends down at all nodes, (node, lane), nowhere much more than elsewhere; NaN: not looked at."""
+    most, least = np.fmin.reduce(bends, axis=0), np.fmax.reduce(bends, axis=0)
+    return np.asarray((least < 0) & (most >= UNEVEN * least))
 
 
-def _divided(known: Sequence[Number], spots: Sequence[Array], used: Positions | None = None) -> list[Number]:
-    """Newton's divided differences; used: by how many of the nodes each polynomial goes, FEWER at least."""
-    found = list(known)
-    for order in range(1, len(found)):
-        for k in range(len(found) - 1, order - 1, -1):
-            found[k] = (found[k] - found[k - 1]) * (1.0 / (spots[k] - spots[k - order]))
-    if used is not None:
-        for k in range(FEWER, len(found)):
-            found[k] = np.where(k < used, 1.0, 0.0) * found[k]
-    return found
+def _newton(todo: Positions, into: tuple[Array, Positions, Array], maps: Array, known: Array, reach: Array) -> None:
+    """Tops of the polynomials of some lanes, put where they are level and no lower than the position."""
+    if not len(todo):
+        return
+    spot, used, value = into
+    coefficients = np.einsum("cij,cj->ic", maps, known)
+    at = np.clip(-coefficients[1] / (2 * coefficients[2]), *reach)
+    for _ in range(ROUNDS):
+        _, slope, second = _at(coefficients, at)
+        last, at = at, np.clip(at - slope / np.where(second < 0, second, -np.inf), *reach)
+        if np.all(np.abs(at - last) <= SETTLED):
+            break
+    top, slope, second = _at(coefficients, at)
+    level = (reach[0] < at) & (at < reach[1]) & (np.abs(slope) <= 1e-9 * np.abs(second)) & (second < 0)
+    good = level & (top >= value[todo])
+    lanes = todo[good]
+    spot[lanes], used[lanes], value[lanes] = at[good], known.shape[1], top[good]
 
 
-def _at(coefficients: Sequence[Number], spots: Sequence[Array], at: Number) -> tuple[Number, Number, Number]:
-    """Value, first and second derivative of Newton's polynomial, by Horner's rule."""
-    value: Number = coefficients[-1]
+def _coefficients(known: Number, stencils: Stencils, top: Positions, used: Positions) -> Number:
+    """Coefficients of the polynomials that were used, (power, lane…), of values at their nodes, (lane…, node)."""
+    if isinstance(known, Dual):
+        real, dual = (_coefficients(part, stencils, top, used) for part in (known.real, known.dual))
+        return Dual(real, dual)
+    kind = stencils.kind[top]
+    maps = np.where((used > FEWER)[..., None, None], stencils.whole[kind], stencils.fewer[kind])
+    return np.einsum("...ij,...j->i...", maps, np.broadcast_to(known, (*top.shape, maps.shape[-1])))
+
+
+def _at(coefficients: Number, at: Number) -> tuple[Number, Number, Number]:
+    """Value, first and second derivative of a polynomial, by Horner's rule."""
+    power = shape_of(coefficients)[0] - 1
+    value: Number = coefficients[power]
     slope: Number = 0.0 * value
     second: Number = 0.0 * value
-    for coefficient, spot in zip(coefficients[:-1][::-1], spots[: len(coefficients) - 1][::-1], strict=True):
-        way = at - spot
-        second = second * way + 2 * slope
-        slope = slope * way + value
-        value = value * way + coefficient
+    for k in range(power - 1, -1, -1):
+        second = second * at + 2.0 * slope
+        slope = slope * at + value
+        value = value * at + coefficients[k]
     return value, slope, second

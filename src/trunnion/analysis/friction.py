@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from trunnion.algebra import linalg
 from trunnion.algebra.dual import Dual, primal
-from trunnion.algebra.namespace import Number
+from trunnion.algebra.namespace import Number, compiled
 from trunnion.algebra.nested import replaced
 from trunnion.analysis import continuation
 from trunnion.errors import Finding, MechanismError
@@ -45,6 +45,8 @@ __all__ = [
 ]
 
 DOUBTFUL_ROUNDS = 20  # of Newton's method, where no certificate says that it ends at the solution that is looked for
+
+COMPILED_ROUNDS = 3  # of Newton's method where the numbers have no values to tell when to end
 
 Method = Literal["newton", "successive-approximation"]
 
@@ -152,7 +154,9 @@ def settle(
     problem = Problem(contacts, start, influence)
     if method.name == "successive-approximation":
         return _successive(problem, method)
-    return _at_once(problem) if problem.one_way else _newton(problem, method)
+    if problem.one_way:
+        return _at_once(problem)
+    return _unrolled(problem, method) if problem.compiled else _newton(problem, method)
 
 
 def _with_own(contact: Contact, column: list[Reaction]) -> list[Reaction]:
@@ -208,6 +212,11 @@ class Problem:
         shape = np.broadcast_shapes(np.shape(lanes), *(np.shape(number) for number in self.numbers()))
         chosen = np.broadcast_to(lanes, shape)
         return self.mapped(lambda number: np.broadcast_to(np.asarray(number, float), shape)[chosen]), chosen
+
+    @cached_property
+    def compiled(self) -> bool:
+        """Whether its numbers have no values yet."""
+        return compiled(self.numbers())
 
     @cached_property
     def felt(self) -> list[Felt]:
@@ -308,10 +317,10 @@ def _newton(problem: Problem, method: FrictionMethod) -> Settled:
     inverse: list[list[Number]] = []
     change: Number = np.inf
     rounds: Number = 0
-    done: Number = False
+    done: Number = np.False_
     renew = True
     for _ in range(method.limit):
-        rounds = rounds + ~np.asarray(done)
+        rounds = rounds + ~done
         if renew:
             rows = real.map_derivative(state)
             inverse = linalg.quick_inverse(identity_minus(rows))
@@ -343,6 +352,33 @@ def _newton(problem: Problem, method: FrictionMethod) -> Settled:
     return Settled(reactions, forces, rounds, change, contraction, done, shares, margin, certain, real)
 
 
+def _unrolled(problem: Problem, method: FrictionMethod) -> Settled:
+    """Newton with a fixed number of rounds, for numbers that are compiled; the last one carries the derivatives.
+
+    Lanes that need more, and those without the certificate, are for whoever compiles to compute again.
+    """
+    real = _primal(problem)
+    forces: list[Number] = [0.0] * len(real.contacts)
+    state = real.state(forces)
+    bound = np.where(np.isfinite(_peak(state.normals)), real.bound(), 0.0)
+    certain = ~(bound >= 1.0)
+    for _ in range(COMPILED_ROUNDS - 1):
+        forces = _corrected(real, state, forces, _matrix(real, state))
+        state = real.state(forces)
+    forces = _corrected(problem, problem.state(forces), forces, _matrix(real, state))
+    before, state = state, problem.state(forces)
+    change = _changed(state, before)
+    done = certain & ~(change > method.tolerance(state.normals))
+    reactions = problem.reactions(forces, state)
+    return Settled(reactions, forces, COMPILED_ROUNDS, change, 0.0, done, 1.0, np.inf, certain, real)
+
+
+def _matrix(problem: Problem, state: State) -> list[list[Number]]:
+    """(1 − A)⁻¹ at a state where the rows of |A| add up to less than 1: no pivots are needed."""
+    matrix = identity_minus(problem.map_derivative(state))
+    return linalg.quick_inverse(matrix) if len(matrix) <= 3 else linalg.inverse(matrix, pivoting=False)
+
+
 def _at_once(problem: Problem) -> Settled:
     """Friction from the frictionless reactions, which it does not change but in what no law looks at."""
     forces = problem.target(problem.state([0.0] * len(problem.contacts)).normals)
@@ -370,10 +406,10 @@ def _successive(problem: Problem, method: FrictionMethod) -> Settled:
     state = problem.state(forces)
     change: Number = np.inf
     previous: Number = np.inf
-    done: Number = False
+    done: Number = np.False_
     rounds: Number = 0
     for _ in range(method.limit):
-        rounds = rounds + ~np.asarray(done)
+        rounds = rounds + ~done
         forces = problem.target(state.normals)
         before, state = state, problem.state(forces)
         previous, change = change, _changed(state, before)
@@ -491,5 +527,5 @@ def _depth(problem: Problem) -> int:
 
 
 def _primal(problem: Problem) -> Problem:
-    """The problem without its dual parts."""
-    return problem.mapped(primal) if _depth(problem) else problem
+    """The problem without derivatives."""
+    return problem.mapped(primal) if _depth(problem) or problem.compiled else problem

@@ -16,7 +16,7 @@ from trunnion.algebra.nested import zipped
 from trunnion.analysis.system import Place, System, Values, driven_coordinates
 from trunnion.groups.planar import Acceleration, Frame, Twist, accelerated, compose, moved, point
 
-__all__ = ["Assembly", "Forward", "Motion", "PointMotion", "Travel", "forward", "pose_of", "rate_of", "start"]
+__all__ = ["Assembly", "Forward", "Motion", "PointMotion", "Travel", "forward", "pose_of", "posed", "rate_of", "start"]
 
 Assembly = Sequence[Any]  # per module: ±1 for a closed form, a `branches.Track` for a general group, None for a driver
 
@@ -246,6 +246,20 @@ def forward(
             walk.take(number, pose_of(walk, number, assembly[number], time), time)
         if travel:
             walk.carried(travel)
+    return walk
+
+
+def posed(system: System, values: Values, assembly: Assembly, time: Number) -> Forward:
+    """The walk of `forward` for what the places alone decide: every link is left at rest."""
+    walk = start(system, values)
+    walk.time = time
+    ground = walk.motions[system.mechanism.fixed_link]
+    with np.errstate(all="ignore"):
+        for number, module in enumerate(system.plan.modules):
+            pose = pose_of(walk, number, assembly[number], time)
+            for link, frame in zip(module.links, pose.frames, strict=True):
+                walk.motions[link] = ground._replace(frame=frame)
+            walk.poses.append(pose)
     return walk
 
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import functools
+import operator
 from typing import Any
 
 import numpy as np
 
+from trunnion.algebra.dual import Dual
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.analysis.account import MARGIN, useful_loads
 from trunnion.analysis.kinematics import Forward
@@ -57,5 +59,12 @@ def efficiency(subject: str, back: Backward) -> tuple[Number, ...]:
 
 
 def locking_margin(back: Backward) -> tuple[Number, ...]:
-    """Multiple of the friction at which a module locks, MARGIN where it does not up to there; without derivatives."""
-    return (functools.reduce(np.minimum, (one.margin for one in back.settled), MARGIN),)
+    """Multiple of the friction at which a module locks, MARGIN where it does not up to there.
+
+    The search for it has no derivatives: they are NaN where dual numbers ask for some below MARGIN.
+    """
+    margin: Number = functools.reduce(np.minimum, (one.margin for one in back.settled), MARGIN)
+    forces: Number = functools.reduce(operator.add, (*back.friction.values(), *back.efforts.values()), 0.0)
+    if isinstance(forces, Dual):
+        return (Dual(margin, np.where(margin < MARGIN, np.nan, 0.0)),)
+    return (margin,)

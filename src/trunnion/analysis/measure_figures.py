@@ -13,18 +13,20 @@ place has none at the nominal mechanism itself, where it is 0 whatever way one g
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.dual import primal
+from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.analysis.extremes import Extreme, largest, shape_of
+from trunnion.analysis.extremes import Extreme, Grid, largest, shape_of
 from trunnion.analysis.fill import unwrap_row
-from trunnion.analysis.measure_lines import distances, total
+from trunnion.analysis.measure_lines import distances, total, turn
 from trunnion.analysis.measure_positions import Window
 from trunnion.analysis.measures import MEASURES, Measure
 from trunnion.analysis.system import FEWEST, System
@@ -43,28 +45,33 @@ class Course(NamedTuple):
     """
 
     number: Number
-    time: Array
+    grid: Grid
     coordinate: Array
-    period: float | None
     gain: float
-
-    @property
-    def weights(self) -> Array:
-        """Of the positions in a mean over time; their sum is 1."""
-        count = len(self.time)
-        if count == 1 or self.period is not None:
-            return np.full(count, 1 / count)
-        steps = np.diff(self.time)
-        weights: Array = np.convolve(steps, [0.5, 0.5]) / (self.time[-1] - self.time[0])
-        return weights
 
     def largest(self, sign: float = 1.0) -> Extreme:
         """The largest value, or the least one with its sign changed."""
-        return largest(sign * self.number, self.time, self.period)
+        return largest(self.number if sign == 1.0 else sign * self.number, self.grid)
+
+    def both(self) -> tuple[Number, Number]:
+        """The largest value, and the least one with its sign changed."""
+        found = largest(_both_ways(self.number), self.grid).value
+        return found[0], found[1]
 
     def place(self, sign: float = 1.0) -> Number:
         """The coordinate at which it is largest."""
         return self.largest(sign).of(self.coordinate, self.gain)
+
+
+def _both_ways(number: Number, shape: tuple[int, ...] | None = None) -> Number:
+    """The number and its negative, one after the other along a new first axis."""
+    shape = shape or shape_of(number)
+    if isinstance(number, Dual):
+        return Dual(_both_ways(number.real, shape), _both_ways(number.dual, shape))
+    found = np.empty((2, *shape))
+    found[0] = number
+    np.negative(found[0], out=found[1])
+    return found
 
 
 # ---- rules ----------------------------------------------------------------------------------------------------
@@ -72,7 +79,7 @@ class Course(NamedTuple):
 
 def _largest(course: Course) -> Number:
     """The largest |value|."""
-    above, below = course.largest().value, course.largest(-1.0).value
+    above, below = course.both()
     return namespace(above, below).maximum(above, below)
 
 
@@ -83,7 +90,7 @@ def _dead_centre(course: Course, sign: float = 1.0) -> Number:
 
 
 def _rms(course: Course) -> Number:
-    square = total(course.number * course.number, course.weights)
+    square = total(course.number * course.number, course.grid.weights)
     return namespace(square).sqrt(square)
 
 
@@ -91,8 +98,8 @@ RULES: dict[str, Callable[[Course], Number]] = {
     "value": lambda course: course.number[..., 0],
     "maximum": lambda course: course.largest().value,
     "minimum": lambda course: -course.largest(-1.0).value,
-    "peak-to-peak": lambda course: course.largest().value + course.largest(-1.0).value,
-    "mean": lambda course: total(course.number, course.weights),
+    "peak-to-peak": lambda course: operator.add(*course.both()),
+    "mean": lambda course: total(course.number, course.grid.weights),
     "rms": _rms,
     "largest": _largest,
     "place-of-maximum": lambda course: course.place(),
@@ -105,18 +112,19 @@ RULES: dict[str, Callable[[Course], Number]] = {
 
 def _ratio(useful: Number, driven: Number, course: Course) -> Number:
     """Useful over drive work of the cycle; NaN where the loads drive.  [D 1]"""
-    work = total(driven, course.weights)
+    work = total(driven, course.grid.weights)
     share = _net(useful, course) / namespace(work).where(primal(work) > 0, work, np.nan)
     return namespace(share, work).where(primal(_net(driven, course)) > 0, share, np.nan)
 
 
 def _net(power: Number, course: Course) -> Number:
     """The mean of a power, 0 where it is no more than rounding or what half the positions would miss: it cancels."""
-    value, real = total(power, course.weights), primal(power)
-    size, halved = total(np.abs(real), course.weights), primal(value)
-    if len(course.time) >= FEWEST:
-        half = course._replace(time=course.time[::2])
-        halved = total(np.broadcast_to(real, (*np.shape(real)[:-1], len(course.time)))[..., ::2], half.weights)
+    value, real = total(power, course.grid.weights), primal(power)
+    size, halved = total(np.abs(real), course.grid.weights), primal(value)
+    count = len(course.grid.at)
+    if count >= FEWEST:
+        half = Grid(course.grid.at[::2], course.grid.period)
+        halved = total(np.broadcast_to(real, (*np.shape(real)[:-1], count))[..., ::2], half.weights)
     nothing = np.abs(primal(value)) <= np.maximum(1e-9 * size, 4 * np.abs(primal(value) - halved))
     return namespace(value).where(nothing, 0.0, value)
 
@@ -126,16 +134,39 @@ def _net(power: Number, course: Course) -> Number:
 
 @dataclass(frozen=True)
 class Reference:
-    """A measure of the nominal mechanism. parts: its course, (position,) each, angles without jumps; turns: what an
-    angle gains in a period, rad; figure: its figure, 0 for what is a deviation by itself."""
+    """A measure of the nominal mechanism.
+
+    parts: its course, (position,) each, angles without jumps; turning: whether it is an angle; attitude: whether it is
+    the turn of a link in space; turns: what an angle gains in a period, rad; figure: its figure, 0 for what is a
+    deviation by itself.
+    """
 
     measure: Measure
     window: Window
     positions: int
     turning: bool
+    attitude: bool
     parts: tuple[Array, ...]
     turns: float = 0.0
     figure: float = 0.0
+
+    @property
+    def against(self) -> bool:
+        """Whether the course is taken less that of the nominal mechanism."""
+        return MEASURES[self.measure.kind].against or self.attitude or self.measure.rule == "deviation"
+
+    @property
+    def opened(self) -> bool:
+        """Whether the course gains whole turns in a period, so that its end is another value than its start."""
+        return bool(self.window.period is not None and self.turns and not self.against)
+
+    @cached_property
+    def grid(self) -> Grid:
+        """The positions as the places of a curve."""
+        time, period = self.window.time, self.window.period
+        if not self.opened or period is None:
+            return Grid(time, period)
+        return Grid(np.append(time, time[0] + period))
 
 
 def reference(
@@ -153,9 +184,9 @@ def reference(
         rates = None if rate is None else _row(window.of(primal(rate), positions), len(window.index))
         followed, turns = _followed(parts[0], window, rates)
         parts = (followed,)
-    found = Reference(measure, window, positions, turning, parts, turns)
+    found = Reference(measure, window, positions, turning, measure.of_attitude(system), parts, turns)
     own = 0.0 if measure.rule == "deviation" else float(np.ravel(_figure(found, parts))[0])
-    return Reference(measure, window, positions, turning, parts, turns, own)
+    return replace(found, figure=own)
 
 
 def figure(curve: Sequence[Number], nominal: Reference) -> Number:
@@ -180,7 +211,7 @@ def shown(curve: Sequence[Number], nominal: Reference) -> Number:
     with np.errstate(all="ignore"):
         parts, measure = _parts(curve, nominal), nominal.measure
         if measure.rule == "line":
-            return distances(parts, _course(nominal, parts[0]).weights)
+            return distances(parts, nominal.grid.weights)
         if measure.rule == "ratio":
             useful, driven = parts
             xp = namespace(driven)
@@ -196,7 +227,8 @@ def span(curve: Sequence[Number], nominal: Reference) -> tuple[Number, Number]:
         return change, change
     with np.errstate(all="ignore"):
         course = _course(nominal, _single(nominal, _parts(curve, nominal)))
-        return -course.largest(-1.0).value, course.largest().value
+        most, least = course.both()
+        return -least, most
 
 
 def kept(curve: Sequence[Number], nominal: Reference, figures: Number | None = None) -> NDArray[np.bool_]:
@@ -231,9 +263,9 @@ def judged(curve: Sequence[Number], nominal: Reference) -> tuple[Number, NDArray
     with np.errstate(all="ignore"):
         change = _single(nominal, _parts(curve, nominal))
         course = _course(nominal, change)
-        least, most = -course.largest(-1.0).value, course.largest().value
-    figures = np.maximum(most, -least)
-    return figures, _within(measure, figures, least, most), change
+        above, below = course.both()
+    figures = np.maximum(above, below)
+    return figures, _within(measure, figures, -below, above), change
 
 
 def known(measure: Measure, status: NDArray[np.int8]) -> NDArray[np.bool_]:
@@ -252,7 +284,7 @@ def _figure(nominal: Reference, parts: Sequence[Number]) -> Number:
     rule = nominal.measure.rule
     if rule == "line":
         course = _course(nominal, parts[0])
-        away = course._replace(number=distances(parts, course.weights))
+        away = course._replace(number=distances(parts, course.grid.weights))
         return RULES["peak-to-peak"](away) if len(parts) == 2 else 2.0 * RULES["maximum"](away)
     if rule == "ratio":
         return _ratio(parts[0], parts[1], _course(nominal, parts[0]))
@@ -267,20 +299,20 @@ def _single(nominal: Reference, parts: Sequence[Number]) -> Number:
         for part, meant in zip(parts, nominal.parts, strict=True):
             square = square + (part - meant) * (part - meant)
         return namespace(square).sqrt(square)
-    against = MEASURES[nominal.measure.kind].against or nominal.measure.rule == "deviation"
-    return parts[0] - nominal.parts[0] if against else parts[0]
+    if nominal.attitude:
+        return turn(parts, nominal.parts, nominal.measure.axis)
+    return parts[0] - nominal.parts[0] if nominal.against else parts[0]
 
 
 def _course(nominal: Reference, number: Number) -> Course:
     """A course over the window; one that gains whole turns in a period with the end of the period, as a range."""
-    window, against = nominal.window, MEASURES[nominal.measure.kind].against or nominal.measure.rule == "deviation"
-    if window.period is None or not nominal.turns or against:
-        return Course(number, window.time, window.coordinate, window.period, window.gain)
+    window = nominal.window
+    if not nominal.opened:
+        return Course(number, nominal.grid, window.coordinate, window.gain)
     again = np.append(np.arange(len(window.time)), 0)
     gains = np.append(np.zeros(len(window.time)), nominal.turns)
-    time = np.append(window.time, window.time[0] + window.period)
     coordinate = np.append(window.coordinate, window.coordinate[0] + window.gain)
-    return Course(number[..., again] + gains, time, coordinate, None, window.gain)
+    return Course(number[..., again] + gains, nominal.grid, coordinate, window.gain)
 
 
 def _parts(curve: Sequence[Number], nominal: Reference) -> tuple[Number, ...]:

@@ -1,4 +1,4 @@
-"""How straight a path is: its distances from the least-squares line through it.
+"""How straight a path is: its distances from the least-squares line through it; how far a link in space has turned.
 
 ISO 12780-1:2011 has this reference line, for which the sum of the squares of the local deviations, at right angles to
 it, is least, and the straightness as the width from the lowest to the highest of them. The positions count by the time
@@ -17,9 +17,11 @@ from trunnion.algebra.dual import Dual, derivative, primal
 from trunnion.algebra.duallinalg import eigh
 from trunnion.algebra.namespace import Number, namespace
 
-__all__ = ["distances", "total"]
+__all__ = ["distances", "total", "turn"]
 
 Array = NDArray[np.float64]
+
+SMALL = 1e-3  # below it six terms of the series are exact to rounding
 
 
 def distances(path: Sequence[Number], weights: Array) -> Number:
@@ -44,6 +46,32 @@ def distances(path: Sequence[Number], weights: Array) -> Number:
         rest = part - way * _wide(share)
         square = square + rest * rest
     return namespace(square).sqrt(square)
+
+
+def turn(axes: Sequence[Number], before: Sequence[Number], axis: str) -> Number:
+    """Component about a global axis of the rotation vector, rad, from one attitude of a link to another.
+
+    axes, before: of its frame, one after the other, nine numbers each. ½ Σ eᵢ⁰ × eᵢ is n sin θ, ½ (Σ eᵢ⁰ · eᵢ − 1) is
+    cos θ; θ/sin θ by its series in 1 − cos θ where that is small, so that there is a derivative at no turn.
+    """
+    sines: list[Number] = [0.0, 0.0, 0.0]
+    cosine: Number = -0.5
+    for k in (0, 3, 6):
+        x, y, z = axes[k : k + 3]
+        a, b, c = before[k : k + 3]
+        sines = [
+            sine + 0.5 * part
+            for sine, part in zip(sines, (b * z - c * y, c * x - a * z, a * y - b * x), strict=True)
+        ]  # fmt: skip
+        cosine = cosine + 0.5 * (a * x + b * y + c * z)
+    small = 1.0 - cosine
+    series = 1 + small * (1 / 3 + small * (2 / 15 + small * (2 / 35 + small * (8 / 315 + small * (8 / 693)))))
+    square = sines[0] * sines[0] + sines[1] * sines[1] + sines[2] * sines[2]
+    xp = namespace(square, cosine)
+    far = primal(small) > SMALL
+    sine = xp.sqrt(xp.where(far, square, 1.0))
+    factor = xp.where(far, xp.arctan2(sine, cosine) / sine, series)
+    return sines["xyz".index(axis)] * factor
 
 
 def _direction(offset: Sequence[Number], weights: Array) -> list[Number]:

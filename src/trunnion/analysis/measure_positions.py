@@ -92,6 +92,14 @@ def plan(run: Run, measures: Sequence[Measure], steps: int) -> Plan:
     duration = run.cycle.duration
     findings: list[Finding] = []
     if duration <= 0:
+        for measure in measures:
+            if measure.of_place or measure.at is not None or measure.over is not None:
+                what = "nothing moves: there are no places in a cycle"
+                findings.append(
+                    Finding(what, f"measures.{measure.name}", "measure it as it stands, without at or over")
+                )
+        if findings:
+            raise MechanismError(findings)
         nothing = np.zeros(1)
         one = Window(np.zeros(1, np.intp), nothing, nothing)
         return Plan(run, nothing, {measure.name: one for measure in measures})
@@ -138,8 +146,10 @@ def _window(run: Run, ends: tuple[float, ...], times: Array, grid: Array, known:
 def _ends(run: Run, measure: Measure) -> tuple[float, ...]:
     """Times, s, of the place or of both ends of the window of a measure; none if it is of the whole cycle."""
     where = f"measures.{measure.name}"
-    if measure.of_place and not run.system.mechanism.drivers:
-        raise MechanismError(Finding("there is no driver whose coordinate would tell a place", where))
+    name = next(iter(run.system.mechanism.drivers))
+    if measure.of_place and not run.system.span(run.values, name).one_way:
+        what = f"the figure is a coordinate of '{name}', which names no one position: it goes there and back"
+        raise MechanismError(Finding(what, where, "let it run one way, or measure something else"))
     if measure.at is not None:
         return (_time(run, measure, measure.at, f"{where}.at"),)
     if measure.over is None:

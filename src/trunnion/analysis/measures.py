@@ -126,13 +126,18 @@ class Measure:
 
     def turning(self, system: System) -> bool:
         """Whether the course is an angle, which may gain whole turns."""
-        return self.unit(system) == "rad"
+        return self.unit(system) == "rad" and not self.of_attitude(system)
+
+    def of_attitude(self, system: System) -> bool:
+        """Whether it is the turn of a link in space from where it lies in the nominal mechanism."""
+        return self.kind == "angle" and system.mechanism.space == "spatial"
 
     def curve(self, back: Backward | Forward) -> tuple[Number, ...]:
         """The course: one number or more, each to broadcast to (sample, position); SI, angles in (−π, π].
 
         back: a `Backward`, or a `Forward` where `of_motion`. Of a point its coordinates, of the efficiency of the cycle
-        useful and drive power. Floats, arrays or dual numbers, as the values were.
+        useful and drive power, of the angle of a link in space the three axes of its frame.
+        Floats, arrays or dual numbers, as the values were.
         """
         walk = back if isinstance(back, Forward) else back.walk
         of = MEASURES[self.kind]
@@ -321,6 +326,13 @@ def _value(measure: Measure, walk: Forward) -> tuple[Number, ...]:
     return (measure.coordinate(walk.system).value(walk),)
 
 
+def _attitude(measure: Measure, walk: Forward) -> tuple[Number, ...]:
+    """The angle of a link; in space the axes of its frame, nine numbers."""
+    if not isinstance(walk, SpatialWalk):
+        return (measure.value(walk),)
+    return tuple(number for axis in walk.motions[measure.subject].frame[:3] for number in axis)
+
+
 def _place(measure: Measure, walk: Forward) -> tuple[Number, ...]:
     return courses.place(measure.subject, walk)
 
@@ -345,7 +357,7 @@ MEASURES: dict[str, MeasureKind] = {
     "point": MeasureKind("m", "coordinate of a point", _value),
     "path_error": MeasureKind("m", "distance of a point from its nominal place", _place, "maximum", against=True),
     "straightness": MeasureKind("m", "straightness of the path of a point", _place, "line"),
-    "angle": MeasureKind("rad", "angle of a link", _value),
+    "angle": MeasureKind("rad", "angle of a link", _attitude),
     "rotation": MeasureKind("rad", "rotation of a joint", _value),
     "slide": MeasureKind("m", "slide of a joint", _value),
     "transmission_error": MeasureKind(OF_JOINT, "transmission error of a joint", _value, against=True),

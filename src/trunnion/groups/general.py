@@ -13,6 +13,7 @@ at the cuts.  [THEORY, "One Jacobian, four uses"]
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -21,9 +22,10 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from trunnion.algebra import linalg
-from trunnion.algebra.dual import Dual, primal
-from trunnion.algebra.namespace import Number, namespace
+from trunnion.algebra.dual import depth, primal
+from trunnion.algebra.namespace import Number, apart, compiled, namespace
 from trunnion.algebra.nested import each, flat, replaced
+from trunnion.algebra.traced import looped
 from trunnion.groups import tree as spanning
 from trunnion.groups.cuts import Row, rows
 from trunnion.groups.gear import NUMBERS, ONE, Gear, GearRow, actions
@@ -47,6 +49,7 @@ from trunnion.groups.tree import OUTER, GroupJoint, Step, across, size_of
 __all__ = ["OUTER", "General", "GroupJoint", "Pose"]
 
 QUICK = 8  # rounds for all lanes
+FEW = 3  # of lanes that are compiled: as many as a small change of the dimensions asks for
 NEWTON_LIMIT = 60  # more for those that need them
 NEARLY = 1e-7  # of its largest allowed step: from here one more round reaches rounding
 TURN_LIMIT = 0.4  # rad a step: keeps Newton on the branch it starts on
@@ -144,9 +147,8 @@ class General:
                 [primal(value) for value in drive],
             )
             numbers = [*drive, *(n for pair in elements for n in flat(pair))]
-            depth = max((n.depth for n in numbers if isinstance(n, Dual)), default=0)
             q = self.coordinates(elements, [q[i] for i in self.free], drive)
-            for _ in range(depth):
+            for _ in range(depth(numbers)):
                 q = self._step(elements, q, drive)
             frames, placed = self._place(elements, q)
             jacobian = self._jacobian(placed, drive)
@@ -165,14 +167,14 @@ class General:
 
     def _newton(self, elements: Elements, start: Sequence[Number], drive: Sequence[Number]) -> list[Number]:
         """Newton on real numbers from `start`; lanes that do not converge are NaN."""
-        q = [np.asarray(v, float) for v in self.coordinates(elements, start, drive)]
+        q = [namespace(v).asarray(v, float) for v in self.coordinates(elements, start, drive)]
         if not self.free:
             return list(q)
         size = self.size(elements)
         scale = [TURN_LIMIT if kind == "turn" else 0.3 * size for kind in self.kept_kinds]
-        q, moved_by = self._iterate(elements, q, drive, scale, QUICK)
+        q, moved_by = self._iterate(elements, q, drive, scale, FEW if compiled(q) else QUICK)
         late = ~(moved_by <= NEARLY)
-        if np.any(late):
+        if apart(late):
             q, moved_by = self._finish_late(elements, q, drive, scale, late)
         q = self._step(elements, q, drive, scale)  # quadratic: from NEARLY to rounding
         closed = moved_by <= NEARLY
@@ -182,12 +184,15 @@ class General:
         self, elements: Elements, q: list[Number], drive: Sequence[Number], scale: Sequence[Number], rounds: int
     ) -> tuple[list[Number], Number]:
         """Newton steps until no lane moves by more than NEARLY (of its scale), at most `rounds`."""
+        if compiled(q):
+            q = looped(lambda numbers: self._step(elements, numbers, drive, scale), q, rounds - 1)
+            rounds = 1
         last: Number = np.inf
         for _ in range(rounds):
             before = [q[i] for i in self.free]
             q = self._step(elements, q, drive, scale)
             moves = [np.abs(q[i] - b) / s for i, b, s in zip(self.free, before, scale, strict=True)]
-            last = np.maximum.reduce(np.broadcast_arrays(*moves))
+            last = functools.reduce(np.maximum, moves)
             if not np.any(last > NEARLY):
                 break
         return q, last
@@ -216,9 +221,8 @@ class General:
         _, placed = self._place(elements, q)
         (step,) = linalg.solve(self._jacobian(placed, drive), self._gap(placed, q, drive))
         if limits is not None:
-            worst = np.maximum.reduce(
-                np.broadcast_arrays(*(np.abs(s) / limit for s, limit in zip(step, limits, strict=True)))
-            )
+            moves = [np.abs(s) / limit for s, limit in zip(step, limits, strict=True)]
+            worst = functools.reduce(np.maximum, moves)
             shrink = 1 / np.maximum(worst, 1.0)
             step = [s * shrink for s in step]
         q = list(q)

@@ -16,6 +16,7 @@ the reactions are those of least size, see `groups.redundant`.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -23,8 +24,8 @@ from typing import NamedTuple
 import numpy as np
 
 from trunnion.algebra import linalg
-from trunnion.algebra.dual import Dual, primal
-from trunnion.algebra.namespace import Number
+from trunnion.algebra.dual import depth, primal
+from trunnion.algebra.namespace import Number, apart, compiled, namespace
 from trunnion.algebra.nested import each, flat, replaced
 from trunnion.algebra.rigid import (
     ZERO,
@@ -37,6 +38,7 @@ from trunnion.algebra.rigid import (
     times,
 )
 from trunnion.algebra.space import cross, dot, plus, scaled
+from trunnion.algebra.traced import looped
 from trunnion.groups import redundant
 from trunnion.groups.spatial_tree import Element, SpatialTree, entries
 from trunnion.groups.tree import OUTER
@@ -45,6 +47,7 @@ from trunnion.joints.spatial import MOTIONS
 __all__ = ["Pose", "SpatialGroup"]
 
 QUICK = 8  # rounds for all lanes
+FEW = 3  # of lanes that are compiled: as many as a small change of the dimensions asks for
 NEWTON_LIMIT = 60  # more for those that need them
 NEARLY = 1e-7  # of its largest allowed step: from here one more round reaches rounding
 TURN_LIMIT = 0.4  # rad a step: keeps Newton on the branch it starts on
@@ -93,10 +96,9 @@ class SpatialGroup(SpatialTree):
             q = self.coordinates([primal(v) for v in assembly or ()], [primal(v) for v in drive])
             q = self._newton(real, q, size)
             numbers = [*drive, *(n for one in elements for n in flat(one))]
-            depth = max((n.depth for n in numbers if isinstance(n, Dual)), default=0)
             found = [value for joint in q for value in joint]
             q = self.coordinates([found[i] for i in self.kept], drive)
-            for _ in range(depth):
+            for _ in range(depth(numbers)):
                 q = self._step(elements, q, size)
             return self._posed(elements, q, size)
 
@@ -123,12 +125,12 @@ class SpatialGroup(SpatialTree):
 
     def _newton(self, elements: Sequence[Element], q: list[list[Number]], size: Number) -> list[list[Number]]:
         """Newton on real numbers; lanes that do not converge are NaN."""
-        q = [[np.asarray(v, float) for v in joint] for joint in q]
+        q = [[namespace(v).asarray(v, float) for v in joint] for joint in q]
         if not self.free or not self.chords:
             return q
-        q, moved_by = self._iterate(elements, q, size, QUICK)
+        q, moved_by = self._iterate(elements, q, size, FEW if compiled(v for joint in q for v in joint) else QUICK)
         late = ~(moved_by <= NEARLY)
-        if np.any(late):
+        if apart(late):
             q, moved_by = self._finish_late(elements, q, size, late)
         q = self._step(elements, q, size)  # quadratic: from NEARLY to rounding
         placed = self.place(elements, q)[1]
@@ -139,15 +141,38 @@ class SpatialGroup(SpatialTree):
         self, elements: Sequence[Element], q: list[list[Number]], size: Number, rounds: int
     ) -> tuple[list[list[Number]], Number]:
         """Newton steps until no lane moves by more than NEARLY (of its limit), at most `rounds`."""
+        if compiled(v for joint in q for v in joint):
+            q = self._looped(elements, q, size, rounds - 1)
+            rounds = 1
         last: Number = np.inf
         for _ in range(rounds):
-            steps = self._steps(elements, q, size)
-            last = self._largest(steps)
-            shrink = 1 / np.maximum(last, 1.0)
-            q = self._advanced(q, [[s * shrink for s in joint] for joint in steps], size)
+            q, last = self._limited_step(elements, q, size)
             if not np.any(last > NEARLY):
                 break
         return q, np.broadcast_to(last, np.broadcast_shapes(np.shape(last), *(np.shape(v) for j in q for v in j)))
+
+    def _limited_step(
+        self, elements: Sequence[Element], q: list[list[Number]], size: Number
+    ) -> tuple[list[list[Number]], Number]:
+        """One Newton step, shortened as a whole where an entry would exceed its limit; the largest entry in terms of it."""
+        steps = self._steps(elements, q, size)
+        last = self._largest(steps)
+        shrink = 1 / np.maximum(last, 1.0)
+        return self._advanced(q, [[s * shrink for s in joint] for joint in steps], size), last
+
+    def _looped(
+        self, elements: Sequence[Element], q: list[list[Number]], size: Number, rounds: int
+    ) -> list[list[Number]]:
+        """So many steps of numbers that are compiled, the step compiled once."""
+
+        def nested(flat_: Sequence[Number]) -> list[list[Number]]:
+            rest = iter(flat_)
+            return [[next(rest) for _ in joint] for joint in q]
+
+        def step(flat_: list[Number]) -> list[Number]:
+            return [v for joint in self._limited_step(elements, nested(flat_), size)[0] for v in joint]
+
+        return nested(looped(step, [v for joint in q for v in joint], rounds))
 
     def _largest(self, steps: list[list[Number]]) -> Number:
         """Largest entry of scaled steps in terms of its limit."""
@@ -156,7 +181,7 @@ class SpatialGroup(SpatialTree):
             for joint, values in zip(self.joints, steps, strict=True)
             for s, kind in zip(values, MOTIONS[joint.kind].steps, strict=True)
         ]
-        return np.maximum.reduce(np.broadcast_arrays(*moves))
+        return functools.reduce(np.maximum, moves)
 
     def _finish_late(
         self, elements: Sequence[Element], q: list[list[Number]], size: Number, late: Number

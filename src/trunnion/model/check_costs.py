@@ -103,14 +103,11 @@ def _untolerated(path: str, where: str) -> Finding:
 
 
 def _play(mechanism: Mechanism, path: str, where: str) -> Iterator[Finding]:
-    """A play that can be chosen is stated as a clearance, of a joint whose play is modelled."""
+    """A play that can be chosen is that of a joint whose play is modelled."""
     name = path.split(".")[1]
     joint = mechanism.effective_joints[name]
     if not has_play(joint):
         yield Finding(f"the play of a {joint.type} joint is not modelled", where, "remove it")
-    elif joint.pin is not None and joint.pin.clearance is None and joint.guide is None:
-        what = "the play follows from a fit or a radius of the hole"
-        yield Finding(what, where, f"state joints.{name}.pin: {{radius: …, clearance: …}}")
 
 
 def _formula(cost: Cost, where: str, kind: Kind) -> Iterator[Finding]:

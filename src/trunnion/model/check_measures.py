@@ -20,6 +20,7 @@ __all__ = ["SUBJECTS", "check_measure", "measure_values", "point_exists"]
 
 OF_POINT = ("point", "path_error", "straightness")
 OF_JOINT = ("rotation", "slide", "transmission_error", "stroke", "dead_centre", "reaction")
+ENDS = ("from", "to")
 PLACES = ("place-of-maximum", "place-of-minimum")
 
 
@@ -118,7 +119,13 @@ def measure_values(mechanism: Mechanism, numbers: ParameterSet) -> Iterator[Find
         if least > most:
             yield Finding(f"at least {least:g} and at most {most:g} (SI)", f"{where}.at_least", "exchange them")
         start, end = value("over.from"), value("over.to")
-        if start == end:
+        kinds = {one.kind.name for key, one in numbers.entries.items() if key.startswith(f"{where}.over.")}
+        if len(kinds) > 1:
+            what = (
+                f"the range runs from {' to '.join(numbers.entries[f'{where}.over.{one}'].kind.name for one in ENDS)}"
+            )
+            yield Finding(what, f"{where}.over", "give two coordinates of the first driver, or two times")
+        elif start == end:
             yield Finding(f"the range begins and ends at {start:g}", f"{where}.over", "give it an extent, or say at: …")
 
 

@@ -170,7 +170,8 @@ def tolerance_values(mechanism: Mechanism, numbers: ParameterSet) -> Iterator[Fi
         name, variation = stated.get(tolerance.path, ("", Variation()))
         where = f"tolerances.{name}" if name else tolerance.path
         yield from _limits(numbers, tolerance, variation, written.get(tolerance.path), where)
-        yield from _options(tolerance, where if name else "tolerance_defaults")
+        told = {key: where if getattr(variation, key) is not None else "tolerance_defaults" for key in OPTIONS}
+        yield from _options(tolerance, {key: f"{place}.{key}" for key, place in told.items()})
     if mechanism.correlations:
         yield from _correlations(mechanism, numbers)
 
@@ -205,24 +206,24 @@ def _limits(
         yield Finding(f"'{path}' is no angle", where, "only an angle is uniform over all directions")
 
 
-def _options(tolerance: Tolerance, where: str) -> Iterator[Finding]:
-    """Whether what a distribution was told makes one."""
+def _options(tolerance: Tolerance, where: Mapping[str, str]) -> Iterator[Finding]:
+    """Whether what a distribution was told makes one. where: each option stands."""
     options: dict[str, Any] = dict(tolerance.options)
     cp, cpk, mode = options.get("cp", 1.0), options.get("cpk"), options.get("mode")
     for key in ("cp", "alpha", "beta"):
         if options.get(key, 1.0) <= 0:
-            yield Finding(f"{key} is {options[key]:g}", f"{where}.{key}", "give a number above 0")
+            yield Finding(f"{key} is {options[key]:g}", where[key], "give a number above 0")
     if cpk is not None and cpk > cp * (1 + ROUNDING):
         what = f"cpk {cpk:g} is above cp {cp:g}: the share of the limits cannot be larger off the middle than in it"
-        yield Finding(what, f"{where}.cpk", "give a cpk of at most cp")
+        yield Finding(what, where["cpk"], "give a cpk of at most cp")
     if mode is not None and not tolerance.lower <= mode <= tolerance.upper:
         what = f"the mode {mode:g} is outside the limits {tolerance.lower:g} to {tolerance.upper:g} (SI)"
         if not np.isnan(tolerance.half_width + mode):
-            yield Finding(what, f"{where}.mode", "give the deviation at which the density peaks")
+            yield Finding(what, where["mode"], "give the deviation at which the density peaks")
     shift = options.get("shift", 0.0)
     if abs(shift) > tolerance.half_width:
         what = f"the shift {shift:g} puts the mean outside the limits, {tolerance.half_width:g} from their middle (SI)"
-        yield Finding(what, f"{where}.shift", "check its unit", Severity.WARNING)
+        yield Finding(what, where["shift"], "check its unit", Severity.WARNING)
 
 
 def _correlations(mechanism: Mechanism, numbers: ParameterSet) -> Iterator[Finding]:
@@ -237,9 +238,9 @@ def _correlations(mechanism: Mechanism, numbers: ParameterSet) -> Iterator[Findi
         if abs(value) > 1:
             sound = False
             yield Finding(f"is {value:g}", f"{where}.coefficient", "give a number from -1 to 1")
-        for path in (path for path in paths if path not in vary):
+        for name in (name for name in one.of if not vary.issuperset(named_paths(numbers, [name]))):
             sound = False
-            yield Finding(f"'{path}' has no tolerance", where, "state one in tolerances: {…}, or leave it out")
+            yield Finding(f"'{name}' has no tolerance", where, "state one in tolerances: {…}, or leave it out")
         if len(paths) < 2 and len(one.of) < 2:
             yield Finding("one number is correlated with nothing", where, "name two, as of: [AB, BC]")
         for pair in map(frozenset, combinations(paths, 2)):
@@ -252,7 +253,7 @@ def _correlations(mechanism: Mechanism, numbers: ParameterSet) -> Iterator[Findi
     if not sound:
         return
     matrix = correlation(mechanism, numbers)
-    if not np.isnan(matrix).any() and (least := float(np.linalg.eigvalsh(matrix)[0])) < -ROUNDING:
+    if matrix.size and not np.isnan(matrix).any() and (least := float(np.linalg.eigvalsh(matrix)[0])) < -ROUNDING:
         what = (
             f"these correlations contradict one another: the least eigenvalue of their matrix is {least:.3g}, below 0"
         )

@@ -169,6 +169,9 @@ def column(path: Path, kind: Kind) -> list[float]:
         text = read_text(path, "a list of deviations", MAX_BYTES, "write a deviation in each line, such as 0.012")
         lines = _lines(text, "sample", "a deviation in each line", "take a part, drawn by lot")
         rows = [(number, [line.strip().rstrip(";,\t").strip(' "')]) for number, line in lines]
+        if any(sign in rows[0][1][0] for sign in ";\t"):
+            remedy = "keep the column of the deviations; a table of two columns is given by --table"
+            raise MechanismError(Finding("has several columns, a sample has one", remedy=remedy, line=rows[0][0]))
         unit_text, numbers = "", rows
         if not _number(rows[0][1][0], ";"):
             unit_text, numbers = _units(rows[0], (kind,))[0], rows[1:]

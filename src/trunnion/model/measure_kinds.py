@@ -15,7 +15,7 @@ from trunnion.model.units import KINDS, Dimension, Kind, UnitError
 if TYPE_CHECKING:
     from trunnion.model.mechanism import Mechanism
 
-__all__ = ["drive_kind", "figure_kind", "place_kind"]
+__all__ = ["drive_kind", "figure_kind", "is_place", "place_kind"]
 
 _OF_SUBJECT = {
     "point": "length",
@@ -36,9 +36,17 @@ def drive_kind(mechanism: Mechanism) -> Kind:
     return KINDS["length" if joint and "rotation" not in freedoms(joint.type) else "angle"]
 
 
+def is_place(measure: Measure) -> bool:
+    """Whether a measure gives a position: a dead centre, or where something is largest or smallest."""
+    return (measure.statistic or "").startswith("place-of-") or measure.subject == "dead_centre"
+
+
 def figure_kind(mechanism: Mechanism, measure: Measure) -> Kind:
-    """What a measure gives: of a joint with two motions the rotation, of a place the drive coordinate."""
-    if (measure.statistic or "").startswith("place-of-") or measure.subject == "dead_centre":
+    """What a measure gives: of a joint with two motions the rotation, of a place the drive coordinate.
+
+    A driver that does not run one way passes a coordinate twice: its places are times, which `place_kind` tells.
+    """
+    if is_place(measure):
         return drive_kind(mechanism)
     known = _OF_SUBJECT.get(measure.subject)
     if known:

@@ -51,7 +51,7 @@ from trunnion.model.parts import (
 from trunnion.model.prices import Price, prices
 from trunnion.model.quantity import Acceleration, AnyQuantity, Quantity
 from trunnion.model.samples import with_samples
-from trunnion.model.tolerances import Tolerance, correlation, tolerated, with_tolerances, written_limits
+from trunnion.model.tolerances import Tolerance, correlation, kept, tolerated, with_tolerances, written_limits
 from trunnion.model.units import Kind
 
 __all__ = ["Mechanism"]
@@ -277,8 +277,8 @@ class Mechanism(Part):
         """The mechanism with some entries replaced, by names as in `parameters`; texts are read as in a file.
 
         So are the choices `over_constraint`, `fits`, `joint_defaults.friction.model`, `joint_defaults.seat` and the
-        last two of a joint. Sizes, seat and misalignment of a joint and the error of a number need not be stated yet, nor
-        a tolerance: `tolerances.AB`, and `tolerances.AB.cp` for a key of it. `measures.NAME.limit` is one text.
+        last two of a joint. Sizes, seat and misalignment of a joint, the error of a number and its tolerance, such as
+        `tolerances.AB` or one key of it, `tolerances.AB.cp`, need not be stated yet. `measures.NAME.limit` is one text.
         """
         data = self.data()
         for name, value in values.items():
@@ -381,7 +381,7 @@ class Mechanism(Part):
 
         data, read = with_points(self.data(), {name: path})
         try:
-            return Mechanism(**data)
+            return Mechanism(**kept(self, data))
         except MechanismError as error:
             raise MechanismError(place_findings(error.findings, read)) from None
 
@@ -402,7 +402,7 @@ class Mechanism(Part):
                 stated = stated if isinstance(stated, dict) else {"coefficient": stated}
                 keep = {"model", *FRICTION_LAWS[law].parameters}
                 holder["friction"] = {"law": law, **{key: value for key, value in stated.items() if key in keep}}
-        return Mechanism(**data)
+        return Mechanism(**kept(self, data))
 
     def with_seats(self, seat: str) -> Mechanism:
         """The mechanism with one seating for all joints with play: "loaded" or "free"; MechanismError for another."""
@@ -412,7 +412,7 @@ class Mechanism(Part):
         data = self.data()
         for holder in (*data.get("joints", {}).values(), *data.get("loop", [])):
             holder.pop("seat", None)
-        return Mechanism(**{**data, "joint_defaults": {**data.get("joint_defaults", {}), "seat": seat}})
+        return Mechanism(**kept(self, {**data, "joint_defaults": {**data.get("joint_defaults", {}), "seat": seat}}))
 
     def data(self) -> dict[str, Any]:
         """The model as plain mappings, lists, numbers and texts: what was stated, as it was written."""

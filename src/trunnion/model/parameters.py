@@ -21,7 +21,7 @@ from trunnion.errors import MechanismError
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.model.expression import MOTION
 from trunnion.model.limits import Limits
-from trunnion.model.measure_kinds import drive_kind, figure_kind, place_kind
+from trunnion.model.measure_kinds import drive_kind, figure_kind, is_place, place_kind
 from trunnion.model.merge import DEFAULT_LAW
 from trunnion.model.parameter_names import ERRORS, ParameterNames
 from trunnion.model.parts import (
@@ -44,6 +44,7 @@ __all__ = [
     "Entry",
     "ParameterSet",
     "dimension_errors",
+    "dimension_kinds",
     "entries",
     "evaluation_order",
     "measured",
@@ -96,7 +97,7 @@ def entries(mechanism: Mechanism) -> list[Entry]:
         return found
     names = ParameterNames(entry.path for entry in found)
     kinds = {entry.path: entry.kind for entry in found}
-    measured = _dimension_kinds(mechanism)
+    measured = dimension_kinds(mechanism)
     errors: dict[str, Entry] = {}
     for name, quantity in mechanism.errors.items():
         with suppress(MechanismError):  # a finding of its own
@@ -250,9 +251,10 @@ def _spring_kind(mechanism: Mechanism, spring: Spring, entry: Entry) -> Kind:
 
 def _measure_kind(mechanism: Mechanism, name: str, entry: Entry) -> Kind:
     """Of a position that of the drive or a time, else what the measure gives."""
-    if entry.location[2] not in ("at", "over"):
-        return figure_kind(mechanism, mechanism.measures[name])
-    kinds = _dimension_kinds(mechanism) if entry.quantity.names else {}
+    measure = mechanism.measures[name]
+    if entry.location[2] not in ("at", "over") and not is_place(measure):
+        return figure_kind(mechanism, measure)
+    kinds = dimension_kinds(mechanism) if entry.quantity.names else {}
     return place_kind(mechanism, entry.quantity, {name: one.dimensions[0] for name, one in kinds.items()})
 
 
@@ -282,7 +284,7 @@ def dimension_errors(found: Iterable[Entry]) -> dict[str, Quantity]:
     return {one.path.removeprefix(before): one.quantity for one in found if one.path.startswith(before)}
 
 
-def _dimension_kinds(mechanism: Mechanism) -> dict[str, Kind]:
+def dimension_kinds(mechanism: Mechanism) -> dict[str, Kind]:
     """What each dimension measures, as far as its value tells."""
     known: dict[str, Dimension | None] = {}
     for name in evaluation_order(mechanism.dimensions)[0]:
@@ -298,7 +300,7 @@ def _dimension_kinds(mechanism: Mechanism) -> dict[str, Kind]:
 
 def measured(mechanism: Mechanism, found: Iterable[Entry]) -> dict[str, Kind]:
     """What each number measures, by path: of a dimension, as far as its value tells."""
-    of_dimensions = {f"dimensions.{name}": kind for name, kind in _dimension_kinds(mechanism).items()}
+    of_dimensions = {f"dimensions.{name}": kind for name, kind in dimension_kinds(mechanism).items()}
     kinds = {entry.path: of_dimensions.get(entry.path, entry.kind) for entry in found}
     deviations = {path: kinds.get(path.removeprefix(ERRORS)) for path in kinds if path.startswith(ERRORS)}
     return {**kinds, **{path: kind for path, kind in deviations.items() if kind}}

@@ -30,6 +30,7 @@ __all__ = [
     "clearance_of",
     "correlation",
     "followers",
+    "kept",
     "may_vary",
     "named_paths",
     "tolerated",
@@ -278,3 +279,33 @@ def _limits_text(middle: float, half: float, kind: Kind) -> str:
         return f"±{_written(half, kind)}"
     upper, lower = (_written(end, kind, "+") for end in (middle + half, middle - half))
     return f"{upper}/{lower}"
+
+
+# ---- numbers that are no more ---------------------------------------------------------------------------------
+
+
+def kept(mechanism: Mechanism, data: Mapping[str, Any]) -> dict[str, Any]:
+    """Plain data made of that of a mechanism, without errors, tolerances and costs of numbers that it no longer has.
+
+    So a mechanism without friction has no tolerance of a coefficient. MechanismError if the data make no mechanism.
+    """
+    named = [key for key in ("errors", "tolerances", "costs") if data.get(key)]
+    if not named:
+        return dict(data)
+    bare = {key: value for key, value in data.items() if key not in (*named, "correlations", "processes")}
+    other = type(mechanism)(**bare)
+
+    def known(name: str) -> bool:
+        try:
+            return bool(clearance_of(other, name) or other.parameter_set.resolve(name.removeprefix("errors.")))
+        except MechanismError:
+            return False
+
+    rest = {key: {name: one for name, one in data[key].items() if known(name)} for key in named}
+    rows = [{**row, "of": [name for name in row["of"] if known(name)]} for row in data.get("correlations", ())]
+    together = [
+        row
+        for row, stated in zip(rows, data.get("correlations", ()), strict=True)
+        if row["of"] == stated["of"] or len(row["of"]) > 1
+    ]
+    return {**data, **rest, **({"correlations": together} if rows else {})}

@@ -41,9 +41,11 @@ def two_sided(lower: Any, upper: Any, mean: Any, sigma: Any) -> tuple[Floats, Fl
 def normal_yield(lower: Any, upper: Any, mean: Any, sigma: Any) -> Floats:
     """Share of a normal distribution between the limits, Φ((upper − mean)/σ) − Φ((lower − mean)/σ); they may be ±∞."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        a = np.nan_to_num((np.asarray(lower, dtype=np.float64) - mean) / sigma, nan=0.0, posinf=np.inf, neginf=-np.inf)
-        b = np.nan_to_num((np.asarray(upper, dtype=np.float64) - mean) / sigma, nan=0.0, posinf=np.inf, neginf=-np.inf)
+        a = (np.asarray(lower, dtype=np.float64) - mean) / sigma
+        b = (np.asarray(upper, dtype=np.float64) - mean) / sigma
+    # 0/0: without spread and right at a limit, which is within it.
+    a, b = np.where(np.isnan(a), -np.inf, a), np.where(np.isnan(b), np.inf, b)
     # Beyond the mean the difference is taken in the left tail, where it keeps its digits.
-    right = a + b > 0
+    right = a > -b
     a, b = np.where(right, -b, a), np.where(right, -a, b)
     return np.asarray(special.ndtr(b) - special.ndtr(a), dtype=np.float64)

@@ -9,8 +9,10 @@ function says). Every quantile is finite for u in (0, 1) and keeps the precision
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +21,7 @@ from scipy import special
 __all__ = ["DISTRIBUTIONS", "Distribution", "Options", "normal_parameters"]
 
 Floats = NDArray[np.float64]
-Options = Mapping[str, float | Sequence[float] | None]
+Options = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
@@ -43,7 +45,7 @@ class Distribution:
 
 def _number(options: Options, name: str, default: float) -> float:
     value = options.get(name)
-    return default if value is None else float(value)  # type: ignore[arg-type]
+    return default if value is None else float(value)
 
 
 # ---- normal ---------------------------------------------------------------------------------------------------
@@ -115,7 +117,7 @@ def _triangular_quantile(u: Floats, lower: float, upper: float, options: Options
     u, mode, width = np.asarray(u), _mode(lower, upper, options), upper - lower
     left = lower + np.sqrt(u * (width * (mode - lower)))
     right = upper - np.sqrt((1 - u) * (width * (upper - mode)))
-    return np.where(u * width < mode - lower, left, right)
+    return np.clip(np.where(u * width < mode - lower, left, right), lower, upper)
 
 
 def _triangular_cdf(x: Floats, lower: float, upper: float, options: Options) -> Floats:
@@ -198,12 +200,19 @@ def _truncated_moments(lower: float, upper: float, options: Options) -> tuple[fl
     peak = min(b, 0.0)
     reach = math.sqrt(peak * peak + 80)
     start, end = max(a, -reach), min(b, reach)
-    nodes, weights = np.polynomial.legendre.leggauss(120)
+    nodes, weights = _gauss(120)
     z = (start + end) / 2 + (end - start) / 2 * nodes
     weights = weights * np.exp((peak - z) * (peak + z) / 2)
     weights /= weights.sum()
     middle = float(weights @ z)
     return mean + sign * sigma * middle, sigma * sigma * float(weights @ (z - middle) ** 2)
+
+
+@lru_cache(maxsize=1)
+def _gauss(number: int) -> tuple[Floats, Floats]:
+    """Nodes and weights of Gauss-Legendre quadrature on −1 ... 1."""
+    nodes, weights = np.polynomial.legendre.leggauss(number)
+    return nodes, weights
 
 
 # ---- beta -----------------------------------------------------------------------------------------------------
@@ -214,11 +223,55 @@ def _shapes(options: Options) -> tuple[float, float]:
 
 
 def _beta_quantile(u: Floats, lower: float, upper: float, options: Options) -> Floats:
-    """lower + w I⁻¹(u; α, β); in the upper half from the upper limit, upper − w I⁻¹(1 − u; β, α)."""
-    u, (alpha, beta), width = np.asarray(u, dtype=np.float64), _shapes(options), upper - lower
-    low = u <= 0.5
-    part = special.betaincinv(np.where(low, alpha, beta), np.where(low, beta, alpha), np.where(low, u, 1 - u))
-    return np.asarray(np.where(low, lower + width * part, upper - width * part), dtype=np.float64)
+    """lower + w x, x = I⁻¹(u; α, β), from a table of ln(x/(1 − x)) over Φ⁻¹(u): I⁻¹ costs fifty times as much.
+
+    Cubic between entries 1/128 apart with the exact slope: x and 1 − x are true to about 1e-10 of their value. What is
+    rarer than 2⁻⁶⁰ is taken as that.
+    """
+    shapes, u = _shapes(options), np.maximum(u, 2.0**-60)
+    table = _beta_table(*shapes)
+    if table is None:
+        odds = _beta_odds(u, *shapes)
+    else:
+        score = (special.ndtri(u) + _REACH) * _DENSITY
+        place = score.astype(np.intp)
+        part = score - place
+        c0, c1, c2, c3 = table[:, place]
+        odds = c0 + part * (c1 + part * (c2 + part * c3))
+    share = special.expit(-np.abs(odds)) * (upper - lower)
+    return np.asarray(np.where(odds < 0, lower + share, upper - share), dtype=np.float64)
+
+
+_REACH, _DENSITY = 9, 128
+"""The table reaches over ±9 standard deviations with 128 entries in each."""
+
+
+def _beta_odds(u: Floats, alpha: float, beta: float) -> Floats:
+    """ln(x/(1 − x)) of the quantile x, with x and 1 − x each found by itself: neither is lost beside the other."""
+    low, tail = u <= 0.5, np.minimum(u, 1 - u)
+    first, second = np.where(low, alpha, beta), np.where(low, beta, alpha)
+    near, far = special.betaincinv(first, second, tail), special.betainccinv(second, first, tail)
+    with np.errstate(divide="ignore"):
+        odds = np.log(near) - np.log(far)
+    return np.asarray(np.where(low, odds, -odds), dtype=np.float64)
+
+
+@lru_cache(maxsize=64)
+def _beta_table(alpha: float, beta: float) -> Floats | None:
+    """Coefficients (4, intervals) of the cubics; None where a tail leaves the range of floats (α or β far below 1)."""
+    s = np.arange(-_REACH * _DENSITY, _REACH * _DENSITY + 1) / _DENSITY
+    odds = np.where(s <= 0, _beta_odds(special.ndtr(s), alpha, beta), -_beta_odds(special.ndtr(-s), beta, alpha))
+    log_x, log_rest = special.log_expit(odds), special.log_expit(-odds)
+    # d odds/ds = φ(s)/(f(x) x (1 − x)), f(x) = x^(α − 1) (1 − x)^(β − 1)/B(α, β).
+    with np.errstate(invalid="ignore", over="ignore"):
+        log_slope = (
+            special.betaln(alpha, beta) - alpha * log_x - beta * log_rest - s * s / 2 - math.log(2 * math.pi) / 2
+        )
+        slope = np.exp(log_slope) / _DENSITY
+    if not (np.isfinite(odds).all() and np.isfinite(slope).all()):
+        return None
+    rise, start, end = np.diff(odds), slope[:-1], slope[1:]
+    return np.stack([odds[:-1], start, 3 * rise - 2 * start - end, start + end - 2 * rise])
 
 
 def _beta_cdf(x: Floats, lower: float, upper: float, options: Options) -> Floats:

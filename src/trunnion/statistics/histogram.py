@@ -8,6 +8,7 @@ does not depend on a library's logarithm. (Buckets by the bits of the number: as
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -39,11 +40,12 @@ class Bins:
     def around(cls, centre: Any, deviation: Any, fineness: int = 7, octaves: int = 20) -> Self:
         """Bins for values expected about `centre` with a standard deviation of `deviation`.
 
-        Where that is 0 or not known (NaN) the scale is 1e-9 of the centre, or 1e-12: rounding falls into few bins.
+        Where that is 0 or not known (NaN, ∞) the scale is 1e-9 of the centre, or 1e-12: rounding falls into few bins.
         """
         centre = np.nan_to_num(np.asarray(centre, dtype=np.float64))
         deviation = np.nan_to_num(np.asarray(deviation, dtype=np.float64), posinf=0.0)
-        return cls(centre, np.maximum(deviation, np.maximum(1e-9 * np.abs(centre), 1e-12)), fineness, octaves)
+        unknown = np.maximum(1e-9 * np.abs(centre), 1e-12)
+        return cls(centre, np.where(deviation > 0, deviation, unknown), fineness, octaves)
 
     @property
     def half(self) -> int:
@@ -58,11 +60,14 @@ class Bins:
     def index(self, values: Any, axis: int = -1) -> NDArray[np.int64]:
         """Bin of each value, samples along `axis`; of NaN it has no meaning."""
         x = np.moveaxis(np.asarray(values, dtype=np.float64), axis, -1)
-        t = (x - np.asarray(self.centre)[..., None]) / np.asarray(self.scale)[..., None]
+        t = np.ascontiguousarray((x - np.asarray(self.centre)[..., None]) / np.asarray(self.scale)[..., None])
         # The greatest float before the next octave: a clip of the float costs less than one of the index.
         far = np.minimum(np.abs(t) + 1.0, np.nextafter(2.0**self.octaves, 0.0))
-        step = (far.view(np.int64) - _ONE) >> (52 - self.fineness)
-        return np.asarray(np.where(t < 0, self.half + ~step, self.half + step), dtype=np.int64)
+        index: NDArray[np.int64] = far.view(np.int64) - _ONE
+        index >>= 52 - self.fineness
+        index ^= t.view(np.int64) >> 63  # −1 − index of negative t: its sign bit drawn through the word is −1
+        index += self.half
+        return index
 
     def edges(self) -> Floats:
         """Edges of the bins, (*figures, number + 1), increasing; those at the ends stand for all beyond them."""
@@ -84,7 +89,7 @@ def count(values: Any, bins: Bins, axis: int = -1) -> Counts:
         x = np.where(missing, 0.0, x)
     index = bins.index(x)
     figures = index.shape[:-1]
-    index = index.reshape(-1, index.shape[-1])
+    index = index.reshape(math.prod(figures), index.shape[-1])
     index += (np.arange(len(index), dtype=np.int64) * bins.number)[:, None]
     chosen = index[~missing.reshape(index.shape)] if gaps else index.ravel()
     counts = np.bincount(chosen, minlength=len(index) * bins.number)
@@ -111,7 +116,7 @@ def quantile(counts: Counts, bins: Bins, q: Any, least: Any = -np.inf, most: Any
         part = np.clip((rank - reached[place] + values[place]) / np.maximum(values[place], 1), 0.0, 1.0)
         left, right = edges[row, place], edges[row, place + 1]
         found[row] = np.clip(left + part * (right - left), low[row], high[row])
-    return np.where(np.isnan(q), np.nan, found.reshape(*counts.shape[:-1], *q.shape))
+    return np.where(np.isnan(q), np.nan, found.reshape((*counts.shape[:-1], *q.shape)))
 
 
 def cdf(counts: Counts, bins: Bins, x: Any) -> Floats:
@@ -124,4 +129,4 @@ def cdf(counts: Counts, bins: Bins, x: Any) -> Floats:
         reached = np.concatenate([[0.0], np.cumsum(values)])
         if reached[-1] > 0:
             found[row] = np.interp(x.ravel(), edges[row], reached) / reached[-1]
-    return found.reshape(*counts.shape[:-1], *x.shape)
+    return found.reshape((*counts.shape[:-1], *x.shape))

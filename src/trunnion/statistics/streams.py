@@ -147,23 +147,20 @@ def factor(correlation: Any) -> Floats:
     return lower
 
 
-def mixed(scores: Floats, lower: Floats) -> Floats:
-    """L z, summed in fixed order: a matrix product of a library may depend on the number of columns in its last bit."""
-    mixed = np.empty_like(scores)
-    for row, weights in enumerate(lower):
-        places = np.flatnonzero(weights)
-        total = weights[places[0]] * scores[places[0]] if places.size else np.zeros_like(scores[row])
-        for place in places[1:]:
-            total = total + weights[place] * scores[place]
-        mixed[row] = total
+def mixed(scores: Floats, matrix: Floats) -> Floats:
+    """M z, summed in fixed order: a matrix product of a library may depend on the number of columns in its last bit."""
+    mixed = np.zeros_like(scores)
+    for place, score in enumerate(scores):
+        mixed += matrix[:, place, None] * score
     return mixed
 
 
-def correlated(u: Floats, cholesky: Floats) -> Floats:
-    """Uniform numbers whose normal scores Φ⁻¹(u) are correlated: Φ(L Φ⁻¹(u)), a Gaussian copula. (dims, count).
+def correlated(u: Floats, matrix: Floats) -> Floats:
+    """Uniform numbers whose normal scores Φ⁻¹(u) are mixed: Φ(M Φ⁻¹(u)), a Gaussian copula. (dims, count).
 
-    u: independent, in (0, 1); cholesky: L of `factor`. The result is kept in (0, 1).
+    u: independent, in (0, 1); matrix: L of `factor` to correlate them, or a rotation, which leaves them independent.
+    The result is kept in (0, 1).
     """
     return np.asarray(
-        np.clip(special.ndtr(mixed(special.ndtri(u), cholesky)), 2.0**-1000, 1 - 2.0**-53), dtype=np.float64
+        np.clip(special.ndtr(mixed(special.ndtri(u), matrix)), 2.0**-1000, 1 - 2.0**-53), dtype=np.float64
     )

@@ -101,7 +101,8 @@ class Moments:
 
 def moments_of(values: Any, axis: int = -1) -> Moments:
     """Moments along the axis of the samples, the last; NaN are left out (and not in the count)."""
-    x = np.moveaxis(np.asarray(values, dtype=np.float64), axis, -1)
+    # In one order in memory, so that sums are taken in one order too.
+    x = np.ascontiguousarray(np.moveaxis(np.asarray(values, dtype=np.float64), axis, -1))
     there = ~np.isnan(x)
     if there.all():
         count: Any = np.full(x.shape[:-1], float(x.shape[-1]))
@@ -157,7 +158,7 @@ class Sums:
 class Tree(Generic[P]):
     """Payloads of blocks in a dyadic tree: node (level, index) holds the blocks [index 2^level, (index + 1) 2^level).
 
-    Trees are values: `merge` gives a new one. nodes: the widest nodes whose blocks are all there, by (level, index);
+    `merge` gives a new tree, `add` puts into this one. nodes: the widest whose blocks are all there, by (level, index);
     prefixes: payload of the first 2^level blocks by level, kept as they come up, for how a figure converges.
     """
 

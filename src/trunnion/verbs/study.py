@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Annotated
 
@@ -15,7 +14,6 @@ from trunnion.verbs.model import exit_status, lines_of, placed, stated
 __all__ = ["tolerance"]
 
 STOPPED = 130
-FEW = 2_000_000  # configurations up to which further processes cost more than they save
 
 
 def tolerance(
@@ -60,10 +58,8 @@ def tolerance(
         typer.Option("--sample", help="NAME=FILE.csv: measured deviations of a number, one column. Repeatable."),
     ] = None,
     kind: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--kind", help="Of the figures: histogram, contributions, envelope, convergence, sobol. Repeatable."
-        ),
+        str | None,
+        typer.Option("--kind", help="One figure alone: histogram, contributions, envelope, convergence or sobol."),
     ] = None,
     out: Out = None,
     report: Report = None,
@@ -75,20 +71,18 @@ def tolerance(
     from trunnion.analysis.tolerance.study import tolerance as run
     from trunnion.verbs.tolerance import check_files, show
 
-    check_files(out or [], kind or [], report)
+    check_files(out or [], report, kind)
     mechanism = stated(file, set_, table, friction)
     for text in sample or []:
         mechanism = mechanism.with_samples(*named_file(text, "--sample"))
     methods = tuple(method or DEFAULT_METHODS)
     counted = samples if any(one in SAMPLINGS for one in methods) else 0
-    if jobs is None:
-        jobs = 1 if counted * steps < FEW and cluster is None else os.cpu_count() or 1
     with lines_of(file), bar("samples", counted, least=1000) as progress:
         result = run(
             mechanism, measure, methods, samples, seed, steps, at, jobs=jobs, chunk=chunk, engine=engine,
             cluster=cluster, checkpoint=checkpoint, resume=resume, progress=progress,
         )  # fmt: skip
-    show(mechanism, result, out or [], kind or [], report, units_row)
+    show(mechanism, result, out or [], units_row, kind, report)
     findings = findings_of(result)
     say(placed(findings, file, ["measures", "joints", "tolerances"]))
     raise typer.Exit(STOPPED if result.attrs["stopped"] else exit_status(findings))

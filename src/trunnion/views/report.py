@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from jinja2 import Template
 
-__all__ = ["embedded", "report"]
+__all__ = ["embedded", "hashed", "inputs_of", "report"]
 
 # A label of the summary: the subject with its unit in words, which of its figures, or in brackets why it is so.
 ASPECT = re.compile(
@@ -62,10 +62,10 @@ def report(result: xr.Dataset, ideal: xr.Dataset | None = None) -> str:
         "notes": [row for row in found if row["severity"] == "note"],
         "errors": error_rows(result), "losses": loss_rows(result),
         "seats": bool(shown["built"] and shown["built"]["seats"]),
-        "balance": _balance(result), "inputs": _inputs(result),
+        "balance": _balance(result), "inputs": inputs_of(result),
         "references": [line for line in str(result.attrs.get("references", "")).splitlines() if line.strip()],
         "version": result.attrs.get("trunnion_version", ""), "model_hash": result.attrs.get("model_hash", ""),
-        "style": Markup(style), "style_hash": _hash(style), "script": Markup(script), "script_hash": _hash(script),
+        "style": Markup(style), "style_hash": hashed(style), "script": Markup(script), "script_hash": hashed(script),
         "scene": Markup(embedded(shown)),
     }  # fmt: skip
     return _template().render(context)
@@ -87,7 +87,7 @@ def embedded(data: Any) -> str:
     return text
 
 
-def _hash(text: str) -> str:
+def hashed(text: str) -> str:
     """The text's hash as a content security policy names it."""
     return "sha256-" + base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
 
@@ -158,7 +158,7 @@ def _worst(label: str, values: Any, unit: str, meaning: str, over: Any) -> dict[
     return {"label": label, "value": text, "place": "everywhere" if same else over.say(index), "meaning": meaning}
 
 
-def _inputs(result: xr.Dataset) -> list[tuple[str, list[dict[str, str]]]]:
+def inputs_of(result: xr.Dataset) -> list[tuple[str, list[dict[str, str]]]]:
     """Input rows by section of the model, the first name of their path."""
     rows = attribute(result, "inputs", [])
     sections = []

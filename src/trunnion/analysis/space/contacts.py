@@ -112,7 +112,7 @@ def _resultant(
     """Friction along the vector of the slip; where there is none, about the axis."""
     square = slip[0] * slip[0] + slip[1] * slip[1]
     xp = namespace(square)
-    moves = (primal(square) > 0) & ~np.asarray(zero)
+    moves = (primal(square) > 0) & np.logical_not(zero)
     speed = xp.where(moves, xp.sqrt(xp.where(moves, square, 1.0)), 0.0)
     share = 1 / xp.where(moves, speed, 1.0)
     cosine, sine = xp.where(moves, slip[0] * share, 1.0), xp.where(moves, slip[1] * share, 0.0)

@@ -298,6 +298,6 @@ def _scalar(back: SpatialBackward, joint: str, friction: Screw, loss: Number) ->
         return dot(friction.u, axis)
     if kind in ("spherical", "universal"):
         speed = back.slips[joint].speed
-        moves = np.asarray(speed > 0)
+        moves = speed > 0
         return namespace(loss).where(moves, -loss / np.where(moves, speed, 1.0), 0.0)
     return dot(moment_at(friction, bearing_middle(walk, joint)), axis)

@@ -154,8 +154,8 @@ class SpatialSystem(System):
     def _smallest_size(self, values: Values) -> Number:
         """Of a mechanism whose axes all meet in one point: the largest length of its pins, or 1 m."""
         lengths = [primal(value) for path, value in values.items() if path.endswith((".pin.bearing", ".pin.radius"))]
-        longest: Number = functools.reduce(np.maximum, lengths, 0.0)
-        return np.where(longest > 0, longest, 1.0)
+        largest = functools.reduce(np.maximum, lengths, 0.0)
+        return np.where(largest > 0, largest, 1.0)
 
 
 def vector(values: Values, path: str) -> Vector3:

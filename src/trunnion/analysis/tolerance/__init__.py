@@ -1,1 +1,1 @@
-"""Tolerances: what a tolerated mechanism does, sample by sample, on one core or many."""
+"""Tolerances: what a mechanism whose numbers vary does, sample by sample, and which limits cost least."""

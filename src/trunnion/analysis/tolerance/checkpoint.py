@@ -27,8 +27,15 @@ SHARE = 0.02  # of the time at most goes into checkpoints
 HEAD, DONE, TALLY = "head", "done", "tally."  # names in the file
 
 
+def _plain(value: object) -> object:
+    if isinstance(value, (np.ndarray, np.generic)):
+        return value.tolist()
+    raise TypeError(f"{value!r} in the identity of a job has no JSON")
+
+
 def _hash(value: object) -> str:
-    return hashlib.sha256(json.dumps(value, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
+    text = json.dumps(value, sort_keys=True, separators=(",", ":"), default=_plain)
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def job_hash(job: Job[Any]) -> str:
@@ -62,6 +69,7 @@ class Checkpoint(Generic[T]):
         self._head = {"format": FORMAT, "version": __version__, "job": job_hash(job), "settings": _settings(job)}
         self._written = perf_counter()
         self._cost = 0.0
+        self.arithmetic: set[str] = set()  # fingerprints of the machines that took part
         self.trouble: Finding | None = None
 
     def begin(self, resume: bool) -> T:
@@ -84,6 +92,7 @@ class Checkpoint(Generic[T]):
             with self.path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
                 head = json.loads(bytes(file[HEAD]))
                 self._check(head)
+                self.arithmetic |= set(head["arithmetic"])
                 done = [(int(first), int(last)) for first, last in file[DONE]]
                 arrays = {name.removeprefix(TALLY): file[name] for name in file.files if name.startswith(TALLY)}
             tally = self._job.empty().from_arrays(arrays)
@@ -109,7 +118,8 @@ class Checkpoint(Generic[T]):
     def _write(self, tally: T) -> None:
         start = perf_counter()
         arrays: dict[str, Any] = {TALLY + name: array for name, array in tally.to_arrays().items()}
-        arrays[HEAD] = np.frombuffer(json.dumps(self._head).encode(), np.uint8)
+        head = self._head | {"arithmetic": sorted(self.arithmetic)}
+        arrays[HEAD] = np.frombuffer(json.dumps(head).encode(), np.uint8)
         arrays[DONE] = np.array(tally.blocks, np.int64).reshape(-1, 2)
         with whole(self.path) as temporary, temporary.open("wb") as file:
             np.savez_compressed(file, **arrays)

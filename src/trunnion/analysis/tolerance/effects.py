@@ -69,14 +69,15 @@ class Effects:
         at = at or {}
         about = {path: value for path, value in at.items() if not path.startswith(SHARE)}
         moved = dict.fromkeys([*about, *(path for row in self.rows for path in (*row.real, row.seed) if path)])
-        overrides: dict[str, Number] = {}
+        deviations: dict[str, Number] = {}  # a number that follows from others goes on to do so
         seats: dict[str, Number] = {}
         for path in moved:
-            start = float(np.ravel(primal(about.get(path, self.inputs.run.values.get(path, 0.0))))[0])
-            real = np.array([[row.real.get(path, start)] for row in self.rows])
+            nominal = float(np.ravel(primal(self.inputs.run.values.get(path, 0.0)))[0])
+            start = about.get(path, nominal)
+            real = np.array([[row.real.get(path, start) - nominal] for row in self.rows])
             number = Dual(real, np.array([[1.0 if row.seed == path else 0.0] for row in self.rows]))
-            (seats if path.startswith("seats.") else overrides)[path] = number
-        values = self.inputs.run.system.mechanism.parameters(overrides)
+            (seats if path.startswith("seats.") else deviations)[path] = number
+        values = self.inputs.run.system.mechanism.parameters(deviations=deviations)
         for joint in self.inputs.held:
             values.update(self.inputs.seat(joint, values))
         for path, offset in self._rims(values, at).items():
@@ -126,17 +127,14 @@ class Effects:
     def total(self, spread: Spread, slope: Array) -> tuple[Array, Array, Array, Array, Array]:
         """Least and largest deviation of a measure, RSS half width, shift of the mean and standard deviation.
 
-        Correlated tolerances make the standard deviation √(sᵀ C s); the worst case does not know of them.
+        Correlated tolerances make the standard deviation √(Sᵀ C S), C the covariance; the worst case does not know of
+        them.
         """
         variance = np.sum(spread.deviation**2, axis=0)
-        correlation, count = self.inputs.population.correlation, len(self.inputs.tolerances)
-        if not np.array_equal(correlation, np.eye(count)):
-            signed = [
-                spread.deviation[i] * (0.0 if self._is_zone(i) else np.sign(slope[self._own(i)[0]]))
-                for i in range(count)
-            ]
-            off = correlation - np.eye(count)
-            variance = variance + np.einsum("i...,ij,j...->...", np.array(signed), off, np.array(signed))
+        off = self._covariance
+        if np.any(off):
+            slopes = [0.0 * slope[0] if self._is_zone(i) else slope[self._own(i)[0]] for i in range(len(off))]
+            variance = variance + np.einsum("i...,ij,j...->...", np.array(slopes), off, np.array(slopes))
         return (
             np.sum(spread.lower, axis=0),
             np.sum(spread.upper, axis=0),
@@ -144,6 +142,12 @@ class Effects:
             np.sum(spread.shift, axis=0),
             np.sqrt(np.maximum(variance, 0.0)),
         )
+
+    @cached_property
+    def _covariance(self) -> Array:
+        """Covariance of the toleranced numbers, without their variances."""
+        covariance: Array = self.inputs.population.covariance()
+        return covariance - np.diag(np.diag(covariance))
 
     def corner(self, real: Array, slope: Array, sign: float) -> dict[str, float]:
         """Numbers that make a measure largest (sign 1) or least (−1), to first order; zones at their rim."""
@@ -175,6 +179,13 @@ class Effects:
     def deviations(self) -> tuple[Array, Array]:
         """Standard deviation and mean deviation of every toleranced number, SI."""
         return self.inputs.population.deviations, self.inputs.population.means
+
+    def gradient(self, slope: Array) -> Array:
+        """Derivatives of a figure by the normal scores of the toleranced numbers, to first order; 0 of directions."""
+        return np.array([
+            0.0 if self._is_zone(i) else slope[self._own(i)[0]] * self.deviations[0][i]
+            for i in range(len(self.inputs.tolerances))
+        ])  # fmt: skip
 
     def numbers(self) -> dict[str, Array]:
         """Of every parameter: nominal value, limits of its deviation, standard deviation and mean; of a clearance the
@@ -260,7 +271,7 @@ class Effects:
         tolerances = self.inputs.tolerances
         seeds = np.eye(len(tolerances))[:, :, None] if tolerances else np.zeros((0, 1, 1))
         values = self.inputs.run.system.mechanism.parameters(
-            {one.path: Dual(self.nominal(i), seeds[i]) for i, one in enumerate(tolerances)}
+            deviations={one.path: Dual(0.0, seeds[i]) for i, one in enumerate(tolerances)}
         )
         deviations, means = self.deviations
         found: dict[str, list[tuple[float, float]]] = {}

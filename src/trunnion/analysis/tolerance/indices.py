@@ -8,6 +8,7 @@ coordinates of a pin in its hole, and the size and direction of a run-out, count
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -77,14 +78,28 @@ def indices(sampler: Sampler, samples: int, seed: int, progress: Callable[[int],
     from scipy.stats import sobol_indices  # takes longer to import than the rest
 
     parts_of = {"f_A": _filled(y_one), "f_B": _filled(y_two), "f_AB": _filled(mixed)}
-    with np.errstate(all="ignore"):
+    with np.errstate(all="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # a number without any effect has no scatter to draw from: NaN
         found = sobol_indices(func=parts_of, n=base)
         spread = found.bootstrap(confidence_level=0.95, n_resamples=BOOTSTRAPS)
     first, total = spread.first_order.confidence_interval, spread.total_order.confidence_interval
     shape = len(y_one), len(parts)  # of one measure scipy leaves out the axis
-    arrays = (found.first_order, first.low, first.high, found.total_order, total.low, total.high)
+    ends = [
+        _closed(end, own)
+        for end, own in zip(
+            (first.low, first.high, total.low, total.high),
+            (found.first_order,) * 2 + (found.total_order,) * 2,
+            strict=True,
+        )
+    ]
+    arrays = (found.first_order, *ends[:2], found.total_order, *ends[2:])
     one, one_low, one_high, all_, all_low, all_high = (np.reshape(array, shape) for array in arrays)
     return Indices(one, one_low, one_high, all_, all_low, all_high, base, lost)
+
+
+def _closed(end: Array, index: Array) -> Array:
+    """An end of an interval, the index itself where nothing scatters."""
+    return np.where(np.isnan(end), index, end)
 
 
 def _filled(y: Array) -> Array:

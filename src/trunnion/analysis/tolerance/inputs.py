@@ -7,7 +7,7 @@ sample. A run-out has a random size and a direction that is uniform over a turn.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -21,8 +21,10 @@ from trunnion.analysis.analyse import Run
 from trunnion.analysis.seating import given_offsets
 from trunnion.analysis.shifts import Play
 from trunnion.errors import Finding, MechanismError
+from trunnion.model.mechanism import Mechanism
 from trunnion.model.tolerances import Tolerance
 from trunnion.statistics.population import Marginal, Population
+from trunnion.statistics.streams import correlated
 
 __all__ = ["Inputs", "inputs_of"]
 
@@ -79,13 +81,17 @@ class Inputs:
         """The play of a joint with these numbers."""
         return shifts.play_of(self.run.system.mechanism.space, self.run.system.joints[joint][0], values, joint)
 
-    def values(self, u: Array) -> dict[str, Number]:
-        """Every number of the mechanism, (sample, 1) where it varies, from u, (dims, sample), uniform in (0, 1)."""
+    def values(self, u: Array, rotation: Array | None = None) -> dict[str, Number]:
+        """Every number of the mechanism, (sample, 1) where it varies, from u, (dims, sample), uniform in (0, 1).
+
+        rotation: orthogonal, of the normal scores of the toleranced numbers; it changes none of their distributions.
+        """
         count = len(self.tolerances)
         rest = iter(u[count:])
+        own = u[:count] if rotation is None else correlated(u[:count], rotation)
         deviations: dict[str, Number] = {}
         turned: dict[str, Number] = {}
-        for tolerance, row in zip(self.tolerances, self.population.draw(u[:count]), strict=True):
+        for tolerance, row in zip(self.tolerances, self.population.draw(own), strict=True):
             deviations[tolerance.path] = row[:, None]
             if tolerance.direction:
                 turned[tolerance.direction] = (2 * np.pi * next(rest) - np.pi)[:, None]
@@ -138,7 +144,7 @@ def inputs_of(run: Run) -> Inputs:
     if not tolerances and not loose:
         remedy = "write `60 mm ± 0.05 mm`, an entry in `tolerances`, or a clearance of a joint"
         raise MechanismError(Finding("nothing has a tolerance or a clearance", "tolerances", remedy))
-    findings = []
+    findings = list(_uneven(mechanism, tolerances))
     for name, play in plays.items():
         if np.any(np.isnan(primal(play.length))):
             assert play.model.size is not None  # else the length is 1
@@ -149,6 +155,16 @@ def inputs_of(run: Run) -> Inputs:
         raise MechanismError(findings)
     marginals = [Marginal(one.distribution, one.lower, one.upper, one.options) for one in tolerances]
     return Inputs(run, tolerances, loose, held, Population(marginals, mechanism.correlation()))
+
+
+def _uneven(mechanism: Mechanism, tolerances: Sequence[Tolerance]) -> Iterator[Finding]:
+    """Speeds and ranges that vary while there are other drivers, which would no longer be at the same positions."""
+    for one in tolerances:
+        section, _, rest = one.path.partition(".")
+        key = rest.partition(".")[2].partition(".")[0]
+        if section == "drivers" and len(mechanism.drivers) > 1 and key != "start":
+            what = "it cannot vary alone: the drivers would no longer be at the same positions together"
+            yield Finding(what, f"tolerances.{one.path}", "leave it out, or vary the start of the driver")
 
 
 def _play(run: Run, joint: str) -> Play | None:

@@ -38,18 +38,22 @@ class Interruption:
     def _hear(self, _number: int, _frame: FrameType | None) -> None:
         again, self.asked = self.asked, True
         if self._open or again:
+            self._open = False
             raise KeyboardInterrupt
 
     def during(self, waiting: Callable[[], A]) -> A | None:
         """What `waiting` returns; None if Ctrl-C ended it."""
         try:
             self._open = True
-            return waiting()
+            found = waiting()
+            self._open = False  # here and not in a `finally`, in which it could still be raised
         except KeyboardInterrupt:
             self.asked = True
             return None
-        finally:
+        except BaseException:
             self._open = False
+            raise
+        return found
 
 
 @contextmanager

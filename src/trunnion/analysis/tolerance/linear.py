@@ -23,7 +23,7 @@ from trunnion.analysis.tolerance.effects import Effects, Spread
 from trunnion.analysis.tolerance.kernel import NumpyKernel
 from trunnion.analysis.tolerance.search import Corner, search
 
-__all__ = ["Linear", "Of", "Total", "linear", "searched"]
+__all__ = ["Linear", "Of", "Total", "by_position", "linear", "searched"]
 
 Array = NDArray[np.float64]
 AT_ONCE = 20_000  # numbers in an array of one walk with dual numbers
@@ -103,7 +103,7 @@ def _of(known: Reference, effects: Effects, course: Course) -> Of:
     real, slope = _scalar(known, effects, course, parts)
     curve_spread = effects.spread(real, slope)
     curve_total = effects.total(curve_spread, slope)
-    if _by_position(measure):
+    if by_position(measure):
         place, whole, steep = _worst(measure, effects, real, slope, curve_total)
     elif MEASURES[measure.kind].against and measure.rule == "rms":
         place, (whole, steep) = -1, (np.full(len(real), np.nan),) * 2
@@ -117,7 +117,7 @@ def _of(known: Reference, effects: Effects, course: Course) -> Of:
     )  # fmt: skip
 
 
-def _by_position(measure: Measure) -> bool:
+def by_position(measure: Measure) -> bool:
     """Whether the figure is made of deviations from nominal and is 0 there, without a derivative."""
     against = MEASURES[measure.kind].against and measure.rule not in ("mean", "rms", "value")
     return measure.rule == "deviation" or against or measure.kind == "path_error"
@@ -172,7 +172,7 @@ def searched(kernel: NumpyKernel, found: Linear, of: Of) -> tuple[Corner, Corner
             course = courses[of.measure.name]
             ends_of = span([part.real for part in course], known)
             whole = np.broadcast_to(ends_of[1] if sign > 0 else ends_of[0], (len(effects.rows),))
-            if of.place < 0 or _by_position(of.measure):
+            if of.place < 0 or by_position(of.measure):
                 return whole, _slope_at(of, effects, course, sign)
             return whole, effects.slopes(figure(course, known), ())[1]
 
@@ -183,19 +183,23 @@ def searched(kernel: NumpyKernel, found: Linear, of: Of) -> tuple[Corner, Corner
 
 def _slope_at(of: Of, effects: Effects, course: Course, sign: float) -> Array:
     """Derivatives of the figure by rows, at a corner."""
-    if not _by_position(of.measure):
+    if not by_position(of.measure):
         return effects.slopes(figure(course, of.reference), ())[1]
-    index = of.reference.window.index
-    slopes = np.array([part.dual[:, index] for part in course])
-    change = np.array([part.real[0, index] for part in course]) - np.array(of.reference.parts)
+    known = of.reference
     if of.measure.kind == "path_error":
+        slopes = np.array([part.dual[:, known.window.index] for part in course])
+        change = np.array([part.real[0, known.window.index] for part in course]) - np.array(known.parts)
         size = np.sqrt(np.sum(change**2, axis=0))
-        place = int(np.nanargmax(size)) if np.any(np.isfinite(size)) else 0
-        found: Array = sign * np.einsum("ar,a->r", slopes[:, :, place], change[:, place]) / (size[place] or 1.0)
-        return found
-    moved = np.remainder(change[0] + np.pi, 2 * np.pi) - np.pi if of.reference.turning else change[0]
+        place = _top(size)
+        along: Array = sign * np.einsum("ar,a->r", slopes[:, :, place], change[:, place]) / (size[place] or 1.0)
+        return along
+    real, slope = effects.slopes(shown(course, known), (len(known.window.index),))
     if of.measure.rule == "peak-to-peak":
-        return slopes[0][:, int(np.nanargmax(moved))] - slopes[0][:, int(np.nanargmin(moved))]
-    place = int(np.nanargmax(sign * moved)) if np.any(np.isfinite(moved)) else 0
-    found = slopes[0][:, place]
-    return found
+        between: Array = slope[:, _top(real[0])] - slope[:, _top(-real[0])]
+        return between
+    return np.asarray(slope[:, _top(sign * real[0])])
+
+
+def _top(numbers: Array) -> int:
+    """Place of the largest; the first of none."""
+    return int(np.nanargmax(numbers)) if np.any(np.isfinite(numbers)) else 0

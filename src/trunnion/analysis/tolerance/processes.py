@@ -18,6 +18,7 @@ from multiprocessing.process import BaseProcess
 from time import perf_counter
 from typing import Any, Generic
 
+from trunnion.analysis.tolerance.arithmetic import fingerprint
 from trunnion.analysis.tolerance.interruption import unheard
 from trunnion.analysis.tolerance.protocol import Blocks, Job, Part, T
 from trunnion.errors import Finding, MechanismError
@@ -62,7 +63,7 @@ def _serve(job: bytes, pipe: Connection) -> None:
                 tally = prepared.evaluate(*blocks)
             except Exception as error:
                 return _report(pipe, error)
-            pipe.send(Part(blocks, perf_counter() - start, tally))
+            pipe.send(Part(blocks, perf_counter() - start, tally, fingerprint()))
 
 
 @dataclass

@@ -63,7 +63,7 @@ class Job(Protocol[T_co]):
         """Samples in all blocks."""
 
     def identity(self) -> Mapping[str, Any]:
-        """All that the bits of the answer depend on, as JSON can write it: model, seed, method, block size, …"""
+        """All that the bits of the answer depend on; JSON or NumPy's `tolist` writes it: model, seed, block, …"""
 
     def empty(self) -> T_co:
         """The tally of no blocks."""
@@ -74,11 +74,12 @@ class Job(Protocol[T_co]):
 
 @dataclass(frozen=True)
 class Part(Generic[T_co]):
-    """Blocks done, the seconds they took where they were done, and their tally."""
+    """Blocks done, the seconds they took where they were done, their tally, and `fingerprint` of that machine."""
 
     blocks: Blocks
     seconds: float
     tally: T_co
+    arithmetic: str
 
 
 class Crew(Protocol[T_co]):

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 from trunnion.analysis.tolerance.protocol import Blocks
 
-__all__ = ["Pace", "Plan", "count", "gaps"]
+__all__ = ["Pace", "Plan", "count", "gaps", "union"]
 
 
 def count(ranges: Iterable[Blocks]) -> int:
@@ -19,6 +19,17 @@ def gaps(done: Iterable[Blocks], blocks: int) -> list[Blocks]:
     """What is missing of 0 … blocks - 1, in order; done: sorted, disjoint."""
     ends = [0, *(end for pair in done for end in pair), blocks]
     return [(first, last) for first, last in zip(ends[::2], ends[1::2], strict=True) if first < last]
+
+
+def union(ranges: Iterable[Blocks]) -> tuple[Blocks, ...]:
+    """Disjoint ranges sorted, neighbours joined."""
+    joined: list[Blocks] = []
+    for first, last in sorted(ranges):
+        if joined and first == joined[-1][1]:
+            joined[-1] = (joined[-1][0], last)
+        else:
+            joined.append((first, last))
+    return tuple(joined)
 
 
 class Plan:
@@ -48,10 +59,15 @@ class Plan:
         return first, first + size
 
 
+EACH = 0.05  # s for every worker: ten times what one portion costs the main process (`python -m benchmarks.spread`)
+LEAST = 16  # part of a full portion that is not worth dividing further
+
+
 class Pace:
     """How many blocks make a portion: those stated, or what takes `seconds` at the pace measured so far.
 
-    Near the end portions shrink to a share of what is left, so that all workers end at about the same time.
+    With many workers portions are longer, so that this process, which merges what all of them send, is busy a tenth of
+    the time at most. Near the end they shrink with what is left, so that all workers end at about the same time.
     """
 
     def __init__(self, stated: int | None, seconds: float) -> None:
@@ -75,5 +91,7 @@ class Pace:
             return self._stated
         if math.isnan(self._per_block):
             return 1
+        seconds = max(self._seconds, EACH * workers)
+        full = int(seconds / max(self._per_block, 1e-9))
         share = math.ceil(left / (2 * workers)) if workers > 1 else left
-        return max(1, min(share, int(self._seconds / max(self._per_block, 1e-9))))
+        return max(1, full // LEAST, min(share, full))

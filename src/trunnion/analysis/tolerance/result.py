@@ -20,6 +20,7 @@ from trunnion.analysis.tolerance.sampling import Sampling, Tally
 from trunnion.analysis.tolerance.search import Corner
 from trunnion.analysis.tolerance.study import Study
 from trunnion.errors import Finding, Status
+from trunnion.model.parameters import dimension_kinds
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -79,6 +80,7 @@ VARIABLES: dict[str, Variable] = {
     "curve_worst_case_lower": Variable(MPOS, "", "least deviation of the course, to first order"),
     "curve_worst_case_upper": Variable(MPOS, "", "largest deviation of the course, to first order"),
     "curve_rss": Variable(MPOS, "", "half width of the course by the root of the sum of squares"),
+    "curve_shift": Variable(MPOS, "", "mean deviation of the course from nominal, to first order"),
     "curve_deviation": Variable(MPOS, "", "standard deviation of the course, to first order"),
     "status": Variable(("position",), "1", "code of the position's status; see the attribute flag_meanings"),
     "samples": Variable((), "1", "number of samples"),
@@ -106,7 +108,9 @@ VARIABLES: dict[str, Variable] = {
     "failed": Variable(("cause",), "1", "samples without an answer, by the gravest status of their positions"),
     "histogram": Variable(("measure", "bin"), "1", "samples in a bin"),
     "edge": Variable(("measure", "edge"), "", "edges of the bins; those at the ends stand for all beyond"),
-    "band": Variable(("measure", "quantile", "position"), "", "value of the course that this share does not exceed"),
+    "band": Variable(
+        ("measure", "quantile", "position"), "", "deviation of the course from nominal that this share does not exceed"
+    ),
     "convergence_samples": Variable(("size",), "1", "first so many samples"),
     "convergence_mean": Variable(("measure", "size"), "", "mean of the first samples"),
     "convergence_deviation": Variable(("measure", "size"), "", "standard deviation of the first samples"),
@@ -129,7 +133,8 @@ def dataset(outcome: Outcome, told: Sequence[Finding]) -> xr.Dataset:
     counted = None if outcome.tally is None or outcome.job is None else sampled(outcome.job, outcome.tally, found)
     arrays = {**_linear(found), **_worst(outcome), **(counted.arrays if counted else {}), **_shares(outcome)}
     units = [measure.figure_unit(system, found.run.values) for measure in found.measures]
-    kinds = mechanism.parameter_kinds()
+    dimensions = {f"dimensions.{name}": kind for name, kind in dimension_kinds(mechanism).items()}
+    kinds = {**mechanism.parameter_kinds(), **dimensions}
     parameter_units = [kinds[name].unit if name in kinds else "m" for name in found.inputs.names]
     dial = system.dial(found.run.values, found.plan.times)
     variables = {
@@ -188,7 +193,7 @@ def dataset(outcome: Outcome, told: Sequence[Finding]) -> xr.Dataset:
 
 def text_of(measure: Any) -> str:
     """What a measure is, in words."""
-    kind = MEASURES[measure.kind].long_name
+    kind = MEASURES[measure.kind].long_name.replace(" a ", " ")
     whole = measure.subject in ("mechanism", "cycle", "instant")
     subject = f" ({measure.subject})" if whole else f" {measure.subject}"
     axis = f", {measure.axis}" if measure.axis else ""
@@ -238,6 +243,7 @@ def _linear(found: Study) -> dict[str, Any]:
         "curve_worst_case_lower": _spread_out(found, [of.curve_total[0] for of in rows], ()),
         "curve_worst_case_upper": _spread_out(found, [of.curve_total[1] for of in rows], ()),
         "curve_rss": _spread_out(found, [of.curve_total[2] for of in rows], ()),
+        "curve_shift": _spread_out(found, [of.curve_total[3] for of in rows], ()),
         "curve_deviation": _spread_out(found, [of.curve_total[4] for of in rows], ()),
         "status": first.status,
     }  # fmt: skip

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from time import perf_counter
 from typing import Generic
 
+from trunnion.analysis.tolerance.arithmetic import fingerprint, mixed
 from trunnion.analysis.tolerance.checkpoint import Checkpoint
 from trunnion.analysis.tolerance.interruption import Interruption
 from trunnion.analysis.tolerance.processes import Processes
@@ -28,7 +29,10 @@ NEAR, FAR = 1.0, 10.0  # s: what a portion takes on this machine, and on a clust
 
 @dataclass(frozen=True)
 class Run(Generic[T]):
-    """The tally of what was done; `stopped`: by Ctrl-C, before the end. `notes`: a checkpoint that was not written."""
+    """The tally of what was done; `stopped`: by Ctrl-C, before the end.
+
+    notes: a checkpoint that could not be written; machines whose last bits differ.
+    """
 
     tally: T
     stopped: bool
@@ -56,7 +60,7 @@ class Here(Generic[T]):
         blocks = self._given[0]
         tally = self._prepared.evaluate(*blocks)
         self._given.clear()
-        return [Part(blocks, perf_counter() - start, tally)]
+        return [Part(blocks, perf_counter() - start, tally, fingerprint())]
 
     def close(self, finished: bool) -> None:
         pass
@@ -110,6 +114,7 @@ def run(
     jobs = _checked(jobs, chunk, resume, checkpoint)
     kept = None if checkpoint is None else Checkpoint(checkpoint, job)
     tally = job.empty() if kept is None else kept.begin(resume)
+    arithmetic = set[str]() if kept is None else kept.arithmetic
     plan = Plan(tally.blocks, job.blocks)
     stopped = False
     if plan.left:
@@ -117,7 +122,7 @@ def run(
         pace = Pace(stated, NEAR if cluster is None else FAR)
         with Interruption() as interruption:
             crew = _crew(job, jobs, cluster, plan.left)
-            spread = _Spread(job, crew, plan, pace, kept, progress, tally)
+            spread = _Spread(job, crew, plan, pace, kept, progress, arithmetic, tally)
             try:
                 spread.go(interruption)
             finally:
@@ -130,8 +135,8 @@ def run(
                     crew.close(finished=not stopped)
     elif progress is not None:
         progress(job.samples)
-    notes = (kept.trouble,) if kept is not None and kept.trouble is not None else ()
-    return Run(tally, stopped, notes)
+    trouble = (kept.trouble,) if kept is not None and kept.trouble is not None else ()
+    return Run(tally, stopped, trouble + mixed(arithmetic))
 
 
 @dataclass
@@ -144,6 +149,7 @@ class _Spread(Generic[T]):
     pace: Pace
     kept: Checkpoint[T] | None
     progress: Callable[[int], None] | None
+    arithmetic: set[str]
     tally: T
 
     def go(self, interruption: Interruption) -> None:
@@ -161,6 +167,7 @@ class _Spread(Generic[T]):
             for part in interruption.during(self.crew.wait) or ():
                 under_way -= 1
                 self.tally = self.tally.merge(part.tally)
+                self.arithmetic.add(part.arithmetic)
                 self.pace.seen(count([part.blocks]), part.seconds)
                 self._tell()
             if self.kept is not None and (under_way or self.plan.left):

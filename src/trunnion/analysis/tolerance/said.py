@@ -88,6 +88,7 @@ def findings_of(outcome: Outcome, counted: Sampled | None) -> Iterator[Finding]:
     if loaded:
         what = f"pins lie anywhere in their holes: seats by loads of {', '.join(loaded)} are not taken"
         yield Finding(what, "joints", "analyse takes them", Severity.NOTE)
+    yield from _measured(outcome)
     yield from _nominal(outcome)
     for of in study.linear.measures:
         yield from _first_order(outcome, of)
@@ -96,6 +97,18 @@ def findings_of(outcome: Outcome, counted: Sampled | None) -> Iterator[Finding]:
     if outcome.indices is not None and outcome.indices.lost:
         what = f"{outcome.indices.lost:,} samples of the variance-based indices have no answer and count as the mean"
         yield Finding(what, "", "narrower tolerances, or a place where all go together", Severity.WARNING)
+
+
+def _measured(outcome: Outcome) -> Iterator[Finding]:
+    """Measured deviations outside the limits of their numbers."""
+    for one in outcome.study.inputs.tolerances:
+        values = np.atleast_1d(np.asarray(one.options.get("values", 0.0)))
+        outside = np.count_nonzero((values < one.lower) | (values > one.upper))
+        if one.distribution == "sample" and outside:
+            far = float(values[np.argmax(np.abs(values))])
+            limits = f"{one.lower:g} to {one.upper:g}"
+            what = f"{outside:,} of {len(values):,} measured deviations are outside the limits {limits}"
+            yield Finding(f"{what}, the farthest {far:g} (SI)", one.path, "check their unit", Severity.WARNING)
 
 
 def _nominal(outcome: Outcome) -> Iterator[Finding]:

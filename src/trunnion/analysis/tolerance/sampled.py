@@ -154,7 +154,7 @@ def limits_of(measure: Any, nominal: float) -> tuple[float, float]:
 
 
 def _bands(job: Sampling, tally: Tally, study: Study) -> Array:
-    """Quantiles of the course at every position."""
+    """Quantiles of the deviation of the course at every position."""
     found = np.full((len(job.measures), len(QUANTILES), job.positions), np.nan)
     for i, measure in enumerate(job.measures):
         index = study.plan.windows[measure.name].index

@@ -29,7 +29,7 @@ from trunnion.statistics.histogram import Bins, count
 from trunnion.statistics.streams import SobolStream, uniforms
 from trunnion.statistics.tally import Moments, Tree, moments_of
 
-__all__ = ["METHODS", "Sampling", "Tally"]
+__all__ = ["METHODS", "Sampling", "Tally", "towards"]
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
@@ -104,7 +104,7 @@ class Sampling:
     """A whole run: which mechanism, what is measured where, how many samples and how they are drawn.
 
     model: plain data of the mechanism; spread: for each measure where its figures are expected, (centre, deviation),
-    and the same of its curve over its window, for the bins.
+    for the bins; curve_spread: nominal value and deviation of its curve over its window. rotation: see `towards`.
     """
 
     model: Mapping[str, Any]
@@ -118,14 +118,20 @@ class Sampling:
     positions: int
     spread: tuple[tuple[float, float], ...]
     curve_spread: tuple[tuple[Array, Array], ...]
+    rotation: Array | None = None
 
     @cached_property
     def block_size(self) -> int:
         """Samples in a block."""
-        most = max(1, min(BATCHES * batch_of(self.engine, self.positions), MOST))
+        most = self.drawing * max(1, batch_of(self.engine, self.positions) // self.drawing)
         if self.method == "monte-carlo":
             return most
         return min(1 << (most.bit_length() - 1), self._points)
+
+    @property
+    def drawing(self) -> int:
+        """Samples whose random numbers are drawn together: the same by any engine."""
+        return max(1, min(BATCHES * batch_of("numpy", self.positions), MOST))
 
     @cached_property
     def _points(self) -> int:
@@ -163,6 +169,9 @@ class Sampling:
             "engine": self.engine,
             "friction": asdict(self.friction),
             "block": self.block_size,
+            "spread": self.spread,
+            "curve_spread": self.curve_spread,
+            "rotation": self.rotation,
             "version": __version__,
         }
 
@@ -183,8 +192,9 @@ class Sampling:
         return Bins.around(centres, deviations)
 
     def curve_bins(self, i: int) -> Bins:
-        """Bins of the curve of a measure at every position of its window."""
-        return Bins.around(*self.curve_spread[i], **BAND)
+        """Bins of the deviation of the curve of a measure from nominal at every position of its window."""
+        nominal, deviation = self.curve_spread[i]
+        return Bins.around(0.0 * nominal, deviation, **BAND)
 
     def prepare(self) -> Sampler:
         """The mechanism read and prepared; once in every process."""
@@ -193,6 +203,19 @@ class Sampling:
         inputs = inputs_of(run)
         known = references(NumpyKernel(run, self.measures, self.friction), places, inputs)
         return Sampler(self, inputs, places, kernel_of(self.engine, run, self.measures, self.friction), known)
+
+
+def towards(gradients: Array) -> Array:
+    """A rotation of the normal scores that turns the first axes to where measures change most, for Sobol points.
+
+    gradients: of each measure by the scores, (measure, score). The rows of the rotation's transpose are their right
+    singular vectors, so that the first coordinates of the points, the evenest, decide most of every measure (linear
+    transformation of J. Imai, K. S. Tan, J. Comput. Finance 10 (2006) 129-155, doi:10.21314/JCF.2006.162).
+    """
+    scale = np.sqrt(np.sum(gradients**2, axis=1, keepdims=True))
+    known = np.nan_to_num(gradients / np.where(scale > 0, scale, 1.0))
+    rotation: Array = np.linalg.svd(known, full_matrices=True)[2].T
+    return rotation
 
 
 def _joined(parts: Sequence[tuple[Array, ...]]) -> tuple[Array, ...]:
@@ -220,7 +243,12 @@ class Sampler:
         replicate, place = divmod(block, job.per_replicate)
         if job.method == "quasi-monte-carlo":
             return self._streams[replicate].points(place * job.block_size, job.block_size)
-        return uniforms(job.seed, block, self.inputs.dims, min(job.block_size, job.samples - block * job.block_size))
+        first, last = block * job.block_size, min((block + 1) * job.block_size, job.samples)
+        parts = [
+            uniforms(job.seed, low // job.drawing, self.inputs.dims, min(job.drawing, last - low))
+            for low in range(first, last, job.drawing)
+        ]
+        return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1)
 
     def figures(self, u: Array) -> tuple[Array, Array, list[Array], NDArray[np.int8]]:
         """Of samples drawn: figures and whether they conform, (measure, sample), curves, status (sample, position)."""
@@ -237,7 +265,7 @@ class Sampler:
 
     def _courses(self, u: Array) -> tuple[Courses, NDArray[np.int8]]:
         """Courses of a batch, each part (sample, position)."""
-        values = self.inputs.values(u)
+        values = self.inputs.values(u, self.job.rotation)
         courses, status = self.kernel.courses(values, self.plan.moved(values))
         full = status.shape
         return {name: tuple(np.broadcast_to(part, full) for part in course) for name, course in courses.items()}, status
@@ -256,7 +284,7 @@ class Sampler:
             lost = np.any(np.isnan(found), axis=0)
             tally.histogram[replicate] += count(found, self.job.bins)
             for i, curve in enumerate(curves):
-                whole = np.broadcast_to(curve, (found.shape[1], curve.shape[-1]))
+                whole = np.broadcast_to(curve, (found.shape[1], curve.shape[-1])) - self.job.curve_spread[i][0]
                 tally.band[i, : whole.shape[1]] += count(whole.T, self.job.curve_bins(i))
             if np.any(lost):
                 gravest = np.max(status, axis=-1)[lost]

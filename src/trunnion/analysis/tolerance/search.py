@@ -41,7 +41,7 @@ class Corner(NamedTuple):
 
 def search(effects: Effects, objective: Objective, start: Mapping[str, float], sign: float) -> Corner:
     """The corner with the largest figure (sign 1) or the least (−1), from that of first order."""
-    at, best, assembles = dict(start), Corner(np.nan, dict(start), 0), True
+    at, best, assembles = dict(start), Corner(0.0, {}, 0), True  # the nominal mechanism
     for rounds in range(1, MOST_ROUNDS + 1):
         real, slope = objective(effects.values(at), effects)
         best = _better(best, Corner(float(real[0]), at, rounds), sign)
@@ -75,7 +75,7 @@ def _flips(effects: Effects, at: Mapping[str, float]) -> list[dict[str, float]]:
         if one.direction or one.distribution == "direction":
             continue
         nominal = effects.nominal(i)
-        places = {nominal, nominal + one.lower, nominal + one.upper} - {at[one.path]}
+        places = {nominal, nominal + one.lower, nominal + one.upper} - {at.get(one.path, nominal)}
         found += [{one.path: place} for place in sorted(places)]
     return found
 

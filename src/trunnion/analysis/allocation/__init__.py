@@ -1,0 +1,1 @@
+"""What tolerances to buy: the least cost that keeps the limits of measures."""

@@ -1,0 +1,350 @@
+"""What tolerances to buy: the least cost that keeps every measure within its limits. The problem and its answer.
+
+Unknown are the half widths t of the contributions (of a clearance: the radial clearance). Every row is one measure at
+one position, with a limit on either side of its nominal. With effects per unit of t the criteria are
+
+    worst case   offset ± Σ worst_i t_i                              within the limits
+    rss          offset ± √(Σ (half_i t_i)²)                         within the limits
+    yield        offset + Σ mean_i t_i ± z √(Σ (deviation_i t_i)²)   within the limits, z so that the yield is met
+
+All of them, and the costs, are convex in t: a point at which the conditions of Karush, Kuhn and Tucker hold is the
+global optimum. The answer carries a lower bound of the cost that proves it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.errors import Finding, MechanismError
+from trunnion.statistics.costs import Cost
+
+__all__ = ["CRITERIA", "Answer", "Contribution", "Criterion", "Effects", "Option", "Problem", "Sampled", "Trial"]
+
+Array = NDArray[np.float64]
+Criterion = Literal["worst-case", "rss", "yield"]
+CRITERIA: dict[Criterion, str] = {
+    "worst-case": "every combination within the tolerances keeps every limit, linearly",
+    "rss": "the root of the sum of squares keeps every limit",
+    "yield": "the stated share of mechanisms keeps every limit",
+}
+SHOWN = {"rad": (180 / np.pi, "deg"), "m": (1e3, "mm")}
+ALLOWED = 1e-9  # of a limit: how far a row may lie beyond it
+PROVEN = 1e-9  # of the cost that tolerances change: a gap below it proves the optimum
+
+
+@dataclass(frozen=True)
+class Option:
+    """One process that a tolerance can be made by: the half width t it holds, m or rad, and what it costs."""
+
+    name: str
+    tolerance: float
+    cost: float
+
+
+@dataclass(frozen=True)
+class Contribution:
+    """One tolerance or clearance.
+
+    value: its half width as stated, m or rad: kept if it has neither a cost nor options.
+    cost: of any half width from least to most; options: the processes to choose from; not both.
+    group: those of one group get one half width, or the option of the same name.
+    """
+
+    name: str
+    value: float = 0.0
+    cost: Cost | None = None
+    options: tuple[Option, ...] = ()
+    group: str = ""
+    least: float = 0.0
+    most: float = np.inf
+
+    @property
+    def fixed(self) -> bool:
+        """Whether it stays as it is."""
+        return self.cost is None and not self.options
+
+
+@dataclass(frozen=True)
+class Effects:
+    """What each contribution does to each row, per unit of its half width: arrays (row, contribution).
+
+    lower, upper: limits of the deviation from the nominal, (row,), infinite where there is none; offset: deviation of
+    the middle of the tolerances, (row,). worst: |∂y/∂p|, of a clearance |Q₁| + |Q₂|; half: what RSS squares, worst if
+    None; deviation, mean: standard deviation and mean, half/3 and 0 if None; correlation: (contribution,
+    contribution). half and deviation are signed: that matters with correlation, and for a yield.
+    labels, places, units: of the rows for messages: names, where in the cycle (" at 60°"), and SI units.
+    """
+
+    worst: Array
+    lower: Array
+    upper: Array
+    half: Array | None = None
+    deviation: Array | None = None
+    mean: Array | None = None
+    offset: Array | None = None
+    correlation: Array | None = None
+    labels: tuple[str, ...] = ()
+    places: tuple[str, ...] = ()
+    units: tuple[str, ...] = ()
+
+    def label(self, row: int) -> str:
+        """Name of a row."""
+        return self.labels[row] if self.labels else f"row {row + 1}"
+
+    def place(self, row: int) -> str:
+        """Where in the cycle a row is, with a blank before it; empty if it is at no one place."""
+        return self.places[row] if self.places else ""
+
+    def say(self, row: int, value: float) -> str:
+        """A deviation of a row with its sign and unit, angles in degrees, lengths in mm."""
+        factor, unit = SHOWN.get(self.units[row], (1.0, self.units[row])) if self.units else (1.0, "")
+        return f"{factor * value:+.6g} {unit}".removesuffix(" 1").rstrip()
+
+    def spread(self) -> Array:
+        """What RSS squares."""
+        return self.worst if self.half is None else self.half
+
+    def sigma(self) -> Array:
+        """Standard deviation of a row per unit of each half width, signed, (row, contribution)."""
+        return self.spread() / 3 if self.deviation is None else self.deviation
+
+    def drift(self) -> Array:
+        """Mean of a row per unit of each half width, (row, contribution)."""
+        return np.zeros_like(self.worst) if self.mean is None else self.mean
+
+    def middle(self) -> Array:
+        """Deviation of the middle of the tolerances, (row,)."""
+        return np.zeros(len(self.worst)) if self.offset is None else self.offset
+
+    def scaled(self, factor: float) -> Effects:
+        """With all limits times a factor."""
+        return replace(self, lower=factor * self.lower, upper=factor * self.upper)
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Contributions, their effects, the criterion; z: how many standard deviations of room `yield` asks for."""
+
+    contributions: tuple[Contribution, ...]
+    effects: Effects
+    criterion: Criterion = "worst-case"
+    z: float = 3.0
+
+    def check(self) -> None:
+        """Raise `MechanismError` with all that makes it no problem."""
+        found = [finding for one in self.contributions for finding in _contribution(one)]
+        found += [finding for members in self.groups().values() for finding in _group(members)]
+        found += _effects(self.effects, len(self.contributions))
+        if not found and all(one.fixed for one in self.contributions):
+            found.append(Finding("no tolerance has a cost", "costs", "say what a tolerance costs"))
+        if found:
+            raise MechanismError(found)
+
+    def groups(self) -> dict[str, list[Contribution]]:
+        """What is bought together, by the name of the group, or of the one contribution."""
+        together: dict[str, list[Contribution]] = {}
+        for one in self.contributions:
+            if not one.fixed:
+                together.setdefault(one.group or f"={one.name}", []).append(one)
+        return together
+
+    def at(self, tolerances: Array) -> tuple[Array, Array]:
+        """Least and largest deviation of each row that the criterion reckons with, (row,) each."""
+        middle, half = self.extent(tolerances)
+        return middle - half, middle + half
+
+    def extent(self, tolerances: Array) -> tuple[Array, Array]:
+        """Middle and half width of each row's range, (row,) each."""
+        effects = self.effects
+        if self.criterion == "worst-case":
+            return effects.middle(), effects.worst @ tolerances
+        if self.criterion == "rss":
+            return effects.middle(), _norm(effects.spread() * tolerances, effects.correlation)
+        drift = effects.middle() + effects.drift() @ tolerances
+        return drift, self.z * _norm(effects.sigma() * tolerances, effects.correlation)
+
+    def used(self, tolerances: Array) -> Array:
+        """Share of its room that each row takes, (row,): above 1 breaks a limit."""
+        middle, half = self.extent(tolerances)
+        base, effects = self.effects.middle(), self.effects
+        room = np.stack([effects.upper - base, base - effects.lower])
+        taken = np.stack([middle - base + half, base - middle + half])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            share = np.where(room > 0, taken / room, np.inf)
+        return np.asarray(np.max(np.where(np.isinf(room), 0.0, share), axis=0), float)
+
+
+class Sampled(NamedTuple):
+    """A yield that was sampled, with its interval."""
+
+    share: float
+    low: float
+    high: float
+
+
+class Trial(NamedTuple):
+    """One allocation that was sampled on the way to a yield."""
+
+    z: float
+    cost: float
+    sampled: Sampled
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Half widths to buy, or why there are none (`findings` with an error, NaN).
+
+    tolerances, costs: by contribution, m or rad; a fixed one costs nothing. choices: names of the options taken.
+    bound: no allocation costs less than this; gap: cost minus bound, a share of the cost that tolerances change.
+    residual: of the optimality conditions, relative; proven: whether the gap proves a global optimum.
+    price: what one more unit (rad, m, …) of a row's room would save, (row,); NaN for a discrete choice.
+    active: rows that limit; used: share of its room each row takes. rounds: of the solver.
+    Of a yield: expected, of normal deviations, linearly; sampled, by `verify`; trials: all that were sampled. There the
+    optimum is that of the same z in every row; other margins in some rows might cost a little less.
+    """
+
+    problem: Problem
+    tolerances: Array
+    costs: Array
+    cost: float
+    bound: float
+    gap: float
+    proven: bool
+    residual: float = np.nan
+    choices: dict[str, str] = field(default_factory=dict)
+    price: Array = field(default_factory=lambda: np.zeros(0))
+    findings: tuple[Finding, ...] = ()
+    rounds: int = 0
+    expected: float = np.nan
+    sampled: Sampled | None = None
+    trials: tuple[Trial, ...] = ()
+
+    @property
+    def found(self) -> bool:
+        """Whether there is an allocation."""
+        return bool(np.isfinite(self.cost))
+
+    @property
+    def used(self) -> Array:
+        """Share of its room that each row takes, (row,)."""
+        return self.problem.used(self.tolerances)
+
+    @property
+    def active(self) -> NDArray[np.intp]:
+        """Rows that limit, by their number."""
+        return np.flatnonzero(self.used > 1 - 1e-6)
+
+    @property
+    def by_name(self) -> dict[str, float]:
+        """Half widths by the names of the contributions."""
+        names = [one.name for one in self.problem.contributions]
+        return dict(zip(names, self.tolerances.tolist(), strict=True))
+
+    def __str__(self) -> str:
+        if not self.found:
+            return "no allocation keeps the limits"
+        word = "global optimum" if self.proven else "best found"
+        return f"cost {self.cost:.8g}, {word} (lower bound {self.bound:.8g}, gap {self.gap:.1e})"
+
+
+def none(problem: Problem, findings: Sequence[Finding]) -> Answer:
+    """The answer that there is none."""
+    nothing = np.full(len(problem.contributions), np.nan)
+    return Answer(
+        problem,
+        nothing,
+        nothing.copy(),
+        np.nan,
+        np.nan,
+        np.nan,
+        False,
+        price=np.full(len(problem.effects.worst), np.nan),
+        findings=tuple(findings),
+    )
+
+
+def shortfall(problem: Problem, least: Array) -> Finding | None:
+    """What a limit would have to be if it is broken even with all tolerances at their least; None if none is.
+
+    least: the half widths, m or rad, that are the least to be had.
+    """
+    used, effects = problem.used(least), problem.effects
+    row = int(np.argmax(used))
+    if used[row] <= 1 + ALLOWED:
+        return None
+    low, high = (float(one[row]) for one in problem.at(least))
+    lower, upper = float(effects.lower[row]), float(effects.upper[row])
+    over, limit = (high, upper) if high - upper >= lower - low else (low, lower)
+    parts = effects.worst[row] * least
+    largest = problem.contributions[int(np.argmax(parts))]
+    kept = "which has no cost and stays as it is" if largest.fixed else "which is at its least"
+    ratio = f", {over / limit:.3g} times the limit" if over * limit > 0 else ""
+    many = int(np.sum(used > 1 + ALLOWED))
+    rows = "positions" if effects.places else "rows"
+    more = f"; {many} of {len(used)} {rows} are beyond their limits" if many > 1 else ""
+    return Finding(
+        f"no tolerances keep the limit {effects.say(row, limit)}: with all at their least it takes "
+        f"{effects.say(row, over)}{effects.place(row)}{ratio}{more}",
+        effects.label(row),
+        f"widen the limit, or narrow first '{largest.name}', {kept} and has the largest part",
+    )
+
+
+def _norm(parts: Array, correlation: Array | None) -> Array:
+    """√(vᵀ C v) of each row of parts, (row,)."""
+    turned = parts if correlation is None else parts @ correlation
+    return np.asarray(np.sqrt(np.maximum(np.einsum("ri,ri->r", parts, turned), 0.0)), float)
+
+
+def _contribution(one: Contribution) -> list[Finding]:
+    where = f"costs.{one.name}"
+    found = one.cost.findings(where) if one.cost else []
+    if one.cost and one.options:
+        found.append(Finding("has a cost model and options", where, "give one of them"))
+    if not 0 <= one.least <= one.most:
+        found.append(Finding(f"least {one.least:g} and most {one.most:g} do not agree", where, "0 ≤ least ≤ most"))
+    if one.options and not any(one.least <= option.tolerance <= one.most for option in one.options):
+        found.append(Finding("no option lies between least and most", where, "widen the bounds"))
+    if one.fixed and not (one.value >= 0 and np.isfinite(one.value)):
+        found.append(Finding("has neither a cost nor a tolerance", where, "state one of them"))
+    if len({option.name for option in one.options}) < len(one.options):
+        found.append(Finding("two options have the same name", where, "rename one"))
+    return found
+
+
+def _group(members: list[Contribution]) -> list[Finding]:
+    where, names = f"costs.{members[0].name}", ", ".join(one.name for one in members)
+    if len({bool(one.options) for one in members}) > 1:
+        return [Finding(f"group {names} mixes cost models and options", where, "give all members the same")]
+    if members[0].options and not set.intersection(*({each.name for each in one.options} for one in members)):
+        return [Finding(f"group {names} has no option in common", where, "give its members the same options")]
+    if max(one.least for one in members) > min(one.most for one in members):
+        return [Finding(f"bounds of group {names} exclude one another", where, "widen them")]
+    return []
+
+
+def _effects(effects: Effects, count: int) -> list[Finding]:
+    if effects.worst.shape[1:] != (count,):
+        return [Finding(f"{count} contributions, effects of {effects.worst.shape[1:]}", "measures", "give one each")]
+    if not len(effects.worst):
+        return [Finding("no measure has a limit", "measures", "state a `limit`")]
+    arrays = [
+        one for one in (effects.worst, effects.half, effects.deviation, effects.mean, effects.offset) if one is not None
+    ]
+    if not all(np.isfinite(one).all() for one in arrays):
+        bad = (
+            int(np.flatnonzero(~np.isfinite(effects.worst).all(axis=1))[0])
+            if not np.isfinite(effects.worst).all()
+            else 0
+        )
+        remedy = "leave positions out that are singular or not assembled"
+        return [Finding("a sensitivity is no number", effects.label(bad), remedy)]
+    bad_rows = np.flatnonzero(~(effects.lower <= effects.upper))
+    if len(bad_rows):
+        return [Finding("the lower limit is above the upper one", effects.label(int(bad_rows[0])), "swap them")]
+    return []

@@ -1,0 +1,91 @@
+"""What an allocation says in words: its summary, its findings, and whether the limits are kept on the mechanism."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from trunnion.analysis.allocation.allocate import CLOSE, share_of
+from trunnion.analysis.allocation.problem import SHOWN
+from trunnion.analysis.allocation.rows import limits
+from trunnion.errors import Finding, Severity
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from trunnion.analysis.allocation.allocate import Allocated
+
+__all__ = ["findings_of", "summary"]
+
+ROUGH = 0.01  # of a limit: what first order may leave out before it is an error
+
+
+def summary(found: Allocated, known: xr.Dataset, arrays: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """What all costs, and before; what of the room is taken."""
+    answer = found.answer
+    rows = [("cost, least", answer.cost if answer.found else None), ("cost as stated", arrays["cost_total_before"])]
+    if answer.found:
+        rows.append(("lower bound of the cost", answer.bound))
+    if answer.sampled is not None:
+        rows += [("yield asked for", found.asked.target), ("yield of the samples", answer.sampled.share)]
+    names = [str(name) for name in known["measure"].values]
+    for name, used in zip(names, arrays["used"].tolist(), strict=True):
+        if answer.found and np.isfinite(used):
+            rows.append((f"{name}, share of its room that is taken", used))
+    return [{"label": label, "value": _plain(value), "unit": "1"} for label, value in rows]
+
+
+def _plain(value: Any) -> float | None:
+    number = None if value is None else float(value)
+    return number if number is not None and np.isfinite(number) else None
+
+
+def findings_of(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:
+    """Why there is no allocation; that it is proven; limits that are not kept on the mechanism itself."""
+    answer = found.answer
+    yield from found.findings
+    yield from answer.findings
+    if not answer.found:
+        return
+    if answer.proven:
+        what = f"no tolerances cost less, to first order: proven to {max(answer.gap, 0.0):.1e} of what they change"
+        if found.asked.criterion == "yield":
+            what = "no tolerances with the same margin at every limit cost less, to first order"
+        yield Finding(what, "", "", Severity.NOTE)
+    for name, share in found.tight.items():
+        what = f"its limits were taken {1 - share:.2%} narrower, so that the mechanism itself keeps them"
+        yield Finding(what, f"measures.{name}", "", Severity.NOTE)
+    if found.asked.criterion == "worst-case":
+        yield from _searched(found, known)
+    if found.asked.criterion == "yield" and "yield_all" in known and answer.sampled is not None:
+        share, high = float(known["yield_all"]), float(known["yield_all_high"])
+        if high < found.asked.target and not any(one.where == "yield" for one in answer.findings):
+            what = f"the yield of the samples is {share:.6g}, {found.asked.target:g} was asked for"
+            yield Finding(what, "yield", "ask for more, or allow narrower tolerances")
+    offers = [factor for factor, one in found.offers if not one.found]
+    if offers:
+        what = f"{len(offers)} of the {len(found.offers)} points of the curve have no tolerances that keep the limits"
+        yield Finding(
+            what, "", f"limits of at least {max(offers):.3g} times the stated ones can be kept", Severity.NOTE
+        )
+
+
+def _searched(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:
+    """Measures whose worst case, as found on the mechanism, is beyond a limit that first order keeps."""
+    units = json.loads(known.attrs["measure_units"])
+    for k, of in enumerate(found.study.linear.measures):
+        lower, upper = limits(of)
+        low, high = float(known["searched_lower"][k]), float(known["searched_upper"][k])
+        shares = share_of(low, lower), share_of(high, upper)
+        beyond = max(shares) - 1
+        if not beyond > CLOSE:
+            continue
+        factor, unit = SHOWN.get(units[k], (1.0, units[k]))
+        value, limit = (high, upper) if shares[1] >= shares[0] else (low, lower)
+        what = f"the worst case found on the mechanism is {factor * value:+.6g} {unit}, {beyond:.2%} beyond the limit "
+        what += f"{factor * limit:+.6g} {unit} that first order keeps"
+        severity = Severity.ERROR if beyond > ROUGH else Severity.WARNING
+        yield Finding(what, f"measures.{of.measure.name}", "ask for `exact`, which takes them narrower", severity)

@@ -1,0 +1,154 @@
+"""What a tolerance costs, by its half width t (of a clearance: the radial clearance).
+
+A model is three functions, the cost, its slope and its curvature over t, and one entry of `COST_MODELS`. Both models
+fall and are convex in t wherever B ≥ 0 and k > 0; the power model is convex in log t too, the exponential one only
+where k t ≥ unit. So an allocation is solved in t, where it is convex with either.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal, Protocol
+
+import numpy as np
+
+from trunnion.errors import Finding
+
+__all__ = ["COST_MODELS", "Cost", "CostModel", "CostParameter"]
+
+
+@dataclass(frozen=True)
+class CostParameter:
+    """One parameter of a model: its unit (pint notation, empty if none), default (None: must be given), least value.
+
+    above: whether it has to be above that least value.
+    """
+
+    unit: str = ""
+    default: float | None = None
+    minimum: float = 0.0
+    above: bool = False
+    meaning: str = ""
+
+
+class CostFunction(Protocol):
+    """A cost, or a derivative of it, from the half width t (m or rad)."""
+
+    def __call__(self, t: float, *, A: float, B: float, k: float, unit: float) -> float: ...
+
+
+@dataclass(frozen=True)
+class CostModel:
+    """A cost of a tolerance, with its first two derivatives with respect to the half width.
+
+    cone: the cone of a conic program that its epigraph is: of z ≥ x^−k, or of z ≥ exp(−k x), with x = t/unit.
+    """
+
+    value: CostFunction
+    slope: CostFunction
+    curvature: CostFunction
+    parameters: Mapping[str, CostParameter]
+    formula: str
+    source: str
+    cone: Literal["power", "exponential"]
+
+
+def power(t: float, *, A: float, B: float, k: float, unit: float) -> float:
+    """A + B/(t/unit)^k: cost of a half width t, m or rad; unbounded as t falls to 0."""
+    return A + B * (t / unit) ** -k if t > 0 else (np.inf if B else A)
+
+
+def power_slope(t: float, *, A: float, B: float, k: float, unit: float) -> float:
+    """−k B/unit (t/unit)^(−k − 1)."""
+    return float(-k * B / unit * (t / unit) ** (-k - 1))
+
+
+def power_curvature(t: float, *, A: float, B: float, k: float, unit: float) -> float:
+    """k (k + 1) B/unit² (t/unit)^(−k − 2)."""
+    return float(k * (k + 1) * B / unit**2 * (t / unit) ** (-k - 2))
+
+
+def exponential(t: float, *, A: float, B: float, k: float, unit: float) -> float:
+    """A + B exp(−k t/unit): cost of a half width t, m or rad; A + B at t = 0."""
+    return A + B * float(np.exp(-k * t / unit))
+
+
+def exponential_slope(t: float, *, A: float, B: float, k: float, unit: float) -> float:
+    """−k B/unit exp(−k t/unit)."""
+    return -k * B / unit * float(np.exp(-k * t / unit))
+
+
+def exponential_curvature(t: float, *, A: float, B: float, k: float, unit: float) -> float:
+    """(k/unit)² B exp(−k t/unit)."""
+    return (k / unit) ** 2 * B * float(np.exp(-k * t / unit))
+
+
+_PARAMETERS: Mapping[str, CostParameter] = {
+    "A": CostParameter(default=0.0, minimum=-np.inf, meaning="cost that no tolerance changes"),
+    "B": CostParameter(meaning="cost that the tolerance changes"),
+    "k": CostParameter(above=True, meaning="how fast the cost falls as the tolerance widens"),
+    "unit": CostParameter(unit="m or rad", above=True, meaning="the half width that counts as 1"),
+}
+
+COST_MODELS: dict[str, CostModel] = {
+    "power": CostModel(
+        power,
+        power_slope,
+        power_curvature,
+        _PARAMETERS,
+        "A + B/(t/unit)^k",
+        "G. H. Sutherland and B. Roth, Mechanism design: accounting for manufacturing tolerances and costs in "
+        "function generating problems, ASME Journal of Engineering for Industry 97 (1975) 283–286 (reciprocal power)",
+        "power",
+    ),
+    "exponential": CostModel(
+        exponential,
+        exponential_slope,
+        exponential_curvature,
+        _PARAMETERS,
+        "A + B exp(−k t/unit)",
+        "F. H. Speckhart, Calculation of tolerance based on a minimum cost approach, ASME Journal of Engineering for "
+        "Industry 94 (1972) 447–453",
+        "exponential",
+    ),
+}
+
+
+@dataclass(frozen=True)
+class Cost:
+    """What one tolerance costs: a name of `COST_MODELS` and its parameters (A; B; k; unit in m or rad)."""
+
+    model: str
+    parameters: Mapping[str, float] = field(default_factory=dict)
+
+    def _values(self) -> dict[str, float]:
+        stated = COST_MODELS[self.model].parameters
+        return {name: self.parameters.get(name, one.default or 0.0) for name, one in stated.items()}
+
+    def value(self, t: float) -> float:
+        """Cost of a half width t, m or rad."""
+        return COST_MODELS[self.model].value(t, **self._values())
+
+    def slope(self, t: float) -> float:
+        """Rise of the cost with t: never above zero."""
+        return COST_MODELS[self.model].slope(t, **self._values())
+
+    def curvature(self, t: float) -> float:
+        """Second derivative of the cost: never below zero."""
+        return COST_MODELS[self.model].curvature(t, **self._values())
+
+    def findings(self, where: str = "") -> list[Finding]:
+        """What is missing or out of range."""
+        if self.model not in COST_MODELS:
+            known = ", ".join(COST_MODELS)
+            return [Finding(f"'{self.model}' is no cost model", where, f"write one of {known}")]
+        found = []
+        for name, one in COST_MODELS[self.model].parameters.items():
+            value = self.parameters.get(name, one.default)
+            if value is None:
+                found.append(Finding(f"'{name}' is missing ({one.meaning})", where, "add it"))
+            elif not value > one.minimum and (one.above or value != one.minimum):
+                limit = f"{'above' if one.above else 'at least'} {one.minimum:g}"
+                found.append(Finding(f"'{name}' is {value:g}, it has to be {limit}", where, "else wider costs more"))
+        return found

@@ -1,0 +1,163 @@
+"""The flat columns of a result of `tolerance` or `allocate`: tables, of which the file's name says which.
+
+`x.csv` (or `x.measures.csv`) has one row a measure, `x.parameters.csv` one a toleranced number, `x.positions.csv` one
+a position, `x.histogram.csv` one a bin of a measure, `x.convergence.csv` one a number of samples. Of an allocation
+`x.csv` has one row a toleranced number, and `x.offers.csv` one a point of cost over accuracy. All in SI.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    import os
+
+    import xarray as xr
+
+__all__ = ["TABLES", "flat", "is_tolerance", "table_of"]
+
+Values = NDArray[Any]
+Flat = list[tuple[str, str, Values]]
+BY_MEASURE = ("sensitivity", "contribution_worst_case", "contribution_rss", "corner_lower", "corner_upper",
+              "first_order", "first_order_low", "first_order_high", "total_order", "total_order_low",
+              "total_order_high")  # fmt: skip
+SHARES = (
+    "yield",
+    "used",
+    "contribution_rss",
+    "first_order",
+    "total_order",
+    "convergence_yield",
+    "cp",
+    "skewness",
+    "kurtosis",
+)
+
+
+def is_tolerance(result: xr.Dataset) -> bool:
+    """Whether it is a result of `tolerance`."""
+    return {"measure", "parameter"} <= set(result.dims)
+
+
+def table_of(path: str | os.PathLike[str], result: xr.Dataset) -> str:
+    """The table that a file of this name holds: of `x.positions.csv` positions, else measures or what is bought."""
+    inner = Path(Path(path).stem).suffix.lstrip(".").lower()
+    return inner if inner in TABLES else ("parameters" if "bought" in result else "measures")
+
+
+def flat(result: xr.Dataset, table: str) -> Flat:
+    """(name, unit, values) of every column of a table."""
+    return TABLES[table](result)
+
+
+def _units(result: xr.Dataset) -> list[str]:
+    return [str(unit) for unit in json.loads(result.attrs["measure_units"])]
+
+
+def _names(result: xr.Dataset, dim: str) -> list[str]:
+    return [str(name) for name in result[dim].values]
+
+
+def _is_share(key: str) -> bool:
+    return key.startswith(SHARES)
+
+
+def _measures(result: xr.Dataset) -> Flat:
+    """One row a measure: its figures; quantiles as `quantile_0.05`; limits and bounds as they are stated."""
+    found: Flat = [("measure", "", np.array(_names(result, "measure"))), ("unit", "", np.array(_units(result)))]
+    for key, ends in (("limits", ("limit_lower", "limit_upper")), ("bounds", ("at_least", "at_most"))):
+        stated = json.loads(result.attrs.get(key, "[]"))
+        for k, name in enumerate(ends):
+            column = [np.nan if pair is None or pair[k] is None else float(pair[k]) for pair in stated]
+            found += [(name, "", np.array(column))] if column else []
+    for variable, one in result.data_vars.items():
+        key = str(variable)
+        if one.dims == ("measure",):
+            found.append((key, "1" if _is_share(key) else "", np.asarray(one.values)))
+        elif one.dims == ("measure", "quantile"):
+            levels = result["quantile"].values
+            stem = key.replace("quantile_value", "quantile")
+            found += [(f"{stem}_{level:g}", "", one.values[:, k]) for k, level in enumerate(levels)]
+    return found
+
+
+def _parameters(result: xr.Dataset) -> Flat:
+    """One row a toleranced number; what is of a measure is `<measure>.sensitivity`, …."""
+    found: Flat = [("parameter", "", np.array(_names(result, "parameter")))]
+    found.append(("unit", "", np.array([str(unit) for unit in json.loads(result.attrs["parameter_units"])])))
+    for variable, one in result.data_vars.items():
+        if one.dims == ("parameter",):
+            found.append((str(variable).removeprefix("parameter_"), "", np.asarray(one.values)))
+    for i, measure in enumerate(_names(result, "measure")):
+        for key in (key for key in BY_MEASURE if key in result):
+            found.append((f"{measure}.{key}", "1" if _is_share(key) else "", result[key].values[i]))
+    return found
+
+
+def _positions(result: xr.Dataset) -> Flat:
+    """One row a position: of each measure its curve, what the tolerances do to it, and its sensitivities."""
+    found: Flat = [(key, str(result[key].attrs.get("units", "")), result[key].values)
+                   for key in ("time", "drive") if key in result.coords]  # fmt: skip
+    for i, (measure, unit) in enumerate(zip(_names(result, "measure"), _units(result), strict=True)):
+        for key, one in result.data_vars.items():
+            name = str(key).replace("curve", "").strip("_")
+            name = f"{measure}.{name}" if name else measure
+            if one.dims == ("measure", "position"):
+                found.append((name, unit, one.values[i]))
+            elif one.dims == ("measure", "quantile", "position"):
+                levels = result["quantile"].values
+                found += [(f"{name}_{level:g}", unit, one.values[i, k]) for k, level in enumerate(levels)]
+            elif one.dims == ("measure", "parameter", "position"):
+                parts = zip(_names(result, "parameter"), one.values[i], strict=True)
+                found += [(f"{measure}.{path}.{str(key).removeprefix('curve_')}", "", row) for path, row in parts]
+    return found
+
+
+def _histogram(result: xr.Dataset) -> Flat:
+    """One row a bin of a measure: its edges and its count."""
+    if "histogram" not in result:
+        return [(name, "", np.empty(0)) for name in ("measure", "from", "to", "count")]
+    counts, edges = result["histogram"].values, result["edge"].values
+    names = np.repeat(_names(result, "measure"), counts.shape[1])
+    low, high = (edges[:, part].ravel() for part in (slice(0, -1), slice(1, None)))
+    return [("measure", "", names), ("from", "", low), ("to", "", high), ("count", "1", counts.ravel())]
+
+
+def _convergence(result: xr.Dataset) -> Flat:
+    """One row a number of samples: mean, deviation and yield of each measure so far."""
+    found: Flat = []
+    if "convergence_samples" in result:
+        found.append(("samples", "1", result["convergence_samples"].values))
+    for i, (measure, unit) in enumerate(zip(_names(result, "measure"), _units(result), strict=True)):
+        for key in (key for key in ("mean", "deviation", "yield") if f"convergence_{key}" in result):
+            row = result[f"convergence_{key}"].values[i]
+            found.append((f"{measure}.{key}", "1" if key == "yield" else unit, row))
+    return found or [("samples", "1", np.empty(0))]
+
+
+def _offers(result: xr.Dataset) -> Flat:
+    """One row a point of cost over accuracy: what limits are multiplied by, the cost, and each tolerance."""
+    if "trade_off_cost" not in result:
+        return [(name, "1", np.empty(0)) for name in ("factor", "cost")]
+    found: Flat = [(key, "1", result[f"trade_off_{key}"].values) for key in ("factor", "cost")]
+    units = [str(unit) for unit in json.loads(result.attrs["parameter_units"])]
+    for j, (path, unit) in enumerate(zip(_names(result, "parameter"), units, strict=True)):
+        if result["bought"].values[j]:
+            found.append((path, unit, result["trade_off_tolerance"].values[:, j]))
+    return found
+
+
+TABLES: dict[str, Callable[[Any], Flat]] = {
+    "measures": _measures,
+    "parameters": _parameters,
+    "positions": _positions,
+    "histogram": _histogram,
+    "convergence": _convergence,
+    "offers": _offers,
+}

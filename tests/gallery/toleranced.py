@@ -1,0 +1,115 @@
+"""Linkages with tolerances of the gallery."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import product
+
+import numpy as np
+
+import trunnion
+from gallery.entry import Entry, Outcome
+from gallery.plane import corner, slope
+from gallery.spatial import rocker_of_rssr
+from trunnion.algebra.dual import Dual, derivative
+from trunnion.analysis.measures import named
+
+__all__ = ["ENTRIES"]
+
+
+def corners(one: Outcome) -> float:
+    """Largest wedge angle with every dimension at one of its limits."""
+    ends = [[(tolerance.path, tolerance.nominal + end) for end in (tolerance.lower, tolerance.upper)]
+            for tolerance in one.mechanism.tolerated()]  # fmt: skip
+    models = (one.mechanism.with_values(dict(values)) for values in product(*ends))
+    return max(float(trunnion.analyse(model)["link_angle"].sel(link="strut")[0]) for model in models)
+
+
+def steepest() -> float:
+    """cos φ = (a + c)/(e − c), a and c at their least, e at its most."""
+    a, c, e = 27.645 - 0.0125, 11.43 - 0.01, 50.8 + 0.0125
+    return float(np.arccos((a + c) / (e - c)))
+
+
+def shifts(one: Outcome, measure: str) -> dict[str, float]:
+    """|∂y/∂p| t of a measure at 60° of the crank, by dual numbers, of every tolerance that does anything to it."""
+    run = trunnion.prepare(one.mechanism)
+    (what,) = named(one.mechanism, [measure], run.values)
+    found = {}
+    for tolerance in one.mechanism.tolerated():
+        values = one.mechanism.parameters(deviations={tolerance.path: Dual(0.0, 1.0)})
+        walk = run.solve(run.cycle.times(6)[1:2], values).walk
+        found[tolerance.path] = abs(float(np.ravel(derivative(what.value(walk)))[0])) * tolerance.half_width
+    return found
+
+
+def worst(measure: str) -> Callable[[Outcome], float]:
+    return lambda one: sum(shifts(one, measure).values())
+
+
+def squares(measure: str) -> Callable[[Outcome], float]:
+    return lambda one: float(np.linalg.norm(list(shifts(one, measure).values())))
+
+
+def by_corner(widths: tuple[float, ...]) -> list[float]:
+    """The same of the rocker of 100, 30, 90, 70 mm from its triangle, by differences; widths: half, mm."""
+    lengths = (100.0, 30.0, 90.0, 70.0)
+
+    def rocker(place: int) -> Callable[[float], complex]:
+        def angle(length: float) -> complex:
+            ground, crank, coupler, one = (*lengths[:place], length, *lengths[place + 1 :])
+            c = corner(crank * np.exp(1j * np.pi / 3), ground, coupler, one, 1)
+            return complex(np.angle(c - ground))
+
+        return angle
+
+    return [abs(slope(rocker(i), lengths[i], 1e-3).real) * widths[i] for i in range(4)]
+
+
+def swing_of_rssr() -> float:
+    """Σ |∂ψ/∂p| t, by differences of the one equation that the length of the rod leaves."""
+    widths = {"a": 2e-5, "b": 5e-5, "c": 3e-5, "d": 4e-5, "alpha": np.radians(0.1), "s1": 5e-5, "s4": 5e-5}
+    nominal = {"a": 30e-3, "b": 120e-3, "c": 70e-3, "d": 100e-3, "alpha": np.pi / 3, "s1": 10e-3, "s4": 20e-3}
+
+    def turned(name: str) -> Callable[[float], complex]:
+        return lambda value: complex(rocker_of_rssr(np.pi / 3, **{name: value}))
+
+    return sum(abs(slope(turned(name), nominal[name], 1e-5).real) * width for name, width in widths.items())
+
+
+ENTRIES = {
+    "one-way-clutch": Entry(
+        says="Largest wedge angle that the limits of its dimensions allow",
+        unit="rad",
+        found=corners,
+        expected=steepest,
+        source="the closed form cos φ = (a + c)/(e − c) at the corner",
+        tolerance=1e-12,
+        report=False,
+    ),
+    "toleranced-fourbar": Entry(
+        says="Most that the tolerances turn the rocker at 60° of the crank, to first order",
+        unit="rad",
+        found=worst("rotation:D"),
+        expected=lambda: sum(by_corner((0.03, 0.02, 0.03, 0.03))),
+        source="the triangle of coupler and rocker, its derivatives by differences",
+        tolerance=1e-11,
+        figures=("mechanism", "torque"),
+    ),
+    "fourbar-by-grades": Entry(
+        says="Root of the sum of squares of what the tolerances turn the rocker at 60° of the crank",
+        unit="rad",
+        found=squares("rotation:D"),
+        expected=lambda: float(np.linalg.norm(by_corner((0.027, 0.02, 0.027, 0.023)))),
+        source="the triangle of coupler and rocker, its derivatives by differences",
+        tolerance=1e-11,
+    ),
+    "toleranced-rssr": Entry(
+        says="Most that the tolerances turn the rocker at 60° of the crank, to first order",
+        unit="rad",
+        found=worst("rotation:D"),
+        expected=swing_of_rssr,
+        source="the one equation that the length of the rod leaves, its derivatives by differences",
+        tolerance=1e-10,
+    ),
+}

@@ -1,0 +1,463 @@
+"""What varies and how: limits, distributions, correlations; and a model with other tolerances."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic_core import PydanticCustomError
+from varied import VARIED
+
+import trunnion
+from trunnion.algebra.dual import Dual, derivative
+from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.model.check import check_model
+from trunnion.model.limits import Limits
+from trunnion.model.mechanism import Mechanism
+from trunnion.model.tolerance_parts import DISTRIBUTIONS, OPTIONS, Variation
+from trunnion.model.tolerances import Tolerance
+from trunnion.statistics import distributions
+
+FindingsOf = Callable[..., tuple[Finding, ...]]
+DEG = np.pi / 180
+
+
+@pytest.fixture
+def varied(tmp_path: Path) -> Mechanism:
+    path = tmp_path / "varied.yaml"
+    path.write_text(VARIED, encoding="utf-8")
+    return Mechanism.read(path)
+
+
+def of(mechanism: Mechanism) -> dict[str, Tolerance]:
+    return {one.path: one for one in mechanism.tolerated()}
+
+
+# ---- limits ---------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("±0.05 mm", (-5e-5, 5e-5)),
+        ("± 50 um", (-5e-5, 5e-5)),
+        ("+/-0.05 mm", (-5e-5, 5e-5)),
+        ("+-0.05 mm", (-5e-5, 5e-5)),
+        ("0.05 mm", (-5e-5, 5e-5)),
+        (5e-5, (-5e-5, 5e-5)),
+        ("+0.02/-0.01 mm", (-1e-5, 2e-5)),
+        ("+0.02 mm / -10 um", (-1e-5, 2e-5)),
+        ("-0.01/+0.02 mm", (-1e-5, 2e-5)),
+        ("+0.02/0 mm", (0.0, 2e-5)),
+        ("0/-0.05 mm", (-5e-5, 0.0)),
+        ("-7/−20 um", (-2e-5, -7e-6)),
+        ("+0.02/-0.01", (-0.01, 0.02)),
+        ("±0.1 deg", (-0.1 * DEG, 0.1 * DEG)),
+        ("±2 * 0.05 mm", (-1e-4, 1e-4)),
+    ],
+)
+def test_limits_as_written(text: float | str, expected: tuple[float, float]) -> None:
+    found = Limits.read(text)
+    assert (found.lower.evaluate(), found.upper.evaluate()) == pytest.approx(expected, rel=1e-15)
+    assert found.source == text
+    assert Limits.read(found) is found
+
+
+@pytest.mark.parametrize(
+    ("text", "what"),
+    [
+        ("+0.02 mm", "sign on one side only"),
+        ("-0.02 mm", "sign on one side only"),
+        ("±+0.02 mm", "sign on one side only"),
+        (-0.1, "to either side has no sign"),
+        ("0.1 mm ± 0.05 mm", "tolerance of their own"),
+        ("±0.05 furlongz", "'furlongz' is not known"),
+        ("+0.02 mm/-0.01 oddunit", "'oddunit' is not known"),
+        (True, "a yes/no value"),
+        ([1, 2], "is a list"),
+        ("±", "cannot be read"),
+    ],
+)
+def test_what_are_no_limits(text: object, what: str) -> None:
+    with pytest.raises(PydanticCustomError) as error:
+        Limits.read(text)
+    assert what in str(error.value)
+
+
+@given(st.floats(1e-9, 1e3), st.floats(0, 1e3))
+def test_limits_with_two_signs(upper: float, lower: float) -> None:
+    found = Limits.read(f"+{upper!r}/-{lower!r}") if "e" not in f"{upper!r}{lower!r}" else Limits.read(upper)
+    assert float(found.upper.evaluate()) == upper
+    assert float(found.lower.evaluate()) == -(lower if isinstance(found.source, str) else upper)
+
+
+# ---- what varies ----------------------------------------------------------------------------------------------
+
+
+def test_every_number_that_varies_in_the_order_of_the_parameters(varied: Mechanism) -> None:
+    found = of(varied)
+    names = list(varied.parameters())
+    assert list(found) == sorted(found, key=names.index)
+    friction = [f"joints.{name}.friction.coefficient" for name in "ABCD"]
+    assert set(found) == {
+        *(f"dimensions.{name}" for name in ("AB", "AD", "BC", "CD")),
+        *friction,
+        "links.crank.mass",
+        "joints.A.pin.clearance",
+        "joints.B.misalignment.offset",
+        "joints.B.seat.xi",
+        "joints.C.pin.radius",
+        "joints.C.pin.hole_radius",
+        "drivers.A.speed",
+    }
+
+
+@pytest.mark.parametrize(
+    ("path", "expected"),
+    [
+        ("dimensions.AB", (0.03, -5e-5, 5e-5, "truncated", {"cp": 1.2})),
+        ("dimensions.AD", (0.1, -1e-5, 2e-5, "truncated", {"cp": 1.2})),
+        ("dimensions.BC", (0.09, -5e-5, 5e-5, "truncated", {"cp": 1.33, "cpk": 1.0, "shift": 1e-5})),
+        ("dimensions.CD", (0.07, -5e-5, 5e-5, "uniform", {})),
+        ("links.crank.mass", (0.2, -0.005, 0.005, "truncated", {"cp": 1.2})),
+        ("joints.A.friction.coefficient", (0.1, -0.03, 0.03, "truncated", {"cp": 1.2})),
+        ("joints.B.friction.coefficient", (0.2, -0.01, 0.02, "triangular", {"mode": 0.005})),
+        ("joints.A.pin.clearance", (2e-5, -3e-6, 1e-5, "sample", {"values": (1e-5, -3e-6, 2e-6)})),
+        ("joints.B.misalignment.offset", (0.0, 0.0, 2e-5, "truncated", {"cp": 1.2})),
+        ("joints.B.seat.xi", (30 * DEG, -np.pi, np.pi, "direction", {})),
+        ("joints.C.pin.radius", (0.00599425, -2.75e-6, 2.75e-6, "truncated", {"cp": 1.2})),
+        ("drivers.A.speed", (2 * np.pi, -np.pi / 30, np.pi / 30, "beta", {"alpha": 2.0, "beta": 3.0})),
+    ],
+)
+def test_limits_and_distribution(varied: Mechanism, path: str, expected: tuple[Any, ...]) -> None:
+    nominal, lower, upper, distribution, options = expected
+    found = of(varied)[path]
+    assert (found.nominal, found.lower, found.upper) == pytest.approx((nominal, lower, upper), rel=1e-12)
+    assert found.half_width == pytest.approx((upper - lower) / 2, rel=1e-12)
+    assert found.distribution == distribution
+    assert found.options.keys() == options.keys()
+    for key, value in options.items():
+        assert found.options[key] == pytest.approx(value, rel=1e-15)
+    assert found.direction == ("joints.B.misalignment.offset_towards" if path.endswith("offset") else "")
+
+
+def test_a_tilt_has_a_direction_of_its_own() -> None:
+    mechanism = trunnion.read(Path(__file__).parents[2] / "examples" / "rssr.yaml").with_values(
+        {"tolerances.D.misalignment.tilt": "+0.1/0 deg", "tolerances.D.misalignment.tilt.direction": "uniform"}
+    )
+    (found,) = mechanism.tolerated()
+    assert (found.direction, found.upper) == ("joints.D.misalignment.towards", pytest.approx(0.1 * DEG))
+
+
+def test_limits_follow_the_dimensions(varied: Mechanism) -> None:
+    changed = varied.with_values({"t": "0.1 mm"})
+    assert of(changed)["dimensions.AB"].upper == pytest.approx(1e-4)
+    assert changed.parameters()["measures.swing.limit.upper"] == pytest.approx(1e-4 / 0.03)
+
+
+def test_numbers_stated_with_a_tolerance_alone_vary_as_the_defaults_say() -> None:
+    mechanism = Mechanism.read(Path(__file__).parents[2] / "examples" / "toleranced-slider-crank.yaml")
+    assert {one.path: (one.lower, one.upper) for one in mechanism.tolerated()} == mechanism.tolerances()
+    assert {one.distribution for one in mechanism.tolerated()} == {"normal"}
+
+
+def test_the_table_of_distributions_is_that_of_the_statistics() -> None:
+    """The model knows the names, so that reading a file does not import the mathematics of them."""
+    declared = {name: tuple(one.parameters) for name, one in distributions.DISTRIBUTIONS.items()}
+    assert declared == DISTRIBUTIONS
+    assert {key for keys in DISTRIBUTIONS.values() for key in keys} == set(OPTIONS) <= Variation.model_fields.keys()
+
+
+def test_every_tolerance_is_a_distribution(varied: Mechanism) -> None:
+    """What the model tells is what the statistics take: finite quantiles and moments."""
+    for one in varied.tolerated():
+        kind = distributions.DISTRIBUTIONS[one.distribution]
+        drawn = kind.quantile(np.array([0.1, 0.5, 0.9]), one.lower, one.upper, one.options)
+        assert np.all(np.isfinite(drawn))
+        assert np.all(np.diff(drawn) >= 0)
+        assert kind.variance(one.lower, one.upper, one.options) > 0
+
+
+# ---- correlation ----------------------------------------------------------------------------------------------
+
+
+def test_correlation(varied: Mechanism) -> None:
+    matrix, paths = varied.correlation(), list(of(varied))
+    expected = np.eye(len(paths))
+    pairs = {("dimensions.AB", "dimensions.BC"): 0.5}
+    friction = [f"joints.{name}.friction.coefficient" for name in "BCD"]  # A has its own, and does not follow
+    pairs |= {(a, b): 0.9 for a in friction for b in friction if a < b}
+    for (a, b), value in pairs.items():
+        i, j = paths.index(a), paths.index(b)
+        expected[i, j] = expected[j, i] = value
+    np.testing.assert_array_equal(matrix, expected)
+
+
+# ---- deviations -----------------------------------------------------------------------------------------------
+
+
+def test_a_deviation_is_added_and_passed_on() -> None:
+    """A number that follows from another goes on to do so, unlike one that is replaced."""
+    mechanism = Mechanism(
+        dimensions={"a": "10 mm ± 0.1 mm", "b": "2 * a ± 0.05 mm"},
+        errors={"b": "1 mm"},
+        links={"ground": {"points": {"A": [0, 0]}}, "arm": {"points": {"A": [0, 0], "P": ["b", "a"]}}},
+        joints={"A": {"type": "revolute", "links": ["ground", "arm"]}},
+        drivers={"A": {"speed": 1}},
+    )
+    values = mechanism.parameters(deviations={"a": 1e-3, "b": 1e-4, "arm.points.P.x": 1e-5})
+    assert values["dimensions.b"] == pytest.approx(0.0231, abs=1e-15)
+    assert values["links.arm.points.P.x"] == pytest.approx(0.02311, abs=1e-15)
+    assert values["links.arm.points.P.y"] == pytest.approx(0.011, abs=1e-15)
+    assert mechanism.parameters({"b": 0.05}, {"b": 1e-4})["links.arm.points.P.x"] == pytest.approx(0.0501, abs=1e-15)
+    samples = mechanism.parameters(deviations={"a": np.array([[0.0], [1e-3]])})
+    assert samples["links.arm.points.P.x"].ravel() == pytest.approx([0.021, 0.023], abs=1e-15)  # type: ignore[union-attr]
+    assert derivative(mechanism.parameters(deviations={"a": Dual(0.0, 1.0)})["links.arm.points.P.x"]) == 2
+    assert mechanism.parameters(deviations={}) == mechanism.parameters()
+
+
+def test_a_deviation_of_a_default_is_of_every_joint(varied: Mechanism) -> None:
+    values = varied.parameters(deviations={"joint_defaults.friction.coefficient": 0.05, "C.friction.coefficient": 0.01})
+    found = [values[f"joints.{name}.friction.coefficient"] for name in "ABCD"]
+    assert found == pytest.approx([0.1, 0.25, 0.26, 0.25], rel=1e-14)
+
+
+# ---- another model --------------------------------------------------------------------------------------------
+
+
+@given(st.floats(0, 1e-3), st.floats(1e-9, 0.5))
+def test_other_tolerances(length: float, friction: float) -> None:
+    one = Mechanism.read(Path(__file__).parents[2] / "examples" / "toleranced-slider-crank.yaml").with_values(
+        {"tolerances.P.friction.coefficient": "+0.02/-0.01"}
+    )
+    found = of(one.with_tolerances({"crank": length, "P.friction.coefficient": friction}))
+    assert found["dimensions.crank"].half_width == pytest.approx(length, rel=1e-11, abs=1e-15)
+    two = found["joints.P.friction.coefficient"]
+    assert (two.lower, two.upper) == pytest.approx((0.005 - friction, 0.005 + friction), rel=1e-10, abs=1e-11)
+
+
+def test_other_tolerances_are_written(varied: Mechanism, tmp_path: Path) -> None:
+    changed = varied.with_tolerances(
+        {
+            "AB": 1.25e-5,
+            "AD": 2e-5,
+            "BC": 3e-5,
+            "links.crank.mass": 0.01,
+            "C.friction.coefficient": 0.001,
+            "joints.A.clearance": 3e-5,
+        }
+    )
+    changed.write(tmp_path / "model.yaml")
+    again = Mechanism.read(tmp_path / "model.yaml")
+    assert again == changed
+    assert again.digest == changed.digest
+    found = of(again)
+    assert found["dimensions.AB"].upper == 1.25e-5
+    assert (found["dimensions.AD"].lower, found["dimensions.AD"].upper) == pytest.approx((-1.5e-5, 2.5e-5))
+    assert found["dimensions.BC"].options == {"cp": 1.33, "cpk": 1.0, "shift": 1e-5}
+    assert found["joints.C.friction.coefficient"].distribution == "triangular"
+    assert found["joints.D.friction.coefficient"] == of(varied)["joints.D.friction.coefficient"]
+    assert again.parameters()["joints.A.pin.clearance"] == 3e-5
+    assert list(again.variations)[: len(varied.variations)] == list(varied.variations)
+
+
+@pytest.mark.parametrize(
+    ("name", "half", "what"),
+    [
+        ("t", 1e-5, "'t' has no tolerance"),
+        ("A.pin.clearance", 1e-5, "varies as measured"),
+        ("B.seat.xi", 1e-5, "varies as measured or over a full turn"),
+        ("AB", -1e-5, "half width of -1e-05"),
+        ("AB", float("nan"), "half width of nan"),
+        ("nothing", 1e-5, "no number named 'nothing'"),
+    ],
+)
+def test_tolerances_that_cannot_be_replaced(varied: Mechanism, name: str, half: float, what: str) -> None:
+    with pytest.raises(MechanismError, match=what):
+        varied.with_tolerances({name: half})
+
+
+def test_tolerances_by_name_and_text(varied: Mechanism) -> None:
+    changed = varied.with_values(
+        {
+            "tolerances.AB": "±0.1 mm",
+            "tolerances.dimensions.BC": "±1 um",
+            "tolerances.AD.cp": 1.5,
+            "tolerances.rocker.mass": 0.1,
+            "measures.theta.limit": "0.3 deg",
+        }
+    )
+    found = of(changed)
+    assert found["dimensions.AB"].upper == 1e-4
+    assert found["dimensions.BC"].upper == 1e-6
+    assert found["dimensions.BC"].options["cpk"] == 1.0
+    assert (found["dimensions.AD"].upper, found["dimensions.AD"].options["cp"]) == (2e-5, 1.5)
+    assert found["links.rocker.mass"].upper == 0.1
+    assert changed.parameters()["measures.theta.limit.lower"] == pytest.approx(-0.3 * DEG)
+    with pytest.raises(MechanismError, match="a limit is stated with the other"):
+        varied.with_values({"measures.theta.limit.lower": "0.3 deg"})
+    with pytest.raises(MechanismError, match="no number named 'XY'"):
+        varied.with_values({"tolerances.XY": "0.3 deg"})
+
+
+def test_without_friction_nothing_varies_that_is_not_there(varied: Mechanism) -> None:
+    ideal = varied.with_friction("off")
+    assert not [path for path in of(ideal) if "friction" in path]
+    assert [one.of for one in ideal.correlations] == [("AB", "BC")]
+    assert "joints.B.seat.xi" not in of(varied.with_seats("loaded"))
+    assert [one.of for one in varied.with_friction("coulomb").correlations] == [one.of for one in varied.correlations]
+
+
+def test_without_friction_no_error_of_it_is_left() -> None:
+    path = Path(__file__).parents[2] / "examples" / "slider-crank.yaml"
+    joint = next(name for name, one in Mechanism.read(path).effective_joints.items() if one.friction)
+    mechanism = Mechanism.read(path).with_values({f"errors.{joint}.friction.coefficient": 0.01})
+    assert mechanism.errors
+    assert not mechanism.with_friction("off").errors
+
+
+# ---- measured samples -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("0.01\n-0.02\n0.005\n", (0.01, -0.02, 0.005)),
+        ("deviation [um]\n10\n\n# a remark\n-3,5\n2;\n", (1e-5, -3.5e-6, 2e-6)),
+        ('"d [mm]"\n"0.01"\n"−0.02"\n', (1e-5, -2e-5)),
+        ("d\r\n1e-5\r\n2e-5\r\n", (1e-5, 2e-5)),
+    ],
+)
+def test_a_sample_from_a_file(varied: Mechanism, tmp_path: Path, text: str, expected: tuple[float, ...]) -> None:
+    path = tmp_path / "sample.csv"
+    path.write_text(text, encoding="utf-8")
+    changed = varied.with_samples("CD", path)
+    found = of(changed)["dimensions.CD"]
+    assert (found.distribution, found.options["values"]) == ("sample", pytest.approx(expected, rel=1e-15))
+    assert (found.lower, found.upper) == pytest.approx((-5e-5, 5e-5))  # as stated
+    changed.write(tmp_path / "model.yaml")
+    assert Mechanism.read(tmp_path / "model.yaml") == changed
+    clearance = of(varied.with_samples("A.pin.clearance", path))["joints.A.pin.clearance"]
+    assert (clearance.lower, clearance.upper) == pytest.approx((min(expected), max(expected)))
+    kept = of(varied.with_samples("BC", path))["dimensions.BC"]
+    assert (kept.lower, kept.upper) == (-5e-5, 5e-5)
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "what"),
+    [
+        ("d [kg]\n1\n2\n", 1, "its unit is that of a mass"),
+        ("d [mm]\n1\nthree\n", 3, "'three' is not a finite number"),
+        ("d [mm]\n1\n", 2, "has 1 row"),
+        ("1; 2\n3; 4\n", 1, "has several columns"),
+        ("# nothing\n", 1, "nothing but remarks"),
+        ("", 1, "is empty"),
+    ],
+)
+def test_a_sample_that_cannot_be_read(varied: Mechanism, tmp_path: Path, text: str, line: int, what: str) -> None:
+    path = tmp_path / "sample.csv"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(MechanismError) as error:
+        varied.with_samples("CD", path)
+    finding = error.value.findings[0]
+    assert what in finding.what
+    assert (finding.file, finding.line) == (str(path), line)
+    assert finding.remedy
+
+
+def test_a_sample_of_nothing(varied: Mechanism, tmp_path: Path) -> None:
+    with pytest.raises(MechanismError, match="no number named 'XY'"):
+        varied.with_samples("XY", tmp_path / "sample.csv")
+    with pytest.raises(MechanismError, match="cannot be read"):
+        varied.with_samples("CD", tmp_path / "none.csv")
+
+
+# ---- findings -------------------------------------------------------------------------------------------------
+
+T = VARIED.splitlines().index("tolerances:") + 2  # line of the first tolerance
+R = VARIED.splitlines().index("correlations:") + 1
+CASES = [
+    ("  AB: ±t", "  XY: ±t", T, "tolerances.XY", "no number named 'XY'", "'AD'"),
+    ("  AB: ±t", "  AB: ±tt", T, "tolerances.AB", "'tt', which is not one of the dim", "'t'"),
+    ("  AB: ±t", "  AB: ±0.1 deg", T, "tolerances.AB", "an angle where a length is needed", "60 mm"),
+    ("  AB: ±t", "  AB: ±0.1", T, "tolerances.AB", "'±0.1' has no unit where a length", "60 mm"),
+    ("  AB: ±t", "  AB: -0.1 mm", T, "tolerances.AB", "a sign on one side only", "+0.02/0 mm"),
+    ("  AB: ±t", "  AB: ±(t - 1 mm)", T, "tolerances.AB", "is above the upper one", "±"),
+    ("  AB: ±t", "  AB: {limits: ±t, distribution: gaussian}", T, "tolerances.AB", "'gaussian' is not a distr", "norm"),
+    ("  AB: ±t", "  AB: {limits: ±t, mode: 1 um}", T, "tolerances.AB.mode", "nothing to the distribution trunc", "tri"),
+    ("  AB: ±t", "  AB: {limits: ±t, cp: 0}", T, "tolerances.AB.cp", "cp is 0", "above 0"),
+    ("  AB: ±t", "  AB: {limits: ±t, cp: 1 mm}", T, "tolerances.AB.cp", "a length where a number", "0.1"),
+    ("  AB: ±t", "  AB: {limits: ±t, cp: 1, cpk: 1.1}", T, "tolerances.AB.cpk", "cpk 1.1 is above cp 1", "at most"),
+    ("  AB: ±t", "  AB: {limits: ±t, cpk: 1.3}", T, "tolerances.AB.cpk", "cpk 1.3 is above cp 1.2", "at most"),
+    ("  AB: ±t", "  AB: {distribution: uniform}", T, "tolerances.AB", "limits of 'dimensions.AB' are missing", "±0.05"),
+    ("  AB: ±t", "  AB: {limits: ±t, direction: uniform}", T, "tolerances.AB.direction", "no direction", "direction"),
+    ("  AB: ±t", "  AB: {distribution: sample}", T, "tolerances.AB", "deviations are missing", "--sample"),
+    ("  AB: ±t", "  AB: {distribution: sample, values: [1 um]}", T, "tolerances.AB.values", "1 entries", "all"),
+    ("  AB: ±t", "  AB: {distribution: sample, values: [1 um, 1 kg]}", T, "tolerances.AB.values.1", "a mass", "mm"),
+    ("  AB: ±t", "  AB: {limits: ±t, alfa: 1}", T, "tolerances.AB.alfa", "'alfa' is unknown", "'alpha'"),
+    ("  AB: ±t", "  AB: ±t\n  dimensions.AB: ±t", T + 1, "tolerances.dimensions.AB", "are the same number", "one"),
+    ("  AB: ±t", "  AB: [1, 2]", T, "tolerances.AB", "not a group", ""),
+    ("  AB: ±t", "  AB: ±t\n  C.x: ±t", T + 1, "tolerances.C.x", "stands for", "which"),
+    ("  AB: ±t", "  AB: ±t\n  assembly.C.x: ±t", T + 1, "tolerances.assembly.C.x", "nothing in it varies", "dimens"),
+    ("  AB: ±t", "  AB: ±t\n  theta.at: 1 deg", T + 1, "tolerances.theta.at", "nothing in it varies", "dimens"),
+    ("  AB: ±t", "  AB: ±t\n  joint_defaults.pin.clearance: 1 um", T + 1, "clearance", "no number named",
+     "joint_defaults"),
+    ("  B.seat.xi:", "  A.pin.radius:", T + 7, "tolerances.A.pin.radius", "is no angle", "all directions"),
+    ("{distribution: direction}", "{limits: ±1 deg, distribution: direction}", T + 7, "tolerances.B.seat.xi",
+     "over the whole turn has no limits", "uniform"),
+    ("+0.02/0 mm", "±0.02 mm", T + 6, "tolerances.B.misalignment.offset", "a size is not negative", "+0.02/0"),
+    ("mode: 0.005", "mode: 0.05", T + 4, "tolerances.joint_defaults.friction.coefficient.mode", "outside", "density"),
+    ("alpha: 2", "alpha: -2", T + 9, "tolerances.drivers.A.speed.alpha", "alpha is -2", "above 0"),
+    ("distribution: truncated, cp: 1.2", "distribution: sample", R - 1, "tolerance_defaults.distribution", "of one",
+     ""),
+    ("distribution: truncated, cp: 1.2", "alpha: 1.2", R - 1, "tolerance_defaults.alpha", "nothing to the", "remove"),
+    ("distribution: truncated, cp: 1.2", "cp: 1, cpk: 2", R - 1, "cpk", "is above cp", "at most"),
+    ("of: [AB, BC], coefficient: 0.5", "of: [AB, XY], coefficient: 0.5", R + 1, "correlations.0.of.1", "'XY'", ""),
+    ("of: [AB, BC], coefficient: 0.5", "of: [AB, t], coefficient: 0.5", R + 1, "correlations.0", "no tolerance",
+     "state"),
+    ("of: [AB, BC], coefficient: 0.5", "of: [AB], coefficient: 0.5", R + 1, "correlations.0", "with nothing", "two"),
+    ("of: [AB, BC], coefficient: 0.5", "of: [AB, AB], coefficient: 0.5", R + 1, "correlations.0", "twice", "two"),
+    ("of: [AB, BC], coefficient: 0.5", "of: [AB, BC], coefficient: 1.5", R + 1, "correlations.0.coefficient", "1.5",
+     "1"),
+    ("of: [AB, BC], coefficient: 0.5", "of: [AB, BC]", R + 1, "correlations.0", "'coefficient' is missing", "add"),
+    ("of: [AB, BC], coefficient: 0.5", "of: [], coefficient: 0.5", R + 1, "correlations.0.of", "has 0 entries", ""),
+    ("coefficient: 0.9", "coefficient: -0.6", R, "correlations", "the least eigenvalue of their matrix is -0.2",
+     "nearer"),
+    ("coefficient: 0.5}", "coefficient: 0.5}\n  - {of: [BC, AB], coefficient: 0.4}", R + 2, "correlations.1", "entry 1",
+     "one"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("old", "new", "line", "where", "what", "remedy"), CASES)
+def test_one_mistake_is_found_where_it_is(
+    findings_of: FindingsOf, old: str, new: str, line: int, where: str, what: str, remedy: str
+) -> None:
+    assert VARIED.count(old) == 1
+    found = findings_of(VARIED.replace(old, new))
+    texts = "\n".join(map(str, found))
+    fitting = [one for one in found if where in one.where and what in one.what and remedy in one.remedy]
+    assert fitting, texts
+    assert fitting[0].line == line, texts
+    assert all(one.remedy and one.where and one.line for one in found), texts
+
+
+def test_doubts_are_kept_apart(tmp_path: Path) -> None:
+    path = tmp_path / "model.yaml"
+    text = VARIED.replace("t: 0.05 mm}", "t: 0.05 mm, idle: 1 mm}")
+    path.write_text(text.replace("  AB: ±t", "  AB: {limits: ±t, shift: 0.1 mm}\n  idle: ±t"), encoding="utf-8")
+    found = {one.where: one for one in check_model(Mechanism.read(path))}
+    assert found["tolerances.idle"].severity is Severity.WARNING
+    assert found["tolerances.AB.shift"].severity is Severity.WARNING
+    assert found["tolerances.BC"].severity is Severity.NOTE
+    assert "go before those that stand with 'dimensions.BC'" in found["tolerances.BC"].what
+
+
+def test_a_load_of_the_motion_has_no_tolerance(findings_of: FindingsOf) -> None:
+    text = VARIED.replace("measures:", "loads: {w: {joint: D, resisting_torque: 1 N m * cos(drive)}}\nmeasures:")
+    (found,) = findings_of(text.replace("  AB: ±t", "  AB: ±t\n  w.resisting_torque: ±1 N m"))
+    assert "varies with the motion" in found.what

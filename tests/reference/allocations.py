@@ -1,0 +1,71 @@
+"""Allocation problems on plain numbers, and a four-bar's sensitivities from its loop equation."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.analysis.allocation.problem import Contribution, Criterion, Effects, Option, Problem
+from trunnion.statistics.costs import Cost
+
+Array = NDArray[np.float64]
+FOUR_BAR = (100.0, 30.0, 90.0, 70.0)  # ground, crank, coupler, rocker, mm
+PRICES = (1.0, 0.6, 1.0, 0.8)  # B of the costs B/t^0.45, t in mm
+
+
+def rocker_sensitivities(crank: Array) -> Array:
+    """∂θ₄/∂l of the four-bar at crank angles, rad: (position, 4), rad/mm.
+
+    l₂ u₂ + l₃ u₃ = l₁ x + l₄ u₄ with u = (cos θ, sin θ). Along u₃ its variation has no dθ₃:
+    dl₂ u₂·u₃ + dl₃ = dl₁ x·u₃ + dl₄ u₄·u₃ + l₄ dθ₄ n₄·u₃, n₄ normal to u₄.
+    """
+    l1, l2, l3, l4 = FOUR_BAR
+    pin = np.stack([l2 * np.cos(crank), l2 * np.sin(crank)])
+    way = np.array([[l1], [0.0]]) - pin
+    d = np.hypot(*way)
+    along = (l3**2 - l4**2 + d**2) / (2 * d)
+    across = np.sqrt(l3**2 - along**2)
+    u3 = (along * way + across * np.stack([-way[1], way[0]])) / d / l3
+    u4 = (pin + l3 * u3 - np.array([[l1], [0.0]])) / l4
+    u2 = pin / l2
+    lever = l4 * (-u4[1] * u3[0] + u4[0] * u3[1])
+    parts = [-u3[0], np.sum(u2 * u3, axis=0), np.ones_like(d), -np.sum(u4 * u3, axis=0)]
+    return np.asarray(np.stack(parts) / lever, float).T
+
+
+def four_bar(criterion: Criterion = "worst-case", positions: int = 72, limit: float = np.radians(0.1)) -> Problem:
+    """The four-bar of THEORY 7: rocker angle within ± limit at all positions; half widths in mm."""
+    effect = rocker_sensitivities(np.arange(positions) * 2 * np.pi / positions)
+    bought = tuple(
+        Contribution(f"l{i + 1}", cost=Cost("power", {"B": price, "k": 0.45, "unit": 1.0}))
+        for i, price in enumerate(PRICES)
+    )
+    return Problem(bought, rows(effect, limit), criterion)
+
+
+def rows(effect: Array, limit: float | Array, **more: Any) -> Effects:
+    """Rows with limits ± limit."""
+    each = np.broadcast_to(np.asarray(limit, float), len(effect)).copy()
+    return Effects(np.abs(effect), -each, each, half=effect, **more)
+
+
+def bought(costs: list[Cost], **bounds: float) -> tuple[Contribution, ...]:
+    """Contributions p0, p1, … with costs."""
+    return tuple(Contribution(f"p{i}", cost=cost, **bounds) for i, cost in enumerate(costs))
+
+
+def random_costs(rng: np.random.Generator, count: int) -> list[Cost]:
+    """A mixture of both models."""
+    models = rng.choice(["power", "exponential"], count)
+    return [
+        Cost(model, {"A": 1.0, "B": rng.uniform(0.5, 5), "k": rng.uniform(0.3, 2.5), "unit": rng.uniform(0.02, 0.1)})
+        for model in models
+    ]
+
+
+def random_options(rng: np.random.Generator, count: int) -> tuple[Option, ...]:
+    """Processes: the narrower, the dearer."""
+    widths, prices = np.sort(rng.uniform(0.01, 0.1, count)), np.sort(rng.uniform(1, 20, count))[::-1]
+    return tuple(Option(f"p{k}", t, c) for k, (t, c) in enumerate(zip(widths, prices, strict=True)))

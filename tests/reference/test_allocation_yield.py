@@ -1,0 +1,104 @@
+"""Allocation by yield: the margin that normal deviations need, and its correction by what is sampled."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from allocations import bought, four_bar, random_options, rows
+from numpy.typing import NDArray
+from scipy.special import ndtr, ndtri
+from scipy.stats import multivariate_normal
+
+from trunnion.analysis.allocation.problem import Contribution, Problem
+from trunnion.analysis.allocation.solve import solve, trade_off
+from trunnion.analysis.allocation.yields import normal_yield
+from trunnion.statistics.costs import Cost
+
+Array = NDArray[np.float64]
+PLAIN = Cost("power", {"B": 1.0, "k": 1.0, "unit": 1.0})
+
+
+def sampled(problem: Problem, wider: float = 1.0, count: int = 400_000) -> object:
+    """A yield of normal deviations by plain samples, with standard deviations `wider` than reckoned."""
+
+    def verify(t: Array) -> tuple[float, float, float]:
+        rng = np.random.default_rng(5)
+        draws = rng.normal(size=(count, len(t))) @ (wider * problem.effects.sigma() * t).T
+        share = float(np.mean(np.all((draws <= problem.effects.upper) & (draws >= problem.effects.lower), axis=1)))
+        half = 1.96 * float(np.sqrt(share * (1 - share) / count))
+        return share, share - half, share + half
+
+    return verify
+
+
+@pytest.mark.parametrize("target", [0.9, 0.9973, 0.999999])
+def test_one_row_has_the_margin_of_the_normal_distribution(target: float) -> None:
+    problem = Problem(bought([PLAIN] * 3), rows(np.array([[1.0, -2.0, 0.5]]), 0.1), "yield")
+    answer = solve(problem, target=target)
+    assert answer.problem.z == pytest.approx(ndtri((1 + target) / 2), rel=1e-6)
+    assert answer.expected == pytest.approx(target, abs=1e-9)
+
+
+def test_independent_rows_multiply() -> None:
+    problem = Problem(bought([PLAIN] * 3), rows(np.diag([1.0, 2.0, 3.0]), 0.1), "yield")
+    t = np.array([0.15, 0.07, 0.04])
+    each = 2 * ndtr(0.1 / (np.array([1.0, 2.0, 3.0]) * t / 3)) - 1
+    assert normal_yield(problem, t) == pytest.approx(float(np.prod(each)), abs=3e-4)
+
+
+def test_dependent_shifted_rows_agree_with_scipy() -> None:
+    """Two rows of three deviations, the first with a shift: the normal distribution of two numbers over a box."""
+    effect, mean = np.array([[1.0, 2.0, -1.0], [0.5, -1.0, 2.0]]), np.array([[0.3, 0.0, 0.2], [0.0, 0.0, 0.0]])
+    problem = Problem(bought([PLAIN] * 3), rows(effect, np.array([0.1, 0.12]), mean=mean), "yield")
+    t = np.array([0.06, 0.05, 0.07])
+    sigma = effect * t / 3
+    box = multivariate_normal(mean @ t, sigma @ sigma.T)
+    exact = box.cdf(np.array([0.1, 0.12]), lower_limit=np.array([-0.1, -0.12]))
+    assert normal_yield(problem, t) == pytest.approx(float(exact), abs=3e-4)
+
+
+def test_four_bar_meets_its_yield_when_sampled() -> None:
+    problem = four_bar("yield")
+    reckoned = solve(problem, target=0.9973)
+    answer = solve(problem, target=0.9973, verify=sampled(problem))  # type: ignore[arg-type]
+    assert answer.sampled is not None
+    assert answer.sampled.low <= 0.9973 <= answer.sampled.high
+    assert len(answer.trials) <= 2
+    assert answer.cost == pytest.approx(reckoned.cost, rel=5e-3)
+    assert solve(four_bar("rss")).cost < reckoned.cost < solve(four_bar()).cost
+
+
+@pytest.mark.parametrize("wider", [0.7, 1.3])
+def test_what_is_sampled_tightens_and_loosens(wider: float) -> None:
+    """Deviations wider than reckoned by a factor need half widths narrower by it."""
+    problem = four_bar("yield")
+    answer = solve(problem, target=0.99, verify=sampled(problem, wider))  # type: ignore[arg-type]
+    assert answer.sampled is not None
+    assert answer.sampled.low <= 0.99 <= answer.sampled.high
+    assert 2 <= len(answer.trials) <= 6
+    assert answer.tolerances == pytest.approx(solve(problem, target=0.99).tolerances / wider, rel=2e-2)
+
+
+def test_processes_meet_a_yield_at_least_cost() -> None:
+    rng = np.random.default_rng(2)
+    parts = tuple(Contribution(f"p{i}", options=random_options(rng, 6)) for i in range(4))
+    problem = Problem(parts, rows(rng.normal(size=(5, 4)), 0.12), "yield")
+    answer = solve(problem, "discrete", 0.95, sampled(problem, count=100_000))  # type: ignore[arg-type]
+    assert answer.sampled is not None
+    assert answer.sampled.high >= 0.95
+    assert not answer.findings
+
+
+def test_a_yield_out_of_reach_is_told() -> None:
+    problem = four_bar("yield")
+    held = tuple(replace(one, least=0.08) for one in problem.contributions)
+    answer = solve(replace(problem, contributions=held), target=0.9999)
+    assert answer.findings
+    assert "yield" in str(answer.findings[0]) or not answer.found
+
+
+def test_cost_falls_along_the_curve() -> None:
+    costs = [one.cost for one in trade_off(four_bar("yield", positions=36), [0.5, 1.0, 2.0], target=0.9973)]
+    assert costs == sorted(costs, reverse=True)

@@ -1,0 +1,43 @@
+"""Costs of tolerances: every entry of the table by its own derivatives, convexity and findings."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from trunnion.statistics.costs import COST_MODELS, Cost
+
+GIVEN = {"A": 1.0, "B": 20.0, "k": 0.7, "unit": 1e-3}
+
+
+@pytest.mark.parametrize("name", COST_MODELS)
+@pytest.mark.parametrize("t", [2e-6, 1e-4, 3e-3])
+def test_slope_and_curvature_are_derivatives_of_the_cost(name: str, t: float) -> None:
+    cost, h = Cost(name, GIVEN), 1e-4 * t
+    slope = (cost.value(t + h) - cost.value(t - h)) / (2 * h)
+    curvature = (cost.slope(t + h) - cost.slope(t - h)) / (2 * h)
+    assert cost.slope(t) == pytest.approx(slope, rel=1e-6)
+    assert cost.curvature(t) == pytest.approx(curvature, rel=1e-6)
+    assert cost.slope(t) < 0 < cost.curvature(t)
+
+
+def test_values_by_hand() -> None:
+    assert Cost("power", {"B": 3.0, "k": 0.5, "unit": 1e-3}).value(4e-3) == pytest.approx(1.5)
+    assert Cost("exponential", {**GIVEN, "k": 2.0}).value(0.5e-3) == pytest.approx(1 + 20 * np.exp(-1))
+    assert Cost("power", GIVEN).value(0.0) == np.inf
+    assert Cost("exponential", GIVEN).value(0.0) == 21.0
+
+
+@pytest.mark.parametrize(
+    ("model", "change", "said"),
+    [
+        ("linear", {}, "'linear' is no cost model"),
+        ("power", {"k": 0.0}, "'k' is 0, it has to be above 0"),
+        ("exponential", {"B": -1.0}, "'B' is -1, it has to be at least 0"),
+        ("power", {"unit": None}, "'unit' is missing"),
+    ],
+)
+def test_what_is_wrong_is_said(model: str, change: dict[str, float | None], said: str) -> None:
+    given = {name: value for name, value in {**GIVEN, **change}.items() if value is not None}
+    assert [str(one) for one in Cost(model, given).findings("costs.AB") if said in str(one)]
+    assert not Cost("power", GIVEN).findings()

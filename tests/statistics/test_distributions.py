@@ -1,0 +1,167 @@
+"""Every distribution: quantile and its inverse, moments, tails; against scipy.stats, integration and mpmath."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mpmath
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import stats
+
+from trunnion.statistics.distributions import DISTRIBUTIONS, normal_parameters
+
+LOW, HIGH = -2e-5, 5e-5
+CASES: list[tuple[str, dict[str, Any], Any]] = [
+    ("normal", {}, stats.norm(1.5e-5, 7e-5 / 6)),
+    ("normal", {"cp": 1.5}, stats.norm(1.5e-5, 7e-5 / 9)),
+    ("normal", {"cp": 1.33, "cpk": 1.0}, stats.norm(1.5e-5 + 0.33 * 7e-5 / 6 / 1.33 * 3, 7e-5 / 6 / 1.33)),
+    ("normal", {"cp": 1.33, "cpk": 1.0, "shift": -3e-6}, stats.norm(1.2e-5, 7e-5 / 6 / 1.33)),
+    ("uniform", {}, stats.uniform(LOW, HIGH - LOW)),
+    ("triangular", {}, stats.triang(0.5, LOW, HIGH - LOW)),
+    ("triangular", {"mode": -1e-5}, stats.triang(1 / 7, LOW, HIGH - LOW)),
+    ("triangular", {"mode": HIGH}, stats.triang(1, LOW, HIGH - LOW)),
+    ("triangular", {"mode": LOW}, stats.triang(0, LOW, HIGH - LOW)),
+    ("truncated", {}, stats.truncnorm(-3, 3, 1.5e-5, 7e-5 / 6)),
+    ("truncated", {"cp": 0.3, "shift": 1e-5}, stats.truncnorm(-4.5 / 7 * 1.8, 2.5 / 7 * 1.8, 2.5e-5, 7e-5 / 1.8)),
+    ("truncated", {"cp": 2, "shift": 5e-5}, stats.truncnorm(-8.5 / 7 * 12, -1.5 / 7 * 12, 6.5e-5, 7e-5 / 12)),
+    ("beta", {}, stats.beta(2, 2, LOW, HIGH - LOW)),
+    ("beta", {"alpha": 5, "beta": 0.7}, stats.beta(5, 0.7, LOW, HIGH - LOW)),
+    ("beta", {"alpha": 0.3, "beta": 40}, stats.beta(0.3, 40, LOW, HIGH - LOW)),
+    ("direction", {}, stats.uniform(-np.pi, 2 * np.pi)),
+]
+IDS = [f"{name}-{'-'.join(f'{k}{v}' for k, v in options.items())}" for name, options, _ in CASES]
+GRID = np.concatenate([2.0 ** -np.arange(1, 54), 1 - 2.0 ** -np.arange(2, 54), np.linspace(0.001, 0.999, 999)])
+SAMPLE = (3e-6, -1e-6, 2e-6, 2e-6)
+
+
+@pytest.mark.parametrize(("name", "options", "known"), CASES, ids=IDS)
+def test_as_in_scipy(name: str, options: dict[str, Any], known: Any) -> None:
+    kind, scale = DISTRIBUTIONS[name], known.std()
+    middle = GRID[(GRID > 1e-9) & (GRID < 1 - 1e-9)]
+    np.testing.assert_allclose(
+        kind.quantile(middle, LOW, HIGH, options), known.ppf(middle), rtol=0, atol=2e-8 * scale, strict=True
+    )
+    x = known.ppf(np.linspace(0.01, 0.99, 99))
+    np.testing.assert_allclose(kind.cdf(x, LOW, HIGH, options), known.cdf(x), rtol=0, atol=1e-12)
+    assert kind.mean(LOW, HIGH, options) == pytest.approx(known.mean(), abs=1e-9 * scale)
+    assert kind.variance(LOW, HIGH, options) == pytest.approx(known.var(), rel=1e-9)
+
+
+@pytest.mark.parametrize(("name", "options", "known"), [*CASES, ("sample", {"values": SAMPLE}, None)])
+def test_moments_are_those_of_the_quantile(name: str, options: dict[str, Any], known: Any) -> None:
+    """∫ x(u) du and ∫ x² du by the trapezoidal rule in y, u = Φ(y) of the normal distribution (smooth at both ends)."""
+    kind = DISTRIBUTIONS[name]
+    y = np.linspace(-8.2, 8.2, 8001)
+    u, weights = stats.norm.cdf(y), stats.norm.pdf(y) * (y[1] - y[0])
+    x = kind.quantile(u, LOW, HIGH, options)
+    mean = weights @ x
+    rough = {"sample": 1e-3, "triangular": 1e-6}.get(name, 1e-9)
+    assert kind.mean(LOW, HIGH, options) == pytest.approx(mean, abs=rough * np.sqrt(kind.variance(LOW, HIGH, options)))
+    assert kind.variance(LOW, HIGH, options) == pytest.approx(weights @ (x - mean) ** 2, rel=5 * rough)
+
+
+@pytest.mark.parametrize(("name", "options", "known"), CASES, ids=IDS)
+def test_finite_rising_and_bounded(name: str, options: dict[str, Any], known: Any) -> None:
+    kind = DISTRIBUTIONS[name]
+    u = np.sort(np.concatenate([GRID, [5e-324, 1e-300, 1e-100]]))
+    x = kind.quantile(u, LOW, HIGH, options)
+    assert np.isfinite(x).all()
+    assert (np.diff(x) >= 0).all()
+    if kind.bounded and name != "direction":
+        assert x.min() >= LOW
+        assert x.max() <= HIGH
+    # Near a limit where the density is infinite neighbouring floats are far apart in probability.
+    np.testing.assert_allclose(
+        kind.cdf(x, LOW, HIGH, options), u, rtol=0, atol=1e-4 if options.get("alpha") == 0.3 else 3e-9
+    )
+
+
+MIRRORED = {"normal": "shift", "truncated": "shift", "triangular": "mode"}
+
+
+@pytest.mark.parametrize(("name", "options", "known"), CASES, ids=IDS)
+def test_mirrored_to_the_last_bits(name: str, options: dict[str, Any], known: Any) -> None:
+    """−x has the mirrored distribution: the upper tail is as exact as the lower."""
+    kind, mirrored = DISTRIBUTIONS[name], dict(options)
+    if name == "beta":
+        mirrored = {"alpha": options.get("beta", 2.0), "beta": options.get("alpha", 2.0)}
+    elif key := MIRRORED.get(name):
+        mean, _ = normal_parameters(LOW, HIGH, options)
+        value = mean - (LOW + HIGH) / 2 if key == "shift" else options.get(key, (LOW + HIGH) / 2)
+        mirrored[key] = -value
+    one, other = kind.quantile(GRID, LOW, HIGH, options), -kind.quantile(1 - GRID, -HIGH, -LOW, mirrored)
+    np.testing.assert_allclose(one, other, rtol=0, atol=2e-15 if name == "direction" else 1e-17)
+
+
+@pytest.mark.parametrize("shift", [-2e-4, 1.5e-4, 3.0])
+def test_cut_off_far_from_the_mean(shift: float) -> None:
+    """A mean far beyond a limit: against mpmath; so far that only logarithms are left (3 m): exponential."""
+    kind, options = DISTRIBUTIONS["truncated"], {"cp": 1.0, "shift": shift}
+    mean, sigma = normal_parameters(LOW, HIGH, options)
+    u = np.array([1e-12, 1e-3, 0.2, 0.5, 0.9])
+    x = kind.quantile(u, LOW, HIGH, options)
+    if abs(shift) < 1:
+        with mpmath.workdps(120):
+            a, b = (mpmath.mpf(v - mean) / mpmath.mpf(sigma) for v in (LOW, HIGH))
+            Fa, Fb = mpmath.ncdf(a), mpmath.ncdf(b)
+            z = [(mpmath.mpf(v) - mpmath.mpf(mean)) / mpmath.mpf(sigma) for v in x]
+            back = [float((mpmath.ncdf(v) - Fa) / (Fb - Fa)) for v in z]
+            exact = [float(mpmath.quad(lambda t, k=k: t**k * mpmath.npdf(t), [a, b]) / (Fb - Fa)) for k in (1, 2)]
+        np.testing.assert_allclose(back[1:], u[1:], rtol=1e-9)
+        assert kind.mean(LOW, HIGH, options) == pytest.approx(mean + sigma * exact[0], rel=1e-10)
+        assert kind.variance(LOW, HIGH, options) == pytest.approx(sigma**2 * (exact[1] - exact[0] ** 2), rel=1e-8)
+        np.testing.assert_allclose(kind.cdf(x, LOW, HIGH, options)[1:], u[1:], rtol=1e-9)
+    else:
+        rate = shift / sigma**2
+        np.testing.assert_allclose(HIGH - x, -np.log(u) / rate, rtol=1e-3)
+        assert HIGH - kind.mean(LOW, HIGH, options) == pytest.approx(1 / rate, rel=1e-4)
+        assert kind.variance(LOW, HIGH, options) == pytest.approx(1 / rate**2, rel=1e-4)
+
+
+def test_narrow_cut_is_uniform() -> None:
+    options = {"cp": 1e-4}
+    assert DISTRIBUTIONS["truncated"].variance(LOW, HIGH, options) == pytest.approx((HIGH - LOW) ** 2 / 12, rel=1e-6)
+
+
+@pytest.mark.parametrize("name", ["normal", "uniform", "triangular", "truncated", "beta"])
+def test_no_tolerance_no_spread(name: str) -> None:
+    kind = DISTRIBUTIONS[name]
+    assert set(kind.quantile(GRID, 1e-5, 1e-5, {})) == {1e-5}
+    assert kind.mean(1e-5, 1e-5, {}) == 1e-5
+    assert kind.variance(1e-5, 1e-5, {}) == 0
+    np.testing.assert_array_equal(kind.cdf(np.array([0.9e-5, 1e-5]), 1e-5, 1e-5, {}), [0, 1])
+
+
+@given(st.lists(st.floats(-1, 1), min_size=1, max_size=30))
+def test_sample_is_the_empirical_distribution(values: list[float]) -> None:
+    """Every value is drawn by an equal part of (0, 1), in order of size."""
+    kind, options = DISTRIBUTIONS["sample"], {"values": tuple(values)}
+    n = len(values)
+    u = (np.arange(n * 8) + 0.5) / (n * 8)
+    np.testing.assert_array_equal(kind.quantile(u, 0, 0, options), np.repeat(np.sort(values), 8))
+    assert kind.mean(0, 0, options) == pytest.approx(np.mean(values), abs=1e-15)
+    assert kind.variance(0, 0, options) == pytest.approx(np.var(values), abs=1e-15)
+    below = [np.mean(np.asarray(values) <= x) for x in (-0.5, 0.0, 0.5)]
+    np.testing.assert_allclose(kind.cdf(np.array([-0.5, 0, 0.5]), 0, 0, options), below)
+
+
+@settings(max_examples=40)
+@given(st.floats(0.05, 300), st.floats(0.05, 300), st.floats(2.0**-53, 0.5))
+def test_beta_table(alpha: float, beta: float, u: float) -> None:
+    """The table against the inverse function itself, x and 1 − x each to 1e-9 of its value."""
+    kind, shapes = DISTRIBUTIONS["beta"], {"alpha": alpha, "beta": beta}
+    x, known = float(kind.quantile(np.array(u), 0.0, 1.0, shapes)), float(stats.beta.ppf(u, alpha, beta))
+    assert x == pytest.approx(known, rel=1e-9, abs=1e-300)
+    rest, known = float(-kind.quantile(np.array(u), -1.0, 0.0, shapes)), float(stats.beta.isf(u, beta, alpha))
+    assert rest == pytest.approx(known, rel=1e-9)
+
+
+def test_table_says_what_it_has() -> None:
+    for name, kind in DISTRIBUTIONS.items():
+        assert kind.name == name
+        assert kind.long_name
+    assert set(DISTRIBUTIONS) == {"normal", "uniform", "triangular", "truncated", "beta", "sample", "direction"}
+    assert not DISTRIBUTIONS["normal"].bounded

@@ -1,0 +1,382 @@
+"""Figures and tables of what tolerances do: every kind of result, what it holds, nothing cut off at an edge."""
+
+from __future__ import annotations
+
+import json
+import re
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import xarray as xr
+from matplotlib.axis import Tick
+from matplotlib.colors import to_hex
+from matplotlib.text import Text
+from stand_in_tolerances import CASES, LIMIT, QUANTILES, at_one_position, gap, odd_names, toleranced
+
+from trunnion.errors import MechanismError
+from trunnion.export import save as export
+from trunnion.verbs.tolerance import check_files, show
+from trunnion.views.figures import PALETTE
+from trunnion.views.plots import save
+from trunnion.views.tolerance import KINDS, MOST_PANELS, drawable, figure, sheet
+from trunnion.views.tolerance_cost import Offer, Price, tolerance_cost, trade_off
+from trunnion.views.tolerance_tables import corners, figures, indices, inputs, overview, tables
+from trunnion.views.toleranced import fixed, limits_text, readings, scaled, share, share_interval
+
+
+@pytest.fixture(scope="module", params=CASES)
+def case(request):
+    return CASES[request.param]()
+
+
+def few(result):
+    """The names of as many measures as a figure holds."""
+    return [str(name) for name in result["measure"].values[:MOST_PANELS]]
+
+
+def outside(drawn):
+    """Texts that lie beyond the edge of a figure."""
+    drawn.canvas.draw()
+    ticks = {id(text) for tick in drawn.findobj(Tick) for text in (tick.label1, tick.label2)}
+    seen = [tick.label1 for axes in drawn.axes for axis in (axes.xaxis, axes.yaxis) for tick in _in_view(axis)]
+    texts = [*(text for text in drawn.findobj(Text) if id(text) not in ticks), *seen]
+    boxes = [(text.get_text(), text.get_window_extent()) for text in texts if text.get_visible()]
+    width, height = drawn.bbox.width, drawn.bbox.height
+    return [
+        text
+        for text, box in boxes
+        if text.strip() and (box.x0 < -1 or box.y0 < -1 or box.x1 > width + 1 or box.y1 > height + 1)
+    ]
+
+
+def _in_view(axis):
+    low, high = sorted(axis.get_view_interval())
+    return [tick for tick in axis.get_major_ticks() if low <= tick.get_loc() <= high]
+
+
+def line(axes, start):
+    """The curve whose label starts so."""
+    return next(one for one in axes.lines if str(one.get_label()).startswith(start)).get_xydata()
+
+
+def labels(axes):
+    return [text.get_text() for text in axes.get_legend().get_texts()]
+
+
+# ---- every kind of result -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_figure_of_every_result_stays_on_its_sheet(case, kind):
+    reads = [read for read in readings(case) if read.name in few(case)]
+    if not any(KINDS[kind].ready(read) for read in reads):
+        with pytest.raises(MechanismError, match=f"no measure has a figure '{kind}'"):
+            figure(case, kind, few(case))
+        return
+    assert not outside(figure(case, kind, few(case)))
+
+
+def test_every_result_makes_a_sheet(case, tmp_path):
+    drawn = sheet(case, few(case))
+    assert not outside(drawn)
+    assert save(drawn, tmp_path / "sheet.svg").stat().st_size > 20_000
+
+
+def test_every_result_makes_tables(case):
+    for table in [*tables(case), inputs(case), overview(case)]:
+        assert table.title
+        assert table.rows
+        assert {len(row) for row in table.rows} == {len(table.head)}
+        assert not any(re.search(r"\bnan\b|\binf\b|-\d", cell) for row in table.rows for cell in row[1:])
+
+
+# ---- figures ------------------------------------------------------------------------------------------------------
+
+
+def test_the_histogram_counts_the_samples_within_and_beyond_the_limits():
+    result = toleranced()
+    (axes,) = (part.axes[0] for part in figure(result, "histogram").subfigs)
+    within, beyond = axes.patches[:2]
+    assert [to_hex(one.get_facecolor()) for one in (within, beyond)] == list(PALETTE[:2])
+    drawn = within.get_data()
+    assert drawn.values.sum() == result.histogram.values.sum()
+    assert np.isin(np.round(np.radians(drawn.edges), 12), np.round(result.edge.values[0], 12)).all()
+    limits = [one.get_xdata()[0] for one in axes.lines if to_hex(one.get_color()) == "#a1260d"]
+    assert limits == [pytest.approx(0.1)]  # the size of a deviation has no lower one
+    seen = axes.transData.inverted().transform(within.get_clip_box().get_points())[:, 0]
+    assert seen == pytest.approx([drawn.edges[0], 0.1])
+    value = float(result["yield"][0])
+    assert f"within {share_interval(value, float(result.yield_low[0]), float(result.yield_high[0]))}" in labels(axes)
+    assert axes.get_xlabel() == "angle-error [°]"
+
+
+def test_a_narrow_distribution_is_told_as_a_deviation_from_nominal():
+    (axes,) = figure(at_one_position(), "histogram").axes
+    assert axes.get_xlabel() == "deviation of theta from nominal 112.3000° [°]"
+    told = labels(axes)
+    assert "nominal 112.3000°" in told
+    assert "limits +0.1/−0.05°" in told
+    assert line(axes, "nominal")[0, 0] == pytest.approx(0.0, abs=1e-9)
+    assert axes.get_xlim()[1] > 0.1
+
+
+def test_bins_of_uneven_width_are_drawn_over_even_ones():
+    result = toleranced(72, 2000)
+    edges = result["edge"].values[0]
+    uneven = np.sort(np.append(edges, 0.5 * (edges[:60] + edges[1:61])))
+    total = np.interp(uneven, edges, np.append(0, np.cumsum(result["histogram"].values[0])))
+    other = result.drop_vars(["edge", "histogram"])
+    other["edge"], other["histogram"] = (("measure", "edge"), [uneven]), (("measure", "bin"), [np.diff(total)])
+    drawn = figure(other, "histogram").axes[0].patches[0].get_data()
+    assert np.ptp(np.diff(drawn.edges)) < 1e-9
+    assert drawn.values.sum() == pytest.approx(2000, abs=1)
+
+
+def test_samples_outside_the_picture_are_counted():
+    result = toleranced(72, 2000)
+    edges = np.append(result["edge"].values[0], np.radians([5.0, 5.1]))
+    counts = np.append(result["histogram"].values[0], [0, 1])
+    other = result.drop_vars(["edge", "histogram"])
+    other["edge"], other["histogram"] = (("measure", "edge"), [edges]), (("measure", "bin"), [counts])
+    other["most"] = (("measure",), [np.radians(5.05)])
+    (axes,) = figure(other, "histogram").axes
+    assert axes.get_xlim()[1] < 0.5
+    assert axes.texts[0].get_text() == f"1 sample outside, up to {readings(other)[0].say(np.radians(5.05))}"
+
+
+def test_the_envelope_has_the_bands_of_the_result_and_closes_the_turn():
+    result = toleranced(72)
+    (axes,) = figure(result, "envelope").axes
+    rss = line(axes, "RSS")
+    assert rss[:-1, 1] == pytest.approx(np.degrees(result["curve_rss"].values[0]))
+    assert rss[-1] == pytest.approx((360.0, rss[0, 1]))
+    worst, outer, inner = axes.collections[:3]
+    for drawn, rows in ((outer, (0, -1)), (inner, (3, 7))):
+        ends = np.degrees(result["band"].values[0][list(rows)])
+        heights = drawn.get_paths()[0].vertices[:, 1]
+        assert (heights.min(), heights.max()) == pytest.approx((ends[0].min(), ends[1].max()))
+    assert worst.get_paths()[0].vertices[:, 1].max() == pytest.approx(np.degrees(result.worst_case_upper.values[0]))
+    corner = line(axes, "worst corner, searched: ")
+    assert corner == pytest.approx(np.array([[20.0, np.degrees(result.searched_upper.values[0])]]))
+    assert {round(one.get_ydata()[0], 9) for one in axes.lines if str(one.get_linestyle()) != "-"} >= {0.1, -0.1}
+
+
+def test_bands_of_values_are_drawn_as_deviations():
+    result = toleranced(72)
+    other = result.copy()
+    other["band"] = result["band"] + result["curve"]
+    other["band"].attrs = {"of": "value"}
+    paths = [figure(one, "envelope").axes[0].collections[1].get_paths()[0].vertices[:, 1] for one in (result, other)]
+    assert paths[0] == pytest.approx(paths[1])
+
+
+def test_a_gap_breaks_the_envelope_and_other_measures_positions_do_not():
+    (axes,) = figure(gap(), "envelope").axes
+    assert np.isnan(line(axes, "RSS")[:, 1]).sum() == 1
+    assert "no answer" in [text.get_text() for text in axes.texts]
+    result = toleranced(72)
+    extra = result.isel(position=[10]).assign_coords(drive=("position", [51.3]))
+    extra["curve"] = np.nan * extra["curve"]
+    both = xr.concat([result, extra], "position", data_vars="minimal", coords="minimal", compat="override")
+    assert both.sizes["position"] == 73
+    assert not np.isnan(line(figure(both, "envelope").axes[0], "RSS")).any()
+
+
+def test_one_position_and_a_structure_have_no_envelope():
+    for result in (at_one_position(), CASES["structure"]()):
+        assert "envelope" not in drawable(readings(result)[0])
+    with pytest.raises(MechanismError, match="measure it at more than one position"):
+        figure(at_one_position(), "envelope")
+
+
+def test_contributions_are_sorted_and_add_up():
+    result = toleranced(72)
+    (axes,) = figure(result, "contributions").axes
+    widths = [patch.get_width() for patch in axes.patches[:4]]
+    assert widths == sorted(widths, reverse=True)
+    assert sum(widths) == pytest.approx(100)
+    assert line(axes, "RSS², added up")[-1, 0] == pytest.approx(100)
+    assert axes.get_yticklabels()[0].get_text() == "coupler.length  ±0.07\u00a0mm"
+
+
+def test_small_contributions_are_drawn_together():
+    (axes,) = figure(CASES["thirty parameters"](), "contributions").axes
+    assert [text.get_text() for text in axes.get_yticklabels()][-1] == "26 others"
+    assert len(axes.get_yticks()) == 5
+
+
+def test_intervals_shrink_with_independent_samples_and_are_told_of_all_others_at_the_end_only():
+    plain = figure(toleranced(24), "convergence").axes
+    assert [len(axes.collections) for axes in plain] == [1, 1, 1]
+    quasi = figure(CASES["sobol"](), "convergence").axes
+    assert all(axes.containers for axes in quasi)
+    half = np.ptp(quasi[2].containers[0][2][0].get_segments()[0][:, 1]) / 2
+    result = CASES["sobol"]()
+    assert half == pytest.approx(50 * float(result.yield_high[0] - result.yield_low[0]), rel=1e-6)
+
+
+def test_too_many_measures_and_unknown_kinds_are_refused():
+    with pytest.raises(MechanismError, match="12 measures do not fit one figure"):
+        sheet(CASES["twelve measures"]())
+    with pytest.raises(MechanismError, match="there is no figure 'pie'"):
+        figure(toleranced(24), "pie")
+    with pytest.raises(MechanismError, match="--method sobol"):
+        figure(toleranced(24), "sobol")
+
+
+# ---- costs --------------------------------------------------------------------------------------------------------
+
+HALF = np.geomspace(5e-6, 3e-4, 30)
+
+
+def prices(count):
+    turned = tuple(
+        (f"turning {grade}", 1e-6 * t, cost) for grade, t, cost in ((6, 6.5, 16), (7, 10.5, 9), (8, 16.5, 6))
+    )
+    return [
+        Price(f"joints.J{k}.pin.clearance", "m", (10.5e-6, 9.0), processes=turned) if k % 2
+        else Price(f"links.L{k}.曲柄", "m", (2e-5, 5.8 + k), HALF, (HALF * 1e3) ** -0.45, group="bores")
+        for k in range(count)
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("count", [1, 2, 4, 14])
+def test_costs_of_tolerances(count):
+    drawn = tolerance_cost(toleranced(24, 100), prices(count))
+    assert not outside(drawn)
+    assert sum(axes.get_visible() for axes in drawn.axes) == min(count, 12)
+    assert any("±0.02\u00a0mm, cost " in axes.get_title(loc="left") for axes in drawn.axes)
+    if count > 12:
+        assert any(text.get_text() == "the 12 dearest of 14" for text in drawn.texts)
+
+
+def test_the_trade_off_marks_the_stated_limits_and_what_cannot_be_kept():
+    result = toleranced(24, 100)
+    shares = np.linspace(0.25, 2, 8)
+    costs = np.where(shares < 0.4, np.nan, 16.456705 / shares**0.45)
+    drawn = trade_off(result, [Offer(*pair) for pair in zip(shares, costs, strict=True)], ("angle-error", LIMIT, "rad"))
+    (axes,) = drawn.axes
+    assert not outside(drawn)
+    assert axes.get_xlabel() == "limit of angle-error ± [°]"
+    assert line(axes, "stated limits") == pytest.approx(np.array([[0.1, 16.456705]]), rel=1e-3)
+    assert [text.get_text() for text in axes.texts] == ["cannot be kept"]
+    stepped = trade_off(result, [Offer(one, float(np.ceil(6 / one) // 3)) for one in shares])
+    assert stepped.axes[0].lines[0].get_drawstyle() == "steps-post"
+
+
+# ---- texts --------------------------------------------------------------------------------------------------------
+
+
+def test_numbers_of_a_measure_share_unit_and_decimals():
+    read = readings(at_one_position())[0]
+    assert read.label == "°"
+    assert read.say(np.radians(112.3)) == "112.3000°"
+    assert read.say(np.radians(0.0486), sign=True) == "+0.0486°"
+    assert fixed(-0.00001, 4) == "0.0000"
+    assert fixed(-12345.678, 1) == "−12\u202f345.7"
+    assert scaled(2e-5, "m") == (1e3, "mm")
+    assert scaled(2e-6, "m") == (pytest.approx(1e6), "µm")
+
+
+@pytest.mark.parametrize(
+    ("value", "low", "high", "text"),
+    [
+        (0.9962, 0.9941, 0.9976, "99.62 % (99.41 to 99.76 %)"),
+        (1.0, 0.9963, 1.0, "100 % (99.63 to 100 %)"),
+        (0.5, 0.4, 0.6, "50.0 % (40.0 to 60.0 %)"),
+        (0.0, 0.0, 0.0038, "0 % (0 to 0.38 %)"),
+        (0.9999981, 0.9999962, 0.999999, "99.99981 % (99.99962 to 99.99990 %)"),
+    ],
+)
+def test_shares_have_the_digits_that_their_intervals_bear(value, low, high, text):
+    assert share_interval(value, low, high).replace("\u00a0", " ") == text
+
+
+def test_a_share_close_to_all_shows_how_close():
+    assert share(0.99998).replace("\u00a0", " ") == "99.9980 %"
+    assert share(float("nan")) == "—"
+
+
+def test_limits_as_a_drawing_has_them():
+    assert limits_text(-0.05, 0.05) == "±0.05"
+    assert limits_text(-0.01, 0.02) == "+0.02/−0.01"
+    assert limits_text(0.0, 0.02) == "+0.02/0"
+    assert limits_text(-np.inf, 0.02) == "+0.02/—"
+
+
+def test_a_table_has_a_column_for_each_method_that_was_run():
+    rows = {row[0]: row[1:] for row in figures(readings(toleranced(72))[0]).rows}
+    assert figures(readings(toleranced(72))[0]).head == ["", "linear", "searched", "Monte Carlo", "95 % interval"]
+    assert rows["worst case"] == ["±0.2391°", "−0.2344 to +0.2423°", "", ""]
+    assert figures(readings(CASES["linear only"]())[0]).head == ["", "linear"]
+    assert "quasi-Monte Carlo" in figures(readings(CASES["sobol"]())[0]).head
+
+
+def test_corners_indices_and_failures_are_told():
+    read = readings(toleranced(72))[0]
+    table = corners(read)
+    assert table.head == ["worst corner", "−0.2344°", "0.2423°"]
+    assert table.rows[0] == ["links.ground.length", "100\u00a0mm", "100.07\u00a0mm"]
+    assert corners(readings(CASES["linear only"]())[0]) is None
+    assert indices(readings(CASES["sobol"]())[0]).rows[0][0] == "links.coupler.length"
+    failed = next(table for table in tables(CASES["failures"]()) if "failed" in table.title)
+    assert [[cell.replace("\u00a0", " ") for cell in row] for row in failed.rows] == [
+        ["all", "120", "4.00 %"],
+        ["cannot be assembled", "80", "2.67 %"],
+        ["locked by friction", "40", "1.33 %"],
+    ]  # fmt: skip
+    assert tables(CASES["twelve measures"]())[-1].title == "all limits together"
+
+
+# ---- files and the verb ----------------------------------------------------------------------------------------------
+
+
+def test_files_are_refused_before_anything_is_computed(tmp_path):
+    check_files([tmp_path / "a.csv", tmp_path / "a.svg"], tmp_path / "a.html", "histogram")
+    for arguments, what in (
+        (([tmp_path / "a.xyz"],), "cannot write a result as '.xyz'"),
+        (([], tmp_path / "a.txt"), "a report is HTML"),
+        (([], None, "pie"), "there is no figure 'pie'"),
+    ):
+        with pytest.raises(MechanismError, match=what):
+            check_files(*arguments)
+
+
+def test_the_verb_writes_what_is_asked_for(tmp_path, capsys):
+    out = [tmp_path / name for name in ("t.csv", "t.parameters.csv", "t.nc", "t.json", "t.svg", "t.pdf")]
+    mechanism = SimpleNamespace(name="Four-bar")
+    show(mechanism, toleranced(24, 500), out, units_row=True, kind="histogram", report=tmp_path / "t.html")
+    assert {path.name for path in tmp_path.iterdir()} == {*(path.name for path in out), "t.html"}
+    told = capsys.readouterr().out
+    assert told.startswith("Four-bar\nangle-error: angle of rocker")
+    assert "wrote " in told
+    assert json.loads((tmp_path / "t.json").read_text())["attrs"]["seed"] == 1
+
+
+def test_tables_of_a_file_by_its_name(tmp_path):
+    pd = pytest.importorskip("pandas")
+    result = toleranced(24, 500, measures=2, sobol=True)
+    rows = {"x": 2, "x.measures": 2, "x.parameters": 4, "x.positions": 24, "x.histogram": 360, "x.convergence": 4}
+    for name, count in rows.items():
+        export(result, tmp_path / f"{name}.csv")
+        assert len(pd.read_csv(tmp_path / f"{name}.csv")) == count, name
+    one = pd.read_csv(tmp_path / "x.csv")
+    assert one["yield"].tolist() == result["yield"].values.tolist()
+    assert one["quantile_0.5"].tolist() == result["quantile_value"].values[:, QUANTILES.index(0.5)].tolist()
+    assert one["limit_upper"][0] == LIMIT
+    several = pd.read_csv(tmp_path / "x.parameters.csv")
+    assert several["angle-error-2.total_order"].tolist() == result["total_order"].values[1].tolist()
+    places = pd.read_csv(tmp_path / "x.positions.csv")
+    assert places["angle-error.worst_case_upper"].to_numpy() == pytest.approx(result.curve_worst_case_upper.values[0])
+    assert places["angle-error.links.crank.length.sensitivity"].to_numpy() == pytest.approx(
+        result.curve_sensitivity.values[0, 1]
+    )
+    export(CASES["linear only"](), tmp_path / "y.histogram.csv")
+    assert (tmp_path / "y.histogram.csv").read_text().startswith("measure,from,to,count")
+
+
+def test_names_are_shown_as_they_are():
+    (axes,) = figure(odd_names(), "contributions").axes
+    told = " ".join(text.get_text() for text in axes.get_yticklabels())
+    assert r"_\$x\$ & <!--" in told

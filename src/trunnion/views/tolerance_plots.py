@@ -221,12 +221,11 @@ def _bands(axes: Axes, over: Abscissa, read: Reading) -> None:
 
 def _corner(axes: Axes, over: Abscissa, read: Reading) -> None:
     """The worst corner of the nonlinear model, where the figure is the largest deviation over the drive."""
-    found = read.value("searched_upper")
+    least, most = read.value("searched_lower"), read.value("searched_upper")
+    found = max(-least, most)
     if not read.is_size or not math.isfinite(found + read.place):
         return
-    at = int(np.nanargmin(np.abs(over.values - read.place)))
-    ends = [read.along(read.row(f"curve_worst_case_{end}"))[at] for end in ("lower", "upper")]
-    sign = 1 if abs(ends[1]) >= abs(ends[0]) else -1
+    sign = 1 if most >= -least else -1
     label = f"worst corner, searched: {read.say(found)} at {read.told_place}"
     axes.plot([read.place], [sign * found * read.factor], "D", color=INK, markersize=5, label=label, zorder=5,
               markerfacecolor="white", markeredgewidth=1.3)  # fmt: skip

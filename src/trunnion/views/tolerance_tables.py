@@ -109,11 +109,11 @@ def _deviation(read: Reading) -> Cells:
 
 
 def _range(read: Reading, low: float, high: float) -> str:
-    """Deviations from nominal, as limits are told; the size of a deviation by its upper end."""
+    """Deviations from nominal, as limits are told; of the size of a deviation the larger one."""
     if math.isnan(low) and math.isnan(high):
         return ""
     if read.is_size:
-        return read.say(high)
+        return read.say(max(-low, high))
     upper = read.say(high, sign=True)
     if upper.startswith("+") and read.say(-low, sign=True) == upper:
         return f"±{upper[1:]}"

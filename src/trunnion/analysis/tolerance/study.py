@@ -169,7 +169,8 @@ def tolerance(
     where it states none, rotation and slide of every joint to the ground that is not driven. methods: of METHODS.
     samples: of the sampling method, and of the variance-based indices; seed: of its random numbers. steps: positions of
     a whole cycle; at: the place (driver coordinate or time) of measures that state neither a place nor a figure.
-    jobs: processes, one a core if not given and worth it. chunk, cluster, checkpoint, resume, progress: `runner.run`. engine: numpy, or jax (an extra).
+    jobs: processes, one a core if not given and worth it; chunk, cluster, checkpoint, resume, progress: `runner.run`.
+    engine: numpy, or jax (an extra).
     Returns a Dataset over (measure, parameter, position, …) of `result.VARIABLES`; SI, each measure in its own unit.
     Method: exact first derivatives by dual numbers; the worst corner of the tolerances found on the mechanism itself;
     Monte Carlo or scrambled Sobol points through the whole analysis; Sobol' indices. Samples that have no answer are

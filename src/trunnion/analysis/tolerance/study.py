@@ -201,7 +201,8 @@ def tolerance(
             what = f"stopped before the end: {done_of(job, tally):,} of {job.samples:,} samples"
             notes.append(Finding(what, "samples", "go on with --resume", Severity.WARNING))
     if "sobol" in methods:
-        own = found.sampling("quasi-monte-carlo", samples, seed)
+        # Not turned: each number is to have its own coordinates of the points.
+        own = replace(found.sampling("quasi-monte-carlo", samples, seed), rotation=None)
         shares = indices(found.sampler(own), samples, seed)
     return dataset(Outcome(found, tuple(methods), worst, job, tally, shares, stopped), [*found.told, *notes])
 

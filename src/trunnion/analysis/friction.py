@@ -26,6 +26,7 @@ from trunnion.algebra import linalg
 from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number, compiled
 from trunnion.algebra.nested import replaced
+from trunnion.algebra.traced import looped
 from trunnion.analysis import continuation
 from trunnion.analysis.friction_method import FrictionMethod, method_named, peak
 from trunnion.groups.planar import is_zero, less
@@ -46,7 +47,8 @@ __all__ = [
 
 DOUBTFUL_ROUNDS = 20  # of Newton's method, where no certificate says that it ends at the solution that is looked for
 
-COMPILED_ROUNDS = 3  # of Newton's method where the numbers have no values to tell when to end
+COMPILED_ROUNDS = 3  # of Newton's method where the numbers have no values to tell when to end; one more beyond FEW
+FEW = 3  # contacts of a dyad
 
 
 class Reacting(Protocol):
@@ -322,9 +324,17 @@ def _unrolled(problem: Problem, method: FrictionMethod) -> Settled:
     state = real.state(forces)
     bound = np.where(np.isfinite(peak(state.normals)), real.bound(), 0.0)
     certain = ~(bound >= 1.0)
-    for _ in range(COMPILED_ROUNDS - 1):
-        forces = _corrected(real, state, forces, _matrix(real, state))
-        state = real.state(forces)
+
+    def step(now: list[Number]) -> list[Number]:
+        state = real.state(now)
+        return _corrected(real, state, now, _matrix(real, state))
+
+    if len(forces) <= FEW:  # written out: quicker to run, but not to compile
+        for _ in range(COMPILED_ROUNDS - 1):
+            forces = step(forces)
+    else:
+        forces = looped(step, forces, COMPILED_ROUNDS)
+    state = real.state(forces)
     forces = _corrected(problem, problem.state(forces), forces, _matrix(real, state))
     before, state = state, problem.state(forces)
     change = _changed(state, before)
@@ -336,7 +346,7 @@ def _unrolled(problem: Problem, method: FrictionMethod) -> Settled:
 def _matrix(problem: Problem, state: State) -> list[list[Number]]:
     """(1 − A)⁻¹ at a state where the rows of |A| add up to less than 1: no pivots are needed."""
     matrix = identity_minus(problem.map_derivative(state))
-    return linalg.quick_inverse(matrix) if len(matrix) <= 3 else linalg.inverse(matrix, pivoting=False)
+    return linalg.quick_inverse(matrix) if len(matrix) <= FEW else linalg.inverse(matrix, pivoting=False)
 
 
 def _at_once(problem: Problem) -> Settled:

@@ -137,7 +137,7 @@ class CompiledKernel:
             with np.errstate(all="ignore"):
                 back = self._back(values, Traced(time), self.method)
                 status = status_number(back) if self.forces else pose_status_number(back.walk)
-                doubtful = (status != Status.SOLVED) | (worst_condition(back.walk) > BORDER)
+                doubtful = (status > Status.ZERO_SLIP) | (worst_condition(back.walk) > BORDER)
                 for settled in back.settled:
                     doubtful = doubtful | np.logical_not(settled.certain)
                 curves = {name: _full(figure(back), shape) for name, figure in self.figures.items()}

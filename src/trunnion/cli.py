@@ -35,6 +35,7 @@ from trunnion.options import (
     points,
 )
 from trunnion.terminal import bar, console, findings_of, say, show_figures, show_rows, wrote
+from trunnion.verbs.allocate import allocate
 from trunnion.verbs.assemble import assemble
 from trunnion.verbs.model import exit_status, lines_of, placed, stated
 from trunnion.verbs.study import tolerance
@@ -183,6 +184,7 @@ def locking(
 
 app.command()(assemble)
 app.command()(tolerance)
+app.command()(allocate)
 
 
 @app.command()

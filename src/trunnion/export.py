@@ -361,4 +361,4 @@ def save(result: xr.Dataset, path: str | os.PathLike[str], units_row: bool = Fal
     if Path(path).suffix.lower() == ".zarr" and Path(path).is_dir():
         raise MechanismError(Finding("exists already", str(path), "remove it or choose another name"))
     with whole(path) as temporary:
-        writer(result, temporary, units_row, table_of(path))
+        writer(result, temporary, units_row, table_of(path, result))

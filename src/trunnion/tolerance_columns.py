@@ -1,7 +1,8 @@
-"""The flat columns of a result of `tolerance`: five tables, of which the file's name says which.
+"""The flat columns of a result of `tolerance` or `allocate`: tables, of which the file's name says which.
 
 `x.csv` (or `x.measures.csv`) has one row a measure, `x.parameters.csv` one a toleranced number, `x.positions.csv` one
-a position, `x.histogram.csv` one a bin of a measure, `x.convergence.csv` one a number of samples. All in SI.
+a position, `x.histogram.csv` one a bin of a measure, `x.convergence.csv` one a number of samples. Of an allocation
+`x.csv` has one row a toleranced number, and `x.offers.csv` one a point of cost over accuracy. All in SI.
 """
 
 from __future__ import annotations
@@ -26,7 +27,17 @@ Flat = list[tuple[str, str, Values]]
 BY_MEASURE = ("sensitivity", "contribution_worst_case", "contribution_rss", "corner_lower", "corner_upper",
               "first_order", "first_order_low", "first_order_high", "total_order", "total_order_low",
               "total_order_high")  # fmt: skip
-SHARES = ("yield", "contribution_rss", "first_order", "total_order", "convergence_yield", "cp", "skewness", "kurtosis")
+SHARES = (
+    "yield",
+    "used",
+    "contribution_rss",
+    "first_order",
+    "total_order",
+    "convergence_yield",
+    "cp",
+    "skewness",
+    "kurtosis",
+)
 
 
 def is_tolerance(result: xr.Dataset) -> bool:
@@ -34,10 +45,10 @@ def is_tolerance(result: xr.Dataset) -> bool:
     return {"measure", "parameter"} <= set(result.dims)
 
 
-def table_of(path: str | os.PathLike[str]) -> str:
-    """The table that a file of this name holds: of `x.positions.csv` positions, else measures."""
+def table_of(path: str | os.PathLike[str], result: xr.Dataset) -> str:
+    """The table that a file of this name holds: of `x.positions.csv` positions, else measures or what is bought."""
     inner = Path(Path(path).stem).suffix.lstrip(".").lower()
-    return inner if inner in TABLES else "measures"
+    return inner if inner in TABLES else ("parameters" if "bought" in result else "measures")
 
 
 def flat(result: xr.Dataset, table: str) -> Flat:
@@ -130,10 +141,23 @@ def _convergence(result: xr.Dataset) -> Flat:
     return found or [("samples", "1", np.empty(0))]
 
 
+def _offers(result: xr.Dataset) -> Flat:
+    """One row a point of cost over accuracy: what limits are multiplied by, the cost, and each tolerance."""
+    if "trade_off_cost" not in result:
+        return [(name, "1", np.empty(0)) for name in ("factor", "cost")]
+    found: Flat = [(key, "1", result[f"trade_off_{key}"].values) for key in ("factor", "cost")]
+    units = [str(unit) for unit in json.loads(result.attrs["parameter_units"])]
+    for j, (path, unit) in enumerate(zip(_names(result, "parameter"), units, strict=True)):
+        if result["bought"].values[j]:
+            found.append((path, unit, result["trade_off_tolerance"].values[:, j]))
+    return found
+
+
 TABLES: dict[str, Callable[[Any], Flat]] = {
     "measures": _measures,
     "parameters": _parameters,
     "positions": _positions,
     "histogram": _histogram,
     "convergence": _convergence,
+    "offers": _offers,
 }

@@ -117,7 +117,7 @@ def test_correlated_sample_by_sample() -> None:
 
 
 def shifted(joint: str, x: Any, y: Any) -> Any:
-    """The angle of the rocker, its pin off by (x, y) in the axes of the hole, which the second link of the joint has."""
+    """The angle of the rocker, its pin off by (x, y) in the axes of the hole, which is in the second link."""
     l1, l2, l3, l4 = FOURBAR.values()
     if joint == "A":
         return fourbar_angle(l1, np.hypot(l2 - x, y), l3, l4, np.pi / 3 + np.arctan2(-y, l2 - x))

@@ -109,7 +109,7 @@ def allocate(
     discrete, or auto: discrete where any cost is a list of processes or options. steps: positions of a whole cycle; at:
     the place of measures that state none. samples, seed: of the samples that verify it, none if 0; jobs: processes for
     them. curve: how many points of cost over accuracy, all limits being multiplied by 0.5 to 2.
-    exact: in the worst case, narrow limits until the worst case found on the mechanism keeps them, not first order only.
+    exact: take limits narrower until the worst case found on the mechanism keeps them, and not first order alone.
     Returns the Dataset of `tolerance` for the mechanism with the tolerances found (`half_widths`), and over
     (parameter), (measure), (offer) those of `result.VARIABLES`.
     Raises MechanismError if nothing has a cost, no measure a limit, or as `tolerance` does. That no tolerances keep the
@@ -132,12 +132,11 @@ def allocate(
 
 
 def half_widths(result: xr.Dataset) -> dict[str, float]:
-    """What an allocation found, by path, SI, for `Mechanism.with_tolerances`; empty if there is none."""
+    """What an allocation found other than stated, by path, SI, for `Mechanism.with_tolerances`."""
     if not result.attrs["found"]:
         return {}
-    names, chosen = result["parameter"].values, result["bought"].values
-    tolerances = result["tolerance"].values
-    return {str(name): float(t) for name, there, t in zip(names, chosen, tolerances, strict=True) if there}
+    columns = (result[key].values.tolist() for key in ("parameter", "bought", "tolerance", "tolerance_before"))
+    return {name: t for name, there, t, was in zip(*columns, strict=True) if there and abs(t - was) > 1e-12 * t}
 
 
 def _check(asked: Asked) -> None:

@@ -203,7 +203,7 @@ def test_lopsided_tolerances_take_room() -> None:
         {"stroke": "D", "limit": "±0.1 deg"},
         {"dead_centre": "D", "limit": "±0.1 deg"},
         {"point": "coupler.C", "axis": "x", "as": "maximum", "limit": "+0.1/-0.05 mm"},
-        {"effort": "A", "as": "maximum", "limit": "±2 mN m"},
+        {"effort": "A", "as": "maximum", "limit": "±0.04 N m"},
     ],
     ids=lambda one: "-".join(map(str, one.values())),
 )

@@ -248,6 +248,74 @@ def plays_table() -> str:
     return _rows(("variable", "dimension", "unit", "meaning"), rows)
 
 
+def tolerances_table() -> str:
+    """Every variable of a tolerance analysis."""
+    from trunnion.analysis.tolerance.result import VARIABLES
+
+    told = {"": "of the measure", "parameter": "of the parameter", "ratio": "one by the other", "drive": "rad, m or s"}
+    rows = [
+        (_code(name), ", ".join(one.dims), told.get(one.units) or _unit(one.units), one.long_name)
+        for name, one in VARIABLES.items()
+    ]
+    return _rows(("variable", "dimensions", "unit", "meaning"), rows)
+
+
+def measures_table() -> str:
+    """Every kind of measure."""
+    from trunnion.analysis.measures import MEASURES
+
+    figures = {
+        "deviation": "largest deviation from nominal", "line": "width about its least-squares line",
+        "ratio": "over the cycle; of `instant` the largest deviation", "dead centre": "place where the joint turns back",
+    }  # fmt: skip
+    rows = [
+        (
+            _code(name),
+            {"N m": "N m or N", "of the joint": "rad or m"}.get(one.unit, one.unit),
+            "motion and forces" if one.of_forces else "motion",
+            figures.get(one.rule, one.rule),
+            one.long_name,
+        )
+        for name, one in MEASURES.items()
+    ]
+    return _rows(("subject", "unit", "needs", "figure if nothing is stated", "what"), rows)
+
+
+def distributions_table() -> str:
+    """Every distribution of a deviation."""
+    from trunnion.statistics.distributions import DISTRIBUTIONS
+
+    def option(name: str, default: float | None) -> str:
+        return _code(name) if default is None else f"{_code(name)} ({default:g})"
+
+    rows = [
+        (
+            _code(name),
+            ", ".join(option(*pair) for pair in one.parameters.items()),
+            "yes" if one.bounded else "no",
+            one.long_name,
+        )
+        for name, one in DISTRIBUTIONS.items()
+    ]
+    return _rows(("`distribution`", "takes (default)", "within its limits", "what"), rows)
+
+
+def costs_table() -> str:
+    """Every model of what a tolerance costs."""
+    from trunnion.statistics.costs import COST_MODELS
+
+    rows = [
+        (
+            _code(name),
+            _code(model.formula),
+            ", ".join(f"{_code(key)}: {one.meaning}" for key, one in model.parameters.items()),
+            model.source,
+        )
+        for name, model in COST_MODELS.items()
+    ]
+    return _rows(("`model`", "cost of the half width t", "parameters", "source"), rows)
+
+
 def assembling_table() -> str:
     """Every variable of whether a mechanism goes together."""
     from trunnion.analysis.assemblability import FIGURES
@@ -531,6 +599,10 @@ TABLES: dict[str, Callable[..., str]] = {
     "results": results_table,
     "sweeps": sweeps_table,
     "plays": plays_table,
+    "tolerances": tolerances_table,
+    "measures": measures_table,
+    "distributions": distributions_table,
+    "cost-models": costs_table,
     "assembling": assembling_table,
     "statuses": status_table,
     "laws": laws_table,

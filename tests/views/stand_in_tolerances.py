@@ -54,7 +54,7 @@ def toleranced(
     effect, sides = np.abs(slope) * half[:, None], np.sqrt(np.sum((slope * half[:, None]) ** 2, axis=0))
     worst = effect.sum(axis=0)
     figures = {
-        "nominal": 0.0, "worst_case_lower": 0.0, "worst_case_upper": worst[top], "rss": sides[top],
+        "nominal": 0.0, "worst_case_lower": -worst[top], "worst_case_upper": worst[top], "rss": sides[top],
         "deviation_linear": sides[top] / 3, "shift_linear": 0.0, "place": 360.0 * top / positions,
     }  # fmt: skip
     by_parameter = {
@@ -77,7 +77,7 @@ def toleranced(
     if "worst-case" in methods:
         corner = np.array(nominal) + half * np.sign(slope[:, top])
         found |= {
-            "searched_lower": (("measure",), [0.0] * measures),
+            "searched_lower": (("measure",), [-0.98 * worst[top]] * measures),
             "searched_upper": (("measure",), [1.013 * worst[top]] * measures),
             "corner_lower": (("measure", "parameter"), [nominal] * measures),
             "corner_upper": (("measure", "parameter"), [corner] * measures),

@@ -13,7 +13,7 @@ from stand_in import NASTY, four_bar
 
 from trunnion.errors import Status
 from trunnion.views.bundle import bundle, web_text
-from trunnion.views.report import embedded, report, summary_of
+from trunnion.views.report import _summary, embedded, report
 
 VOID = {"meta", "link", "br", "img", "input", "hr"}
 
@@ -123,13 +123,13 @@ def test_contents(plain, ideal):
 )  # fmt: skip
 def test_a_summary_label_is_a_subject_and_a_remark(plain, label, subject, remark):
     plain.attrs["summary"] = json.dumps([{"label": label, "value": 7.0, "unit": "W"}])
-    assert summary_of(plain) == [(subject, [("7.000\u00a0W", remark)])]
+    assert _summary(plain) == [(subject, [("7.000\u00a0W", remark)])]
 
 
 def test_figures_of_one_subject_stand_together(plain):
     rows = [{"label": f"force, {which}", "value": 1.0, "unit": "1"} for which in ("least", "largest", "more than")]
     plain.attrs["summary"] = json.dumps(rows)
-    assert summary_of(plain) == [("force", [("1", "least"), ("1", "largest"), ("> 1", "")])]
+    assert _summary(plain) == [("force", [("1", "least"), ("1", "largest"), ("> 1", "")])]
 
 
 def test_a_gap_is_told_even_if_no_finding_speaks_of_it():

@@ -308,8 +308,7 @@ def test_limits_as_a_drawing_has_them():
 def test_a_table_has_a_column_for_each_method_that_was_run():
     rows = {row[0]: row[1:] for row in figures(readings(toleranced(72))[0]).rows}
     assert figures(readings(toleranced(72))[0]).head == ["", "linear", "searched", "Monte Carlo", "95 % interval"]
-    assert rows["worst case"][0] == "0.2391°"
-    assert rows["worst case"][1] == "0.2423°"
+    assert rows["worst case"] == ["±0.2391°", "−0.2344 to +0.2423°", "", ""]
     assert figures(readings(CASES["linear only"]())[0]).head == ["", "linear"]
     assert "quasi-Monte Carlo" in figures(readings(CASES["sobol"]())[0]).head
 
@@ -317,7 +316,8 @@ def test_a_table_has_a_column_for_each_method_that_was_run():
 def test_corners_indices_and_failures_are_told():
     read = readings(toleranced(72))[0]
     table = corners(read)
-    assert table.rows[0] == ["links.ground.length", "100.07\u00a0mm"]
+    assert table.head == ["worst corner", "−0.2344°", "0.2423°"]
+    assert table.rows[0] == ["links.ground.length", "100\u00a0mm", "100.07\u00a0mm"]
     assert corners(readings(CASES["linear only"]())[0]) is None
     assert indices(readings(CASES["sobol"]())[0]).rows[0][0] == "links.coupler.length"
     failed = next(table for table in tables(CASES["failures"]()) if "failed" in table.title)

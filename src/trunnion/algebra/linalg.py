@@ -11,13 +11,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from trunnion.algebra.dual import primal
-from trunnion.algebra.namespace import Number, compiled, namespace
-from trunnion.algebra.traced import eliminated
+from trunnion.algebra.namespace import Number, namespace
+from trunnion.algebra.traced import kept
 
 __all__ = ["condition", "cross", "determinant", "dot", "inverse", "quick_inverse", "solve", "weighted"]
 
 Vector = tuple[Number, Number]
-UNROLLED = 2  # size up to which a system is written out entry by entry also where it is compiled
 
 
 def dot(a: Vector, b: Vector) -> Number:
@@ -39,26 +38,26 @@ def weighted(weights: Sequence[Number], values: Sequence[Number]) -> Number:
     return total
 
 
-def solve(matrix: Sequence[Sequence[Number]], *sides: Sequence[Number]) -> list[list[Number]]:
+def solve(matrix: Sequence[Sequence[Number]], *sides: Sequence[Number], pivoting: bool = True) -> list[list[Number]]:
     """Solutions x of A x = b for each right-hand side b in `sides`, by elimination with row pivoting per lane.
 
     matrix: n rows of n entries; sides: n entries each. Returns one list of n entries for each side.
-    A singular lane comes out non-finite (a zero pivot divides).
+    Without pivoting the diagonal must outweigh the rest of each row. A singular lane comes out non-finite (a zero
+    pivot divides).
     """
     n = len(matrix)
     columns = n + len(sides)
     rows = [[*row, *(side[i] for side in sides)] for i, row in enumerate(matrix)]
-    if n > UNROLLED and compiled(entry for row in rows for entry in row):
-        return eliminated(rows)[0]
     xp = namespace(*(entry for row in rows for entry in row))
     rows = _quiet(rows)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         for k in range(n - 1):
-            _pivot(rows, k, columns, xp)
+            if pivoting:
+                _pivot(rows, k, columns, xp)
             for i in range(k + 1, n):
                 factor = rows[i][k] / rows[k][k]
                 for j in range(k + 1, columns):
-                    rows[i][j] = rows[i][j] - factor * rows[k][j]
+                    rows[i][j] = kept(rows[i][j] - factor * rows[k][j])
         solutions: list[list[Number]] = []
         for column in range(n, columns):
             x: list[Number] = [0.0] * n
@@ -90,14 +89,15 @@ def _pivot(rows: list[list[Number]], k: int, columns: int, xp: Number) -> Number
             if everywhere:
                 rows[k][j], rows[i][j] = lower, upper
             else:
-                rows[k][j], rows[i][j] = xp.where(swap, lower, upper), xp.where(swap, upper, lower)
+                rows[k][j], rows[i][j] = kept(xp.where(swap, lower, upper)), xp.where(swap, upper, lower)
     return sign
 
 
-def inverse(matrix: Sequence[Sequence[Number]]) -> list[list[Number]]:
+def inverse(matrix: Sequence[Sequence[Number]], pivoting: bool = True) -> list[list[Number]]:
     """A⁻¹ as rows, by elimination with row pivoting per lane; non-finite where a lane is singular."""
     n = len(matrix)
-    columns = solve(matrix, *([1.0 if i == j else 0.0 for i in range(n)] for j in range(n)))
+    sides = ([1.0 if i == j else 0.0 for i in range(n)] for j in range(n))
+    columns = solve(matrix, *sides, pivoting=pivoting)
     return [[columns[j][i] for j in range(n)] for i in range(n)]
 
 
@@ -127,8 +127,6 @@ def determinant(matrix: Sequence[Sequence[Number]]) -> Number:
     """Determinant by elimination with row pivoting per lane; NaN or 0 where a lane is singular."""
     n = len(matrix)
     rows = [list(row) for row in matrix]
-    if n > UNROLLED and compiled(entry for row in rows for entry in row):
-        return eliminated(rows)[1]
     xp = namespace(*(entry for row in rows for entry in row))
     rows = _quiet(rows)
     product: Number = 1.0
@@ -138,7 +136,7 @@ def determinant(matrix: Sequence[Sequence[Number]]) -> Number:
             for i in range(k + 1, n):
                 factor = rows[i][k] / rows[k][k]
                 for j in range(k + 1, n):
-                    rows[i][j] = rows[i][j] - factor * rows[k][j]
+                    rows[i][j] = kept(rows[i][j] - factor * rows[k][j])
     return product
 
 

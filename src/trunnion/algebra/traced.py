@@ -14,21 +14,24 @@ from __future__ import annotations
 import functools
 import operator
 from collections.abc import Callable, Sequence
+from importlib import import_module
 from typing import Any
 
 import numpy as np
 
-__all__ = ["Traced", "Untraceable", "bare", "eliminated", "looped"]
+__all__ = ["Traced", "UntraceableError", "bare", "kept", "looped"]
 
 
-class Untraceable(TypeError):
+class UntraceableError(TypeError):
     """A kernel asks for what only numbers with values have: it cannot be compiled as it stands."""
 
 
-def _jnp() -> Any:
-    import jax.numpy as jnp
+def _jax() -> Any:
+    return import_module("jax")
 
-    return jnp
+
+def _jnp() -> Any:
+    return import_module("jax.numpy")
 
 
 def bare(number: Any) -> Any:
@@ -85,15 +88,13 @@ class Traced:
 
     def held(self) -> Traced:
         """The number as a constant for derivatives, as the real part of a dual number is."""
-        import jax
-
-        return Traced(jax.lax.stop_gradient(self.value))
+        return Traced(_jax().lax.stop_gradient(self.value))
 
     def astype(self, kind: Any) -> Traced:
         return Traced(self.value.astype(kind))
 
     def all(self, axis: Any = None) -> Any:
-        return np.all(self, axis=axis)  # type: ignore[call-overload]
+        return np.all(self, axis=axis)
 
     def __getitem__(self, index: Any) -> Traced:
         return Traced(self.value[bare(index)])
@@ -101,7 +102,7 @@ class Traced:
     # ---- what needs a value -------------------------------------------------------------------------------------
 
     def _refuse(self, *_: Any, **__: Any) -> Any:
-        raise Untraceable("a number that is being compiled has no value yet")
+        raise UntraceableError("a number that is being compiled has no value yet")
 
     __bool__ = __float__ = __int__ = __index__ = __len__ = __iter__ = __array__ = _refuse
 
@@ -115,7 +116,7 @@ class Traced:
         if any(hasattr(one, "dual") for one in inputs):
             return NotImplemented
         if method != "__call__" or options:
-            raise Untraceable(f"np.{ufunc.__name__} with {method} {', '.join(options)} is not compiled")
+            raise UntraceableError(f"np.{ufunc.__name__} with {method} {', '.join(options)} is not compiled")
         return getattr(functions, ufunc.__name__)(*inputs)
 
     def __array_function__(self, function: Any, types: Any, args: Sequence[Any], options: dict[str, Any]) -> Any:
@@ -143,8 +144,8 @@ class Traced:
     __le__ = _operator(operator.le)
     __gt__ = _operator(operator.gt)
     __ge__ = _operator(operator.ge)
-    __eq__ = _operator(operator.eq)  # type: ignore[assignment]
-    __ne__ = _operator(operator.ne)  # type: ignore[assignment]
+    __eq__ = _operator(operator.eq)
+    __ne__ = _operator(operator.ne)
 
     def __neg__(self) -> Traced:
         return Traced(-self.value)
@@ -162,17 +163,7 @@ class Traced:
 _OF_ALL_LANES: dict[Any, bool] = {np.any: True, np.all: False}
 
 
-TAKEN_FOR_CHEAP = ("sin", "cos")
-
-
-def _once(found: Any) -> Any:
-    """The same number, computed in one place only.
-
-    XLA holds sines for as cheap as sums and repeats them in every loop that uses them; a quotient it keeps. The
-    divisor is 1, which XLA cannot know, and NaN where the number is.
-    """
-    jnp = _jnp()
-    return found / jnp.where(found == found, 1.0, jnp.nan)
+TAKEN_FOR_CHEAP = ("sin", "cos")  # by XLA, which would repeat them
 
 
 class _Functions:
@@ -182,12 +173,12 @@ class _Functions:
         try:
             apply = getattr(_jnp(), name)
         except AttributeError:
-            raise Untraceable(f"JAX has no np.{name}") from None
+            raise UntraceableError(f"JAX has no np.{name}") from None
 
         @functools.wraps(apply)
         def function(*args: Any, **options: Any) -> Any:
             found = apply(*bare(args), **{key: bare(value) for key, value in options.items()})
-            return _dressed(_once(found) if name in TAKEN_FOR_CHEAP else found)
+            return kept(_dressed(found)) if name in TAKEN_FOR_CHEAP else _dressed(found)
 
         setattr(self, name, function)
         return function
@@ -201,7 +192,7 @@ functions: Any = _Functions()
 
 def looped(step: Callable[[list[Any]], list[Any]], start: Sequence[Any], rounds: int) -> list[Any]:
     """step(… step(start)), with the step compiled once. start, and what a step makes of it: lists of numbers."""
-    import jax
+    jax = _jax()
 
     def body(_: Any, numbers: list[Any]) -> list[Any]:
         return [_jnp().asarray(bare(one), float) for one in step([Traced(one) for one in numbers])]
@@ -213,25 +204,14 @@ def looped(step: Callable[[list[Any]], list[Any]], start: Sequence[Any], rounds:
     return [Traced(one) for one in jax.lax.fori_loop(0, rounds, body, state)]
 
 
-def eliminated(rows: Sequence[Sequence[Any]]) -> tuple[list[list[Any]], Any]:
-    """X of A X = B from the rows of (A, B), n × (n + m), by Gauss and Jordan with row pivoting in every lane; det A.
+def kept(number: Any) -> Any:
+    """The number, computed in one place only where it is compiled.
 
-    On the stacked entries: as many operations are written down for any number of them.
+    XLA repeats cheap sums and products in every loop that uses them, and what these are made of again in those: a
+    number that many others are made of is better kept. A quotient is, for XLA; this one's divisor is 1, which XLA
+    cannot know, and NaN where the number is.
     """
-    jnp = _jnp()
-    entries = [[jnp.asarray(bare(entry), float) for entry in row] for row in rows]
-    shape = np.broadcast_shapes(*(entry.shape for row in entries for entry in row))
-    table = jnp.stack([jnp.stack([jnp.broadcast_to(entry, shape) for entry in row]) for row in entries])
-    n = len(rows)
-    number = np.arange(n).reshape(n, *([1] * len(shape)))
-    determinant = jnp.ones(shape)
-    for k in range(n):
-        best = jnp.argmax(jnp.where(number < k, -1.0, jnp.abs(table[:, k])), axis=0)
-        chosen = (number == best)[:, None]
-        pivot = jnp.sum(jnp.where(chosen, table, 0.0), axis=0)
-        table = jnp.where(chosen, table[k], table)  # what stood in its place goes where it was
-        determinant = determinant * jnp.where(best == k, pivot[k], -pivot[k])
-        pivot = pivot / pivot[k]
-        reduced = table - table[:, k : k + 1] * pivot
-        table = jnp.where((number == k)[:, None], pivot, reduced)
-    return [[Traced(table[i, j]) for i in range(n)] for j in range(n, len(rows[0]))], Traced(determinant)
+    if not isinstance(number, Traced):
+        return number
+    value, jnp = number.value, _jnp()
+    return Traced(value / jnp.where(value == value, 1.0, jnp.nan))

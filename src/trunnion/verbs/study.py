@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Annotated
 
@@ -15,7 +14,6 @@ from trunnion.verbs.model import exit_status, lines_of, placed, stated
 __all__ = ["tolerance"]
 
 STOPPED = 130
-FEW = 2_000_000  # configurations up to which further processes cost more than they save
 
 
 def tolerance(
@@ -79,8 +77,6 @@ def tolerance(
         mechanism = mechanism.with_samples(*named_file(text, "--sample"))
     methods = tuple(method or DEFAULT_METHODS)
     counted = samples if any(one in SAMPLINGS for one in methods) else 0
-    if jobs is None:
-        jobs = 1 if counted * steps < FEW and cluster is None else os.cpu_count() or 1
     with lines_of(file), bar("samples", counted, least=1000) as progress:
         result = run(
             mechanism, measure, methods, samples, seed, steps, at, jobs=jobs, chunk=chunk, engine=engine,

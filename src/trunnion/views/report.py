@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from jinja2 import Template
 
-__all__ = ["embedded", "hashed", "inputs_of", "report", "summary_of"]
+__all__ = ["embedded", "hashed", "inputs_of", "report"]
 
 # A label of the summary: the subject with its unit in words, which of its figures, or in brackets why it is so.
 ASPECT = re.compile(
@@ -57,7 +57,7 @@ def report(result: xr.Dataset, ideal: xr.Dataset | None = None) -> str:
         "spatial": shown.get("space") == "spatial",
         "positions": result.sizes["position"], "thinned": _ordinal(shown), "method": result.attrs.get("method", ""),
         "unanswered": sum(run.stop - run.start for run in runs),
-        "summary": summary_of(result),
+        "summary": _summary(result),
         "findings": [row for row in found if row["severity"] != "note"],
         "notes": [row for row in found if row["severity"] == "note"],
         "errors": error_rows(result), "losses": loss_rows(result),
@@ -101,7 +101,7 @@ def _ordinal(shown: dict[str, Any]) -> str:
     return f"{stride}{suffix}"
 
 
-def summary_of(result: xr.Dataset) -> list[tuple[str, list[tuple[str, str]]]]:
+def _summary(result: xr.Dataset) -> list[tuple[str, list[tuple[str, str]]]]:
     """Subjects, each with its figures and what they are: ("drive torque of A", [("9.3 kN m", "largest, at 24°")])."""
     rows = []
     for row in attribute(result, "summary", []):

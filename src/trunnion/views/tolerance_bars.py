@@ -104,9 +104,10 @@ def sobol(parent: FigureBase, read: Reading) -> None:
         spread = None if spread is None else np.where(spread > 0, spread, 0.0)
         axes.barh(place + offset, 100 * values[kept], 0.36, color=colour, label=label, zorder=2, xerr=spread,
                   error_kw={"ecolor": INK, "elinewidth": 1.0, "capsize": 2.5})  # fmt: skip
-    most = float(np.nanmax(np.append(first, total), initial=0.0))
+    highs = [read.row(f"{key}_high") for key in ("first_order", "total_order")]
+    most = float(np.nanmax(np.concatenate([first, total, *highs]), initial=0.0))
     left = len(paths) - len(kept)
-    _frame(axes, [_short(about[paths[k]]) for k in kept], 100 * max(most, 0.05) * 1.08)
+    _frame(axes, [_short(about[paths[k]]) for k in kept], 100 * max(most, 0.05))
     if left:
         axes.text(0.99, 0.02, f"{left} smaller are not shown", transform=axes.transAxes, ha="right", va="bottom",
                   fontsize=8, color=MUTED)  # fmt: skip

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
+from trunnion.statistics import intervals
 from trunnion.views.cycle import Abscissa, Array
 from trunnion.views.figures import INK, MUTED, PALETTE, SHADE, along, curve, dress, legend
 from trunnion.views.lettering import plain
@@ -26,7 +27,7 @@ FEWEST, BARS = 20, 60  # of a histogram
 CORE = 0.01  # share of the samples at either end beyond those
 FAR = 1.5  # of their width, beyond which none decides how far the picture goes
 READABLE = 0.02  # of nominal: a spread below it is drawn as a deviation
-Z95 = 1.959963984540054
+MEANINGS = {"mean": "mean", "deviation": "deviation σ"}
 
 
 # ---- distribution -------------------------------------------------------------------------------------------------
@@ -183,8 +184,11 @@ def envelope(parent: FigureBase, read: Reading) -> None:
     _bands(axes, over, read)
     if read.has("curve_rss"):
         rss = read.along(read.row("curve_rss"))
+        middle = read.along(read.row("curve_shift")) if read.has("curve_shift") else 0.0
         for k, sign in enumerate((1, -1)):
-            curve(axes, over, sign * rss, None if k else "RSS", color=INK, linewidth=1.1, linestyle=(0, (5, 2)))
+            curve(
+                axes, over, middle + sign * rss, None if k else "RSS", color=INK, linewidth=1.1, linestyle=(0, (5, 2))
+            )
     _corner(axes, over, read)
     limits = [one for one in read.limits if math.isfinite(one)] if read.nominal == 0 else []
     for k, one in enumerate(limits):
@@ -220,14 +224,12 @@ def _bands(axes: Axes, over: Abscissa, read: Reading) -> None:
 
 def _corner(axes: Axes, over: Abscissa, read: Reading) -> None:
     """The worst corner of the nonlinear model, where the figure is the largest deviation over the drive."""
-    found = read.value("searched_upper")
-    if not read.is_size or not math.isfinite(found + read.place):
+    ends = [read.value(f"searched_{end}") for end in ("lower", "upper")]
+    found = max(ends, key=abs)
+    if read.nominal != 0.0 or not math.isfinite(sum(ends) + read.place) or found == 0.0:
         return
-    at = int(np.nanargmin(np.abs(over.values - read.place)))
-    ends = [read.along(read.row(f"curve_worst_case_{end}"))[at] for end in ("lower", "upper")]
-    sign = 1 if abs(ends[1]) >= abs(ends[0]) else -1
-    label = f"worst corner, searched: {read.say(found)} at {read.told_place}"
-    axes.plot([read.place], [sign * found * read.factor], "D", color=INK, markersize=5, label=label, zorder=5,
+    label = f"worst corner, searched: {read.say(found, sign=True)} at {read.told_place}"
+    axes.plot([read.place], [found * read.factor], "D", color=INK, markersize=5, label=label, zorder=5,
               markerfacecolor="white", markeredgewidth=1.3)  # fmt: skip
 
 
@@ -248,21 +250,15 @@ def _holes(axes: Axes, over: Abscissa, read: Reading) -> None:
 
 def convergence(parent: FigureBase, read: Reading) -> None:
     """Mean, standard deviation and yield of the first samples, 2ᵏ of them, with their 95 % intervals."""
-    size = read.row("convergence_samples")
-    rows = [
-        ("mean", read.row("convergence_mean"), _scaled_interval(read, "mean", size)),
-        ("deviation σ", read.row("convergence_deviation"), _scaled_interval(read, "deviation", size)),
-    ]
-    panels = list(parent.subplots(2 + read.limited, 1, sharex=True, squeeze=False)[:, 0])
+    size, told = read.row("convergence_samples"), ["mean", "deviation", *(["yield"] if read.limited else [])]
+    panels = list(parent.subplots(len(told), 1, sharex=True, squeeze=False)[:, 0])
     unit = f" [{read.label}]" if read.label else ""
-    for axes, (title, values, half) in zip(panels, rows, strict=False):
-        dress(axes, "", plain(f"{title}{unit}"))
-        _running(axes, size, values * read.factor, (values - half) * read.factor, (values + half) * read.factor)
-    if read.limited:
-        dress(panels[2], "", "yield [%]")
-        values = read.row("convergence_yield")
-        low, high = _wilson(values, size) if _is_plain(read) else _last(read, values)
-        _running(panels[2], size, 100 * values, 100 * low, 100 * high)
+    for axes, key in zip(panels, told, strict=True):
+        title, factor = (f"{MEANINGS[key]}{unit}", read.factor) if key != "yield" else ("yield [%]", 100.0)
+        values = read.row(f"convergence_{key}")
+        low, high = _intervals(read, key, values, size)
+        dress(axes, "", plain(title))
+        _running(axes, size, values * factor, low * factor, high * factor)
     for axes in panels:
         axes.set_xscale("log")
         axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if size[-1] < 50 * size[0] else (1.0,)))
@@ -279,29 +275,17 @@ def _is_plain(read: Reading) -> bool:
     return str(read.result.attrs.get("sampling", "monte-carlo")) == "monte-carlo"
 
 
-def _scaled_interval(read: Reading, key: str, size: Array) -> Array:
-    """Half of the interval at every number of samples; of other than independent ones only of the last."""
-    half = 0.5 * (read.value(f"{key}_high") - read.value(f"{key}_low"))
-    found = half * np.sqrt(size[-1] / size)
-    return found if _is_plain(read) else np.where(np.arange(len(size)) == len(size) - 1, half, np.nan)
-
-
-def _last(read: Reading, values: Array) -> tuple[Array, Array]:
-    """The interval of the yield, known of all samples only."""
-    ends = []
-    for end in ("low", "high"):
-        row = np.full(len(values), np.nan)
-        row[-1] = read.value(f"yield_{end}")
-        ends.append(row)
-    return ends[0], ends[1]
-
-
-def _wilson(passed: Array, count: Array) -> tuple[Array, Array]:
-    """95 % interval of a share (Wilson, 1927)."""
-    room = Z95**2 / count
-    middle = (passed + room / 2) / (1 + room)
-    half = np.sqrt(room * passed * (1 - passed) + room**2 / 4) / (1 + room)
-    return middle - half, middle + half
+def _intervals(read: Reading, key: str, values: Array, size: Array) -> tuple[Array, Array]:
+    """95 % intervals at every number of samples; of other than independent ones only of the last, as it is told."""
+    low, high = read.value(f"{key}_low"), read.value(f"{key}_high")
+    if not _is_plain(read):
+        last = np.arange(len(size)) == len(size) - 1
+        return np.where(last, low, np.nan), np.where(last, high, np.nan)
+    if key == "yield":
+        found = intervals.share(np.rint(values * size), size)
+        return np.asarray(found[0], float), np.asarray(found[1], float)
+    half = 0.5 * (high - low) * np.sqrt(size[-1] / size)
+    return values - half, values + half
 
 
 def _running(axes: Axes, size: Array, values: Array, low: Array, high: Array) -> None:
@@ -310,8 +294,8 @@ def _running(axes: Axes, size: Array, values: Array, low: Array, high: Array) ->
     if known.sum() > 1:
         axes.fill_between(size, low, high, color=WITHIN, alpha=0.18, linewidth=0, label="95 % interval")
     elif known.any():
-        spread = np.abs(np.stack([values - low, high - values])[:, known])
-        axes.errorbar(size[known], values[known], yerr=spread, color=WITHIN, capsize=4, linewidth=1.3,
+        middle, half = 0.5 * (low + high)[known], 0.5 * (high - low)[known]
+        axes.errorbar(size[known], middle, yerr=half, color=WITHIN, capsize=4, linewidth=1.3, fmt="none",
                       label="95 % interval")  # fmt: skip
     last = values[np.isfinite(values)]
     if last.size:

@@ -16,7 +16,7 @@ from matplotlib import rc_context
 
 from trunnion.views.bundle import web_text
 from trunnion.views.cycle import attribute
-from trunnion.views.report import hashed, inputs_of, summary_of
+from trunnion.views.report import hashed, inputs_of
 from trunnion.views.tolerance import KINDS, drawable, figure
 from trunnion.views.tolerance_notes import NOTES, ON_SAMPLES
 from trunnion.views.tolerance_tables import (
@@ -25,9 +25,9 @@ from trunnion.views.tolerance_tables import (
     corners,
     failed,
     figures,
+    headline,
     indices,
     inputs,
-    overall,
     overview,
 )  # fmt: skip
 from trunnion.views.toleranced import Reading, methods, readings
@@ -56,15 +56,14 @@ def report(result: xr.Dataset, first: Sequence[Section] = (), kicker: str = "Wha
     style = web_text("report.css") + web_text("tolerance.css")
     reads, found = readings(result), attribute(result, "findings", [])
     run = methods(result)
-    whole = [*failed(result), *overall(result)]
     parts = [*first, *(_measure(result, read) for read in reads)]
     context: dict[str, Any] = {
         "kicker": kicker, "name": str(result.attrs.get("name", "")) or "Mechanism",
         "formula": str(result.attrs.get("formula", "")), "facts": _facts(result, run),
-        "summary": summary_of(result),
+        "summary": headline(result),
         "findings": [row for row in found if row["severity"] != "note"],
         "notes": [row for row in found if row["severity"] == "note"],
-        "overview": overview(result), "sections": [_drawn(part) for part in parts], "whole": whole,
+        "overview": overview(result), "sections": [_drawn(part) for part in parts], "whole": failed(result),
         "toleranced": inputs(result), "inputs": inputs_of(result),
         "methods": [NOTES[name] for name in run if name in NOTES],
         "on_samples": ON_SAMPLES if any("monte-carlo" in name for name in run) else "",

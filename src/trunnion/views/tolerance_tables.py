@@ -23,6 +23,7 @@ __all__ = [
     "corners",
     "failed",
     "figures",
+    "headline",
     "indices",
     "inputs",
     "overall",
@@ -31,6 +32,7 @@ __all__ = [
 ]
 
 APART = 5e-4  # two shares that differ by more have a column each
+MOST_HEADS = 6
 LEAST, LEAST_INDEX = 1e-3, 5e-3  # shares below which a number has no row of its own in the terminal
 MOST = 20  # rows of contributions there
 
@@ -109,12 +111,12 @@ def _deviation(read: Reading) -> Cells:
 
 
 def _range(read: Reading, low: float, high: float) -> str:
-    """Deviations from nominal, as limits are told; the size of a deviation by its upper end."""
+    """Deviations from nominal as limits are told: "±0.2375°", "−0.1732 to +0.1599°"; one end if there is but one."""
     if math.isnan(low) and math.isnan(high):
         return ""
-    if read.is_size:
-        return read.say(high)
     upper = read.say(high, sign=True)
+    if low == 0.0 and read.nominal == 0.0:
+        return read.say(high)
     if upper.startswith("+") and read.say(-low, sign=True) == upper:
         return f"±{upper[1:]}"
     sign = "+" if low > 0 else ""
@@ -137,6 +139,8 @@ def _worst(read: Reading) -> Cells:
 def _extremes(read: Reading) -> Cells:
     """Of the samples, as deviations from nominal."""
     least, most = read.value("least"), read.value("most")
+    if read.is_size:
+        return {"sampled": "" if math.isnan(most) else read.say(most)}
     return {"sampled": _range(read, least - read.nominal, most - read.nominal)}
 
 
@@ -195,19 +199,20 @@ def contributions(read: Reading, short: bool = False) -> Table:
     kept = [one for one in found if max(_zero(one.rss_share), _zero(one.worst_share)) >= LEAST][:MOST] or found[:1]
     kept = kept if short and len(kept) < len(found) - 1 else found
     apart = any(abs(one.variance_share - one.rss_share) > APART for one in kept)
-    head = ["contribution", "tolerance", "sensitivity", "worst ±", "share", "of RSS²"]
-    head += ["of variance"] if apart else []
+    shares = {"share": "worst_share", "of RSS²": "rss_share"} | ({"of variance": "variance_share"} if apart else {})
+    if apart and short:  # a terminal is 80 characters wide; the share follows from the size beside it
+        del shares["share"]
+    head = ["contribution", "tolerance", "sensitivity", "worst ±", *shares]
     rows = [
         [
             one.short if short else one.name, one.limits, _sensitivity(read, one), read.say(one.worst),
-            share(one.worst_share, 1), share(one.rss_share, 1), *([share(one.variance_share, 1)] if apart else []),
+            *(share(getattr(one, key), 1) for key in shares.values()),
         ]
         for one in kept
     ]  # fmt: skip
     rest = [one for one in found if one not in kept]
     if rest:
-        keys = ("worst_share", "rss_share", "variance_share")[: 2 + apart]
-        sums = (float(np.nansum([getattr(one, key) for one in rest])) for key in keys)
+        sums = (float(np.nansum([getattr(one, key) for one in rest])) for key in shares.values())
         rows.append([f"{len(rest)} others", "", "", "", *(share(part, 1) for part in sums)])
     at = f" at {read.told_place}" if read.told_place else ""
     return Table(f"what contributes to {read.name}{at}", head, rows)
@@ -289,6 +294,21 @@ def overview(result: xr.Dataset) -> Table:
         rows.append([read.name, read.told_limits, cells["nominal"]["linear"], worst, cells["RSS"]["linear"], *told])
     kept = [k for k in range(len(head)) if k == 0 or any(row[k] for row in rows)]
     return Table("measures", [head[k] for k in kept], [[row[k] for k in kept] for row in rows])
+
+
+def headline(result: xr.Dataset) -> list[tuple[str, list[tuple[str, str]]]]:
+    """What is read first: of each measure, at most MOST_HEADS, the yield or else the worst case; then of all limits."""
+    found = []
+    reads = sorted(readings(result), key=lambda read: not read.limited)[:MOST_HEADS]
+    for read in reads:
+        cells = {label: tell(read) for label, tell in FIGURES}
+        worst = cells["worst case"].get("searched") or cells["worst case"].get("linear", "")
+        told = [(cells["yield"].get("sampled", ""), f"yield, {cells['yield'].get('interval', '')}")]
+        told += [(worst, "worst case"), (cells["Cpk"].get("sampled", ""), "Cpk")]
+        kept = [pair for pair in told if pair[0]]
+        found += [(read.name, kept)] if kept else []
+    whole = [(text.partition(" (")[0], "yield") for table in overall(result) for text in table.rows[0][1:]]
+    return [*found, *([("all limits together", whole)] if whole else [])]
 
 
 def failed(result: xr.Dataset) -> list[Table]:

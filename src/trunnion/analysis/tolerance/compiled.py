@@ -13,6 +13,7 @@ import os
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
+from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.namespace import Number
-from trunnion.algebra.traced import Traced, Untraceable, bare
+from trunnion.algebra.traced import Traced, UntraceableError, bare
 from trunnion.analysis.analyse import (
     CHUNK,
     NEAR_SINGULAR,
@@ -33,8 +34,8 @@ from trunnion.analysis.analyse import (
 )
 from trunnion.analysis.friction import FrictionMethod
 from trunnion.analysis.kinematics import forward
-from trunnion.analysis.kinetostatics import Backward, solve
-from trunnion.analysis.system import Values
+from trunnion.analysis.kinetostatics import Backward
+from trunnion.analysis.system import Values, law_of, rubbing
 from trunnion.errors import Finding, MechanismError, Status
 
 __all__ = ["CompiledKernel", "Figure"]
@@ -42,6 +43,7 @@ __all__ = ["CompiledKernel", "Figure"]
 Array = NDArray[np.float64]
 Figure = Callable[[Backward], Number]  # one number of every position, of the motion (`back.walk`) or of the forces
 BATCH = {"cpu": 1 << 13, "gpu": 1 << 22}  # configurations at a time, by platform: on a CPU they stay in its cache
+HOPELESS = 0.5  # share of doubtful lanes from which the rest is left to NumPy
 BORDER = 0.99 * NEAR_SINGULAR  # condition from which NumPy decides what a position is
 
 
@@ -57,7 +59,8 @@ class CompiledKernel:
     """Curves of measures over samples and positions, compiled once for each set of numbers that vary.
 
     run: the prepared mechanism; figures: by name, what to read off each walk; forces: whether one of them needs more
-    than the motion; threads: batches at a time, by default one for each core. Raises MechanismError if JAX is not installed, or the mechanism has what only NumPy does.
+    than the motion; threads: batches at a time, by default one for each core. Raises MechanismError if JAX is not
+    installed, or the mechanism has what only NumPy does.
     """
 
     def __init__(
@@ -73,6 +76,7 @@ class CompiledKernel:
         self.forces = forces
         self.method = method or FrictionMethod()
         self._jax = _imported()
+        _check(run)
         self.threads = threads or (os.cpu_count() or 1 if self.platform == "cpu" else 1)
         self.again = 0  # lanes that NumPy computed again, so far
         self._functions: dict[Any, Callable[..., _Compiled]] = {}
@@ -107,8 +111,11 @@ class CompiledKernel:
                 doubtful[part] = found.doubtful[: samples - low]
 
         fill(0)  # alone: it may have to be compiled first
-        with ThreadPoolExecutor(self.threads) as pool:
-            list(pool.map(fill, range(rows, samples, rows)))
+        if np.mean(doubtful[:rows]) > HOPELESS:
+            doubtful[rows:] = True  # as the rest would be: NumPy is quicker at once
+        else:
+            with ThreadPoolExecutor(self.threads) as pool:
+                list(pool.map(fill, range(rows, samples, rows)))
         self._again(values, time, curves, status, doubtful)
         return curves, status
 
@@ -130,7 +137,7 @@ class CompiledKernel:
             with np.errstate(all="ignore"):
                 back = self._back(values, Traced(time), self.method)
                 status = status_number(back) if self.forces else pose_status_number(back.walk)
-                doubtful = (status != Status.SOLVED) | (worst_condition(back.walk) > BORDER)
+                doubtful = (status > Status.ZERO_SLIP) | (worst_condition(back.walk) > BORDER)
                 for settled in back.settled:
                     doubtful = doubtful | np.logical_not(settled.certain)
                 curves = {name: _full(figure(back), shape) for name, figure in self.figures.items()}
@@ -138,16 +145,36 @@ class CompiledKernel:
 
         return compute
 
+    def gradient(
+        self, values: Values, time: Array, figure: str, reduce: Callable[[Any], Any]
+    ) -> dict[str, NDArray[np.float64]]:
+        """Derivatives of one number by every array among the values, each in its shape, by reverse differentiation.
+
+        reduce: makes that number of the figure's curve (sample, position), in JAX. Positions that are not plainly
+        solved are not computed again here: leave them out in `reduce`, or take a figure without them.
+        """
+        constants = {path: value for path, value in values.items() if not np.ndim(value)}
+        arrays = {path: np.asarray(value, float) for path, value in values.items() if np.ndim(value)}
+        pure = self.pure(constants)
+        with self._wide():
+            slopes = self._jax.grad(lambda varied: reduce(pure(varied, time).curves[figure]))(arrays)
+            return {path: np.asarray(slope) for path, slope in slopes.items()}
+
     def _back(self, values: Values, time: Number, method: FrictionMethod) -> Backward:
         """One walk, back again only where forces are asked for."""
         run = self.run
         try:
             if self.forces:
-                return solve(run.system, values, run.chosen.assembly, time, method)
+                return run.solve(time, values, method)
             return Backward(forward(run.system, values, run.chosen.assembly, time), {})
-        except Untraceable as error:
+        except UntraceableError as error:
             what = f"this mechanism is not compiled: {error}"
             raise MechanismError(Finding(what, "engine", "use the engine numpy")) from error
+
+    def by_numpy(self, values: Values, time: Number) -> Backward:
+        """The same walk by NumPy."""
+        with np.errstate(all="ignore"):
+            return self._back(values, time, self.method)
 
     def _again(
         self,
@@ -164,8 +191,8 @@ class CompiledKernel:
             row, column = rows[low : low + CHUNK], columns[low : low + CHUNK]
             part = {path: _lanes(value, row) for path, value in values.items()}
             times = time[column] if time.ndim == 1 else time[row, column]
+            back = self.by_numpy(part, times)
             with np.errstate(all="ignore"):
-                back = self._back(part, times, self.method)
                 found = status_of(back, row.shape) if self.forces else pose_status(back.walk, row.shape)
                 status[row, column] = found
                 for name, figure in self.figures.items():
@@ -205,9 +232,20 @@ def _lanes(value: Number, rows: NDArray[np.intp]) -> Number:
 
 
 def _full(number: Number, shape: tuple[int, ...]) -> Any:
-    import jax.numpy as jnp
+    return import_module("jax.numpy").broadcast_to(bare(number), shape)
 
-    return jnp.broadcast_to(bare(number), shape)
+
+def _check(run: Run) -> None:
+    """MechanismError for what only NumPy does."""
+    remedy = "use the engine numpy"
+    for module in run.system.plan.modules:
+        if module.redundant:
+            what = f"the links {', '.join(module.links)} are over-constrained, which is solved by least squares"
+            raise MechanismError(Finding(f"{what}: that is not compiled", "engine", remedy))
+    for joint in rubbing(run.system):
+        if law_of(run.system, joint).relaxation is not None:
+            what = f"the friction of {joint} has a memory along the cycle: that is not compiled"
+            raise MechanismError(Finding(what, f"joints.{joint}.friction", remedy))
 
 
 # ---- JAX ------------------------------------------------------------------------------------------------------
@@ -216,7 +254,7 @@ def _full(number: Number, shape: tuple[int, ...]) -> Any:
 def _imported() -> Any:
     """JAX, with what it compiles kept between runs; MechanismError if it is not installed."""
     try:
-        import jax
+        jax: Any = import_module("jax")
     except ImportError:
         what = "the engine jax needs the package jax, which is not installed"
         raise MechanismError(Finding(what, "engine", "pip install 'trunnion[jax]', or use the engine numpy")) from None
@@ -238,8 +276,6 @@ def cache_directory() -> Path:
 
 @contextlib.contextmanager
 def _float64(jax: Any) -> Iterator[None]:
-    enable = getattr(jax, "enable_x64", None)
-    if enable is None:  # before 0.8
-        from jax.experimental import enable_x64 as enable
-    with enable(True):
+    holder = jax if hasattr(jax, "enable_x64") else import_module("jax.experimental")  # before JAX 0.8
+    with holder.enable_x64(True):
         yield

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,10 +23,13 @@ from trunnion.analysis.measures import Measure
 from trunnion.analysis.tolerance.inputs import Inputs
 from trunnion.errors import Finding, MechanismError
 
+if TYPE_CHECKING:
+    from trunnion.analysis.tolerance.compiled import CompiledKernel
+
 __all__ = ["Courses", "Kernel", "NumpyKernel", "batch_of", "kernel_of", "references"]
 
 
-AT_ONCE = 10_000  # numbers in an array
+AT_ONCE = {"numpy": 10_000, "jax": 1 << 20}  # numbers in an array, by engine
 Courses = dict[str, tuple[Number, ...]]
 
 
@@ -50,7 +53,8 @@ class NumpyKernel:
         return not all(measure.of_motion for measure in self.measures)
 
     @cached_property
-    def _method(self) -> FrictionMethod:
+    def method(self) -> FrictionMethod:
+        """How friction is settled, with the margin if a measure asks for it."""
         margin = any(measure.wants_margin for measure in self.measures)
         return replace(self.friction, margin_up_to=MARGIN) if margin else self.friction
 
@@ -58,7 +62,7 @@ class NumpyKernel:
         """Motion, and forces if any measure needs them."""
         with np.errstate(all="ignore"):
             if self.forces:
-                return self.run.solve(time, values, self._method)
+                return self.run.solve(time, values, self.method)
             return posed(self.run.system, values, self.run.chosen.assembly, time)
 
     def courses(self, values: Mapping[str, Number], time: Number) -> tuple[Courses, NDArray[np.int8]]:
@@ -78,15 +82,51 @@ class NumpyKernel:
         return tuple(_where(there, part) for part in measure.curve(found))
 
 
+@dataclass(frozen=True)
+class JaxKernel:
+    """The same compiled by JAX; what it cannot decide NumPy computes again. numpy: the kernel it stands for."""
+
+    numpy: NumpyKernel
+
+    @cached_property
+    def _parts(self) -> dict[str, tuple[Measure, int]]:
+        """Measure and number of each part of each course, by a name."""
+        found = self.numpy.solved(self.numpy.run.values, np.zeros(1))
+        counts = [len(measure.curve(found)) for measure in self.numpy.measures]
+        pairs = zip(self.numpy.measures, counts, strict=True)
+        return {f"{measure.name} {k}": (measure, k) for measure, count in pairs for k in range(count)}
+
+    @cached_property
+    def _compiled(self) -> CompiledKernel:
+        from trunnion.analysis.tolerance.compiled import CompiledKernel
+
+        def figure(measure: Measure, k: int) -> Callable[[Backward], Number]:
+            return lambda back: measure.curve(back.walk if measure.of_motion else back)[k]
+
+        figures = {name: figure(*part) for name, part in self._parts.items()}
+        return CompiledKernel(self.numpy.run, figures, self.numpy.forces, self.numpy.method)
+
+    def courses(self, values: Mapping[str, Number], time: Number) -> tuple[Courses, NDArray[np.int8]]:
+        """As `NumpyKernel.courses`, of plain numbers."""
+        curves, status = self._compiled.curves(values, np.asarray(time, float))
+        found: Courses = {measure.name: () for measure in self.numpy.measures}
+        for name, (measure, _) in self._parts.items():
+            found[measure.name] += (_where(known(measure, status), curves[name]),)
+        return found, status
+
+
 def batch_of(engine: str, positions: int) -> int:
     """Samples that an engine takes best at a time: of NumPy in arrays that stay in cache."""
-    return max(1, AT_ONCE // positions)
+    return max(1, AT_ONCE[engine] // positions)
 
 
 def kernel_of(engine: str, run: Run, measures: Sequence[Measure], friction: FrictionMethod) -> Kernel:
     """The kernel of an engine by its name. Raises MechanismError if there is none, or its package is missing."""
+    numpy = NumpyKernel(run, measures, friction)
     if engine == "numpy":
-        return NumpyKernel(run, measures, friction)
+        return numpy
+    if engine == "jax":
+        return JaxKernel(numpy)
     raise MechanismError(Finding(f"there is no engine '{engine}'", "engine", "use numpy or jax"))
 
 

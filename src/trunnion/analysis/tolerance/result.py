@@ -80,6 +80,7 @@ VARIABLES: dict[str, Variable] = {
     "curve_worst_case_lower": Variable(MPOS, "", "least deviation of the course, to first order"),
     "curve_worst_case_upper": Variable(MPOS, "", "largest deviation of the course, to first order"),
     "curve_rss": Variable(MPOS, "", "half width of the course by the root of the sum of squares"),
+    "curve_shift": Variable(MPOS, "", "mean deviation of the course from nominal, to first order"),
     "curve_deviation": Variable(MPOS, "", "standard deviation of the course, to first order"),
     "status": Variable(("position",), "1", "code of the position's status; see the attribute flag_meanings"),
     "samples": Variable((), "1", "number of samples"),
@@ -242,6 +243,7 @@ def _linear(found: Study) -> dict[str, Any]:
         "curve_worst_case_lower": _spread_out(found, [of.curve_total[0] for of in rows], ()),
         "curve_worst_case_upper": _spread_out(found, [of.curve_total[1] for of in rows], ()),
         "curve_rss": _spread_out(found, [of.curve_total[2] for of in rows], ()),
+        "curve_shift": _spread_out(found, [of.curve_total[3] for of in rows], ()),
         "curve_deviation": _spread_out(found, [of.curve_total[4] for of in rows], ()),
         "status": first.status,
     }  # fmt: skip

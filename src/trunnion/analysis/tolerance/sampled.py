@@ -83,8 +83,13 @@ def _replicated(totals: list[Moments], count: int) -> dict[str, Any]:
     own = [_part(total, slice(0, count)) for total in totals]
     return {
         "mean": intervals.by_replicates(np.array([one.mean for one in own]), axis=0),
-        "deviation": intervals.by_replicates(np.array([one.deviation for one in own]), axis=0),
+        "deviation": intervals.by_replicates(np.array([_of_even_points(one) for one in own]), axis=0),
     }
+
+
+def _of_even_points(one: Moments) -> Array:
+    """Standard deviation of the points of a replicate, by n: their mean is as good as true, so none is used up by it."""
+    return one.deviation * np.sqrt(np.maximum(one.count - 1, 0) / np.maximum(one.count, 1))
 
 
 def _quantiles(job: Sampling, tally: Tally, figures: Moments, replicated: bool) -> dict[str, Any]:

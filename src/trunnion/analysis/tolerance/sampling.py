@@ -123,10 +123,15 @@ class Sampling:
     @cached_property
     def block_size(self) -> int:
         """Samples in a block."""
-        most = max(1, min(BATCHES * batch_of(self.engine, self.positions), MOST))
+        most = self.drawing * max(1, batch_of(self.engine, self.positions) // self.drawing)
         if self.method == "monte-carlo":
             return most
         return min(1 << (most.bit_length() - 1), self._points)
+
+    @property
+    def drawing(self) -> int:
+        """Samples whose random numbers are drawn together: the same by any engine."""
+        return max(1, min(BATCHES * batch_of("numpy", self.positions), MOST))
 
     @cached_property
     def _points(self) -> int:
@@ -238,7 +243,12 @@ class Sampler:
         replicate, place = divmod(block, job.per_replicate)
         if job.method == "quasi-monte-carlo":
             return self._streams[replicate].points(place * job.block_size, job.block_size)
-        return uniforms(job.seed, block, self.inputs.dims, min(job.block_size, job.samples - block * job.block_size))
+        first, last = block * job.block_size, min((block + 1) * job.block_size, job.samples)
+        parts = [
+            uniforms(job.seed, low // job.drawing, self.inputs.dims, min(job.drawing, last - low))
+            for low in range(first, last, job.drawing)
+        ]
+        return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1)
 
     def figures(self, u: Array) -> tuple[Array, Array, list[Array], NDArray[np.int8]]:
         """Of samples drawn: figures and whether they conform, (measure, sample), curves, status (sample, position)."""

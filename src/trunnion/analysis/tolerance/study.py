@@ -34,10 +34,12 @@ if TYPE_CHECKING:
 
 __all__ = ["DEFAULT_METHODS", "METHODS", "Study", "study", "tolerance"]
 
+ENGINES = ("numpy", "jax")
 METHODS = ("linear", "worst-case", *SAMPLINGS, "sobol")
 DEFAULT_METHODS = ("linear", "worst-case", "monte-carlo")
 DEFAULT_SAMPLES = 10_000
 MOST_SAMPLES = 10**15
+FEW = 10_000_000  # configurations up to which further processes cost more than they save
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,7 +155,7 @@ def tolerance(
     at: float | str | None = None,
     *,
     friction: FrictionMethod | None = None,
-    jobs: int | None = 1,
+    jobs: int | None = None,
     chunk: int | None = None,
     engine: str = "numpy",
     cluster: str | None = None,
@@ -167,7 +169,8 @@ def tolerance(
     where it states none, rotation and slide of every joint to the ground that is not driven. methods: of METHODS.
     samples: of the sampling method, and of the variance-based indices; seed: of its random numbers. steps: positions of
     a whole cycle; at: the place (driver coordinate or time) of measures that state neither a place nor a figure.
-    jobs, chunk, cluster, checkpoint, resume, progress: see `runner.run`. engine: numpy, or jax (an extra).
+    jobs: processes, one a core if not given and worth it; chunk, cluster, checkpoint, resume, progress: `runner.run`.
+    engine: numpy, or jax (an extra).
     Returns a Dataset over (measure, parameter, position, …) of `result.VARIABLES`; SI, each measure in its own unit.
     Method: exact first derivatives by dual numbers; the worst corner of the tolerances found on the mechanism itself;
     Monte Carlo or scrambled Sobol points through the whole analysis; Sobol' indices. Samples that have no answer are
@@ -176,7 +179,7 @@ def tolerance(
     """
     from trunnion.analysis.tolerance.result import Outcome, dataset
 
-    _check(methods, samples, seed)
+    _check(methods, samples, seed, engine)
     found = study(mechanism, measures, steps, at, friction)
     worst = found.worst() if "worst-case" in methods else None
     method = next((one for one in methods if one in SAMPLINGS), None)
@@ -187,6 +190,8 @@ def tolerance(
     stopped = False
     if method is not None:
         job = found.sampling(method, samples, seed, engine)
+        alone = job.samples * job.positions < FEW and cluster is None
+        jobs = 1 if jobs is None and (alone or engine != "numpy") else jobs
         ran = runner.run(
             job, jobs=jobs, chunk=chunk, cluster=cluster, checkpoint=checkpoint, resume=resume, progress=progress
         )
@@ -196,7 +201,8 @@ def tolerance(
             what = f"stopped before the end: {done_of(job, tally):,} of {job.samples:,} samples"
             notes.append(Finding(what, "samples", "go on with --resume", Severity.WARNING))
     if "sobol" in methods:
-        own = found.sampling("quasi-monte-carlo", samples, seed)
+        # Not turned: each number is to have its own coordinates of the points.
+        own = replace(found.sampling("quasi-monte-carlo", samples, seed), rotation=None)
         shares = indices(found.sampler(own), samples, seed)
     return dataset(Outcome(found, tuple(methods), worst, job, tally, shares, stopped), [*found.told, *notes])
 
@@ -206,7 +212,7 @@ def done_of(job: Sampling, tally: Tally) -> int:
     return int(sum(np.max(total.count) for tree in tally.trees if (total := tree.total()) is not None))
 
 
-def _check(methods: Sequence[str], samples: int, seed: int) -> None:
+def _check(methods: Sequence[str], samples: int, seed: int, engine: str) -> None:
     known = ", ".join(METHODS)
     findings = [
         Finding(f"there is no method '{method}'", "method", f"use {known}")
@@ -218,6 +224,8 @@ def _check(methods: Sequence[str], samples: int, seed: int) -> None:
     if not 1 <= samples <= MOST_SAMPLES:
         remedy = f"give a number from 1 to {MOST_SAMPLES:,}, or leave the sampling methods out"
         findings.append(Finding(f"{samples} samples", "samples", remedy))
+    if engine not in ENGINES:
+        findings.append(Finding(f"there is no engine '{engine}'", "engine", f"use {' or '.join(ENGINES)}"))
     if not 0 <= seed < 1 << 63:
         findings.append(Finding(f"a seed of {seed}", "seed", "give a whole number from 0"))
     if findings:

@@ -1,0 +1,204 @@
+"""The compiled kernel against NumPy's, and its gradients against dual numbers."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import trunnion
+from mechanisms import DURANGO
+from trunnion import Mechanism, MechanismError
+from trunnion.algebra.dual import derivative, seed
+from trunnion.analysis.analyse import Run, pose_status, prepare, status_of
+from trunnion.analysis.measures import named, outputs
+from trunnion.errors import Status
+
+jax = pytest.importorskip("jax")
+compiled = pytest.importorskip("trunnion.analysis.tolerance.compiled")
+
+EXAMPLES = DURANGO.parent
+SAMPLES = 5
+
+
+@pytest.fixture(autouse=True, scope="module")
+def cache(tmp_path_factory: pytest.TempPathFactory) -> None:
+    jax.config.update("jax_compilation_cache_dir", str(tmp_path_factory.mktemp("compiled")))
+
+
+def figures(run: Run, *names: str) -> dict[str, Callable[[Any], Any]]:
+    """What the measures of these names read off a walk."""
+
+    def reader(measure: Any) -> Callable[[Any], Any]:
+        return lambda back: measure.value(back.walk) if measure.of_motion else back.efforts[measure.subject]
+
+    return {one.name: reader(one) for one in named(run.system.mechanism, names, run.values)}
+
+
+def varied(run: Run, *names: str, spread: float = 1e-3) -> dict[str, Any]:
+    """All numbers, those named with a random share more or less in every sample."""
+    mechanism, rng = run.system.mechanism, np.random.default_rng(4)
+    paths = [mechanism.path_of(name) for name in names]
+    chosen = {path: run.values[path] * (1 + spread * rng.standard_normal((SAMPLES, 1))) for path in paths}
+    return mechanism.parameter_set.evaluate(chosen)
+
+
+def by_numpy(run: Run, values: Mapping[str, Any], time: Any, read: Mapping[str, Any]) -> tuple[dict[str, Any], Any]:
+    back = run.solve(time, values)
+    shape = (SAMPLES, len(time))
+    with np.errstate(all="ignore"):
+        return {name: np.broadcast_to(one(back), shape) for name, one in read.items()}, status_of(back, shape)
+
+
+def agree(found: Any, expected: Any) -> None:
+    for name, curve in expected.items():
+        scale = np.nanmax(np.abs(curve))
+        np.testing.assert_allclose(found[name], curve, rtol=1e-9, atol=1e-12 * scale, err_msg=name)
+
+
+def free(run: Run) -> list[str]:
+    """Dimensions and places of points that are stated as numbers, not as expressions of others, and are not 0."""
+    entries = run.system.mechanism.parameter_set.entries
+    kinds = ("dimensions.", "links.", "loop.")
+    return [
+        path for path, one in entries.items() if path.startswith(kinds) and not one.depends and run.values.get(path)
+    ]
+
+
+@pytest.mark.parametrize(
+    "example",
+    ["durango-fourbar", "slider-crank", "whitworth-quick-return", "scotch-yoke", "geared-five-bar", "universal-joint"],
+)
+def test_agrees_with_numpy(example: str) -> None:
+    """Of dyads of all kinds, a general group and a closed form in space: motion and forces with friction, by status."""
+    run = prepare(trunnion.read(EXAMPLES / f"{example}.yaml"))
+    motion = [one.name for one in outputs(run.system)][:1]
+    read_off = figures(run, *motion, *(f"effort:{driver}" for driver in run.system.mechanism.drivers))
+    values, time = varied(run, *free(run)[:4]), run.cycle.times(72)
+    kernel = compiled.CompiledKernel(run, read_off)
+    curves, status = kernel.curves(values, time)
+    expected, expected_status = by_numpy(run, values, time, read_off)
+    np.testing.assert_array_equal(status, expected_status)
+    agree(curves, expected)
+    assert kernel.again < status.size / 2
+
+
+def test_motion_alone() -> None:
+    run = prepare(trunnion.read(DURANGO))
+    read_off = figures(run, "angle:rocker", "coupler.E.x")
+    values, time = varied(run, "AB", "BC"), run.cycle.times(90)
+    curves, status = compiled.CompiledKernel(run, read_off, forces=False).curves(values, time)
+    back = run.solve(time, values)
+    np.testing.assert_array_equal(status, pose_status(back.walk, status.shape))
+    agree(curves, by_numpy(run, values, time, read_off)[0])
+
+
+@pytest.mark.parametrize("example", ["inverted-slider-crank", "jansen", "rccc"])
+def test_motion_of_other_modules(example: str) -> None:
+    """A general group with slides, three loops, a closed form in space."""
+    run = prepare(trunnion.read(EXAMPLES / f"{example}.yaml"))
+    read_off = figures(run, *(one.name for one in outputs(run.system)))
+    values, time = varied(run, *free(run)[:4], spread=1e-4), run.cycle.times(72)
+    curves, status = compiled.CompiledKernel(run, read_off, forces=False).curves(values, time)
+    np.testing.assert_array_equal(status, pose_status(run.solve(time, values).walk, status.shape))
+    agree(curves, by_numpy(run, values, time, read_off)[0])
+
+
+LAWS: list[dict[str, Any]] = [
+    {"law": "viscous", "coefficient": 0.1, "viscous": 0.05},
+    {"law": "stribeck", "coefficient": 0.1, "static": 0.15, "stribeck_speed": 0.02, "viscous": 0.01},
+    {"law": "brown-mcphee", "coefficient": 0.1, "static": 0.15, "transition_speed": 0.02, "viscous": 0.01},
+    {"law": "rolling-bearing", "coefficient": 0.0015},
+]
+
+
+def with_law(law: dict[str, Any]) -> Run:
+    data = trunnion.read(DURANGO).data()
+    data["joint_defaults"]["friction"] = law
+    return prepare(Mechanism.model_validate(data))
+
+
+@pytest.mark.parametrize("law", LAWS, ids=lambda law: law["law"])
+def test_friction_laws(law: dict[str, Any]) -> None:
+    run = with_law(law)
+    read_off = figures(run, "effort:A")
+    values, time = varied(run, "AB", "joint_defaults.friction.coefficient"), run.cycle.times(36)
+    curves, status = compiled.CompiledKernel(run, read_off).curves(values, time)
+    expected, expected_status = by_numpy(run, values, time, read_off)
+    np.testing.assert_array_equal(status, expected_status)
+    agree(curves, expected)
+
+
+def test_bristles_are_left_to_numpy() -> None:
+    run = with_law({"law": "dahl", "coefficient": 0.12, "stiffness": 4e3})
+    with pytest.raises(MechanismError, match="memory along the cycle"):
+        compiled.CompiledKernel(run, {})
+
+
+def test_failures_are_those_of_numpy() -> None:
+    """Lengths so far off that some samples do not assemble and others come near to a dead centre."""
+    run = prepare(trunnion.read(DURANGO))
+    read_off = figures(run, "angle:rocker", "effort:A")
+    values, time = varied(run, "AB", "BC", "CD", spread=0.2), run.cycle.times(90)
+    curves, status = compiled.CompiledKernel(run, read_off).curves(values, time)
+    expected, expected_status = by_numpy(run, values, time, read_off)
+    assert np.any(status == Status.NOT_ASSEMBLED)
+    assert np.any(status == Status.SOLVED)
+    np.testing.assert_array_equal(status, expected_status)
+    agree(curves, expected)
+
+
+def test_any_number_of_samples_and_times_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Batches that do not come out even, and times that differ from sample to sample."""
+    monkeypatch.setitem(compiled.BATCH, "cpu", 60)  # two samples at a time
+    run = prepare(trunnion.read(DURANGO))
+    read_off = figures(run, "effort:A")
+    values = varied(run, "AB")
+    time = run.cycle.times(30) + np.linspace(0.0, 0.01, SAMPLES)[:, None]
+    curves, _ = compiled.CompiledKernel(run, read_off).curves(values, time)
+    back = run.solve(time, values)
+    agree(curves, {"effort:A": back.efforts["A"]})
+
+
+@pytest.mark.parametrize("figure", ["angle:rocker", "effort:A"])
+def test_gradients_are_those_of_dual_numbers(figure: str) -> None:
+    run = prepare(trunnion.read(DURANGO))
+    read_off = figures(run, figure)
+    time = run.cycle.times(60)[3:27]  # no position with a relative speed of zero
+    values = varied(run, "AB", "BC", "CD")
+    stated = {path: values[path] for path in free(run) if np.ndim(values[path])}
+    slopes = compiled.CompiledKernel(run, read_off).gradient(values, time, figure, lambda curve: curve.sum())
+    parameters = run.system.mechanism.parameter_set
+    for name in ("AB", "BC"):
+        path = parameters.resolve(name)
+        moved = parameters.evaluate({**stated, path: seed(stated[path])})
+        with np.errstate(all="ignore"):
+            curve = read_off[figure](run.solve(time, moved))
+        chained = sum(slope * derivative(moved[one]) for one, slope in slopes.items())
+        np.testing.assert_allclose(chained, np.sum(derivative(curve), axis=1, keepdims=True), rtol=1e-9)
+
+
+def test_what_only_numpy_does_is_said() -> None:
+    run = prepare(trunnion.read(EXAMPLES / "bennett.yaml"))
+    with pytest.raises(MechanismError, match=r"over-constrained.*use the engine numpy"):
+        compiled.CompiledKernel(run, {})
+
+
+def test_jax_is_imported_only_where_asked_for() -> None:
+    code = "import sys, trunnion, trunnion.analysis.tolerance.compiled; sys.exit('jax' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False, cwd=Path(__file__).parent).returncode == 0
+
+
+def test_compiled_functions_are_kept_between_runs(tmp_path: Path) -> None:
+    run = prepare(trunnion.read(DURANGO))
+    jax.config.update("jax_compilation_cache_dir", str(tmp_path))
+    values, time = varied(run, "AB"), run.cycle.times(12)
+    kernel = compiled.CompiledKernel(run, figures(run, "angle:rocker"), forces=False)
+    kernel.curves(values, time)
+    assert kernel.function(values) is kernel.function(values)
+    assert compiled.cache_directory().parts[-2:] == ("trunnion", "jax")

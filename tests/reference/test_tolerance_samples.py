@@ -1,0 +1,357 @@
+"""Random samples against closed forms on the same and on other random numbers, and against first order if small."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import stats
+
+import mechanisms
+import mechanisms_space
+import trunnion
+from mechanisms import Array
+from toleranced import (
+    CLUTCH,
+    FOURBAR,
+    RSSR,
+    SLIDER,
+    clutch,
+    clutch_angle,
+    fourbar,
+    fourbar_angle,
+    rssr,
+    rssr_angle,
+    sampler,
+    slider_crank,
+    slider_place,
+    varied,
+)  # fmt: skip
+from trunnion import Mechanism
+from trunnion.analysis.tolerance.study import study
+from trunnion.statistics.streams import SobolStream, uniforms
+
+Law = Callable[[Array], Array]
+MM = 1e-3
+
+
+def normal(width: float) -> Law:
+    return lambda u: stats.norm.ppf(u) * width / 3
+
+
+def figures(mechanism: Mechanism, u: Array, **options: Any) -> Array:
+    """Of the first measure."""
+    return sampler(study(mechanism, **options)).figures(u)[0][0]
+
+
+# ---- sample by sample -----------------------------------------------------------------------------------------
+
+CASES: dict[str, tuple[Mechanism, Callable[..., Any], Mapping[str, float], list[Law]]] = {
+    "clutch": (clutch(), clutch_angle, CLUTCH, [normal(0.0125 * MM), normal(0.01 * MM), normal(0.0125 * MM)]),
+    "four-bar": (fourbar(), fourbar_angle, FOURBAR, [normal(0.05 * MM)] * 4),
+    "four-bar, wide": (fourbar("±5 mm"), fourbar_angle, FOURBAR, [normal(5 * MM)] * 4),
+    "slider-crank": (slider_crank(), slider_place, SLIDER, [normal(0.02 * MM), normal(0.05 * MM), normal(0.1 * MM)]),
+    "RSSR": (rssr(), rssr_angle, RSSR, [normal(np.radians(0.05) if n == "alpha" else 0.02 * MM) for n in RSSR]),
+}
+
+
+@pytest.mark.parametrize("method", ["plain", "sobol"])
+@pytest.mark.parametrize("name", CASES)
+def test_sample_by_sample(name: str, method: str) -> None:
+    """The same uniform numbers through SciPy's quantiles and the closed form: the same figure, to 1e-12."""
+    mechanism, of, at, laws = CASES[name]
+    dims = len(laws)
+    u = uniforms(7, 3, dims, 700) if method == "plain" else SobolStream(7, 2, dims).points(0, 512)
+    own = of(*(value + law(row) for value, law, row in zip(at.values(), laws, u, strict=True)))
+    np.testing.assert_allclose(figures(mechanism, u), own, rtol=0, atol=1e-12)
+
+
+T = 0.4 * MM
+LAWS: dict[str, tuple[dict[str, Any], Law]] = {
+    "normal, cpk": (
+        {"limits": "±0.4 mm", "cp": 1.33, "cpk": 1},
+        lambda u: stats.norm.ppf(u, T * 0.33 / 1.33, T / 3.99),
+    ),
+    "one side": ({"limits": "+0.4/0 mm"}, lambda u: stats.norm.ppf(u, T / 2, T / 6)),
+    "uniform": ({"limits": "+0.4/-0.2 mm", "distribution": "uniform"}, lambda u: stats.uniform.ppf(u, -T / 2, 1.5 * T)),
+    "triangular": (
+        {"limits": "±0.4 mm", "distribution": "triangular", "mode": "0.2 mm"},
+        lambda u: stats.triang.ppf(u, 0.75, -T, 2 * T),
+    ),
+    "truncated": (
+        {"limits": "±0.4 mm", "distribution": "truncated", "cp": 0.4, "shift": "0.1 mm"},
+        lambda u: stats.truncnorm.ppf(u, -1.5, 0.9, T / 4, T / 1.2),
+    ),
+    "beta": (
+        {"limits": "±0.4 mm", "distribution": "beta", "alpha": 2, "beta": 3.5},
+        lambda u: stats.beta.ppf(u, 2, 3.5, -T, 2 * T),
+    ),
+    "sample": (
+        {"distribution": "sample", "values": ["0.3 mm", "-0.1 mm", "0.05 mm", "0.2 mm"]},
+        lambda u: np.array([-0.1, 0.05, 0.2, 0.3])[np.ceil(4 * u).astype(int) - 1] * MM,
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_every_distribution_sample_by_sample(name: str) -> None:
+    keys, law = LAWS[name]
+    u = uniforms(2, 0, 1, 800)
+    found = figures(fourbar(tolerances={"l4": keys}), u)
+    np.testing.assert_allclose(found, fourbar_angle(**FOURBAR | {"l4": 0.07 + law(u[0])}), rtol=0, atol=1e-11)
+
+
+def test_correlated_sample_by_sample() -> None:
+    """Lower Cholesky factor of the correlation times the normal scores; a uniform number by its copula."""
+    tolerances = {"l1": "±0.4 mm", "l2": {"limits": "±0.4 mm", "distribution": "uniform"}, "l4": "±0.4 mm"}
+    correlations = [{"of": ["l1", "l2"], "coefficient": 0.7}, {"of": ["l2", "l4"], "coefficient": -0.5}]
+    u = uniforms(2, 0, 3, 800)
+    z = np.linalg.cholesky([[1, 0.7, 0], [0.7, 1, -0.5], [0, -0.5, 1]]) @ stats.norm.ppf(u)
+    own = fourbar_angle(0.1 + z[0] * T / 3, 0.03 + T * (2 * stats.norm.cdf(z[1]) - 1), 0.09, 0.07 + z[2] * T / 3)
+    found = figures(fourbar(tolerances=tolerances, correlations=correlations), u)
+    np.testing.assert_allclose(found, own, rtol=0, atol=1e-12)
+
+
+def shifted(joint: str, x: Any, y: Any) -> Any:
+    """The angle of the rocker, its pin off by (x, y) in the axes of the hole, which is in the second link."""
+    l1, l2, l3, l4 = FOURBAR.values()
+    if joint == "A":
+        return fourbar_angle(l1, np.hypot(l2 - x, y), l3, l4, np.pi / 3 + np.arctan2(-y, l2 - x))
+    if joint == "B":
+        return fourbar_angle(l1, l2, np.hypot(l3 - x, y), l4)
+    if joint == "C":
+        return fourbar_angle(l1, l2, l3, np.hypot(l4 + x, y)) - np.arctan2(y, l4 + x)
+    return fourbar_angle(l1, l2, l3, np.hypot(l4 - x, y)) - np.arctan2(-y, l4 - x)
+
+
+def joined(joint: str, **parts: Any) -> dict[str, Any]:
+    joints = fourbar().data()["joints"]
+    return joints | {joint: {**joints[joint], **parts}}
+
+
+@pytest.mark.parametrize("joint", "ABCD")
+def test_pins_anywhere_in_their_holes_sample_by_sample(joint: str) -> None:
+    """Clearance of 0.2 mm ± 0.1 mm: uniform over the disc of its own radius."""
+    pin = {"radius": "5 mm", "clearance": "0.2 mm ± 0.1 mm"}
+    u = uniforms(2, 0, 3, 800)
+    room = 0.2 * MM + normal(0.1 * MM)(u[0])
+    x, y = (room * np.sqrt(u[1]) * part(2 * np.pi * u[2]) for part in (np.cos, np.sin))
+    found = figures(fourbar(tolerances={}, joints=joined(joint, pin=pin)), u)
+    np.testing.assert_allclose(found, shifted(joint, x, y), rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("joint", "ABCD")
+def test_seats_and_run_outs_sample_by_sample(joint: str) -> None:
+    """A seat at any angle of a given play; a hole that is off by up to 0.2 mm in any direction."""
+    u = uniforms(2, 0, 2, 400)
+    xi = 2 * np.pi * u[0] - np.pi
+    pin = {"radius": "5 mm", "clearance": "0.2 mm"}
+    seat = fourbar(
+        joints=joined(joint, pin=pin, seat={"xi": "0 deg"}),
+        tolerances={f"joints.{joint}.seat.xi": {"distribution": "direction"}},
+    )
+    own = shifted(joint, 0.2 * MM * np.cos(xi), 0.2 * MM * np.sin(xi))
+    np.testing.assert_allclose(figures(seat, u[:1]), own, rtol=0, atol=1e-12)
+    run_out = fourbar(
+        joints=joined(joint, misalignment={"offset": "0 mm"}),
+        tolerances={f"joints.{joint}.misalignment.offset": {"limits": "+0.2/0 mm", "direction": "uniform"}},
+    )
+    size, towards = 0.1 * MM + normal(0.1 * MM)(u[0]), 2 * np.pi * u[1] - np.pi
+    own = shifted(joint, size * np.cos(towards), size * np.sin(towards))
+    np.testing.assert_allclose(figures(run_out, u), own, rtol=0, atol=1e-12)
+
+
+@given(
+    st.tuples(*(st.floats(-0.1, 0.1) for _ in range(4))),
+    st.floats(1e-6, 0.08),
+    st.floats(-180, 180),
+    st.integers(0, 10**6),
+)
+def test_any_four_bar_sample_by_sample(changes: tuple[float, ...], width: float, place: float, seed: int) -> None:
+    """Any sizes, any width, anywhere on the turn; where the circles do not meet there is no figure."""
+    sizes = {name: value * (1 + change) for (name, value), change in zip(FOURBAR.items(), changes, strict=True)}
+    mechanism = fourbar(
+        dimensions=sizes, tolerances={name: width * value for name, value in sizes.items()},
+        measures={"angle": {"angle": "rocker", "at": f"{place} deg"}},
+    )  # fmt: skip
+    u = uniforms(seed, 0, 4, 50)
+    lengths = [value * (1 + width / 3 * stats.norm.ppf(row)) for value, row in zip(sizes.values(), u, strict=True)]
+    own = fourbar_angle(*lengths, crank=np.radians(place))
+    found = figures(mechanism, u)
+    away = np.abs(np.remainder(found - own + np.pi, 2 * np.pi) - np.pi)
+    assert np.all((away < 1e-9) | (np.isnan(found) & np.isnan(own)))
+
+
+# ---- what a run says of its samples ---------------------------------------------------------------------------
+
+LIMITS = {"angle": {"angle": "rocker", "at": "60 deg", "limit": "+0.05/-0.07 deg"}}
+SIGMA = np.linalg.norm([13.654, 13.401, 15.623, 6.323]) * 0.05e-3 / 3
+
+
+@pytest.fixture(scope="module")
+def plain() -> tuple[Any, Array]:
+    """A run, and the same samples by the closed form."""
+    mechanism, samples = fourbar(measures=LIMITS), 5000
+    result = trunnion.tolerance(mechanism, methods=["monte-carlo"], samples=samples, seed=9)
+    size = study(mechanism).sampling("monte-carlo", samples, 9).block_size
+    blocks = [uniforms(9, i, 4, min(size, samples - i * size)) for i in range(-(-samples // size))]
+    deviations = normal(0.05 * MM)(np.concatenate(blocks, axis=1))
+    return result, fourbar_angle(*(np.array(list(FOURBAR.values()))[:, None] + deviations))
+
+
+def test_moments(plain: tuple[Any, Array]) -> None:
+    result, own = plain
+    assert result["samples"].item() == len(own) == 5000
+    assert result["mean"].item() == pytest.approx(np.mean(own), rel=1e-14)
+    assert result["deviation"].item() == pytest.approx(np.std(own, ddof=1), rel=1e-11)
+    assert result["skewness"].item() == pytest.approx(stats.skew(own), rel=1e-3, abs=1e-6)
+    assert result["kurtosis"].item() == pytest.approx(stats.kurtosis(own, fisher=False), rel=1e-3)
+    assert result["least"].item() == pytest.approx(np.min(own), abs=1e-14)
+    assert result["most"].item() == pytest.approx(np.max(own), abs=1e-14)
+    assert int(result["failed"].sum()) == 0
+    assert result["band"].values[0, :, 0] == pytest.approx(result["quantile_value"].values[0], abs=0.1 * SIGMA)
+
+
+def test_quantiles(plain: tuple[Any, Array]) -> None:
+    """Within the width of a bin, 1/128 of σ near the middle; intervals from order statistics."""
+    result, own = plain
+    q = result["quantile"].values
+    assert result["quantile_value"].values[0] == pytest.approx(np.quantile(own, q), abs=0.05 * SIGMA)
+    for i, share in enumerate(q):
+        low, high = stats.binom.ppf([0.025, 0.975], len(own), share)
+        found = result["quantile_low"].values[0, i], result["quantile_high"].values[0, i]
+        if low < 1 or high >= len(own):
+            continue
+        known = np.sort(own)[[int(low) - 1, int(high)]]
+        assert found == pytest.approx(tuple(known), abs=0.05 * SIGMA if 0.01 < share < 0.99 else 0.3 * SIGMA)
+
+
+def test_intervals(plain: tuple[Any, Array]) -> None:
+    result, own = plain
+    mean = stats.ttest_1samp(own, 0).confidence_interval(0.95)
+    assert (result["mean_low"].item(), result["mean_high"].item()) == pytest.approx(tuple(mean), rel=1e-9)
+    resampled = stats.bootstrap((own,), np.std, n_resamples=999, rng=np.random.default_rng(1), method="basic")
+    known = resampled.confidence_interval
+    found = result["deviation_low"].item(), result["deviation_high"].item()
+    assert found == pytest.approx(tuple(known), abs=0.3 * (known.high - known.low))
+
+
+def test_yield_and_capability(plain: tuple[Any, Array]) -> None:
+    result, own = plain
+    low, high = fourbar_angle(**FOURBAR) + np.radians([-0.07, 0.05])
+    passed = int(np.count_nonzero((own >= low) & (own <= high)))
+    assert 0.5 * len(own) < passed < 0.99 * len(own)
+    assert result["yield"].item() == passed / len(own) == result["yield_all"].item()
+    known = stats.binomtest(passed, len(own)).proportion_ci(method="wilson")
+    assert (result["yield_low"].item(), result["yield_high"].item()) == pytest.approx((known.low, known.high), rel=1e-9)
+    mean, sigma = np.mean(own), np.std(own, ddof=1)
+    assert result["cp"].item() == pytest.approx((high - low) / (6 * sigma), rel=1e-9)
+    assert result["cpk"].item() == pytest.approx(min(high - mean, mean - low) / (3 * sigma), rel=1e-9)
+
+
+def test_histogram_and_convergence(plain: tuple[Any, Array]) -> None:
+    result, own = plain
+    edges, counts = result["edge"].values[0], result["histogram"].values[0]
+    assert np.sum(counts) == len(own)
+    near = np.histogram(own, edges)[0] - counts
+    assert np.sum(np.abs(near)) <= 4  # a figure may lie on an edge but for rounding
+    sizes = result["convergence_samples"].values
+    assert sizes[-1] == len(own)
+    for i, size in enumerate(sizes):
+        assert result["convergence_mean"].values[0, i] == pytest.approx(np.mean(own[:size]), rel=1e-13)
+        assert result["convergence_deviation"].values[0, i] == pytest.approx(np.std(own[:size], ddof=1), rel=1e-9)
+
+
+def test_sobol_points() -> None:
+    """Eight scramblings of a power of two of points each; intervals from their spread by Student's t."""
+    mechanism = fourbar(measures=LIMITS)
+    result = trunnion.tolerance(mechanism, methods=["quasi-monte-carlo"], samples=5000, seed=4)
+    assert result["samples"].item() == 8 * 512
+    u = np.array([SobolStream(4, i, 4).points(0, 512) for i in range(8)])
+    sizes = np.array(list(FOURBAR.values()))[:, None, None]
+    own = fourbar_angle(*(sizes + normal(0.05 * MM)(np.moveaxis(u, 1, 0))))
+    assert result["mean"].item() == pytest.approx(np.mean(own), rel=1e-14)
+    assert result["deviation"].item() == pytest.approx(np.std(own, ddof=1), rel=1e-11)
+    known = stats.ttest_1samp(np.mean(own, axis=1), 0).confidence_interval(0.95)
+    assert (result["mean_low"].item(), result["mean_high"].item()) == pytest.approx(tuple(known), rel=1e-9)
+    low, high = fourbar_angle(**FOURBAR) + np.radians([-0.07, 0.05])
+    shares = np.mean((own >= low) & (own <= high), axis=1)
+    assert result["yield"].item() == pytest.approx(np.mean(shares), abs=1e-15)
+    known = stats.ttest_1samp(shares, 0).confidence_interval(0.95)
+    found = result["yield_low"].item(), result["yield_high"].item()
+    assert found == pytest.approx(tuple(known), abs=0.06 * (known.high - known.low))
+
+
+# ---- large tolerances: brute force ----------------------------------------------------------------------------
+
+
+def test_large_tolerances_against_brute_force() -> None:
+    """±8 mm of each link, uniform: a million samples of one's own, with random numbers of another kind."""
+    tolerances = {name: {"limits": "±8 mm", "distribution": "uniform"} for name in FOURBAR}
+    measures = {
+        "angle": {"angle": "rocker", "at": "60 deg", "limit": "±14 deg"},
+        "above": {"angle": "rocker", "at": "60 deg", "at_least": "88 deg"},
+    }
+    result = trunnion.tolerance(fourbar(tolerances=tolerances, measures=measures), samples=20_000)
+    rng = np.random.default_rng(0)
+    count = 1_000_000
+    own = fourbar_angle(*(value + 8 * MM * rng.uniform(-1, 1, count) for value in FOURBAR.values()))
+    nominal = fourbar_angle(**FOURBAR)
+    assert abs(stats.skew(own)) > 0.12  # first order knows none
+    assert result["searched_upper"].values[0] < 0.9 * result["worst_case_upper"].values[0]
+    assert abs(result["mean"].values[0] - np.mean(own)) < 3 * np.std(own) / np.sqrt(20_000)
+    assert result["deviation"].values[0] == pytest.approx(np.std(own), rel=0.02)
+    assert result["skewness"].values[0] == pytest.approx(stats.skew(own), abs=0.08)
+    assert result["kurtosis"].values[0] == pytest.approx(stats.kurtosis(own, fisher=False), abs=0.15)
+    known = np.quantile(own, result["quantile"].values)
+    low, high = result["quantile_low"].values[0], result["quantile_high"].values[0]
+    assert np.all((low - (high - low) / 2 < known) & (known < high + (high - low) / 2))
+    inside = [np.mean(np.abs(own - nominal) < np.radians(14)), np.mean(own > np.radians(88))]
+    assert np.all(np.abs(result["yield"].values - inside) < 4 * np.sqrt(0.25 / 20_000))
+    both = np.mean((np.abs(own - nominal) < np.radians(14)) & (own > np.radians(88)))
+    assert result["yield_all"].item() == pytest.approx(both, abs=0.012)
+    assert 0.5 < both < min(inside) < 0.99
+    assert result["searched_upper"].values[0] >= np.max(own) - nominal - 1e-12
+    assert result["searched_lower"].values[0] <= np.min(own) - nominal + 1e-12
+
+
+# ---- small tolerances: first order ----------------------------------------------------------------------------
+
+SMALL: dict[str, tuple[Callable[[], Mechanism], list[str]]] = {
+    "clutch": (clutch, ["wedge"]),
+    "RSSR": (rssr, ["psi"]),
+    "four-bar with friction": (
+        lambda: varied(mechanisms.model(mechanisms.four_bar()), 1e-4),
+        ["mean:effort:A", "rms:effort:A", "maximum:effort:A", "mean:reaction:C.x", "stroke:D"],
+    ),
+    "slider-crank, Stribeck": (
+        lambda: varied(mechanisms.model(mechanisms.slider_crank(), mechanisms.law_named("stribeck")), 1e-4),
+        ["mean:effort:A", "rms:effort:A", "mean:reaction:C.y"],
+    ),
+    "class III": (lambda: varied(mechanisms.model(mechanisms.class_three()), 1e-4), ["rms:effort:A", "stroke:H"]),
+    "RCCC": (
+        lambda: varied(mechanisms_space.MODELS["RCCC"]().data | {"joint_defaults": {"friction": 0.05}}, 1e-4, 6),
+        ["mean:effort:A", "maximum:slide:D", "rms:effort:A"],
+    ),
+    "Cardan": (lambda: varied(mechanisms_space.cardan(), 1e-4, 8), ["mean:effort:input", "rms:effort:input"]),
+}
+
+
+@pytest.mark.parametrize("method", ["monte-carlo", "quasi-monte-carlo"])
+@pytest.mark.parametrize("name", SMALL)
+def test_small_tolerances_against_first_order(name: str, method: str) -> None:
+    """Mean and standard deviation within twice their own 95 % intervals of those by derivatives."""
+    build, measures = SMALL[name]
+    found = trunnion.tolerance(build(), measures, methods=["linear", method], samples=1200, steps=20)
+    for figure, linear in (
+        ("mean", found["nominal"] + found["shift_linear"]),
+        ("deviation", found["deviation_linear"]),
+    ):
+        middle, low, high = (found[key].values for key in (figure, f"{figure}_low", f"{figure}_high"))
+        room = (high - low) + 2e-3 * found["deviation_linear"].values  # second order in 1e-4
+        assert np.all(np.abs(middle - linear.values) <= room), figure
+        assert np.all(high - low < 0.35 * found["deviation_linear"].values)

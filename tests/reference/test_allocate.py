@@ -230,6 +230,13 @@ def test_nothing_keeps_the_limits() -> None:
     assert "keep the limit +0.05 deg" in said
 
 
+def test_a_nominal_figure_beyond_its_bounds() -> None:
+    result = trunnion.allocate(fourbar(measures={"t": {"effort": "A", "as": "maximum", "at_most": "1 N m"}}), steps=12)
+    (said,) = findings(result, "error")
+    assert said.startswith("measures.t: the nominal figure is ")
+    assert said.endswith("N m, at_most is 1 N m: no tolerance mends that")
+
+
 def test_what_cannot_be_asked() -> None:
     model = trunnion.read(EXAMPLES / "toleranced-fourbar.yaml")
     for options, text in (
@@ -272,6 +279,27 @@ def test_costs_that_are_not_taken() -> None:
     assert "it changes the play of B" in said
     assert result["bought"].sel(parameter="joints.B.pin.radius") == 0
     assert float(result["used"][0]) == pytest.approx(1)
+
+
+def test_run_outs_and_seats_stay_as_they_are() -> None:
+    """A run-out that points anywhere has no middle; a pin whose seat is given has no play to choose."""
+    data = fourbar().data()
+    tolerances = {
+        **data["tolerances"],
+        "joints.B.misalignment.offset": {"limits": "+0.01/0 mm", "direction": "uniform"},
+    }
+    joints = {**data["joints"]}
+    joints["B"] = {**joints["B"], "misalignment": {"offset": "0 mm"}}
+    joints["C"] = {**joints["C"], "pin": {"clearance": "10 um"}, "seat": {"xi": "30 deg"}}
+    costs = {**data["costs"], **{name: data["costs"]["l1"] for name in ("B.misalignment.offset", "C.clearance")}}
+    result = trunnion.allocate(fourbar(joints=joints, costs=costs, tolerances=tolerances), steps=24, samples=0)
+    told = " ".join(findings(result, "warning"))
+    assert "cannot be bought, it may point anywhere" in told
+    assert "cannot be bought, its pin has a given seat" in told
+    # what it does stays, and the others keep their limits with it
+    assert result["bought"].sel(parameter="joints.B.misalignment.offset") == 0
+    assert float(result["used"][0]) == pytest.approx(1)
+    assert float(result["cost_total"]) > 16.6
 
 
 def test_curve_of_cost_over_accuracy() -> None:

@@ -291,7 +291,7 @@ def test_run_outs_and_seats_stay_as_they_are() -> None:
     joints = {**data["joints"]}
     joints["B"] = {**joints["B"], "misalignment": {"offset": "0 mm"}}
     joints["C"] = {**joints["C"], "pin": {"clearance": "10 um"}, "seat": {"xi": "30 deg"}}
-    costs = {**data["costs"], **{name: data["costs"]["l1"] for name in ("B.misalignment.offset", "C.clearance")}}
+    costs = {**data["costs"], **dict.fromkeys(("B.misalignment.offset", "C.clearance"), data["costs"]["l1"])}
     result = trunnion.allocate(fourbar(joints=joints, costs=costs, tolerances=tolerances), steps=24, samples=0)
     told = " ".join(findings(result, "warning"))
     assert "cannot be bought, it may point anywhere" in told

@@ -77,6 +77,20 @@ def swing_of_rssr() -> float:
     return sum(abs(slope(turned(name), nominal[name], 1e-5).real) * width for name, width in widths.items())
 
 
+def least_cost(one: Outcome) -> float:
+    return float(trunnion.allocate(one.mechanism, steps=4, samples=0)["cost_total"])
+
+
+def least_cost_by_hand() -> float:
+    """Σ B/√t with t ∝ (B/|S|)^(2/3) and Σ |S| t = 0.1 mm, S of the piston at 60° by the triangle of its rod."""
+    angle = np.arcsin(50 * np.sin(np.pi / 3) / 200)
+    rod = 1 / np.cos(angle)  # a pin's load under a unit load at the piston, too
+    slopes = np.array([np.cos(np.pi / 3) - np.sin(np.pi / 3) * np.tan(angle), rod, rod, rod, rod])
+    prices = np.array([0.5, 0.8, 0.2, 0.2, 0.3])
+    shape = (prices / slopes) ** (2 / 3)
+    return float(np.sum(prices / np.sqrt(0.1 * shape / (slopes @ shape))))
+
+
 ENTRIES = {
     "one-way-clutch": Entry(
         says="Largest wedge angle that the limits of its dimensions allow",
@@ -103,6 +117,15 @@ ENTRIES = {
         expected=lambda: float(np.linalg.norm(by_corner((0.027, 0.02, 0.027, 0.023)))),
         source="the triangle of coupler and rocker, its derivatives by differences",
         tolerance=1e-11,
+    ),
+    "piston-by-cost": Entry(
+        says="Least cost of tolerances and pins with which the piston keeps its stop",
+        unit="1",
+        found=least_cost,
+        expected=least_cost_by_hand,
+        source="the closed form of one limit, t ∝ (B/|S|)^(2/3)",
+        tolerance=1e-9,
+        figures=("mechanism", "torque"),
     ),
     "toleranced-rssr": Entry(
         says="Most that the tolerances turn the rocker at 60° of the crank, to first order",

@@ -13,7 +13,7 @@ import pytest
 
 import trunnion
 from mechanisms import DURANGO
-from trunnion import MechanismError
+from trunnion import Mechanism, MechanismError
 from trunnion.algebra.dual import derivative, seed
 from trunnion.analysis.analyse import Run, pose_status, prepare, status_of
 from trunnion.analysis.measures import named, outputs
@@ -72,7 +72,7 @@ def free(run: Run) -> list[str]:
 
 @pytest.mark.parametrize(
     "example",
-    ["durango-fourbar", "slider-crank", "whitworth-quick-return", "scotch-yoke", "toggle-press", "universal-joint"],
+    ["durango-fourbar", "slider-crank", "whitworth-quick-return", "scotch-yoke", "geared-five-bar", "universal-joint"],
 )
 def test_agrees_with_numpy(example: str) -> None:
     """Of dyads of all kinds, a general group and a closed form in space: motion and forces with friction, by status."""
@@ -96,6 +96,48 @@ def test_motion_alone() -> None:
     back = run.solve(time, values)
     np.testing.assert_array_equal(status, pose_status(back.walk, status.shape))
     agree(curves, by_numpy(run, values, time, read_off)[0])
+
+
+@pytest.mark.parametrize("example", ["inverted-slider-crank", "jansen", "rccc"])
+def test_motion_of_other_modules(example: str) -> None:
+    """A general group with slides, three loops, a closed form in space."""
+    run = prepare(trunnion.read(EXAMPLES / f"{example}.yaml"))
+    read_off = figures(run, *(one.name for one in outputs(run.system)))
+    values, time = varied(run, *free(run)[:4], spread=1e-4), run.cycle.times(72)
+    curves, status = compiled.CompiledKernel(run, read_off, forces=False).curves(values, time)
+    np.testing.assert_array_equal(status, pose_status(run.solve(time, values).walk, status.shape))
+    agree(curves, by_numpy(run, values, time, read_off)[0])
+
+
+LAWS: list[dict[str, Any]] = [
+    {"law": "viscous", "coefficient": 0.1, "viscous": 0.05},
+    {"law": "stribeck", "coefficient": 0.1, "static": 0.15, "stribeck_speed": 0.02, "viscous": 0.01},
+    {"law": "brown-mcphee", "coefficient": 0.1, "static": 0.15, "transition_speed": 0.02, "viscous": 0.01},
+    {"law": "rolling-bearing", "coefficient": 0.0015},
+]
+
+
+def with_law(law: dict[str, Any]) -> Run:
+    data = trunnion.read(DURANGO).data()
+    data["joint_defaults"]["friction"] = law
+    return prepare(Mechanism.model_validate(data))
+
+
+@pytest.mark.parametrize("law", LAWS, ids=lambda law: law["law"])
+def test_friction_laws(law: dict[str, Any]) -> None:
+    run = with_law(law)
+    read_off = figures(run, "effort:A")
+    values, time = varied(run, "AB", "joint_defaults.friction.coefficient"), run.cycle.times(36)
+    curves, status = compiled.CompiledKernel(run, read_off).curves(values, time)
+    expected, expected_status = by_numpy(run, values, time, read_off)
+    np.testing.assert_array_equal(status, expected_status)
+    agree(curves, expected)
+
+
+def test_bristles_are_left_to_numpy() -> None:
+    run = with_law({"law": "dahl", "coefficient": 0.12, "stiffness": 4e3})
+    with pytest.raises(MechanismError, match="memory along the cycle"):
+        compiled.CompiledKernel(run, {})
 
 
 def test_failures_are_those_of_numpy() -> None:

@@ -1,4 +1,4 @@
-"""Yields and their intervals against true ones, and what Sobol points gain: true figures by formula or by quadrature."""
+"""Yields and their intervals against true ones, and what Sobol points gain: true ones by formula or quadrature."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from mechanisms import Array
 from mechanisms_parts import prismatic
 from toleranced import FOURBAR, fourbar, fourbar_angle
 from trunnion import Mechanism
-from trunnion.analysis.tolerance.sampled import sampled
+from trunnion.analysis.tolerance.sampled import QUANTILES, sampled
 from trunnion.analysis.tolerance.study import Study, study
 
 MM, SEEDS = 1e-3, 200
@@ -113,7 +113,8 @@ def intervals(mechanism: Mechanism, method: str, samples: int) -> dict[str, Arra
 def _arrays(found: Study, first: Any, seed: int) -> dict[str, Array]:
     batch = replace(first, job=replace(first.job, seed=seed))
     arrays = sampled(batch.job, batch.evaluate(0, batch.job.blocks), found).arrays
-    kept = {f"{key}_{end}": arrays[f"{key}_{end}"] for key in ("mean", "deviation") for end in ("low", "high")}
+    keys = ("mean", "deviation", "quantile")
+    kept = {f"{key}_{end}": arrays[f"{key}_{end}"] for key in keys for end in ("low", "high")}
     for end in ("low", "high"):
         kept[f"yield_{end}"] = np.append(arrays[f"yield_{end}"], arrays[f"yield_all_{end}"])
     return kept
@@ -132,7 +133,7 @@ def test_intervals_are_honest(method: str, samples: int) -> None:
     assert np.all(np.abs(share - 0.95) <= 0.03 + 1e-12), share
     assert abs(np.mean(share) - 0.95) < 0.015
     for key, true in (("mean", 0.06), ("deviation", 1e-5)):
-        assert np.all(covered(rows, key, true) > 0.88)
+        assert np.all(np.abs(covered(rows, key, true) - 0.95) <= 0.04)
 
 
 @pytest.mark.parametrize(("method", "samples"), [("monte-carlo", 1000), ("quasi-monte-carlo", 2048)])
@@ -142,7 +143,23 @@ def test_intervals_of_the_four_bar_are_honest(method: str, samples: int) -> None
     share = covered(rows, "yield", below(HIGH) - below(LOW))
     assert np.all(np.abs(share - 0.95) <= 0.03 + 1e-12), share
     assert abs(covered(rows, "mean", mean)[0] - 0.95) <= 0.03
-    assert covered(rows, "deviation", sigma)[0] > 0.85
+    assert abs(covered(rows, "deviation", sigma)[0] - 0.95) <= 0.03
+
+
+FEW = pytest.mark.xfail(strict=True, reason="of too few points a replicate has no such quantile, but an interval")
+
+
+@pytest.mark.parametrize(
+    ("method", "samples"),
+    [("monte-carlo", 1000), ("quasi-monte-carlo", 8192), pytest.param("quasi-monte-carlo", 1024, marks=FEW)],
+)
+def test_intervals_of_quantiles(method: str, samples: int) -> None:
+    """Of plain samples by order statistics, never below 95 % but for chance; of Sobol points by their replicates."""
+    rows = intervals(sledge(), method, samples)
+    true = 0.06 + 1e-5 * stats.norm.ppf(QUANTILES)
+    known = np.all(np.isfinite(rows["quantile_low"][:, 0] + rows["quantile_high"][:, 0]), axis=0)
+    assert np.count_nonzero(known) >= len(QUANTILES) - 2
+    assert np.all(covered(rows, "quantile", true)[0, known] >= 0.87)
 
 
 # ---- Sobol points ---------------------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""A study of a real mechanism: the same bits for any workers and portions, stopped and resumed, here or on a cluster."""
+"""A study of a real mechanism: the same bits for any workers and portions, stopped and resumed, on a cluster."""
 
 from __future__ import annotations
 

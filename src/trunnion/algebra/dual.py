@@ -130,7 +130,7 @@ class Dual:
 
 
 def primal(number: Any) -> Any:
-    """The number without any ε: its innermost real part. A number that is compiled becomes a constant for derivatives."""
+    """The number without any ε: its innermost real part; of a compiled one, a constant for derivatives."""
     while isinstance(number, Dual):
         number = number.real
     return number.held() if isinstance(number, Traced) else number

@@ -42,7 +42,8 @@ def solve(matrix: Sequence[Sequence[Number]], *sides: Sequence[Number], pivoting
     """Solutions x of A x = b for each right-hand side b in `sides`, by elimination with row pivoting per lane.
 
     matrix: n rows of n entries; sides: n entries each. Returns one list of n entries for each side.
-    Without pivoting the diagonal must outweigh the rest of each row. A singular lane comes out non-finite (a zero pivot divides).
+    Without pivoting the diagonal must outweigh the rest of each row. A singular lane comes out non-finite (a zero
+    pivot divides).
     """
     n = len(matrix)
     columns = n + len(sides)

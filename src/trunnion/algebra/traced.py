@@ -14,21 +14,24 @@ from __future__ import annotations
 import functools
 import operator
 from collections.abc import Callable, Sequence
+from importlib import import_module
 from typing import Any
 
 import numpy as np
 
-__all__ = ["Traced", "Untraceable", "bare", "kept", "looped"]
+__all__ = ["Traced", "UntraceableError", "bare", "kept", "looped"]
 
 
-class Untraceable(TypeError):
+class UntraceableError(TypeError):
     """A kernel asks for what only numbers with values have: it cannot be compiled as it stands."""
 
 
-def _jnp() -> Any:
-    import jax.numpy as jnp
+def _jax() -> Any:
+    return import_module("jax")
 
-    return jnp
+
+def _jnp() -> Any:
+    return import_module("jax.numpy")
 
 
 def bare(number: Any) -> Any:
@@ -85,15 +88,13 @@ class Traced:
 
     def held(self) -> Traced:
         """The number as a constant for derivatives, as the real part of a dual number is."""
-        import jax
-
-        return Traced(jax.lax.stop_gradient(self.value))
+        return Traced(_jax().lax.stop_gradient(self.value))
 
     def astype(self, kind: Any) -> Traced:
         return Traced(self.value.astype(kind))
 
     def all(self, axis: Any = None) -> Any:
-        return np.all(self, axis=axis)  # type: ignore[call-overload]
+        return np.all(self, axis=axis)
 
     def __getitem__(self, index: Any) -> Traced:
         return Traced(self.value[bare(index)])
@@ -101,7 +102,7 @@ class Traced:
     # ---- what needs a value -------------------------------------------------------------------------------------
 
     def _refuse(self, *_: Any, **__: Any) -> Any:
-        raise Untraceable("a number that is being compiled has no value yet")
+        raise UntraceableError("a number that is being compiled has no value yet")
 
     __bool__ = __float__ = __int__ = __index__ = __len__ = __iter__ = __array__ = _refuse
 
@@ -115,7 +116,7 @@ class Traced:
         if any(hasattr(one, "dual") for one in inputs):
             return NotImplemented
         if method != "__call__" or options:
-            raise Untraceable(f"np.{ufunc.__name__} with {method} {', '.join(options)} is not compiled")
+            raise UntraceableError(f"np.{ufunc.__name__} with {method} {', '.join(options)} is not compiled")
         return getattr(functions, ufunc.__name__)(*inputs)
 
     def __array_function__(self, function: Any, types: Any, args: Sequence[Any], options: dict[str, Any]) -> Any:
@@ -143,8 +144,8 @@ class Traced:
     __le__ = _operator(operator.le)
     __gt__ = _operator(operator.gt)
     __ge__ = _operator(operator.ge)
-    __eq__ = _operator(operator.eq)  # type: ignore[assignment]
-    __ne__ = _operator(operator.ne)  # type: ignore[assignment]
+    __eq__ = _operator(operator.eq)
+    __ne__ = _operator(operator.ne)
 
     def __neg__(self) -> Traced:
         return Traced(-self.value)
@@ -172,7 +173,7 @@ class _Functions:
         try:
             apply = getattr(_jnp(), name)
         except AttributeError:
-            raise Untraceable(f"JAX has no np.{name}") from None
+            raise UntraceableError(f"JAX has no np.{name}") from None
 
         @functools.wraps(apply)
         def function(*args: Any, **options: Any) -> Any:
@@ -191,7 +192,7 @@ functions: Any = _Functions()
 
 def looped(step: Callable[[list[Any]], list[Any]], start: Sequence[Any], rounds: int) -> list[Any]:
     """step(… step(start)), with the step compiled once. start, and what a step makes of it: lists of numbers."""
-    import jax
+    jax = _jax()
 
     def body(_: Any, numbers: list[Any]) -> list[Any]:
         return [_jnp().asarray(bare(one), float) for one in step([Traced(one) for one in numbers])]

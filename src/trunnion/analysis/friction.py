@@ -17,7 +17,7 @@ import operator
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal, NamedTuple, Protocol, get_args
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,8 +26,9 @@ from trunnion.algebra import linalg
 from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number, compiled
 from trunnion.algebra.nested import replaced
+from trunnion.algebra.traced import looped
 from trunnion.analysis import continuation
-from trunnion.errors import Finding, MechanismError
+from trunnion.analysis.friction_method import FrictionMethod, method_named, peak
 from trunnion.groups.planar import is_zero, less
 from trunnion.joints.friction import FrictionLaw
 from trunnion.joints.pairs import ContactLoad, Reaction
@@ -46,47 +47,8 @@ __all__ = [
 
 DOUBTFUL_ROUNDS = 20  # of Newton's method, where no certificate says that it ends at the solution that is looked for
 
-COMPILED_ROUNDS = 3  # of Newton's method where the numbers have no values to tell when to end
-
-Method = Literal["newton", "successive-approximation"]
-
-
-@dataclass(frozen=True)
-class FrictionMethod:
-    """How friction and reactions are settled.
-
-    name: "newton" or "successive-approximation" ([D] steps 1-5).
-    criterion: largest change of a joint's reaction between two rounds, N, at which the iteration ends ([D] used
-    1e-3 N); None: 1e-3 N for [D], and for Newton 1e-8 of the largest reaction, which leaves some 1e-10 of it.
-    limit: most rounds; a position that needs more is not converged.
-    margin_up_to: how far, in multiples of the friction, to look for the point at which it locks; 0: not at all.
-    """
-
-    name: Method = "newton"
-    criterion: float | None = None
-    limit: int = 200
-    margin_up_to: float = 0.0
-
-    def tolerance(self, normals: Sequence[Number]) -> Number:
-        """Allowed change, N."""
-        if self.criterion is not None:
-            return self.criterion
-        if self.name == "successive-approximation":
-            return 1e-3
-        return 1e-8 * _peak(normals)
-
-
-def method_named(name: str, criterion: float | None, limit: int) -> FrictionMethod:
-    """A method from its name and figures; MechanismError if they make no sense."""
-    for known in get_args(Method):
-        if name == known:
-            if criterion is not None and not criterion > 0:
-                raise MechanismError(Finding(f"a criterion of {criterion:g} N is never met", "criterion", "above 0"))
-            if limit < 1:
-                raise MechanismError(Finding(f"{limit} rounds settle nothing", "iterations", "give 1 or more"))
-            return FrictionMethod(known, criterion, limit)
-    known_names = " or ".join(get_args(Method))
-    raise MechanismError(Finding(f"there is no method '{name}'", "method", f"use {known_names}"))
+COMPILED_ROUNDS = 3  # of Newton's method where the numbers have no values to tell when to end; one more beyond FEW
+FEW = 3  # contacts of a dyad
 
 
 class Reacting(Protocol):
@@ -311,7 +273,7 @@ def _newton(problem: Problem, method: FrictionMethod) -> Settled:
     forces: list[Number] = [0.0] * len(real.contacts)
     state = real.state(forces)
     # a lane whose loads are no numbers, because another module locked or opened, is not this module's affair
-    bound = np.where(np.isfinite(_peak(state.normals)), real.bound(), 0.0)
+    bound = np.where(np.isfinite(peak(state.normals)), real.bound(), 0.0)
     certain = ~(bound >= 1.0)
     rows: list[list[Number]] = []
     inverse: list[list[Number]] = []
@@ -360,11 +322,19 @@ def _unrolled(problem: Problem, method: FrictionMethod) -> Settled:
     real = _primal(problem)
     forces: list[Number] = [0.0] * len(real.contacts)
     state = real.state(forces)
-    bound = np.where(np.isfinite(_peak(state.normals)), real.bound(), 0.0)
+    bound = np.where(np.isfinite(peak(state.normals)), real.bound(), 0.0)
     certain = ~(bound >= 1.0)
-    for _ in range(COMPILED_ROUNDS - 1):
-        forces = _corrected(real, state, forces, _matrix(real, state))
-        state = real.state(forces)
+
+    def step(now: list[Number]) -> list[Number]:
+        state = real.state(now)
+        return _corrected(real, state, now, _matrix(real, state))
+
+    if len(forces) <= FEW:  # written out: quicker to run, but not to compile
+        for _ in range(COMPILED_ROUNDS - 1):
+            forces = step(forces)
+    else:
+        forces = looped(step, forces, COMPILED_ROUNDS)
+    state = real.state(forces)
     forces = _corrected(problem, problem.state(forces), forces, _matrix(real, state))
     before, state = state, problem.state(forces)
     change = _changed(state, before)
@@ -376,7 +346,7 @@ def _unrolled(problem: Problem, method: FrictionMethod) -> Settled:
 def _matrix(problem: Problem, state: State) -> list[list[Number]]:
     """(1 − A)⁻¹ at a state where the rows of |A| add up to less than 1: no pivots are needed."""
     matrix = identity_minus(problem.map_derivative(state))
-    return linalg.quick_inverse(matrix) if len(matrix) <= 3 else linalg.inverse(matrix, pivoting=False)
+    return linalg.quick_inverse(matrix) if len(matrix) <= FEW else linalg.inverse(matrix, pivoting=False)
 
 
 def _at_once(problem: Problem) -> Settled:
@@ -420,7 +390,7 @@ def _successive(problem: Problem, method: FrictionMethod) -> Settled:
     measurable = np.isfinite(previous) & (previous > 0)
     ratio = np.where(measurable, change / np.where(measurable, previous, 1.0), 0.0)
     real = _primal(problem)
-    bound = np.where(np.isfinite(_peak(real.state([0.0] * len(real.contacts)).normals)), real.bound(), 0.0)
+    bound = np.where(np.isfinite(peak(real.state([0.0] * len(real.contacts)).normals)), real.bound(), 0.0)
     margin = _margin(real, bound, method.margin_up_to)
     reactions = problem.reactions(forces, state)
     return Settled(reactions, forces, rounds, change, ratio, done, 1.0, margin, ~(bound >= 1.0), real)
@@ -506,11 +476,6 @@ def _added(a: Reaction, b: Reaction) -> Reaction:
 def _total(parts: Sequence[Number]) -> Number:
     """Sum; of nothing a literal zero. The built-in sum would add the first part to 0."""
     return functools.reduce(operator.add, parts) if parts else 0.0
-
-
-def _peak(normals: Sequence[Number]) -> Number:
-    """Largest of numbers that are not negative; NaN if one is NaN."""
-    return functools.reduce(np.maximum, [primal(normal) for normal in normals])
 
 
 def _largest(values: Sequence[Number]) -> Number:

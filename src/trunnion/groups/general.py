@@ -44,12 +44,11 @@ from trunnion.groups.planar import (
     scaled,
 )
 from trunnion.groups.protocol import Elements
-from trunnion.groups.tree import OUTER, GroupJoint, Step, across, size_of
+from trunnion.groups.tree import FEW, OUTER, GroupJoint, Step, across, size_of
 
 __all__ = ["OUTER", "General", "GroupJoint", "Pose"]
 
 QUICK = 8  # rounds for all lanes
-FEW = 3  # of lanes that are compiled: as many as a small change of the dimensions asks for
 NEWTON_LIMIT = 60  # more for those that need them
 NEARLY = 1e-7  # of its largest allowed step: from here one more round reaches rounding
 TURN_LIMIT = 0.4  # rad a step: keeps Newton on the branch it starts on
@@ -185,13 +184,12 @@ class General:
     ) -> tuple[list[Number], Number]:
         """Newton steps until no lane moves by more than NEARLY (of its scale), at most `rounds`."""
         if compiled(q):
-            q = looped(lambda numbers: self._step(elements, numbers, drive, scale), q, rounds - 1)
-            rounds = 1
+            q, rounds = looped(lambda now: self._step(elements, now, drive, scale), q, rounds - 1), 1
         last: Number = np.inf
         for _ in range(rounds):
             before = [q[i] for i in self.free]
             q = self._step(elements, q, drive, scale)
-            moves = [np.abs(q[i] - b) / s for i, b, s in zip(self.free, before, scale, strict=True)]
+            moves = (np.abs(q[i] - b) / s for i, b, s in zip(self.free, before, scale, strict=True))
             last = functools.reduce(np.maximum, moves)
             if not np.any(last > NEARLY):
                 break
@@ -221,8 +219,7 @@ class General:
         _, placed = self._place(elements, q)
         (step,) = linalg.solve(self._jacobian(placed, drive), self._gap(placed, q, drive))
         if limits is not None:
-            moves = [np.abs(s) / limit for s, limit in zip(step, limits, strict=True)]
-            worst = functools.reduce(np.maximum, moves)
+            worst = functools.reduce(np.maximum, (np.abs(s) / limit for s, limit in zip(step, limits, strict=True)))
             shrink = 1 / np.maximum(worst, 1.0)
             step = [s * shrink for s in step]
         q = list(q)

@@ -41,13 +41,12 @@ from trunnion.algebra.space import cross, dot, plus, scaled
 from trunnion.algebra.traced import looped
 from trunnion.groups import redundant
 from trunnion.groups.spatial_tree import Element, SpatialTree, entries
-from trunnion.groups.tree import OUTER
+from trunnion.groups.tree import FEW, OUTER
 from trunnion.joints.spatial import MOTIONS
 
 __all__ = ["Pose", "SpatialGroup"]
 
 QUICK = 8  # rounds for all lanes
-FEW = 3  # of lanes that are compiled: as many as a small change of the dimensions asks for
 NEWTON_LIMIT = 60  # more for those that need them
 NEARLY = 1e-7  # of its largest allowed step: from here one more round reaches rounding
 TURN_LIMIT = 0.4  # rad a step: keeps Newton on the branch it starts on
@@ -142,8 +141,7 @@ class SpatialGroup(SpatialTree):
     ) -> tuple[list[list[Number]], Number]:
         """Newton steps until no lane moves by more than NEARLY (of its limit), at most `rounds`."""
         if compiled(v for joint in q for v in joint):
-            q = self._looped(elements, q, size, rounds - 1)
-            rounds = 1
+            q, rounds = self._looped(elements, q, size, rounds - 1), 1
         last: Number = np.inf
         for _ in range(rounds):
             q, last = self._limited_step(elements, q, size)
@@ -154,7 +152,7 @@ class SpatialGroup(SpatialTree):
     def _limited_step(
         self, elements: Sequence[Element], q: list[list[Number]], size: Number
     ) -> tuple[list[list[Number]], Number]:
-        """One Newton step, shortened as a whole where an entry would exceed its limit; the largest entry in terms of it."""
+        """One Newton step, shortened as a whole where an entry would exceed its limit; the largest in terms of it."""
         steps = self._steps(elements, q, size)
         last = self._largest(steps)
         shrink = 1 / np.maximum(last, 1.0)

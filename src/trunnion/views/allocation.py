@@ -10,7 +10,6 @@ import numpy as np
 from trunnion.errors import Finding, MechanismError
 from trunnion.statistics.costs import Cost
 from trunnion.views.cycle import attribute, names
-from trunnion.views.quantities import number
 from trunnion.views.tolerance import KINDS as OF_TOLERANCES
 from trunnion.views.tolerance import figure as tolerance_figure
 from trunnion.views.tolerance_cost import Offer, Price, tolerance_cost, trade_off
@@ -48,8 +47,8 @@ def headed(result: xr.Dataset) -> str:
     if result.attrs["criterion"] == "yield":
         criterion += f" of {share(float(result.attrs['target']))}"
     cost, before = float(result["cost_total"]), float(result["cost_total_before"])
-    told = f"{criterion}: cost {number(cost, 8)}"
-    told += f", as stated {number(before, 8)}" if math.isfinite(before) else ""
+    told = f"{criterion}: cost {cost:.8g}"
+    told += f", as stated {before:.8g}" if math.isfinite(before) else ""
     if result.attrs["criterion"] == "yield":
         return told
     return f"{told}, {'global optimum to first order' if result.attrs['proven'] else 'best found'}"
@@ -161,7 +160,7 @@ def figure(result: xr.Dataset, kind: str | None = None) -> Figure:
         return tolerance_figure(result, kind)
     if "trade_off_cost" not in result:
         raise MechanismError(Finding("no measure has a figure 'trade-off'", "--kind", "ask for --curve 21"))
-    return trade_off(result, offers(result), _limit(result))
+    return trade_off(result, offers(result), _limit(result), stepped=result.attrs["choices"] == "discrete")
 
 
 def offers(result: xr.Dataset) -> list[Offer]:

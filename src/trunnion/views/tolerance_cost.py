@@ -57,11 +57,14 @@ class Price:
     group: str = ""
 
 
-def trade_off(result: xr.Dataset, offers: Sequence[Offer], limit: tuple[str, float, str] | None = None) -> Figure:
+def trade_off(
+    result: xr.Dataset, offers: Sequence[Offer], limit: tuple[str, float, str] | None = None, stepped: bool = False
+) -> Figure:
     """Least cost over accuracy, the stated limits marked.
 
     result: whose name stands beneath; limit: (measure, half width, SI unit) of the one limit there is: the axis is then
-    that limit, else its share of the stated ones.
+    that limit, else its share of the stated ones. stepped: as with processes to choose from: what keeps a limit keeps
+    any wider one too.
     """
     drawn = new("What accuracy costs", result)
     axes = drawn.subplots()
@@ -73,7 +76,7 @@ def trade_off(result: xr.Dataset, offers: Sequence[Offer], limit: tuple[str, flo
         scale, unit = scaled(half, si)
         factor, title = half * scale, f"limit of {name} ± [{unit}]" if unit else f"limit of {name} ±"
     dress(axes, plain(title), "least cost")
-    steps: dict[str, Any] = {"drawstyle": "steps-post"} if _is_stepped(cost) else {}
+    steps: dict[str, Any] = {"drawstyle": "steps-post"} if stepped or _is_stepped(cost) else {}
     axes.plot(factor * share, cost, color=PALETTE[0], linewidth=1.8, marker="o", markersize=3.2,
               label="least cost", **steps)  # fmt: skip
     known = np.isfinite(cost)

@@ -132,12 +132,11 @@ def allocate(
 
 
 def half_widths(result: xr.Dataset) -> dict[str, float]:
-    """What an allocation found, by path, SI, for `Mechanism.with_tolerances`; empty if there is none."""
+    """What an allocation found other than stated, by path, SI, for `Mechanism.with_tolerances`."""
     if not result.attrs["found"]:
         return {}
-    names, chosen = result["parameter"].values, result["bought"].values
-    tolerances = result["tolerance"].values
-    return {str(name): float(t) for name, there, t in zip(names, chosen, tolerances, strict=True) if there}
+    columns = (result[key].values.tolist() for key in ("parameter", "bought", "tolerance", "tolerance_before"))
+    return {name: t for name, there, t, was in zip(*columns, strict=True) if there and abs(t - was) > 1e-12 * t}
 
 
 def _check(asked: Asked) -> None:

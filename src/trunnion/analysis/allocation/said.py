@@ -20,13 +20,15 @@ if TYPE_CHECKING:
 
 __all__ = ["findings_of", "summary"]
 
-ROUGH = 0.01  # of a limit: what first order may leave out before it is an error
+ROUGH, SLIGHT = 0.01, 0.001  # of a limit: what first order may leave out before it is an error, and a warning
 
 
 def summary(found: Allocated, known: xr.Dataset, arrays: Mapping[str, Any]) -> list[dict[str, Any]]:
     """What all costs, and before; what of the room is taken."""
     answer = found.answer
-    rows = [("cost, least", answer.cost if answer.found else None), ("cost as stated", arrays["cost_total_before"])]
+    rows = [("cost, least", answer.cost if answer.found else None)]
+    if np.isfinite(arrays["cost_total_before"]):
+        rows.append(("cost as stated", float(arrays["cost_total_before"])))
     if answer.found:
         rows.append(("lower bound of the cost", answer.bound))
     if answer.sampled is not None:
@@ -56,7 +58,7 @@ def findings_of(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:
             what = "no tolerances with the same margin at every limit cost less, to first order"
         yield Finding(what, "", "", Severity.NOTE)
     for name, share in found.tight.items():
-        what = f"its limits were taken {1 - share:.2%} narrower, so that the mechanism itself keeps them"
+        what = f"its limits were taken {100 * (1 - share):.2g} % narrower, so that the mechanism itself keeps them"
         yield Finding(what, f"measures.{name}", "", Severity.NOTE)
     if found.asked.criterion == "worst-case":
         yield from _searched(found, known)
@@ -85,7 +87,7 @@ def _searched(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:
             continue
         factor, unit = SHOWN.get(units[k], (1.0, units[k]))
         value, limit = (high, upper) if shares[1] >= shares[0] else (low, lower)
-        what = f"the worst case found on the mechanism is {factor * value:+.6g} {unit}, {beyond:.2%} beyond the limit "
-        what += f"{factor * limit:+.6g} {unit} that first order keeps"
-        severity = Severity.ERROR if beyond > ROUGH else Severity.WARNING
+        what = f"the worst case found on the mechanism is {factor * value:+.6g} {unit}, {100 * beyond:.2g} % beyond the "
+        what += f"limit {factor * limit:+.6g} {unit} that first order keeps"
+        severity = Severity.ERROR if beyond > ROUGH else Severity.WARNING if beyond > SLIGHT else Severity.NOTE
         yield Finding(what, f"measures.{of.measure.name}", "ask for `exact`, which takes them narrower", severity)

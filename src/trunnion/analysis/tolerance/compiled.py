@@ -13,6 +13,7 @@ import os
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
+from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.namespace import Number
-from trunnion.algebra.traced import Traced, Untraceable, bare
+from trunnion.algebra.traced import Traced, UntraceableError, bare
 from trunnion.analysis.analyse import (
     CHUNK,
     NEAR_SINGULAR,
@@ -58,7 +59,8 @@ class CompiledKernel:
     """Curves of measures over samples and positions, compiled once for each set of numbers that vary.
 
     run: the prepared mechanism; figures: by name, what to read off each walk; forces: whether one of them needs more
-    than the motion; threads: batches at a time, by default one for each core. Raises MechanismError if JAX is not installed, or the mechanism has what only NumPy does.
+    than the motion; threads: batches at a time, by default one for each core. Raises MechanismError if JAX is not
+    installed, or the mechanism has what only NumPy does.
     """
 
     def __init__(
@@ -135,7 +137,7 @@ class CompiledKernel:
             with np.errstate(all="ignore"):
                 back = self._back(values, Traced(time), self.method)
                 status = status_number(back) if self.forces else pose_status_number(back.walk)
-                doubtful = (status != Status.SOLVED) | (worst_condition(back.walk) > BORDER)
+                doubtful = (status > Status.ZERO_SLIP) | (worst_condition(back.walk) > BORDER)
                 for settled in back.settled:
                     doubtful = doubtful | np.logical_not(settled.certain)
                 curves = {name: _full(figure(back), shape) for name, figure in self.figures.items()}
@@ -165,9 +167,14 @@ class CompiledKernel:
             if self.forces:
                 return run.solve(time, values, method)
             return Backward(forward(run.system, values, run.chosen.assembly, time), {})
-        except Untraceable as error:
+        except UntraceableError as error:
             what = f"this mechanism is not compiled: {error}"
             raise MechanismError(Finding(what, "engine", "use the engine numpy")) from error
+
+    def by_numpy(self, values: Values, time: Number) -> Backward:
+        """The same walk by NumPy."""
+        with np.errstate(all="ignore"):
+            return self._back(values, time, self.method)
 
     def _again(
         self,
@@ -184,8 +191,8 @@ class CompiledKernel:
             row, column = rows[low : low + CHUNK], columns[low : low + CHUNK]
             part = {path: _lanes(value, row) for path, value in values.items()}
             times = time[column] if time.ndim == 1 else time[row, column]
+            back = self.by_numpy(part, times)
             with np.errstate(all="ignore"):
-                back = self._back(part, times, self.method)
                 found = status_of(back, row.shape) if self.forces else pose_status(back.walk, row.shape)
                 status[row, column] = found
                 for name, figure in self.figures.items():
@@ -225,9 +232,7 @@ def _lanes(value: Number, rows: NDArray[np.intp]) -> Number:
 
 
 def _full(number: Number, shape: tuple[int, ...]) -> Any:
-    import jax.numpy as jnp
-
-    return jnp.broadcast_to(bare(number), shape)
+    return import_module("jax.numpy").broadcast_to(bare(number), shape)
 
 
 def _check(run: Run) -> None:
@@ -249,7 +254,7 @@ def _check(run: Run) -> None:
 def _imported() -> Any:
     """JAX, with what it compiles kept between runs; MechanismError if it is not installed."""
     try:
-        import jax
+        jax: Any = import_module("jax")
     except ImportError:
         what = "the engine jax needs the package jax, which is not installed"
         raise MechanismError(Finding(what, "engine", "pip install 'trunnion[jax]', or use the engine numpy")) from None
@@ -271,8 +276,6 @@ def cache_directory() -> Path:
 
 @contextlib.contextmanager
 def _float64(jax: Any) -> Iterator[None]:
-    enable = getattr(jax, "enable_x64", None)
-    if enable is None:  # before 0.8
-        from jax.experimental import enable_x64 as enable
-    with enable(True):
+    holder = jax if hasattr(jax, "enable_x64") else import_module("jax.experimental")  # before JAX 0.8
+    with holder.enable_x64(True):
         yield

@@ -265,8 +265,10 @@ def measures_table() -> str:
     from trunnion.analysis.measures import MEASURES
 
     figures = {
-        "deviation": "largest deviation from nominal", "line": "width about its least-squares line",
-        "ratio": "over the cycle; of `instant` the largest deviation", "dead centre": "place where the joint turns back",
+        "deviation": "largest deviation from nominal",
+        "line": "width about its least-squares line",
+        "ratio": "over the cycle; of `instant` the largest deviation",
+        "dead centre": "place where the joint turns back",
     }  # fmt: skip
     rows = [
         (

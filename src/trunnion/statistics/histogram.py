@@ -100,8 +100,8 @@ def quantile(counts: Counts, bins: Bins, q: Any, least: Any = -np.inf, most: Any
     """Value below which the share q of the counted lies, (*figures, *q).
 
     The density within a bin is linear, with the slope between the bins beside it, so that the quantile of a smooth
-    distribution is off by the third power of the width. least, most: extremes over all values (arrays over figures), which no quantile passes. NaN where nothing is counted
-    or q is NaN.
+    distribution is off by the third power of the width. least, most: extremes over all values (arrays over figures),
+    which no quantile passes. NaN where nothing is counted or q is NaN.
     """
     q = np.asarray(q, dtype=np.float64)
     edges = np.broadcast_to(bins.edges(), (*counts.shape[:-1], bins.number + 1)).reshape(-1, bins.number + 1)

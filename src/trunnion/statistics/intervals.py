@@ -70,8 +70,9 @@ def share_by_replicates(
 
     Wilson's score with the variance that the replicates show and Student's t for z, so that it stays in [0, 1]; where
     no count is near its ends it is `by_replicates` of the shares. Counts are whole, so their variance is taken as at
-    least 1/12 (or `least`: 1/4, the most that a count which is one of two whole numbers has, covers more often); if all or none passed, it is `share` of all points as if they were independent, which is wider.
-    Where hardly any point failed, the counts are 0 or 1 and t alone covers far too seldom; this does not.
+    least 1/12 (or `least`: 1/4, the most that a count which is one of two neighbours has, covers more often); if all or
+    none passed, it is `share` of all points as if they were independent, which is wider. Where hardly any point failed,
+    the counts are 0 or 1 and t alone covers far too seldom; this does not.
     """
     passed = np.asarray(passed, dtype=np.float64)
     number = passed.shape[axis]

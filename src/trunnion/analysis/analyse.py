@@ -202,8 +202,8 @@ def analyse(
 
 
 def check_steps(steps: int) -> None:
-    if not 1 <= steps <= MOST_STEPS:
-        remedy = f"give a number from 1 to {MOST_STEPS:,}"
+    if not isinstance(steps, (int, np.integer)) or not 1 <= steps <= MOST_STEPS:
+        remedy = f"give a whole number from 1 to {MOST_STEPS:,}"
         raise MechanismError(Finding(f"cannot analyse {steps} positions", "steps", remedy))
 
 

@@ -23,7 +23,7 @@ from trunnion.model.units import KINDS
 if TYPE_CHECKING:
     from trunnion.model.mechanism import Mechanism
 
-__all__ = ["check_values"]
+__all__ = ["NOT_NEGATIVE", "check_values"]
 
 Values = Mapping[str, Number]
 # Rounding in a file of four to six digits may violate the triangle inequality of a flat body by this much.
@@ -47,7 +47,7 @@ def check_values(mechanism: Mechanism, numbers: ParameterSet) -> Iterator[Findin
             yield from _radians(entry.where, float(values[path]))
         if path.startswith(ERRORS):
             continue  # a deviation has a sign
-        if entry.path.rpartition(".")[2] in _NOT_NEGATIVE and not entry.alias and values[path] < 0:
+        if entry.path.rpartition(".")[2] in NOT_NEGATIVE and not entry.alias and values[path] < 0:
             yield Finding(f"is {values[path]:g}, which is negative", path, "give a value of at least 0")
     for name, link in mechanism.links.items():
         yield from _inertia(mechanism, link, values, f"links.{name}")
@@ -66,7 +66,7 @@ def check_values(mechanism: Mechanism, numbers: ParameterSet) -> Iterator[Findin
     yield from _sides(mechanism, values)
 
 
-_NOT_NEGATIVE = frozenset(
+NOT_NEGATIVE = frozenset(
     {"mass", "radius", "hole_radius", "length", "bearing", "clearance", "cylindricity", "end_float"}
     | {"resisting_torque", "resisting_force"}
 )

@@ -11,6 +11,7 @@ from trunnion.analysis.account import model_notes
 from trunnion.analysis.measures import Measure
 from trunnion.analysis.tolerance.sampling import CAUSES
 from trunnion.errors import Finding, Severity, Status
+from trunnion.model.check_values import NOT_NEGATIVE
 
 if TYPE_CHECKING:
     from trunnion.analysis.tolerance.linear import Of
@@ -89,6 +90,7 @@ def findings_of(outcome: Outcome, counted: Sampled | None) -> Iterator[Finding]:
         what = f"pins lie anywhere in their holes: seats by loads of {', '.join(loaded)} are not taken"
         yield Finding(what, "joints", "analyse takes them", Severity.NOTE)
     yield from _measured(outcome)
+    yield from _impossible(outcome)
     yield from _nominal(outcome)
     for of in study.linear.measures:
         yield from _first_order(outcome, of)
@@ -109,6 +111,15 @@ def _measured(outcome: Outcome) -> Iterator[Finding]:
             limits = f"{one.lower:g} to {one.upper:g}"
             what = f"{outside:,} of {len(values):,} measured deviations are outside the limits {limits}"
             yield Finding(f"{what}, the farthest {far:g} (SI)", one.path, "check their unit", Severity.WARNING)
+
+
+def _impossible(outcome: Outcome) -> Iterator[Finding]:
+    """Limits that let a number be what the model itself would refuse."""
+    for one in outcome.study.inputs.tolerances:
+        least = one.nominal + one.lower
+        if one.path.rpartition(".")[2] in NOT_NEGATIVE and least < 0:
+            what = f"its limits let it be {least:g} (SI), which is negative"
+            yield Finding(what, one.path, "narrow the limits", Severity.WARNING)
 
 
 def _nominal(outcome: Outcome) -> Iterator[Finding]:

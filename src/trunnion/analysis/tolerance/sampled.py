@@ -22,6 +22,7 @@ from trunnion.statistics.tally import Moments
 __all__ = ["QUANTILES", "Sampled", "sampled"]
 
 Array = NDArray[np.float64]
+FEWEST = 4.0  # points of a replicate expected beyond a quantile, from which its interval is told
 QUANTILES = (0.00135, 0.005, 0.025, 0.05, 0.25, 0.5, 0.75, 0.95, 0.975, 0.995, 0.99865)
 
 
@@ -88,7 +89,7 @@ def _replicated(totals: list[Moments], count: int) -> dict[str, Any]:
 
 
 def _of_even_points(one: Moments) -> Array:
-    """Standard deviation of the points of a replicate, by n: their mean is as good as true, so none is used up by it."""
+    """Standard deviation of the points of a replicate, by n: their mean is all but true and uses none up."""
     return one.deviation * np.sqrt(np.maximum(one.count - 1, 0) / np.maximum(one.count, 1))
 
 
@@ -99,6 +100,9 @@ def _quantiles(job: Sampling, tally: Tally, figures: Moments, replicated: bool) 
     if replicated:
         each = np.array([quantile(own, job.bins, q, figures.least, figures.most) for own in tally.histogram])
         low, high = intervals.by_replicates(each, axis=0)
+        # the quantile of a replicate with hardly a point beyond it is its extreme
+        few = figures.count[:, None] / job.replicates * np.minimum(q, 1 - q) < FEWEST
+        low, high = np.where(few, np.nan, low), np.where(few, np.nan, high)
     else:
         low, high = np.empty_like(found), np.empty_like(found)
         for i, n in enumerate(figures.count):

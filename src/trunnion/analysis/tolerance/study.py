@@ -25,9 +25,10 @@ from trunnion.analysis.tolerance.sampling import METHODS as SAMPLINGS
 from trunnion.analysis.tolerance.sampling import Sampler, Sampling, Tally, towards
 from trunnion.analysis.tolerance.search import Corner
 from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.model.measure_kinds import place_kind
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.quantity import Quantity
-from trunnion.model.units import UnitError, si_unit
+from trunnion.model.units import UnitError
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -221,8 +222,8 @@ def _check(methods: Sequence[str], samples: int, seed: int, engine: str) -> None
     ]
     if sum(method in SAMPLINGS for method in methods) > 1:
         findings.append(Finding("two sampling methods at once", "method", f"take one of {' and '.join(SAMPLINGS)}"))
-    if not 1 <= samples <= MOST_SAMPLES:
-        remedy = f"give a number from 1 to {MOST_SAMPLES:,}, or leave the sampling methods out"
+    if not isinstance(samples, int) or not 1 <= samples <= MOST_SAMPLES:
+        remedy = f"give a whole number from 1 to {MOST_SAMPLES:,}, or leave the sampling methods out"
         findings.append(Finding(f"{samples} samples", "samples", remedy))
     if engine not in ENGINES:
         findings.append(Finding(f"there is no engine '{engine}'", "engine", f"use {' or '.join(ENGINES)}"))
@@ -236,9 +237,14 @@ def placed(mechanism: Mechanism, measure: Measure, at: float | str) -> Measure:
     """A measure taken at a place if it has none of its own and no figure of a whole course."""
     if measure.at is not None or measure.over is not None or measure.statistic or measure.rule not in ("deviation",):
         return measure
+    remedy = "write 60deg, 20mm or 0.1s, as the driver turns or slides"
     try:
         quantity = Quantity.read(at)
+        kind = place_kind(mechanism, quantity, {})
+        quantity.check({}, kind)
         value = float(quantity.evaluate())
     except UnitError as error:
-        raise MechanismError(Finding(f"'{at}' is no place: {error.what}", "at", "write 60deg, 20mm or 0.1s")) from None
-    return replace(measure, at=value, timed=si_unit(quantity.check({})) == "s")
+        raise MechanismError(Finding(f"'{at}' is no place: {error.what}", "at", remedy)) from None
+    except KeyError:
+        raise MechanismError(Finding(f"'{at}' is no place", "at", remedy)) from None
+    return replace(measure, at=value, timed=kind.unit == "s")

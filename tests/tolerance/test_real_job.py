@@ -134,5 +134,5 @@ def test_seed_and_only_the_seed_changes_samples() -> None:
         )
     ]  # fmt: skip
     xr.testing.assert_identical(found[0], found[1])
-    assert found[2]["convergence_mean"].values[0, 0] == found[0]["mean"].values[0]
+    assert found[2]["convergence_mean"].values[0, 2] == found[0]["mean"].values[0]
     assert found[3]["mean"].item() != found[0]["mean"].item()

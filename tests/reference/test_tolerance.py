@@ -439,7 +439,7 @@ def test_without_measures_outputs_are_taken() -> None:
 
 # ---- figures of a course --------------------------------------------------------------------------------------
 
-FINE = np.linspace(0, 2 * np.pi, 1440, endpoint=False)
+FINE = np.linspace(0, 2 * np.pi, 7200, endpoint=False)
 COURSES: dict[str, dict[str, Any]] = {
     "path": {"path_error": "coupler.C"},
     "place": {"path_error": "coupler.C", "at": "60 deg"},
@@ -457,7 +457,7 @@ def of_courses(sizes: Any) -> dict[str, tuple[float, float]]:
     pin, meant = sizes[0] + sizes[3] * np.exp(1j * angle), FOURBAR["l1"] + FOURBAR["l4"] * np.exp(1j * nominal)
     away, turned = np.abs(pin - meant), angle - nominal
     stroke, height = np.ptp(angle) - np.ptp(nominal), np.max(pin.imag) - np.max(meant.imag)
-    figures = {"path": np.max(away), "place": away[240], "rms": np.sqrt(np.mean(away**2)), "swing": np.ptp(turned)}
+    figures = {"path": np.max(away), "place": away[1200], "rms": np.sqrt(np.mean(away**2)), "swing": np.ptp(turned)}
     found = {
         name: (float(value), float(value)) for name, value in (figures | {"stroke": stroke, "height": height}).items()
     }

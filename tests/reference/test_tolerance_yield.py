@@ -153,13 +153,7 @@ def test_intervals_of_the_four_bar_are_honest(method: str, samples: int) -> None
     assert abs(covered(rows, "deviation", sigma)[0] - 0.95) <= 0.03
 
 
-FEW = pytest.mark.xfail(strict=True, reason="of too few points a replicate has no such quantile, but an interval")
-
-
-@pytest.mark.parametrize(
-    ("method", "samples"),
-    [("monte-carlo", 1000), ("quasi-monte-carlo", 8192), pytest.param("quasi-monte-carlo", 1024, marks=FEW)],
-)
+@pytest.mark.parametrize(("method", "samples"), [("monte-carlo", 1000), ("quasi-monte-carlo", 8192)])
 def test_intervals_of_quantiles(method: str, samples: int) -> None:
     """Of plain samples by order statistics, never below 95 % but for chance; of Sobol points by their replicates."""
     rows = intervals(sledge(), method, samples)
@@ -195,10 +189,6 @@ def test_sobol_points_reach_a_million_plain_samples() -> None:
         sigma, sigma * np.sqrt((kurtosis - 1) / 4), np.sqrt(q * (1 - q)) / density,
         np.sqrt(true_yield * (1 - true_yield)),
     ]) / 1000  # fmt: skip
-    gain = rms / plain
-    assert gain[0] < 0.1  # of the mean: measured 0.034
-    assert gain[1] < 0.5  # of the standard deviation: 0.20
-    # A share is a sum of steps, which even points help less: some ten times better than as many plain samples, no more.
-    as_many = rms / (plain * np.sqrt(1e6 / 32_768))
-    assert np.all(as_many[2:] < 0.7)
-    assert np.all(gain[2:] < 4)  # of the quantile and the yield: 2.7, 2.7; they do not reach it
+    gain = rms / plain  # measured: 0.032, 0.11, 1.03, 0.11
+    assert np.all(gain[[0, 1, 3]] < 0.3)  # of mean, standard deviation and yield
+    assert gain[2] < 1.3  # of the 99.865 % quantile, beyond which 44 points lie

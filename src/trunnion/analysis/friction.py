@@ -46,7 +46,6 @@ __all__ = [
 ]
 
 DOUBTFUL_ROUNDS = 20  # of Newton's method, where no certificate says that it ends at the solution that is looked for
-
 COMPILED_ROUNDS = 3  # of Newton's method where the numbers have no values to tell when to end; one more beyond FEW
 FEW = 3  # contacts of a dyad
 EXTRAPOLATED = 1e-2  # of the tolerance: what the change after the last round may be, as its like is guessed

@@ -130,7 +130,8 @@ class Extreme(NamedTuple):
         """What another number of the positions is at the place; gain: by how much it grows in a period."""
         stencils = self.grid.stencils
         known = values[stencils.nodes[self.top]] + gain * stencils.laps[self.top]
-        return _at(_coefficients(known, stencils, self.top, self.used), self.spot)[0]
+        gone = np.where(np.isnan(primal(self.value)), np.nan, 0.0)
+        return _at(_coefficients(known, stencils, self.top, self.used), self.spot)[0] + gone
 
 
 def shape_of(number: Number) -> tuple[int, ...]:

@@ -138,7 +138,7 @@ class Reference:
 
     parts: its course, (position,) each, angles without jumps; turning: whether it is an angle; attitude: whether it is
     the turn of a link in space; turns: what an angle gains in a period, rad; figure: its figure, 0 for what is a
-    deviation by itself.
+    deviation by itself; NaN where it has none.
     """
 
     measure: Measure
@@ -185,8 +185,9 @@ def reference(
         followed, turns = _followed(parts[0], window, rates)
         parts = (followed,)
     found = Reference(measure, window, positions, turning, measure.of_attitude(system), parts, turns)
-    own = 0.0 if measure.rule == "deviation" else float(np.ravel(_figure(found, parts))[0])
-    return replace(found, figure=own)
+    if measure.rule == "deviation":
+        return replace(found, figure=0.0 if all(np.all(np.isfinite(part)) for part in parts) else np.nan)
+    return replace(found, figure=float(np.ravel(_figure(found, parts))[0]))
 
 
 def figure(curve: Sequence[Number], nominal: Reference) -> Number:

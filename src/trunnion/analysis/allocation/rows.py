@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.analysis.allocation.problem import Criterion, Effects
-from trunnion.analysis.measures import MEASURES, Measure
+from trunnion.analysis.measures import Measure
 from trunnion.analysis.tolerance.effects import Spread
 from trunnion.analysis.tolerance.linear import Of, by_position
 from trunnion.analysis.tolerance.study import Study
@@ -66,7 +66,7 @@ def limits(of: Of) -> tuple[float, float]:
     most = np.inf if measure.at_most is None else measure.at_most
     if measure.rule == "deviation":
         return max(lower, -most), min(upper, most)
-    if not _against(measure):
+    if not _against(of):
         return max(lower, least - of.reference.figure), min(upper, most - of.reference.figure)
     if measure.rule == "maximum" and measure.kind != "path_error":
         return -np.inf, min(upper, most)
@@ -77,22 +77,24 @@ def limits(of: Of) -> tuple[float, float]:
     return -min(upper, most), min(upper, most)  # what has a size and no sign
 
 
-def _against(measure: Measure) -> bool:
+def _against(of: Of) -> bool:
     """Whether the figure is made of deviations from the nominal mechanism and is 0 there."""
-    return measure.kind == "path_error" or (MEASURES[measure.kind].against and measure.rule != "value")
+    return of.measure.kind == "path_error" or (of.reference.against and of.measure.rule != "value")
 
 
 def _block(of: Of) -> _Block:
     measure = of.measure
-    root = _against(measure) and measure.rule == "rms"  # kept where every position keeps it
+    # without a derivative, but no further off than the worst position: kept where every position keeps it
+    root = _against(of) and measure.rule == "rms"
+    root |= measure.kind == "path_error" and measure.rule in ("mean", "minimum", "peak-to-peak")
     lower, upper = limits(of)
-    if (by_position(measure) and of.place >= 0) or root:
+    if (by_position(of.reference) and of.place >= 0) or root:
         index = np.asarray(of.reference.window.index, np.intp)
         moving = measure.kind == "path_error"
         return _Block(of.curve_sensitivity, of.curve_spread, lower, upper, index, moving)
     spread = Spread(*(np.asarray(part)[:, None] for part in of.spread))
     place = of.reference.window.index[of.place] if of.place >= 0 else -1
-    return _Block(of.sensitivity[:, None], spread, lower, upper, np.array([place]), by_position(measure))
+    return _Block(of.sensitivity[:, None], spread, lower, upper, np.array([place]), by_position(of.reference))
 
 
 def rows_of(

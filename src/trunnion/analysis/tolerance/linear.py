@@ -18,7 +18,7 @@ from trunnion.algebra.dual import Dual
 from trunnion.algebra.namespace import Number
 from trunnion.analysis.measure_figures import Reference, figure, shown, span
 from trunnion.analysis.measure_positions import Plan
-from trunnion.analysis.measures import MEASURES, Measure
+from trunnion.analysis.measures import Measure
 from trunnion.analysis.tolerance.effects import Effects, Spread
 from trunnion.analysis.tolerance.kernel import NumpyKernel
 from trunnion.analysis.tolerance.search import Corner, search
@@ -37,7 +37,8 @@ class Of:
 
     real, slope: of the figure by rows of the batch; sensitivity, spread: (parameter,); total: all together. curve,
     curve_sensitivity, curve_spread, curve_total: the same of the course at every position of the window. place:
-    position in the window at which the figure is taken, −1 if it is of no single one.
+    position in the window at which the figure is taken, −1 if it is of no single one. lead: derivatives that the search
+    of the worst case begins with, slope where there is one.
     """
 
     reference: Reference
@@ -51,6 +52,7 @@ class Of:
     curve_spread: Spread
     curve_total: Total
     place: int
+    lead: Array
 
     @property
     def measure(self) -> Measure:
@@ -103,24 +105,33 @@ def _of(known: Reference, effects: Effects, course: Course) -> Of:
     real, slope = _scalar(known, effects, course, parts)
     curve_spread = effects.spread(real, slope)
     curve_total = effects.total(curve_spread, slope)
-    if by_position(measure):
+    lead = None
+    if by_position(known):
         place, whole, steep = _worst(measure, effects, real, slope, curve_total)
-    elif MEASURES[measure.kind].against and measure.rule == "rms":
-        place, (whole, steep) = -1, (np.full(len(real), np.nan),) * 2
+    elif (known.against and measure.rule not in ("mean", "value")) or measure.kind == "path_error":
+        place, whole, steep = -1, *(np.full(len(real), np.nan),) * 2
+        lead = slope[:, _top(curve_total[1])]
     else:
         place, (whole, steep) = -1, effects.slopes(figure(course, known), ())
         place = 0 if measure.rule == "value" else -1
+        steep = np.where(np.isfinite(whole), steep, np.nan)  # of what does not exist
     spread = effects.spread(whole, steep)
     return Of(
         known, whole, steep, effects.sensitivity(whole, steep), spread, effects.total(spread, steep),
-        real[0], effects.sensitivity(real, slope), curve_spread, curve_total, place,
+        real[0], effects.sensitivity(real, slope), curve_spread, curve_total, place, steep if lead is None else lead,
     )  # fmt: skip
 
 
-def by_position(measure: Measure) -> bool:
-    """Whether the figure is made of deviations from nominal and is 0 there, without a derivative."""
-    against = MEASURES[measure.kind].against and measure.rule not in ("mean", "rms", "value")
-    return measure.rule == "deviation" or against or measure.kind == "path_error"
+def by_position(known: Reference) -> bool:
+    """Whether the figure is 0 of the nominal mechanism, without a derivative, but has that of the course somewhere.
+
+    Of a distance neither the mean, the least nor any spread has; of other deviations the root of the mean square has
+    not; and nothing is largest or least of a course that is 0 throughout.
+    """
+    rule = known.measure.rule
+    if known.measure.kind == "path_error":
+        return rule in ("deviation", "value", "maximum", "largest")
+    return rule == "deviation" or (known.against and rule in ("maximum", "minimum", "largest", "peak-to-peak"))
 
 
 def _scalar(known: Reference, effects: Effects, course: Course, parts: Sequence[Dual]) -> tuple[Array, Array]:
@@ -172,18 +183,19 @@ def searched(kernel: NumpyKernel, found: Linear, of: Of) -> tuple[Corner, Corner
             course = courses[of.measure.name]
             ends_of = span([part.real for part in course], known)
             whole = np.broadcast_to(ends_of[1] if sign > 0 else ends_of[0], (len(effects.rows),))
-            if of.place < 0 or by_position(of.measure):
+            if of.place < 0 or by_position(of.reference):
                 return whole, _slope_at(of, effects, course, sign)
             return whole, effects.slopes(figure(course, known), ())[1]
 
-        return search(found.effects, objective, found.effects.corner(of.real, of.slope, sign), sign)
+        start = found.effects.corner(of.real, of.lead, sign)
+        return search(found.effects, objective, start, sign, bool(np.isfinite(known.figure)))
 
     return ends(-1.0), ends(1.0)
 
 
 def _slope_at(of: Of, effects: Effects, course: Course, sign: float) -> Array:
     """Derivatives of the figure by rows, at a corner."""
-    if not by_position(of.measure):
+    if not by_position(of.reference):
         return effects.slopes(figure(course, of.reference), ())[1]
     known = of.reference
     if of.measure.kind == "path_error":

@@ -134,6 +134,10 @@ def _nominal(outcome: Outcome) -> Iterator[Finding]:
         elif code == Status.NEAR_SINGULAR and len(where):
             what = f"close to a dead centre {dial.intervals(where)}: first order says little there"
             yield Finding(what, "", "rely on the samples there", Severity.WARNING)
+    for of in study.linear.measures:
+        if not np.isfinite(of.reference.figure):
+            name, remedy = of.measure.name, "take it at a place, or over a range, where there is one"
+            yield Finding(f"{name}: the nominal mechanism has no such figure", f"measures.{name}", remedy)
 
 
 def _first_order(outcome: Outcome, of: Of) -> Iterator[Finding]:

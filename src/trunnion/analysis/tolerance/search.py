@@ -39,9 +39,13 @@ class Corner(NamedTuple):
     assembles: bool = True
 
 
-def search(effects: Effects, objective: Objective, start: Mapping[str, float], sign: float) -> Corner:
-    """The corner with the largest figure (sign 1) or the least (−1), from that of first order."""
-    at, best, assembles = dict(start), Corner(0.0, {}, 0), True  # the nominal mechanism
+def search(effects: Effects, objective: Objective, start: Mapping[str, float], sign: float, known: bool) -> Corner:
+    """The corner with the largest figure (sign 1) or the least (−1), from that of first order.
+
+    known: whether the nominal mechanism has the figure. NaN if none is found.
+    """
+    among = known and all(one.lower <= 0.0 <= one.upper for one in effects.inputs.tolerances)
+    at, best, assembles = dict(start), Corner(0.0 if among else np.nan, {}, 0), True  # the nominal mechanism
     for rounds in range(1, MOST_ROUNDS + 1):
         real, slope = objective(effects.values(at), effects)
         best = _better(best, Corner(float(real[0]), at, rounds), sign)

@@ -92,7 +92,7 @@ class Study:
             known = of.reference
             centre = known.figure + _finite(of.total[3])
             spread.append((centre, _finite(of.total[4])))
-            middle = 0.0 * of.curve if known.measure.rule == "deviation" else of.curve
+            middle = 0.0 * of.curve if known.against else of.curve  # what `shown` gives of the nominal mechanism
             curves.append((np.nan_to_num(middle), np.nan_to_num(of.curve_total[4])))
         model = self.run.system.mechanism.data()
         rotation = None

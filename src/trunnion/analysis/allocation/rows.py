@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.analysis.allocation.problem import Criterion, Effects
-from trunnion.analysis.measures import Measure
 from trunnion.analysis.tolerance.effects import Spread
 from trunnion.analysis.tolerance.linear import Of, by_position
 from trunnion.analysis.tolerance.study import Study

@@ -252,7 +252,7 @@ def tolerances_table() -> str:
     """Every variable of a tolerance analysis."""
     from trunnion.analysis.tolerance.result import VARIABLES
 
-    told = {"": "of the measure", "parameter": "of the parameter", "ratio": "one by the other", "drive": "rad, m or s"}
+    told = {"": "of the measure", "parameter": "of the parameter", "ratio": "one by the other", "drive": "rad, m, s"}
     rows = [
         (_code(name), ", ".join(one.dims), told.get(one.units) or _unit(one.units), one.long_name)
         for name, one in VARIABLES.items()
@@ -265,8 +265,10 @@ def measures_table() -> str:
     from trunnion.analysis.measures import MEASURES
 
     figures = {
-        "deviation": "largest deviation from nominal", "line": "width about its least-squares line",
-        "ratio": "over the cycle; of `instant` the largest deviation", "dead centre": "place where the joint turns back",
+        "deviation": "largest deviation from nominal",
+        "line": "width about its least-squares line",
+        "ratio": "over the cycle; of `instant` the largest deviation",
+        "dead centre": "place where the joint turns back",
     }  # fmt: skip
     rows = [
         (

@@ -82,7 +82,7 @@ def test_the_model_is_written_with_its_comments(run: Run, tmp_path: Path) -> Non
     assert read.parameters()["links.rocker.mass"] == pytest.approx(0.35)
     again = run("bought.yaml", *QUICK)
     assert again.code == 0
-    assert "cost 28.6, as stated" in again.out or "cost 28.6," in again.out
+    assert "cost 28.6, as stated 28.6" in again.out
 
 
 def test_plays_are_written(run: Run, tmp_path: Path) -> None:
@@ -111,7 +111,7 @@ def test_the_model_itself_is_not_overwritten(run: Run, tmp_path: Path) -> None:
 def test_yield_and_rss(run: Run) -> None:
     code, out, _ = run(FOURBAR, "--steps", 24, "--samples", 1000, "--yield", 0.95)
     assert code == 0
-    assert "yield of 95 %" in out
+    assert "yield of 95.0 %" in out
     assert "trials" in out
     code, out, _ = run(FOURBAR, *QUICK, "--criterion", "rss")
     assert code == 0
@@ -121,7 +121,7 @@ def test_yield_and_rss(run: Run) -> None:
 def test_exact(run: Run) -> None:
     code, out, err = run(FOURBAR, *QUICK, "--exact")
     assert code == 0
-    assert "taken 0.0" in err
+    assert "narrower, so that the mechanism itself keeps them" in err
     assert "100 %" in out
 
 
@@ -145,7 +145,7 @@ def test_names_of_the_file(run: Run) -> None:
     assert code == 2
     code, _, err = run(GRADES, *QUICK, "--choice", "continuous")
     assert code == 1
-    assert "fourbar-by-grades.yaml:39: error: costs.l1: has a table of processes" in err
+    assert "fourbar-by-grades.yaml:40: error: costs.l1: has a table of processes" in err
 
 
 @pytest.mark.parametrize(

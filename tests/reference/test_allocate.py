@@ -203,7 +203,7 @@ def test_lopsided_tolerances_take_room() -> None:
         {"stroke": "D", "limit": "±0.1 deg"},
         {"dead_centre": "D", "limit": "±0.1 deg"},
         {"point": "coupler.C", "axis": "x", "as": "maximum", "limit": "+0.1/-0.05 mm"},
-        {"effort": "A", "as": "maximum", "limit": "±2 mN m"},
+        {"effort": "A", "as": "maximum", "limit": "±0.04 N m"},
     ],
     ids=lambda one: "-".join(map(str, one.values())),
 )
@@ -228,6 +228,13 @@ def test_nothing_keeps_the_limits() -> None:
     assert f"takes +{np.degrees(worst):.6g} deg at 20°" in said
     assert "measures.rocker-angle" in said
     assert "keep the limit +0.05 deg" in said
+
+
+def test_a_nominal_figure_beyond_its_bounds() -> None:
+    result = trunnion.allocate(fourbar(measures={"t": {"effort": "A", "as": "maximum", "at_most": "1 N m"}}), steps=12)
+    (said,) = findings(result, "error")
+    assert said.startswith("measures.t: the nominal figure is ")
+    assert said.endswith("N m, at_most is 1 N m: no tolerance mends that")
 
 
 def test_what_cannot_be_asked() -> None:
@@ -272,6 +279,27 @@ def test_costs_that_are_not_taken() -> None:
     assert "it changes the play of B" in said
     assert result["bought"].sel(parameter="joints.B.pin.radius") == 0
     assert float(result["used"][0]) == pytest.approx(1)
+
+
+def test_run_outs_and_seats_stay_as_they_are() -> None:
+    """A run-out that points anywhere has no middle; a pin whose seat is given has no play to choose."""
+    data = fourbar().data()
+    tolerances = {
+        **data["tolerances"],
+        "joints.B.misalignment.offset": {"limits": "+0.01/0 mm", "direction": "uniform"},
+    }
+    joints = {**data["joints"]}
+    joints["B"] = {**joints["B"], "misalignment": {"offset": "0 mm"}}
+    joints["C"] = {**joints["C"], "pin": {"clearance": "10 um"}, "seat": {"xi": "30 deg"}}
+    costs = {**data["costs"], **dict.fromkeys(("B.misalignment.offset", "C.clearance"), data["costs"]["l1"])}
+    result = trunnion.allocate(fourbar(joints=joints, costs=costs, tolerances=tolerances), steps=24, samples=0)
+    told = " ".join(findings(result, "warning"))
+    assert "cannot be bought, it may point anywhere" in told
+    assert "cannot be bought, its pin has a given seat" in told
+    # what it does stays, and the others keep their limits with it
+    assert result["bought"].sel(parameter="joints.B.misalignment.offset") == 0
+    assert float(result["used"][0]) == pytest.approx(1)
+    assert float(result["cost_total"]) > 16.6
 
 
 def test_curve_of_cost_over_accuracy() -> None:

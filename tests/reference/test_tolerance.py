@@ -435,3 +435,43 @@ def test_without_measures_outputs_are_taken() -> None:
     assert "no measure is stated" in json.loads(found.attrs["findings"])[-1]["what"]
     steep = slopes(fourbar_angle, FOURBAR, 3e-5)
     np.testing.assert_allclose(found["sensitivity"].values[0], steep, rtol=1e-8)
+
+
+# ---- figures of a course --------------------------------------------------------------------------------------
+
+FINE = np.linspace(0, 2 * np.pi, 7200, endpoint=False)
+COURSES: dict[str, dict[str, Any]] = {
+    "path": {"path_error": "coupler.C"},
+    "place": {"path_error": "coupler.C", "at": "60 deg"},
+    "rms": {"path_error": "coupler.C", "as": "rms"},
+    "error": {"transmission_error": "D"},
+    "swing": {"transmission_error": "D", "as": "peak-to-peak"},
+    "stroke": {"stroke": "D"},
+    "height": {"point": "coupler.C", "axis": "y", "as": "maximum"},
+}
+
+
+def of_courses(sizes: Any) -> dict[str, tuple[float, float]]:
+    """Least and largest deviation of every figure above of one four-bar from the nominal one."""
+    angle, nominal = (fourbar_angle(*one, crank=FINE) for one in (sizes, FOURBAR.values()))
+    pin, meant = sizes[0] + sizes[3] * np.exp(1j * angle), FOURBAR["l1"] + FOURBAR["l4"] * np.exp(1j * nominal)
+    away, turned = np.abs(pin - meant), angle - nominal
+    stroke, height = np.ptp(angle) - np.ptp(nominal), np.max(pin.imag) - np.max(meant.imag)
+    figures = {"path": np.max(away), "place": away[1200], "rms": np.sqrt(np.mean(away**2)), "swing": np.ptp(turned)}
+    found = {
+        name: (float(value), float(value)) for name, value in (figures | {"stroke": stroke, "height": height}).items()
+    }
+    return found | {"error": (float(np.min(turned)), float(np.max(turned)))}
+
+
+def test_worst_case_of_figures_of_a_course() -> None:
+    """Found on the mechanism: the same as the best of all corners by the closed form."""
+    found = trunnion.tolerance(fourbar(measures=COURSES), methods=FAST, steps=180)
+    signs = itertools.product((-1, 0, 1), repeat=4)
+    corners = [of_courses([v + s * T for v, s in zip(FOURBAR.values(), sign, strict=True)]) for sign in signs]
+    for name in COURSES:
+        at = found.sel(measure=name)
+        assert at["searched_upper"].item() == pytest.approx(max(one[name][1] for one in corners), rel=1e-4), name
+        assert at["searched_lower"].item() == pytest.approx(min(one[name][0] for one in corners), rel=1e-4, abs=1e-15)
+        if name != "rms":  # of which first order takes the largest instead
+            assert at["worst_case_upper"].item() == pytest.approx(at["searched_upper"].item(), rel=0.01)

@@ -40,7 +40,7 @@ def _linear(knots: Sequence[Number], values: Sequence[Number], place: Number) ->
     slopes = [(values[k + 1] - values[k]) / (knots[k + 1] - knots[k]) for k in range(len(knots) - 1)]
     if all(isinstance(number, (int, float)) for number in (*knots, *values)):
         index = np.clip(np.searchsorted(np.array(knots), primal(place), side="right") - 1, 0, len(slopes) - 1)
-        knot, value, slope = (namespace(place).take(np.array(row), index) for row in (knots, values, slopes))
+        knot, value, slope = (namespace(index).take(np.array(row), index) for row in (knots, values, slopes))
         return value + slope * (place - knot)
     found = values[0] + slopes[0] * (place - knots[0])
     xp = namespace(place, *knots, *values)

@@ -46,9 +46,9 @@ __all__ = [
 ]
 
 DOUBTFUL_ROUNDS = 20  # of Newton's method, where no certificate says that it ends at the solution that is looked for
-
 COMPILED_ROUNDS = 3  # of Newton's method where the numbers have no values to tell when to end; one more beyond FEW
 FEW = 3  # contacts of a dyad
+EXTRAPOLATED = 1e-2  # of the tolerance: what the change after the last round may be, as its like is guessed
 
 
 class Reacting(Protocol):
@@ -326,19 +326,23 @@ def _unrolled(problem: Problem, method: FrictionMethod) -> Settled:
     certain = ~(bound >= 1.0)
 
     def step(now: list[Number]) -> list[Number]:
-        state = real.state(now)
-        return _corrected(real, state, now, _matrix(real, state))
+        at = real.state(now)
+        return _corrected(real, at, now, _matrix(real, at))
 
     if len(forces) <= FEW:  # written out: quicker to run, but not to compile
-        for _ in range(COMPILED_ROUNDS - 1):
+        for _ in range(COMPILED_ROUNDS - 2):
             forces = step(forces)
     else:
-        forces = looped(step, forces, COMPILED_ROUNDS)
+        forces = looped(step, forces, COMPILED_ROUNDS - 1)
     state = real.state(forces)
+    forces = step(forces)
+    before, state = state, real.state(forces)
+    previous = _changed(state, before)
     forces = _corrected(problem, problem.state(forces), forces, _matrix(real, state))
     before, state = state, problem.state(forces)
     change = _changed(state, before)
-    done = certain & ~(change > method.tolerance(state.normals))
+    # of a quadratic method: the next round would change less than change · (change/previous)
+    done = certain & ~(change * change > EXTRAPOLATED * method.tolerance(state.normals) * previous)
     reactions = problem.reactions(forces, state)
     return Settled(reactions, forces, COMPILED_ROUNDS, change, 0.0, done, 1.0, np.inf, certain, real)
 

@@ -63,13 +63,16 @@ def by_replicates(values: Any, confidence: float = 0.95, axis: int = -1) -> Inte
     return mean - half, mean + half
 
 
-def share_by_replicates(passed: Any, size: int, confidence: float = 0.95, axis: int = -1) -> Interval:
+def share_by_replicates(
+    passed: Any, size: int, confidence: float = 0.95, axis: int = -1, least: float = 1 / 12
+) -> Interval:
     """Interval of a chance from the counts `passed` of R independent replicates of `size` points each.
 
     Wilson's score with the variance that the replicates show and Student's t for z, so that it stays in [0, 1]; where
     no count is near its ends it is `by_replicates` of the shares. Counts are whole, so their variance is taken as at
-    least 1/12; if all or none passed, it is `share` of all points as if they were independent, which is wider.
-    Where hardly any point failed, the counts are 0 or 1 and t alone covers far too seldom; this does not.
+    least 1/12 (or `least`: 1/4, the most that a count which is one of two neighbours has, covers more often); if all or
+    none passed, it is `share` of all points as if they were independent, which is wider. Where hardly any point failed,
+    the counts are 0 or 1 and t alone covers far too seldom; this does not.
     """
     passed = np.asarray(passed, dtype=np.float64)
     number = passed.shape[axis]
@@ -78,7 +81,7 @@ def share_by_replicates(passed: Any, size: int, confidence: float = 0.95, axis: 
     if number < 2:
         return plain
     estimate = total / (number * size)
-    variance = np.maximum(passed.var(axis=axis, ddof=1), 1 / 12) / (number * size * size)
+    variance = np.maximum(passed.var(axis=axis, ddof=1), least) / (number * size * size)
     spread = estimate * (1 - estimate)
     inside = spread > 0
     t = special.stdtrit(number - 1, (1 + confidence) / 2)

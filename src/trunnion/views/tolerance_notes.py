@@ -14,7 +14,7 @@ NOTES: dict[str, tuple[str, str]] = {
         "the pin bears under a unit load at the measure.",
     ),
     "worst-case": (
-        "Worst case, searched",
+        "Worst case by search",
         "The corner that the sensitivities point to is put into the nonlinear model and improved from there; the "
         "worst corner that was found is run again, and its figure is the one reported. A search finds a bad corner; "
         "it does not prove that none is worse.",

@@ -308,7 +308,7 @@ def headline(result: xr.Dataset) -> list[tuple[str, list[tuple[str, str]]]]:
         kept = [pair for pair in told if pair[0]]
         found += [(read.name, kept)] if kept else []
     whole = [(text.partition(" (")[0], "yield") for table in overall(result) for text in table.rows[0][1:]]
-    return [*found, *([("all limits together", whole)] if whole else [])]
+    return [*found, *([("All limits together", whole)] if whole else [])]
 
 
 def failed(result: xr.Dataset) -> list[Table]:

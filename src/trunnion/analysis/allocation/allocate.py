@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import Dual, derivative
-from trunnion.analysis.allocation.problem import CRITERIA, Answer, Contribution, Criterion, Option, Problem
+from trunnion.analysis.allocation.problem import CRITERIA, SHOWN, Answer, Contribution, Criterion, Option, Problem, none
 from trunnion.analysis.allocation.rows import Rows, joined, limits, part_of, rows_of
 from trunnion.analysis.allocation.solve import CHOICES, solve, trade_off
 from trunnion.analysis.allocation.solve import Choice as Way
@@ -176,10 +176,10 @@ def _found(mechanism: Mechanism, measures: Sequence[str], asked: Asked) -> Alloc
     if not mechanism.costs:
         remedy = "say what tolerances cost, as costs: {AB: {model: power, B: 1, k: 0.45, unit: mm}}"
         raise MechanismError(Finding("no tolerance has a cost", "costs", remedy))
-    none = {one.path: _start(one) for one in mechanism.prices() if one.play and not _clearance(mechanism, one.path)}
-    now = _studied(mechanism.with_tolerances(none) if none else mechanism, measures, asked)
+    absent = {one.path: _start(one) for one in mechanism.prices() if one.play and not _clearance(mechanism, one.path)}
+    now = _studied(mechanism.with_tolerances(absent) if absent else mechanism, measures, asked)
     prices, told = _prices(now)
-    before = {**_stated(now, prices), **{path: 0.0 for path in none if path in prices}}
+    before = {**_stated(now, prices), **{path: 0.0 for path in absent if path in prices}}
     way: Way = asked.choice if asked.choice != "auto" else _way(prices)
     first = rows_of(now, _stated(now, prices), asked.criterion)
     told += [_unknown(name) for name in first.unknown]
@@ -302,7 +302,9 @@ class _Search:
         rows = self._rows(now, _stated(now, self.prices))
         for count in range(1, ROUNDS + 1):
             whole = rows if kept is None else joined(rows, kept)
-            answer = self._solved(Problem(_contributions(now, self.prices), whole.effects, self.asked.criterion))
+            problem = Problem(_contributions(now, self.prices), whole.effects, self.asked.criterion)
+            off = _off(now)
+            answer = none(problem, off) if off else self._solved(problem)
             if not answer.found:
                 break
             bought = self._bought(answer)
@@ -376,6 +378,22 @@ def _beyond(now: Study) -> list[float]:
 def share_of(value: float, limit: float) -> float:
     """A deviation as a share of a limit to the same side; 0 of another side, or without a limit."""
     return max(value / limit, 0.0) if np.isfinite(limit) and limit != 0 and np.isfinite(value) else 0.0
+
+
+def _off(now: Study) -> list[Finding]:
+    """Measures whose nominal figure is beyond their bounds, which no tolerance mends."""
+    found = []
+    for of in now.linear.measures:
+        lower, upper = limits(of)
+        if lower > 0 or upper < 0:
+            measure, nominal = of.measure, of.reference.figure
+            word, bound = ("at_least", nominal + lower) if lower > 0 else ("at_most", nominal + upper)
+            unit = measure.figure_unit(now.run.system, now.run.values)
+            factor, shown = SHOWN.get(unit, (1.0, "" if unit == "1" else unit))
+            told, limit = (f"{factor * value:.6g} {shown}".rstrip() for value in (nominal, bound))
+            what = f"the nominal figure is {told}, {word} is {limit}: no tolerance mends that"
+            found.append(Finding(what, f"measures.{measure.name}", "change the mechanism or the bound"))
+    return found
 
 
 def _unknown(name: str) -> Finding:

@@ -33,7 +33,8 @@ def allocate_continuous(problem: Problem) -> Answer:
         what = "has a table of processes, which is no continuous choice"
         return none(problem, [Finding(what, f"costs.{chosen[0]}", "choose discrete, or give it a cost model")])
     task = task_of(problem, sides(problem))
-    trouble = unbounded(task) or unmet(problem, task)
+    early = shortfall(problem, task.tolerances(task.low)) if np.any(task.sides.room < 0) else None
+    trouble = early or unbounded(task) or unmet(problem, task)
     if trouble:
         return none(problem, [trouble])
     point = minimise(task)

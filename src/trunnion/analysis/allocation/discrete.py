@@ -44,7 +44,8 @@ def allocate_discrete(problem: Problem) -> Answer:
     if not groups:
         return allocate_continuous(problem)
     search = _Search(problem, groups)
-    trouble = unbounded(search.task) or search.unmet()
+    early = search.unmet() if np.any(search.limits.room < 0) else None
+    trouble = early or unbounded(search.task) or search.unmet()
     return none(problem, [trouble]) if trouble else search.run()
 
 

@@ -87,9 +87,7 @@ def _searched(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:
             continue
         factor, unit = SHOWN.get(units[k], (1.0, units[k]))
         value, limit = (high, upper) if shares[1] >= shares[0] else (low, lower)
-        what = (
-            f"the worst case found on the mechanism is {factor * value:+.6g} {unit}, {100 * beyond:.2g} % beyond the "
-        )
-        what += f"limit {factor * limit:+.6g} {unit} that first order keeps"
+        what = f"the worst case found on the mechanism is {factor * value:+.6g} {unit}, {100 * beyond:.2g} % beyond "
+        what += f"the limit {factor * limit:+.6g} {unit} that first order keeps"
         severity = Severity.ERROR if beyond > ROUGH else Severity.WARNING if beyond > SLIGHT else Severity.NOTE
         yield Finding(what, f"measures.{of.measure.name}", "ask for `exact`, which takes them narrower", severity)

@@ -2,7 +2,7 @@
 
 First order S_i = V(E(y | p_i))/V(y), total S_Ti = 1 − V(E(y | all but p_i))/V(y), by `scipy.stats.sobol_indices`
 (estimators of A. Saltelli et al., Comput. Phys. Commun. 181 (2010) 259-270, doi:10.1016/j.cpc.2009.09.018) on scrambled
-Sobol points, with intervals by bootstrap. The two
+Sobol points, with percentile intervals by bootstrap. The two
 coordinates of a pin in its hole, and the size and direction of a run-out, count as one number each.
 """
 
@@ -11,6 +11,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,26 +76,31 @@ def indices(sampler: Sampler, samples: int, seed: int, progress: Callable[[int],
         points[rows] = two[rows]
         mixed[i] = analysed(points)
     lost = int(sum(np.count_nonzero(np.any(np.isnan(y), axis=0)) for y in (y_one, y_two, *mixed)))
+    return _indices(_filled(y_one), _filled(y_two), _filled(mixed), seed, lost)
+
+
+def _indices(y_one: Array, y_two: Array, mixed: Array, seed: int, lost: int) -> Indices:
+    """Both orders with percentile intervals: scipy's own bootstrap cannot be given a seed."""
     from scipy.stats import sobol_indices  # takes longer to import than the rest
 
-    parts_of = {"f_A": _filled(y_one), "f_B": _filled(y_two), "f_AB": _filled(mixed)}
+    base = y_one.shape[-1]
+    shape = len(y_one), len(mixed)  # of one measure scipy leaves out the axis
+
+    def both(points: Any) -> Array:
+        parts = {"f_A": y_one[..., points], "f_B": y_two[..., points], "f_AB": mixed[..., points]}
+        found = sobol_indices(func=parts, n=base)
+        return np.array([np.reshape(found.first_order, shape), np.reshape(found.total_order, shape)])
+
+    rng = np.random.Generator(np.random.Philox(seed))
     with np.errstate(all="ignore"), warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # a number without any effect has no scatter to draw from: NaN
-        found = sobol_indices(func=parts_of, n=base)
-        spread = found.bootstrap(confidence_level=0.95, n_resamples=BOOTSTRAPS)
-    first, total = spread.first_order.confidence_interval, spread.total_order.confidence_interval
-    shape = len(y_one), len(parts)  # of one measure scipy leaves out the axis
-    ends = [
-        _closed(end, own)
-        for end, own in zip(
-            (first.low, first.high, total.low, total.high),
-            (found.first_order,) * 2 + (found.total_order,) * 2,
-            strict=True,
-        )
-    ]
-    arrays = (found.first_order, *ends[:2], found.total_order, *ends[2:])
-    one, one_low, one_high, all_, all_low, all_high = (np.reshape(array, shape) for array in arrays)
-    return Indices(one, one_low, one_high, all_, all_low, all_high, base, lost)
+        warnings.simplefilter("ignore")  # a measure that nothing moves has no shares: NaN
+        first, total = both(slice(None))
+        drawn = np.array([both(rng.integers(base, size=base)) for _ in range(BOOTSTRAPS)])
+        low, high = np.nanquantile(drawn, [0.025, 0.975], axis=0)
+    return Indices(
+        first, _closed(low[0], first), _closed(high[0], first), total, _closed(low[1], total), _closed(high[1], total),
+        base, lost,
+    )  # fmt: skip
 
 
 def _closed(end: Array, index: Array) -> Array:

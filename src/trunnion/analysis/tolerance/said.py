@@ -144,7 +144,7 @@ def _first_order(outcome: Outcome, of: Of) -> Iterator[Finding]:
     """A measure of which first order knows nothing, or whose worst case found is another."""
     name, lower, upper = of.measure.name, float(of.total[0]), float(of.total[1])
     if not np.isfinite(upper):
-        what = f"{name}: first order has no answer"
+        what = "first order has no answer"
         yield Finding(what, f"measures.{name}", "rely on the samples", Severity.WARNING)
         return
     if outcome.worst is None:
@@ -153,11 +153,11 @@ def _first_order(outcome: Outcome, of: Of) -> Iterator[Finding]:
     least, most = outcome.worst[i]
     for end, corner in (("least", least), ("largest", most)):
         if not corner.assembles:
-            what = f"{name}: at the linear corner of the {end} deviation the mechanism has no answer"
+            what = f"at the linear corner of the {end} deviation the mechanism has no answer"
             yield Finding(what, f"measures.{name}", "the tolerances let it not go together there", Severity.WARNING)
     size, found = max(-lower, upper), max(-least.value, most.value)
     if np.isfinite(found) and abs(found - size) > FAR_OFF * max(size, found) and max(size, found) > 0:
-        what = f"{name}: the worst case found is {found / size if size else np.inf:.2f} times that of first order"
+        what = f"the worst case found is {found / size if size else np.inf:.2f} times that of first order"
         yield Finding(what, f"measures.{name}", "rely on the one found, and on samples", Severity.NOTE)
 
 
@@ -171,5 +171,5 @@ def _samples(outcome: Outcome, counted: Sampled) -> Iterator[Finding]:
     for i, measure in enumerate(outcome.study.measures):
         if limited(measure) and counted.arrays["yield"][i] < 1:
             share, low, high = (float(counted.arrays[key][i]) for key in ("yield", "yield_low", "yield_high"))
-            what = f"{measure.name}: {share:.4%} of the samples keep the limits (95 % interval {low:.4%} to {high:.4%})"
+            what = f"{share:.4%} of the samples keep the limits (95 % interval {low:.4%} to {high:.4%})"
             yield Finding(what, f"measures.{measure.name}", "`allocate` finds tolerances that do", Severity.NOTE)

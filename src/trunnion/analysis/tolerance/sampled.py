@@ -100,6 +100,10 @@ def _quantiles(job: Sampling, tally: Tally, figures: Moments, replicated: bool) 
     if replicated:
         each = np.array([quantile(own, job.bins, q, figures.least, figures.most) for own in tally.histogram])
         low, high = intervals.by_replicates(each, axis=0)
+        # even points tell a share to half of one: an error that the replicates have in common
+        half = 0.5 * job.replicates / np.maximum(np.max(figures.count), 1.0)
+        below, above = (quantile(counts, job.bins, q + sign * half, figures.least, figures.most) for sign in (-1, 1))
+        low, high = np.minimum(low, below), np.maximum(high, above)
         # the quantile of a replicate with hardly a point beyond it is its extreme
         few = figures.count[:, None] / job.replicates * np.minimum(q, 1 - q) < FEWEST
         low, high = np.where(few, np.nan, low), np.where(few, np.nan, high)
@@ -120,7 +124,8 @@ def _yields(totals: list[Moments], passes: Moments, done: int, count: int, repli
     passed = np.rint(passes.mean * passes.count)
     if replicated:
         each = np.array([np.rint(one.mean[count:] * one.count[count:]) for one in totals])
-        low, high = intervals.share_by_replicates(each, int(np.max(totals[0].count)), axis=0)
+        # turned to where a measure changes most, a replicate's count is all but one of two numbers: on the safe side
+        low, high = intervals.share_by_replicates(each, int(np.max(totals[0].count)), axis=0, least=0.25)
     else:
         low, high = intervals.share(passed, passes.count)
     share = passed / done if done else np.full(count + 1, np.nan)

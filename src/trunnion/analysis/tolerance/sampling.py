@@ -123,7 +123,9 @@ class Sampling:
     @cached_property
     def block_size(self) -> int:
         """Samples in a block."""
-        most = self.drawing * max(1, batch_of(self.engine, self.positions) // self.drawing)
+        most = self.drawing
+        if self.engine != "numpy":  # what pays to be compiled takes more at a time
+            most *= max(1, batch_of(self.engine, self.positions) // self.drawing)
         if self.method == "monte-carlo":
             return most
         return min(1 << (most.bit_length() - 1), self._points)

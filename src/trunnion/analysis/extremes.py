@@ -26,6 +26,7 @@ __all__ = ["Extreme", "Grid", "largest", "shape_of"]
 
 POINTS, FEWER = 7, 5
 UNEVEN = 8.0  # times the least bend the largest one may have, for a polynomial to go through
+RISE, SHARE = 2.0, 0.05  # of the rise and of the bend of a parabola: more is no top of a smooth curve
 ROUNDS = 8  # of Newton's method, which ends at rounding after some three
 SETTLED = 1e-13  # of a step: the last step of Newton's method
 ALIKE = 1e-9  # of a step: grids of positions whose polynomials are made of the same numbers
@@ -145,7 +146,8 @@ def largest(curve: Number, grid: Grid) -> Extreme:
     lanes = shape[:-1]
     real = np.broadcast_to(primal(curve), shape).reshape(-1, shape[-1])
     rows, tops = _tops(real, periodic=grid.period is not None)
-    spot, used, value = _refined(real[rows[:, None], stencils.nodes[tops]], real[rows, tops], stencils, tops)
+    about, sides = real[rows[:, None], stencils.nodes[tops]], _sides(real, rows, tops)
+    spot, used, value = _refined(about, real[rows, tops], sides, stencils, tops)
     if len(rows) > len(real):
         chosen = _highest(rows, value, len(real))
         tops, spot, used, value = tops[chosen], spot[chosen], used[chosen], value[chosen]
@@ -190,20 +192,45 @@ def _highest(rows: Positions, value: Array, count: int) -> Positions:
     return winners[np.searchsorted(rows[winners], np.arange(count))]
 
 
-def _refined(known: Array, value: Array, stencils: Stencils, tops: Positions) -> tuple[Array, Positions, Array]:
-    """Place of every top from its position, in steps; how many nodes make it; its value. value: of the position."""
+def _sides(real: Array, rows: Positions, tops: Positions) -> tuple[Array, Array]:
+    """Values at the positions before and after each top; of the other end where there is none."""
+    count = real.shape[1]
+    return real[rows, (tops - 1) % count], real[rows, (tops + 1) % count]
+
+
+def _highest_top(value: Array, sides: tuple[Array, Array], reach: Array) -> Array:
+    """The most that a polynomial may make of a top: RISE times what the parabola through its neighbours rises, and a
+    SHARE of its bend; anything at the end of a range.
+    """
+    with np.errstate(all="ignore"):
+        before, after = (value - sides[0]) / -reach[0], (sides[1] - value) / reach[1]
+        bend = (after - before) / (reach[1] - reach[0])
+        slope = (before * reach[1] - after * reach[0]) / (reach[1] - reach[0])
+        rise = -slope * slope / (4 * bend) * RISE - bend * SHARE
+    return np.where((reach[0] < 0) & (reach[1] > 0), value + rise, np.inf)
+
+
+def _refined(
+    known: Array, value: Array, sides: tuple[Array, Array], stencils: Stencils, tops: Positions
+) -> tuple[Array, Positions, Array]:
+    """Place of every top from its position, in steps; how many nodes make it; its value.
+
+    value: of the position; sides: of those beside it.
+    """
     points = known.shape[1]
     spot, used = np.zeros(len(known)), np.zeros(len(known), np.intp)
     if points < 3:
         return spot, used, value
     value, kind = value.copy(), stencils.kind[tops]
+    most = _highest_top(value, sides, stencils.reach[:, tops])
     bends = np.einsum("cij,cj->ic", stencils.bends[kind], known)
     todo = np.flatnonzero(_even(bends))
-    _newton(todo, (spot, used, value), stencils.whole[kind[todo]], known[todo], stencils.reach[:, tops[todo]])
+    into = (spot, used, value)
+    _newton(todo, into, stencils.whole[kind[todo]], known[todo], stencils.reach[:, tops[todo]], most[todo])
     if points > FEWER and np.any(used == 0):
         bends = np.where(stencils.few[kind].T, bends, np.nan)
         todo = np.flatnonzero((used == 0) & _even(bends))
-        _newton(todo, (spot, used, value), stencils.fewer[kind[todo]], known[todo], stencils.reach[:, tops[todo]])
+        _newton(todo, into, stencils.fewer[kind[todo]], known[todo], stencils.reach[:, tops[todo]], most[todo])
         used[todo[used[todo] > 0]] = FEWER
     return spot, used, value
 
@@ -214,8 +241,11 @@ def _even(bends: Array) -> NDArray[np.bool_]:
     return np.asarray((least < 0) & (most >= UNEVEN * least))
 
 
-def _newton(todo: Positions, into: tuple[Array, Positions, Array], maps: Array, known: Array, reach: Array) -> None:
-    """Tops of the polynomials of some lanes, put where they are level and no lower than the position."""
+def _newton(
+    todo: Positions, into: tuple[Array, Positions, Array], maps: Array, known: Array, reach: Array, most: Array
+) -> None:
+    """Tops of the polynomials of some lanes, put where they are level, no lower than the position and no higher than
+    the most."""
     if not len(todo):
         return
     spot, used, value = into
@@ -228,7 +258,7 @@ def _newton(todo: Positions, into: tuple[Array, Positions, Array], maps: Array, 
             break
     top, slope, second = _at(coefficients, at)
     level = (reach[0] < at) & (at < reach[1]) & (np.abs(slope) <= 1e-9 * np.abs(second)) & (second < 0)
-    good = level & (top >= value[todo])
+    good = level & (top >= value[todo]) & (top <= most)
     lanes = todo[good]
     spot[lanes], used[lanes], value[lanes] = at[good], known.shape[1], top[good]
 

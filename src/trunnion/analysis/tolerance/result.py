@@ -97,7 +97,9 @@ VARIABLES: dict[str, Variable] = {
     "quantile_value": Variable(("measure", "quantile"), "", "figure that this share does not exceed"),
     "quantile_low": Variable(("measure", "quantile"), "", "quantile, lower end of the 95 % interval"),
     "quantile_high": Variable(("measure", "quantile"), "", "quantile, upper end of the 95 % interval"),
-    "yield": Variable(M, "1", "share of the samples within the limits of the measure"),
+    "yield": Variable(
+        M, "1", "share of the samples within the limits of the measure, or with an answer if it has none"
+    ),
     "yield_low": Variable(M, "1", "yield, lower end of the 95 % interval"),
     "yield_high": Variable(M, "1", "yield, upper end of the 95 % interval"),
     "yield_all": Variable((), "1", "share of the samples within all limits"),

@@ -135,9 +135,9 @@ def _ends(measure: Measure, course: Total, total: Total) -> Total:
     if measure.kind == "path_error" or measure.rule in ("peak-to-peak", "largest"):
         lower = np.zeros_like(lower)
     elif measure.rule == "maximum":
-        lower = np.asarray(np.max(np.nan_to_num(course[0], nan=-np.inf)))
+        lower, upper = (np.asarray(np.max(np.nan_to_num(end, nan=-np.inf))) for end in course[:2])
     elif measure.rule == "minimum":
-        upper = np.asarray(np.min(np.nan_to_num(course[1], nan=np.inf)))
+        lower, upper = (np.asarray(np.min(np.nan_to_num(end, nan=np.inf))) for end in course[:2])
     return (lower, upper, rest[0], rest[1], rest[2])
 
 

@@ -51,7 +51,15 @@ from trunnion.model.parts import (
 from trunnion.model.prices import Price, prices
 from trunnion.model.quantity import Acceleration, AnyQuantity, Quantity
 from trunnion.model.samples import with_samples
-from trunnion.model.tolerances import Tolerance, correlation, kept, tolerated, with_tolerances, written_limits
+from trunnion.model.tolerances import (
+    Tolerance,
+    correlation,
+    keep_limits,
+    kept,
+    tolerated,
+    with_tolerances,
+    written_limits,
+)
 from trunnion.model.units import Kind
 
 __all__ = ["Mechanism"]
@@ -283,6 +291,7 @@ class Mechanism(Part):
         data = self.data()
         for name, value in values.items():
             _assign(data, self._location(name), value, self.coordinates)
+            keep_limits(self, name, value, data)
         return Mechanism(**data)
 
     def path_of(self, name: str) -> str:

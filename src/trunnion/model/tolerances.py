@@ -20,7 +20,7 @@ from trunnion.model.limits import Limits
 from trunnion.model.parameters import Entry, ParameterSet, measured
 from trunnion.model.quantity import Quantity
 from trunnion.model.tolerance_parts import DISTRIBUTIONS, Variation
-from trunnion.model.units import KINDS, Kind
+from trunnion.model.units import KINDS, Kind, UnitError
 
 if TYPE_CHECKING:
     from trunnion.model.mechanism import Mechanism
@@ -265,6 +265,38 @@ def with_tolerances(mechanism: Mechanism, half_widths: Mapping[str, float]) -> d
         written = {key: one.model_dump(mode="json", exclude_unset=True) for key, one in entries.items()}
         data["tolerances"] = {**data.get("tolerances", {}), **written}
     return data
+
+
+def keep_limits(mechanism: Mechanism, name: str, value: Any, data: dict[str, Any]) -> None:
+    """Write the limits that stood with a number, as in `40 mm ± 0.02 mm`, into `tolerances` where it is replaced by one
+    without: another nominal value is no other tolerance.
+    """
+    numbers = mechanism.parameter_set
+    entry = next((one for one in (numbers.entries.get(path) for path in _paths(numbers, name)) if one), None)
+    if entry is None or entry.quantity.tolerance is None or not may_vary(entry):
+        return
+    if entry.alias and not entry.alias.startswith(DEFAULTS):
+        return
+    try:
+        if Quantity.read(value, entry.kind).tolerance is not None:
+            return
+    except UnitError:  # a finding of its own
+        return
+    lower, upper = entry.quantity.tolerance
+    stated = data.setdefault("tolerances", {})
+    known = variations(mechanism, numbers).get(entry.path, ("", Variation()))
+    key = known[0] or entry.path
+    text = _limits_text((lower + upper) / 2, (upper - lower) / 2, entry.kind)
+    if known[1].limits is None:
+        own = stated.get(key, {})
+        stated[key] = {**(own if isinstance(own, dict) else {}), "limits": text}
+
+
+def _paths(numbers: ParameterSet, name: str) -> list[str]:
+    try:
+        return [numbers.resolve(name)]
+    except MechanismError:
+        return []
 
 
 def _written(value: float, kind: Kind, sign: str = "") -> str:

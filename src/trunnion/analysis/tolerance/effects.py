@@ -29,6 +29,7 @@ __all__ = ["Effects", "Spread", "effects_of"]
 Array = NDArray[np.float64]
 SHARE = "share."  # of the radius at which a pin lies in its hole: before joint and component, at a corner
 NOBODY = -1
+NOISE = 1e-11
 QUARTERS = (0.0, 0.5 * np.pi, np.pi, 1.5 * np.pi)
 
 
@@ -102,6 +103,12 @@ class Effects:
         real = np.broadcast_to(np.asarray(primal(number), float), full)
         slope = np.broadcast_to(np.asarray(derivative(number), float), full)
         return real, slope
+
+    def without_noise(self, slope: Array) -> Array:
+        """Derivatives, 0 where what the whole tolerance makes of them is rounding beside what others do anywhere."""
+        weights = self.weights.reshape(-1, *(1,) * (slope.ndim - 1))
+        size = np.nan_to_num(np.abs(slope) * weights)
+        return np.where((weights > 0) & (size <= NOISE * np.max(size, initial=0.0)), 0.0 * slope, slope)
 
     def sensitivity(self, real: Array, slope: Array) -> Array:
         """∂y/∂p of every parameter, (parameter, …); of a zone |Q| summed over its ends; NaN of a direction."""

@@ -103,6 +103,7 @@ def _of(known: Reference, effects: Effects, course: Course) -> Of:
     measure, window = known.measure, known.window
     parts = [Dual(part.real[:, window.index], part.dual[:, window.index]) for part in course]
     real, slope = _scalar(known, effects, course, parts)
+    slope = effects.without_noise(slope)
     curve_spread = effects.spread(real, slope)
     curve_total = effects.total(curve_spread, slope)
     lead = None
@@ -115,6 +116,7 @@ def _of(known: Reference, effects: Effects, course: Course) -> Of:
         place, (whole, steep) = -1, effects.slopes(figure(course, known), ())
         place = 0 if measure.rule == "value" else -1
         steep = np.where(np.isfinite(whole), steep, np.nan)  # of what does not exist
+    steep = effects.without_noise(steep)
     spread = effects.spread(whole, steep)
     total = effects.total(spread, steep)
     if by_position(known):

@@ -252,7 +252,8 @@ def tolerances_table() -> str:
     """Every variable of a tolerance analysis."""
     from trunnion.analysis.tolerance.result import VARIABLES
 
-    told = {"": "of the measure", "parameter": "of the parameter", "ratio": "one by the other", "drive": "rad, m, s"}
+    told = {"": "of the measure", "parameter": "of the parameter", "ratio": "one by the other", "drive": "deg, mm, s",
+            "course": "of the course", "course ratio": "course by parameter"}  # fmt: skip
     rows = [
         (_code(name), ", ".join(one.dims), told.get(one.units) or _unit(one.units), one.long_name)
         for name, one in VARIABLES.items()

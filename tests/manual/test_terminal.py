@@ -9,7 +9,7 @@ from trunnion.terminal import show_rows
 
 HEAD = ["", "linear", "searched", "Monte Carlo", "of variance"]
 ROWS = [
-    ["torque", "286.5797\u00a0N\u00a0m at 245°", "−0.9887 to +0.9784\u00a0N\u00a0m", "286.58\u00a0N\u00a0m", "46\u00a0%"],
+    ["peak", "286.579\u00a0N\u00a0m at 245°", "−0.9887 to +0.9784\u00a0N\u00a0m", "286.58\u00a0N\u00a0m", "46\u00a0%"],
     ["99.73 % range", "286.0893 to 287.0702\u00a0N\u00a0m", "", "286.0980 to 287.0377\u00a0N\u00a0m", "—"],
 ]  # fmt: skip
 

@@ -41,3 +41,11 @@ def test_what_is_wrong_is_said(model: str, change: dict[str, float | None], said
     given = {name: value for name, value in {**GIVEN, **change}.items() if value is not None}
     assert [str(one) for one in Cost(model, given).findings("costs.AB") if said in str(one)]
     assert not Cost("power", GIVEN).findings()
+
+
+@pytest.mark.parametrize("model", sorted(COST_MODELS))
+def test_cost_that_no_tolerance_changes(model: str) -> None:
+    """Without B a tolerance of 0 costs A, and its derivatives are 0."""
+    found = COST_MODELS[model]
+    numbers = {"A": 2.0, "B": 0.0, "k": 0.5, "unit": 1e-3}
+    assert [part(0.0, **numbers) for part in (found.value, found.slope, found.curvature)] == [2.0, 0.0, 0.0]

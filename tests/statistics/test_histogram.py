@@ -95,3 +95,11 @@ def test_without_an_expected_spread(centre: float, deviation: float) -> None:
     x = np.full(100, 5.0)
     found = quantile(count(x, bins), bins, [0.01, 0.99], x.min(), x.max())
     np.testing.assert_array_equal(found, 5.0)
+
+
+def test_bins_narrower_than_rounding() -> None:
+    """Values whose spread is lost in the rounding of their centre still have quantiles, and no warning."""
+    bins = Bins(0.5, 1e-22)
+    values = 0.5 + np.array([[-2.0, -1.0, 0.0, 1.0, 2.0]]) * 2.0**-52
+    found = quantile(count(values, bins), bins, [0.1, 0.5, 0.9], values.min(), values.max())
+    assert np.all(np.abs(found - 0.5) <= 2.0**-51)

@@ -110,7 +110,9 @@ def test_damage_is_told_or_does_no_harm(part: Path) -> None:
 def test_other_files_are_refused(tmp_path: Path, text: str) -> None:
     path = tmp_path / "model.yaml"
     path.write_text(text)
-    assert "cannot be read as a checkpoint" in refusal(path, ToyJob())
+    what = refusal(path, ToyJob())
+    assert "cannot be read as a checkpoint" in what
+    assert "pickle" not in what
 
 
 def test_blocks_that_do_not_fit_are_damage(part: Path) -> None:

@@ -27,6 +27,7 @@ __all__ = ["Extreme", "Grid", "largest", "shape_of"]
 POINTS, FEWER = 7, 5
 UNEVEN = 8.0  # times the least bend the largest one may have, for a polynomial to go through
 RISE, SHARE = 2.0, 0.05  # of the rise and of the bend of a parabola: more is no top of a smooth curve
+ROUNDING = 1e-14
 ROUNDS = 8  # of Newton's method, which ends at rounding after some three
 SETTLED = 1e-13  # of a step: the last step of Newton's method
 ALIKE = 1e-9  # of a step: grids of positions whose polynomials are made of the same numbers
@@ -114,7 +115,7 @@ def _maps(spots: Array, own: int) -> tuple[Array, Array, Array, NDArray[np.bool_
 class Extreme(NamedTuple):
     """The largest value of every lane and where it is.
 
-    value; place: in the unit of the positions; inside: whether the curve is level there, at no end of its range.
+    value; place: in the unit of the positions; inside: whether the curve turns back there, at no end of its range.
     top: the position next to it; spot: how far from there it is, in steps, with its derivatives; used: how many nodes
     its polynomial has, 0 where it is a position itself.
     """
@@ -161,7 +162,8 @@ def largest(curve: Number, grid: Grid) -> Extreme:
         bend = np.where(used > 0, primal(second), -np.inf)
         moved = moved - Dual(0.0 * moved, slope.dual) * (1.0 / bend)
     place = moved * stencils.step[top] + grid.at[top] + gone
-    return Extreme(found + gone, place, used > 0, grid, top, moved, used)
+    between = (stencils.reach[0, top] < 0) & (stencils.reach[1, top] > 0)
+    return Extreme(found + gone, place, (used > 0) | between, grid, top, moved, used)
 
 
 def _tops(real: Array, periodic: bool) -> tuple[Positions, Positions]:
@@ -258,7 +260,8 @@ def _newton(
             break
     top, slope, second = _at(coefficients, at)
     level = (reach[0] < at) & (at < reach[1]) & (np.abs(slope) <= 1e-9 * np.abs(second)) & (second < 0)
-    good = level & (top >= value[todo]) & (top <= most)
+    least = value[todo] - ROUNDING * np.max(np.abs(known), axis=1)  # a top right at a position is it but for rounding
+    good = level & (top >= least) & (top <= most)
     lanes = todo[good]
     spot[lanes], used[lanes], value[lanes] = at[good], known.shape[1], top[good]
 

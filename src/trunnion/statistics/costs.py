@@ -61,12 +61,12 @@ def power(t: float, *, A: float, B: float, k: float, unit: float) -> float:
 
 def power_slope(t: float, *, A: float, B: float, k: float, unit: float) -> float:
     """−k B/unit (t/unit)^(−k − 1)."""
-    return float(-k * B / unit * (t / unit) ** (-k - 1))
+    return float(-k * B / unit * (t / unit) ** (-k - 1)) if B else 0.0  # also where t is 0, and the cost A
 
 
 def power_curvature(t: float, *, A: float, B: float, k: float, unit: float) -> float:
     """k (k + 1) B/unit² (t/unit)^(−k − 2)."""
-    return float(k * (k + 1) * B / unit**2 * (t / unit) ** (-k - 2))
+    return float(k * (k + 1) * B / unit**2 * (t / unit) ** (-k - 2)) if B else 0.0
 
 
 def exponential(t: float, *, A: float, B: float, k: float, unit: float) -> float:

@@ -128,9 +128,11 @@ def _tilted(share: Floats, values: Counts, edges: Floats, place: NDArray[np.intp
     """
     width, middle = np.diff(edges), 0.5 * (edges[1:] + edges[:-1])
     before, after = np.maximum(place - 1, 0), np.minimum(place + 1, len(values) - 1)
-    rise = values[after] / width[after] - values[before] / width[before]
-    own = np.maximum(values[place], 1) / width[place]
-    s = np.clip(0.5 * width[place] * rise / (middle[after] - middle[before]) / own, -1.0, 1.0)
+    with np.errstate(all="ignore"):
+        rise = values[after] / width[after] - values[before] / width[before]
+        own = np.maximum(values[place], 1) / width[place]
+        s = np.clip(0.5 * width[place] * rise / (middle[after] - middle[before]) / own, -1.0, 1.0)
+    s = np.where(np.isnan(s), 0.0, s)  # bins narrower than the rounding of their centre have no width
     root = np.sqrt(np.maximum((1 - s) ** 2 + 4 * s * share, 0.0))
     return np.clip(2 * share / np.maximum(1 - s + root, 1e-300), 0.0, 1.0)
 

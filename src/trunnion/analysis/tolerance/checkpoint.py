@@ -10,6 +10,7 @@ from contextlib import suppress
 from pathlib import Path
 from time import perf_counter
 from typing import Any, Generic
+from zipfile import is_zipfile
 
 import numpy as np
 
@@ -88,6 +89,11 @@ class Checkpoint(Generic[T]):
         return empty
 
     def _read(self) -> T:
+        if self.path.is_file() and not is_zipfile(self.path):
+            remedy = "name the file that the run was begun with, or another for a new run"
+            raise MechanismError(
+                Finding("cannot be read as a checkpoint: it is none, or its end is missing", str(self.path), remedy)
+            )
         try:
             with self.path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
                 head = json.loads(bytes(file[HEAD]))

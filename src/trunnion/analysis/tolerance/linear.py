@@ -116,10 +116,29 @@ def _of(known: Reference, effects: Effects, course: Course) -> Of:
         place = 0 if measure.rule == "value" else -1
         steep = np.where(np.isfinite(whole), steep, np.nan)  # of what does not exist
     spread = effects.spread(whole, steep)
+    total = effects.total(spread, steep)
+    if by_position(known):
+        total = _ends(measure, curve_total, total)
     return Of(
-        known, whole, steep, effects.sensitivity(whole, steep), spread, effects.total(spread, steep),
+        known, whole, steep, effects.sensitivity(whole, steep), spread, total,
         real[0], effects.sensitivity(real, slope), curve_spread, curve_total, place, steep if lead is None else lead,
     )  # fmt: skip
+
+
+def _ends(measure: Measure, course: Total, total: Total) -> Total:
+    """Least and largest deviation of a figure that is made of the deviations at all positions.
+
+    A distance and a spread are at least 0; a maximum over the positions is at least the largest of what each can be at
+    least.
+    """
+    lower, upper, *rest = total
+    if measure.kind == "path_error" or measure.rule in ("peak-to-peak", "largest"):
+        lower = np.zeros_like(lower)
+    elif measure.rule == "maximum":
+        lower, upper = (np.asarray(np.max(np.nan_to_num(end, nan=-np.inf))) for end in course[:2])
+    elif measure.rule == "minimum":
+        lower, upper = (np.asarray(np.min(np.nan_to_num(end, nan=np.inf))) for end in course[:2])
+    return (lower, upper, rest[0], rest[1], rest[2])
 
 
 def by_position(known: Reference) -> bool:

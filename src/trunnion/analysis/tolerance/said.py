@@ -9,6 +9,7 @@ import numpy as np
 
 from trunnion.analysis.account import model_notes
 from trunnion.analysis.measures import Measure
+from trunnion.analysis.tolerance.linear import by_position
 from trunnion.analysis.tolerance.sampling import CAUSES
 from trunnion.errors import Finding, Severity, Status
 from trunnion.model.check_values import NOT_NEGATIVE
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = ["findings_of", "summary"]
 
+OTHERWISE, ENOUGH = 1.5, 100  # ratio of standard deviations that is told, and samples from which it is
 FAR_OFF = 0.2  # between first order and what is found, of which it is said
 
 
@@ -142,6 +144,10 @@ def _nominal(outcome: Outcome) -> Iterator[Finding]:
 
 def _first_order(outcome: Outcome, of: Of) -> Iterator[Finding]:
     """A measure of which first order knows nothing, or whose worst case found is another."""
+    position = of.reference.window.index[of.place] if of.place >= 0 else -1
+    if position >= 0 and not of.measure.of_motion and outcome.study.linear.status[position] == Status.ZERO_SLIP:
+        what = "a relative speed is zero there: friction jumps, and first order is of one side"
+        yield Finding(what, f"measures.{of.measure.name}", "rely on the samples", Severity.WARNING)
     name, lower, upper = of.measure.name, float(of.total[0]), float(of.total[1])
     if not np.isfinite(upper):
         what = "first order has no answer"
@@ -161,6 +167,18 @@ def _first_order(outcome: Outcome, of: Of) -> Iterator[Finding]:
         yield Finding(what, f"measures.{name}", "rely on the one found, and on samples", Severity.NOTE)
 
 
+def _scatter(outcome: Outcome, counted: Sampled) -> Iterator[Finding]:
+    """Measures whose samples scatter quite otherwise than first order says."""
+    for i, of in enumerate(outcome.study.linear.measures):
+        linear, found = float(of.total[4]), float(counted.arrays["deviation"][i])
+        if by_position(of.reference) or counted.done < ENOUGH or not np.isfinite(linear + found):
+            continue
+        if max(linear, found) > 0 and not 1 / OTHERWISE < found / max(linear, 1e-300) < OTHERWISE:
+            what = f"the samples scatter by {found:.4g} (SI), first order says {linear:.4g}"
+            remedy = "it is not linear within the tolerances: rely on the samples"
+            yield Finding(what, f"measures.{of.measure.name}", remedy, Severity.WARNING)
+
+
 def _samples(outcome: Outcome, counted: Sampled) -> Iterator[Finding]:
     failed, done = counted.arrays["failed"], counted.done
     for code in range(CAUSES):
@@ -168,6 +186,7 @@ def _samples(outcome: Outcome, counted: Sampled) -> Iterator[Finding]:
             text = list(Status)[code].text if code < CAUSES - 1 else "a figure does not exist"
             what = f"{int(failed[code]):,} of {done:,} samples ({failed[code] / done:.2%}) have no answer: {text}"
             yield Finding(what, "tolerances", "they count as outside every limit; moments are of the others")
+    yield from _scatter(outcome, counted)
     for i, measure in enumerate(outcome.study.measures):
         if limited(measure) and counted.arrays["yield"][i] < 1:
             share, low, high = (float(counted.arrays[key][i]) for key in ("yield", "yield_low", "yield_high"))

@@ -123,8 +123,6 @@ def study(
     """A study of a mechanism. Raises MechanismError as `tolerance` does."""
     check_steps(steps)
     run = prepare(mechanism)
-    if run.determinacy is not None:
-        run.determinacy.refuse()
     inputs = inputs_of(run)
     names = list(mechanism.measures) if measures is None else list(measures)
     told: list[Finding] = []
@@ -139,6 +137,8 @@ def study(
         listed = ", ".join(one.name for one in found)
         what = f"no measure is stated: {listed} taken, joints to the ground without a driver"
         told.append(Finding(what, "measures", remedy, Severity.NOTE))
+    if run.determinacy is not None and not all(one.of_motion for one in found):
+        run.determinacy.refuse()
     if run.cycle.duration <= 0:  # there is one position
         found = [replace(one, statistic="value") if one.rule == "deviation" else one for one in found]
     if at is not None:

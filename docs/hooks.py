@@ -264,8 +264,8 @@ def allocations_table() -> str:
 
 def _toleranced(variables: Mapping[str, Any]) -> str:
     told = {
-        "": "of the measure", "parameter": "of the parameter", "ratio": "one by the other", "drive": "rad, m, s",
-        "1/": "1 by that of the measure",
+        "": "of the measure", "parameter": "of the parameter", "ratio": "one by the other", "drive": "deg, mm, s",
+        "1/": "1 by that of the measure", "course": "of the course", "course ratio": "course by parameter",
     }  # fmt: skip
     rows = [
         (

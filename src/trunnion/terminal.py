@@ -46,16 +46,46 @@ def show_figures(title: str, rows: list[dict[str, Any]]) -> None:
 
 
 def show_rows(title: str, head: list[str], rows: list[list[str]]) -> None:
-    """Rows of texts under their heads."""
+    """Rows of texts under their heads, broken between words where they are too wide, but not before a unit."""
     from rich.table import Table
 
-    console().print(title, style="italic", markup=False, highlight=False, soft_wrap=True)
+    out = console()
+    out.print(title, style="italic", markup=False, highlight=False, soft_wrap=True)
+    cells = _fitted([head, *rows], out.width - 3 * len(head) + 1)
     table = Table(show_edge=False)
-    for name in head:
-        table.add_column(name, justify="right", overflow="fold")
-    for row in rows:
+    for name in cells[0]:
+        table.add_column(name, justify="right", overflow="fold", no_wrap=cells[0] is not head)
+    for row in cells[1:]:
         table.add_row(*row)
-    console().print(table, markup=False, highlight=False)
+    out.print(table, markup=False, highlight=False)
+
+
+def _fitted(rows: list[list[str]], room: int) -> list[list[str]]:
+    """The cells broken into lines at plain spaces so that all columns take so much room; as they are if they do, or
+    cannot. rich itself breaks at spaces that are not to be broken, too."""
+    from rich.cells import cell_len
+
+    columns = list(zip(*rows, strict=True))
+    widths = [max(cell_len(cell) for cell in column) for column in columns]
+    least = [max(cell_len(word) for cell in column for word in cell.split(" ")) for column in columns]
+    if sum(widths) <= room or sum(least) > room:
+        return rows
+    while sum(widths) > room:
+        widest = max((k for k in range(len(widths)) if widths[k] > least[k]), key=widths.__getitem__)
+        widths[widest] -= 1
+    return [[_broken(cell, width, cell_len) for cell, width in zip(row, widths, strict=True)] for row in rows]
+
+
+def _broken(text: str, width: int, length: Callable[[str], int]) -> str:
+    """A text in lines no wider than this, broken at plain spaces."""
+    lines = [""]
+    for word in text.split(" "):
+        longer = f"{lines[-1]} {word}" if lines[-1] else word
+        if length(longer) <= width or not lines[-1]:
+            lines[-1] = longer
+        else:
+            lines.append(word)
+    return "\n".join(lines)
 
 
 def findings_of(result: xr.Dataset) -> list[Finding]:

@@ -2,7 +2,8 @@
 
 `x.csv` (or `x.measures.csv`) has one row a measure, `x.parameters.csv` one a toleranced number, `x.positions.csv` one
 a position, `x.histogram.csv` one a bin of a measure, `x.convergence.csv` one a number of samples. Of an allocation
-`x.csv` has one row a toleranced number, and `x.offers.csv` one a point of cost over accuracy. All in SI.
+`x.csv` has one row a toleranced number, and `x.offers.csv` one a point of cost over accuracy. All in SI, but for what
+the drive is at: degrees, mm or s. A unit that is not one for a whole column is in the column `unit`.
 """
 
 from __future__ import annotations
@@ -60,6 +61,29 @@ def _units(result: xr.Dataset) -> list[str]:
     return [str(unit) for unit in json.loads(result.attrs["measure_units"])]
 
 
+def _course_units(result: xr.Dataset) -> list[str]:
+    """Of the course of each measure; that of a dead centre is no angle of the drive."""
+    return [str(unit) for unit in json.loads(result.attrs.get("curve_units", result.attrs["measure_units"]))]
+
+
+def _parameter_units(result: xr.Dataset) -> list[str]:
+    return [str(unit) for unit in json.loads(result.attrs["parameter_units"])]
+
+
+def _common(units: list[str]) -> str:
+    """The unit of all; empty if there are several."""
+    return units[0] if len(set(units)) == 1 else ""
+
+
+def _stated(one: Any) -> str:
+    """The unit that a variable names."""
+    return str(one.attrs.get("units", ""))
+
+
+def _by(unit: str, other: str) -> str:
+    return f"{unit}/{other}" if unit and other else ""
+
+
 def _names(result: xr.Dataset, dim: str) -> list[str]:
     return [str(name) for name in result[dim].values]
 
@@ -75,28 +99,31 @@ def _measures(result: xr.Dataset) -> Flat:
         stated = json.loads(result.attrs.get(key, "[]"))
         for k, name in enumerate(ends):
             column = [np.nan if pair is None or pair[k] is None else float(pair[k]) for pair in stated]
-            found += [(name, "", np.array(column))] if column else []
+            found += [(name, _common(_units(result)), np.array(column))] if column else []
     for variable, one in result.data_vars.items():
         key = str(variable)
         if one.dims == ("measure",):
-            found.append((key, "1" if _is_share(key) else "", np.asarray(one.values)))
+            found.append((key, "1" if _is_share(key) else _stated(one), np.asarray(one.values)))
         elif one.dims == ("measure", "quantile"):
             levels = result["quantile"].values
             stem = key.replace("quantile_value", "quantile")
-            found += [(f"{stem}_{level:g}", "", one.values[:, k]) for k, level in enumerate(levels)]
+            found += [(f"{stem}_{level:g}", _stated(one), one.values[:, k]) for k, level in enumerate(levels)]
     return found
 
 
 def _parameters(result: xr.Dataset) -> Flat:
     """One row a toleranced number; what is of a measure is `<measure>.sensitivity`, …."""
     found: Flat = [("parameter", "", np.array(_names(result, "parameter")))]
-    found.append(("unit", "", np.array([str(unit) for unit in json.loads(result.attrs["parameter_units"])])))
+    found.append(("unit", "", np.array(_parameter_units(result))))
     for variable, one in result.data_vars.items():
         if one.dims == ("parameter",):
-            found.append((str(variable).removeprefix("parameter_"), "", np.asarray(one.values)))
-    for i, measure in enumerate(_names(result, "measure")):
+            found.append((str(variable).removeprefix("parameter_"), _stated(one), np.asarray(one.values)))
+    own = _common(_parameter_units(result))
+    for i, (measure, unit) in enumerate(zip(_names(result, "measure"), _units(result), strict=True)):
+        told = {"sensitivity": _by(unit, own), "contribution_worst_case": unit, "corner_lower": own,
+                "corner_upper": own}  # fmt: skip
         for key in (key for key in BY_MEASURE if key in result):
-            found.append((f"{measure}.{key}", "1" if _is_share(key) else "", result[key].values[i]))
+            found.append((f"{measure}.{key}", told.get(key, "1"), result[key].values[i]))
     return found
 
 
@@ -104,7 +131,8 @@ def _positions(result: xr.Dataset) -> Flat:
     """One row a position: of each measure its curve, what the tolerances do to it, and its sensitivities."""
     found: Flat = [(key, str(result[key].attrs.get("units", "")), result[key].values)
                    for key in ("time", "drive") if key in result.coords]  # fmt: skip
-    for i, (measure, unit) in enumerate(zip(_names(result, "measure"), _units(result), strict=True)):
+    numbers = list(zip(_names(result, "parameter"), _parameter_units(result), strict=True))
+    for i, (measure, unit) in enumerate(zip(_names(result, "measure"), _course_units(result), strict=True)):
         for key, one in result.data_vars.items():
             name = str(key).replace("curve", "").strip("_")
             name = f"{measure}.{name}" if name else measure
@@ -114,8 +142,9 @@ def _positions(result: xr.Dataset) -> Flat:
                 levels = result["quantile"].values
                 found += [(f"{name}_{level:g}", unit, one.values[i, k]) for k, level in enumerate(levels)]
             elif one.dims == ("measure", "parameter", "position"):
-                parts = zip(_names(result, "parameter"), one.values[i], strict=True)
-                found += [(f"{measure}.{path}.{str(key).removeprefix('curve_')}", "", row) for path, row in parts]
+                end = str(key).removeprefix("curve_")
+                parts = zip(numbers, one.values[i], strict=True)
+                found += [(f"{measure}.{path}.{end}", _by(unit, other), row) for (path, other), row in parts]
     return found
 
 
@@ -126,7 +155,8 @@ def _histogram(result: xr.Dataset) -> Flat:
     counts, edges = result["histogram"].values, result["edge"].values
     names = np.repeat(_names(result, "measure"), counts.shape[1])
     low, high = (edges[:, part].ravel() for part in (slice(0, -1), slice(1, None)))
-    return [("measure", "", names), ("from", "", low), ("to", "", high), ("count", "1", counts.ravel())]
+    unit = _stated(result["edge"])
+    return [("measure", "", names), ("from", unit, low), ("to", unit, high), ("count", "1", counts.ravel())]
 
 
 def _convergence(result: xr.Dataset) -> Flat:
@@ -146,8 +176,7 @@ def _offers(result: xr.Dataset) -> Flat:
     if "trade_off_cost" not in result:
         return [(name, "1", np.empty(0)) for name in ("factor", "cost")]
     found: Flat = [(key, "1", result[f"trade_off_{key}"].values) for key in ("factor", "cost")]
-    units = [str(unit) for unit in json.loads(result.attrs["parameter_units"])]
-    for j, (path, unit) in enumerate(zip(_names(result, "parameter"), units, strict=True)):
+    for j, (path, unit) in enumerate(zip(_names(result, "parameter"), _parameter_units(result), strict=True)):
         if result["bought"].values[j]:
             found.append((path, unit, result["trade_off_tolerance"].values[:, j]))
     return found

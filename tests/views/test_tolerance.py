@@ -380,3 +380,11 @@ def test_names_are_shown_as_they_are():
     (axes,) = figure(odd_names(), "contributions").axes
     told = " ".join(text.get_text() for text in axes.get_yticklabels())
     assert r"_\$x\$ & <!--" in told
+
+
+def test_a_unit_of_two_words_is_not_broken():
+    result = CASES["torque"]()
+    (read,) = readings(result)
+    assert read.say(read.nominal).endswith("\u00a0kN\u00a0m")
+    cells = [cell for table in tables(result) for row in table.rows for cell in row]
+    assert not [cell for cell in cells if "N m" in cell]

@@ -32,10 +32,11 @@ from trunnion.analysis.measures import MEASURES, Measure
 from trunnion.analysis.system import FEWEST, System
 from trunnion.errors import Status
 
-__all__ = ["RULES", "Course", "Reference", "figure", "judged", "kept", "known", "reference", "shown", "span"]
+__all__ = ["RULES", "Course", "Reference", "figure", "judged", "kept", "known", "moment", "reference", "shown", "span"]
 
 Array = NDArray[np.float64]
 TURN = 2 * np.pi
+FLAT = 1e-9  # of its size: a course that changes less has no extremes to tell the place of
 
 
 class Course(NamedTuple):
@@ -218,6 +219,26 @@ def shown(curve: Sequence[Number], nominal: Reference) -> Number:
             xp = namespace(driven)
             return useful / xp.where(primal(driven) > 0, driven, np.nan)
         return _single(nominal, parts)
+
+
+def moment(nominal: Reference) -> float:
+    """Time, s, at which the nominal mechanism has the extreme that is its figure; NaN of other figures.
+
+    Rising with the times of the window; NaN as well where the course does not change, or is a deviation, so 0.
+    """
+    rule = nominal.measure.rule
+    if rule not in ("maximum", "minimum", "largest") or nominal.against or len(nominal.window.index) < 2:
+        return float("nan")
+    with np.errstate(all="ignore"):
+        course = _course(nominal, _single(nominal, nominal.parts))
+        sizes = np.abs(course.number)
+        if not np.ptp(course.number) > FLAT * np.max(sizes):
+            return float("nan")
+        sign = -1.0 if rule == "minimum" else 1.0
+        if rule == "largest":
+            above, below = course.both()
+            sign = 1.0 if above >= below else -1.0
+        return float(np.ravel(course.largest(sign).place)[0])
 
 
 def span(curve: Sequence[Number], nominal: Reference) -> tuple[Number, Number]:

@@ -49,7 +49,7 @@ KINDS: dict[str, Kind] = {
     ),
     "envelope": Kind(
         "Envelope over the drive", envelope, lambda read: read.places is not None, lambda _: PANEL + 0.3,
-        "measure it at more than one position",
+        "measure it at more than one position; a place in the cycle has none",
     ),
     "convergence": Kind(
         "Convergence", convergence, lambda read: len(read.row("convergence_samples")) > 1, lambda _: PANEL + 1.0,

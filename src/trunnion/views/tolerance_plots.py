@@ -170,11 +170,11 @@ def _left_out(axes: Axes, read: Reading, low: float, high: float) -> None:
 
 
 def envelope(parent: FigureBase, read: Reading) -> None:
-    """Deviation from nominal over the drive: worst case, bands of the samples, RSS, limits."""
+    """Deviation of the course from nominal over the drive: worst case, bands of the samples, RSS, limits."""
     assert read.places is not None
     axes, over = parent.subplots(), read.places[0]
     unit = f" [{read.label}]" if read.label else ""
-    along(axes, over, plain(f"deviation of {read.name}{unit}"))
+    along(axes, over, plain(f"deviation of {read.course or read.name}{unit}"))
     _holes(axes, over, read)
     if read.has("curve_worst_case_upper"):
         ends = [read.along(read.row(f"curve_worst_case_{end}")) for end in ("lower", "upper")]
@@ -190,7 +190,7 @@ def envelope(parent: FigureBase, read: Reading) -> None:
                 axes, over, middle + sign * rss, None if k else "RSS", color=INK, linewidth=1.1, linestyle=(0, (5, 2))
             )
     _corner(axes, over, read)
-    limits = [one for one in read.limits if math.isfinite(one)] if read.nominal == 0 else []
+    limits = [one for one in read.limits if math.isfinite(one)] if read.limits_course else []
     for k, one in enumerate(limits):
         axes.axhline(one * read.factor, label=None if k else f"limits {read.told_limits}", **LIMITED)
     axes.margins(y=0.07)

@@ -96,7 +96,8 @@ def _told(read: Reading, key: str) -> str:
 
 
 def _nominal(read: Reading) -> Cells:
-    return {"linear": _told(read, "nominal")}
+    at = f" at {read.told_place}" if read.is_extreme and read.nominal != 0.0 and read.told_place else ""
+    return {"linear": f"{_told(read, 'nominal')}{at}"}
 
 
 def _mean(read: Reading) -> Cells:
@@ -244,6 +245,7 @@ def _sensitivity(read: Reading, one: Contribution) -> str:
     if math.isnan(one.sensitivity):
         return "—"
     factor, shown = (1e3, "mm") if one.unit == "m" else scaled(1.0, one.unit)
+    shown = shown.replace(" ", "\u00a0")
     unit = f"{read.label or '1'}/{shown}" if shown else read.label
     return f"{number(one.sensitivity * read.factor / factor)}\u00a0{unit}".rstrip("\u00a0")
 
@@ -276,6 +278,7 @@ def value_text(value: float, unit: str, digits: int = 8) -> str:
     if not math.isfinite(value):
         return "—"
     factor, shown = (1e3, "mm") if unit == "m" else scaled(abs(value), unit)
+    shown = shown.replace(" ", "\u00a0")
     gap = "" if shown in ("°", "") else "\u00a0"
     return f"{value * factor + 0.0:.{digits}g}".replace("-", "−") + f"{gap}{shown}"
 

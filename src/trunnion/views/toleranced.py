@@ -64,6 +64,7 @@ class Reading:
     """One measure of a result, (parameter, position, quantile, …), its unit and its limits.
 
     limits: (lower, upper) of the deviation from nominal, bounds: of the measure itself; SI, infinite without.
+    rule: what makes the figure of the course, empty if it is not told; course: what the course is, in words.
     """
 
     result: xr.Dataset
@@ -72,6 +73,8 @@ class Reading:
     unit: str
     limits: tuple[float, float]
     bounds: tuple[float, float]
+    rule: str = ""
+    course: str = ""
 
     def value(self, key: str) -> float:
         """One number, NaN if the result lacks it."""
@@ -131,8 +134,8 @@ class Reading:
 
     @property
     def label(self) -> str:
-        """The unit that is shown; empty for a pure number."""
-        return self.scale[1]
+        """The unit that is shown, not to be broken; empty for a pure number."""
+        return self.scale[1].replace(" ", "\u00a0")
 
     @cached_property
     def decimals(self) -> int:
@@ -170,8 +173,11 @@ class Reading:
 
     @cached_property
     def places(self) -> tuple[Abscissa, list[int]] | None:
-        """What its curve is drawn over, and which positions (−1: a gap); None if it is known at less than two."""
-        if "drive" not in self.result.coords or not self.has("curve"):
+        """What its curve is drawn over, and which positions (−1: a gap).
+
+        None if it is known at less than two, or if the figure is a place itself, another quantity than its course.
+        """
+        if self.is_place or "drive" not in self.result.coords or not self.has("curve"):
             return None
         drive = np.asarray(self.result["drive"].values, float)
         known = np.flatnonzero(np.isfinite(self.row("curve")) & np.isfinite(drive))
@@ -208,7 +214,22 @@ class Reading:
         unit = str(self.result.attrs.get("drive_unit", ""))
         if not math.isfinite(self.place) or self.places is None:
             return ""
-        return f"{self.place:.4g}°" if unit in DEGREE else f"{self.place:.4g} {unit}".rstrip()
+        return f"{self.place:.4g}°" if unit in DEGREE else f"{self.place:.4g}\u00a0{unit}".rstrip()
+
+    @property
+    def is_place(self) -> bool:
+        """Whether the figure is a place in the cycle, as a dead centre is."""
+        return self.rule.startswith(("place", "dead"))
+
+    @property
+    def is_extreme(self) -> bool:
+        """Whether the figure is that of the position where the course is largest or least."""
+        return self.rule in ("maximum", "minimum", "largest")
+
+    @property
+    def limits_course(self) -> bool:
+        """Whether its limits are those of the course, too: of a largest deviation, 0 of the nominal mechanism."""
+        return self.nominal == 0.0 and (self.rule in ("", "deviation") or self.is_extreme)
 
     # ---- shares ---------------------------------------------------------------------------------------------------
 
@@ -242,16 +263,16 @@ class Reading:
 
 def readings(result: xr.Dataset) -> list[Reading]:
     """Every measure of a result."""
-    keys = ("measure_units", "limits", "bounds", "measure_texts")
-    units, limits, bounds, texts = (attribute(result, key, []) for key in keys)
+    keys = ("measure_units", "limits", "bounds", "measure_texts", "measure_rules", "curve_texts")
+    units, limits, bounds, texts, rules, courses = (attribute(result, key, []) for key in keys)
     found = []
     for i, name in enumerate(names(result, "measure")):
         about = [(one[i] if i < len(one) else None) or (None, None) for one in (limits, bounds)]
-        text = str(texts[i]) if i < len(texts) else ""
+        text, rule, course = (str(one[i]) if i < len(one) else "" for one in (texts, rules, courses))
         lows, highs = ([-math.inf if one[0] is None else float(one[0]) for one in about],
                        [math.inf if one[1] is None else float(one[1]) for one in about])  # fmt: skip
         ends = list(zip(lows, highs, strict=True))
-        found.append(Reading(result.isel(measure=i), name, text, str(units[i]), ends[0], ends[1]))
+        found.append(Reading(result.isel(measure=i), name, text, str(units[i]), ends[0], ends[1], rule, course))
     return found
 
 
@@ -299,7 +320,7 @@ def with_unit(lower: float, upper: float, unit: str) -> str:
         return ""
     size = max(abs(lower), abs(upper))
     factor, shown = (1e3, "mm") if unit == "m" else scaled(size, unit)
-    gap = "" if shown in ("°", "") else "\u00a0"
+    shown, gap = shown.replace(" ", "\u00a0"), "" if shown in ("°", "") else "\u00a0"
     return f"{limits_text(lower * factor, upper * factor)}{gap}{shown}"
 
 

@@ -12,18 +12,21 @@ from numpy.typing import NDArray
 
 from trunnion import __version__
 from trunnion.analysis.account import finding_row, references
-from trunnion.analysis.measures import MEASURES
+from trunnion.analysis.measure_figures import moment
 from trunnion.analysis.tolerance.indices import Indices
 from trunnion.analysis.tolerance.said import findings_of, summary
 from trunnion.analysis.tolerance.sampled import QUANTILES, sampled
 from trunnion.analysis.tolerance.sampling import Sampling, Tally
 from trunnion.analysis.tolerance.search import Corner
 from trunnion.analysis.tolerance.study import Study
+from trunnion.analysis.tolerance.words import course_text, text_of
 from trunnion.errors import Finding, Status
 from trunnion.model.parameters import dimension_kinds
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from trunnion.analysis.tolerance.linear import Of
 
 __all__ = ["VARIABLES", "Outcome", "Variable", "dataset"]
 
@@ -32,8 +35,12 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Variable:
-    """Dimensions, unit and long name of a result. Unit empty: that of each measure, in the attribute
-    `measure_units`; "parameter": that of each parameter, in `parameter_units`; "ratio": measure over parameter."""
+    """Dimensions, unit and long name of a result.
+
+    Unit empty: that of each measure, in the attribute `measure_units`; "parameter": that of each parameter, in
+    `parameter_units`; "ratio": measure over parameter; "course": that of each course, in `curve_units`; "course ratio":
+    course over parameter; "drive": deg, mm or s, as `drive_unit` says.
+    """
 
     dims: tuple[str, ...]
     units: str
@@ -56,7 +63,7 @@ class Outcome:
 M, P, MP, MPOS = ("measure",), ("parameter",), ("measure", "parameter"), ("measure", "position")
 VARIABLES: dict[str, Variable] = {
     "nominal": Variable(M, "", "figure of the nominal mechanism"),
-    "place": Variable(M, "drive", "drive coordinate at which the figure is taken, of figures of one position"),
+    "place": Variable(M, "drive", "drive coordinate at which the figure is taken; of an extreme, the nominal one"),
     "parameter_nominal": Variable(P, "parameter", "nominal value; of a clearance its radius"),
     "parameter_lower": Variable(P, "parameter", "lower limit of the deviation from nominal"),
     "parameter_upper": Variable(P, "parameter", "upper limit of the deviation from nominal"),
@@ -75,13 +82,13 @@ VARIABLES: dict[str, Variable] = {
     "searched_upper": Variable(M, "", "largest deviation found on the mechanism itself"),
     "corner_lower": Variable(MP, "parameter", "value of the parameter at the least deviation"),
     "corner_upper": Variable(MP, "parameter", "value of the parameter at the largest deviation"),
-    "curve": Variable(MPOS, "", "course of the measure on the nominal mechanism"),
-    "curve_sensitivity": Variable(("measure", "parameter", "position"), "ratio", "derivative of the course"),
-    "curve_worst_case_lower": Variable(MPOS, "", "least deviation of the course, to first order"),
-    "curve_worst_case_upper": Variable(MPOS, "", "largest deviation of the course, to first order"),
-    "curve_rss": Variable(MPOS, "", "half width of the course by the root of the sum of squares"),
-    "curve_shift": Variable(MPOS, "", "mean deviation of the course from nominal, to first order"),
-    "curve_deviation": Variable(MPOS, "", "standard deviation of the course, to first order"),
+    "curve": Variable(MPOS, "course", "course of the measure on the nominal mechanism"),
+    "curve_sensitivity": Variable(("measure", "parameter", "position"), "course ratio", "derivative of the course"),
+    "curve_worst_case_lower": Variable(MPOS, "course", "least deviation of the course, to first order"),
+    "curve_worst_case_upper": Variable(MPOS, "course", "largest deviation of the course, to first order"),
+    "curve_rss": Variable(MPOS, "course", "half width of the course by the root of the sum of squares"),
+    "curve_shift": Variable(MPOS, "course", "mean deviation of the course from nominal, to first order"),
+    "curve_deviation": Variable(MPOS, "course", "standard deviation of the course, to first order"),
     "status": Variable(("position",), "1", "code of the position's status; see the attribute flag_meanings"),
     "samples": Variable((), "1", "number of samples"),
     "mean": Variable(M, "", "mean of the figure"),
@@ -111,7 +118,9 @@ VARIABLES: dict[str, Variable] = {
     "histogram": Variable(("measure", "bin"), "1", "samples in a bin"),
     "edge": Variable(("measure", "edge"), "", "edges of the bins; those at the ends stand for all beyond"),
     "band": Variable(
-        ("measure", "quantile", "position"), "", "deviation of the course from nominal that this share does not exceed"
+        ("measure", "quantile", "position"),
+        "course",
+        "deviation of the course from nominal that this share does not exceed",
     ),
     "convergence_samples": Variable(("size",), "1", "first so many samples"),
     "convergence_mean": Variable(("measure", "size"), "", "mean of the first samples"),
@@ -135,17 +144,16 @@ def dataset(outcome: Outcome, told: Sequence[Finding]) -> xr.Dataset:
     counted = None if outcome.tally is None or outcome.job is None else sampled(outcome.job, outcome.tally, found)
     arrays = {**_linear(found), **_worst(outcome), **(counted.arrays if counted else {}), **_shares(outcome)}
     units = [measure.figure_unit(system, found.run.values) for measure in found.measures]
+    curve_units = [measure.unit(system) for measure in found.measures]
     dimensions = {f"dimensions.{name}": kind for name, kind in dimension_kinds(mechanism).items()}
     kinds = {**mechanism.parameter_kinds(), **dimensions}
     parameter_units = [kinds[name].unit if name in kinds else "m" for name in found.inputs.names]
     dial = system.dial(found.run.values, found.plan.times)
+    known = _units(units, curve_units, parameter_units, dial.unit)
     variables = {
-        name: xr.Variable(
-            VARIABLES[name].dims, array,
-            {"long_name": VARIABLES[name].long_name, **_unit(VARIABLES[name].units, units, parameter_units, dial.unit)},
-        )
-        for name, array in arrays.items()
-    }  # fmt: skip
+        name: xr.Variable(of.dims, array, {"long_name": of.long_name, "units": known.get(of.units, of.units)})
+        for (name, array), of in zip(arrays.items(), map(VARIABLES.__getitem__, arrays), strict=True)
+    }
     used = {dim for name in variables for dim in VARIABLES[name].dims}
     coordinates: dict[str, Any] = {
         "measure": [measure.name for measure in found.measures],
@@ -170,16 +178,11 @@ def dataset(outcome: Outcome, told: Sequence[Finding]) -> xr.Dataset:
         "sampling": outcome.job.method if outcome.job else "",
         "engine": outcome.job.engine if outcome.job else "numpy",
         "seed": outcome.job.seed if outcome.job else -1,
-        "measure_units": json.dumps(units),
-        "measure_texts": json.dumps([text_of(measure) for measure in found.measures], ensure_ascii=False),
+        **_of_measures(found, units, curve_units),
         "parameter_units": json.dumps(parameter_units),
         "distributions": json.dumps(
             [*(one.distribution for one in found.inputs.tolerances), *("play" for _ in found.inputs.loose)]
         ),
-        "limits": json.dumps(
-            [None if (m.lower, m.upper) == (None, None) else [m.lower, m.upper] for m in found.measures]
-        ),
-        "bounds": json.dumps([[m.at_least, m.at_most] for m in found.measures]),
         "drive": dial.of,
         "drive_unit": dial.unit.strip(),
         "periodic": int(found.run.cycle.periodic),
@@ -193,27 +196,28 @@ def dataset(outcome: Outcome, told: Sequence[Finding]) -> xr.Dataset:
     return xr.Dataset(variables, {**told_of, "time": times, "drive": over}, attributes)
 
 
-def text_of(measure: Any) -> str:
-    """What a measure is, in words."""
-    kind = MEASURES[measure.kind].long_name.replace(" a ", " ")
-    whole = measure.subject in ("mechanism", "cycle", "instant")
-    subject = f" ({measure.subject})" if whole else f" {measure.subject}"
-    axis = f", {measure.axis}" if measure.axis else ""
-    rule = {
-        "deviation": ", largest deviation from nominal", "value": " at a position", "line": "", "ratio": "",
-        "dead centre": "", "dead centre, least": " (least)",
-    }.get(measure.rule, f", {measure.rule.replace('-', ' ')}")  # fmt: skip
-    own = MEASURES[measure.kind].rule == measure.rule and measure.rule != "deviation"
-    return f"{kind}{subject}{axis}{'' if own else rule}"
+def _of_measures(found: Study, units: Sequence[str], curve_units: Sequence[str]) -> dict[str, str]:
+    """Attributes that are a list each, an entry for each measure."""
+    system, measures = found.run.system, found.measures
+    limits = [None if (one.lower, one.upper) == (None, None) else [one.lower, one.upper] for one in measures]
+    told: dict[str, list[Any]] = {
+        "measure_units": list(units),
+        "measure_texts": [text_of(one, system) for one in measures],
+        "measure_rules": [one.rule for one in measures],
+        "curve_units": list(curve_units),
+        "curve_texts": [course_text(one, system) for one in measures],
+        "limits": limits,
+        "bounds": [[one.at_least, one.at_most] for one in measures],
+    }
+    return {key: json.dumps(entries, ensure_ascii=False) for key, entries in told.items()}
 
 
-def _unit(kind: str, units: Sequence[str], parameters: Sequence[str], drive: str) -> dict[str, str]:
-    """The unit, if it is one for all measures and parameters."""
-    own = units[0] if len(set(units)) == 1 else ""
-    parameter = parameters[0] if len(set(parameters)) == 1 else ""
-    ratio = f"{own}/{parameter}" if own and parameter else ""
-    drives = drive.strip().replace("°", "deg")
-    return {"units": {"": own, "parameter": parameter, "ratio": ratio, "drive": drives}.get(kind, kind)}
+def _units(own: Sequence[str], courses: Sequence[str], parameters: Sequence[str], drive: str) -> dict[str, str]:
+    """The units that `Variable` names by another: where it is one for all measures and parameters, else none."""
+    figure, course, parameter = (many[0] if len(set(many)) == 1 else "" for many in (own, courses, parameters))
+    ratios = (f"{one}/{parameter}" if one and parameter else "" for one in (figure, course))
+    found = {"": figure, "course": course, "parameter": parameter, "drive": drive.strip().replace("°", "deg")}
+    return found | dict(zip(("ratio", "course ratio"), ratios, strict=True))
 
 
 def _linear(found: Study) -> dict[str, Any]:
@@ -228,11 +232,9 @@ def _linear(found: Study) -> dict[str, Any]:
         shares = halves**2 / np.sum(halves**2, axis=1, keepdims=True)
         variance = scatter**2 / np.sum(scatter**2, axis=1, keepdims=True)
     numbers = effects.numbers()
-    dial = found.run.system.dial(found.run.values, found.plan.times)
-    place = [dial.values[of.reference.window.index[of.place]] if of.place >= 0 else np.nan for of in rows]
     return {
         "nominal": np.array([of.reference.figure for of in rows]),
-        "place": np.array(place, float),
+        "place": np.array([_place(found, of) for of in rows], float),
         **{f"parameter_{key}": array for key, array in numbers.items()},
         "sensitivity": np.array([of.sensitivity for of in rows]),
         "contribution_worst_case": worst,
@@ -249,6 +251,16 @@ def _linear(found: Study) -> dict[str, Any]:
         "curve_deviation": _spread_out(found, [of.curve_total[4] for of in rows], ()),
         "status": first.status,
     }  # fmt: skip
+
+
+def _place(found: Study, of: Of) -> float:
+    """The drive coordinate at which a figure is taken; NaN if it is of no single position."""
+    run, known = found.run, of.reference
+    time = known.window.time[of.place] if of.place >= 0 else moment(known)
+    if not np.isfinite(time) or run.cycle.duration <= 0:
+        return float("nan")
+    time = time % run.cycle.duration if run.cycle.periodic else time
+    return float(run.system.dial(run.values, np.array([time])).values[0])
 
 
 def _spread_out(found: Study, arrays: Sequence[Array], shape: tuple[int, ...]) -> Array:

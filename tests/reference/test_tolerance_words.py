@@ -1,0 +1,127 @@
+"""What a study of tolerances says of its measures: what their courses are, in which unit, and where extremes lie."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mechanisms_parts import prismatic, slide
+from toleranced import clutch, rssr, slider_crank
+from trunnion import Mechanism, save, tolerance
+from trunnion.views.tolerance import drawable, figure
+from trunnion.views.tolerance_tables import figures
+from trunnion.views.toleranced import readings
+
+MEASURES: dict[str, dict[str, Any]] = {
+    "top": {"point": "piston.P", "axis": "x", "at": "60 deg"},
+    "soon": {"point": "piston.P", "axis": "x", "at": "0.1 s"},
+    "swing": {"angle": "rod", "as": "maximum"},
+    "back": {"angle": "rod", "as": "minimum", "over": ["-10 deg", "180 deg"]},
+    "stroke": {"stroke": "C"},
+    "dead": {"dead_centre": "C"},
+    "late": {"rotation": "P", "as": "place-of-minimum"},
+    "wave": {"transmission_error": "P"},
+}
+
+
+LENGTHS = {"r": "50 mm", "l": "200 mm", "e": "0 mm"}
+
+
+@pytest.fixture(scope="module")
+def result() -> Any:
+    model = slider_crank(dimensions=LENGTHS, measures=MEASURES)
+    return tolerance(model, methods=("linear", "monte-carlo"), samples=200, steps=72, jobs=1)
+
+
+def told(result: Any, key: str) -> dict[str, Any]:
+    return dict(zip(result.measure.values.tolist(), json.loads(result.attrs[key]), strict=True))
+
+
+def test_where_a_measure_is_taken(result: Any) -> None:
+    assert told(result, "measure_texts") == {
+        "top": "coordinate of point piston.P, x at 60° of A",
+        "soon": "coordinate of point piston.P, x at 0.1 s",
+        "swing": "angle of link rod, maximum",
+        "back": "angle of link rod, minimum over −10° to 180° of A",
+        "stroke": "stroke of joint C",
+        "dead": "dead centre of joint C",
+        "late": "rotation of joint P, place of minimum",
+        "wave": "transmission error of joint P, largest deviation from nominal",
+    }
+    still = tolerance(clutch(), methods=("linear",))
+    assert told(still, "measure_texts") == {"wedge": "angle of link strut"}
+
+
+def test_place_on_a_slide_and_axis_in_space() -> None:
+    """A driver that slides has places in mm; the turn of a link in space is about an axis."""
+    ram = Mechanism(
+        links={
+            "ground": {"points": {"A": {"at": [0, 0], "axis": [1, 0]}}},
+            "ram": {"points": {"A": slide(0, 0), "P": ["10 mm ± 0.1 mm", 0]}},
+        },
+        joints={"A": prismatic("ground", "ram")},
+        drivers={"A": {"speed": "10 mm/s", "range": ["0 mm", "50 mm"]}},
+        measures={"x": {"point": "ram.P", "axis": "x", "at": "20 mm"}},
+    )
+    found = tolerance(ram, methods=("linear",), steps=5)
+    assert told(found, "measure_texts") == {"x": "coordinate of point ram.P, x at 20 mm of A"}
+    found = tolerance(rssr(measures={"it": {"angle": "rod", "axis": "z"}}), methods=("linear",), steps=12)
+    assert told(found, "curve_texts") == {"it": "angle of rod about z"}
+
+
+def test_the_course_is_told_in_its_own_unit(result: Any) -> None:
+    """Of a dead centre it is the slide in m, though its figure is an angle of the crank."""
+    units = {"top": "m", "soon": "m", "swing": "rad", "back": "rad", "stroke": "m", "dead": "m", "late": "rad",
+             "wave": "rad"}  # fmt: skip
+    assert told(result, "curve_units") == units
+    assert told(result, "measure_units") == units | {"dead": "rad"}
+    texts = told(result, "curve_texts")
+    assert texts["stroke"] == texts["dead"] == "slide of C"
+    assert (texts["top"], texts["swing"], texts["wave"]) == ("x of piston.P", "angle of rod", "rotation of P")
+    assert told(result, "measure_rules")["dead"] == "dead centre"
+
+
+def test_an_envelope_is_that_of_the_course(result: Any) -> None:
+    """None of a place in the cycle; of a stroke it says that it is the slide, whose limits are others."""
+    reads = {read.name: read for read in readings(result)}
+    assert [name for name, read in reads.items() if "envelope" in drawable(read)] == ["swing", "back", "stroke", "wave"]
+    (axes,) = figure(result, "envelope", ["stroke"]).axes
+    assert axes.get_ylabel() == "deviation of slide of C [mm]"
+
+
+def test_place_of_the_nominal_extreme(result: Any) -> None:
+    """The rod is steepest with the crank at 90 and 270°, whose place is told beside the figure."""
+    place = dict(zip(result.measure.values.tolist(), result.place.values.tolist(), strict=True))
+    assert place["swing"] == pytest.approx(270)
+    assert place["back"] == pytest.approx(90)
+    assert place["top"] == pytest.approx(60)
+    (read,) = (read for read in readings(result) if read.name == "swing")
+    assert figures(read).rows[0][1].endswith("° at 270°")
+
+
+def test_units_of_the_columns(result: Any, tmp_path: Path) -> None:
+    """The place has that of the drive; what is of one measure has its own, a course its own."""
+
+    def units(table: str) -> dict[str, str]:
+        path = tmp_path / f"x.{table}.csv"
+        save(result, path, units_row=True)
+        head, second = path.read_text("utf-8").splitlines()[:2]
+        return dict(zip(head.split(","), second.split(","), strict=True))
+
+    assert units("measures")["place"] == "deg"
+    places = units("positions")
+    assert (places["dead"], places["dead.rss"], places["dead.band_0.5"]) == ("m", "m", "m")
+    assert places["swing.dimensions.r.sensitivity"] == "rad/m"
+    numbers = units("parameters")
+    assert (numbers["nominal"], numbers["dead.sensitivity"]) == ("m", "rad/m")
+    assert (numbers["dead.contribution_worst_case"], numbers["dead.contribution_rss"]) == ("rad", "1")
+
+
+def test_unit_of_all_measures() -> None:
+    """One unit of all measures stands in the units of each variable."""
+    found = tolerance(slider_crank(dimensions=LENGTHS), methods=("linear",))
+    assert {found[name].attrs["units"] for name in ("nominal", "curve", "curve_rss", "rss")} == {"m"}
+    assert found.curve_sensitivity.attrs["units"] == found.sensitivity.attrs["units"] == "m/m"

@@ -244,6 +244,18 @@ def test_limits_are_written_where_they_stand(run: Run, tmp_path: Path) -> None:
     assert float(trunnion.tolerance(read, ["angle"], ["linear"], steps=24)["worst_case_upper"][0]) <= np.radians(0.2)
 
 
+def test_entries_are_added_without_moving_the_others(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "m.yaml").write_text(INLINE, "utf-8")
+    added = ("--set", "costs.l1.most=30 um", "--set", "tolerances.l2.distribution=uniform")
+    code, _, err = run("m.yaml", "--steps", 24, "--samples", 0, *added, "--write", "b.yaml")
+    assert code == 0, err
+    text = (tmp_path / "b.yaml").read_text("utf-8")
+    assert "  l1: {model: power, B: 1,   k: 0.45, unit: mm, least: 1 um, most: 30 um}\n" in text
+    assert "  crank:   {points: {A: [0, 0],  B: [l2, 0]}}\n" in text
+    assert "# turned\n  l2: {distribution: uniform}\ncosts:\n" in text
+    assert trunnion.read(tmp_path / "b.yaml").prices()[0].most == pytest.approx(3e-5)
+
+
 def test_no_model_of_limits_that_are_not_kept(run: Run, tmp_path: Path) -> None:
     (tmp_path / "m.yaml").write_text(INLINE, "utf-8")
     narrow = ("--set", "measures.angle.limit=±0.01 deg", "--set", "measures.place.limit=±0.001 mm")

@@ -22,6 +22,7 @@ from trunnion.model.limit_texts import number_with
 from trunnion.model.limits import Limits
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.quantity import Quantity
+from trunnion.model.rewrite import rewrite_mechanism
 from trunnion.model.tolerance_parts import DISTRIBUTIONS, OPTIONS, Variation
 from trunnion.model.tolerances import Tolerance
 from trunnion.model.units import KINDS
@@ -528,3 +529,16 @@ def test_texts_that_are_no_half_width(varied: Mechanism, half: object, what: str
     for name in ("AB", "joints.A.clearance"):
         with pytest.raises(MechanismError, match=re.escape(what)):
             varied.with_tolerances({name: half})
+
+
+def test_a_model_with_less_in_it_is_rewritten(varied: Mechanism, tmp_path: Path) -> None:
+    """Entries that went, of a file in one line or another: the file that is written holds the mechanism."""
+    (tmp_path / "source.yaml").write_text("# a four-bar\n" + VARIED, encoding="utf-8")
+    bare = {key: one for key, one in varied.data().items() if key != "correlations"}
+    rewrite_mechanism(Mechanism(**bare), tmp_path / "source.yaml", tmp_path / "bare.yaml")
+    assert Mechanism.read(tmp_path / "bare.yaml") == Mechanism(**bare)
+    assert (tmp_path / "bare.yaml").read_text("utf-8").startswith("# a four-bar")
+    named = varied.with_values({"tolerances.D.friction.coefficient": 0.01, "AB": "31 mm"})
+    rewrite_mechanism(named, tmp_path / "source.yaml", tmp_path / "named.yaml")
+    assert Mechanism.read(tmp_path / "named.yaml") == named
+    assert "AB: 31 mm, BC: 90 mm ± 0.02 mm" in (tmp_path / "named.yaml").read_text("utf-8")

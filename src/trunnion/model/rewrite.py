@@ -69,33 +69,60 @@ def _texts(mechanism: Mechanism, source: Path) -> Iterator[str]:
 
 
 def _edited(text: str, before: Mapping[str, Any], after: Mapping[str, Any]) -> str | None:
-    """The text with nothing but values changed where they stand; None if entries came or went."""
-    changed = list(_changed(before, after))
+    """The text with values changed where they stand, and entries added; None if there is more to change."""
     root = YAML(typ="safe", pure=True).compose(text)
-    for node, value in sorted(
-        ((_node(root, location), value) for location, value in changed),
-        key=lambda pair: -1 if pair[0] is None else pair[0].start_mark.index,
-        reverse=True,
-    ):
-        if node is None or isinstance(value, (Mapping, list)) or value is None:
-            return None
-        start, end = node.start_mark.index, node.end_mark.index
-        new = _scalar(value, quoted=bool(node.style))
+    edits = [_edit(text, root, location, value) for location, value in _changed(before, after)]
+    for edit in sorted((one for one in edits if one), key=lambda one: one[0])[::-1]:
+        start, end, new = edit
         rest = text[end:]
         blanks = len(rest) - len(rest.lstrip(" "))
-        if rest[blanks : blanks + 1] == "#":  # the comment behind it stays in its column
+        if end > start and rest[blanks : blanks + 1] == "#":  # the comment behind it stays in its column
             rest = " " * max(1, blanks + end - start - len(new)) + rest[blanks:]
         text = text[:start] + new + rest
-    return text
+    return None if None in edits else text
+
+
+def _edit(text: str, root: Node, location: Location, value: Any) -> tuple[int, int, str] | None:
+    """From where to where a text is to be replaced by what; None if a value cannot be put in so."""
+    if not location:
+        return None
+    node, parent, key = _node(root, location), _node(root, location[:-1]), location[-1]
+    if isinstance(node, ScalarNode) and isinstance(value, (str, int, float)):
+        return node.start_mark.index, node.end_mark.index, _scalar(value, quoted=bool(node.style))
+    if node is not None or not isinstance(parent, MappingNode) or not parent.value or value is None:
+        return None
+    entry = f"{_scalar(key, quoted=False)}: {_flow(value)}"
+    if parent.flow_style:
+        end = parent.end_mark.index - 1
+        return end, end, f", {entry}"
+    if parent is root and isinstance(value, Mapping):
+        lines = (f"  {_scalar(name, quoted=False)}: {_flow(one)}\n" for name, one in value.items())
+        return len(text), len(text), f"{'' if text.endswith(chr(10)) else chr(10)}{key}:\n{''.join(lines)}"
+    first, last = parent.value[0][0], parent.value[-1][1]
+    if not (isinstance(last, ScalarNode) or last.flow_style):
+        return None
+    end = text.find("\n", last.end_mark.index)
+    end = len(text) if end < 0 else end
+    return end, end, f"\n{' ' * first.start_mark.column}{entry}"
+
+
+def _flow(value: Any) -> str:
+    """A value on one line."""
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{_scalar(key, quoted=False)}: {_flow(one)}" for key, one in value.items()) + "}"
+    return f"[{', '.join(map(_flow, value))}]" if isinstance(value, list) else _scalar(value, quoted=False)
 
 
 def _changed(before: Any, after: Any, location: Location = ()) -> Iterator[tuple[Location, Any]]:
     """Where two sets of plain data differ, and what the second has there; the whole group if entries came or went."""
     if before == after:
         return
-    if isinstance(before, Mapping) and isinstance(after, Mapping) and list(before) == list(after):
+    if isinstance(before, Mapping) and isinstance(after, Mapping) and before.keys() <= after.keys():
         for key, value in after.items():
-            yield from _changed(before[key], value, (*location, key))
+            if key in before:
+                yield from _changed(before[key], value, (*location, key))
+            else:
+                yield (*location, key), value
     elif isinstance(before, list) and isinstance(after, list) and len(before) == len(after):
         for index, value in enumerate(after):
             yield from _changed(before[index], value, (*location, index))
@@ -103,8 +130,8 @@ def _changed(before: Any, after: Any, location: Location = ()) -> Iterator[tuple
         yield location, after
 
 
-def _node(root: Node, location: Location) -> ScalarNode | None:
-    """The node of a single value; None if there is none, as where the file has a short form of it."""
+def _node(root: Node, location: Location) -> Node | None:
+    """The node of a value; None if there is none, as where the file has a short form of it."""
     node = root
     for key in location:
         if isinstance(node, MappingNode):
@@ -115,10 +142,10 @@ def _node(root: Node, location: Location) -> ScalarNode | None:
         if found is None:
             return None
         node = found
-    return node if isinstance(node, ScalarNode) else None
+    return node
 
 
-def _scalar(value: float | str, quoted: bool) -> str:
+def _scalar(value: float | str, *, quoted: bool) -> str:
     """A value as it stands in a file, in quotation marks if they were there or are needed."""
     if not isinstance(value, str):
         return json.dumps(value)

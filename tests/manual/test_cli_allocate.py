@@ -89,7 +89,7 @@ def test_plays_are_written(run: Run, tmp_path: Path) -> None:
     code, _, _ = run(PISTON, *QUICK, "--write", "bought.json", "--out", "p.png", "--kind", "cost")
     assert code == 0
     read = trunnion.read(tmp_path / "bought.json")
-    assert read.parameters()["joints.Q.pin.clearance"] == pytest.approx(1.81095e-5, rel=1e-5)
+    assert read.parameters()["joints.Q.pin.clearance"] == 1.8109e-5  # of 1.81095e-5
     code, _, err = run(PISTON, *QUICK, "--write", "bought.toml")
     assert code == 2
     assert "write .yaml or .json" in err
@@ -184,3 +184,117 @@ def test_the_figures_of_the_verification(run: Run, tmp_path: Path) -> None:
         ElementTree.parse(tmp_path / f"{kind}.svg")
     result = trunnion.allocate(trunnion.read(FOURBAR), steps=24, samples=100)
     assert np.all(np.isfinite(result["tolerance"].values))
+
+
+INLINE = """\
+trunnion: 1
+dimensions:
+  l1:   100 mm +0.04/-0.02 mm   # ground
+  l2:    30 mm ± 0.02 mm        # crank
+  l3:   "90 mm ± 30 um"
+  l4:    70 mm
+links:
+  ground:  {points: {A: [0, 0],  D: [l1, 0]}}
+  crank:   {points: {A: [0, 0],  B: [l2, 0]}}
+  coupler: {points: {B: [0, 0],  C: [l3, 0]}}
+  rocker:  {points: {D: [0, 0],  C: [l4, 0]}}
+joints:
+  A: {type: revolute,   links: [ground, crank]}
+  B: {type: revolute,   links: [crank, coupler]}
+  C: {type: revolute,   links: [coupler, rocker], pin: {fit: 12 mm H7/g6}}
+  D: {type: revolute,   links: [ground, rocker]}
+drivers: {A: {speed: 120 rpm}}
+assembly: {C: [94 mm, 70 mm]}
+measures:
+  angle: {angle: rocker, limit: ±0.2 deg}
+  place: {point: coupler.C, axis: x, at: 60 deg, limit: ±0.25 mm}
+tolerances:
+  l4: ±0.03 mm   # turned
+costs:
+  l1: {model: power, B: 1,   k: 0.45, unit: mm, least: 1 um}
+  l2: {model: power, B: 0.6, k: 0.45, unit: mm, least: 1 um}
+  l3: {model: power, B: 1,   k: 0.45, unit: mm, least: 1 um}
+  l4: {model: power, B: 0.8, k: 0.45, unit: mm, least: 1 um}
+"""
+
+
+def test_limits_are_written_where_they_stand(run: Run, tmp_path: Path) -> None:
+    """Nothing but the limits is changed, rounded down to five digits: the model that is written keeps its limits."""
+    (tmp_path / "m.yaml").write_text(INLINE, "utf-8")
+    code, _, err = run("m.yaml", "--steps", 24, "--samples", 0, "--write", "b.yaml")
+    assert code == 0, err
+    text = (tmp_path / "b.yaml").read_text("utf-8")
+    pairs = [(old, new) for old, new in zip(INLINE.split("\n"), text.split("\n"), strict=True) if old != new]
+    assert [old.split(":")[0] for old, _ in pairs] == ["  l1", "  l2", "  l3", "  l4"]
+    stated, read = (trunnion.read(tmp_path / name) for name in ("m.yaml", "b.yaml"))
+    result = trunnion.allocate(stated, steps=24, samples=0)
+    found = dict(zip(result["parameter"].values.tolist(), result["tolerance"].values.tolist(), strict=True))
+    for one in read.tolerated():
+        if one.path.startswith("dimensions."):
+            assert found[one.path] * (1 - 1e-4) <= one.half_width <= found[one.path] * (1 + 1e-9)
+            assert (one.lower + one.upper) / 2 == pytest.approx(1e-5 if one.path.endswith("l1") else 0, abs=1e-15)
+    (l1, l2, l3, l4) = (new for _, new in pairs)
+    assert "# ground" in l1
+    assert l2.endswith("# crank")
+    assert l3.startswith('  l3:   "90 mm ± ')
+    assert l3.endswith(' um"')
+    assert l4.endswith("# turned")
+    again = trunnion.allocate(read, steps=24, samples=0)
+    assert float(again["cost_total_before"]) == pytest.approx(float(result["cost_total"]), rel=1e-4)
+    assert float(trunnion.tolerance(read, ["angle"], ["linear"], steps=24)["worst_case_upper"][0]) <= np.radians(0.2)
+
+
+def test_entries_are_added_without_moving_the_others(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "m.yaml").write_text(INLINE, "utf-8")
+    added = ("--set", "costs.l1.most=30 um", "--set", "tolerances.l2.distribution=uniform")
+    code, _, err = run("m.yaml", "--steps", 24, "--samples", 0, *added, "--write", "b.yaml")
+    assert code == 0, err
+    text = (tmp_path / "b.yaml").read_text("utf-8")
+    assert "  l1: {model: power, B: 1,   k: 0.45, unit: mm, least: 1 um, most: 30 um}\n" in text
+    assert "  crank:   {points: {A: [0, 0],  B: [l2, 0]}}\n" in text
+    assert "# turned\n  l2: {distribution: uniform}\ncosts:\n" in text
+    assert trunnion.read(tmp_path / "b.yaml").prices()[0].most == pytest.approx(3e-5)
+
+
+def test_no_model_of_limits_that_are_not_kept(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "m.yaml").write_text(INLINE, "utf-8")
+    narrow = ("--set", "measures.angle.limit=±0.01 deg", "--set", "measures.place.limit=±0.001 mm")
+    code, _, err = run("m.yaml", "--steps", 24, "--samples", 0, *narrow, "--write", "b.yaml")
+    assert code == 1
+    assert "'b.yaml' is not written: there is no allocation" in err
+    assert not (tmp_path / "b.yaml").exists()
+    # each measure that cannot be kept, with its own positions
+    assert "measures.angle: no tolerances keep the limit" in err
+    assert "24 of 24 positions are beyond their limits" in err
+    (place,) = [line for line in err.split("\n") if "measures.place: no tolerances keep the limit" in line]
+    assert "positions" not in place
+
+
+def test_a_yield_within_its_interval_is_said(run: Run, tmp_path: Path) -> None:
+    """Whether the samples reach the yield or not: the heading and a note say it if they do not."""
+    said = []
+    for seed in range(1, 7):
+        code, out, err = run(FOURBAR, "--steps", 12, "--samples", 200, "--yield", 0.9, "--seed", seed)
+        assert code == 0
+        said.append("(sampled " in out)
+        assert ("note: yield: the yield of the samples is 0." in err) == said[-1]
+        assert ("less than 0.9, which lies in its interval" in err) == said[-1]
+    assert any(said)
+
+
+def test_a_number_of_a_cost_that_is_not_stated(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "m.yaml").write_text(INLINE, "utf-8")
+    _, out, _ = run("m.yaml", "--steps", 12, "--samples", 0, "--set", "costs.dimensions.l1.most=15 um")
+    assert "±0.015 mm" in out
+    code, _, err = run("m.yaml", "--steps", 12, "--samples", 0, "--set", "costs.l5.most=15 um")
+    assert code == 2
+    assert "costs.l5.most" in err
+
+
+def test_the_play_of_a_fit_cannot_be_bought(run: Run, tmp_path: Path) -> None:
+    cost = "  C.clearance: {options: {close: {tolerance: 10 um, cost: 3}}}\n"
+    (tmp_path / "m.yaml").write_text(INLINE + cost, "utf-8")
+    code, _, err = run("m.yaml", *QUICK)
+    assert code == 2
+    assert "its play comes of the fit 12 mm H7/g6" in err
+    assert "to buy it state pin.clearance instead" in err

@@ -104,7 +104,7 @@ CASES = [
     ("  AB: {model", "  XY: {model", C, "costs.XY", "no number named 'XY'", "'AB'"),
     ("  AB: {model", "  t: {model", C, "costs.t", "'dimensions.t' has no tolerance", "as a start"),
     ("  A.clearance: {model", "  D.clearance: {model", C + 4, "costs.D.clearance", "states no clearance", "clearance:"),
-    ("  A.clearance: {model", "  C.clearance: {model", C + 4, "costs.C.clearance", "states no clearance", "clearance:"),
+    ("  A.clearance: {model", "  C.clearance: {model", C + 4, "costs.C.clearance", "the fit 12 mm H7/g6", "state pin"),
     ("  A.clearance: {model", "  B.pin.clearance: {model", C + 4, "costs.B.pin", "has no tolerance", "joints.B.clear"),
     ("  A.clearance: {model", "  AB.x: 1\n  A.clearance: {model", C + 4, "costs.AB.x", "not a group", ""),
     ("  A.clearance: {model", "  dimensions.AB: {model", C + 4, "costs.dimensions.AB", "are the same", "keep one"),
@@ -147,5 +147,5 @@ def test_a_cost_of_what_varies_as_measured_is_doubted(varied: Mechanism, tmp_pat
 def test_a_play_of_a_radius_is_not_for_sale() -> None:
     data = Mechanism.read(EXAMPLES / "fourbar-by-grades.yaml").data()
     data["joints"]["B"]["pin"] = {"radius": "6 mm", "hole_radius": "6.01 mm"}
-    with pytest.raises(MechanismError, match=r"the joint of 'B.clearance' states no clearance"):
+    with pytest.raises(MechanismError, match=r"'B.clearance' cannot be bought: its play comes of the radii"):
         Mechanism(**data)

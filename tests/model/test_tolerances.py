@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -17,10 +18,14 @@ import trunnion
 from trunnion.algebra.dual import Dual, derivative
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.model.check import check_model
+from trunnion.model.limit_texts import number_with
 from trunnion.model.limits import Limits
 from trunnion.model.mechanism import Mechanism
+from trunnion.model.quantity import Quantity
+from trunnion.model.rewrite import rewrite_mechanism
 from trunnion.model.tolerance_parts import DISTRIBUTIONS, OPTIONS, Variation
 from trunnion.model.tolerances import Tolerance
+from trunnion.model.units import KINDS
 from trunnion.statistics import distributions
 
 FindingsOf = Callable[..., tuple[Finding, ...]]
@@ -461,3 +466,79 @@ def test_a_load_of_the_motion_has_no_tolerance(findings_of: FindingsOf) -> None:
     text = VARIED.replace("measures:", "loads: {w: {joint: D, resisting_torque: 1 N m * cos(drive)}}\nmeasures:")
     (found,) = findings_of(text.replace("  AB: ±t", "  AB: ±t\n  w.resisting_torque: ±1 N m"))
     assert "varies with the motion" in found.what
+
+
+# ---- limits that stand with the number ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "half", "digits", "expected"),
+    [
+        ("40 mm ± 0.02 mm", 6.78042419607e-6, 5, "40 mm ± 0.0067804 mm"),
+        ("40 mm ± 0.02 mm", 6.78e-6, 5, "40 mm ± 0.00678 mm"),
+        ("40 ± 0.02 mm", 6.78049e-6, 4, "40 ± 0.00678 mm"),
+        ("40mm±20um", 6.78049e-6, 4, "40mm±6.78um"),
+        ("40 mm +0.02/-0.01 mm", 2.19999e-5, 3, "40 mm +0.0269/-0.0169 mm"),
+        ("40 mm -0.01/+0.02 mm", 2.19999e-5, 3, "40 mm -0.0169/+0.0269 mm"),
+        ("40 mm +0.02 mm/0", 5e-6, 12, "40 mm +0.015 mm/+0.005"),
+        ("2 in ± 0.001 in", 2.54e-5, 5, "2 in ± 0.001 in"),
+        ("r + 3 mm ± 1e-2 mm", 1.23456789e-7, 5, "r + 3 mm ± 0.00012345 mm"),
+        ("40 mm ± 0.02 mm", 0.0, 5, "40 mm ± 0 mm"),
+    ],
+)
+def test_text_of_a_number_with_other_limits(text: str, half: float, digits: int, expected: str) -> None:
+    found = number_with(Quantity.read(text, KINDS["length"]), half, digits)
+    assert found == expected
+    again = Quantity.read(found, KINDS["length"]).tolerance
+    assert again is not None
+    assert half * (1 - 10.0 ** (1 - digits)) - 1e-18 <= (again[1] - again[0]) / 2 <= half * (1 + 1e-9)
+
+
+def test_limits_are_changed_where_they_stand(varied: Mechanism) -> None:
+    """With the number, in its entry of `tolerances`, or else in a new one."""
+    data = varied.data()
+    data["joints"]["A"] = {**data["joints"]["A"], "friction": "0.1 ± 0.02"}
+    data["joint_defaults"] = {**data["joint_defaults"], "friction": "0.2 ± 0.03"}
+    data["tolerances"] = {key: one for key, one in data["tolerances"].items() if "friction" not in key}
+    data["correlations"] = []
+    one = Mechanism(**data)
+    new = {"CD": "±0.0123456 mm", "A.friction.coefficient": 0.01, "B.friction.coefficient": 0.02, "AB": "7 um"}
+    changed = one.with_tolerances(new, 4).data()
+    assert changed["dimensions"]["CD"] == "70 mm ± 0.01234 mm"
+    assert changed["joints"]["A"]["friction"] == "0.1 ± 0.01"
+    assert changed["joint_defaults"] == data["joint_defaults"]
+    assert changed["tolerances"]["joints.B.friction.coefficient"] == "±0.02"
+    assert changed["tolerances"]["CD"] == {"distribution": "uniform"}
+    assert changed["tolerances"]["AB"] == "±0.007 mm"
+    assert set(changed["tolerances"]) == {*data["tolerances"], "joints.B.friction.coefficient"}
+
+
+@pytest.mark.parametrize(
+    ("half", "what"),
+    [
+        ("0.02", "has no unit"),
+        ("0.02 deg", "is an angle where a length is needed"),
+        ("+0.02/-0.01 mm", "half width of"),
+        ("-0.02 mm", "half width of '-0.02 mm'"),
+        ("AB / 1000", "is no number with a unit"),
+        (None, "is empty"),
+        ([1e-5], "is a list"),
+    ],
+)
+def test_texts_that_are_no_half_width(varied: Mechanism, half: object, what: str) -> None:
+    for name in ("AB", "joints.A.clearance"):
+        with pytest.raises(MechanismError, match=re.escape(what)):
+            varied.with_tolerances({name: half})
+
+
+def test_a_model_with_less_in_it_is_rewritten(varied: Mechanism, tmp_path: Path) -> None:
+    """Entries that went, of a file in one line or another: the file that is written holds the mechanism."""
+    (tmp_path / "source.yaml").write_text("# a four-bar\n" + VARIED, encoding="utf-8")
+    bare = {key: one for key, one in varied.data().items() if key != "correlations"}
+    rewrite_mechanism(Mechanism(**bare), tmp_path / "source.yaml", tmp_path / "bare.yaml")
+    assert Mechanism.read(tmp_path / "bare.yaml") == Mechanism(**bare)
+    assert (tmp_path / "bare.yaml").read_text("utf-8").startswith("# a four-bar")
+    named = varied.with_values({"tolerances.D.friction.coefficient": 0.01, "AB": "31 mm"})
+    rewrite_mechanism(named, tmp_path / "source.yaml", tmp_path / "named.yaml")
+    assert Mechanism.read(tmp_path / "named.yaml") == named
+    assert "AB: 31 mm, BC: 90 mm ± 0.02 mm" in (tmp_path / "named.yaml").read_text("utf-8")

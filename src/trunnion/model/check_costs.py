@@ -84,7 +84,13 @@ def cost_values(mechanism: Mechanism, numbers: ParameterSet) -> Iterator[Finding
 
 
 def _unknown(mechanism: Mechanism, name: str, where: str, numbers: ParameterSet) -> Finding:
-    if name.endswith(".clearance") and name.removeprefix("joints.").removesuffix(".clearance") in mechanism.joints:
+    joint = mechanism.effective_joints.get(name.removeprefix("joints.").removesuffix(".clearance"))
+    if name.endswith(".clearance") and joint is not None:
+        if joint.pin is not None and (joint.pin.fit is not None or joint.pin.hole_radius is not None):
+            source = f"the fit {joint.pin.fit.source}" if joint.pin.fit is not None else "the radii of pin and hole"
+            what = f"'{name}' cannot be bought: its play comes of {source}"
+            remedy = "to buy it state pin.clearance instead, or remove the cost: the play stays as it is"
+            return Finding(what, where, remedy)
         what = f"the joint of '{name}' states no clearance"
         return Finding(what, where, "state pin: {clearance: 0.02 mm}, or of a guide guide: {clearance: 0.02 mm}")
     try:

@@ -22,6 +22,7 @@ from trunnion.model.check import check_model
 from trunnion.model.contact import has_play, play
 from trunnion.model.cost_parts import Process
 from trunnion.model.findings import repair, schema_findings
+from trunnion.model.limit_texts import DIGITS
 from trunnion.model.merge import FitChoice, merge_joint
 from trunnion.model.names import nearest
 from trunnion.model.parameters import LIMITS, Location, ParameterSet, nominal_dimensions
@@ -48,7 +49,7 @@ from trunnion.model.parts import (
     Variation,
     VariationDefaults,
 )
-from trunnion.model.prices import Price, prices
+from trunnion.model.prices import FORMULA, Price, cost_paths, prices
 from trunnion.model.quantity import Acceleration, AnyQuantity, Quantity
 from trunnion.model.samples import with_samples
 from trunnion.model.tolerances import (
@@ -266,12 +267,14 @@ class Mechanism(Part):
         """What tolerances and plays cost, by path, as stated in `costs`; in the order of the file."""
         return prices(self)
 
-    def with_tolerances(self, half_widths: Mapping[str, float]) -> Mechanism:
-        """The mechanism with other tolerances: half widths in SI by name, each about the middle of its limits.
+    def with_tolerances(self, half_widths: Mapping[str, float | str], digits: int = DIGITS) -> Mechanism:
+        """The mechanism with other tolerances: half widths by name, each about the middle of its limits.
 
-        The clearance of a joint, `joints.B.clearance`, is replaced itself, SI.
+        A half width is in SI, or a text such as ±0.02 mm. The clearance of a joint, `joints.B.clearance`, is replaced
+        itself. Limits that stand with the number, `40 mm ± 0.02 mm`, are changed there. digits: how many significant
+        ones a half width is rounded down to. MechanismError for what is no half width.
         """
-        return Mechanism(**with_tolerances(self, half_widths))
+        return Mechanism(**with_tolerances(self, half_widths, digits))
 
     def with_samples(self, name: str, path: str | os.PathLike[str]) -> Mechanism:
         """The mechanism with a number that varies as measured: deviations in the one column of a CSV file.
@@ -306,7 +309,7 @@ class Mechanism(Part):
 
     def _location(self, name: str) -> Location:
         """Where what a name means stands, or would stand; MechanismError if it means nothing."""
-        choice = self._choice(name) or self._limits(name)
+        choice = self._choice(name) or self._limits(name) or self._price(name)
         if choice:
             return choice
         entry = self.parameter_set.entries.get(self.path_of(name))
@@ -347,6 +350,19 @@ class Mechanism(Part):
         of = next(stated, of)
         short = key == "limits" and (of not in self.variations or self.variations[of].model_fields_set == {"limits"})
         return (section, of) if short else (section, of, key)
+
+    def _price(self, name: str) -> Location | None:
+        """Where a number of a cost stands, or would stand, by any name of what it is a cost of; None if not meant."""
+        section, _, rest = name.partition(".")
+        of, _, key = rest.rpartition(".")
+        if section != "costs" or key not in (*FORMULA, "least", "most"):
+            return None
+        try:
+            path = self.parameter_set.resolve(of)
+        except MechanismError:
+            path = ""
+        stated = [one for one in self.costs if one == of or (path and path in cost_paths(self, one))]
+        return (section, stated[0], key) if stated else None
 
     def _unstated(self, name: str) -> tuple[str, Location] | None:
         """Path and place of the error of a number, or of a number of a joint, that the file may state and does not."""

@@ -38,6 +38,7 @@ __all__ = [
     "Rate",
     "Stiffness",
     "Time",
+    "deviation_spans",
     "term",
 ]
 
@@ -186,6 +187,13 @@ def _split(text: str, kind: Kind) -> tuple[str, tuple[float, float] | None]:
             raise UnitError(f"the tolerance in '{text}' has a sign after ±", "write ± 0.05 mm")
         deviations.append(-deviations[0])
     return main, (min(deviations), max(deviations))
+
+
+def deviation_spans(text: str) -> list[tuple[int, int]]:
+    """Where the deviations of a tolerance, with their signs, stand in a text of plain signs; empty if it has none."""
+    if found := _SYMMETRIC.match(text):
+        return [found.span(2)]
+    return [found.span(2), found.span(3)] if (found := _LIMITS.match(text)) else []
 
 
 def term(text: str) -> tuple[str, str]:

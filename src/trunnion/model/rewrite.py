@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import json
 import os
-from collections.abc import Mapping, MutableMapping
+import re
+from collections.abc import Iterator, Mapping, MutableMapping
 from io import StringIO
 from pathlib import Path
 from typing import Any
 
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
+from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.file import read_mechanism, write_mechanism
@@ -19,6 +22,7 @@ from trunnion.output import whole
 __all__ = ["rewrite_mechanism"]
 
 YAMLS = (".yaml", ".yml")
+Location = tuple[str | int, ...]
 
 
 def rewrite_mechanism(
@@ -31,25 +35,135 @@ def rewrite_mechanism(
     source, path = Path(source), Path(path)
     if not over and path.exists() and path.samefile(source):
         raise MechanismError(Finding("is the model itself", str(path), "name another file, or add --force"))
-    text = _rewritten(mechanism, source) if {source.suffix.lower(), path.suffix.lower()} <= set(YAMLS) else None
-    if text is None:
-        write_mechanism(mechanism, path)
-        return
+    own = {source.suffix.lower(), path.suffix.lower()} <= set(YAMLS)
     with whole(path) as temporary:
-        temporary.write_text(text, encoding="utf-8", newline="\n")
-        if read_mechanism(temporary) != mechanism:  # a way of writing that was not foreseen: without the comments then
-            write_mechanism(mechanism, temporary)
+        for text in _texts(mechanism, source) if own else ():
+            temporary.write_text(text, encoding="utf-8", newline="\n")
+            if _holds(temporary, mechanism):
+                return
+        write_mechanism(mechanism, temporary)  # a way of writing that was not foreseen: without the comments then
 
 
-def _rewritten(mechanism: Mechanism, source: Path) -> str | None:
+def _holds(path: Path, mechanism: Mechanism) -> bool:
+    try:
+        return read_mechanism(path) == mechanism
+    except MechanismError:
+        return False
+
+
+def _texts(mechanism: Mechanism, source: Path) -> Iterator[str]:
+    """Texts of the mechanism that are to be tried, the one that is most like the source first."""
+    try:
+        text, before = source.read_text("utf-8"), read_mechanism(source).data()
+        found = _edited(text, before, mechanism.data())
+    except (MechanismError, YAMLError, OSError, ValueError, TypeError, LookupError):
+        return
+    if found is not None:
+        yield found
+    again = _rewritten(text, before, mechanism)
+    if again is not None:
+        yield again
+
+
+# ---- values alone ---------------------------------------------------------------------------------------------
+
+
+def _edited(text: str, before: Mapping[str, Any], after: Mapping[str, Any]) -> str | None:
+    """The text with values changed where they stand, and entries added; None if there is more to change."""
+    root = YAML(typ="safe", pure=True).compose(text)
+    edits = [_edit(text, root, location, value) for location, value in _changed(before, after)]
+    for edit in sorted((one for one in edits if one), key=lambda one: one[0])[::-1]:
+        start, end, new = edit
+        rest = text[end:]
+        blanks = len(rest) - len(rest.lstrip(" "))
+        if end > start and rest[blanks : blanks + 1] == "#":  # the comment behind it stays in its column
+            rest = " " * max(1, blanks + end - start - len(new)) + rest[blanks:]
+        text = text[:start] + new + rest
+    return None if None in edits else text
+
+
+def _edit(text: str, root: Node, location: Location, value: Any) -> tuple[int, int, str] | None:
+    """From where to where a text is to be replaced by what; None if a value cannot be put in so."""
+    if not location:
+        return None
+    node, parent, key = _node(root, location), _node(root, location[:-1]), location[-1]
+    if isinstance(node, ScalarNode) and isinstance(value, (str, int, float)):
+        return node.start_mark.index, node.end_mark.index, _scalar(value, quoted=bool(node.style))
+    if node is not None or not isinstance(parent, MappingNode) or not parent.value or value is None:
+        return None
+    entry = f"{_scalar(key, quoted=False)}: {_flow(value)}"
+    if parent.flow_style:
+        end = parent.end_mark.index - 1
+        return end, end, f", {entry}"
+    if parent is root and isinstance(value, Mapping):
+        lines = (f"  {_scalar(name, quoted=False)}: {_flow(one)}\n" for name, one in value.items())
+        return len(text), len(text), f"{'' if text.endswith(chr(10)) else chr(10)}{key}:\n{''.join(lines)}"
+    first, last = parent.value[0][0], parent.value[-1][1]
+    if not (isinstance(last, ScalarNode) or last.flow_style):
+        return None
+    end = text.find("\n", last.end_mark.index)
+    end = len(text) if end < 0 else end
+    return end, end, f"\n{' ' * first.start_mark.column}{entry}"
+
+
+def _flow(value: Any) -> str:
+    """A value on one line."""
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{_scalar(key, quoted=False)}: {_flow(one)}" for key, one in value.items()) + "}"
+    return f"[{', '.join(map(_flow, value))}]" if isinstance(value, list) else _scalar(value, quoted=False)
+
+
+def _changed(before: Any, after: Any, location: Location = ()) -> Iterator[tuple[Location, Any]]:
+    """Where two sets of plain data differ, and what the second has there; the whole group if entries came or went."""
+    if before == after:
+        return
+    if isinstance(before, Mapping) and isinstance(after, Mapping) and before.keys() <= after.keys():
+        for key, value in after.items():
+            if key in before:
+                yield from _changed(before[key], value, (*location, key))
+            else:
+                yield (*location, key), value
+    elif isinstance(before, list) and isinstance(after, list) and len(before) == len(after):
+        for index, value in enumerate(after):
+            yield from _changed(before[index], value, (*location, index))
+    else:
+        yield location, after
+
+
+def _node(root: Node, location: Location) -> Node | None:
+    """The node of a value; None if there is none, as where the file has a short form of it."""
+    node = root
+    for key in location:
+        if isinstance(node, MappingNode):
+            found = next((value for name, value in node.value if name.value == str(key)), None)
+        else:
+            there = isinstance(node, SequenceNode) and isinstance(key, int) and key < len(node.value)
+            found = node.value[key] if there else None
+        if found is None:
+            return None
+        node = found
+    return node
+
+
+def _scalar(value: float | str, *, quoted: bool) -> str:
+    """A value as it stands in a file, in quotation marks if they were there or are needed."""
+    if not isinstance(value, str):
+        return json.dumps(value)
+    plain = re.fullmatch(r"[\w±+.-][^\n:#,\[\]{}\"']*", value) and value == value.strip()
+    return value if plain and not quoted else json.dumps(value, ensure_ascii=False)
+
+
+# ---- entries that came or went --------------------------------------------------------------------------------
+
+
+def _rewritten(text: str, before: Mapping[str, Any], mechanism: Mechanism) -> str | None:
     """The text of the source with what is different put in; None if it cannot be had."""
     yaml = YAML(typ="rt", pure=True)
     yaml.preserve_quotes = True
     yaml.allow_unicode = True
     yaml.width = 4096  # lines stay as long as they are
     try:
-        before = read_mechanism(source).data()
-        tree = yaml.load(source.read_text("utf-8"))
+        tree = yaml.load(text)
         _change(tree, before, mechanism.data())
         stream = StringIO()
         yaml.dump(tree, stream)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from itertools import combinations
+from itertools import combinations, pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, MechanismError
+from trunnion.model.limit_texts import DIGITS, half_width, limits_text, number_with, written
 from trunnion.model.limits import Limits
-from trunnion.model.parameters import Entry, ParameterSet, measured
+from trunnion.model.parameters import Entry, Location, ParameterSet, measured
 from trunnion.model.quantity import Quantity
 from trunnion.model.tolerance_parts import DISTRIBUTIONS, Variation
 from trunnion.model.units import KINDS, Kind, UnitError
@@ -42,7 +43,6 @@ __all__ = [
 
 DEFAULTS = "joint_defaults."
 FULL_TURN = "direction"  # the distribution over all directions
-SHOWN_UNITS = {"length": ("mm", 1e3), "angle": ("deg", 180 / np.pi)}  # in which a tolerance is written
 
 
 @dataclass(frozen=True)
@@ -230,18 +230,22 @@ def clearance_of(mechanism: Mechanism, name: str, numbers: ParameterSet | None =
     return next((path for path in paths if path in known), "")
 
 
-def with_tolerances(mechanism: Mechanism, half_widths: Mapping[str, float]) -> dict[str, Any]:
-    """Plain data of the mechanism with other half widths of tolerances, and other clearances, SI, by name."""
+def with_tolerances(
+    mechanism: Mechanism, half_widths: Mapping[str, float | str], digits: int = DIGITS
+) -> dict[str, Any]:
+    """Plain data of the mechanism with other half widths of tolerances, and other clearances, SI or text, by name."""
     numbers = mechanism.parameter_set
     kinds = measured(mechanism, numbers.entries.values())
     known = {one.path: one for one in tolerated(mechanism)}
     stated = variations(mechanism, numbers)
     clearances: dict[str, float | str] = {}
+    texts: list[tuple[Location, str]] = []
     entries: dict[str, Any] = {}
     findings: list[Finding] = []
-    for name, half in half_widths.items():
+    for name, told in half_widths.items():
         if play := clearance_of(mechanism, name):
-            clearances[play] = _written(half, KINDS["length"])
+            half = _half(told, KINDS["length"], name, findings)
+            clearances[play] = written(half, KINDS["length"], digits)
             continue
         path = mechanism.path_of(name)
         tolerance = known.get(path)
@@ -249,21 +253,24 @@ def with_tolerances(mechanism: Mechanism, half_widths: Mapping[str, float]) -> d
             what = "has no tolerance" if tolerance is None else "varies as measured or over a full turn"
             findings.append(Finding(f"'{name}' {what}, none can be replaced", remedy="state limits in tolerances: {…}"))
             continue
-        if not (np.isfinite(half) and half >= 0):
-            findings.append(Finding(f"a half width of {half:g} is none", path, "give a number of at least 0, SI"))
-            continue
+        half = _half(told, kinds[path], name, findings)
         key, variation = stated.get(path, ("", Variation()))
-        middle = (tolerance.lower + tolerance.upper) / 2
-        text = _limits_text(middle, half, kinds[path])
-        own = key if key and not numbers.resolve(key).startswith(DEFAULTS) else path
+        if variation.limits is None and (own := _in_place(mechanism, numbers.entries[path], half, digits)):
+            texts.append(own)
+            continue
+        text = limits_text((tolerance.lower + tolerance.upper) / 2, half, kinds[path], digits)
+        own_key = key if key and not numbers.resolve(key).startswith(DEFAULTS) else path
         group = variation.model_copy(update={"limits": Limits.read(text)})
-        entries[own] = Variation(**{one: getattr(group, one) for one in {*variation.model_fields_set, "limits"}})
+        entries[own_key] = Variation(**{one: getattr(group, one) for one in {*variation.model_fields_set, "limits"}})
     if findings:
         raise MechanismError(findings)
     data = (mechanism.with_values(clearances) if clearances else mechanism).data()
+    for location, text in texts:
+        holder, last = _holder(data, location)
+        holder[last] = text
     if entries:
-        written = {key: one.model_dump(mode="json", exclude_unset=True) for key, one in entries.items()}
-        data["tolerances"] = {**data.get("tolerances", {}), **written}
+        plain = {key: one.model_dump(mode="json", exclude_unset=True) for key, one in entries.items()}
+        data["tolerances"] = {**data.get("tolerances", {}), **plain}
     return data
 
 
@@ -286,7 +293,8 @@ def keep_limits(mechanism: Mechanism, name: str, value: Any, data: dict[str, Any
     stated = data.setdefault("tolerances", {})
     known = variations(mechanism, numbers).get(entry.path, ("", Variation()))
     key = known[0] or entry.path
-    text = _limits_text((lower + upper) / 2, (upper - lower) / 2, entry.kind)
+    kind = measured(mechanism, numbers.entries.values())[entry.path]
+    text = limits_text((lower + upper) / 2, (upper - lower) / 2, kind, DIGITS)
     if known[1].limits is None:
         own = stated.get(key, {})
         stated[key] = {**(own if isinstance(own, dict) else {}), "limits": text}
@@ -299,18 +307,38 @@ def _paths(numbers: ParameterSet, name: str) -> list[str]:
         return []
 
 
-def _written(value: float, kind: Kind, sign: str = "") -> str:
-    """A value with its unit, to 12 digits."""
-    unit, factor = SHOWN_UNITS.get(kind.name, (kind.unit if kind.dimensions and kind.unit != "1" else "", 1.0))
-    return f"{value * factor:{sign}.12g} {unit}".strip()
+def _half(told: float | str, kind: Kind, name: str, findings: list[Finding]) -> float:
+    """A half width in SI; 0 and a finding if it is none."""
+    try:
+        return half_width(told, kind, name)
+    except MechanismError as error:
+        findings += error.findings
+        return 0.0
 
 
-def _limits_text(middle: float, half: float, kind: Kind) -> str:
-    """Limits about a middle, as a file has them."""
-    if abs(middle) <= 1e-12 * half or (middle == 0 == half):
-        return f"±{_written(half, kind)}"
-    upper, lower = (_written(end, kind, "+") for end in (middle + half, middle - half))
-    return f"{upper}/{lower}"
+def _in_place(mechanism: Mechanism, entry: Entry, half: float, digits: int) -> tuple[Location, str] | None:
+    """Where the text of a number that carries its own limits stands, and the text with others; None if it has none."""
+    if entry.alias or not entry.quantity.tolerance:
+        return None
+    try:
+        holder, last = _holder(mechanism.data(), entry.location)
+        there = holder[last]
+    except (KeyError, IndexError, TypeError):
+        return None
+    text = number_with(entry.quantity, half, digits) if there == entry.quantity.source else None
+    return None if text is None else (entry.location, text)
+
+
+def _holder(data: dict[str, Any], location: Location) -> tuple[Any, Any]:
+    """The group or list in which an entry of plain data stands, and its key there; short forms are looked through."""
+    holder: Any = data
+    for key, following in pairwise(location):
+        if isinstance(holder[key], str):  # a coefficient of friction by itself
+            return holder, key
+        if following == "at" and isinstance(holder[key], list):  # a point that is nothing but its place
+            return holder[key], location[-1]
+        holder = holder[key]
+    return holder, location[-1]
 
 
 # ---- numbers that are no more ---------------------------------------------------------------------------------

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from trunnion.errors import Finding, MechanismError
+from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.options import IMAGES, File, FrictionLaw, Measures, Out, Report, Set, Steps, TableFile, UnitsRow
 from trunnion.terminal import bar, console, findings_of, say, show_rows, wrote
 from trunnion.verbs.model import exit_status, lines_of, placed, stated
@@ -23,6 +23,7 @@ __all__ = ["allocate"]
 
 FEW = 2_000_000  # configurations up to which further processes cost more than they save
 STOPPED = 130
+WRITTEN = 5  # significant digits of a tolerance in the model that is written
 
 
 class Criterion(StrEnum):
@@ -84,7 +85,7 @@ def allocate(
     units_row: UnitsRow = False,
 ) -> None:
     """Tolerances and plays of least cost that keep the limits of measures, verified; what accuracy costs."""
-    from trunnion.analysis.allocation.allocate import DEFAULT_YIELD, half_widths
+    from trunnion.analysis.allocation.allocate import DEFAULT_YIELD
     from trunnion.analysis.allocation.allocate import allocate as run
 
     _check(file, write, force, out or [], report, kind)
@@ -98,16 +99,31 @@ def allocate(
             seed, curve, exact=exact, jobs=jobs, progress=progress,
         )  # fmt: skip
     written = _show(result, out or [], units_row, kind, report)
-    if write is not None and result.attrs["found"]:
+    findings = findings_of(result)
+    if write is not None and result.attrs["found"] and not result.attrs["stopped"] and not exit_status(findings):
         from trunnion.model.rewrite import rewrite_mechanism
 
-        rewrite_mechanism(mechanism.with_tolerances(half_widths(result)), file, write, force)
+        rewrite_mechanism(_bought(mechanism, result), file, write, force)
         written.append(write)
+    elif write is not None:
+        why = "the limits are not kept with the tolerances found" if result.attrs["found"] else "there is no allocation"
+        why = "stopped before the tolerances were verified" if result.attrs["stopped"] else why
+        findings.append(Finding(f"'{write}' is not written: {why}", "--write", "", Severity.ERROR))
     for path in written:
         wrote(path)
-    findings = findings_of(result)
     say(placed(_named(findings, mechanism), file, ["measures", "joints", "tolerances", "costs"]))
     raise typer.Exit(STOPPED if result.attrs["stopped"] else exit_status(findings))
+
+
+def _bought(mechanism: Mechanism, result: xr.Dataset) -> Mechanism:
+    """The mechanism with what was found: options as they are, all others rounded down, so that the limits hold."""
+    from trunnion.analysis.allocation.allocate import half_widths
+
+    found = half_widths(result)
+    made = dict(zip(result["parameter"].values.tolist(), result["choice"].values.tolist(), strict=True))
+    options = {path: t for path, t in found.items() if made[path]}
+    others = {path: t for path, t in found.items() if not made[path]}
+    return mechanism.with_tolerances(options).with_tolerances(others, WRITTEN)
 
 
 def _check(file: Path, write: Path | None, force: bool, out: list[Path], report: Path | None, kind: str | None) -> None:

@@ -46,6 +46,9 @@ def headed(result: xr.Dataset) -> str:
     criterion = CRITERIA[str(result.attrs["criterion"])]
     if result.attrs["criterion"] == "yield":
         criterion += f" of {share(float(result.attrs['target']))}"
+        sampled = float(result["yield_all"]) if "yield_all" in result else math.nan
+        if sampled < float(result.attrs["target"]):
+            criterion += f" (sampled {_share(sampled)})"
     cost, before = float(result["cost_total"]), float(result["cost_total_before"])
     told = f"{criterion}: cost {cost:.8g}"
     told += f", as stated {before:.8g}" if math.isfinite(before) else ""

@@ -239,7 +239,9 @@ def _prices(found: Study) -> tuple[dict[str, Price], list[Finding]]:
         elif one.path in known and known[one.path].direction:
             what = "it may point anywhere: its tolerance has no middle to stay at"
         elif plays := _plays_of(found, one.path):
-            what = f"it changes the play of {', '.join(plays)}: buy the clearance, {plays[0]}.clearance, instead"
+            what = (
+                f"it changes the play of {', '.join(plays)}: state pin.clearance and buy {plays[0]}.clearance instead"
+            )
         if what:
             remedy = "remove the cost; the tolerance stays as it is"
             findings.append(Finding(f"cannot be bought, {what}", f"costs.{one.path}", remedy, Severity.WARNING))

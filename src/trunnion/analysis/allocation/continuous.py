@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from trunnion.analysis.allocation.cones import settled
 from trunnion.analysis.allocation.interior import Point, polished
-from trunnion.analysis.allocation.problem import PROVEN, Answer, Problem, none, shortfall
+from trunnion.analysis.allocation.problem import PROVEN, Answer, Problem, none, shortfalls
 from trunnion.analysis.allocation.sides import sides
 from trunnion.analysis.allocation.task import Task, task_of
 from trunnion.errors import Finding, Severity
@@ -33,10 +33,10 @@ def allocate_continuous(problem: Problem) -> Answer:
         what = "has a table of processes, which is no continuous choice"
         return none(problem, [Finding(what, f"costs.{chosen[0]}", "choose discrete, or give it a cost model")])
     task = task_of(problem, sides(problem))
-    early = shortfall(problem, task.tolerances(task.low)) if np.any(task.sides.room < 0) else None
+    early = shortfalls(problem, task.tolerances(task.low)) if np.any(task.sides.room < 0) else []
     trouble = early or unbounded(task) or unmet(problem, task)
     if trouble:
-        return none(problem, [trouble])
+        return none(problem, trouble)
     point = minimise(task)
     if point is None:
         what = "the solver found no allocation, though nothing says that the limits cannot be kept"
@@ -69,24 +69,22 @@ def answer_of(problem: Problem, task: Task, point: Point) -> Answer:
     )
 
 
-def unbounded(task: Task) -> Finding | None:
+def unbounded(task: Task) -> list[Finding]:
     """What no limit and no bound holds."""
     free = np.flatnonzero(~np.isfinite(task.most))
-    if not len(free):
-        return None
     what = "no limit bounds this tolerance: the wider, the cheaper"
-    return Finding(what, f"costs.{task.names[free[0]]}", "state `most`")
+    return [Finding(what, f"costs.{task.names[one]}", "state `most`") for one in free]
 
 
-def unmet(problem: Problem, task: Task) -> Finding | None:
-    """Why no half widths keep the limits; None if some do."""
+def unmet(problem: Problem, task: Task) -> list[Finding]:
+    """Why no half widths keep the limits; empty if some do."""
     least = task.tolerances(task.low)
     if task.sides.rising or not np.all(task.sides.room > 0):
-        return shortfall(problem, least)
+        return shortfalls(problem, least)
     if np.all(task.sides.value(least) <= 1):
-        return None
+        return []
     found = settled(task, relaxed=True)
-    return shortfall(problem, task.tolerances(found[0])) if found else None
+    return shortfalls(problem, task.tolerances(found[0])) if found else []
 
 
 def minimise(task: Task) -> Point | None:

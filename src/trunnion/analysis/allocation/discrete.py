@@ -23,7 +23,7 @@ from scipy.optimize import Bounds, LinearConstraint, milp
 
 from trunnion.analysis.allocation.continuous import allocate_continuous, minimise, unbounded
 from trunnion.analysis.allocation.interior import Point
-from trunnion.analysis.allocation.problem import ALLOWED, PROVEN, Answer, Contribution, Problem, none, shortfall
+from trunnion.analysis.allocation.problem import ALLOWED, PROVEN, Answer, Contribution, Problem, none, shortfalls
 from trunnion.analysis.allocation.sides import Sides, sides
 from trunnion.analysis.allocation.task import Task, task_of
 from trunnion.errors import Finding, Severity
@@ -44,9 +44,9 @@ def allocate_discrete(problem: Problem) -> Answer:
     if not groups:
         return allocate_continuous(problem)
     search = _Search(problem, groups)
-    early = search.unmet() if np.any(search.limits.room < 0) else None
+    early = search.unmet() if np.any(search.limits.room < 0) else []
     trouble = early or unbounded(search.task) or search.unmet()
-    return none(problem, [trouble]) if trouble else search.run()
+    return none(problem, trouble) if trouble else search.run()
 
 
 @dataclass
@@ -95,15 +95,15 @@ class _Search:
         """How many unknowns there are."""
         return self.chosen + len(self.task.unit) + len(self.task.costs)
 
-    def unmet(self) -> Finding | None:
+    def unmet(self) -> list[Finding]:
         """Why no choice keeps the limits: told only where the narrowest half widths are the best to be had."""
         if any(not names for names in self.names):
             which = next(k for k, names in enumerate(self.names) if not names)
             one = self.problem.contributions[self.members[which][0]]
-            return Finding("no option of the group lies between the bounds of all", f"costs.{one.name}", "widen them")
+            return [Finding("no option of the group lies between the bounds of all", f"costs.{one.name}", "widen them")]
         if not self.limits.rising and np.all(self.limits.room > 0):
-            return None
-        return shortfall(self.problem, self.narrowest())
+            return []
+        return shortfalls(self.problem, self.narrowest())
 
     def narrowest(self) -> Array:
         """The least half widths of all, m or rad."""
@@ -238,9 +238,9 @@ class _Search:
     def _answer(self, best: _Best, bound: float, rounds: int) -> Answer:
         problem = self.problem
         if not np.isfinite(best.cost):
-            found = shortfall(problem, self.narrowest())
             what = "no choice of processes keeps the limits"
-            return none(problem, [found or Finding(what, "processes", "widen a limit or add a finer process")])
+            doubt = Finding(what, "processes", "widen a limit or add a finer process")
+            return none(problem, shortfalls(problem, self.narrowest()) or [doubt])
         u = best.point.u if best.point else np.zeros(0)
         gap = max(best.cost - bound, 0.0) / self.scale + (best.point.gap if best.point else 0.0)
         costs = self.prices @ best.taken

@@ -268,15 +268,28 @@ def none(problem: Problem, findings: Sequence[Finding]) -> Answer:
     )
 
 
-def shortfall(problem: Problem, least: Array) -> Finding | None:
-    """What a limit would have to be if it is broken even with all tolerances at their least; None if none is.
+def shortfalls(problem: Problem, least: Array) -> list[Finding]:
+    """Of each measure with limits that are broken even with all tolerances at their least what they would have to be.
 
     least: the half widths, m or rad, that are the least to be had.
     """
     used, effects = problem.used(least), problem.effects
-    row = int(np.argmax(used))
-    if used[row] <= 1 + ALLOWED:
-        return None
+    own: dict[str, list[int]] = {}
+    for row in range(len(used)):
+        own.setdefault(effects.label(row) if effects.labels else "", []).append(row)
+    found = []
+    for rows in own.values():
+        over = [row for row in rows if used[row] > 1 + ALLOWED]
+        if over:
+            places, broken = (len({effects.place(row) for row in some}) for some in (rows, over))
+            more = f"; {broken} of {places} positions are beyond their limits" if places > 1 else ""
+            found.append(_shortfall(problem, least, max(over, key=lambda row: used[row]), more))
+    return found
+
+
+def _shortfall(problem: Problem, least: Array, row: int, more: str) -> Finding:
+    """That a row cannot keep its limit, and what has the largest part in that."""
+    effects = problem.effects
     low, high = (float(one[row]) for one in problem.at(least))
     lower, upper = float(effects.lower[row]), float(effects.upper[row])
     over, limit = (high, upper) if high - upper >= lower - low else (low, lower)
@@ -284,9 +297,6 @@ def shortfall(problem: Problem, least: Array) -> Finding | None:
     largest = problem.contributions[int(np.argmax(parts))]
     kept = "which has no cost and stays as it is" if largest.fixed else "which is at its least"
     ratio = f", {over / limit:.3g} times the limit" if over * limit > 0 else ""
-    many = int(np.sum(used > 1 + ALLOWED))
-    rows = "positions" if effects.places else "rows"
-    more = f"; {many} of {len(used)} {rows} are beyond their limits" if many > 1 else ""
     return Finding(
         f"no tolerances keep the limit {effects.say(row, limit)}: with all at their least it takes "
         f"{effects.say(row, over)}{effects.place(row)}{ratio}{more}",

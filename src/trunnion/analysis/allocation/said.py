@@ -63,16 +63,28 @@ def findings_of(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:
     if found.asked.criterion == "worst-case":
         yield from _searched(found, known)
     if found.asked.criterion == "yield" and "yield_all" in known and answer.sampled is not None:
-        share, high = float(known["yield_all"]), float(known["yield_all_high"])
-        if high < found.asked.target and not any(one.where == "yield" for one in answer.findings):
-            what = f"the yield of the samples is {share:.6g}, {found.asked.target:g} was asked for"
-            yield Finding(what, "yield", "ask for more, or allow narrower tolerances")
-    offers = [factor for factor, one in found.offers if not one.found]
-    if offers:
-        what = f"{len(offers)} of the {len(found.offers)} points of the curve have no tolerances that keep the limits"
-        yield Finding(
-            what, "", f"limits of at least {max(offers):.3g} times the stated ones can be kept", Severity.NOTE
-        )
+        yield from _yielded(found, known)
+    missing = [factor for factor, one in found.offers if not one.found]
+    if missing:
+        least = min((factor for factor, one in found.offers if one.found), default=np.nan)
+        points = f"1 of the {len(found.offers)} points of the curve has"
+        if len(missing) > 1:
+            points = f"{len(missing)} of the {len(found.offers)} points of the curve have"
+        remedy = f"limits of at least {least:.3g} times the stated ones can be kept" if np.isfinite(least) else ""
+        yield Finding(f"{points} no tolerances that keep the limits", "", remedy, Severity.NOTE)
+
+
+def _yielded(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:
+    """That the samples have less than the yield asked for: an error if it is not within their interval."""
+    target, any_other = found.asked.target, any(one.where == "yield" for one in found.answer.findings)
+    share, low, high = (float(known[f"yield_all{end}"]) for end in ("", "_low", "_high"))
+    if high < target and not any_other:
+        what = f"the yield of the samples is {share:.6g}, {target:g} was asked for"
+        yield Finding(what, "yield", "ask for more, or allow narrower tolerances")
+    elif share < target <= high:
+        what = f"the yield of the samples is {share:.6g}, less than {target:g}, which lies in its interval "
+        remedy = "take more samples, or ask for more, to be surer"
+        yield Finding(f"{what}{low:.6g} to {high:.6g}", "yield", remedy, Severity.NOTE)
 
 
 def _searched(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:

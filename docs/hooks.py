@@ -20,7 +20,7 @@ import shlex
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 from xml.etree.ElementTree import Element
@@ -252,10 +252,29 @@ def tolerances_table() -> str:
     """Every variable of a tolerance analysis."""
     from trunnion.analysis.tolerance.result import VARIABLES
 
-    told = {"": "of the measure", "parameter": "of the parameter", "ratio": "one by the other", "drive": "rad, m, s"}
+    return _toleranced(VARIABLES)
+
+
+def allocations_table() -> str:
+    """Every variable of an allocation beside those of the tolerance analysis."""
+    from trunnion.analysis.allocation.result import VARIABLES
+
+    return _toleranced(VARIABLES)
+
+
+def _toleranced(variables: Mapping[str, Any]) -> str:
+    told = {
+        "": "of the measure", "parameter": "of the parameter", "ratio": "one by the other", "drive": "rad, m, s",
+        "1/": "1 by that of the measure",
+    }  # fmt: skip
     rows = [
-        (_code(name), ", ".join(one.dims), told.get(one.units) or _unit(one.units), one.long_name)
-        for name, one in VARIABLES.items()
+        (
+            _code(name),
+            ", ".join(one.dims),
+            "" if name == "choice" else told.get(one.units) or _unit(one.units),
+            one.long_name,
+        )
+        for name, one in variables.items()
     ]
     return _rows(("variable", "dimensions", "unit", "meaning"), rows)
 
@@ -602,6 +621,7 @@ TABLES: dict[str, Callable[..., str]] = {
     "sweeps": sweeps_table,
     "plays": plays_table,
     "tolerances": tolerances_table,
+    "allocations": allocations_table,
     "measures": measures_table,
     "distributions": distributions_table,
     "cost-models": costs_table,

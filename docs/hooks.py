@@ -546,17 +546,20 @@ SECTIONS = ("Link", "Point", "PolarPoint", "InertiaTensor", "Joint", "Pin", "Gui
 
 
 def meanings() -> dict[str, dict[str, str]]:
-    """What each key means, by class and key; the tables below refuse to be built if one is missing or too many."""
+    """What each key means, by class and key, where its class has no descriptions of its own.
+
+    The tables below refuse to be built if one is missing or too many.
+    """
     return yaml.safe_load((DOCS / "meanings.yaml").read_text("utf-8"))
 
 
 def section(name: str) -> str:
     """The keys of one section: what each takes, its default, its meaning."""
-    told = meanings()[name]
     fields = {field.alias or key: field for key, field in _class(name).model_fields.items()}
+    told = meanings().get(name) or {key: field.description for key, field in fields.items() if field.description}
     stray = set(told) ^ set(fields)
     if stray:
-        raise PluginError(f"docs/meanings.yaml, {name}: {', '.join(sorted(stray))} is told or stated, not both")
+        raise PluginError(f"{name}: {', '.join(sorted(stray))} is told or stated, not both")
     rows = [(_code(key), _takes(field), _default(field), told[key]) for key, field in fields.items()]
     return _rows(("key", "takes", "default", "meaning"), rows)
 

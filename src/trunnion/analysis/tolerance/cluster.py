@@ -120,7 +120,11 @@ class Cluster(Generic[T]):
             warnings.simplefilter("ignore")  # versions are compared by the workers, ports are no matter
             if self._address == "local":
                 # a range that ends its third worker is given up, as `Processes` does it
-                config = {"distributed.scheduler.allowed-failures": DEATHS - 1}
+                config = {
+                    "distributed.scheduler.allowed-failures": DEATHS - 1,
+                    # a worker that dies while it starts tells so before it hears of `silence_logs`
+                    "distributed.nanny.pre-spawn-environ.DASK_LOGGING__DISTRIBUTED": "critical",
+                }
                 with unheard(), dask.config.set(config):
                     options: dict[str, Any] = {"threads_per_worker": 1, "dashboard_address": None, "memory_limit": 0}
                     local = LocalCluster(n_workers=jobs, silence_logs=logging.CRITICAL + 1, **options)

@@ -1,4 +1,4 @@
-"""Tolerance studies: `python -m benchmarks.tolerances`, or `make bench-tolerances`.
+"""Tolerance studies: `python -m benchmarks.tolerances`.
 
 Time a configuration (one sample at one position), workers, memory with the number of samples, the peer, and the
 accuracy of Sobol points beside plain ones. All contenders of a table run in one go on one machine; read the ratios.

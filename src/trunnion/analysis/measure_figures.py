@@ -2,8 +2,8 @@
 
 A course is what `Measure.curve` gives at the positions of a `measure_positions.Plan`; `reference` keeps that of the
 nominal mechanism once, `figure` makes the numbers of many samples. Angles follow those of the nominal mechanism, from
-which they are less than half a turn away. Extremes lie between positions too (`extremes`: value off by O(h⁵), place by
-O(h⁴), h the step, where the course is smooth); means are sums over a period, which a smooth course leaves nearly exact,
+which they are less than half a turn away. Extremes lie between positions too (`extremes`: value off by O(h⁷), place by
+O(h⁶), h the step, where the course is smooth); means are sums over a period, which a smooth course leaves nearly exact,
 and trapezoids over a range, off by O(h²). A figure is NaN where a position that it needs has no answer, and a dead
 centre that is not within its range is NaN.
 

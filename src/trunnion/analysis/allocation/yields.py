@@ -123,7 +123,7 @@ def _expected(problem: Problem, target: float, solve: Callable[[Problem], Answer
         return min(enough, key=lambda one: one.cost)
     best = max(tried, key=lambda one: one.expected)
     what = f"with all tolerances as narrow as they can be the yield is {best.expected:.6g}, not {target:g}"
-    doubt = Finding(what, "yield", "allow narrower tolerances, widen a limit or ask for less", Severity.WARNING)
+    doubt = Finding(what, "yield", "allow narrower tolerances, widen a limit or ask for less", Severity.ERROR)
     return replace(best, findings=(*best.findings, doubt))
 
 
@@ -161,7 +161,7 @@ def _sampled(answer: Answer, target: float, solve: Callable[[Problem], Answer], 
         return replace(best, trials=tuple(trials))
     share = best.sampled.share if best.sampled else np.nan
     what = f"the best yield that was sampled is {share:.6g}, not {target:g}"
-    doubt = Finding(what, "yield", "allow narrower tolerances, widen a limit or ask for less", Severity.WARNING)
+    doubt = Finding(what, "yield", "allow narrower tolerances, widen a limit or ask for less", Severity.ERROR)
     return replace(best, trials=tuple(trials), findings=(*best.findings, doubt))
 
 

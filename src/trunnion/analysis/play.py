@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.dual import Dual, derivative, primal
+from trunnion.algebra.dual import Dual, derivative
 from trunnion.algebra.namespace import Number
 from trunnion.analysis import kinetostatics, shifts
 from trunnion.analysis.account import model_notes
@@ -174,13 +174,7 @@ def _check(known: Mapping[str, Play]) -> None:
     if not known:
         remedy = "state joints.NAME.pin.clearance (guide.clearance), such as 20 um"
         raise MechanismError(Finding("no joint states a clearance", "joints", remedy))
-    findings = []
-    for name, one in known.items():
-        if np.any(np.isnan(primal(one.length))):
-            assert one.model.size is not None  # else the length is 1
-            part, keys = one.model.size
-            what = "the length over which its ends lie apart is not stated"
-            findings.append(Finding(what, f"joints.{name}.{part}", f"state joints.{name}.{part}.{keys[0]}"))
+    findings = [finding for name, one in known.items() for finding in shifts.unstated_length(name, one)]
     if findings:
         raise MechanismError(findings)
 

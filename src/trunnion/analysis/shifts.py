@@ -16,11 +16,12 @@ from trunnion.algebra import rigid
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.space import plus, scaled
+from trunnion.errors import Finding
 from trunnion.groups import planar
 from trunnion.joints.clearance import CLEARANCE_MODELS, ClearanceModel, leaning
 from trunnion.model.contact import clearance
 
-__all__ = ["Play", "hole", "misaligned", "misaligned_planar", "play_of", "seated", "seated_planar"]
+__all__ = ["Play", "hole", "misaligned", "misaligned_planar", "play_of", "seated", "seated_planar", "unstated_length"]
 
 Values = Mapping[str, Number]
 
@@ -52,6 +53,16 @@ def length_of(model: ClearanceModel, values: Values, joint: str) -> Number:
         return 1.0
     part, keys = model.size
     return next((values[path] for key in keys if (path := f"joints.{joint}.{part}.{key}") in values), np.nan)
+
+
+def unstated_length(joint: str, play: Play) -> list[Finding]:
+    """What there is to say where the length over which the ends of a play lie apart is not known."""
+    if not np.any(np.isnan(primal(play.length))):
+        return []
+    assert play.model.size is not None  # else the length is 1
+    part, keys = play.model.size
+    what = "the length over which its ends lie apart is not stated"
+    return [Finding(what, f"joints.{joint}.{part}", f"state joints.{joint}.{part}.{keys[0]}")]
 
 
 def hole(frame: rigid.Frame, values: Values, joint: str) -> rigid.Frame:

@@ -14,7 +14,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
 from trunnion.analysis import shifts
 from trunnion.analysis.analyse import Run
@@ -146,11 +145,7 @@ def inputs_of(run: Run) -> Inputs:
         raise MechanismError(Finding("nothing has a tolerance or a clearance", "tolerances", remedy))
     findings = list(_uneven(mechanism, tolerances))
     for name, play in plays.items():
-        if np.any(np.isnan(primal(play.length))):
-            assert play.model.size is not None  # else the length is 1
-            part, keys = play.model.size
-            what = "the length over which its ends lie apart is not stated"
-            findings.append(Finding(what, f"joints.{name}.{part}", f"state joints.{name}.{part}.{keys[0]}"))
+        findings += shifts.unstated_length(name, play)
     if findings:
         raise MechanismError(findings)
     marginals = [Marginal(one.distribution, one.lower, one.upper, one.options) for one in tolerances]

@@ -1,0 +1,103 @@
+"""What a measurement is to the analysis: courses over the cycle, turn by turn, with what is known of their accuracy.
+
+Everything is SI. A measurement has conditions, a condition has courses, a course has one row for each turn.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.errors import Finding
+
+__all__ = ["Accuracy", "Condition", "Course", "Measurement"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """Standard uncertainties of a channel that averaging does not lessen.
+
+    zero: of its zero, in the unit of the course; gain: of its gain, relative; they are the same at every position of
+    all turns of a file.
+    """
+
+    zero: float = 0.0
+    gain: float = 0.0
+
+
+@dataclass(frozen=True)
+class Course:
+    """One channel in one condition.
+
+    channel: its name in the mapping; measures: what it measures, as `analysis.measures.named` reads it (`effort:input`,
+    `rate:output`, `load:brake`); unit: SI; turns: (turn, position), NaN where there is nothing to be had.
+    """
+
+    channel: str
+    measures: str
+    unit: str
+    turns: Array
+    accuracy: Accuracy = Accuracy()
+
+    @cached_property
+    def count(self) -> NDArray[np.intp]:
+        """Turns that have a value, (position,)."""
+        return np.asarray(np.count_nonzero(np.isfinite(self.turns), axis=0))
+
+    @cached_property
+    def mean(self) -> Array:
+        """Mean over the turns, (position,); NaN where no turn has a value."""
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)
+            return np.asarray(np.nanmean(self.turns, axis=0))
+
+    @cached_property
+    def scatter(self) -> Array:
+        """Standard deviation between turns, (position,); NaN with fewer than two."""
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)
+            return np.asarray(np.nanstd(self.turns, axis=0, ddof=1))
+
+    @cached_property
+    def uncertainty(self) -> Array:
+        """Standard uncertainty of the mean, (position,): scatter/√n, zero and gain; GUM (JCGM 100:2008), 4.2 and 5.1.
+
+        NaN with fewer than two turns.
+        """
+        repeated = self.scatter / np.sqrt(np.maximum(self.count, 1))
+        return np.sqrt(repeated**2 + self.accuracy.zero**2 + (self.accuracy.gain * self.mean) ** 2)
+
+
+@dataclass(frozen=True)
+class Condition:
+    """One working condition: what was set, and what was measured over the cycle.
+
+    values: numbers of the model that were set or measured once, by name, SI, for `Mechanism.with_values`;
+    phase: (position,), share of the cycle from the start of the model's, in [0, 1); files: where it comes from.
+    """
+
+    name: str
+    values: Mapping[str, float]
+    phase: Array
+    courses: Mapping[str, Course]
+    files: Sequence[str] = ()
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """All conditions of a measurement, what there is to say of the data, and what was done to them.
+
+    done: sentences for a report, such as the filter and its cut-off.
+    """
+
+    name: str
+    conditions: tuple[Condition, ...]
+    findings: tuple[Finding, ...] = ()
+    done: Sequence[str] = field(default_factory=tuple)

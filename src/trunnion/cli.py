@@ -213,7 +213,7 @@ def sweep(
     mechanism = stated(file, set_, table, friction, seat)
     check_measure(measure, mechanism)
     with lines_of(file), bar("points", points(grid)) as progress:
-        result = run(mechanism, grid, steps, progress=progress)
+        result = run(mechanism, grid, steps, progress=progress, margin=measure == "locking_margin")
     for path in out or []:
         if path in drawn:
             from trunnion.views import plots

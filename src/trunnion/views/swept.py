@@ -124,7 +124,8 @@ def _list(result: xr.Dataset, measure: str, over: Scale) -> tuple[list[str], lis
     found = figures(result)
     efforts = [name for name in found if name.endswith(".effort_max")]
     ideal = [name for name in ("efficiency_ideal",) if name in found]
-    shown = list(dict.fromkeys([measure, "efficiency", *ideal, *efforts, "friction_power_mean", "locking_margin"]))
+    margin = [name for name in ("locking_margin",) if name in found]
+    shown = list(dict.fromkeys([measure, "efficiency", *ideal, *efforts, "friction_power_mean", *margin]))
     picked, status = _thinned(len(over.values), MOST_ROWS), statuses(result)[:, 0]
     titles = [f"{name.replace('_', ' ')} [{found[name][0]}]".removesuffix(" [1]") for name in shown]
     words = [_word(int(code)) for code in status]

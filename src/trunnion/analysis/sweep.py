@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 __all__ = ["FIGURES", "MOST_POINTS", "Figure", "Swept", "sweep"]
 
 MOST_POINTS = 100_000
-MOST_NAMES = 2
+MOST_NAMES = 6
 
 Values = Sequence[float | str] | NDArray[np.float64]
 Over = Mapping[str, Values | tuple[float | str, float | str, int]]

@@ -281,10 +281,7 @@ def test_points_that_cannot_be_assembled_have_no_figures() -> None:
 
 BAD: dict[str, tuple[dict[str, Any], str]] = {
     "nothing": ({}, "0 names"),
-    "seven names": (
-        {name: [2] for name in ("AB", "BC", "CD", "A.speed", "crank.mass", "rocker.mass", "coupler.mass")},
-        "7 names",
-    ),
+    "seven names": ({f"n{i}": [1] for i in range(7)}, "7 names"),
     "unknown name": ({"AX": [1, 2]}, "known: 'AB', 'BC'"),
     "several numbers": ({"coefficient": [0.1, 0.2]}, "say which"),
     "not one number": ({"joints.B.friction": [0.1]}, "set one of"),

@@ -51,7 +51,7 @@ def test_table_csv_netcdf_and_figure(run: Run, tmp_path: Path) -> None:
     for i, row in enumerate(found):
         one = trunnion.analyse(mechanism.with_values({"AB": float(row["AB"])}), 36)
         power = float(one["friction_power"].sum("joint").mean())
-        assert float(row["friction_power_mean"]) == pytest.approx(power, rel=1e-14)
+        assert float(row["friction_power_mean"]) == pytest.approx(power, rel=1e-9)
         assert float(row["A.effort_max"]) == float(again["drive_effort_max"].sel(driver="A")[i])
         assert float(row["C.reaction_max"]) == float(again["reaction_max"].sel(joint="C")[i])
         assert f"{power:.6g}" in done.out
@@ -175,7 +175,7 @@ def test_a_figure_of_nothing_and_of_many() -> None:
     """All points locked or out of reach; more curves than a legend can name; one point; an infinite margin."""
     mechanism = trunnion.read(FOUR_BAR)
     view.figure(trunnion.sweep(mechanism, {"AB": ["2.7 m", "2.8 m"]}, 36))
-    view.figure(trunnion.sweep(mechanism, {"AB": ["2.1 m"]}, 4), "locking_margin")
+    view.figure(trunnion.sweep(mechanism, {"AB": ["2.1 m"]}, 4, margin=True), "locking_margin")
     many = trunnion.sweep(mechanism, {"AB": ["2.2 m", "2 m"], "B.friction.coefficient": (0.1, 0.2, 9)}, 4)
     figure = view.figure(many, "A.effort_max")
     assert figure.axes[0].get_legend() is None

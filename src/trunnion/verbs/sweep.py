@@ -48,6 +48,9 @@ Family = Annotated[
     ),
 ]
 Kind = Annotated[str, typer.Option("--kind", help="curves, or map: contours over two of the names.")]
+Margin = Annotated[
+    bool, typer.Option("--margin", help="Look for the locking margin too; takes many times as long as all else.")
+]
 Picture = Annotated[str, typer.Option("--format", help="png, svg or pdf, for a folder of figures.")]
 
 
@@ -58,6 +61,7 @@ def sweep(
     x: Along = None,
     family: Family = None,
     kind: Kind = "curves",
+    margin: Margin = False,
     steps: Steps = 360,
     set_: Set = None,
     table: TableFile = None,
@@ -78,7 +82,7 @@ def sweep(
     mechanism = stated(file, set_, table, friction, seat)
     check_measure(measures, mechanism)
     with lines_of(file), bar("points", points(grid)) as progress:
-        result = run(mechanism, grid, steps, progress=progress)
+        result = run(mechanism, grid, steps, progress=progress, margin=margin or "locking_margin" in measures)
     _write(result, out or [], files, (x or "", family or "", kind), units_row)
     _show(result, mechanism, file, measures, x or "", family or "")
     say(placed(findings_of(result), file, ["assembly"]))

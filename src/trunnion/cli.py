@@ -38,6 +38,7 @@ from trunnion.terminal import bar, console, findings_of, say, show_figures, show
 from trunnion.verbs.allocate import allocate
 from trunnion.verbs.assemble import assemble
 from trunnion.verbs.model import exit_status, lines_of, placed, stated
+from trunnion.verbs.rig import rig
 from trunnion.verbs.study import tolerance
 
 if TYPE_CHECKING:
@@ -185,6 +186,7 @@ def locking(
 app.command()(assemble)
 app.command()(tolerance)
 app.command()(allocate)
+app.command()(rig)
 
 
 @app.command()

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 __all__ = ["rig"]
 
 MOST_SHOWN = 60  # conditions in a table
-BIASED = 0.2  # of the standard uncertainty: a bias of the sensors that is shown
+BIASED = 0.5  # of the standard uncertainty: a bias of the sensors that is shown
 FEWEST = 20  # conditions from which a progress bar is worth it
 
 

@@ -33,7 +33,7 @@ from trunnion.analysis.rig.virtual_sensors import (
     readings,
     stream,
 )
-from trunnion.errors import Finding, MechanismError
+from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.measured.measurement import Accuracy, Condition, Course, Measurement
 from trunnion.measured.rig_file import Rig, Value
 from trunnion.model.mechanism import Mechanism
@@ -71,6 +71,12 @@ class Observation:
     cases: tuple[Case, ...]
     skipped: tuple[int, ...]
     findings: tuple[Finding, ...]
+
+    def seeded(self, seed: int) -> Observation:
+        """The same with the random numbers of another seed: other errors of the sensors, other noise."""
+        check_seed(seed)
+        drawn = {name: draw(channel, int(seed)) for name, channel in self.channels.items()}
+        return replace(self, seed=int(seed), drawn=drawn)
 
     @property
     def rate(self) -> float:
@@ -199,6 +205,12 @@ def _si(mechanism: Mechanism, name: str, value: Value) -> float:
     return float(np.ravel(changed.parameters()[changed.path_of(name)])[0])
 
 
+def check_seed(seed: int) -> None:
+    """MechanismError for what seeds no random numbers."""
+    if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or not 0 <= seed < MOST_SEEDS:
+        raise MechanismError(Finding(f"the seed {seed} is no whole number from 0", "seed", "give one such as 1"))
+
+
 def observe(
     mechanism: Mechanism,
     rig: Rig | str | os.PathLike[str],
@@ -212,8 +224,7 @@ def observe(
     it locks or does not go together, is left out, and a finding says which and why.
     Raises MechanismError for a rig that does not fit the mechanism, or if no condition is left.
     """
-    if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or not 0 <= seed < MOST_SEEDS:
-        raise MechanismError(Finding(f"the seed {seed} is no whole number from 0", "seed", "give one such as 1"))
+    check_seed(seed)
     rig = rig if isinstance(rig, Rig) else Rig.read(rig)
     with placed_at("set"):
         mechanism = mechanism.with_values(dict(rig.set_)) if rig.set_ else mechanism
@@ -237,6 +248,8 @@ def observe(
         what = f"none of the {len(rows)} conditions can be measured"
         remedy = "take conditions in which the model has an answer at every position"
         raise MechanismError([*findings, Finding(what, "schedule", remedy)])
+    if any(one.severity is Severity.ERROR for one in findings):
+        raise MechanismError(findings)
     skipped = tuple(case.number for case in cases if not case.worst.solved)
     drawn = {name: draw(channel, int(seed)) for name, channel in channels.items()}
     return Observation(mechanism, rig, int(seed), channels, drawn, sound, skipped, findings)

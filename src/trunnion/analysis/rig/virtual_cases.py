@@ -17,7 +17,7 @@ from trunnion.analysis.rig.virtual_sensors import Channel, resolved
 from trunnion.errors import Finding, MechanismError, Severity, Status
 from trunnion.measured.rig_file import Rig, Value
 
-__all__ = ["Case", "case_of", "channels_of", "findings_of", "measures_of", "placed_at"]
+__all__ = ["Case", "case_of", "channels_of", "findings_of", "measures_of", "placed_at", "speed_differs"]
 
 MOST_ROWS = 20_000_000
 BEYOND = 0.1  # of a cycle that is recorded past the last, so that its end is there
@@ -193,6 +193,11 @@ def findings_of(cases: Sequence[Case], channels: Mapping[str, Channel], rig: Rig
         )
         yield Finding(what, where, "", Severity.NOTE)
     yield from _lost_pulses(sound, rig)
+    driver = next(iter(cases[0].run.system.mechanism.drivers))
+    told = rig.encoder or any(one.measures == f"rate:{driver}" for one in channels.values())
+    if sound and not told and speed_differs(sound):
+        what = f"the conditions differ in speed, and nothing measured tells where {driver} is"
+        yield Finding(what, "encoder", f"state an encoder, or a sensor of rate:{driver}")
     for i, (name, channel) in enumerate(channels.items()):
         peaks = {case.number: float(np.max(np.abs(case.true.values[i]))) for case in sound}
         clipped = [case for case in sound if peaks[case.number] > channel.limit]
@@ -203,6 +208,14 @@ def findings_of(cases: Sequence[Case], channels: Mapping[str, Channel], rig: Rig
             )
             key = "range" if channel.limit == channel.range else "span"
             yield Finding(what, f"sensors.{name}.{key}", "take a sensor with a larger range", Severity.WARNING)
+
+
+def speed_differs(cases: Sequence[Case]) -> bool:
+    """Whether the first driver runs one way and not as fast in all conditions."""
+    driver = next(iter(cases[0].run.system.mechanism.drivers))
+    spans = [case.run.system.span(case.run.values, driver) for case in cases]
+    durations = [case.run.cycle.duration for case in cases]
+    return spans[0].one_way and max(durations) - min(durations) > 1e-9 * max(durations)
 
 
 def _named(cases: Sequence[Case]) -> str:

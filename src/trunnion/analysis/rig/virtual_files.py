@@ -18,13 +18,13 @@ from numpy.typing import NDArray
 from ruamel.yaml import YAML
 
 from trunnion import __version__
+from trunnion.analysis.rig.virtual_cases import Case, speed_differs
 from trunnion.errors import Finding, MechanismError
 from trunnion.measured.rig_file import FORMATS
 from trunnion.output import whole
 
 if TYPE_CHECKING:
     from trunnion.analysis.rig.virtual import Observation, Record
-    from trunnion.analysis.rig.virtual_cases import Case
     from trunnion.analysis.rig.virtual_sensors import Channel
 
 __all__ = ["MAPPING", "TRUTH", "check_form", "mapping_of", "truth_of", "write"]
@@ -138,15 +138,25 @@ def mapping_of(observation: Observation, form: str) -> dict[str, Any]:
     """The mapping that reads the files of an observation; what a laboratory knows, and no more than that."""
     rig = observation.rig
     found: dict[str, Any] = {"trunnion-data": 1, "name": rig.name or observation.mechanism.name}
-    found["files"] = [
-        {"file": f"{case.name}.{form}"} | ({"set": dict(case.settings)} if case.settings else {})
-        for case in observation.cases
-    ]
+    angle = _angle(observation)
+    timed = angle.get("angle", {}).get("from") == "time" or "angle" not in angle
+    found["files"] = [_file(observation, case, form, timed) for case in observation.cases]
     if rig.set_:
         found["set"] = dict(rig.set_)
     found["time"] = {"column": rig.time.column, "unit": rig.time.unit}
-    found |= _angle(observation)
+    found |= angle
     found["channels"] = {name: _channel(observation, name) for name in observation.channels}
+    return found
+
+
+def _file(observation: Observation, case: Case, form: str, timed: bool) -> dict[str, Any]:
+    """A file with what was set, and where the time alone tells the position, when it ran."""
+    found: dict[str, Any] = {"file": f"{case.name}.{form}"}
+    if case.settings:
+        found["set"] = dict(case.settings)
+    if timed and case.rows > case.running:
+        ends = (case.before, case.before + case.running - 1)
+        found["over"] = [f"{end / observation.rate:.9g} s" for end in ends]
     return found
 
 
@@ -169,18 +179,42 @@ def _angle(observation: Observation) -> dict[str, Any]:
 
 
 def _source(observation: Observation, driver: str) -> dict[str, Any]:
-    rig, run = observation.rig, observation.cases[0].run
-    if rig.encoder:
-        found: dict[str, Any] = {"from": "pulses", "column": rig.encoder.column, "per_turn": rig.encoder.per_turn}
-        found["kind"] = rig.encoder.kind
-        if rig.encoder.zero.evaluate():
-            found["zero"] = rig.encoder.zero.source
-        if rig.encoder.index:
-            found["index"] = {"column": rig.encoder.index}
+    """The encoder if there is one, else a constant speed, else a measured one."""
+    case = observation.cases[0]
+    run = case.run
+    encoder = observation.rig.encoder
+    if encoder:
+        found: dict[str, Any] = {"from": "pulses", "column": encoder.column, "per_turn": encoder.per_turn}
+        found["kind"] = encoder.kind
+        zero = _first_edge(observation) if encoder.kind == "level" else float(encoder.zero.evaluate())
+        if zero:
+            found["zero"] = f"{math.degrees(zero):.12g} deg"
+        if encoder.index:
+            found["index"] = {"column": encoder.index}
         return found
-    speed = float(np.ravel(run.system.drive(run.values, driver, 0.0)[1])[0])
-    start = float(np.ravel(run.system.drive(run.values, driver, -observation.cases[0].before / observation.rate)[0])[0])
+    if speed_differs(observation.cases):
+        measured = next(name for name, one in observation.channels.items() if one.measures == f"rate:{driver}")
+        start = math.degrees(float(np.ravel(run.system.drive(run.values, driver, 0.0)[0])[0]))
+        return {"from": "speed", "channel": measured} | ({"zero": f"{start:.12g} deg"} if start else {})
+    at_zero = -case.before / observation.rate
+    start, speed, _ = (float(np.ravel(one)[0]) for one in run.system.drive(run.values, driver, at_zero))
     return {"from": "time", "speed": f"{speed:.15g} rad/s", "zero": f"{math.degrees(start):.12g} deg"}
+
+
+def _first_edge(observation: Observation) -> float:
+    """Coordinate, rad, at the index pulse, or without one where the level of the encoder first rises."""
+    encoder, case = observation.rig.encoder, observation.cases[0]
+    assert encoder is not None  # asked of encoders only
+    zero = float(encoder.zero.evaluate())
+    if encoder.index:
+        return zero
+    driver = next(iter(observation.mechanism.drivers))
+    start, speed, _ = (float(np.ravel(one)[0]) for one in case.run.system.drive(case.run.values, driver, 0.0))
+    pitch = 2 * math.pi / encoder.per_turn
+    count = (start - zero) / pitch
+    # backward, the level rises in the middle of a pulse
+    edge = math.floor(count + 1e-9) + 1 if speed > 0 else math.ceil(count - 0.5 - 1e-9) - 0.5
+    return zero + edge * pitch
 
 
 def _channel(observation: Observation, name: str) -> dict[str, Any]:

@@ -27,7 +27,26 @@ Dimensions = Mapping[str, Fraction]
 
 HERTZ: Dimensions = {"second": Fraction(-1)}
 _AMOUNT = re.compile(r"\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*(.*?)\s*", re.DOTALL)
-_USUAL = "s ms µs min Hz kHz V mV A mA N kN N m kN m rpm rad/s m/s mm/s deg rad mm µm %".split()
+_USUAL = (
+    "s",
+    "ms",
+    "Hz",
+    "kHz",
+    "V",
+    "mV",
+    "A",
+    "mA",
+    "N",
+    "kN",
+    "N m",
+    "rpm",
+    "rad/s",
+    "m/s",
+    "deg",
+    "rad",
+    "mm",
+    "%",
+)
 _SYMBOLS = {"meter": "m", "gram": "kg", "second": "s", "radian": "rad", "ampere": "A", "kelvin": "K"}
 _VOLT: Dimensions = {"gram": Fraction(1), "meter": Fraction(2), "second": Fraction(-3), "ampere": Fraction(-1)}
 

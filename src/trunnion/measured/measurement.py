@@ -94,7 +94,8 @@ class Condition:
     """One working condition: what was set, and what was measured over the cycle.
 
     values: numbers of the model that were set or measured once, by name, SI, for `Mechanism.with_values`;
-    phase: (position,), share of the cycle from the start of the model's, in [0, 1); files: where it comes from.
+    phase: (position,), share of the cycle from the start of the model's, in [0, 1); files: where it comes from;
+    speed: of the driver, mean over the turns, rad/s, below zero where its coordinate falls; NaN if the cycle is a time.
     """
 
     name: str
@@ -102,6 +103,7 @@ class Condition:
     phase: Array
     courses: Mapping[str, Course]
     files: Sequence[str] = ()
+    speed: float = float("nan")
 
 
 @dataclass(frozen=True)

@@ -35,6 +35,7 @@ from trunnion.terminal import bar, console, findings_of, say, show_figures, wrot
 from trunnion.verbs.allocate import allocate
 from trunnion.verbs.assemble import assemble
 from trunnion.verbs.model import exit_status, lines_of, placed, stated
+from trunnion.verbs.rig import rig
 from trunnion.verbs.study import tolerance
 from trunnion.verbs.sweep import sweep
 
@@ -183,6 +184,7 @@ def locking(
 app.command()(assemble)
 app.command()(tolerance)
 app.command()(allocate)
+app.command()(rig)
 app.command()(sweep)
 
 

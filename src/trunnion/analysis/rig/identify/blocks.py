@@ -6,28 +6,30 @@ The turns of a condition are its independent repetitions; within a turn neighbou
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError
+from trunnion.measured.efficiency import efficiency_of, pairs_of
 from trunnion.measured.measurement import Condition, Course, Measurement
 
-__all__ = ["Block", "HoldOut", "blocks_of", "channels_of"]
+__all__ = ["EFFICIENCY", "Block", "HoldOut", "blocks_of", "channels_of"]
 
 Array = NDArray[np.float64]
 HoldOut = float | str | Sequence[str] | None
+EFFICIENCY = "efficiency"  # the channel that is computed from torques and speeds, one figure a turn
 
 
 @dataclass(frozen=True)
 class Block:
     """One channel in one condition.
 
-    condition: its index; turns, held: (turn, position), those to fit and those held out; alone: whether the whole
-    condition is held out, so that nothing of it is fitted.
+    condition: its index; turns, held: (turn, position), those to fit and those held out; effects: of a course that is
+    computed from others, what a standard uncertainty of each of their errors does to it, by the name of the error.
     """
 
     condition: int
@@ -35,6 +37,12 @@ class Block:
     course: Course
     turns: Array
     held: Array
+    effects: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def unresolved(self) -> float:
+        """Standard uncertainty by steps between readings that the scatter does not carry it over."""
+        return float(self.course.unresolved)
 
     @property
     def fitted(self) -> bool:
@@ -85,30 +93,52 @@ def _mean(turns: Array) -> Array:
         return np.asarray(np.nanmean(turns, axis=0)) if len(turns) else np.full(turns.shape[1], np.nan)
 
 
-def channels_of(measurement: Measurement, wanted: Sequence[str] | None) -> list[str]:
+def channels_of(measurement: Measurement, wanted: Sequence[str] | None, joints: Mapping[str, str]) -> list[str]:
     """Channels to fit, in the order of the data; all if none is named. MechanismError for one that is not there."""
     known = list(dict.fromkeys(name for one in measurement.conditions for name in one.courses))
     if not known:
         raise MechanismError(Finding("the measurement has no channels", measurement.name, "map one to a measure"))
-    missing = [name for name in wanted or () if name not in known]
+    told = any(pairs_of(one, joints) for one in measurement.conditions)
+    missing = [name for name in wanted or () if name not in known and not (name == EFFICIENCY and told)]
     if missing:
         what = f"there is no channel '{missing[0]}'"
-        raise MechanismError(Finding(what, "channels", f"the measurement has {', '.join(known)}"))
-    return [name for name in known if wanted is None or name in wanted]
+        computed = f", and {EFFICIENCY} of them" if told else ""
+        raise MechanismError(Finding(what, "channels", f"the measurement has {', '.join(known)}{computed}"))
+    if wanted is None:
+        return known
+    return [name for name in dict.fromkeys([*known, EFFICIENCY]) if name in wanted]
 
 
-def blocks_of(measurement: Measurement, channels: Sequence[str], hold_out: HoldOut) -> list[Block]:
-    """The blocks, with what is held out: whole conditions by name, or a share of the turns of each, the last ones."""
+def _efficiency(condition: Condition, joints: Mapping[str, str]) -> tuple[Course, dict[str, float]]:
+    """The efficiency of each turn as a course of one position, and what the errors of its sensors do to it."""
+    found = efficiency_of(condition, joints)
+    effects = {
+        f"{one.source} of {one.channel}": one.sensitivity * one.input
+        for one in found.contributions
+        if one.source in ("gain", "zero")
+    }
+    return Course(EFFICIENCY, "efficiency:cycle", "1", found.per_turn[:, None]), effects
+
+
+def blocks_of(
+    measurement: Measurement, channels: Sequence[str], hold_out: HoldOut, joints: Mapping[str, str]
+) -> list[Block]:
+    """The blocks, with what is held out: whole conditions by name, or a share of the turns of each, the last ones.
+
+    joints: of the loads, for the efficiency.
+    """
     held, share = _held(measurement, hold_out)
     found = []
     for index, condition in enumerate(measurement.conditions):
         for channel in channels:
-            course = condition.courses.get(channel)
+            course, effects = condition.courses.get(channel), {}
+            if course is None and channel == EFFICIENCY and pairs_of(condition, joints):
+                course, effects = _efficiency(condition, joints)
             if course is None:
                 continue
             turns = np.atleast_2d(np.asarray(course.turns, float))
             keep = 0 if condition.name in held else len(turns) - _share(turns, share, condition)
-            found.append(Block(index, channel, course, turns[:keep], turns[keep:]))
+            found.append(Block(index, channel, course, turns[:keep], turns[keep:], effects))
     if not any(block.fitted for block in found):
         raise MechanismError(Finding("all conditions are held out", "hold_out", "leave some to fit"))
     return found

@@ -30,7 +30,8 @@ GUESS = 0.01  # of a course: the scatter of one without repetitions, until its r
 class Sensor:
     """One error of a sensor: its zero or its gain.
 
-    sizes: its standard uncertainty in each block, in the unit of the course or relative; 0 in blocks of other sensors.
+    sizes: its standard uncertainty in each block, in the unit of the course or relative, 0 in blocks of other sensors;
+    of a sensor behind a course that is computed, what it does to that, with its sign.
     stated: whether anything is known of it; one that is not is free.
     """
 
@@ -65,15 +66,21 @@ def sensors_of(blocks: Sequence[Block], own: Sequence[str] | None = None) -> lis
                 sizes[k] = float(size)
             name = f"{kind} of {channel}" + (f" in {place}" if place else "")
             found.append(Sensor(name, channel, kind, tuple(sizes), not free))
-    return found
+    effects: dict[tuple[str, str], list[float]] = {}
+    for k, block in enumerate(blocks):
+        for name, size in block.effects.items():
+            name = f"{name} in {own[block.condition]}" if own else name
+            effects.setdefault((name, block.channel), [0.0] * len(blocks))[k] = size
+    return found + [Sensor(name, channel, "zero", tuple(sizes), True) for (name, channel), sizes in effects.items()]
 
 
 @dataclass
 class Problem:
     """What is fitted: the model to the blocks.
 
-    masks: positions used, by block; weights: 1/variance of the mean, by block; refused: how often a step was taken
-    back because the model has no answer there.
+    masks: positions used, by block; variances: of one turn, by block; factors: by channel, for the correlation within a
+    turn; left_over: for a misfit, so that it does not outweigh what is stated of the sensors; refused: how often a step
+    was taken back because the model has no answer there.
     """
 
     model: Model
@@ -83,6 +90,7 @@ class Problem:
     masks: list[Mask] = field(default_factory=list)
     variances: list[Array] = field(default_factory=list)
     factors: dict[str, float] = field(default_factory=dict)
+    left_over: float = 1.0
     refused: int = 0
     evaluations: int = 0
 
@@ -148,8 +156,9 @@ class Problem:
     def weight(self, k: int) -> Array:
         """1/variance of the mean at each position of a block, 0 where it is not used."""
         block = self.blocks[k]
-        scale = self.variances[k] * self.factors.get(block.channel, 1.0)
-        return np.where(self.masks[k], np.maximum(block.count, 1) / scale, 0.0)
+        factor = self.factors.get(block.channel, 1.0) * self.left_over
+        scale = self.variances[k] * factor / np.maximum(block.count, 1)
+        return np.where(self.masks[k], 1 / (scale + block.unresolved**2), 0.0)
 
     # ---- what is used -----------------------------------------------------------------------------------------
 

@@ -98,7 +98,7 @@ class Judged:
 
     @cached_property
     def interval(self) -> tuple[Array, Array]:
-        """95 %, within the limits; one-sided of an unknown on one, from where the step without limits ends if inside."""
+        """95 %, within the limits; one-sided of an unknown on one, from where a step without limits ends if inside."""
         low, high = (one[: self.problem.count] for one in self.problem.bounds)
         n = self.problem.count
         u, freedom = self.deviation[:n], self.found.spread.freedom[:n]
@@ -153,7 +153,7 @@ class Judged:
             mask = self.problem.masks[k]
             before = np.where(mask, self.problem.misses(self.start, k, block.mean), np.nan)
             after = np.where(mask, self.problem.misses(self.found.x, k, block.mean), np.nan)
-            scatter = np.sqrt(self.problem.variances[k] / np.maximum(block.count, 1))
+            scatter = np.sqrt(self.problem.variances[k] / np.maximum(block.count, 1) + block.unresolved**2)
             known = scatter if block.repeats else np.full(len(mask), np.nan)
             out = int(np.count_nonzero(np.isfinite(block.mean) & ~mask))
             row = (before, after, np.where(mask, known, np.nan))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -14,12 +14,13 @@ from trunnion.analysis.friction import FrictionMethod
 from trunnion.analysis.measures import Measure, named
 from trunnion.analysis.rig.identify.blocks import Block, HoldOut, blocks_of, channels_of
 from trunnion.analysis.rig.identify.courses import Model
-from trunnion.analysis.rig.identify.fit import Problem, sensors_of
+from trunnion.analysis.rig.identify.fit import Problem, fit, sensors_of
 from trunnion.analysis.rig.identify.search import Search, search
 from trunnion.analysis.rig.identify.separate import Group, inseparable
-from trunnion.analysis.rig.identify.uncertainty import Spread, spread_of
+from trunnion.analysis.rig.identify.uncertainty import Spread, left_over, spread_of
 from trunnion.analysis.rig.identify.unknowns import Parameters, described, unknowns
 from trunnion.errors import Finding, MechanismError
+from trunnion.measured.efficiency import load_joints
 from trunnion.measured.measurement import Measurement
 from trunnion.model.mechanism import Mechanism
 
@@ -99,18 +100,41 @@ def identified(
     run = prepare(stated)
     if run.determinacy is not None:
         run.determinacy.refuse()
-    wanted = channels_of(measurement, channels)
-    blocks = blocks_of(measurement, wanted, hold_out)
+    joints = load_joints(stated)
+    blocks = blocks_of(measurement, channels_of(measurement, channels, joints), hold_out, joints)
     measures = _measures(stated, run, blocks)
     phases = tuple(np.asarray(one.phase, float) for one in measurement.conditions)
     model = Model(run, tuple(unknowns(stated, paths, start or {})), measures, settings, phases,
                   method or FrictionMethod())  # fmt: skip
+    if channels is None:
+        model, blocks = _telling(model, blocks)
     names = [one.name for one in measurement.conditions] if sensors == "condition" else None
     problem = Problem(model, blocks, sensors_of(blocks, names), guard)
     found = search(problem, starts)
     spread = spread_of(problem, found.fit.x)
+    if spread.test.misfit and problem.sensors:
+        problem.left_over = left_over(problem, spread)
+        found = replace(found, fit=fit(problem, found.fit.x))
+        spread = spread_of(problem, found.fit.x)
     groups = inseparable(problem, found.fit.x, spread)
     return Identified(stated, measurement, run, problem, found, spread, groups, hold_out)
+
+
+def _telling(model: Model, blocks: list[Block]) -> tuple[Model, list[Block]]:
+    """Only the channels that an unknown acts on, as far as the start tells; all if there are none."""
+    courses = model.courses(np.array([one.start for one in model.unknowns]))
+    sizes = np.array([one.size or 1.0 for one in model.unknowns])
+    moved = dict.fromkeys(model.measures, 0.0)
+    for said in courses.said:
+        for name, one in said.items():
+            most = float(np.nanmax(np.abs(one.value), initial=0.0))
+            change = float(np.nanmax(np.abs(np.nan_to_num(one.slope)) * sizes[:, None], initial=0.0))
+            moved[name] = max(moved[name], change / most if most else change)
+    kept = {name: model.measures[name] for name, share in moved.items() if share > NOTHING} or model.measures
+    return replace(model, measures=kept), [block for block in blocks if block.channel in kept]
+
+
+NOTHING = 1e-9  # of a course: what an unknown does to it
 
 
 def _stated(

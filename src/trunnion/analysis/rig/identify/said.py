@@ -69,7 +69,7 @@ def _fit(judged: Judged) -> Iterator[Finding]:
         chance = "less than 0.01 %" if test.chance < 1e-4 else f"{100 * test.chance:.2g} %"
         what = (
             f"the model does not fit: its residuals are {test.reduced:.3g} times (reduced χ²) what the scatter between "
-            f"turns explains, chance {chance}; the intervals contain what is left over, as if alike in all conditions"
+            f"turns explains, chance {chance}; the intervals contain what is left over"
         )
         yield Finding(what, "fit", "look at the residuals; free another number, or take another friction law",
                       Severity.WARNING)  # fmt: skip

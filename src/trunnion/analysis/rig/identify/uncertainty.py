@@ -17,7 +17,7 @@ from scipy import special
 from trunnion.analysis.rig.identify.blocks import Block
 from trunnion.analysis.rig.identify.fit import Problem
 
-__all__ = ["CONFIDENCE", "Spread", "Test", "correlation_factors", "quantile", "spread_of"]
+__all__ = ["CONFIDENCE", "Spread", "Test", "correlation_factors", "left_over", "quantile", "spread_of"]
 
 Array = NDArray[np.float64]
 CONFIDENCE = 0.95
@@ -150,6 +150,9 @@ def spread_of(problem: Problem, x: Array) -> Spread:
     turns, freedom, follows = _between_turns(problem, x, inverse)
     test = lack_of_fit(problem, x)
     parts = {"scatter": turns}
+    steps = _steps(problem, x, inverse)
+    if np.any(steps):
+        parts["resolution"] = steps
     left, pieces = _left_over(problem, x, inverse, again=False)
     if np.any(left):
         parts["scatter"] = turns + left
@@ -165,6 +168,16 @@ def spread_of(problem: Problem, x: Array) -> Spread:
     with np.errstate(all="ignore"):  # Welch and Satterthwaite; what was stated has infinite freedom
         freedom = np.where(random > 0, freedom * (whole / random) ** 2, np.inf)
     return Spread(information, inverse, null, parts, freedom, test, follows)
+
+
+def _steps(problem: Problem, x: Array, inverse: Array) -> Array:
+    """Covariance by readings that stick to steps: of a mean that does not get finer by more turns."""
+    total = np.zeros_like(inverse)
+    for k, block in enumerate(problem.blocks):
+        if block.fitted and block.unresolved:
+            columns = inverse @ (np.nan_to_num(problem.said(x, k)[1]) * problem.weight(k)) * block.unresolved
+            total += columns @ columns.T
+    return total
 
 
 def _inverse(information: Array) -> tuple[Array, Array]:
@@ -287,24 +300,33 @@ def _weighed(problem: Problem, x: Array, k: int) -> tuple[float, Array, float]:
     turns = np.where(mask, block.deviations, 0.0)
     count = len(turns)
     powers = _powers(turns) / (count - 1)  # the mean has that of one turn over their number
-    scatter = _smooth(np.sum(powers, axis=0) / count)
+    steps = np.count_nonzero(mask) * block.unresolved**2
+    scatter = _smooth(np.sum(powers, axis=0) / count) + steps
     floor = np.maximum(scatter, FLOOR * float(np.mean(scatter)))
     weights = _doubled(len(mask)) / floor
     many = min(NEIGHBOURS, len(scatter)) * 2.0 * (count - 1)
     fair = (many - 2) / many if many > 4 else 0.5  # 1/variance is too large on average
     least = 2 * float(np.sum(weights * scatter * (scatter / floor)))
-    return float(np.sum(weights * fair * _powers(gap))), np.asarray(powers @ weights), least
+    each = powers @ weights + float(np.sum(weights * steps))
+    return float(np.sum(weights * fair * _powers(gap))), np.asarray(each), least
+
+
+def left_over(problem: Problem, spread: Spread) -> float:
+    """How much more than the scatter the misfit moves the estimates, as variances; 1 without one."""
+    misfit, scatter = (np.diagonal(spread.parts[key])[: problem.count] for key in ("misfit", "scatter"))
+    known = scatter > 0
+    return 1.0 + float(np.mean(misfit[known] / scatter[known])) if np.any(known) else 1.0
 
 
 def _left_over(problem: Problem, x: Array, inverse: Array, again: bool) -> tuple[Array, float]:
-    """Covariance by the residuals of the means, as correlated as they are, and its freedom.
+    """Covariance by the residuals of the means, as correlated as they are along the cycle, and its freedom.
 
-    again: beside the scatter between turns, as a misfit of the model, which is taken to be the same in all conditions:
-    as many times larger as there are. Else of blocks without repetitions.
+    again: beside the scatter between turns, as a misfit of the model; it is larger by as much as the conditions
+    resemble each other. Else of blocks without repetitions.
     """
     count = len(x)
     total = np.zeros((count, count))
-    pieces, used = 0.0, 0
+    pieces, gaps = 0.0, []
     for k, block in enumerate(problem.blocks):
         mask = problem.masks[k]
         if not block.fitted or block.repeats != again or not np.any(mask):
@@ -317,10 +339,25 @@ def _left_over(problem: Problem, x: Array, inverse: Array, again: bool) -> tuple
         total += np.real((spectrum * own) @ spectrum.conj().T)
         real = _doubled(len(mask)) * power
         pieces += float(np.sum(real) ** 2 / np.sum(real * power)) if np.any(power) else 0.0
-        used += 1
-    if not used:
+        gaps.append((block.channel, gap))
+    if not gaps:
         return total, np.inf
     left = max(pieces - count, 1.0)
-    if again:
-        return total * used, max(left / used, 1.0)
-    return total * max(pieces, 1.0) / left, left
+    if not again:
+        return total * max(pieces, 1.0) / left, left
+    alike = _alike(gaps)
+    return total * alike * max(pieces, 1.0) / left, max(left / alike, 1.0)
+
+
+def _alike(gaps: Sequence[tuple[str, Array]]) -> float:
+    """How many conditions tell the same of a misfit: 1 if each has its own, their number if all have one."""
+    most = 1.0
+    for channel in dict.fromkeys(name for name, _ in gaps):
+        rows = [gap for name, gap in gaps if name == channel]
+        if len({len(row) for row in rows}) > 1:
+            most = max(most, float(len(rows)))
+            continue
+        own = float(sum(np.sum(row**2) for row in rows))
+        together = float(np.sum(np.sum(rows, axis=0) ** 2))
+        most = max(most, together / own if own > 0 else 1.0)
+    return most

@@ -34,6 +34,7 @@ from trunnion.output import folder
 from trunnion.terminal import bar, console, findings_of, say, show_figures, wrote
 from trunnion.verbs.allocate import allocate
 from trunnion.verbs.assemble import assemble
+from trunnion.verbs.identify import identify
 from trunnion.verbs.model import exit_status, lines_of, placed, stated
 from trunnion.verbs.rig import rig
 from trunnion.verbs.study import tolerance
@@ -185,6 +186,7 @@ app.command()(assemble)
 app.command()(tolerance)
 app.command()(allocate)
 app.command()(rig)
+app.command()(identify)
 app.command()(sweep)
 
 

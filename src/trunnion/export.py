@@ -12,8 +12,8 @@ they were given, then `efficiency`, `<driver>.effort_max`, `<joint>.reaction_max
 `drive`, `<measure>`, `<measure>.worst_case`, `<measure>.rss`, `<measure>.deviation`, `<measure>.<joint>.worst_case`,
 …. Of tolerances the file's name says which table it holds: one row a measure, or of `x.parameters.csv` one a toleranced
 number, see `tolerance_columns`. What `assemble` finds has one row a position: `<driver>.coordinate`, `needed_share`,
-`needed_clearance`, …, `<joint>.uniform_1_x` of end 1, …, `status`. What `identify` finds has one row a parameter, or what the file's
-name says, see `identified_columns`.
+`needed_clearance`, …, `<joint>.uniform_1_x` of end 1, …, `status`. What `identify` finds has one row a parameter,
+or what the file's name says, see `identified_columns`.
 """
 
 from __future__ import annotations

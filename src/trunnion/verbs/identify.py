@@ -42,7 +42,7 @@ def identify(
         list[str] | None,
         typer.Option(
             "--channel",
-            help="A channel by its name in the mapping, or efficiency. Repeatable; all that tell something if not given.",
+            help="A channel by its name in the mapping, or efficiency. Repeatable; if not given, all that tell.",
             show_default=False,
         ),
     ] = None,
@@ -59,12 +59,15 @@ def identify(
         ),
     ] = None,
     sensors: Annotated[
-        str, typer.Option("--sensors", help="Zero and gain of a channel are off alike in a whole channel, or condition.")
+        str,
+        typer.Option("--sensors", help="Zero and gain of a channel are off alike in a whole channel, or condition."),
     ] = "channel",
     delay: Annotated[
         str | None,
         typer.Option(
-            "--delay", help="By which channels may lag behind the angle: 0.2ms, a standard uncertainty.", show_default=False
+            "--delay",
+            help="By which channels may lag behind the angle: 0.2ms, a standard uncertainty.",
+            show_default=False,
         ),
     ] = None,
     guard: Annotated[
@@ -72,7 +75,9 @@ def identify(
     ] = 1,
     starts: Annotated[
         int | None,
-        typer.Option("--starts", help="Places to begin at; more than one if the model does not fit.", show_default=False),
+        typer.Option(
+            "--starts", help="Places to begin at; more than one if the model does not fit.", show_default=False
+        ),
     ] = None,
     set_: Set = None,
     table: TableFile = None,
@@ -84,7 +89,8 @@ def identify(
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="With --write: also over the model itself.")] = False,
     kind: Annotated[
-        str | None, typer.Option("--kind", help="Which figure: intervals, correlation or residuals.", show_default=False)
+        str | None,
+        typer.Option("--kind", help="Which figure: intervals, correlation or residuals.", show_default=False),
     ] = None,
     out: Out = None,
     report: Annotated[

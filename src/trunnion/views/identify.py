@@ -180,7 +180,9 @@ def _figures(result: xr.Dataset) -> Figure:
         axes.plot(x, before * factor, "D", color=BEFORE, markerfacecolor="none", markersize=5, label="before")
         axes.errorbar(x, after * factor, COVERED * np.nan_to_num(spread) * factor, fmt="o", color=AFTER, markersize=5,
                       capsize=3, label=f"after, ±{COVERED:g} u by scatter")  # fmt: skip
-        axes.set_xticks(x, [plain(names(result, "condition")[k]) for k in own], fontsize=8, rotation=40 * (len(own) > 8))
+        axes.set_xticks(
+            x, [plain(names(result, "condition")[k]) for k in own], fontsize=8, rotation=40 * (len(own) > 8)
+        )
     legend(rows[0], least=1)
     return sheet
 

@@ -43,9 +43,7 @@ class Sensor:
     stated: bool
 
 
-def sensors_of(
-    blocks: Sequence[Block], own: Sequence[str] | None = None, delay: float | None = None
-) -> list[Sensor]:
+def sensors_of(blocks: Sequence[Block], own: Sequence[str] | None = None, delay: float | None = None) -> list[Sensor]:
     """Errors of the sensors of all blocks: one for each channel, or of each condition if these have names.
 
     An infinite standard uncertainty says that nothing is known of it. delay: by which a channel may lag behind the

@@ -84,7 +84,7 @@ def signs(
 ) -> list[str]:
     """Channels that are likely to have the wrong sign: power in, or power out, below zero in all turns of a file.
 
-    courses: turns of all conditions; turning: mean speed of the driver by its angle, rad/s with its sign, if there is one.
+    courses: turns of all conditions; turning: mean speed of the driver by its angle, rad/s with its sign.
     """
     rates = {one.measures.partition(":")[2]: key for key, one in channels.items() if one.measures.startswith("rate:")}
     drivers = {

@@ -23,8 +23,8 @@ TOLD_BY = 5  # samples between pulses from which a lost one shows in the time be
 class Pulses:
     """Times at which counts were reached.
 
-    counts: (pulse,), of a turn `per_turn`; spoilt: from when to when pulses were lost, (stretch, 2); until: from when on pulses were missed;
-    crossings: whether the times are finer than the sampling; slack: counts between two samples.
+    counts: (pulse,), of a turn `per_turn`; spoilt: from when to when pulses were lost, (stretch, 2); until: from when
+    on they were missed; crossings: whether the times are finer than the sampling; slack: counts between two samples.
     """
 
     times: Array
@@ -160,8 +160,8 @@ def _missed(found: Pulses, step: float, account: Account) -> Pulses:
         told.append(f"{counted(int(lost.sum()), 'pulse')} lost")
     if np.any(pairs):
         told.append(f"{counted(int(-pairs.sum()), 'pulse')} too many")
-    account.warn("angle", f"the encoder: {' and '.join(told)}, {times(at)}; the count is set right, these turns are left out",
-                 "check encoder, cable and counter")  # fmt: skip
+    what = f"the encoder: {' and '.join(told)}, {times(at)}; the count is set right, these turns are left out"
+    account.warn("angle", what, "check encoder, cable and counter")
     way = np.sign(found.counts[-1] - found.counts[0]) or 1.0
     mended = found.counts + way * np.concatenate([[0.0], np.cumsum(change)])
     return replace(found, counts=mended, spoilt=np.column_stack([at, found.times[1:][change != 0]]))
@@ -195,8 +195,8 @@ def by_index(found: Pulses, index: Array, per_turn: int, step: float, account: A
         lost, more = -int(change[change < 0].sum()), int(change[change > 0].sum())
         told = [f"{counted(lost, 'pulse')} lost"] * (lost > 0) + [f"{counted(more, 'pulse')} too many"] * (more > 0)
         where = f"in {counted(int(np.count_nonzero(wrong)), 'turn')} of {change.size}, {times(index[:-1][wrong])}"
-        account.warn("angle", f"the encoder: {' and '.join(told)} {where}; the count is set right at the index, these turns "
-                     "are left out", "check encoder, cable and counter")  # fmt: skip
+        what = f"the encoder: {' and '.join(told)} {where}; set right at the index, these turns are left out"
+        account.warn("angle", what, "check encoder, cable and counter")
     place = np.clip(np.searchsorted(index, found.times, side="right") - 1, 0, index.size - 1)
     return found.counts - at[0] - way * usual - way * level[place], np.column_stack(
         [index[:-1][wrong], index[1:][wrong]]

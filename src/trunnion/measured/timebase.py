@@ -42,7 +42,7 @@ def timeline(table: Table, base: TimeBase | None, account: Account) -> Timeline:
     """Time of the rows of a table by the mapping, else by what the file itself tells of its sampling."""
     if base is not None and base.rate is not None:
         step = 1.0 / base.rate.value
-        return Timeline(np.arange(table.rows) * step, None, step, np.empty(0, dtype=np.intp))
+        return Timeline(_counted(table.rows) * step, None, step, np.empty(0, dtype=np.intp))
     if base is None or base.column not in table.columns:
         if table.interval is None:
             what = "nothing tells the time of its rows"
@@ -50,9 +50,13 @@ def timeline(table: Table, base: TimeBase | None, account: Account) -> Timeline:
             raise MechanismError(Finding(what, "time", remedy, file=table.file))
         start, step = table.interval
         account.say(f"time is that of the waveforms: every {step:.6g} s")
-        return Timeline(start + np.arange(table.rows) * step, None, step, np.empty(0, dtype=np.intp))
+        return Timeline(start + _counted(table.rows) * step, None, step, np.empty(0, dtype=np.intp))
     column = table.columns[str(base.column)]
     return _stated(column.values * _factor(base, column, account), account)
+
+
+def _counted(rows: int) -> Array:
+    return np.arange(rows, dtype=np.float64)
 
 
 def _factor(base: TimeBase, column: Column, account: Account) -> float:
@@ -74,7 +78,7 @@ def _stated(seconds: Array, account: Account) -> Timeline:
     finite = np.isfinite(seconds)
     highest = np.maximum.accumulate(np.where(finite, seconds, -np.inf))
     rising = finite & (seconds > np.concatenate([[-np.inf], highest[:-1]]))
-    lost, total = np.count_nonzero(~finite), seconds.size
+    lost, total = int(np.count_nonzero(~finite)), seconds.size
     if lost:
         what = f"{counted(lost, 'row')} of {total:,} {'has' if lost == 1 else 'have'} no time"
         account.warn("time", f"{what}; left out", "check the logger, or state time: {rate: …}")
@@ -104,7 +108,7 @@ def _backward(seconds: Array, finite: NDArray[np.bool_], rising: NDArray[np.bool
         what = f"the time repeats in {counted(repeated.size, 'row')} of {stated.size:,}, {times(stated[repeated])}"
         account.warn("time", f"{what}; these rows are left out", remedy)
     if back.size:
-        out = np.count_nonzero(finite & ~rising) - repeated.size
+        out = int(np.count_nonzero(finite & ~rising)) - repeated.size
         what = (
             f"the time runs backward {counted(back.size, 'time')}, {times(stated[back])}, by up to {-steps.min():.4g} s"
         )

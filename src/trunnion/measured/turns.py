@@ -63,15 +63,12 @@ def cut(
     if numbers.size:
         usual = float(np.median(lengths))
         odd = np.abs(lengths / usual - 1) > APART
-        if np.any(odd):
-            told = f"{counted(int(np.count_nonzero(odd)), 'turn')} of {numbers.size} last" + "s" * (np.sum(odd) == 1)
-            span = (
-                f"{lengths[odd].min():.4g} to {lengths[odd].max():.4g} s"
-                if np.sum(odd) > 1
-                else f"{lengths[odd][0]:.4g} s"
-            )
-            account.note(where, f"{told} {span} where {usual:.4g} s is usual, and {'is' if np.sum(odd) == 1 else 'are'} left out",
-                         "the drive starts, stops or stands there; state files: over: if it should not count")  # fmt: skip
+        if count := int(np.count_nonzero(odd)):
+            low, high = lengths[odd].min(), lengths[odd].max()
+            span = f"{low:.4g} to {high:.4g} s" if count > 1 else f"{low:.4g} s"
+            what = f"{counted(count, 'turn')} of {numbers.size} {'lasts' if count == 1 else 'last'} {span}"
+            what = f"{what} where {usual:.4g} s is usual, and {'is' if count == 1 else 'are'} left out"
+            account.note(where, what, "the drive starts, stops or stands there; files: over: can name what counts")
         keep &= ~odd
     if len(spoilt):
         hit = np.zeros(numbers.size, dtype=np.bool_)
@@ -165,7 +162,7 @@ def _averaged(turns: Turns, values: Array) -> Array:
 
 
 def _interpolated(turns: Turns, values: Array, line: Timeline) -> Array:
-    """A cubic through the four samples about each position; a straight line between two where one of them is missing."""
+    """A cubic through the four samples about a position; a straight line between two where one of them is missing."""
     known = np.isfinite(turns.share)
     highest = np.maximum.accumulate(np.where(known, turns.share, -np.inf))
     rows = np.flatnonzero(known & (turns.share > np.concatenate([[-np.inf], highest[:-1]])))

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from trunnion.analysis.inspect import Check, check
     from trunnion.analysis.locking import locking
     from trunnion.analysis.play import play
+    from trunnion.analysis.rig.virtual import observe
     from trunnion.analysis.sweep import sweep
     from trunnion.analysis.tolerance.study import tolerance
     from trunnion.errors import Finding, MechanismError, Status
@@ -40,6 +41,7 @@ _PLACES = {
     "assemble": "trunnion.analysis.assemblability",
     "check": "trunnion.analysis.inspect",
     "locking": "trunnion.analysis.locking",
+    "observe": "trunnion.analysis.rig.virtual",
     "play": "trunnion.analysis.play",
     "prepare": "trunnion.analysis.analyse",
     "read": "trunnion.model.file",
@@ -65,6 +67,7 @@ __all__ = [
     "check",
     "dual",
     "locking",
+    "observe",
     "play",
     "prepare",
     "read",

@@ -16,14 +16,12 @@ from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.options import (
     IMAGES,
     Criterion,
-    Drawn,
     File,
     FrictionLaw,
     Kinds,
     Measures,
     Method,
     Out,
-    Over,
     Report,
     Rounds,
     Seats,
@@ -31,15 +29,16 @@ from trunnion.options import (
     Steps,
     TableFile,
     UnitsRow,
-    over,
-    points,
 )
-from trunnion.terminal import bar, console, findings_of, say, show_figures, show_rows, wrote
+from trunnion.output import folder
+from trunnion.terminal import bar, console, findings_of, say, show_figures, wrote
 from trunnion.verbs.allocate import allocate
 from trunnion.verbs.assemble import assemble
 from trunnion.verbs.data import data
 from trunnion.verbs.model import exit_status, lines_of, placed, stated
+from trunnion.verbs.rig import rig
 from trunnion.verbs.study import tolerance
+from trunnion.verbs.sweep import sweep
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -235,6 +234,10 @@ def sweep(
     raise typer.Exit(exit_status(findings_of(result)))
 
 
+app.command()(rig)
+app.command()(sweep)
+
+
 @app.command()
 def play(
     file: File,
@@ -287,7 +290,7 @@ def plot(
         result = _run(mechanism, steps, None)
     ideal = _ideal(mechanism, steps, None)
     if not single:
-        _folder(out)
+        folder(out)
     shown = with_worst_case(result, mechanism) if "error" in (kind or PLOTS) else result
     for name, figure in [(name, PLOTS[name](shown, ideal)) for name in kind or drawable(result)]:
         path = out if single else out / f"{name}.{image.lstrip('.')}"
@@ -343,7 +346,7 @@ def examples(
         raise MechanismError(Finding(f"there is no example '{name}'", remedy=f"use one of {', '.join(found)}"))
     from trunnion.output import whole
 
-    _folder(to)
+    folder(to)
     target = to / source.name
     if target.exists() and not force:
         raise MechanismError(Finding("exists already", str(target), "use --force to overwrite it"))
@@ -367,15 +370,6 @@ def schema(
 
     with whole(out) as temporary:
         temporary.write_text(text, encoding="utf-8")
-
-
-def _folder(path: Path) -> None:
-    """Make a folder; MechanismError if it cannot be one."""
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        what = f"cannot be made a folder: {error.strerror or error}"
-        raise MechanismError(Finding(what, str(path), "name a folder, or a .png, .svg or .pdf file")) from None
 
 
 def _version(show: bool) -> None:

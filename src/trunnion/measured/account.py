@@ -84,4 +84,7 @@ def places(mask: NDArray[np.bool_], time: NDArray[np.float64]) -> str:
     if lengths[longest] < 3:
         return where
     last = min(starts[longest] + lengths[longest], time.size - 1)
-    return f"{where}, the longest {time[last] - time[starts[longest]]:.3g} s at {time[starts[longest]]:.5g} s"
+    span = f"{time[last] - time[starts[longest]]:.3g} s"
+    return (
+        f"{where} for {span}" if starts.size == 1 else f"{where}, the longest {span} at {time[starts[longest]]:.5g} s"
+    )

@@ -53,7 +53,7 @@ def pulses_of(source: AngleSource, readings: Array, line: Timeline, indexed: boo
         found = _of_count(source, readings[finite], line.seconds[finite], line.step, account)
     if indexed or found.times.size < 9:
         return found
-    return _missed(found, line.step, account)
+    return _missed(found, line.step, 0.5 * (source.per_turn or 0), account)
 
 
 def _of_count(source: AngleSource, readings: Array, seconds: Array, step: float, account: Account) -> Pulses:
@@ -135,8 +135,11 @@ def _of_level(source: AngleSource, found: Pulses, line: Timeline, indexed: bool,
     return found
 
 
-def _missed(found: Pulses, step: float, account: Account) -> Pulses:
-    """Pulses that are missing or too many, told by the time between their neighbours; the count is set right."""
+def _missed(found: Pulses, step: float, most: float, account: Account) -> Pulses:
+    """Pulses that are missing or too many, told by the time between their neighbours; the count is set right.
+
+    most: pulses in a row that are taken for lost; more, and the shaft stood.
+    """
     between = np.diff(found.times)
     jumps = np.abs(np.diff(found.counts))
     each = between / np.maximum(jumps, 1.0)
@@ -144,10 +147,11 @@ def _missed(found: Pulses, step: float, account: Account) -> Pulses:
     if float(np.median(usual)) < TOLD_BY * step:
         return found
     calm = np.abs(median_filter(each, size=3, mode="nearest") / usual - 1) < 0.25
-    lost = np.where(calm & (each > 1.6 * usual) & (each < 4.5 * usual), np.rint(each / usual) - 1, 0.0)
+    single = jumps == 1
+    lost = np.where(calm & single & (each > 1.6 * usual) & (each < most * usual), np.rint(each / usual) - 1, 0.0)
     pairs = np.zeros(each.size)
     short = (each[:-1] + each[1:] < 1.4 * usual[:-1]) & (each[:-1] + each[1:] > 0.6 * usual[:-1])
-    pairs[1:][short] = -1.0
+    pairs[1:][short & single[1:] & single[:-1]] = -1.0
     pairs[2:][(pairs[1:-1] < 0) & (pairs[2:] < 0)] = 0.0
     change = lost + pairs
     if not np.any(change):

@@ -137,12 +137,12 @@ class _File:
         cuts = []
         for setting in settings(mapping, self.entry, self.table, self.line, account):
             allowed = self._used() & setting.rows
-            turns = cut(share, self.line, allowed, mapping.positions, spoilt, account, setting.name)
+            turns = cut(share, self.line, allowed, mapping.positions, spoilt, account, self._named(setting))
             if turns.numbers.size:
                 cuts.append((setting, turns))
             else:
-                account.error(f"condition {setting.name}" if setting.name else "turns", self._no_turn(share, allowed),
-                              "check angle, or record for longer")  # fmt: skip
+                what = self._no_turn(share, allowed)
+                account.error(f"condition {self._named(setting)}", what, "check angle, or record for longer")
         if not cuts:
             return []
         self._check_rows(cuts)
@@ -152,6 +152,9 @@ class _File:
         if not mapping.timed:
             signs(mapping.channels, whole, way * self._rate([part.turns for part in parts]), account)
         return [self._condition(part, zeros, drifts, way) for part in parts]
+
+    def _named(self, setting: Setting) -> str:
+        return setting.name or self.path.stem
 
     def _used(self) -> NDArray[np.bool_]:
         if self.entry.over is None:
@@ -179,9 +182,10 @@ class _File:
         if known.size < 3:
             what = "the coordinate of the driver is known in no row that is used"
             raise MechanismError(Finding(what, "angle", "check angle.column", file=self.account.file))
+        clock = np.repeat(self.line.spoilt[:, None], 2, axis=1)
         way = 1.0 if found.values[known[-1]] >= found.values[known[0]] else -1.0
         start = float(mapping.start.evaluate())
-        return way * (found.values - start) / cycle, way, found.spoilt
+        return way * (found.values - start) / cycle, way, np.concatenate([found.spoilt, clock])
 
     def _no_turn(self, share: Array, allowed: NDArray[np.bool_]) -> str:
         known = share[np.isfinite(share) & allowed]
@@ -208,10 +212,10 @@ class _File:
         """Tell how turns are sampled, whether they are enough and equally fast, and what the filter leaves of them."""
         account, mapping = self.account, self.mapping
         for setting, turns in cuts:
-            where = f"condition {setting.name}" if setting.name else "turns"
+            where = f"condition {self._named(setting)}"
             if turns.numbers.size < 2:
                 account.warn(where, "has one turn: there is no scatter, so no uncertainty", "record two turns or more")
-            steady(turns, setting.name or self.path.stem, account)
+            steady(turns, self.line.step, where, account)
             if turns.density < 1:
                 samples = f"{turns.density * mapping.positions:.4g} samples a turn for {mapping.positions} positions"
                 what = f"the sampling is slow: {samples}; between them it is interpolated"
@@ -294,7 +298,7 @@ class _File:
             values[path] = float(np.nanmean(courses[channel_name].turns))
         positions = self.mapping.positions
         speed = np.nan if self.mapping.timed else way * self._rate([part.turns])
-        name = part.setting.name or self.path.stem
+        name = self._named(part.setting)
         return Condition(name, values, np.arange(positions) / positions, courses, (str(self.path),), speed)
 
 

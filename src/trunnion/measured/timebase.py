@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,8 @@ UNEVEN = 0.2  # of the usual step, standard deviation
 class Timeline:
     """Rising times of the rows that are kept.
 
-    seconds: (row,); kept: rows of the table, None if all; step: the usual one, s; breaks: rows that follow a gap.
+    seconds: (row,); kept: rows of the table, None if all; step: the usual one, s; breaks: rows that follow a gap;
+    even: whether the samples are evenly spaced but for gaps; spoilt: times at which the clock ran backward.
     """
 
     seconds: Array
@@ -32,6 +33,7 @@ class Timeline:
     step: float
     breaks: NDArray[np.intp]
     even: bool = True
+    spoilt: Array = field(default_factory=lambda: np.empty(0))
 
     def rows(self, values: Array) -> Array:
         """The values of the rows that are kept."""
@@ -86,7 +88,7 @@ def _stated(seconds: Array, account: Account) -> Timeline:
     if kept.size < 3:
         what = f"the time rises in {kept.size} of {counted(total, 'row')}"
         raise MechanismError(Finding(what, "time", "check that time.column is the right one", file=account.file))
-    _backward(seconds, finite, rising, account)
+    spoilt = _backward(seconds, finite, rising, account)
     clean = seconds[kept] if kept.size < total else seconds
     steps = np.diff(clean)
     step = float(np.median(steps))
@@ -94,11 +96,11 @@ def _stated(seconds: Array, account: Account) -> Timeline:
     wide = steps > GAP * step
     usual = steps[~wide] / step
     spread = float(np.std(usual)) if usual.size else 0.0
-    return Timeline(clean, kept if kept.size < total else None, step, np.flatnonzero(wide) + 1, spread < UNEVEN)
+    return Timeline(clean, kept if kept.size < total else None, step, np.flatnonzero(wide) + 1, spread < UNEVEN, spoilt)
 
 
-def _backward(seconds: Array, finite: NDArray[np.bool_], rising: NDArray[np.bool_], account: Account) -> None:
-    """Tell of rows whose time repeats or runs backward."""
+def _backward(seconds: Array, finite: NDArray[np.bool_], rising: NDArray[np.bool_], account: Account) -> Array:
+    """Tell of rows whose time repeats or runs backward; the times of the latter."""
     stated = seconds[finite]
     steps = np.diff(stated)
     repeated, back = np.flatnonzero(steps == 0), np.flatnonzero(steps < 0)
@@ -114,6 +116,7 @@ def _backward(seconds: Array, finite: NDArray[np.bool_], rising: NDArray[np.bool
         )
         remedy = "split the file where a new recording begins, or check the logger's clock"
         account.warn("time", f"{what}; {counted(max(out, 1), 'row')} left out until it has passed", remedy)
+    return np.asarray(stated[back])
 
 
 def _tell_gaps(seconds: Array, steps: Array, step: float, account: Account) -> None:

@@ -46,13 +46,13 @@ class Turns:
 
 
 def cut(
-    share: Array, line: Timeline, allowed: Mask, positions: int, spoilt: Array, account: Account, name: str = ""
+    share: Array, line: Timeline, allowed: Mask, positions: int, spoilt: Array, account: Account, name: str
 ) -> Turns:
     """The whole turns among the rows that are allowed; those left out are told.
 
     share: cycles gone through, rising with time, NaN where not known; spoilt: stretches of time to leave out.
     """
-    where = f"condition {name}" if name else "turns"
+    where = f"condition {name}"
     known = np.isfinite(share)
     highest = np.maximum.accumulate(np.where(known, share, -np.inf))
     begin, end, numbers = _whole(share, highest, line)
@@ -73,7 +73,7 @@ def cut(
     if len(spoilt):
         hit = np.zeros(numbers.size, dtype=np.bool_)
         for low, high in spoilt:
-            hit |= (begin < high) & (end > low)
+            hit |= (begin <= high) & (end >= low)
         keep &= ~hit
     numbers, begin, end = numbers[keep], begin[keep], end[keep]
     rows = _rows_of(share, numbers, begin, end, line, known & allowed, positions)
@@ -86,7 +86,10 @@ def _whole(share: Array, highest: Array, line: Timeline) -> tuple[Array, Array, 
     if np.count_nonzero(finite) < 3:
         return np.empty(0), np.empty(0), np.empty(0, dtype=np.intp)
     first = int(np.argmax(finite))
-    rising, seconds = highest[first:], line.seconds[first:]
+    last = int(np.searchsorted(highest, highest[-1]))  # what follows stands, or is not known
+    rising, seconds = highest[first : last + 1], line.seconds[first : last + 1]
+    if rising.size < 3:
+        return np.empty(0), np.empty(0), np.empty(0, dtype=np.intp)
     steps = np.diff(rising)
     usual = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.0
     low, high = int(np.ceil(rising[0] - 1.01 * usual)), int(np.floor(rising[-1] + 1.01 * usual))

@@ -186,54 +186,6 @@ app.command()(assemble)
 app.command()(tolerance)
 app.command()(allocate)
 app.command()(data)
-
-
-@app.command()
-def sweep(
-    file: File,
-    over_: Over,
-    measure: Drawn = "efficiency",
-    steps: Steps = 360,
-    set_: Set = None,
-    table: TableFile = None,
-    friction: FrictionLaw = None,
-    seat: Seats = None,
-    out: Out = None,
-    units_row: UnitsRow = False,
-) -> None:
-    """How efficiency, drive effort, reactions, friction and locking margin change with one or two numbers."""
-    from trunnion.analysis.sweep import sweep as run
-    from trunnion.export import save
-    from trunnion.verbs.play import check_files
-    from trunnion.views.swept import check_measure
-    from trunnion.views.swept import table as swept_table
-
-    grid = over(over_)
-    drawn = [path for path in out or [] if path.suffix.lower() in IMAGES]
-    check_files(out or [])
-    mechanism = stated(file, set_, table, friction, seat)
-    check_measure(measure, mechanism)
-    with lines_of(file), bar("points", points(grid)) as progress:
-        result = run(mechanism, grid, steps, progress=progress)
-    for path in out or []:
-        if path in drawn:
-            from trunnion.views import plots
-            from trunnion.views.sweep import figure
-
-            plots.save(figure(result, measure), path)
-        else:
-            save(result, path, units_row)
-    head, rows, left_out = swept_table(result, measure)
-    name = f"{measure.replace('_', ' ')} over {' and, in columns, '.join(grid)}"
-    show_rows(f"{mechanism.name or file}\n{name}", head, rows)
-    if left_out:
-        console().print(f"{left_out:,} points more; --out FILE.csv has all", markup=False, highlight=False)
-    say(placed(findings_of(result), file, ["assembly"]))
-    for path in out or []:
-        wrote(path)
-    raise typer.Exit(exit_status(findings_of(result)))
-
-
 app.command()(rig)
 app.command()(sweep)
 

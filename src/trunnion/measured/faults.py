@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
+from trunnion.errors import Severity
 from trunnion.measured.account import Account, counted, places, runs
 from trunnion.measured.tables import Column
 
@@ -52,8 +53,19 @@ def cells(where: str, column: Column, readings: Array, seconds: Array, account: 
     account.warn(where, f"{what}; left out", "check cable and logger")
 
 
-def signal(where: str, readings: Array, seconds: Array, span: Span, limit: float | None, account: Account) -> None:
-    """Look for faults in the rows of a span, and make the readings that they spoil NaN."""
+def signal(
+    where: str,
+    readings: Array,
+    seconds: Array,
+    span: Span,
+    limit: float | None,
+    account: Account,
+    steady: bool = False,
+) -> None:
+    """Look for faults in the rows of a span, and make the readings that they spoil NaN.
+
+    limit: the end of the range, in readings; steady: whether one reading throughout is nothing strange, as of a speed.
+    """
     part, time = readings[span.low : span.high], seconds[span.low : span.high]
     finite = np.isfinite(part)
     if np.count_nonzero(finite) < 10:
@@ -62,7 +74,8 @@ def signal(where: str, readings: Array, seconds: Array, span: Span, limit: float
     low, high = (float(one) for one in np.percentile(known, (1, 99)))
     if known.min() == known.max():
         what = f"reads {known[0]:.6g} in every one of {known.size:,} rows"
-        account.warn(where, what, "check that the sensor is connected, and that the column is the right one")
+        severity = Severity.NOTE if steady else Severity.WARNING
+        account.warn(where, what, "check that the sensor is connected and the column the right one", severity)
         return
     wide = max(high - low, 1e-300)
     if limit is not None:
@@ -99,7 +112,7 @@ def _plateaus(where: str, part: Array, time: Array, account: Account) -> None:
         return
     for end in (float(finite.max()), float(finite.min())):
         at = int(np.count_nonzero(finite == end))
-        if at < max(5, 2e-4 * finite.size):
+        if end == 0 or at < max(5, 2e-4 * finite.size):
             continue
         mask = part == end
         _, lengths = runs(mask)

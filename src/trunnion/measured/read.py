@@ -247,13 +247,14 @@ class _File:
         high = int(np.searchsorted(line.seconds, max(float(part.turns.end[-1]) for part in parts), side="right"))
         span = faults.Span(low, high, sum(part.turns.numbers.size for part in parts))
         readings = self.readings.pop(name)
-        faults.signal(where, readings, line.seconds, span, own.limit, account)
+        speed = channel.measures.startswith("rate:")
+        faults.signal(where, readings, line.seconds, span, own.limit, account, speed)
         values = own.quantity(readings, zero, channel.sign, line.seconds)
         if mapping.filter is not None:
             values = filtered(values, line, mapping.filter, account, where)
         for part in parts:
             part.courses[name] = resampled(part.turns, values, line)
-        if channel.measures.startswith("rate:"):  # a speed that creeps is one
+        if speed:  # one that creeps is the drive's
             return None
         found = drift([(part.turns, part.courses[name]) for part in parts])
         if found is None:

@@ -28,7 +28,7 @@ class Turns:
     """Whole turns of one condition in a file.
 
     share: (row,), the cycle counted on, rising, whole at the start of each; numbers: of the turns; begin, end: their
-    times, s; rows: those that belong to them; positions: how many a turn.
+    times, s; rows: those that belong to them; positions: how many a turn; step: between samples, s.
     """
 
     share: Array
@@ -37,12 +37,12 @@ class Turns:
     end: Array
     rows: Mask
     positions: int
+    step: float
 
     @property
     def density(self) -> float:
         """Samples a position."""
-        whole = self.numbers.size * self.positions
-        return float(np.count_nonzero(self.rows)) / whole if whole else 0.0
+        return float(np.mean(self.end - self.begin)) / (self.step * self.positions) if self.numbers.size else 0.0
 
 
 def cut(
@@ -73,11 +73,12 @@ def cut(
     if len(spoilt):
         hit = np.zeros(numbers.size, dtype=np.bool_)
         for low, high in spoilt:
-            hit |= (begin <= high) & (end >= low)
+            slack = min(line.step, 0.25 * (high - low))  # an index may lie where a turn begins
+            hit |= (begin <= high - slack) & (end >= low + slack)
         keep &= ~hit
     numbers, begin, end = numbers[keep], begin[keep], end[keep]
     rows = _rows_of(share, numbers, begin, end, line, known & allowed, positions)
-    return Turns(share, numbers, begin, end, rows, positions)
+    return Turns(share, numbers, begin, end, rows, positions, line.step)
 
 
 def _whole(share: Array, highest: Array, line: Timeline) -> tuple[Array, Array, NDArray[np.intp]]:
@@ -205,7 +206,8 @@ def _cubic(x: Array, y: Array, at: Array) -> Array:
 def turn_means(course: Array) -> Array:
     """Mean of each turn over the positions that most turns have, (turn,); NaN where one lacks many of them."""
     finite = np.isfinite(course)
-    usual = np.nanmean(np.where(finite.any(axis=0), course, np.nan), axis=0) if course.size else np.empty(0)
-    level = float(np.nanmean(usual)) if usual.size and np.isfinite(usual).any() else np.nan
+    count = finite.sum(axis=0)
+    usual = np.where(finite, course, 0.0).sum(axis=0) / np.maximum(count, 1)
+    level = float(usual[count > 0].mean()) if np.any(count) else np.nan
     left = np.where(finite, course - usual, 0.0).sum(axis=1) / np.maximum(finite.sum(axis=1), 1)
     return np.where(finite.mean(axis=1) > 0.5, level + left, np.nan)

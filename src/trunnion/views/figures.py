@@ -34,12 +34,14 @@ def style_of(index: int) -> dict[str, Any]:
 
 
 def new(title: str, result: xr.Dataset, height: float = 4.3, width: float = WIDTH) -> Figure:
-    """An empty figure with its title and, smaller, the name of the mechanism."""
+    """An empty figure with its title, of one line or more, and, smaller, the name of the mechanism."""
     layout = ConstrainedLayoutEngine(w_pad=0.08, h_pad=0.06, hspace=0.03, wspace=0.04)
     figure = Sheet(figsize=(width, height), dpi=150, facecolor="white", layout=layout)
     FigureCanvasAgg(figure)
     name = str(result.attrs.get("name", ""))
-    figure.suptitle(plain(title), x=0.012, ha="left", fontsize=12, fontweight="bold", color=INK)
+    figure.suptitle(
+        "\n".join(map(plain, title.split("\n"))), x=0.012, ha="left", fontsize=12, fontweight="bold", color=INK
+    )
     if name:
         figure.supxlabel(plain(name), x=0.99, ha="right", fontsize=7.5, color=MUTED)
     return figure
@@ -138,10 +140,10 @@ def frame_peak(axes: Axes, most: float, shown: float, factor: float, unit: str) 
         return
     low, high, room = axes.dataLim.y0, axes.dataLim.y1, 1.05
     axes.set_ylim(max(min(low, 0.0), -shown * factor) * room, min(max(high, 0.0), shown * factor) * room)
-    _outside(axes, most, unit)
+    outside(axes, most, unit)
 
 
-def _outside(axes: Axes, most: float, unit: str) -> None:
+def outside(axes: Axes, most: float, unit: str) -> None:
     text = f"peak {quantity(most, unit)} lies outside"
     box = {"boxstyle": "round,pad=0.2", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
     axes.text(0.99, 0.97, text, transform=axes.transAxes, ha="right", va="top", fontsize=8, color=MUTED, bbox=box)
@@ -156,7 +158,7 @@ def square(axes: Axes, most: float, shown: float, factor: float, unit: str) -> N
     half = shown * factor
     axes.set_aspect("equal", adjustable="box")
     axes.set(xlim=(-half, half), ylim=(-half, half))
-    _outside(axes, most, unit)
+    outside(axes, most, unit)
 
 
 def legend(axes: Axes, most: int = 6, room: int = 90, least: int = 2) -> None:

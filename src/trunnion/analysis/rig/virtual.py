@@ -96,7 +96,7 @@ class Observation:
         """The readings of one condition, faults included."""
         columns = self._readings(case)
         rig = self.rig
-        time = np.arange(case.rows) / self.rate * PER_SECOND[rig.time.unit]
+        time = (np.arange(case.rows) - case.origin) / self.rate * PER_SECOND[rig.time.unit]
         found: dict[str, NDArray[Any]] = {rig.time.column: np.round(time, TIME_DECIMALS[rig.time.unit])}
         if rig.encoder:
             angle, zero = self._angle(case), float(rig.encoder.zero.evaluate())

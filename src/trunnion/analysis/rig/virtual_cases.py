@@ -65,6 +65,14 @@ class Case:
         return float(np.ravel(found[0])[0]), float(np.ravel(found[1])[0])
 
     @property
+    def origin(self) -> float:
+        """Sample, counted from the first of the file, at which time is 0: the first, or, where the driver does not name
+        positions by its coordinate, the start of the first cycle."""
+        driver = next(iter(self.run.system.mechanism.drivers))
+        named = self.run.system.turns(driver) and self.run.system.span(self.run.values, driver).one_way
+        return 0.0 if named else self.before + self.lead
+
+    @property
     def part(self) -> slice:
         """Samples at which the machine runs."""
         return slice(self.before, self.before + self.running)

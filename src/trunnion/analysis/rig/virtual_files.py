@@ -160,7 +160,7 @@ def _file(observation: Observation, case: Case, form: str, timed: bool) -> dict[
     if case.settings:
         found["set"] = dict(case.settings)
     if timed and case.rows > case.running:
-        ends = (case.before, case.before + case.running - 1)
+        ends = (case.before - case.origin, case.before + case.running - 1 - case.origin)
         found["over"] = [f"{end / observation.rate:.9g} s" for end in ends]
     return found
 
@@ -228,9 +228,10 @@ def _channel(observation: Observation, name: str) -> dict[str, Any]:
     found: dict[str, Any] = {"column": channel.column, "measures": channel.measures, "unit": channel.reading}
     if stated.sensitivity:
         found["gain"] = stated.sensitivity.source
-    before = min(case.before for case in observation.cases)
-    if channel.zeroed and before > 1:
-        found["zero"] = {"over": ["0 s", f"{AT_REST * before / observation.rate:.6g} s"]}
+    case = observation.cases[0]
+    if channel.zeroed and case.before > 1:
+        rest = (-case.origin, AT_REST * case.before - case.origin)
+        found["zero"] = {"over": [f"{one / observation.rate + 0.0:.6g} s" for one in rest]}
     if stated.range:
         found["range"] = stated.range.source
     accuracy: dict[str, Any] = {}

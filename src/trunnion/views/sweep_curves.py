@@ -59,7 +59,7 @@ def _panel(panel: Panel, told: Field, alone: bool) -> None:
         _curve(axes, x, y[:, k] * told.factor, label, look)
         if ideal is not None:
             name = "ideal" if other is None else "ideal, dashed"
-            _curve(axes, x, ideal[:, k] * told.factor, None if k else name, {**look, **IDEAL})
+            _curve(axes, x, ideal[:, k] * told.factor, name if k == count - 1 else None, {**look, **IDEAL})
     _lost(axes, x, y * told.factor, status)
     ticks(axes, told.plan.x)
     if not np.isfinite(y).any() and not (status >= Status.NOT_CONVERGED).any():

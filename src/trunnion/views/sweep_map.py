@@ -34,7 +34,7 @@ __all__ = ["draw", "need_two"]
 
 Beyond = Literal["neither", "both", "min", "max"]
 
-BANDS = 8
+BANDS = 10
 COLOURS = colormaps["viridis"]
 FINER = 8  # parts of a cell along a logarithmic axis
 NOTHING = -1  # beside the statuses: sound, and yet without a number

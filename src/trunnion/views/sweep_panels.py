@@ -8,6 +8,7 @@ from textwrap import fill, wrap
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from matplotlib.lines import Line2D
 from matplotlib.ticker import NullLocator, ScalarFormatter
 from numpy.typing import NDArray
 
@@ -211,9 +212,9 @@ def tell(shown: Board, least: int = 1) -> None:
         legend(shown.panels[0].axes, least=least)
         return
     named: dict[str, Any] = {}
-    for panel in shown.panels:
-        for handle, label in zip(*panel.axes.get_legend_handles_labels(), strict=True):
-            named.setdefault(label, handle)
+    entries = [entry for axes, _ in shown.panels for entry in zip(*axes.get_legend_handles_labels(), strict=True)]
+    for handle, label in sorted(entries, key=lambda entry: not isinstance(entry[0], Line2D)):  # curves before areas
+        named.setdefault(label, handle)
     if len(named) < least:
         shown.strip.remove()
         return

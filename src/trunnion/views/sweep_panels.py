@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from trunnion.views.as_built import angle_scale
 from trunnion.views.cycle import Array, usual_peak
+from trunnion.views.error_plot import LOST
 from trunnion.views.figures import INK, MUTED, dress, legend, new
 from trunnion.views.lettering import plain
 from trunnion.views.quantities import prefixed
@@ -35,6 +36,7 @@ __all__ = [
     "ends",
     "field",
     "on_scale",
+    "ring",
     "scale_of_colours",
     "tell",
     "ticks",
@@ -239,6 +241,13 @@ def scale_of_colours(shown: Board, colours: ScalarMappable, label: str, ticks: A
     bar.ax.tick_params(labelsize=8.5, colors=MUTED, labelcolor=INK)
     bar.ax.minorticks_off()
     return bar
+
+
+def ring(axes: Axes, x: Array, y: Array, size: float, beyond: bool = False) -> None:
+    """Rings of a size around points at which contact is lost, also over the frame; in the legend one that is seen."""
+    look: dict[str, Any] = {"color": LOST, "markerfacecolor": "none", "linestyle": "", "marker": "o"}
+    axes.plot([], [], markersize=7, markeredgewidth=1.2, label="contact lost at some position", **look)
+    axes.plot(x, y, markersize=size, markeredgewidth=0.15 * size, zorder=4, clip_on=not beyond, **look)
 
 
 # ---- axes -----------------------------------------------------------------------------------------------------

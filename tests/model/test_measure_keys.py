@@ -118,6 +118,7 @@ KINDS = [
     ({"stroke": "D"}, "angle"),
     ({"dead_centre": "D"}, "angle"),
     ({"dead_centre": "D", "as": "place-of-minimum"}, "angle"),
+    ({"rate": "D"}, "angular speed"),
     ({"effort": "A"}, "moment"),
     ({"effort": "A", "as": "place-of-maximum"}, "angle"),
     ({"reaction": "C"}, "force"),
@@ -131,14 +132,21 @@ KINDS = [
 @pytest.mark.parametrize(("keys", "kind"), KINDS)
 def test_what_a_measure_gives(varied: Mechanism, keys: dict[str, str], kind: str) -> None:
     """A limit of another kind is a finding."""
-    units = {"length": "1 um", "angle": "1 deg", "moment": "1 N m", "force": "1 N", "number": 0.1}
+    units = {
+        "length": "1 um",
+        "angle": "1 deg",
+        "angular speed": "1 rpm",
+        "moment": "1 N m",
+        "force": "1 N",
+        "number": 0.1,
+    }
     good = with_measure(varied, **keys, limit=units[kind], at_most=units[kind])
     assert {one.name for path, one in good.parameter_kinds().items() if path.startswith("measures.")} == {kind}
     with pytest.raises(MechanismError) as error:
         with_measure(varied, **keys, limit="1 kg")
     (finding,) = error.value.findings  # both limits, once
     assert finding.where == "measures.one.limit"
-    assert f"'1 kg' is a mass where {'an' if kind == 'angle' else 'a'} {kind} is needed" in finding.what
+    assert f"'1 kg' is a mass where {'an' if kind[0] == 'a' else 'a'} {kind} is needed" in finding.what
 
 
 @pytest.mark.parametrize("slides", [{"stroke": "S"}, {"transmission_error": "S"}, {"slide": "S"}])

@@ -33,7 +33,9 @@ NEAR = Measure("near", "dead_centre", "C", statistic="place-of-minimum")
 
 @pytest.fixture(scope="module")
 def crank() -> Run:
-    return prepare(build(slider_crank(R, L, E)))
+    data = slider_crank(R, L, E)
+    data["loads"]["press"] = {"joint": "C", "resisting_force": "30 N"}
+    return prepare(build(data))
 
 
 @pytest.fixture(scope="module")
@@ -385,12 +387,43 @@ def test_derivative_of_a_peak_and_of_the_efficiency() -> None:
         assert float(np.ravel(derivative(slopes[name]))[0]) == pytest.approx(slope, rel=1e-4, abs=1e-8), name
 
 
+# ---- speeds and loads of joints -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("model", "joints"), [("slider-crank", ["O", "P"]), ("pezzuti-cardan", ["input", "output"])])
+def test_speeds_and_what_loads_take(model: str, joints: list[str]) -> None:
+    """Speeds as the books have them; torque of the load times speed is the useful power."""
+    mechanism = trunnion.read(EXAMPLES / f"{model}.yaml")
+    loads = [name for name, load in mechanism.loads.items() if load.joint]
+    run = prepare(mechanism)
+    found = trunnion.analyse(mechanism, 24)
+    measures = named(mechanism, [*(f"rate:{one}" for one in joints), *(f"load:{one}" for one in loads)], run.values)
+    back = run.solve(run.cycle.times(24))
+    curves = {one.name: np.broadcast_to(one.curve(back)[0], 24) for one in measures}
+    for joint in joints:
+        np.testing.assert_allclose(
+            curves[f"rate:{joint}"], found["joint_rotation_velocity"].sel(joint=joint), rtol=1e-12
+        )
+    taken = sum(curves[f"load:{one}"] * curves[f"rate:{mechanism.loads[one].joint}"] for one in loads)
+    if loads:
+        np.testing.assert_allclose(taken, found["useful_power"], rtol=1e-12)
+        assert [one.unit(run.system) for one in measures] == ["rad/s"] * len(joints) + ["N m"] * len(loads)
+
+
+def test_no_load_where_the_joint_rests(crank: Run) -> None:
+    """A crank at a dead centre: the slide rests, and what the load takes there has no value."""
+    measure = Measure("press", "load", "press")
+    time = np.array([0.1, 0.3]) * crank.cycle.duration
+    np.testing.assert_allclose(np.abs(measure.curve(crank.solve(time))[0]), 30.0, rtol=1e-12)
+
+
 # ---- every kind with every statistic --------------------------------------------------------------------------
 
 SUBJECTS = {
     "point": ("piston.P", "x"), "path_error": ("piston.P", ""), "straightness": ("rod.P", ""), "angle": ("rod", ""),
     "rotation": ("P", ""), "slide": ("C", ""), "transmission_error": ("C", ""), "stroke": ("C", ""),
-    "dead_centre": ("C", ""), "effort": ("A", ""), "reaction": ("P", ""), "efficiency": ("cycle", ""),
+    "dead_centre": ("C", ""), "rate": ("P", ""), "load": ("press", ""),
+    "effort": ("A", ""), "reaction": ("P", ""), "efficiency": ("cycle", ""),
     "locking_margin": ("mechanism", ""),
 }  # fmt: skip
 
@@ -421,7 +454,7 @@ def test_every_kind_with_every_statistic(crank: Run) -> None:
         np.testing.assert_allclose(found[0], reference.figure, rtol=1e-12, atol=1e-12, err_msg=one.name)
         picture = np.broadcast_to(shown(many[one.name], reference), (3, len(reference.window.time)))
         assert picture.shape[-1] == len(reference.window.index)
-        assert one.figure_unit(crank.system, crank.values) in ("m", "rad", "N", "N m", "1")
+        assert one.figure_unit(crank.system, crank.values) in ("m", "rad", "rad/s", "N", "N m", "1")
         dual = figure(slopes[one.name], reference)
         np.testing.assert_allclose(np.ravel(primal(dual))[0], found[1], rtol=1e-9, atol=1e-12, err_msg=one.name)
         least, most = span(many[one.name], reference)

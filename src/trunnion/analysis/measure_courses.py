@@ -8,13 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from trunnion.algebra.dual import Dual
+from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.analysis.account import MARGIN, useful_loads
 from trunnion.analysis.kinematics import Forward
 from trunnion.analysis.kinetostatics import Backward
+from trunnion.analysis.space.motion import SpatialWalk
 
-__all__ = ["efficiency", "effort", "locking_margin", "place", "reaction"]
+__all__ = ["efficiency", "effort", "joint_rate", "load", "locking_margin", "place", "reaction"]
 
 
 def place(subject: str, walk: Forward) -> tuple[Number, ...]:
@@ -26,6 +27,25 @@ def place(subject: str, walk: Forward) -> tuple[Number, ...]:
 def effort(subject: str, back: Backward) -> tuple[Number, ...]:
     """Torque or force of a driver, N m or N."""
     return (back.efforts[subject],)
+
+
+def joint_rate(joint: str, back: Backward, turns: bool) -> Number:
+    """Speed of the second link against the first, rad/s about the joint's axis or m/s along it."""
+    if isinstance(back.walk, SpatialWalk):
+        return back.walk.rates(joint)[0 if turns else 1]
+    return back.slips[joint].speed
+
+
+def load(subject: str, back: Backward) -> tuple[Number, ...]:
+    """Torque or force of a load on a joint against the joint's positive sense, N m or N; NaN where the joint rests.
+
+    Times the speed of the joint it is the power that the load takes.
+    """
+    stated = back.walk.system.mechanism.loads[subject]
+    rate = joint_rate(stated.joint or "", back, stated.resisting_torque is not None)
+    moving = primal(rate) != 0
+    xp = namespace(rate)
+    return (-back.load_powers[subject] / xp.where(moving, rate, np.nan),)
 
 
 def reaction(subject: str, axis: str, back: Backward) -> tuple[Number, ...]:

@@ -47,6 +47,7 @@ __all__ = [
 
 AXES = ("x", "y", "z")
 OF_JOINT = "of the joint"
+RATE = "of the joint, a second"
 STATISTICS = (
     *("value", "maximum", "minimum", "peak-to-peak", "mean", "rms", "largest"),
     *("place-of-maximum", "place-of-minimum"),
@@ -111,6 +112,10 @@ class Measure:
     def unit(self, system: System) -> str:
         """SI unit of the course."""
         unit = MEASURES[self.kind].unit
+        if self.kind == "load":
+            return "N" if system.mechanism.loads[self.subject].resisting_torque is None else "N m"
+        if unit == RATE:
+            return "rad/s" if system.turns(self.subject) else "m/s"
         if unit == "N m":
             return "N m" if system.turns(self.subject) else "N"
         return ("rad" if system.turns(self.subject) else "m") if unit == OF_JOINT else unit
@@ -190,10 +195,11 @@ class MotionKind:
 
 @dataclass(frozen=True)
 class MeasureKind:
-    """What a measure may be. unit: SI, of the course ("N m": or N, by the driver; "of the joint": rad or m).
+    """What a measure may be. unit: SI, of the course ("N m": or N, by the driver or load; "of the joint": rad or m).
 
-    curve: the course, of a `Backward` if `of_forces`, else of a `Forward`; rule: what makes the figure of it where no
-    statistic is stated; against: whether the course is compared to that of the nominal mechanism, position by position.
+    curve: the course, of a `Backward` if `of_forces` (it needs more than the places), else of a `Forward`; rule: what
+    makes the figure of it where no statistic is stated; against: whether the course is compared to that of the nominal
+    mechanism, position by position.
     """
 
     unit: str
@@ -341,6 +347,14 @@ def _effort(measure: Measure, back: Backward) -> tuple[Number, ...]:
     return courses.effort(measure.subject, back)
 
 
+def _rate(measure: Measure, back: Backward) -> tuple[Number, ...]:
+    return (courses.joint_rate(measure.subject, back, back.walk.system.turns(measure.subject)),)
+
+
+def _load(measure: Measure, back: Backward) -> tuple[Number, ...]:
+    return courses.load(measure.subject, back)
+
+
 def _reaction(measure: Measure, back: Backward) -> tuple[Number, ...]:
     return courses.reaction(measure.subject, measure.axis, back)
 
@@ -363,7 +377,9 @@ MEASURES: dict[str, MeasureKind] = {
     "transmission_error": MeasureKind(OF_JOINT, "transmission error of a joint", _value, against=True),
     "stroke": MeasureKind(OF_JOINT, "stroke of a joint", _value, "peak-to-peak"),
     "dead_centre": MeasureKind(OF_JOINT, "dead centre of a joint", _value, "dead centre"),
+    "rate": MeasureKind(RATE, "speed of a joint", _rate, of_forces=True),
     "effort": MeasureKind("N m", "effort of a driver", _effort, of_forces=True),
+    "load": MeasureKind("N m", "torque or force of a load on a joint", _load, of_forces=True),
     "reaction": MeasureKind("N", "reaction in a joint", _reaction, of_forces=True),
     "efficiency": MeasureKind("1", "efficiency", _efficiency, "ratio", of_forces=True),
     "locking_margin": MeasureKind("1", "locking margin", _margin, "minimum", of_forces=True),
@@ -380,16 +396,16 @@ def coordinate_unit(system: System, values: Values) -> str:
 
 # ---- by name --------------------------------------------------------------------------------------------------
 
-FORMS = "[STATISTIC:]link.point.x, angle:link, rotation:joint, slide:joint, effort:driver or KIND:NAME"
+FORMS = "[STATISTIC:]link.point.x, angle:link, rotation:joint, slide:joint, effort:driver, load:name or KIND:NAME"
 
 
 def named(mechanism: Mechanism, names: Iterable[str], values: Values) -> list[Measure]:
     """Measures by their names in the model, or written as they are.
 
-    `link.point.x`, `angle:link` (in space `angle:link.x`), `rotation:joint`, `slide:joint`, `effort:driver`,
-    `reaction:joint` or `reaction:joint.x`, `efficiency:cycle`, `efficiency:instant`, `locking_margin:mechanism`,
-    `path_error:link.point`, `straightness:link.point`, `stroke:joint`, `dead_centre:joint`, `transmission_error:joint`;
-    before any of them a statistic: `maximum:effort:A`, `rms:link.point.x`.
+    `link.point.x`, `angle:link` (in space `angle:link.x`), `rotation:joint`, `slide:joint`, `rate:joint`,
+    `effort:driver`, `load:name`, `reaction:joint` or `reaction:joint.x`, `efficiency:cycle`, `efficiency:instant`,
+    `locking_margin:mechanism`, `path_error:link.point`, `straightness:link.point`, `stroke:joint`, `dead_centre:joint`,
+    `transmission_error:joint`; before any of them a statistic: `maximum:effort:A`, `rms:link.point.x`.
     Raises MechanismError for a name that means nothing.
     """
     found, findings = [], []

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["SUBJECTS", "check_measure", "measure_values", "point_exists"]
 
 OF_POINT = ("point", "path_error", "straightness")
-OF_JOINT = ("rotation", "slide", "transmission_error", "stroke", "dead_centre", "reaction")
+OF_JOINT = ("rotation", "slide", "transmission_error", "stroke", "dead_centre", "rate", "reaction")
 ENDS = ("from", "to")
 PLACES = ("place-of-maximum", "place-of-minimum")
 
@@ -40,6 +40,7 @@ def check_measure(mechanism: Mechanism, measure: Measure, where: str) -> Iterato
         "angle": ("link", list(mechanism.effective_links)),
         **dict.fromkeys(OF_JOINT, ("joint", joints)),
         "effort": ("driver", list(mechanism.drivers)),
+        "load": ("load on a joint", [one for one, load in mechanism.loads.items() if load.joint is not None]),
     }
     for key, (noun, names) in known.items():
         name = getattr(measure, key)

@@ -53,6 +53,11 @@ def figure_kind(mechanism: Mechanism, measure: Measure) -> Kind:
         return KINDS[known]
     name = getattr(measure, measure.subject) if measure.subject else ""
     joint = mechanism.effective_joints.get(name)
+    if measure.subject == "load":
+        load = mechanism.loads.get(name)
+        return KINDS["force" if load and load.resisting_torque is None else "moment"]
+    if measure.subject == "rate":
+        return KINDS["speed" if joint and motions(joint.type)[:1] == ("slide",) else "angular speed"]
     if measure.subject == "effort":
         return KINDS["force" if joint and "rotation" not in freedoms(joint.type) else "moment"]
     return KINDS["length" if joint and motions(joint.type)[:1] == ("slide",) else "angle"]

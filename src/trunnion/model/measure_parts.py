@@ -23,7 +23,9 @@ SUBJECTS = (
     "transmission_error",
     "stroke",
     "dead_centre",
+    "rate",
     "effort",
+    "load",
     "reaction",
     "efficiency",
     "locking_margin",
@@ -76,7 +78,13 @@ class Measure(Part):
             "with `as` place-of-minimum, smallest"
         ),
     )
+    rate: str | None = Field(
+        default=None, description="joint whose speed is watched: of its rotation, of a prismatic one of its slide"
+    )
     effort: str | None = Field(default=None, description="driver whose effort is watched")
+    load: str | None = Field(
+        default=None, description="load on a joint, whose torque or force against the joint's positive sense is watched"
+    )
     reaction: str | None = Field(
         default=None,
         description="joint whose reaction is watched, its magnitude or, with `axis`, a component",

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from trunnion.analysis.inspect import Check, check
     from trunnion.analysis.locking import locking
     from trunnion.analysis.play import play
+    from trunnion.analysis.rig.compare import compare
     from trunnion.analysis.sweep import sweep
     from trunnion.analysis.tolerance.study import tolerance
     from trunnion.errors import Finding, MechanismError, Status
@@ -38,6 +39,7 @@ _PLACES = {
     "analyse": "trunnion.analysis.analyse",
     "assemble": "trunnion.analysis.assemblability",
     "check": "trunnion.analysis.inspect",
+    "compare": "trunnion.analysis.rig.compare",
     "locking": "trunnion.analysis.locking",
     "play": "trunnion.analysis.play",
     "prepare": "trunnion.analysis.analyse",
@@ -61,6 +63,7 @@ __all__ = [
     "analyse",
     "assemble",
     "check",
+    "compare",
     "dual",
     "locking",
     "play",

@@ -17,7 +17,7 @@ from trunnion.analysis.seating import settle
 from trunnion.analysis.tolerance.kernel import NumpyKernel
 from trunnion.analysis.travel import lanes
 from trunnion.errors import Finding, MechanismError, Status
-from trunnion.measured.measurement import Condition, Measurement
+from trunnion.measured.measurement import Condition
 from trunnion.model.mechanism import Mechanism
 
 __all__ = ["Modelled", "measure_of", "modelled", "prepared"]
@@ -73,25 +73,24 @@ def measure_of(mechanism: Mechanism, run: Run, channel: str, name: str) -> Measu
 
 
 def modelled(
-    mechanism: Mechanism, condition: Condition, channels: Mapping[str, str], method: FrictionMethod
+    mechanism: Mechanism,
+    condition: Condition,
+    channels: Mapping[str, str],
+    method: FrictionMethod,
+    also: Mapping[str, str] | None = None,
 ) -> Modelled:
-    """The model with the values of a condition. channels: what each measures, by name.
+    """The model with the values of a condition. channels: what each measures, by name; also: others, if they can be.
 
     Raises MechanismError for values or measures that the model does not have, all in one go.
     """
     run = prepared(mechanism, condition)
     findings: list[Finding] = []
     measures: dict[str, Measure] = {}
-    for channel, name in channels.items():
+    for channel, name in {**(also or {}), **channels}.items():
         try:
-            measures[channel] = measure_of(run.system.mechanism, run, channel, name)
+            measures[channel] = _checked(run, condition, channel, name)
         except MechanismError as error:
-            findings += error.findings
-            continue
-        unit, own = measures[channel].unit(run.system), condition.courses[channel].unit
-        if own != unit:
-            what = f"measures {own}, and {name} is in {unit}"
-            findings.append(Finding(what, f"channels.{channel}.unit", "state its unit and gain, or what else it measures"))
+            findings += error.findings if channel in channels else ()
     if findings:
         raise MechanismError(findings)
     if run.determinacy is not None and not all(one.of_motion for one in measures.values()):
@@ -104,6 +103,16 @@ def modelled(
         for channel, measure in measures.items()
     }
     return Modelled(run, drive, unit, span, status, found, measures)
+
+
+def _checked(run: Run, condition: Condition, channel: str, name: str) -> Measure:
+    """What a channel measures; MechanismError if the model has no such course, or has it in another unit."""
+    measure = measure_of(run.system.mechanism, run, channel, name)
+    unit, own = measure.unit(run.system), condition.courses[channel].unit
+    if own != unit:
+        what = f"is in {own}, and {name} is in {unit}"
+        raise MechanismError(Finding(what, f"channels.{channel}", "state its unit and gain, or what else it measures"))
+    return measure
 
 
 def prepared(mechanism: Mechanism, condition: Condition) -> Run:
@@ -163,13 +172,3 @@ def _beside(turning: bool, course: Array, measured: Array) -> Array:
         return course
     turns = np.round((measured - course) / (2 * np.pi))
     return course + 2 * np.pi * np.nan_to_num(turns)
-
-
-def channels_of(measurement: Measurement, wanted: object = None) -> dict[str, str]:
-    """What each channel of a measurement measures, by name; only the wanted ones, MechanismError if there is no such."""
-    found: dict[str, str] = {}
-    for condition in measurement.conditions:
-        for channel, course in condition.courses.items():
-            if course.measures:
-                found.setdefault(channel, course.measures)
-    return found

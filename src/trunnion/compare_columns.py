@@ -2,7 +2,8 @@
 
 `x.csv` has one row a position of a condition: `condition`, what was set, `phase`, the drive, `status`, and of each
 channel `<channel>.measured`, `.scatter`, `.uncertainty`, `.expanded`, `.model`, `.residual`, `.compared`.
-`x.figures.csv` has one row a channel in a condition: `rms`, `largest`, `bias`, `within`, `verdict`, …, and the efficiency. SI.
+`x.figures.csv` has one row a channel in a condition: `rms`, `largest`, `bias`, `within`, `verdict`, …, and the
+efficiency. SI.
 """
 
 from __future__ import annotations

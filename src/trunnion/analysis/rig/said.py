@@ -121,9 +121,12 @@ def _explained(name: str, measures: str, kind: str, members: Sequence[tuple[Comp
     rms = max(pair.judged.rms for _, pair in members)
     unit = members[0][1].course.unit
     offset = all(pair.judged.verdict is Verdict.OFFSET for _, pair in members)
+    if offset and kind == "zero":
+        story, remedy = _story(name, measures, kind, [_size(pair, kind) for _, pair in members], members)
+        what = f"is within U {where} apart from {story}: {_share(worst)} of the positions are within with it"
+        return Finding(what, f"channels.{name}", remedy)
     what = (
-        f"{'is within U apart from a constant offset' if offset else 'is not within U'} {where}: "
-        f"{_share(worst)} of the positions are within, RMS of the residual {said(rms, unit)}"
+        f"is not within U {where}: {_share(worst)} of the positions are within, RMS of the residual {said(rms, unit)}"
     )
     if not kind:
         remedy = "look at the residual along the cycle; `trunnion identify` fits numbers of the model to it"
@@ -131,7 +134,7 @@ def _explained(name: str, measures: str, kind: str, members: Sequence[tuple[Comp
     sizes = [_size(pair, kind) for _, pair in members]
     least = min(cause.explains for cause in sizes)
     story, remedy = _story(name, measures, kind, sizes, members)
-    alike = {other.kind for _, pair in members for other in pair.others} - {kind} if not offset else set()
+    alike = {other.kind for _, pair in members for other in pair.others} - {kind}
     also = f"; {' or '.join(KINDS[one] for one in KINDS if one in alike)} would explain as much" if alike else ""
     return Finding(f"{what}; {story} explains {_share(least)} of its mean square{also}", f"channels.{name}", remedy)
 

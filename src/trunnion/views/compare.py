@@ -87,10 +87,8 @@ def efficiency(result: xr.Dataset, width: float = WIDTH) -> Figure:
     for k, (name, where) in enumerate(series):
         look: dict[str, Any] = style_of(k) if len(series) > 1 else {"color": MODEL, "linestyle": "-"}
         if many and other is not None:
-            look = {
-                "color": _colours(other).to_rgba(np.nanmean(other.values[where], keepdims=True))[0],
-                "linestyle": "-",
-            }
+            tone = np.nanmean(other.values[where], keepdims=True)
+            look = {"color": _colours(other).to_rgba(tone)[0], "linestyle": "-"}
         _points(axes, result, over, where, look, single=len(series) == 1)
         if name and not many:
             axes.plot([], [], label=plain(name), **look, linewidth=1.6)

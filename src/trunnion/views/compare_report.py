@@ -6,6 +6,8 @@ and nothing else, so no name in a model or a file can become code.
 
 from __future__ import annotations
 
+import re
+from html import escape
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,7 +15,7 @@ import numpy as np
 from trunnion.views.bundle import web_text
 from trunnion.views.compare import efficiency, panels, small
 from trunnion.views.compare_notes import definitions
-from trunnion.views.compare_tables import conditions, efficiencies, files, headline, results, sensors
+from trunnion.views.compare_tables import conditions, efficiencies, files, headline, results, sensors, verdicts
 from trunnion.views.compared import label, units
 from trunnion.views.cycle import attribute, names
 from trunnion.views.report import hashed, inputs_of
@@ -42,15 +44,21 @@ def report(result: xr.Dataset) -> str:
         "data_findings": attribute(result, "data_findings", []),
         "efficiency": table,
         "picture": _picture("Measured and modelled efficiency", efficiency(result)) if table else None,
-        "results": results(result), "conditions": conditions(result), "sensors": sensors(result),
+        "verdicts": verdicts(result), "conditions": conditions(result), "sensors": sensors(result),
         "files": files(result), "done": attribute(result, "done", []),
         "channels": [_channel(result, i, name) for i, name in enumerate(names(result, "channel"))],
-        "definitions": definitions(result), "inputs": inputs_of(result),
+        "definitions": [(term, Markup(_lowered(text))) for term, text in definitions(result)],
+        "inputs": inputs_of(result),
         "references": [line for line in str(result.attrs.get("references", "")).splitlines() if line.strip()],
         "version": result.attrs.get("trunnion_version", ""), "model_hash": result.attrs.get("model_hash", ""),
         "style": Markup(style), "style_hash": hashed(style),
     }  # fmt: skip
     return template("compare.html.j2").render(context)
+
+
+def _lowered(text: str) -> str:
+    """A text for the page with its indices, written behind a low line, set low."""
+    return re.sub(r"_([a-z]+)", r"<sub>\1</sub>", escape(text, quote=False))
 
 
 def _facts(result: xr.Dataset) -> list[tuple[str, str]]:
@@ -78,7 +86,7 @@ def _channel(result: xr.Dataset, channel: int, name: str) -> dict[str, Any]:
             f"{len(shown)} of {len(there)} conditions are drawn, those with the largest residuals for their uncertainty"
         )
     pictures = [_picture(f"{name}, {label(result, k)}", small(result, channel, k)) for k in shown]
-    return {"title": name, "about": "; ".join(about), "pictures": pictures}
+    return {"title": name, "about": "; ".join(about), "pictures": pictures, "table": results(result, channel)}
 
 
 def _severity(result: xr.Dataset, channel: int, condition: int) -> float:

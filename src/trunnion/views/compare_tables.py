@@ -15,7 +15,7 @@ from trunnion.views.tolerance_tables import Table
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["conditions", "efficiencies", "files", "headline", "results", "sensors"]
+__all__ = ["conditions", "efficiencies", "files", "headline", "results", "sensors", "verdicts"]
 
 NONE = "—"
 
@@ -33,6 +33,17 @@ def results(result: xr.Dataset, channel: int | None = None) -> Table:
     first = ["condition"] if channel is not None else ["condition", "channel"]
     head = ["RMS", "largest", "at", "bias", "within ±U", "at least", "correlation", "verdict"]
     return Table("results", [*first, *head], rows)
+
+
+def verdicts(result: xr.Dataset) -> Table:
+    """The verdict of every channel in every condition, with what was set."""
+    told, channels = sets(result), names(result, "channel")
+    rows = []
+    for k, name in enumerate(names(result, "condition")):
+        values = [setting(one.values[k], one.unit) if np.isfinite(one.values[k]) else NONE for one in told]
+        cells = [verdict(result, i, k).text if result["turns"].values[i, k] else NONE for i in range(len(channels))]
+        rows.append([name, *values, *cells])
+    return Table("verdicts", ["condition", *(one.name for one in told), *channels], rows)
 
 
 def _figures(result: xr.Dataset, i: int, k: int) -> list[str]:

@@ -188,6 +188,7 @@ def _attributes(
         "drive_name": drivers[0] if drivers and first.unit != "s" else "",
         "drive_span": first.span,
         "periodic": int(all(one.model.run.cycle.periodic for one in found)),
+        "all_within": int(_all_within(found)),
         "coverage": coverage,
         "probability": probability(coverage),
         "model_hash": mechanism.digest,
@@ -200,6 +201,12 @@ def _attributes(
         "verdict_meanings": " ".join(code.name.lower() for code in Verdict),
         **{name: json.dumps(row, ensure_ascii=False) for name, row in rows.items()},
     }
+
+
+def _all_within(found: Sequence[Compared]) -> bool:
+    """Whether every course is within, and every efficiency."""
+    courses = all(pair.within for one in found for pair in one.pairs.values())
+    return courses and all(one.efficiency.within for one in found if one.efficiency is not None)
 
 
 def _files(found: Sequence[Compared]) -> list[dict[str, Any]]:

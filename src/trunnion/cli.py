@@ -16,14 +16,12 @@ from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.options import (
     IMAGES,
     Criterion,
-    Drawn,
     File,
     FrictionLaw,
     Kinds,
     Measures,
     Method,
     Out,
-    Over,
     Report,
     Rounds,
     Seats,
@@ -31,15 +29,15 @@ from trunnion.options import (
     Steps,
     TableFile,
     UnitsRow,
-    over,
-    points,
 )
-from trunnion.terminal import bar, console, findings_of, say, show_figures, show_rows, wrote
+from trunnion.output import folder
+from trunnion.terminal import bar, console, findings_of, say, show_figures, wrote
 from trunnion.verbs.allocate import allocate
 from trunnion.verbs.assemble import assemble
 from trunnion.verbs.compare import compare
 from trunnion.verbs.model import exit_status, lines_of, placed, stated
 from trunnion.verbs.study import tolerance
+from trunnion.verbs.sweep import sweep
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -187,52 +185,7 @@ app.command()(assemble)
 app.command()(tolerance)
 app.command()(allocate)
 app.command()(compare)
-
-
-@app.command()
-def sweep(
-    file: File,
-    over_: Over,
-    measure: Drawn = "efficiency",
-    steps: Steps = 360,
-    set_: Set = None,
-    table: TableFile = None,
-    friction: FrictionLaw = None,
-    seat: Seats = None,
-    out: Out = None,
-    units_row: UnitsRow = False,
-) -> None:
-    """How efficiency, drive effort, reactions, friction and locking margin change with one or two numbers."""
-    from trunnion.analysis.sweep import sweep as run
-    from trunnion.export import save
-    from trunnion.verbs.play import check_files
-    from trunnion.views.swept import check_measure
-    from trunnion.views.swept import table as swept_table
-
-    grid = over(over_)
-    drawn = [path for path in out or [] if path.suffix.lower() in IMAGES]
-    check_files(out or [])
-    mechanism = stated(file, set_, table, friction, seat)
-    check_measure(measure, mechanism)
-    with lines_of(file), bar("points", points(grid)) as progress:
-        result = run(mechanism, grid, steps, progress=progress)
-    for path in out or []:
-        if path in drawn:
-            from trunnion.views import plots
-            from trunnion.views.sweep import figure
-
-            plots.save(figure(result, measure), path)
-        else:
-            save(result, path, units_row)
-    head, rows, left_out = swept_table(result, measure)
-    name = f"{measure.replace('_', ' ')} over {' and, in columns, '.join(grid)}"
-    show_rows(f"{mechanism.name or file}\n{name}", head, rows)
-    if left_out:
-        console().print(f"{left_out:,} points more; --out FILE.csv has all", markup=False, highlight=False)
-    say(placed(findings_of(result), file, ["assembly"]))
-    for path in out or []:
-        wrote(path)
-    raise typer.Exit(exit_status(findings_of(result)))
+app.command()(sweep)
 
 
 @app.command()
@@ -287,7 +240,7 @@ def plot(
         result = _run(mechanism, steps, None)
     ideal = _ideal(mechanism, steps, None)
     if not single:
-        _folder(out)
+        folder(out)
     shown = with_worst_case(result, mechanism) if "error" in (kind or PLOTS) else result
     for name, figure in [(name, PLOTS[name](shown, ideal)) for name in kind or drawable(result)]:
         path = out if single else out / f"{name}.{image.lstrip('.')}"
@@ -343,7 +296,7 @@ def examples(
         raise MechanismError(Finding(f"there is no example '{name}'", remedy=f"use one of {', '.join(found)}"))
     from trunnion.output import whole
 
-    _folder(to)
+    folder(to)
     target = to / source.name
     if target.exists() and not force:
         raise MechanismError(Finding("exists already", str(target), "use --force to overwrite it"))
@@ -367,15 +320,6 @@ def schema(
 
     with whole(out) as temporary:
         temporary.write_text(text, encoding="utf-8")
-
-
-def _folder(path: Path) -> None:
-    """Make a folder; MechanismError if it cannot be one."""
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        what = f"cannot be made a folder: {error.strerror or error}"
-        raise MechanismError(Finding(what, str(path), "name a folder, or a .png, .svg or .pdf file")) from None
 
 
 def _version(show: bool) -> None:

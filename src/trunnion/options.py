@@ -14,14 +14,12 @@ from trunnion.errors import Finding, MechanismError
 __all__ = [
     "IMAGES",
     "Criterion",
-    "Drawn",
     "File",
     "FrictionLaw",
     "Kinds",
     "Measures",
     "Method",
     "Out",
-    "Over",
     "Report",
     "Rounds",
     "Seats",
@@ -66,15 +64,6 @@ Rounds = Annotated[int, typer.Option("--iterations", help="Most rounds of the fr
 Report = Annotated[
     Path | None, typer.Option("--report", help="Also write the report, one HTML file.", show_default=False)
 ]
-Over = Annotated[
-    list[str],
-    typer.Option(
-        "--over",
-        help="NAME=FROM:TO:COUNT or NAME=VALUE,VALUE,…: misalignment=0deg:30deg:16. Once or twice.",
-        show_default=False,
-    ),
-]
-Drawn = Annotated[str, typer.Option("--measure", help="What is drawn, by its name in the CSV file: A.effort_max.")]
 Out = Annotated[
     list[Path] | None,
     typer.Option("--out", help="Write it: .csv .json .nc .zarr .parquet, or a figure: .png .svg .pdf. Repeatable."),

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from trunnion.errors import Finding, MechanismError
 
-__all__ = ["whole"]
+__all__ = ["folder", "whole"]
 
 
 def _umask() -> int:
@@ -50,3 +50,12 @@ def whole(path: str | os.PathLike[str]) -> Iterator[Path]:
         if temporary.is_dir():
             shutil.rmtree(temporary, ignore_errors=True)
         temporary.unlink(missing_ok=True)
+
+
+def folder(path: Path) -> None:
+    """Make a folder of figures; MechanismError if it cannot be one."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        what = f"cannot be made a folder: {error.strerror or error}"
+        raise MechanismError(Finding(what, str(path), "name a folder, or a .png, .svg or .pdf file")) from None

@@ -1,4 +1,4 @@
-"""A sweep is so many analyses: every point equals one to the bit, and what has no answer has no figures."""
+"""A sweep is so many analyses: every point equals one, and what has no answer has no figures."""
 
 from __future__ import annotations
 
@@ -14,12 +14,16 @@ import xarray as xr
 
 import trunnion
 from trunnion import Mechanism, MechanismError, Status
+from trunnion.analysis.friction import FrictionMethod
 from trunnion.analysis.sweep import FIGURES, MOST_POINTS
+from trunnion.analysis.sweep_grid import grid as grid_of
+from trunnion.analysis.sweep_points import Points
 from trunnion.export import figures as figures_of
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 CARDAN = EXAMPLES / "pezzuti-cardan.yaml"
 STEPS = 24
+Values = dict[str, list[Any]]
 
 
 def read(name: str) -> Mechanism:
@@ -69,8 +73,8 @@ def test_a_point_equals_the_analysis_to_the_bit(model: str, name: str, text: str
     if model == "inverted-slider-crank":
         text = f"1.02 * ({mechanism.dimensions['post'].source})"
     one = trunnion.analyse(mechanism.with_values({name: text}), STEPS)
-    swept = trunnion.sweep(mechanism, {name: [text]}, STEPS)
-    assert set(swept.data_vars) == {name for name, one in FIGURES.items() if not one.part}
+    swept = trunnion.sweep(mechanism, {name: [text]}, STEPS, margin=True)
+    assert set(swept.data_vars) == {name for name, one in FIGURES.items() if one.part != "errors"}
     for key, value in expected(one).items():
         assert np.array_equal(swept[key].values[..., 0], value, equal_nan=True), key
     assert swept.attrs["driver_units"] == one.attrs["driver_units"]
@@ -108,7 +112,7 @@ def test_two_names_are_a_grid() -> None:
     lengths, coefficients = ["1.6 m", "2 m", "2.2 m"], [0.1, 0.3]
     seen: list[int] = []
     grid = trunnion.sweep(
-        mechanism, {"AB": lengths, "B.friction.coefficient": coefficients}, STEPS, progress=seen.append
+        mechanism, {"AB": lengths, "B.friction.coefficient": coefficients}, STEPS, progress=seen.append, margin=True
     )
     assert seen == [1, 2, 3, 4, 5, 6]
     assert grid["efficiency"].dims == ("AB", "B.friction.coefficient")
@@ -116,7 +120,90 @@ def test_two_names_are_a_grid() -> None:
     for (i, length), (k, coefficient) in itertools.product(enumerate(lengths), enumerate(coefficients)):
         one = trunnion.analyse(mechanism.with_values({"AB": length, "B.friction.coefficient": coefficient}), STEPS)
         for key, value in expected(one).items():
-            assert np.array_equal(grid[key].values[..., i, k], value, equal_nan=True), (key, length, coefficient)
+            found = grid[key].values[..., i, k]
+            np.testing.assert_allclose(found, value, rtol=1e-9, err_msg=f"{key} {length} {coefficient}")
+
+
+# of every kind: dyads, class III, Newton in space, closed form in space; with points that lock or cannot be assembled
+TOGETHER: dict[str, Values] = {
+    "durango-fourbar": {"AB": ["1.6 m", "2.6 m", "2.2 m"], "joint_defaults.friction.coefficient": [0.0, 0.3, 2.0]},
+    "slider-crank": {"r": ["40 mm", "50 mm"], "O.speed": [50, 100], "P.friction.coefficient": [0, 0.1]},
+    "jansen": {"dimensions.a": ["37 cm", "38 cm"]},
+    "toggle-press": {"L": ["200 mm", "203 mm"]},
+    "rssr": {"a": ["30 mm", "31 mm"], "A.speed": [10, 20]},
+    "pezzuti-cardan": {"misalignment": ["5 deg", "25 deg"], "bearing": ["15 mm", "40 mm"], "input.speed": [20, 100]},
+    "universal-joint": {"delta": ["5 deg", "40 deg"], "input.speed": ["100 rpm", "3000 rpm"]},
+    "five-bar-robot": {"arm": ["250 mm", "260 mm"]},
+}
+
+
+@pytest.mark.parametrize("model", TOGETHER)
+def test_points_solved_together_equal_points_solved_alone(model: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Statuses exactly, figures but for the rounding of the friction iteration."""
+    mechanism, over = read(model), TOGETHER[model]
+    points = Points(mechanism, grid_of(mechanism, over), STEPS, FrictionMethod())
+    assert points._similar
+    assert any(found is not None for found in points._together(list(np.ndindex(points.shape))))
+    both = trunnion.sweep(mechanism, over, STEPS)
+    monkeypatch.setattr(Points, "_similar", False)
+    alone = trunnion.sweep(mechanism, over, STEPS)
+    assert np.array_equal(both["status"], alone["status"])
+    assert set(both.data_vars) == set(alone.data_vars)
+    power = float(alone["drive_effort_rms"].max()) * 1e-9
+    for name, values in alone.data_vars.items():
+        np.testing.assert_allclose(both[name].values, values.values, rtol=1e-9, atol=power, err_msg=str(name))
+
+
+def test_errors_of_points_solved_together() -> None:
+    """Errors without seats go through one pass as well: beside the ideal mechanism, point by point as `analyse`."""
+    data = read("slider-crank").data()
+    data["errors"] = {"r": "0.05 mm"}
+    mechanism = Mechanism(**data)
+    swept = trunnion.sweep(mechanism, {"r": ["40 mm", "50 mm"], "errors.dimensions.r": ["0 mm", "0.1 mm"]}, STEPS)
+    assert np.all(swept["transmission_error_max"].values[..., 0] == 0)
+    one = trunnion.analyse(mechanism.with_values({"r": "50 mm", "errors.dimensions.r": "0.1 mm"}), STEPS)
+    for key in ("efficiency", "efficiency_ideal"):
+        np.testing.assert_allclose(swept[key].values[1, 1], float(one[key]), rtol=1e-12)
+    kept = one["status"].values == Status.SOLVED
+    error = np.abs(one["joint_slide_error"].sel(joint="S").values[kept]).max()
+    np.testing.assert_allclose(float(swept["transmission_error_max"].sel(joint="S")[1, 1]), error, rtol=1e-9)
+
+
+def test_a_point_with_another_assembly_is_looked_at_by_itself() -> None:
+    """The hint lies still, the joint moves past it: nearest is the other assembly then, as it is for `analyse`."""
+    data = read("durango-fourbar").data()
+    data["assembly"] = {"C": [4.0, 0.3]}
+    mechanism = Mechanism(**data)
+    over = {"CD": ["2.8 m", "3.0 m", "3.6 m", "4.2 m", "5 m"], "BC": ["5 m", "5.5 m", "6 m"]}
+    swept = trunnion.sweep(mechanism, over, STEPS)
+    for (i, cd), (k, bc) in itertools.product(enumerate(over["CD"]), enumerate(over["BC"])):
+        one = trunnion.analyse(mechanism.with_values({"CD": cd, "BC": bc}), STEPS)
+        assert int(swept["status"][i, k]) == int(one["status"].max())
+        if one["status"].max() < Status.NOT_CONVERGED:
+            np.testing.assert_allclose(
+                swept["drive_effort_rms"].values[0, i, k],
+                np.sqrt((one["drive_effort"].values[0] ** 2).mean()),
+                rtol=1e-9,
+            )
+
+
+def test_six_names() -> None:
+    mechanism = read("durango-fourbar")
+    over = {
+        "AB": ["1.6 m", "2 m"], "CD": ["3 m"], "A.speed": [5.0], "B.friction.coefficient": [0.1, 0.2],
+        "C.friction.coefficient": [0.1], "D.friction.coefficient": [0.1, 0.3],
+    }  # fmt: skip
+    swept = trunnion.sweep(mechanism, over, STEPS)
+    assert swept["efficiency"].dims == tuple(over)
+    at = {"AB": "2 m", "CD": "3 m", "A.speed": 5.0} | {
+        f"{j}.friction.coefficient": c for j, c in zip("BCD", (0.2, 0.1, 0.3), strict=True)
+    }
+    one = trunnion.analyse(mechanism.with_values(at), STEPS)
+    np.testing.assert_allclose(
+        swept["drive_power_mean"].values[1, 0, 0, 1, 0, 1], one["drive_power"].sum("driver").mean(), rtol=1e-9
+    )
+    columns = figures_of(swept)
+    assert columns["B.friction.coefficient"][1].tolist() == [0.1, 0.1, 0.2, 0.2] * 2
 
 
 # ---- the Cardan joint -----------------------------------------------------------------------------------------
@@ -138,7 +225,7 @@ def test_efficiency_falls_with_misalignment_by_their_own_friction(tmp_path: Path
     assert changed != text
     (tmp_path / "own.yaml").write_text(changed, "utf-8")
     swept = trunnion.sweep(
-        trunnion.read(tmp_path / "own.yaml"), {"misalignment": [f"{a} deg" for a in (0, 1, 15, 30)]}, STEPS
+        trunnion.read(tmp_path / "own.yaml"), {"misalignment": [f"{a} deg" for a in (0, 1, 15, 30)]}, STEPS, margin=True
     )
     assert np.all(np.diff(swept["efficiency"][:-1]) < 0)
     assert int(swept["status"][-1]) == Status.LOCKED
@@ -169,7 +256,9 @@ def test_efficiency_falls_with_speed() -> None:
 
 def test_without_friction_nothing_is_lost() -> None:
     mechanism = trunnion.read(CARDAN).with_friction("off")
-    grid = trunnion.sweep(mechanism, {"misalignment": ("0 deg", "40 deg", 5), "input.speed": (5, 150, 2)}, 72)
+    grid = trunnion.sweep(
+        mechanism, {"misalignment": ("0 deg", "40 deg", 5), "input.speed": (5, 150, 2)}, 72, margin=True
+    )
     assert np.allclose(grid["efficiency"], 1, rtol=0, atol=1e-12)
     assert np.all(grid["friction_power_mean"] == 0)
     assert np.all(np.isinf(grid["locking_margin"]))
@@ -179,7 +268,7 @@ def test_without_friction_nothing_is_lost() -> None:
 
 
 def test_points_that_cannot_be_assembled_have_no_figures() -> None:
-    swept = trunnion.sweep(read("durango-fourbar"), {"AB": ["2.1 m", "2.6 m", "2.2 m"]}, 72)
+    swept = trunnion.sweep(read("durango-fourbar"), {"AB": ["2.1 m", "2.6 m", "2.2 m"]}, 72, margin=True)
     assert swept["status"].values.tolist()[1] == Status.NOT_ASSEMBLED
     assert int(swept["without_answer"][1]) == 5
     assert np.isfinite(swept["drive_effort_max"].values[0]).tolist() == [True, False, True]
@@ -192,7 +281,7 @@ def test_points_that_cannot_be_assembled_have_no_figures() -> None:
 
 BAD: dict[str, tuple[dict[str, Any], str]] = {
     "nothing": ({}, "0 names"),
-    "three names": ({"AB": [2], "BC": [6], "CD": [3]}, "3 names"),
+    "seven names": ({f"n{i}": [1] for i in range(7)}, "7 names"),
     "unknown name": ({"AX": [1, 2]}, "known: 'AB', 'BC'"),
     "several numbers": ({"coefficient": [0.1, 0.2]}, "say which"),
     "not one number": ({"joints.B.friction": [0.1]}, "set one of"),

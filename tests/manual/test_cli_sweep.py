@@ -14,7 +14,7 @@ import xarray as xr
 import trunnion
 from manual.conftest import Run
 from trunnion.views import sweep as view
-from trunnion.views.swept import table
+from trunnion.views.sweep_tables import tables
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 FOUR_BAR = EXAMPLES / "durango-fourbar.yaml"
@@ -51,7 +51,7 @@ def test_table_csv_netcdf_and_figure(run: Run, tmp_path: Path) -> None:
     for i, row in enumerate(found):
         one = trunnion.analyse(mechanism.with_values({"AB": float(row["AB"])}), 36)
         power = float(one["friction_power"].sum("joint").mean())
-        assert float(row["friction_power_mean"]) == pytest.approx(power, rel=1e-14)
+        assert float(row["friction_power_mean"]) == pytest.approx(power, rel=1e-9)
         assert float(row["A.effort_max"]) == float(again["drive_effort_max"].sel(driver="A")[i])
         assert float(row["C.reaction_max"]) == float(again["reaction_max"].sel(joint="C")[i])
         assert f"{power:.6g}" in done.out
@@ -111,7 +111,7 @@ BAD = {
     "wrong unit": (["--over", "AB=1kg,2kg"], "length"),
     "one without unit": (["--over", "AB=1000:2m:3"], "1000.0 has no unit"),
     "twice": (["--over", "AB=1m,2m", "--over", "AB=3m,4m"], "given twice"),
-    "three": (["--over", "AB=1m", "--over", "BC=1m", "--over", "CD=1m"], "3 names"),
+    "seven": ([text for i in range(7) for text in ("--over", f"n{i}=1m")], "7 names"),
     "too many": (["--over", "AB=1m:2m:100001"], "100,001 points"),
     "impossible": (["--over", "crank.mass=1kg,-1kg"], "negative"),
     "unknown measure": (["--over", "AB=1m,2m", "--measure", "efficency"], "did you mean 'efficiency'"),
@@ -153,7 +153,7 @@ def test_a_figure_of_nothing_and_of_many() -> None:
     """All points locked or out of reach; more curves than a legend can name; one point; an infinite margin."""
     mechanism = trunnion.read(FOUR_BAR)
     view.figure(trunnion.sweep(mechanism, {"AB": ["2.7 m", "2.8 m"]}, 36))
-    view.figure(trunnion.sweep(mechanism, {"AB": ["2.1 m"]}, 4), "locking_margin")
+    view.figure(trunnion.sweep(mechanism, {"AB": ["2.1 m"]}, 4, margin=True), "locking_margin")
     many = trunnion.sweep(mechanism, {"AB": ["2.2 m", "2 m"], "B.friction.coefficient": (0.1, 0.2, 9)}, 4)
     figure = view.figure(many, "A.effort_max")
     assert figure.axes[0].get_legend() is None
@@ -162,11 +162,11 @@ def test_a_figure_of_nothing_and_of_many() -> None:
 
 def test_long_tables_are_thinned() -> None:
     mechanism = trunnion.read(FOUR_BAR)
-    _, shown, left = table(trunnion.sweep(mechanism, {"AB": ("2 m", "2.1 m", 50)}, 1))
+    _, _, shown, left = tables(trunnion.sweep(mechanism, {"AB": ("2 m", "2.1 m", 50)}, 1))[0]
     assert len(shown) == 40
     assert left == 10
     assert (shown[0][0], shown[-1][0]) == ("2", "2.1")
-    head, shown, left = table(trunnion.sweep(mechanism, {"AB": [2, 2.1], "BC": ("6 m", "6.1 m", 12)}, 1))
+    _, head, shown, left = tables(trunnion.sweep(mechanism, {"AB": [2, 2.1], "BC": ("6 m", "6.1 m", 12)}, 1))[0]
     assert len(head) == 9
     assert left == 8
     assert head[-1] == "6.1 m"

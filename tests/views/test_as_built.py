@@ -15,7 +15,7 @@ from trunnion.views.error_plot import error, with_worst_case
 from trunnion.views.plots import PLOTS, READY, drawable, save
 from trunnion.views.seat_plot import FACTORS, PIN
 from trunnion.views.sweep import figure as sweep_figure
-from trunnion.views.swept import table
+from trunnion.views.sweep_tables import tables
 
 INCH = 0.0254
 
@@ -281,7 +281,7 @@ def test_a_sweep_is_drawn_beside_the_ideal_mechanism(slider, tmp_path):
     lost = swept["status"].values == Status.CONTACT_LOST
     told = [text.get_text() for text in axes.get_legend().get_texts()]
     assert ("contact lost at some position" in told) == lost.any()
-    head, rows, _ = table(swept)
+    _, head, rows, _ = tables(swept)[0]
     assert head[:3] == ["misalignment [deg]", "efficiency", "efficiency ideal"]
     assert ([row[-1] == "contact lost" for row in rows] == lost).all()
     save(sweep_figure(swept, "output.transmission_error_max"), tmp_path / "error.png")

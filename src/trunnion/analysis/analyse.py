@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import operator
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -40,6 +40,7 @@ __all__ = [
     "analyse",
     "analyse_run",
     "check_steps",
+    "filled",
     "pose_status",
     "positions",
     "prepare",
@@ -239,11 +240,15 @@ def positions(
     steps: int = 360,
     method: FrictionMethod | None = None,
     progress: Callable[[int], None] | None = None,
+    margin: bool = True,
 ) -> Positions:
-    """The numbers of every variable of `results` at equally spaced positions, their statuses and causes."""
+    """The numbers of every variable of `results` at equally spaced positions, their statuses and causes.
+
+    margin: whether the locking margin is looked for; it is infinite if not.
+    """
     check_steps(steps)
     _refuse_seats(run)
-    method = replace(method or FrictionMethod(), margin_up_to=account.MARGIN)
+    method = replace(method or FrictionMethod(), margin_up_to=account.MARGIN if margin else 0.0)
     steps = steps if run.cycle.duration > 0 else 1
     time = run.cycle.times(steps)
     labels = run.system.engine.labels(run.system) | ({"end": ["1", "2"]} if run.seats else {})
@@ -310,10 +315,46 @@ def _fill_as_built(
         np.maximum(status, np.where(seated.sticks, status.dtype.type(Status.ZERO_SLIP), 0), out=status)
     else:
         _fill(arrays, run.solve(part, method=method), part, window, causes)
-    links = labels["link"]
-    joints = [(links.index(first), links.index(second)) for _, (first, second) in run.system.joints.values()]
-    fill_errors(arrays, scratch, joints, window)
+    fill_errors(arrays, scratch, _link_numbers(run.system), window)
     _blank(arrays, arrays["status"][window].astype(np.int8), window)
+
+
+def filled(
+    back: Backward,
+    meant: Backward | None,
+    time: NDArray[np.float64],
+    shape: tuple[int, int],
+    wanted: Collection[str],
+) -> tuple[Arrays, Arrays]:
+    """Variables of `results` by name, (…, mechanism, position), of one walk over many mechanisms; the same of `meant`.
+
+    meant: the walk of the mechanisms without errors, if any has some; the first arrays then hold the differences too.
+    time: (mechanism, position) or (position,), s; wanted: what will be read, of the rest there is nothing.
+    """
+    system, everything = back.walk.system, slice(None)
+    if meant is None:
+        arrays = _of_many(system, shape, {*wanted, "status"}, [])
+        _fill(arrays, back, time, everything)
+        return arrays, {}
+    arrays, ideal = (_of_many(system, shape, {*wanted, *IDEAL, *COMPARED}, ["errors"]) for _ in range(2))
+    _fill(arrays, back, time, everything)
+    _fill(ideal, meant, time, everything)
+    fill_errors(arrays, ideal, _link_numbers(system), everything)
+    _blank(arrays, arrays["status"].astype(np.int8), everything)
+    return arrays, ideal
+
+
+def _of_many(system: System, shape: tuple[int, int], wanted: Collection[str], parts: Sequence[str]) -> Arrays:
+    """Arrays to be filled, (…, mechanism, position)."""
+    labels, absent = system.engine.labels(system), system.engine.absent(system)
+    flat = results.allocate(labels, shape[0] * shape[1], absent, parts, wanted)
+    return {name: array.reshape(*array.shape[:-1], *shape) for name, array in flat.items()}
+
+
+def _link_numbers(system: System) -> list[tuple[int, int]]:
+    """Numbers of the links of every joint."""
+    links = system.engine.labels(system)["link"]
+    return [(links.index(first), links.index(second)) for _, (first, second) in system.joints.values()]
 
 
 def _fill(

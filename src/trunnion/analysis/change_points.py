@@ -13,7 +13,7 @@ from trunnion.analysis.system import System, Values
 from trunnion.errors import Finding
 from trunnion.structure.decompose import Module
 
-__all__ = ["find", "finding"]
+__all__ = ["find", "finding", "suspects"]
 
 Array = NDArray[np.float64]
 
@@ -31,6 +31,16 @@ def finding(system: System, values: Values, module: Module, at: Sequence[float])
     return Finding(what, f"links {', '.join(module.links)}", remedy)
 
 
+def suspects(margin: Array) -> NDArray[np.bool_]:
+    """Where 1/condition may touch zero, of all places along the last axis but the first and the last.
+
+    A minimum that the slope of its neighbours would reach.
+    """
+    before, here, after = margin[..., :-2], margin[..., 1:-1], margin[..., 2:]
+    steep = np.maximum(np.abs(here - before), np.abs(after - here))
+    return np.asarray((here <= before) & (here <= after) & (here <= 1.1 * steep))
+
+
 def find(walk: Forward, number: int, assembly: Any, times: Array, pose: Any) -> list[float]:
     """Times at which a closed form passes a position where its assemblies meet, s.
 
@@ -40,9 +50,6 @@ def find(walk: Forward, number: int, assembly: Any, times: Array, pose: Any) -> 
     if len(times) < 3:
         return []
     margin = np.broadcast_to(1 / walk.system.groups[number].condition(pose), times.shape)
-    before, here, after = margin[:-2], margin[1:-1], margin[2:]
-    steep = np.maximum(np.abs(here - before), np.abs(after - here))
-    suspects = np.flatnonzero((here <= before) & (here <= after) & (here <= 1.1 * steep)) + 1
 
     def margin_at(moment: float) -> float:
         trial = start(walk.system, walk.values)
@@ -51,7 +58,7 @@ def find(walk: Forward, number: int, assembly: Any, times: Array, pose: Any) -> 
         found = 1 / walk.system.groups[number].condition(pose_of(trial, number, assembly, moment))
         return float(np.nan_to_num(np.ravel(found)[0], nan=1.0))
 
-    moments = [_lowest(margin_at, times[k - 1], times[k + 1]) for k in suspects]
+    moments = [_lowest(margin_at, times[k - 1], times[k + 1]) for k in np.flatnonzero(suspects(margin)) + 1]
     return [moment for moment in moments if margin_at(moment) < TOUCHING]
 
 

@@ -94,7 +94,7 @@ def label(result: xr.Dataset, condition: int) -> str:
 def setting(value: float, unit: str) -> str:
     """What was set, with its unit: "15°", "62.83 rad/s"."""
     space = "" if unit in ("°", "") else "\u00a0"
-    return f"{float(f'{value:.4g}'):g}{space}{unit}".replace("-", "−")
+    return f"{float(f'{value:.4g}'):g}{space}{unit}".replace("-", "−").replace(" ", "\u00a0")
 
 
 def coverage_of(result: xr.Dataset) -> str:
@@ -105,7 +105,7 @@ def coverage_of(result: xr.Dataset) -> str:
 def text(value: float, unit: str, digits: int = 3) -> str:
     """A number with its unit, which is not scaled any more."""
     space = "" if unit in ("°", "") else "\u00a0"
-    return f"{number(float(value), digits)}{space}{unit}"
+    return f"{number(float(value), digits)}{space}{unit}".replace(" ", "\u00a0")
 
 
 def scale_of(result: xr.Dataset, channel: int, condition: int | None = None) -> tuple[float, str]:

@@ -139,10 +139,10 @@ def frame_peak(axes: Axes, most: float, shown: float, factor: float, unit: str) 
         return
     low, high, room = axes.dataLim.y0, axes.dataLim.y1, 1.05
     axes.set_ylim(max(min(low, 0.0), -shown * factor) * room, min(max(high, 0.0), shown * factor) * room)
-    _outside(axes, most, unit)
+    outside(axes, most, unit)
 
 
-def _outside(axes: Axes, most: float, unit: str) -> None:
+def outside(axes: Axes, most: float, unit: str) -> None:
     text = f"peak {quantity(most, unit)} lies outside"
     box = {"boxstyle": "round,pad=0.2", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
     axes.text(0.99, 0.97, text, transform=axes.transAxes, ha="right", va="top", fontsize=8, color=MUTED, bbox=box)
@@ -157,7 +157,7 @@ def square(axes: Axes, most: float, shown: float, factor: float, unit: str) -> N
     half = shown * factor
     axes.set_aspect("equal", adjustable="box")
     axes.set(xlim=(-half, half), ylim=(-half, half))
-    _outside(axes, most, unit)
+    outside(axes, most, unit)
 
 
 def legend(axes: Axes, most: int = 6, room: int = 90, least: int = 2) -> None:

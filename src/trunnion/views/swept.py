@@ -1,4 +1,4 @@
-"""A sweep in words and numbers: its scales in the units they were given in, its figures by name, a short table.
+"""A sweep in words and numbers: its scales in the units they were given in, what runs along what, figures by name.
 
 Figures are named as the columns of the CSV file: `efficiency`, `A.effort_max`, `B.reaction_max`.
 """
@@ -6,9 +6,11 @@ Figures are named as the columns of the CSV file: `efficiency`, `A.effort_max`, 
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from trunnion.analysis.sweep import FIGURES
 from trunnion.errors import Finding, MechanismError, Status
@@ -20,9 +22,11 @@ from trunnion.views.cycle import Array
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Scale", "cause", "check_measure", "grid", "meaning", "scales", "statuses", "table"]
+__all__ = [
+    "Arrangement", "Scale", "arrange", "arranged", "cause", "check_axes", "check_measure", "grid", "meaning", "scales",
+    "statuses", "thinned",
+]  # fmt: skip
 
-MOST_ROWS, MOST_COLUMNS = 40, 8  # of a table
 CAUSES = {
     Status.NOT_CONVERGED: "not converged",
     Status.LOCKED: "locked",
@@ -30,6 +34,7 @@ CAUSES = {
     Status.SINGULAR: "dead centre",
     Status.NOT_ASSEMBLED: "cannot be assembled",
 }
+SIGNS = {"um": "µm", "deg": "°"}  # in figures
 
 
 class Scale(NamedTuple):
@@ -44,9 +49,24 @@ class Scale(NamedTuple):
         """The name with its unit, for an axis or the head of a column."""
         return f"{self.name} [{self.unit}]" if self.unit else self.name
 
+    @property
+    def label(self) -> str:
+        """The same with the unit as figures show it: µm for um, ° for deg."""
+        return self._replace(unit=SIGNS.get(self.unit, self.unit)).title
+
+    @property
+    def varies(self) -> bool:
+        return len(self.values) > 1
+
     def say(self, index: int) -> str:
         """A value with its unit."""
         return f"{self.values[index]:.6g} {self.unit}".rstrip()
+
+    def told(self, index: int) -> str:
+        """An equation for a figure: "misalignment = −5°"."""
+        unit = SIGNS.get(self.unit, self.unit)
+        gap = "" if unit in ("", "°") else " "
+        return f"{self.name} = {f'{self.values[index]:.6g}'.replace('-', '−')}{gap}{unit}"
 
 
 def scales(result: xr.Dataset) -> list[Scale]:
@@ -61,7 +81,91 @@ def scales(result: xr.Dataset) -> list[Scale]:
     return found
 
 
-def check_measure(name: str, mechanism: Mechanism) -> None:
+# ---- what runs along what -------------------------------------------------------------------------------------
+
+
+class Arrangement(NamedTuple):
+    """Which name runs along the axis, which tells the curves (or runs upwards in a map), which the panels.
+
+    fixed: names with one value, which have no place but in the title.
+    """
+
+    x: Scale
+    other: Scale | None
+    facets: tuple[Scale, ...]
+    fixed: tuple[Scale, ...]
+
+    def at(self) -> str:
+        """The fixed values in words, "" if there are none."""
+        return ", ".join(one.told(0) for one in self.fixed)
+
+
+def arrange(result: xr.Dataset, x: str = "", family: str = "") -> Arrangement:
+    """What runs along what: the axis is `x`, the curves are of `family`, the panels of the other names, in order.
+
+    Unless they are given, the first two names with more than one value. MechanismError for a name that is not swept.
+    """
+    every = {one.name: one for one in scales(result)}
+    first, second = check_axes({name: len(one.values) for name, one in every.items()}, x, family)
+    rest = [one for name, one in every.items() if name not in (first, second)]
+    return Arrangement(
+        every[first],
+        every[second] if second else None,
+        tuple(one for one in rest if one.varies),
+        tuple(one for one in rest if not one.varies),
+    )
+
+
+def check_axes(counts: Mapping[str, int], x: str = "", family: str = "") -> tuple[str, str]:
+    """Names of the axis and of the curves, "" if there is one curve, from how many values each swept name has."""
+    for name, option in ((x, "--x"), (family, "--family")):
+        if name and name not in counts:
+            raise MechanismError(Finding(f"'{name}' is not swept over", option, nearest(name, counts)))
+    if x and x == family:
+        raise MechanismError(Finding(f"'{x}' cannot be both the axis and the curves", "--family", "name another"))
+    order = sorted(counts, key=lambda name: counts[name] == 1)  # stable: as given, those with one value last
+    first = x or next((name for name in order if name != family), family)
+    second = family if first != family else ""
+    return first, second or next((name for name in order if name != first and counts[name] > 1), "")
+
+
+def arranged(result: xr.Dataset, plan: Arrangement, values: NDArray[np.generic]) -> NDArray[np.generic]:
+    """Values of all points in the order of the file as (axis, curve, *facets)."""
+    names = json.loads(result.attrs["swept"])
+    shown = [plan.x, *([plan.other] if plan.other else []), *plan.facets]
+    cube = values.reshape([result.sizes[name] for name in names])
+    cube = cube.transpose([names.index(one.name) for one in (*shown, *plan.fixed)])
+    cube = cube.reshape([len(one.values) for one in shown])
+    return cube if plan.other else cube[:, np.newaxis]
+
+
+def grid(result: xr.Dataset, plan: Arrangement, name: str) -> tuple[str, Array]:
+    """Unit and values, (axis, curve, *facets), of a figure."""
+    found = figures(result)
+    if name not in found:
+        of_errors = name.endswith("_ideal") or name.endswith("transmission_error_max")
+        what = "no mechanism of the sweep has errors" if of_errors else "the sweep does not hold it"
+        remedy = "state errors, a misalignment or a seat: loaded" if of_errors else nearest(name, found)
+        raise MechanismError(Finding(f"{what}: there is no figure '{name}'", "--measure", remedy))
+    unit, values = found[name]
+    return unit, np.asarray(arranged(result, plan, values), float)
+
+
+def statuses(result: xr.Dataset, plan: Arrangement) -> NDArray[np.int8]:
+    """Codes of status, (axis, curve, *facets)."""
+    flat = result["status"].transpose(*json.loads(result.attrs["swept"])).values.ravel()
+    return np.asarray(arranged(result, plan, flat), np.int8)
+
+
+def thinned(count: int, most: int) -> list[int]:
+    """Indices of at most so many of them, evenly, the ends among them."""
+    return [int(i) for i in np.unique(np.rint(np.linspace(0, count - 1, min(count, most))))]
+
+
+# ---- in words -------------------------------------------------------------------------------------------------
+
+
+def check_measure(names: str | Iterable[str], mechanism: Mechanism) -> None:
     """MechanismError with the nearest name if a sweep of a mechanism has no such figure."""
     members = {"driver": list(mechanism.drivers), "joint": list(mechanism.effective_joints)}
     known = [
@@ -70,19 +174,9 @@ def check_measure(name: str, mechanism: Mechanism) -> None:
         for member in (members[one.dims[0]] if one.dims else [""])
         if key != "status"
     ]
-    if name not in known:
-        raise MechanismError(Finding(f"there is no figure '{name}'", "--measure", nearest(name, known)))
-
-
-def grid(result: xr.Dataset, name: str) -> tuple[str, Array]:
-    """Unit and values, (first name, second name), of a figure."""
-    shape = [result.sizes[one] for one in json.loads(result.attrs["swept"])]
-    found = figures(result)
-    if name not in found:
-        what = f"no mechanism of the sweep has errors: there is no figure '{name}'"
-        raise MechanismError(Finding(what, "--measure", "state errors, a misalignment or a seat: loaded"))
-    unit, values = found[name]
-    return unit, np.asarray(values, float).reshape(shape[0], -1)
+    for name in [names] if isinstance(names, str) else names:
+        if name not in known:
+            raise MechanismError(Finding(f"there is no figure '{name}'", "--measure", nearest(name, known)))
 
 
 def meaning(name: str, unit: str) -> str:
@@ -96,69 +190,6 @@ def meaning(name: str, unit: str) -> str:
     return f"{told.long_name} of {member}"
 
 
-def statuses(result: xr.Dataset) -> Array:
-    swept = json.loads(result.attrs["swept"])
-    return np.asarray(result["status"].transpose(*swept).values).reshape(result.sizes[swept[0]], -1)
-
-
 def cause(code: int) -> str:
     """Why a point has no figures, in a word or two."""
     return next(text for status, text in CAUSES.items() if status == code)
-
-
-# ---- table ----------------------------------------------------------------------------------------------------
-
-
-def table(result: xr.Dataset, measure: str = "efficiency") -> tuple[list[str], list[list[str]], int]:
-    """Head, rows and how many points are not shown: figures over one name, or one figure over both."""
-    over, *others = scales(result)
-    return _matrix(result, measure, over, others[0]) if others else _list(result, measure, over)
-
-
-def _thinned(count: int, most: int) -> list[int]:
-    """Indices of at most so many of them, evenly, the ends among them."""
-    return [int(i) for i in np.unique(np.rint(np.linspace(0, count - 1, min(count, most))))]
-
-
-def _list(result: xr.Dataset, measure: str, over: Scale) -> tuple[list[str], list[list[str]], int]:
-    found = figures(result)
-    efforts = [name for name in found if name.endswith(".effort_max")]
-    ideal = [name for name in ("efficiency_ideal",) if name in found]
-    shown = list(dict.fromkeys([measure, "efficiency", *ideal, *efforts, "friction_power_mean", "locking_margin"]))
-    picked, status = _thinned(len(over.values), MOST_ROWS), statuses(result)[:, 0]
-    titles = [f"{name.replace('_', ' ')} [{found[name][0]}]".removesuffix(" [1]") for name in shown]
-    words = [_word(int(code)) for code in status]
-    head = [over.title, *titles, *(["status"] if any(words) else [])]
-    rows = []
-    for i in picked:
-        cells = ["" if np.isnan(found[name][1][i]) else _number(found[name][1][i]) for name in shown]
-        rows.append([_number(over.values[i]), *cells, *([words[i]] if any(words) else [])])
-    return head, rows, len(over.values) - len(picked)
-
-
-def _word(code: int) -> str:
-    """What a table says of a point that has no figures, or not quite sound ones."""
-    if code >= Status.NOT_CONVERGED:
-        return cause(code)
-    milder = {int(Status.NEAR_SINGULAR): "near singular", int(Status.CONTACT_LOST): "contact lost"}
-    return milder.get(code, "")
-
-
-def _number(value: float) -> str:
-    return f"{value + 0.0:.6g}".replace("inf", "∞")  # + 0.0: no negative zero
-
-
-def _matrix(result: xr.Dataset, measure: str, over: Scale, other: Scale) -> tuple[list[str], list[list[str]], int]:
-    _, values = grid(result, measure)
-    status = statuses(result)
-    down, across = _thinned(values.shape[0], MOST_ROWS), _thinned(values.shape[1], MOST_COLUMNS)
-    head = [over.title, *(other.say(k) for k in across)]
-    rows = []
-    for i in down:
-        cells = [
-            cause(int(status[i, k])) if np.isnan(values[i, k]) and status[i, k] >= Status.NOT_CONVERGED
-            else _number(values[i, k])
-            for k in across
-        ]  # fmt: skip
-        rows.append([f"{over.values[i]:.6g}", *cells])
-    return head, rows, values.size - len(down) * len(across)

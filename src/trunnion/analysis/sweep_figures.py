@@ -1,0 +1,91 @@
+"""The figures of a cycle: what its positions come to, and the reduction that every point of a sweep goes through."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.analysis.account import efficiency, sound_positions
+from trunnion.analysis.system import Cycle, System
+from trunnion.errors import Status
+
+__all__ = ["FIGURES", "INTEGERS", "Figure", "Reduced", "reduced"]
+
+Arrays = Mapping[str, NDArray[Any]]
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A number of a cycle: dimensions before the swept names, unit, long name; part: "errors" of those that only
+    mechanisms with errors have, "margin" of the one that is looked for only if asked.
+    """
+
+    dims: tuple[str, ...]
+    units: str
+    long_name: str
+    part: str = ""
+
+
+FIGURES: dict[str, Figure] = {
+    "efficiency": Figure((), "1", "useful work over drive work of the cycle"),
+    "efficiency_ideal": Figure((), "1", "efficiency of the mechanism without errors", "errors"),
+    "drive_effort_min": Figure(("driver",), "N m", "least drive effort"),
+    "drive_effort_max": Figure(("driver",), "N m", "largest drive effort"),
+    "drive_effort_rms": Figure(("driver",), "N m", "root mean square of the drive effort"),
+    "drive_power_mean": Figure((), "W", "mean power of all drivers"),
+    "useful_power_mean": Figure((), "W", "mean power taken by the useful loads"),
+    "friction_power_mean": Figure((), "W", "mean power lost to friction"),
+    "reaction_max": Figure(("joint",), "N", "largest reaction"),
+    "transmission_error_max": Figure(
+        ("joint",), "rad", "largest error of the joint's rotation, of a prismatic joint its slide", "errors"
+    ),
+    "locking_margin": Figure(
+        (), "1", "least multiple of the friction at which a position locks, ∞ if beyond 10", "margin"
+    ),
+    "without_answer": Figure((), "1", "positions without an answer"),
+    "status": Figure((), "1", "code of the gravest status of a position; see the attribute flag_meanings"),
+}
+INTEGERS = {"status": np.int8, "without_answer": np.int32}
+Reduced = dict[str, Any]
+
+
+def reduced(arrays: Arrays, ideal: Arrays, cycle: Cycle, system: System) -> Reduced:
+    """The figures of FIGURES of one cycle; numbers, or rows over drivers or joints.
+
+    arrays: over positions, by the names of `results.VARIABLES`: status, drive_effort, drive_power, useful_power,
+    friction_power, reaction_force, and locking_margin if it was looked for; ideal: status and powers of the mechanism
+    without errors, empty if it has none, else arrays also have joint_rotation_error and joint_slide_error.
+    """
+    status = arrays["status"]
+    missing = int(np.count_nonzero(status >= Status.NOT_CONVERGED))
+    told: Reduced = {"status": int(np.max(status)), "without_answer": missing}
+    if "locking_margin" in arrays:
+        told["locking_margin"] = float(np.min(arrays["locking_margin"]))
+    if ideal:
+        told["efficiency_ideal"] = efficiency(ideal, cycle)
+    if missing:
+        return told
+    sound = sound_positions(status)
+    kept = sound if len(sound) else np.arange(len(status))
+    effort = arrays["drive_effort"]
+    size = np.sqrt(np.sum(arrays["reaction_force"] ** 2, axis=1))
+    if ideal:
+        turned, slid = (np.abs(arrays[f"joint_{what}_error"][:, kept]) for what in ("rotation", "slide"))
+        slides = np.array([kind == "prismatic" for kind, _ in system.joints.values()])
+        told["transmission_error_max"] = np.where(slides, np.max(slid, axis=1), np.max(turned, axis=1))
+    else:  # beside points with errors
+        told |= {"efficiency_ideal": efficiency(arrays, cycle), "transmission_error_max": 0.0}
+    return told | {
+        "efficiency": efficiency(arrays, cycle),
+        "drive_effort_min": np.min(effort[:, kept], axis=1),
+        "drive_effort_max": np.max(effort[:, kept], axis=1),
+        "drive_effort_rms": [float(np.sqrt(cycle.mean(row**2))) for row in effort],
+        "drive_power_mean": cycle.mean(np.sum(arrays["drive_power"], axis=0)),
+        "useful_power_mean": cycle.mean(arrays["useful_power"]),
+        "friction_power_mean": cycle.mean(np.sum(arrays["friction_power"], axis=0)),
+        "reaction_max": np.max(size[:, kept], axis=1),
+    }

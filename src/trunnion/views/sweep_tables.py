@@ -1,0 +1,119 @@
+"""A sweep as short tables: figures over one name, or one figure over two, with a table for each value of further names.
+
+Long tables are thinned evenly, their ends kept; how many points are left out is told.
+"""
+
+from __future__ import annotations
+
+from itertools import product
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from trunnion.errors import Status
+from trunnion.export import figures
+from trunnion.views.swept import Arrangement, arrange, cause, grid, statuses, thinned
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import xarray as xr
+    from numpy.typing import NDArray
+
+    from trunnion.views.cycle import Array
+
+__all__ = ["Table", "tables"]
+
+MOST_ROWS, MOST_COLUMNS = 40, 8  # of a table
+LEAST_ROWS, MOST_TABLES = 6, 6  # where there are several
+BESIDE = "friction_power_mean", "locking_margin"  # told beside the measure, if the sweep has them
+
+
+class Table(NamedTuple):
+    """Title, head and rows of texts; left_out: points that are not shown."""
+
+    title: str
+    head: list[str]
+    rows: list[list[str]]
+    left_out: int
+
+
+def tables(result: xr.Dataset, measures: Sequence[str] = ("efficiency",), x: str = "", family: str = "") -> list[Table]:
+    """One table of several figures over a single name; of more names one for each measure and value of the facets."""
+    plan = arrange(result, x, family)
+    if plan.other is None:
+        return [_list(result, measures, plan)]
+    return [table for measure in measures for table in _matrices(result, measure, plan)]
+
+
+def _list(result: xr.Dataset, measures: Sequence[str], plan: Arrangement) -> Table:
+    found = figures(result)
+    efforts = [name for name in found if name.endswith(".effort_max")]
+    shown = [*measures, "efficiency", "efficiency_ideal", *efforts, *BESIDE]
+    shown = [name for name in dict.fromkeys(shown) if name in found or name in measures]
+    columns = [grid(result, plan, name)[1][:, 0] for name in shown]
+    picked, status = thinned(len(plan.x.values), MOST_ROWS), statuses(result, plan)[:, 0]
+    titles = [f"{name.replace('_', ' ')} [{found[name][0]}]".removesuffix(" [1]") for name in shown]
+    words = [_word(int(code)) for code in status]
+    head = [plan.x.title, *titles, *(["status"] if any(words) else [])]
+    rows = []
+    for i in picked:
+        cells = ["" if np.isnan(column[i]) else _number(column[i]) for column in columns]
+        rows.append([_number(plan.x.values[i]), *cells, *([words[i]] if any(words) else [])])
+    said = ", ".join(name.replace("_", " ") for name in measures)
+    return Table(_titled(f"{said} over {plan.x.name}", plan.at()), head, rows, len(plan.x.values) - len(picked))
+
+
+def _matrices(result: xr.Dataset, measure: str, plan: Arrangement) -> list[Table]:
+    """A table for each combination of the facets' values; of many of them some."""
+    assert plan.other is not None  # a matrix has columns
+    unit, values = grid(result, plan, measure)
+    status = statuses(result, plan)
+    places = list(product(*(range(len(one.values)) for one in plan.facets)))
+    shown = [places[i] for i in thinned(len(places), MOST_TABLES)]
+    most = max(LEAST_ROWS, MOST_ROWS // len(shown))
+    name = measure.replace("_", " ") + (f" [{unit}]" if unit not in ("", "1") else "")
+    title = f"{name} over {plan.x.name} and, in columns, {plan.other.name}"
+    made = []
+    for place in shown:
+        at = ", ".join([*(one.told(i) for one, i in zip(plan.facets, place, strict=True)), *_listed(plan.at())])
+        index: Any = (slice(None), slice(None), *place)
+        made.append(_matrix(_titled(title, at), plan, values[index], status[index], most))
+    hidden = (len(places) - len(shown)) * plan.x.values.size * plan.other.values.size
+    made[-1] = made[-1]._replace(left_out=made[-1].left_out + hidden)
+    return made
+
+
+def _matrix(title: str, plan: Arrangement, values: Array, status: NDArray[np.int8], most: int) -> Table:
+    assert plan.other is not None
+    down, across = thinned(values.shape[0], most), thinned(values.shape[1], MOST_COLUMNS)
+    head = [plan.x.title, *(plan.other.say(k) for k in across)]
+    rows = []
+    for i in down:
+        cells = [
+            cause(int(status[i, k])) if np.isnan(values[i, k]) and status[i, k] >= Status.NOT_CONVERGED
+            else "" if np.isnan(values[i, k]) else _number(values[i, k])
+            for k in across
+        ]  # fmt: skip
+        rows.append([_number(plan.x.values[i]), *cells])
+    return Table(title, head, rows, values.size - len(down) * len(across))
+
+
+def _titled(title: str, at: str) -> str:
+    return f"{title}, at {at}" if at else title
+
+
+def _listed(text: str) -> list[str]:
+    return [text] if text else []
+
+
+def _word(code: int) -> str:
+    """What a table says of a point that has no figures, or not quite sound ones."""
+    if code >= Status.NOT_CONVERGED:
+        return cause(code)
+    milder = {int(Status.NEAR_SINGULAR): "near singular", int(Status.CONTACT_LOST): "contact lost"}
+    return milder.get(code, "")
+
+
+def _number(value: float) -> str:
+    return f"{value + 0.0:.6g}".replace("inf", "∞")  # + 0.0: no negative zero

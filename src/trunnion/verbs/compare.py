@@ -54,6 +54,7 @@ def compare(
     Exit status 0 if every course and efficiency is within, 1 if not or if it cannot be told.
     """
     from trunnion.analysis.rig.compare import compare as run
+    from trunnion.analysis.rig.said import gathered
     from trunnion.measured.read import read_measured
 
     _check(out or [], report, kind)
@@ -63,7 +64,7 @@ def compare(
         result = run(mechanism, measurement, channel, progress=progress)
     _write(result, out or [], report, kind, channel, condition, units_row)
     _tables(result)
-    say(measurement.findings)
+    say(gathered(measurement.findings))
     findings = findings_of(result)
     say(placed(findings, file, ["assembly", "measures"]))
     for path in [*(out or []), *([report] if report else [])]:

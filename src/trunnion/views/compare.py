@@ -6,6 +6,7 @@ What was measured is drawn with its expanded uncertainty U, the model as a curve
 from __future__ import annotations
 
 from collections.abc import Sequence
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -216,7 +217,8 @@ def overlay(result: xr.Dataset, shown: Sequence[tuple[int, int]]) -> Figure:
     sheet = new(f"Measured and model{more}", result, height=1.0 + 3.2 * rows, width=WIDTH if count == 1 else 10.6)
     parts = np.ravel(np.asarray(sheet.subfigures(rows, columns, squeeze=False)))
     for part, (i, k) in zip(parts, shown, strict=False):
-        part.suptitle(plain(label(result, k)), x=0.012, ha="left", fontsize=9.5, color=INK)
+        lines = [plain(line) for line in wrap(label(result, k), 80)[:2]]
+        part.suptitle("\n".join(lines), x=0.012, ha="left", fontsize=9.5, color=INK)
         _panel(part, result, i, k)
     return sheet
 
@@ -226,7 +228,8 @@ def small(result: xr.Dataset, channel: int, condition: int) -> Figure:
     layout = ConstrainedLayoutEngine(w_pad=0.05, h_pad=0.04, hspace=0.03, wspace=0.03)
     sheet = Sheet(figsize=(4.4, 3.5), dpi=150, facecolor="white", layout=layout)
     FigureCanvasAgg(sheet)
-    sheet.suptitle(plain(label(result, condition)), x=0.012, ha="left", fontsize=9, color=INK)
+    lines = [plain(line) for line in wrap(label(result, condition), 62)[:2]]
+    sheet.suptitle("\n".join(lines), x=0.012, ha="left", fontsize=9, color=INK)
     _panel(sheet, result, channel, condition)
     return sheet
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from trunnion.analysis.rig.judge import Verdict
 from trunnion.views.compared import coverage_of, scale_of, sets, setting, text, units, verdict
 from trunnion.views.cycle import Array, attribute, names
-from trunnion.views.quantities import number, prefixed, quantity
+from trunnion.views.quantities import number, prefixed
 from trunnion.views.tolerance_tables import Table
 
 if TYPE_CHECKING:
@@ -36,14 +37,13 @@ def results(result: xr.Dataset, channel: int | None = None) -> Table:
 
 
 def verdicts(result: xr.Dataset) -> Table:
-    """The verdict of every channel in every condition, with what was set."""
-    told, channels = sets(result), names(result, "channel")
+    """The verdict of every channel in every condition."""
+    channels = names(result, "channel")
     rows = []
     for k, name in enumerate(names(result, "condition")):
-        values = [setting(one.values[k], one.unit) if np.isfinite(one.values[k]) else NONE for one in told]
         cells = [verdict(result, i, k).text if result["turns"].values[i, k] else NONE for i in range(len(channels))]
-        rows.append([name, *values, *cells])
-    return Table("verdicts", ["condition", *(one.name for one in told), *channels], rows)
+        rows.append([name, *cells])
+    return Table("verdicts", ["condition", *channels], rows)
 
 
 def _figures(result: xr.Dataset, i: int, k: int) -> list[str]:
@@ -58,7 +58,7 @@ def _figures(result: xr.Dataset, i: int, k: int) -> list[str]:
     bias, wide = of("bias"), of("bias_expanded")
     told = sized(bias)
     if np.isfinite(bias) and np.isfinite(wide):
-        told = f"{number(bias * factor, 3)}\u00a0±\u00a0{text(wide * factor, unit, 2)}"
+        told = _beside(bias * factor, wide * factor, unit)
     alike = of("correlation")
     return [
         sized(of("rms")),
@@ -72,13 +72,21 @@ def _figures(result: xr.Dataset, i: int, k: int) -> list[str]:
     ]
 
 
+def _beside(value: float, wide: float, unit: str) -> str:
+    """A value with its expanded uncertainty, to two digits of that (GUM 7.2.6)."""
+    places = 1 - math.floor(math.log10(wide)) if wide > 0 else 3
+    if not 0 <= places <= 6:
+        return f"{number(value, 3)}\u00a0±\u00a0{text(wide, unit, 2)}"
+    digits = f"{value:.{places}f}".replace("-", "−"), f"{wide:.{places}f}"
+    return f"{digits[0]}\u00a0±\u00a0{digits[1]}\u00a0{unit}".rstrip().replace(" ", "\u00a0")
+
+
 def place(result: xr.Dataset, value: float) -> str:
     """A place of the drive in words."""
     if not np.isfinite(value):
         return NONE
-    unit = str(result.attrs["drive_unit"])
-    factor, shown = prefixed(value, unit)
-    return text(value * factor, shown, 4)
+    factor, shown = prefixed(value, str(result.attrs["drive_unit"]))
+    return setting(value * factor, shown)
 
 
 def _share(value: float) -> str:
@@ -124,10 +132,15 @@ def sensors(result: xr.Dataset) -> Table:
     rows = []
     for i, (name, unit) in enumerate(zip(names(result, "channel"), units(result), strict=True)):
         zero, gain = (_spread(result[f"accuracy_{what}"].values[i]) for what in ("zero", "gain"))
-        zeros = " to ".join(dict.fromkeys(quantity(one, unit) if one else "0" for one in zero)) or NONE
+        zeros = " to ".join(dict.fromkeys(_small(one, unit) if one else "0" for one in zero)) or NONE
         gains = " to ".join(dict.fromkeys(f"{number(100 * one, 3)}\u00a0%" if one else "0" for one in gain)) or NONE
         rows.append([name, measures[i], "" if unit == "1" else unit, zeros, gains])
     return Table("sensors", ["channel", "measures", "unit", "u of the zero", "u of the gain"], rows)
+
+
+def _small(value: float, unit: str) -> str:
+    factor, shown = prefixed(value, unit)
+    return text(value * factor, shown)
 
 
 def _spread(values: Array) -> list[float]:

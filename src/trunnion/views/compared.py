@@ -88,7 +88,8 @@ def label(result: xr.Dataset, condition: int) -> str:
     told = [f"{one.name} {setting(one.values[condition], one.unit)}" for one in varied(result) or sets(result)[:2]
             if np.isfinite(one.values[condition])]  # fmt: skip
     name = names(result, "condition")[condition]
-    return f"{name}: {', '.join(told)}" if told else name
+    named = all(one.name in name for one in varied(result))  # as a name made of the settings has them
+    return name if named or not told else f"{name}: {', '.join(told)}"
 
 
 def setting(value: float, unit: str) -> str:

@@ -16,7 +16,7 @@ from trunnion.analysis.account import PEZZUTI, finding_row, inputs, references
 from trunnion.analysis.friction import FrictionMethod
 from trunnion.analysis.rig.compare import Compared, Pair
 from trunnion.analysis.rig.judge import Verdict, expanded, probability, uncertainty_of
-from trunnion.analysis.rig.said import findings_of, units_set
+from trunnion.analysis.rig.said import findings_of, gathered, units_set
 from trunnion.errors import Status
 from trunnion.measured.measurement import Measurement
 from trunnion.model.mechanism import Mechanism
@@ -174,7 +174,7 @@ def _attributes(
         "channel_measures": list(channels.values()),
         **dict(zip(("set_units", "set_written"), units_set(mechanism, sets), strict=True)),
         "findings": [finding_row(finding) for finding in told],
-        "data_findings": [finding_row(finding) for finding in measurement.findings],
+        "data_findings": [{**finding_row(one), "file": one.file} for one in gathered(measurement.findings)],
         "done": list(measurement.done),
         "files": _files(found),
         "condition_files": [list(one.condition.files) for one in found],

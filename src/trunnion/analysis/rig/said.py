@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
+import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,8 +23,9 @@ from trunnion.model.units import unit as unit_of
 if TYPE_CHECKING:
     from trunnion.analysis.rig.compare import Compared, Pair
 
-__all__ = ["findings_of", "said", "units_set"]
+__all__ = ["findings_of", "gathered", "said", "units_set"]
 
+SLOWER = 0.01  # of a speed: a difference to speak of
 AGREE = np.radians(1.0)  # shifts that differ by less, or by less than a fifth, are one
 
 
@@ -34,6 +38,7 @@ def findings_of(
         *_shifts(found),
         *(finding for name in channels for finding in _of_channel(name, channels[name], found)),
         *_efficiencies(found),
+        *_speeds(found),
         *_of_the_model(found),
         *_left_out(found),
         *_accuracies(channels, found),
@@ -55,6 +60,24 @@ def units_set(mechanism: Mechanism, names: Iterable[str]) -> tuple[list[str], li
         units.append(row["unit"])
         written.append((text, float(unit_of(text)[0]) if text and text != "1" else 1.0))
     return units, written
+
+
+def gathered(findings: Iterable[Finding]) -> list[Finding]:
+    """Findings about data files, those that differ in numbers only told once, with the files they are of."""
+    alike: dict[tuple[str, ...], list[Finding]] = {}
+    for one in findings:
+        what = re.sub(r"[-−+]?\d[\d.,e+-]*", "#", one.what)
+        alike.setdefault((one.severity, one.where.partition(" ")[0], what, one.remedy), []).append(one)
+    told = []
+    for rows in alike.values():
+        first, files = rows[0], list(dict.fromkeys(Path(one.file).name for one in rows if one.file))
+        if len(rows) > 1:
+            where = first.where if len({one.where for one in rows}) == 1 else f"{first.where.partition(' ')[0]}s"
+            some = ", ".join(files[:4]) + (", …" if len(files) > 4 else "")
+            what = f"{first.what} — and so {len(rows)} times in all" + (f": {some}" if files else "")
+            first = replace(first, what=what, where=where, file="", line=None)
+        told.append(first)
+    return told
 
 
 def said(value: float, unit: str, signed: bool = False) -> str:
@@ -245,6 +268,28 @@ def _efficiencies(found: Sequence[Compared]) -> Iterator[Finding]:
             f"{one.condition.name}: measured {of.measured:.4f} ± {of.expanded:.2g}, model {of.model:.4f}"
         )
         yield Finding(what, "efficiency", "look at the channels; `trunnion identify` fits friction to them")
+
+
+def _speeds(found: Sequence[Compared]) -> Iterator[Finding]:
+    """A driver that turned at another speed than the model's."""
+    off = []
+    for one in found:
+        run = one.model.run
+        first = next(iter(run.system.mechanism.drivers), "")
+        if not first or not np.isfinite(one.condition.speed) or one.model.unit != "rad":
+            continue
+        theirs = one.model.span / run.cycle.duration
+        if abs(one.condition.speed - theirs) > SLOWER * abs(theirs):
+            off.append((one, first, theirs))
+    if off:
+        one, driver, theirs = off[0]
+        where = _in([case.condition.name for case, _, _ in off], len(found))
+        what = (
+            f"the driver did not turn at the model's speed {where}: {said(one.condition.speed, 'rad/s')} measured, "
+            f"{said(theirs, 'rad/s')} in the model"
+        )
+        remedy = f"state set: {{{driver}.speed: {{mean: …}}}} in the mapping, of a channel that measures rate:{driver}"
+        yield Finding(what, f"drivers.{driver}", remedy, Severity.WARNING)
 
 
 def _answers(found: Sequence[Compared]) -> Iterator[Finding]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from html import escape
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -41,7 +42,7 @@ def report(result: xr.Dataset) -> str:
         "formula": str(result.attrs["formula"]), "facts": _facts(result), "summary": headline(result),
         "findings": [row for row in found if row["severity"] != "note"],
         "notes": [row for row in found if row["severity"] == "note"],
-        "data_findings": attribute(result, "data_findings", []),
+        "data_findings": [_of_file(row) for row in attribute(result, "data_findings", [])],
         "efficiency": table,
         "picture": _picture("Measured and modelled efficiency", efficiency(result)) if table else None,
         "verdicts": verdicts(result), "conditions": conditions(result), "sensors": sensors(result),
@@ -54,6 +55,11 @@ def report(result: xr.Dataset) -> str:
         "style": Markup(style), "style_hash": hashed(style),
     }  # fmt: skip
     return template("compare.html.j2").render(context)
+
+
+def _of_file(row: dict[str, str]) -> dict[str, str]:
+    """A finding about data with the name of its file."""
+    return {**row, "where": " ".join(part for part in (Path(row["file"]).name, row["where"]) if part)}
 
 
 def _lowered(text: str) -> str:

@@ -148,8 +148,10 @@ def _explained(name: str, measures: str, kind: str, members: Sequence[tuple[Comp
         story, remedy = _story(name, measures, kind, [_size(pair, kind) for _, pair in members], members)
         what = f"is within U {where} apart from {story}: {_share(worst)} of the positions are within with it"
         return Finding(what, f"channels.{name}", remedy)
+    several = len(members) > 1
     what = (
-        f"is not within U {where}: {_share(worst)} of the positions are within, RMS of the residual {said(rms, unit)}"
+        f"is not within U {where}: {'down to ' if several else ''}{_share(worst)} of the positions are within, RMS of "
+        f"the residual {'up to ' if several else ''}{said(rms, unit)}"
     )
     if not kind:
         remedy = "look at the residual along the cycle; `trunnion identify` fits numbers of the model to it"

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from trunnion.analysis.locking import locking
     from trunnion.analysis.play import play
     from trunnion.analysis.rig.compare import compare
+    from trunnion.analysis.rig.virtual import observe
     from trunnion.analysis.sweep import sweep
     from trunnion.analysis.tolerance.study import tolerance
     from trunnion.errors import Finding, MechanismError, Status
@@ -41,6 +42,7 @@ _PLACES = {
     "check": "trunnion.analysis.inspect",
     "compare": "trunnion.analysis.rig.compare",
     "locking": "trunnion.analysis.locking",
+    "observe": "trunnion.analysis.rig.virtual",
     "play": "trunnion.analysis.play",
     "prepare": "trunnion.analysis.analyse",
     "read": "trunnion.model.file",
@@ -66,6 +68,7 @@ __all__ = [
     "compare",
     "dual",
     "locking",
+    "observe",
     "play",
     "prepare",
     "read",

@@ -36,6 +36,7 @@ from trunnion.verbs.allocate import allocate
 from trunnion.verbs.assemble import assemble
 from trunnion.verbs.compare import compare
 from trunnion.verbs.model import exit_status, lines_of, placed, stated
+from trunnion.verbs.rig import rig
 from trunnion.verbs.study import tolerance
 from trunnion.verbs.sweep import sweep
 
@@ -184,6 +185,7 @@ def locking(
 app.command()(assemble)
 app.command()(tolerance)
 app.command()(allocate)
+app.command()(rig)
 app.command()(compare)
 app.command()(sweep)
 

@@ -100,6 +100,19 @@ def test_a_measure_of_choice(run: Run) -> None:
     assert "B.reaction max [N]" in done.out
 
 
+def test_several_measures_are_figures_in_a_folder(run: Run, tmp_path: Path) -> None:
+    grid = ("--over", "AB=2m,2.1m", "--over", "B.friction.coefficient=0.1,0.2", "--over", "CD=3m,3.1m", "--steps", 4)
+    measures = ("--measure", "efficiency", "--measure", "A.effort_max")
+    options = ("--x", "CD", "--family", "AB", "--kind", "map", "--format", "svg")
+    done = run(FOUR_BAR, *grid, *measures, *options, "--out", "figures", "--out", "all.csv")
+    assert done.code == 0
+    assert files(tmp_path) == {"figures", "all.csv"}
+    assert files(tmp_path / "figures") == {"efficiency.svg", "A.effort_max.svg"}
+    assert "efficiency over CD and, in columns, AB, at B.friction.coefficient" in done.out
+    assert "A.effort max [N m] over CD" in done.out
+    assert len(rows(tmp_path / "all.csv")) == 8
+
+
 BAD = {
     "no range": (["--over", "AB"], "FROM:TO:COUNT"),
     "two parts": (["--over", "AB=1m:2m"], "FROM:TO:COUNT"),
@@ -120,6 +133,15 @@ BAD = {
     "no folder": (["--over", "AB=1m,2m", "--steps", "4", "--out", "missing/r.svg"], "missing/r.svg"),
     "no steps": (["--over", "AB=1m,2m", "--steps", "0"], "0 positions"),
     "no over": ([], "--over"),
+    "two in one file": (
+        ["--over", "AB=1m", *(f"--measure={one}" for one in ("efficiency", "status")), "--out=a.svg"],
+        "2 figures do not fit one file",
+    ),
+    "axis of a stranger": (["--over", "AB=1m,2m", "--x", "BC"], "'BC' is not swept over"),
+    "curves along the axis": (["--over", "AB=1m,2m", "--x", "AB", "--family", "AB"], "both the axis and the curves"),
+    "unknown kind": (["--over", "AB=1m,2m", "--kind", "contour"], "no kind of figure 'contour'"),
+    "map over one": (["--over", "AB=1m,2m", "--over", "BC=6m", "--kind", "map"], "needs two names that vary"),
+    "unknown picture": (["--over", "AB=1m,2m", "--out", "folder", "--format", "bmp"], "no kind of figure"),
 }
 
 

@@ -25,11 +25,12 @@ class Accuracy:
     """Standard uncertainties of a channel that averaging does not lessen.
 
     zero: of its zero, in the unit of the course; gain: of its gain, relative; they are the same at every position of
-    all turns of a file.
+    all turns of a file. resolution: step from one reading to the next, in the unit of the course, 0 if it is not known.
     """
 
     zero: float = 0.0
     gain: float = 0.0
+    resolution: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -66,13 +67,26 @@ class Course:
             return np.asarray(np.nanstd(self.turns, axis=0, ddof=1))
 
     @cached_property
-    def uncertainty(self) -> Array:
-        """Standard uncertainty of the mean, (position,): scatter/√n, zero and gain; GUM (JCGM 100:2008), 4.2 and 5.1.
+    def unresolved(self) -> float:
+        """Standard uncertainty by the resolution, step/√12 (GUM F.2.2.1), where readings scatter by less than half a
+        step; more than that carries them over the steps, and their mean is finer."""
+        step = self.accuracy.resolution
+        if not step:
+            return 0.0
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)
+            scatter = float(np.nanmedian(self.scatter))
+        return 0.0 if scatter > step / 2 else step / 12**0.5
 
-        NaN with fewer than two turns.
+    @cached_property
+    def uncertainty(self) -> Array:
+        """Standard uncertainty of the mean, (position,): scatter/√n, zero, gain and resolution.
+
+        GUM (JCGM 100:2008), 4.2 and 5.1. NaN with fewer than two turns.
         """
         repeated = self.scatter / np.sqrt(np.maximum(self.count, 1))
-        return np.sqrt(repeated**2 + self.accuracy.zero**2 + (self.accuracy.gain * self.mean) ** 2)
+        known = self.accuracy.zero**2 + self.unresolved**2
+        return np.sqrt(repeated**2 + known + (self.accuracy.gain * self.mean) ** 2)
 
 
 @dataclass(frozen=True)
@@ -80,7 +94,8 @@ class Condition:
     """One working condition: what was set, and what was measured over the cycle.
 
     values: numbers of the model that were set or measured once, by name, SI, for `Mechanism.with_values`;
-    phase: (position,), share of the cycle from the start of the model's, in [0, 1); files: where it comes from.
+    phase: (position,), share of the cycle from the start of the model's, in [0, 1); files: where it comes from;
+    speed: of the driver, mean over the turns, rad/s, below zero where its coordinate falls; NaN if the cycle is a time.
     """
 
     name: str
@@ -88,6 +103,7 @@ class Condition:
     phase: Array
     courses: Mapping[str, Course]
     files: Sequence[str] = ()
+    speed: float = float("nan")
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ from trunnion.model.mechanism import Mechanism
 from trunnion.model.text import read_text
 from trunnion.output import whole
 
-__all__ = ["placed", "read_mechanism", "write_mechanism"]
+__all__ = ["Lines", "place", "placed", "read_entries", "read_mechanism", "write_mechanism"]
 
 MAX_BYTES = 1_000_000  # some ten thousand links; parsing takes seconds
 MAX_DEPTH = 30
@@ -43,20 +43,31 @@ def read_mechanism(path: str | os.PathLike[str], tables: TableFiles | None = Non
     MechanismError with every finding of severity error, each with file, line, what and remedy.
     """
     path = Path(path)
-    try:
-        kind = _file_type(path)
-        data, lines = _parse(read_text(path, "a model file", MAX_BYTES, "start from one of the examples"), kind)
-        findings = [] if "trunnion" in data else [_unversioned()]
-    except MechanismError as error:
-        raise MechanismError(finding.at(str(path), finding.line) for finding in error.findings) from None
+    data, lines = read_entries(path)
+    findings = [] if "trunnion" in data else [_unversioned().at(str(path), 1)]
     data, read = with_points(data, tables or {})
     try:
         mechanism = Mechanism(**data)
     except MechanismError as error:
         findings += place_findings(error.findings, read)
     if findings:
-        raise MechanismError(_placed(findings, str(path), lines, data)) from None
+        raise MechanismError(place(findings, str(path), lines, data)) from None
     return mechanism
+
+
+def read_entries(
+    path: Path, noun: str = "a model file", start_from: str = "start from one of the examples"
+) -> tuple[dict[str, Any], Lines]:
+    """Plain data of a file of entries, and the line of every path in it.
+
+    noun: what the file should be, with its article; start_from: remedy for an empty one. MechanismError with the file
+    in every finding.
+    """
+    try:
+        kind = _file_type(path)
+        return _parse(read_text(path, noun, MAX_BYTES, start_from), kind)
+    except MechanismError as error:
+        raise MechanismError(finding.at(str(path), finding.line) for finding in error.findings) from None
 
 
 def placed(findings: Iterable[Finding], path: str | os.PathLike[str], sections: Iterable[str] = ()) -> list[Finding]:
@@ -250,7 +261,7 @@ class _Builder:
         return text
 
 
-def _placed(findings: Iterable[Finding], file: str, lines: Lines, data: Mapping[str, Any]) -> list[Finding]:
+def place(findings: Iterable[Finding], file: str, lines: Lines, data: Mapping[str, Any]) -> list[Finding]:
     """Findings with their file and line, in the order of the file."""
     rows = _rows(data)
     placed = [

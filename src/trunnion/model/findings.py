@@ -59,8 +59,8 @@ def _finding(error: ErrorDetails, model: type[BaseModel], data: Mapping[str, Any
     elif kind == "string_pattern_mismatch":  # the only texts with a pattern
         what = f"'{error['input'][:40]}' is no name of an assembly"
         remedy = "write way-1, way-2, … as `check` lists them"
-    elif kind == "literal_error" and key == "trunnion":
-        what, remedy = f"the file is of version {error['input']!r}, this program reads 1", "write trunnion: 1"
+    elif kind == "literal_error" and key.startswith("trunnion"):
+        what, remedy = f"the file is of version {error['input']!r}, this program reads 1", f"write {key}: 1"
     elif kind == "literal_error":
         wrong = f"'{error['input'][:40]}' " if isinstance(error["input"], str) else ""
         what, remedy = f"{wrong}is none of {context['expected']}", f"write one of {context['expected']}"

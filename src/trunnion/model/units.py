@@ -28,6 +28,7 @@ __all__ = [
     "UnitError",
     "dimension_text",
     "fits",
+    "root",
     "si_unit",
     "unit",
 ]
@@ -157,18 +158,25 @@ def _meant(text: str) -> str:
 
 
 @cache
-def unit(text: str) -> tuple[Fraction, Dimension]:
-    """Factor to SI and dimension of a unit such as `N m`, `kg m^2`, `rpm`; UnitError if it is none of mechanics."""
+def root(text: str) -> tuple[Fraction, dict[str, Fraction], tuple[str, ...]]:
+    """Factor to SI, exponents by base unit of pint, and the units named, of any unit pint knows; UnitError if none."""
     registry = _registry()
     try:
         spaced = _TORQUE.sub(r"\1N m", text)  # pint reads Nm as a measure of yarn
         parsed = registry.parse_units(spaced.replace("·", "*").replace("⋅", "*"))
-        factor, root = registry.get_root_units(parsed)
+        factor, base = registry.get_root_units(parsed)
     except Exception as error:  # pint raises its own, tokenizer and arithmetic errors on text that is no unit
         raise UnitError(f"the unit '{text}' is not known", _meant(text)) from error
+    exponents = {str(name): Fraction(str(power)) for name, power in base._units.items()}
+    to_si = Fraction(str(factor)) / Fraction(1000) ** int(exponents.get("gram", 0))
+    return to_si, exponents, tuple(str(name) for name in parsed._units)
+
+
+@cache
+def unit(text: str) -> tuple[Fraction, Dimension]:
+    """Factor to SI and dimension of a unit such as `N m`, `kg m^2`, `rpm`; UnitError if it is none of mechanics."""
+    factor, exponents, names = root(text)
     order = ("meter", "gram", "second", "radian")
-    exponents = {str(name): Fraction(str(power)) for name, power in root._units.items()}
-    names = [str(name) for name in parsed._units]
     if set(exponents) - set(order) or any(name.endswith("bel") for name in names):
         raise UnitError(f"the unit '{text}' is not one of mechanics", "use units of length, mass, time and angle")
     length, mass, time, angle = (exponents.get(name, Fraction(0)) for name in order)
@@ -176,4 +184,4 @@ def unit(text: str) -> tuple[Fraction, Dimension]:
     per_time = dimension == _dimension(time=-1) and factor != 1
     if per_time or any(name.endswith("hertz") for name in names):
         raise UnitError(f"the unit '{text}' may count turns or radians", "write an angular speed in rpm or rad/s")
-    return Fraction(str(factor)) / Fraction(1000) ** int(mass), dimension
+    return factor, dimension

@@ -156,7 +156,7 @@ def _show(result: xr.Dataset, mechanism: Mechanism, file: Path, measures: Sequen
     """The tables, and how many points they leave out."""
     from trunnion.views.sweep_tables import tables
 
-    shown = tables(result, measures, x, family)
+    shown = tables(result, measures, x, family, console().width)
     for k, one in enumerate(shown):
         show_rows(f"{mechanism.name or file}\n{one.title}" if k == 0 else one.title, one.head, one.rows)
     left_out = sum(one.left_out for one in shown) // (len(measures) if len(shown) > 1 else 1)

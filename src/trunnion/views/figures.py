@@ -34,12 +34,14 @@ def style_of(index: int) -> dict[str, Any]:
 
 
 def new(title: str, result: xr.Dataset, height: float = 4.3, width: float = WIDTH) -> Figure:
-    """An empty figure with its title and, smaller, the name of the mechanism."""
+    """An empty figure with its title, of one line or more, and, smaller, the name of the mechanism."""
     layout = ConstrainedLayoutEngine(w_pad=0.08, h_pad=0.06, hspace=0.03, wspace=0.04)
     figure = Sheet(figsize=(width, height), dpi=150, facecolor="white", layout=layout)
     FigureCanvasAgg(figure)
     name = str(result.attrs.get("name", ""))
-    figure.suptitle(plain(title), x=0.012, ha="left", fontsize=12, fontweight="bold", color=INK)
+    figure.suptitle(
+        "\n".join(map(plain, title.split("\n"))), x=0.012, ha="left", fontsize=12, fontweight="bold", color=INK
+    )
     if name:
         figure.supxlabel(plain(name), x=0.99, ha="right", fontsize=7.5, color=MUTED)
     return figure

@@ -40,11 +40,11 @@ FINER = 8  # parts of a cell along a logarithmic axis
 NOTHING = -1  # beside the statuses: sound, and yet without a number
 # fill and hatch of what has no number, to be told apart without colours
 LOOKS: dict[int, tuple[str, str]] = {
-    Status.NOT_CONVERGED: ("#f3f4f6", "....."),
+    Status.NOT_CONVERGED: ("#f3f4f6", "..."),
     Status.LOCKED: ("#dfe2e6", "////"),
     Status.LOAD_UNDEFINED: ("#f3f4f6", "||||"),
     Status.SINGULAR: ("#dfe2e6", "----"),
-    Status.NOT_ASSEMBLED: ("#eceef1", "xxxx"),
+    Status.NOT_ASSEMBLED: ("#eceef1", "xxx"),
 }
 
 
@@ -222,7 +222,7 @@ def _hinder(axes: Axes, edges: list[Array], where: NDArray[np.bool_], code: int,
         boxes += [_box(edges, start, stop, k) for start, stop in changes.reshape(-1, 2)]
     outline = [Path.MOVETO, Path.LINETO, Path.LINETO, Path.LINETO, Path.CLOSEPOLY]
     path = Path(np.concatenate(boxes), outline * len(boxes))
-    fill, hatch = LOOKS.get(code, ("white", "ooo"))
+    fill, hatch = LOOKS.get(code, ("white", "oo"))
     look: dict[str, Any] = {
         "facecolor": fill if filled else "none", "edgecolor": MUTED if code != NOTHING else "#b4bac1", "hatch": hatch,
         "linewidth": 0,

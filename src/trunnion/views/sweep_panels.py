@@ -16,7 +16,7 @@ from trunnion.views.cycle import Array, usual_peak
 from trunnion.views.figures import INK, MUTED, dress, legend, new
 from trunnion.views.lettering import plain
 from trunnion.views.quantities import prefixed
-from trunnion.views.swept import Arrangement, Scale, arrange, grid, meaning, statuses, thinned
+from trunnion.views.swept import Arrangement, Scale, arrange, grid, meaning, statuses, thinned, written
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -41,7 +41,9 @@ __all__ = [
 
 MOST_PANELS = 12
 MOST_COLUMNS = 4  # of panels
-ROOM = {1: 70, 2: 40, 3: 30, 4: 24}  # characters along a panel, by how many stand side by side
+# characters along a panel, and their size in its title, by how many panels stand side by side
+ROOM = {1: 70, 2: 40, 3: 28, 4: 24}
+SIZE = {1: 8.5, 2: 8.5, 3: 8.0, 4: 7.2}
 WIDE = 74  # characters of a title in a line
 ALIKE = 1e-9  # of the largest: numbers that differ by less are taken as one
 
@@ -161,7 +163,7 @@ def board(result: xr.Dataset, told: Field, title: str, upward: str) -> Board:
         dress(axes, across, _wrapped(upward, 60 if count == 1 else 32) if leftmost else "")
         axes.tick_params(labelbottom=lowest, labelleft=leftmost)
         if count > 1:
-            axes.set_title(_within(told.panels[k], ROOM[columns]), fontsize=8.5, loc="left", color=INK)
+            axes.set_title(_within(told.panels[k], ROOM[columns]), fontsize=SIZE[columns], loc="left", color=INK)
         panels.append(Panel(axes, k))
     strip = sheet.add_subplot(space[0, :]) if count > 1 else None
     if strip is not None:
@@ -200,7 +202,7 @@ def _short(text: str, room: int) -> str:
     """An equation without so many of the first parts of its name: "…friction.coefficient = 0.1"."""
     while len(text) > room and "." in text.split(" = ")[0].lstrip("…"):
         text = f"…{text.lstrip('…').partition('.')[2]}"
-    return text if len(text) <= room + 4 else f"…{text[-room - 3 :]}"
+    return text if len(text) <= room else f"…{text[1 - room :]}"
 
 
 def tell(shown: Board, least: int = 1) -> None:
@@ -268,9 +270,9 @@ def ticks(axes: Axes, scale: Scale, along: str = "x", margin: float = 0.015) -> 
     (axes.set_xlim if along == "x" else axes.set_ylim)(*ends(scale, margin))
     values = np.unique(scale.values)
     if values.size == 1:
-        axis.set_ticks(values, [f"{values[0]:.6g}".replace("-", "−")])
+        axis.set_ticks(values, [written(values[0])])
     elif kind == "log" and values.size <= 7:  # the values themselves, as they were given
-        axis.set_ticks(values, [f"{value:.6g}" for value in values])
+        axis.set_ticks(values, [written(value) for value in values])
         axis.set_minor_locator(NullLocator())
     elif kind == "linear":
         form = ScalarFormatter(useMathText=True)

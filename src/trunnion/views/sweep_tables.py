@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 __all__ = ["Table", "tables"]
 
 MOST_ROWS, MOST_COLUMNS = 40, 8  # of a table
+LEAST_COLUMNS = 3
 LEAST_ROWS, MOST_TABLES = 6, 6  # where there are several
 BESIDE = "friction_power_mean", "locking_margin"  # told beside the measure, if the sweep has them
 
@@ -38,12 +39,17 @@ class Table(NamedTuple):
     left_out: int
 
 
-def tables(result: xr.Dataset, measures: Sequence[str] = ("efficiency",), x: str = "", family: str = "") -> list[Table]:
-    """One table of several figures over a single name; of more names one for each measure and value of the facets."""
+def tables(
+    result: xr.Dataset, measures: Sequence[str] = ("efficiency",), x: str = "", family: str = "", room: int = 1000
+) -> list[Table]:
+    """One table of several figures over a single name; of more names one for each measure and value of the facets.
+
+    room: characters in a line, which limit how many columns of a long table are shown.
+    """
     plan = arrange(result, x, family)
     if plan.other is None:
         return [_list(result, measures, plan)]
-    return [table for measure in measures for table in _matrices(result, measure, plan)]
+    return [table for measure in measures for table in _matrices(result, measure, plan, room)]
 
 
 def _list(result: xr.Dataset, measures: Sequence[str], plan: Arrangement) -> Table:
@@ -64,7 +70,7 @@ def _list(result: xr.Dataset, measures: Sequence[str], plan: Arrangement) -> Tab
     return Table(_titled(f"{said} over {plan.x.name}", plan.at()), head, rows, len(plan.x.values) - len(picked))
 
 
-def _matrices(result: xr.Dataset, measure: str, plan: Arrangement) -> list[Table]:
+def _matrices(result: xr.Dataset, measure: str, plan: Arrangement, room: int) -> list[Table]:
     """A table for each combination of the facets' values; of many of them some."""
     assert plan.other is not None  # a matrix has columns
     unit, values = grid(result, plan, measure)
@@ -78,25 +84,36 @@ def _matrices(result: xr.Dataset, measure: str, plan: Arrangement) -> list[Table
     for place in shown:
         at = ", ".join([*(one.told(i) for one, i in zip(plan.facets, place, strict=True)), *_listed(plan.at())])
         index: Any = (slice(None), slice(None), *place)
-        made.append(_matrix(_titled(title, at), plan, values[index], status[index], most))
+        made.append(_matrix(_titled(title, at), plan, values[index], status[index], (most, room)))
     hidden = (len(places) - len(shown)) * plan.x.values.size * plan.other.values.size
     made[-1] = made[-1]._replace(left_out=made[-1].left_out + hidden)
     return made
 
 
-def _matrix(title: str, plan: Arrangement, values: Array, status: NDArray[np.int8], most: int) -> Table:
+def _matrix(title: str, plan: Arrangement, values: Array, status: NDArray[np.int8], most: tuple[int, int]) -> Table:
+    """most: rows, and characters in a line."""
     assert plan.other is not None
-    down, across = thinned(values.shape[0], most), thinned(values.shape[1], MOST_COLUMNS)
-    head = [plan.x.title, *(plan.other.say(k) for k in across)]
-    rows = []
-    for i in down:
-        cells = [
-            cause(int(status[i, k])) if np.isnan(values[i, k]) and status[i, k] >= Status.NOT_CONVERGED
-            else "" if np.isnan(values[i, k]) else _number(values[i, k])
-            for k in across
-        ]  # fmt: skip
-        rows.append([_number(plan.x.values[i]), *cells])
+    down = thinned(values.shape[0], most[0])
+    columns = [[plan.x.title, *(_number(plan.x.values[i]) for i in down)]]
+    for k, (numbers, codes) in enumerate(zip(values[down].T, status[down].T, strict=True)):
+        columns += [[plan.other.say(k), *map(_cell, numbers.tolist(), codes.tolist())]]
+    across = thinned(values.shape[1], MOST_COLUMNS)
+    while len(across) > LEAST_COLUMNS and _width(columns, across) > most[1]:
+        across = thinned(values.shape[1], len(across) - 1)
+    head, *rows = ([columns[0][i], *(columns[k + 1][i] for k in across)] for i in range(len(down) + 1))
     return Table(title, head, rows, values.size - len(down) * len(across))
+
+
+def _cell(value: float, status: int) -> str:
+    if not np.isnan(value):
+        return _number(value)
+    return cause(status) if status >= Status.NOT_CONVERGED else ""
+
+
+def _width(columns: list[list[str]], across: list[int]) -> int:
+    """Characters that the first and these columns take; the words of a cause may stand below each other."""
+    picked = [columns[0], *(columns[k + 1] for k in across)]
+    return sum(3 + max(len(column[0]), *(len(word) for cell in column for word in cell.split())) for column in picked)
 
 
 def _titled(title: str, at: str) -> str:

@@ -18,13 +18,14 @@ from trunnion.export import figures
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.names import nearest
 from trunnion.views.cycle import Array
+from trunnion.views.quantities import SUPERSCRIPT, WORDS
 
 if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
     "Arrangement", "Scale", "arrange", "arranged", "cause", "check_axes", "check_measure", "grid", "meaning", "scales",
-    "statuses", "thinned",
+    "statuses", "thinned", "written",
 ]  # fmt: skip
 
 CAUSES = {
@@ -34,7 +35,7 @@ CAUSES = {
     Status.SINGULAR: "dead centre",
     Status.NOT_ASSEMBLED: "cannot be assembled",
 }
-SIGNS = {"um": "µm", "deg": "°"}  # in figures
+SIGNS = {"um": "µm", "deg": "°", **WORDS}  # in figures
 
 
 class Scale(NamedTuple):
@@ -66,7 +67,14 @@ class Scale(NamedTuple):
         """An equation for a figure: "misalignment = −5°"."""
         unit = SIGNS.get(self.unit, self.unit)
         gap = "" if unit in ("", "°") else " "
-        return f"{self.name} = {f'{self.values[index]:.6g}'.replace('-', '−')}{gap}{unit}"
+        return f"{self.name} = {written(self.values[index])}{gap}{unit}"
+
+
+def written(value: float) -> str:
+    """A number as it was given, for a figure: a true minus, 2.5×10⁻⁶ for 2.5e-06."""
+    mantissa, _, power = f"{value + 0.0:.6g}".partition("e")
+    shown = f"{mantissa}×10{str(int(power)).translate(SUPERSCRIPT)}" if power else mantissa
+    return shown.replace("-", "−")
 
 
 def scales(result: xr.Dataset) -> list[Scale]:
@@ -96,8 +104,8 @@ class Arrangement(NamedTuple):
     fixed: tuple[Scale, ...]
 
     def at(self) -> str:
-        """The fixed values in words, "" if there are none."""
-        return ", ".join(one.told(0) for one in self.fixed)
+        """The fixed values in words, none of them to be broken into lines; "" if there are none."""
+        return ", ".join(one.told(0).replace(" ", "\u00a0") for one in self.fixed)
 
 
 def arrange(result: xr.Dataset, x: str = "", family: str = "") -> Arrangement:

@@ -1,1 +1,1 @@
-"""The computer side of a test rig: a model observed, compared with measurements, and identified from them."""
+"""The computer side of a test rig: what its sensors would show, and the model beside what they did show."""

@@ -1,0 +1,319 @@
+"""What a virtual rig leaves behind: data files like those of a real one, the mapping that reads them, and the truth.
+
+CSV, Parquet and TDMS hold the same numbers to the last bit: they are rounded to what the shortest text of a CSV cell
+says before any is written.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import math
+import os
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from ruamel.yaml import YAML
+
+from trunnion import __version__
+from trunnion.analysis.rig.virtual_cases import Case, speed_differs
+from trunnion.errors import Finding, MechanismError
+from trunnion.measured.rig_file import FORMATS
+from trunnion.output import whole
+
+if TYPE_CHECKING:
+    from trunnion.analysis.rig.virtual import Observation, Record
+    from trunnion.analysis.rig.virtual_sensors import Channel
+
+__all__ = ["MAPPING", "TRUTH", "check_form", "mapping_of", "truth_of", "write"]
+
+MAPPING, TRUTH = "mapping.yaml", "truth.yaml"
+PACKAGES = {"parquet": "pyarrow", "tdms": "nptdms"}
+ROWS = 100_000  # of text written at a time
+AT_REST = 0.9  # share of the idle stretch that the zero is taken from: a filter carries the run into the rest
+
+
+def check_form(form: str) -> None:
+    """MechanismError for a format that is none, or whose package is not there."""
+    if form not in FORMATS:
+        raise MechanismError(Finding(f"'{form}' is no format of data files", "format", f"use {', '.join(FORMATS)}"))
+    package = PACKAGES.get(form)
+    if package and importlib.util.find_spec(package) is None:
+        raise MechanismError(Finding(f"{form} needs {package}", "format", f"pip install 'trunnion[{form}]'"))
+
+
+def write(
+    observation: Observation, folder: str | os.PathLike[str], form: str, progress: Callable[[int], None] | None = None
+) -> list[str]:
+    """Write everything into a folder, which is made if it is not there; the names of the files."""
+    check_form(form)
+    folder = Path(folder)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        what = f"cannot be made a folder: {error.strerror or error}"
+        raise MechanismError(Finding(what, str(folder), "name a folder")) from None
+    names = []
+    units = units_of(observation)
+    for done, record in enumerate(observation.records(), 1):
+        names.append(f"{record.name}.{form}")
+        with whole(folder / names[-1]) as temporary:
+            WRITERS[form](record, units, temporary, observation)
+        if progress:
+            progress(done)
+    for name, data in ((MAPPING, mapping_of(observation, form)), (TRUTH, truth_of(observation))):
+        with whole(folder / name) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as stream:
+            stream.write(HEADS[name])
+            _yaml().dump(data, stream)
+        names.append(name)
+    return names
+
+
+def units_of(observation: Observation) -> dict[str, str]:
+    """Unit of every column that has one."""
+    found = {observation.rig.time.column: observation.rig.time.unit}
+    return found | {channel.column: channel.reading for channel in observation.channels.values()}
+
+
+# ---- tables ---------------------------------------------------------------------------------------------------
+
+
+def _csv(record: Record, units: Mapping[str, str], path: Path, observation: Observation) -> None:
+    """Text, a column's unit in brackets behind its name; an empty cell where there is no reading."""
+    head = [f"{name} [{units[name]}]" if name in units else name for name in record.columns]
+    count = len(next(iter(record.columns.values())))
+    with path.open("w", encoding="utf-8", newline="") as stream:
+        stream.write(",".join(head) + "\n")
+        for low in range(0, count, ROWS):
+            cells = [_texts(values[low : low + ROWS]) for values in record.columns.values()]
+            stream.write("\n".join(map(",".join, zip(*cells, strict=True))))
+            stream.write("\n")
+
+
+def _texts(values: NDArray[Any]) -> list[str]:
+    """The shortest text of every number that gives the same float again; nothing for NaN."""
+    texts = list(map(repr, values.tolist()))
+    for k in np.flatnonzero(~np.isfinite(values)) if values.dtype.kind == "f" else ():
+        texts[k] = ""
+    return texts
+
+
+def _parquet(record: Record, units: Mapping[str, str], path: Path, observation: Observation) -> None:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    fields, columns = [], []
+    for name, values in record.columns.items():
+        column = pa.array(values, from_pandas=True)  # NaN as null
+        columns.append(column)
+        fields.append(pa.field(name, column.type, metadata={"unit": units[name]} if name in units else None))
+    pq.write_table(pa.table(columns, schema=pa.schema(fields)), path)
+
+
+def _tdms(record: Record, units: Mapping[str, str], path: Path, observation: Observation) -> None:
+    from nptdms import ChannelObject, RootObject, TdmsWriter
+
+    about = {"name": record.name, "description": observation.rig.name}
+    objects = []
+    for name, values in record.columns.items():
+        properties: dict[str, Any] = {"unit_string": units[name]} if name in units else {}
+        objects.append(ChannelObject("rig", name, values, properties=properties))
+    with TdmsWriter(str(path)) as stream:
+        stream.write_segment([RootObject(properties=about), *objects])
+
+
+WRITERS: Mapping[str, Callable[[Record, Mapping[str, str], Path, Observation], None]] = {
+    "csv": _csv,
+    "parquet": _parquet,
+    "tdms": _tdms,
+}
+
+
+# ---- the mapping ----------------------------------------------------------------------------------------------
+
+
+def mapping_of(observation: Observation, form: str) -> dict[str, Any]:
+    """The mapping that reads the files of an observation; what a laboratory knows, and no more than that."""
+    rig = observation.rig
+    found: dict[str, Any] = {"trunnion-data": 1, "name": rig.name or observation.mechanism.name}
+    angle = _angle(observation)
+    timed = angle.get("angle", {}).get("from") == "time" or "angle" not in angle
+    found["files"] = [_file(observation, case, form, timed) for case in observation.cases]
+    if rig.set_:
+        found["set"] = dict(rig.set_)
+    found["time"] = {"column": rig.time.column, "unit": rig.time.unit}
+    found |= angle
+    found["channels"] = {name: _channel(observation, name) for name in observation.channels}
+    return found
+
+
+def _file(observation: Observation, case: Case, form: str, timed: bool) -> dict[str, Any]:
+    """A file with what was set, and where the time alone tells the position, when it ran."""
+    found: dict[str, Any] = {"file": f"{case.name}.{form}"}
+    if case.settings:
+        found["set"] = dict(case.settings)
+    if timed and case.rows > case.running:
+        ends = (case.before, case.before + case.running - 1)
+        found["over"] = [f"{end / observation.rate:.9g} s" for end in ends]
+    return found
+
+
+def _angle(observation: Observation) -> dict[str, Any]:
+    """Where the coordinate of the driver comes from, and what a cycle is."""
+    run = observation.cases[0].run
+    driver = next(iter(observation.mechanism.drivers))
+    turns = run.system.turns(driver) and run.system.span(run.values, driver).one_way
+    duration = run.cycle.duration
+    if not turns:
+        return {"cycle": f"{duration:.15g} s"}
+    drives = [float(np.ravel(run.system.drive(run.values, driver, time)[0])[0]) for time in (0.0, duration)]
+    found: dict[str, Any] = {"angle": _source(observation, driver)}
+    extent = math.degrees(abs(drives[1] - drives[0]))
+    if abs(extent - 360) > 1e-9:
+        found["cycle"] = f"{extent:.12g} deg"
+    if drives[0]:
+        found["start"] = f"{math.degrees(drives[0]):.12g} deg"
+    return found
+
+
+def _source(observation: Observation, driver: str) -> dict[str, Any]:
+    """The encoder if there is one, else a constant speed, else a measured one."""
+    case = observation.cases[0]
+    run = case.run
+    encoder = observation.rig.encoder
+    if encoder:
+        found: dict[str, Any] = {"from": "pulses", "column": encoder.column, "per_turn": encoder.per_turn}
+        found["kind"] = encoder.kind
+        zero = _first_edge(observation) if encoder.kind == "level" else float(encoder.zero.evaluate())
+        if zero:
+            found["zero"] = f"{math.degrees(zero):.12g} deg"
+        if encoder.index:
+            found["index"] = {"column": encoder.index}
+        return found
+    if speed_differs(observation.cases):
+        measured = next(name for name, one in observation.channels.items() if one.measures == f"rate:{driver}")
+        start = math.degrees(float(np.ravel(run.system.drive(run.values, driver, 0.0)[0])[0]))
+        return {"from": "speed", "channel": measured} | ({"zero": f"{start:.12g} deg"} if start else {})
+    at_zero = -case.before / observation.rate
+    start, speed, _ = (float(np.ravel(one)[0]) for one in run.system.drive(run.values, driver, at_zero))
+    return {"from": "time", "speed": f"{speed:.15g} rad/s", "zero": f"{math.degrees(start):.12g} deg"}
+
+
+def _first_edge(observation: Observation) -> float:
+    """Coordinate, rad, at the index pulse, or without one where the level of the encoder first rises."""
+    encoder, case = observation.rig.encoder, observation.cases[0]
+    assert encoder is not None  # asked of encoders only
+    zero = float(encoder.zero.evaluate())
+    if encoder.index:
+        return zero
+    driver = next(iter(observation.mechanism.drivers))
+    start, speed, _ = (float(np.ravel(one)[0]) for one in case.run.system.drive(case.run.values, driver, 0.0))
+    pitch = 2 * math.pi / encoder.per_turn
+    count = (start - zero) / pitch
+    # backward, the level rises in the middle of a pulse
+    edge = math.floor(count + 1e-9) + 1 if speed > 0 else math.ceil(count - 0.5 - 1e-9) - 0.5
+    return zero + edge * pitch
+
+
+def _channel(observation: Observation, name: str) -> dict[str, Any]:
+    channel = observation.channels[name]
+    stated = channel.stated
+    found: dict[str, Any] = {"column": channel.column, "measures": channel.measures, "unit": channel.reading}
+    if stated.sensitivity:
+        found["gain"] = stated.sensitivity.source
+    before = min(case.before for case in observation.cases)
+    if channel.at_rest and before > 1 and channel.per_turn == 0:
+        found["zero"] = {"over": ["0 s", f"{AT_REST * before / observation.rate:.6g} s"]}
+    if stated.range:
+        found["range"] = stated.range.source
+    accuracy: dict[str, Any] = {}
+    if channel.gain:
+        accuracy["gain"] = stated.accuracy.gain.source
+    zero = _stated_zero(channel, observation.zero_uncertainty(name))
+    if zero:
+        accuracy["zero"] = f"{zero:.4g} {channel.unit}"
+    return found | ({"accuracy": accuracy} if accuracy else {})
+
+
+def _stated_zero(channel: Channel, zero: float) -> float:
+    """Uncertainty of the zero with the steps of a converter that noise does not carry over (GUM F.2.2.1)."""
+    return zero if channel.noise > channel.step / 2 else math.hypot(zero, channel.step / math.sqrt(12))
+
+
+# ---- the truth ------------------------------------------------------------------------------------------------
+
+
+def truth_of(observation: Observation) -> dict[str, Any]:
+    """What was drawn and what is true, in SI: for a check of what is found from the files, not for finding it."""
+    mechanism = observation.mechanism
+    found: dict[str, Any] = {
+        "trunnion-truth": 1,
+        "made_by": f"trunnion {__version__}",
+        "model": mechanism.name,
+        "model_hash": mechanism.digest,
+        "seed": observation.seed,
+        "sensors": {
+            name: {
+                "measures": channel.measures,
+                "unit": channel.unit,
+                "gain_error": observation.drawn[name].gain,
+                "zero_error": observation.drawn[name].zero,
+                "offset": observation.drawn[name].offset,
+                "drift_per_second": channel.drift,
+                "noise": channel.noise,
+                "step": channel.step,
+            }
+            for name, channel in observation.channels.items()
+        },
+        "conditions": [
+            {
+                "name": case.name,
+                "set": dict(case.settings),
+                "efficiency": case.efficiency if math.isfinite(case.efficiency) else None,
+                "cycle_seconds": case.run.cycle.duration,
+                "samples": "solved at each" if case.true.exact else "interpolated on a grid of the cycle",
+                "mean": {name: _mean(observation, case, i) for i, name in enumerate(observation.channels)},
+            }
+            for case in observation.cases
+        ],
+    }
+    if observation.skipped:
+        found["left_out"] = list(observation.skipped)
+    if observation.rig.faults:
+        found["faults"] = [_fault(fault.model_dump(by_alias=True)) for fault in observation.rig.faults]
+    found["parameters"] = {
+        path: float(np.ravel(value)[0]) for path, value in mechanism.parameters().items() if np.size(value) == 1
+    }
+    return found
+
+
+def _mean(observation: Observation, case: Case, i: int) -> float:
+    """Mean of a true course over the recorded cycles."""
+    whole = round(observation.rig.schedule.turns * case.run.cycle.duration * observation.rate)
+    return float(np.mean(case.true.at_samples(i)[:whole]))
+
+
+def _fault(data: dict[str, Any]) -> dict[str, Any]:
+    """A fault as it was stated."""
+    plain = {key: getattr(value, "source", value) for key, value in data.items()}
+    plain = {key: value["source"] if isinstance(value, dict) else value for key, value in plain.items()}
+    return {
+        key: list(value) if isinstance(value, tuple) else value for key, value in plain.items() if value is not None
+    }
+
+
+HEADS = {
+    MAPPING: "# What the columns of the data files measure: for `trunnion data`, `compare` and `identify`.\n",
+    TRUTH: "# What the virtual rig drew and what is true of the model, in SI: to check what is found from the files.\n",
+}
+
+
+def _yaml() -> YAML:
+    yaml = YAML(typ="safe", pure=True)
+    yaml.default_flow_style = None
+    yaml.allow_unicode = True
+    yaml.width = 118
+    yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]  # keys as stated
+    return yaml

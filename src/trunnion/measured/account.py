@@ -1,0 +1,70 @@
+"""What is found and done while the files are read: findings with their file, and sentences for a report."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.errors import Finding, Severity
+
+__all__ = ["Account", "counted", "places", "runs", "times"]
+
+
+@dataclass
+class Account:
+    """Findings about one data file, and what was done to its data."""
+
+    file: str
+    findings: list[Finding] = field(default_factory=list)
+    done: list[str] = field(default_factory=list)
+
+    def warn(self, where: str, what: str, remedy: str, severity: Severity = Severity.WARNING) -> None:
+        """A fault of the data."""
+        self.findings.append(Finding(what, where, remedy, severity, file=self.file))
+
+    def note(self, where: str, what: str, remedy: str = "") -> None:
+        """Something to know."""
+        self.warn(where, what, remedy, Severity.NOTE)
+
+    def error(self, where: str, what: str, remedy: str) -> None:
+        """Why there is no result of this part."""
+        self.warn(where, what, remedy, Severity.ERROR)
+
+    def say(self, sentence: str) -> None:
+        """Something that was done; once."""
+        if sentence not in self.done:
+            self.done.append(sentence)
+
+
+def counted(count: int, noun: str, plural: str = "") -> str:
+    """A number with its noun."""
+    return f"{count:,} {noun if count == 1 else plural or noun + 's'}"
+
+
+def runs(mask: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """First place and length of every stretch of a mask that is true."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
+    return edges[::2], edges[1::2] - edges[::2]
+
+
+def times(found: Sequence[float] | NDArray[np.float64], most: int = 3) -> str:
+    """Some times in words."""
+    told = ", ".join(f"{t:.5g}" for t in found[:most])
+    return f"at {told}{', …' if len(found) > most else ''} s"
+
+
+def places(mask: NDArray[np.bool_], time: NDArray[np.float64]) -> str:
+    """Where the stretches of a mask are: how many, where the first, how long the longest."""
+    starts, lengths = runs(mask)
+    if starts.size <= 3:
+        where = times(time[starts])
+    else:
+        where = f"in {starts.size:,} places from {time[starts[0]]:.5g} to {time[starts[-1]]:.5g} s"
+    longest = int(np.argmax(lengths))
+    if lengths[longest] < 3:
+        return where
+    last = min(starts[longest] + lengths[longest], time.size - 1)
+    return f"{where}, the longest {time[last] - time[starts[longest]]:.3g} s at {time[starts[longest]]:.5g} s"

@@ -1,0 +1,155 @@
+"""Coordinate of the driver at every row: from a column, from time, from a speed, or from the pulses of an encoder."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.errors import Finding, MechanismError
+from trunnion.measured.account import Account, counted, times
+from trunnion.measured.amounts import alike, dimensions
+from trunnion.measured.mapping import AngleSource
+from trunnion.measured.pulses import by_index, index_times, pulses_of
+from trunnion.measured.tables import Table
+from trunnion.measured.timebase import Timeline
+
+__all__ = ["Coordinate", "coordinate"]
+
+Array = NDArray[np.float64]
+TURN = 2 * np.pi
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """Coordinate of the driver by row, rad, NaN where it is not known; spoilt: stretches of time, (stretch, 2), in which it is wrong."""
+
+    values: Array
+    spoilt: Array
+
+
+def coordinate(source: AngleSource, table: Table, line: Timeline, speed: Array | None, account: Account) -> Coordinate:
+    """The coordinate by its source; speed: that of the channel, rad/s, of a source `speed`."""
+    zero = float(source.zero.evaluate())  # type: ignore[arg-type]
+    index = np.empty(0)
+    if source.index is not None:
+        index = index_times(table.columns[source.index.column].values, line, source.index.column, account)
+    if source.from_ == "pulses":
+        return _of_pulses(source, table, line, index, zero, account)
+    if source.from_ == "column":
+        values = _of_column(source, table, line, account)
+    elif source.from_ == "time":
+        assert source.speed is not None
+        rate = float(source.speed.evaluate())  # type: ignore[arg-type]
+        values = rate * line.seconds
+        account.say(f"the angle is that of a constant speed of {rate:.6g} rad/s")
+    else:
+        assert speed is not None
+        values = _integrated(speed, line, account)
+    values = source.sign * values
+    if index.size > 1 and source.from_ in ("time", "speed"):
+        values, spoilt = _tied(values, index, line, account)
+    else:
+        spoilt = np.empty((0, 2))
+        _check_index(values, index, line, account)
+    return Coordinate(values + zero, spoilt)
+
+
+def _of_column(source: AngleSource, table: Table, line: Timeline, account: Account) -> Array:
+    column = table.columns[str(source.column)]
+    unit = source.unit or column.unit
+    if not unit:
+        account.note("angle", f"the column '{source.column}' has no unit and is taken for rad", "state angle.unit")
+    factor, found = dimensions(unit or "rad")
+    if not alike(found, dimensions("rad")[1]):
+        what = f"the column '{source.column}' has the unit '{unit}', which is no angle"
+        raise MechanismError(Finding(what, "angle", "name another column", file=account.file))
+    values = line.rows(column.values) * factor
+    finite = np.flatnonzero(np.isfinite(values))
+    if finite.size < values.size:
+        what = f"{counted(values.size - finite.size, 'cell')} of '{source.column}' of {values.size:,} are no number"
+        account.warn("angle", f"{what}; these rows are left out", "check the angle sensor and its cable")
+    if finite.size < 3:
+        return np.full(values.size, np.nan)
+    told = np.unwrap(values[finite])
+    steps = np.abs(np.diff(told))
+    moving = steps[steps > 0]
+    if moving.size and np.median(moving) > TURN / 4:
+        what = f"a turn has {TURN / float(np.median(moving)):.3g} samples: which way it turns cannot be told"
+        account.warn("angle", what, "sample at least 8 times a turn")
+    values[finite] = told
+    return values
+
+
+def _integrated(speed: Array, line: Timeline, account: Account) -> Array:
+    """The integral of a speed, from the first row; where it is missing it is interpolated."""
+    finite = np.isfinite(speed)
+    if np.count_nonzero(finite) < 2:
+        return np.full(speed.size, np.nan)
+    bridged = speed if finite.all() else np.interp(line.seconds, line.seconds[finite], speed[finite])
+    steps = 0.5 * (bridged[1:] + bridged[:-1]) * np.diff(line.seconds)
+    account.say("the angle is the integral of the speed from the first row; its zero creeps with the sensor's error")
+    return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+def _tied(values: Array, index: Array, line: Timeline, account: Account) -> tuple[Array, Array]:
+    """An angle stretched between the pulses of an index so that these are a turn apart; not known beyond them."""
+    at = np.interp(index, line.seconds, values)
+    way = np.sign(at[-1] - at[0]) or 1.0
+    turns = np.rint(np.diff(at) / TURN * way)
+    spoilt = np.column_stack([index[:-1], index[1:]])[turns != 1]
+    if spoilt.size:
+        told = counted(len(spoilt), "interval")
+        account.warn("angle.index", f"{told} of the index, {times(spoilt[:, 0])}, are not one turn of the angle; left out",
+                     "check index pulse and speed")  # fmt: skip
+    exact = way * TURN * np.concatenate([[0.0], np.cumsum(np.maximum(turns, 1))])
+    account.say("the angle is tied to the index pulse once a turn")
+    inside = (line.seconds >= index[0]) & (line.seconds <= index[-1])
+    rising = np.interp(values * way, at * way, exact * way) * way
+    return np.where(inside, rising, np.nan), spoilt
+
+
+def _check_index(values: Array, index: Array, line: Timeline, account: Account) -> None:
+    """Tell where the index of an angle that needs none is out of place."""
+    if index.size < 2:
+        return
+    at = np.interp(index, line.seconds, np.where(np.isfinite(values), values, np.nan))
+    offsets = np.angle(np.exp(1j * (at - at[0])))
+    far = np.flatnonzero(np.abs(offsets) > np.radians(5.0))
+    if far.size:
+        what = f"{counted(far.size, 'index pulse')} of {index.size} more than 5 deg off the first, {times(index[far])}"
+        account.warn("angle.index", what, "check the angle sensor: it slips, or its readings jump")
+
+
+def _of_pulses(
+    source: AngleSource, table: Table, line: Timeline, index: Array, zero: float, account: Account
+) -> Coordinate:
+    """The angle between pulses by interpolation in time, counted anew from every index pulse."""
+    assert source.per_turn is not None
+    readings = line.rows(table.columns[str(source.column)].values)
+    found = pulses_of(source, readings, line, index.size > 1, account)
+    if found.times.size < 2:
+        raise MechanismError(
+            Finding(
+                f"the column '{source.column}' has {counted(found.times.size, 'pulse')}: there are no turns", "angle",
+                "check that angle.column is the encoder's, and angle.kind", file=account.file,
+            )
+        )  # fmt: skip
+    counts, spoilt = found.counts, found.spoilt
+    if index.size > 1:
+        counts, lost = by_index(found, index, source.per_turn, line.step, account)
+        spoilt = np.concatenate([spoilt, lost])
+    elif index.size == 1:
+        counts = counts - np.interp(index[0], found.times, counts)
+    turned = source.sign * TURN / source.per_turn * counts
+    values = np.interp(line.seconds, found.times, turned, left=np.nan, right=np.nan)
+    if found.until is not None:
+        values[line.seconds > found.until] = np.nan
+    pulse = 360.0 / source.per_turn
+    blur = pulse * min(0.5 * line.step / max(float(np.median(np.diff(found.times))), 1e-300), 1.0)
+    account.say(
+        f"the angle is interpolated between pulses {pulse:.4g} deg apart, each known to ± {blur:.2g} deg by the sampling"
+        if not found.crossings else f"the angle is interpolated between pulses {pulse:.4g} deg apart"
+    )  # fmt: skip
+    return Coordinate(values + zero, spoilt)

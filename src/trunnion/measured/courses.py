@@ -1,0 +1,126 @@
+"""What the turns of a condition say together: drift of a zero, wrong signs, a speed that is not steady."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.measured.account import Account, counted
+from trunnion.measured.mapping import Channel
+from trunnion.measured.turns import Turns, turn_means
+
+__all__ = ["Drift", "drift", "signs", "steady"]
+
+Array = NDArray[np.float64]
+STEADY = 0.03  # of the mean speed, between the slowest and the fastest turn
+CERTAIN = 6.0  # standard errors from which a slope is one
+PLAIN = 3.0  # times what turns scatter about the line, that a drift amounts to
+SHARE = 0.002  # of the largest value over the turn, that a drift amounts to
+
+
+@dataclass(frozen=True)
+class Drift:
+    """A zero that creeps: slope and its standard error, SI a second, and what it amounts to over the turns."""
+
+    slope: float
+    error: float
+    change: float
+    scatter: float
+    span: float
+
+
+def drift(parts: Sequence[tuple[Turns, Array]]) -> Drift | None:
+    """The slope that the means of turns have in common in all conditions of a file, where it is plain; else None."""
+    times: list[Array] = []
+    means: list[Array] = []
+    largest, within = 0.0, 0
+    for turns, course in parts:
+        mean = turn_means(course)
+        middle = 0.5 * (turns.begin + turns.end)
+        finite = np.isfinite(mean)
+        if np.count_nonzero(finite) < 3:
+            continue
+        within += 1
+        times.append(middle[finite] - middle[finite].mean())
+        means.append(mean[finite] - mean[finite].mean())
+        largest = max(largest, float(np.nanmax(np.abs(course))))
+    if not times:
+        return None
+    t, y = np.concatenate(times), np.concatenate(means)
+    free = t.size - within - 1
+    square = float(np.sum(t**2))
+    if free < 4 or square == 0:
+        return None
+    slope = float(np.sum(t * y)) / square
+    scatter = float(np.sqrt(np.sum((y - slope * t) ** 2) / free))
+    error = scatter / np.sqrt(square)
+    span = float(max(turns.end[-1] for turns, _ in parts if turns.end.size)) - float(
+        min(turns.begin[0] for turns, _ in parts if turns.begin.size)
+    )
+    change = slope * float(np.ptp(t)) if within == 1 else slope * span
+    if abs(slope) < CERTAIN * error or abs(change) < PLAIN * scatter or abs(change) < SHARE * largest:
+        return None
+    return Drift(slope, error, change, scatter, span)
+
+
+def steady(turns: Turns, name: str, account: Account) -> None:
+    """Tell where the turns of a condition are not equally fast."""
+    lengths = turns.end - turns.begin
+    if lengths.size < 2:
+        return
+    spread = float(np.ptp(1 / lengths)) / float(np.mean(1 / lengths))
+    if spread > STEADY:
+        slow, fast = 60 / float(lengths.max()), 60 / float(lengths.min())
+        place = f"condition {name}"
+        what = f"the speed is not steady: {slow:.4g} to {fast:.4g} cycles a minute, {100 * spread:.3g} % between turns"
+        account.warn(place, what, "state files: over: to use the steady part, or mend the speed control")
+
+
+def signs(
+    channels: Mapping[str, Channel], courses: Mapping[str, Array], turning: float | None, account: Account
+) -> list[str]:
+    """Channels that are likely to have the wrong sign: power in, or power out, below zero in all turns of a file.
+
+    courses: turns of all conditions; turning: mean speed of the driver by its angle, rad/s with its sign, if there is one.
+    """
+    rates = {one.measures.partition(":")[2]: key for key, one in channels.items() if one.measures.startswith("rate:")}
+    drivers = {
+        one.measures.partition(":")[2]: key for key, one in channels.items() if one.measures.startswith("effort:")
+    }
+    suspects, gives = [], False
+    for driver, effort in drivers.items():
+        rate = rates.get(driver)
+        if rate is None and (turning is None or len(drivers) > 1):
+            continue
+        against = courses[rate] if rate else np.full_like(courses[effort], turning or 0.0)
+        power = turn_means(courses[effort] * against)
+        power = power[np.isfinite(power)]
+        if power.size and np.all(power < 0):
+            opposed = (
+                rate and turning is not None and float(np.nanmean(courses[rate])) * turning < 0 and len(drivers) == 1
+            )
+            likely = str(rate) if opposed else effort
+            other = "the angle turns the other way" if opposed else "or it drives the motor: then nothing is wrong"
+            what = f"sign: the power into {driver} is below zero in all {counted(power.size, 'turn')}"
+            account.warn(
+                f"channels.{likely}", f"{what} ({power.mean():.4g} W), {other}", f"write sign: {-channels[likely].sign}"
+            )
+            suspects.append(likely)
+        gives = gives or bool(power.size and np.all(power > 0)) or effort in suspects
+    loads = {one.measures.partition(":")[2]: key for key, one in channels.items() if one.measures.startswith("load:")}
+    out = [key for joint, key in rates.items() if joint not in drivers]
+    for load, key in loads.items():
+        rate = rates.get(load) or (out[0] if len(out) == 1 else None)
+        if rate is None or not gives:
+            continue
+        power = turn_means(courses[key] * courses[rate])
+        power = power[np.isfinite(power)]
+        if power.size and np.all(power < 0):
+            what = f"sign: the power that {load} takes is below zero in all {counted(power.size, 'turn')}"
+            account.warn(f"channels.{key}", f"{what} ({power.mean():.4g} W) while the drive gives power",
+                         f"write sign: {-channels[key].sign} (or turn that of {rate})")  # fmt: skip
+            suspects.append(key)
+    return suspects

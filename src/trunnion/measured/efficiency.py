@@ -1,0 +1,200 @@
+"""Efficiency as a test rig finds it, η = P_out/P_in = T_out ω_out/(T_in ω_in) [P 22], with its uncertainty.
+
+Powers are means over whole turns of the product of torque and speed at each position. The uncertainty follows the Guide
+to the expression of uncertainty in measurement (JCGM 100:2008): type A from the ratios of the single turns (4.2), type
+B from gain, zero and resolution of every channel, each with its sensitivity ∂η/∂x (5.1). A channel that stands on both
+sides, such as one speed sensor for both, has its errors in both. Gain, zero and resolution of different channels are
+taken as independent.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.errors import Finding, MechanismError
+from trunnion.measured.measurement import Condition, Course
+
+if TYPE_CHECKING:
+    from trunnion.model.mechanism import Mechanism
+
+__all__ = ["COVERAGE", "Contribution", "Efficiency", "Pairs", "efficiency_of", "load_joints", "pairs_of"]
+
+COVERAGE = 2.0
+"""Factor k of the expanded uncertainty U = k u: about 95 % of a normal distribution (GUM 6.3.3)."""
+
+Array = NDArray[np.float64]
+Source = Literal["gain", "zero", "resolution", "repeatability"]
+
+
+@dataclass(frozen=True)
+class Contribution:
+    """What one source of one channel does to the efficiency; channel: empty of the scatter between turns.
+
+    input: its standard uncertainty, of a gain relative, else in the unit of the channel; sensitivity: ∂η/∂ of it;
+    effect: the standard uncertainty of η by it alone, |sensitivity| · input.
+    """
+
+    channel: str
+    source: Source
+    input: float
+    sensitivity: float
+
+    @property
+    def effect(self) -> float:
+        return abs(self.sensitivity) * self.input
+
+
+@dataclass(frozen=True)
+class Efficiency:
+    """An efficiency measured in one condition.
+
+    value: mean power out over mean power in, of all whole turns; uncertainty: standard; power_in, power_out: W;
+    per_turn: ratios of the single turns; left_out: turns that have a gap in a channel that is needed.
+    """
+
+    value: float
+    uncertainty: float
+    power_in: float
+    power_out: float
+    per_turn: Array
+    contributions: tuple[Contribution, ...]
+    left_out: int = 0
+
+    @property
+    def expanded(self) -> float:
+        """U = k u with k = COVERAGE."""
+        return COVERAGE * self.uncertainty
+
+    @property
+    def turns(self) -> int:
+        """Whole turns that it is made of."""
+        return len(self.per_turn)
+
+    def by_channel(self) -> dict[str, float]:
+        """Standard uncertainty of η by each channel, the largest first; "" is the scatter between turns."""
+        squares: dict[str, float] = {}
+        for one in self.contributions:
+            squares[one.channel] = squares.get(one.channel, 0.0) + one.effect**2
+        return dict(sorted(((name, value**0.5) for name, value in squares.items()), key=lambda item: -item[1]))
+
+    def __str__(self) -> str:
+        return f"η = {self.value:.4f} ± {self.expanded:.2g} (k = {COVERAGE:g})"
+
+
+@dataclass(frozen=True)
+class Pairs:
+    """The courses whose products are powers: (torque or force, speed), of drivers and of loads."""
+
+    driven: tuple[tuple[Course, Course], ...]
+    loaded: tuple[tuple[Course, Course], ...]
+
+
+def load_joints(mechanism: Mechanism) -> dict[str, str]:
+    """The joint that each load on a joint acts in, by name of the load."""
+    return {name: load.joint for name, load in mechanism.loads.items() if load.joint is not None}
+
+
+def pairs_of(condition: Condition, joints: Mapping[str, str] | None = None) -> Pairs | None:
+    """The channels that tell power in and out: `effort:D` with `rate:D`, `load:L` with `rate:` of its joint.
+
+    joints: of the loads, see `load_joints`. Without it a load goes with the one measured speed that is no driver's, or
+    with the only one there is. None where a torque or its speed is missing.
+    """
+    subjects: dict[str, dict[str, Course]] = {"effort": {}, "rate": {}, "load": {}}
+    for course in condition.courses.values():
+        kind, _, subject = course.measures.partition(":")
+        if kind in subjects:
+            subjects[kind].setdefault(subject, course)
+    efforts, rates, loads = subjects["effort"], subjects["rate"], subjects["load"]
+    free = [name for name in rates if name not in efforts] or list(rates)
+    guessed = free[0] if len(free) == 1 else ""
+    places = {name: (joints or {}).get(name, guessed) for name in loads}
+    if not efforts or not loads or any(name not in rates for name in (*efforts, *places.values())):
+        return None
+    return Pairs(
+        tuple((course, rates[name]) for name, course in efforts.items()),
+        tuple((course, rates[places[name]]) for name, course in loads.items()),
+    )
+
+
+def efficiency_of(
+    condition: Condition, joints: Mapping[str, str] | None = None, noise: Mapping[str, float] | None = None
+) -> Efficiency:
+    """The efficiency of one condition, with its standard uncertainty.
+
+    joints: see `pairs_of`. With fewer than two whole turns the scatter is not known, and the uncertainty is NaN. noise:
+    of each channel, the standard deviation of the mean of as many readings as there are positions and turns together;
+    it then takes the place of the scatter between turns, for an experiment that is planned.
+    Raises MechanismError where the channels do not tell both powers, or no turn is whole.
+    """
+    pairs = pairs_of(condition, joints)
+    if pairs is None:
+        there = ", ".join(f"{name} ({course.measures})" for name, course in condition.courses.items()) or "none"
+        what = f"the channels do not tell the power in and out; there are {there}"
+        remedy = "measure effort: and rate: of the driver, load: of a load on a joint and rate: of that joint"
+        raise MechanismError(Finding(what, condition.name, remedy))
+    powers_in, powers_out = _powers(pairs.driven), _powers(pairs.loaded)
+    whole = np.isfinite(powers_in) & np.isfinite(powers_out)
+    left_out = int(np.count_nonzero(~whole))
+    powers_in, powers_out = powers_in[whole], powers_out[whole]
+    if not len(powers_in):
+        what = f"no turn is whole in all channels of {len(whole)}"
+        raise MechanismError(Finding(what, condition.name, "look at the gaps that `trunnion data` reports"))
+    power_in, power_out = float(np.mean(powers_in)), float(np.mean(powers_out))
+    value = power_out / power_in if power_in else float("nan")
+    with np.errstate(all="ignore"):
+        per_turn = powers_out / powers_in
+    weights = _weights(pairs, value, power_in, whole)
+    if noise is None:
+        several = len(per_turn) > 1
+        scatter = float(np.std(per_turn, ddof=1)) / len(per_turn) ** 0.5 if several else float("nan")
+        repeated = [Contribution("", "repeatability", scatter, 1.0)]
+    else:
+        repeated = [
+            Contribution(name, "repeatability", noise.get(name, 0.0), float(np.sqrt(np.mean(weight**2))))
+            for name, (_, weight) in weights.items()
+        ]
+    contributions = (*(one for one in repeated if one.input != 0), *_type_b(weights))
+    uncertainty = float(np.sqrt(sum(one.effect**2 for one in contributions)))
+    return Efficiency(value, uncertainty, power_in, power_out, per_turn, contributions, left_out)
+
+
+def _powers(pairs: Sequence[tuple[Course, Course]]) -> Array:
+    """Mean power of each turn, W, (turn,); NaN of a turn with a gap."""
+    total: Array = np.sum([np.mean(force.turns * speed.turns, axis=1) for force, speed in pairs], axis=0)
+    return total
+
+
+def _weights(pairs: Pairs, value: float, power_in: float, whole: NDArray[np.bool_]) -> dict[str, tuple[Course, Array]]:
+    """∂η/∂x of the readings of each channel, at every position of all whole turns; its mean is that of a zero.
+
+    η = P_out/P_in: dη = (dP_out − η dP_in)/P_in, and a power changes with a torque by ω, with a speed by T. A channel
+    in several powers has the sum.
+    """
+    found: dict[str, tuple[Course, Array]] = {}
+    for side, factor in ((pairs.driven, -value), (pairs.loaded, 1.0)):
+        for pair in side:
+            for own, other in (pair, pair[::-1]):
+                weight = factor / power_in * other.turns[whole]
+                before = found.get(own.channel)
+                found[own.channel] = (own, weight if before is None else before[1] + weight)
+    return {name: (Course(name, one.measures, one.unit, one.turns[whole], one.accuracy), weight)
+            for name, (one, weight) in found.items()}  # fmt: skip
+
+
+def _type_b(weights: Mapping[str, tuple[Course, Array]]) -> list[Contribution]:
+    """Contributions of gain, zero and resolution, channel by channel: x → (1 + gain) x + zero."""
+    found = []
+    for name, (course, weight) in weights.items():
+        by_zero = float(np.mean(weight))
+        found += [
+            Contribution(name, "gain", course.accuracy.gain, float(np.mean(weight * course.turns))),
+            Contribution(name, "zero", course.accuracy.zero, by_zero),
+            Contribution(name, "resolution", course.unresolved, by_zero),
+        ]
+    return [one for one in found if one.input > 0]

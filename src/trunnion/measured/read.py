@@ -1,0 +1,316 @@
+"""Data files of a test rig as a Measurement: read by a mapping, checked, cut into turns, and brought to positions."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.measured import faults
+from trunnion.measured.account import Account, counted
+from trunnion.measured.angle import Coordinate, coordinate
+from trunnion.measured.channels import Reading, Zeroed, filtered, reading, zeroed
+from trunnion.measured.courses import Drift, drift, signs, steady
+from trunnion.measured.mapping import DataMapping, File, Mapped, Zero, read_mapping
+from trunnion.measured.measurement import Accuracy, Condition, Course, Measurement
+from trunnion.measured.settings import Setting, settings
+from trunnion.measured.tables import Table, read_table
+from trunnion.measured.timebase import Timeline, timeline
+from trunnion.measured.turns import DENSE, Turns, cut, resampled
+
+__all__ = ["read_measured"]
+
+Array = NDArray[np.float64]
+FEW_HARMONICS = 5.0
+
+
+def read_measured(
+    mapping: str | os.PathLike[str] | Mapping[str, Any], files: Iterable[str | os.PathLike[str]] | None = None
+) -> Measurement:
+    """The measurement that a mapping file describes: courses over the cycle, turn by turn, with what is wrong in them.
+
+    mapping: its path, or its entries; files: data files instead of those it names. Faults of the data are findings of
+    the result; MechanismError, with every finding, where mapping or files cannot be read or there is no turn at all.
+    """
+    mapped = read_mapping(mapping)
+    conditions: list[Condition] = []
+    findings: list[Finding] = []
+    done: dict[str, list[str]] = {}
+    failed = False
+    for path, entry in _files(mapped, files):
+        account = Account(str(path))
+        try:
+            conditions += _File(mapped.mapping, path, entry, account).conditions()
+        except MechanismError as error:
+            account.findings += [one for one in error.findings if one not in account.findings]
+            failed = True
+        findings += account.findings
+        for sentence in account.done:
+            done.setdefault(sentence, []).append(path.name)
+    findings = mapped.placed(findings)
+    if failed or not conditions:
+        raise MechanismError([one for one in findings if one.severity is not Severity.NOTE])
+    told = [
+        one if len(on) == len(set(p for p in _names(conditions))) else f"{', '.join(on)}: {one}"
+        for one, on in done.items()
+    ]
+    name = mapped.mapping.name or Path(mapped.file).stem
+    return Measurement(name, tuple(_distinct(conditions)), tuple(findings), tuple(told))
+
+
+def _names(conditions: Sequence[Condition]) -> list[str]:
+    return [Path(file).name for one in conditions for file in one.files]
+
+
+def _files(mapped: Mapped, files: Iterable[str | os.PathLike[str]] | None) -> list[tuple[Path, File]]:
+    """Data files with what the mapping says of them; files of the command line keep the entry of the same file."""
+    stated = {(mapped.folder / entry.file).resolve(): entry for entry in mapped.mapping.files}
+    if files is not None and (named := [Path(one) for one in files]):
+        return [(path, stated.get(path.resolve()) or File(file=path.name or ".")) for path in named]
+    if not mapped.mapping.files:
+        finding = Finding(
+            "no data file is named", "files", "write files: [{file: run-01.csv}], or name them after the mapping"
+        )
+        raise MechanismError(mapped.placed([finding]))
+    return [(mapped.folder / entry.file, entry) for entry in mapped.mapping.files]
+
+
+def _distinct(conditions: Sequence[Condition]) -> list[Condition]:
+    """Conditions with different names: the file is added where two are alike, then a number."""
+    found: list[Condition] = []
+    names = [one.name for one in conditions]
+    for one in conditions:
+        name = one.name
+        if names.count(name) > 1:
+            name = f"{name} ({', '.join(Path(file).stem for file in one.files)})"
+        plain, number = name, 2
+        while any(name == other.name for other in found):
+            name, number = f"{plain} {number}", number + 1
+        found.append(one if name == one.name else replace(one, name=name))
+    return found
+
+
+@dataclass(frozen=True)
+class _Part:
+    """One condition of a file: its setting, its turns and the courses of the channels, (turn, position)."""
+
+    setting: Setting
+    turns: Turns
+    courses: dict[str, Array]
+
+
+class _File:
+    """One data file on its way to conditions."""
+
+    def __init__(self, mapping: DataMapping, path: Path, entry: File, account: Account) -> None:
+        self.mapping, self.entry, self.account, self.path = mapping, entry, account, path
+        table = read_table(path, *_columns(mapping, entry))
+        for note in table.notes:
+            account.say(note)
+        self.line: Timeline = timeline(table, mapping.time, account)
+        if mapping.filter is not None:
+            self._check_filter(table)
+        self.own: dict[str, Reading] = {}
+        self.readings: dict[str, Array] = {}
+        for name, channel in mapping.channels.items():
+            column = table.columns[channel.column]
+            self.own[name] = reading(name, channel, column, account)
+            self.readings[name] = np.array(self.line.rows(column.values))
+            faults.cells(f"channels.{name}", column, self.readings[name], self.line.seconds, account)
+        self.table = table
+
+    def conditions(self) -> list[Condition]:
+        """The conditions of the file, each with its turns."""
+        mapping, account = self.mapping, self.account
+        zeros = {
+            name: zeroed(
+                name, channel, self.own[name], self.readings[name], self.line, mapping.drift == "remove", account
+            )
+            for name, channel in mapping.channels.items()
+        }
+        share, way, spoilt = self._share(zeros)
+        cuts = []
+        for setting in settings(mapping, self.entry, self.table, self.line, account):
+            allowed = self._used() & setting.rows
+            turns = cut(share, self.line, allowed, mapping.positions, spoilt, account, setting.name)
+            if turns.numbers.size:
+                cuts.append((setting, turns))
+            else:
+                account.error(f"condition {setting.name}" if setting.name else "turns", self._no_turn(share, allowed),
+                              "check angle, or record for longer")  # fmt: skip
+        if not cuts:
+            return []
+        self._check_rows(cuts)
+        parts = [_Part(setting, turns, {}) for setting, turns in cuts]
+        drifts = {name: self._channel(name, zeros[name], parts) for name in mapping.channels}
+        whole = {name: np.concatenate([part.courses[name] for part in parts]) for name in mapping.channels}
+        if not mapping.timed:
+            signs(mapping.channels, whole, way * self._rate([part.turns for part in parts]), account)
+        return [self._condition(part, zeros, drifts, way) for part in parts]
+
+    def _used(self) -> NDArray[np.bool_]:
+        if self.entry.over is None:
+            return np.ones(self.line.seconds.size, dtype=np.bool_)
+        begin, end = (one.value for one in self.entry.over)
+        return (self.line.seconds >= begin) & (self.line.seconds <= end)
+
+    def _share(self, zeros: Mapping[str, Zeroed]) -> tuple[Array, float, Array]:
+        """Cycles gone through by row, which way the coordinate runs, and stretches of time in which it is wrong."""
+        mapping = self.mapping
+        cycle = float(mapping.cycle.evaluate())  # type: ignore[arg-type]
+        if mapping.timed:
+            return self.line.seconds / cycle, 1.0, np.empty((0, 2))
+        assert mapping.angle is not None
+        source, speed = mapping.angle, None
+        if source.channel is not None:
+            name = source.channel
+            own = self.own[name]
+            if own.scale.unit != "rad/s":
+                what = f"the channel '{name}' is a speed in {own.scale.unit}, not of a turning driver"
+                raise MechanismError(Finding(what, "angle.channel", "name one in rpm or rad/s", file=self.account.file))
+            speed = own.quantity(self.readings[name], zeros[name], mapping.channels[name].sign, self.line.seconds)
+        found: Coordinate = coordinate(source, self.table, self.line, speed, self.account)
+        known = np.flatnonzero(np.isfinite(found.values) & self._used())
+        if known.size < 3:
+            what = "the coordinate of the driver is known in no row that is used"
+            raise MechanismError(Finding(what, "angle", "check angle.column", file=self.account.file))
+        way = 1.0 if found.values[known[-1]] >= found.values[known[0]] else -1.0
+        start = float(mapping.start.evaluate())  # type: ignore[arg-type]
+        return way * (found.values - start) / cycle, way, found.spoilt
+
+    def _no_turn(self, share: Array, allowed: NDArray[np.bool_]) -> str:
+        known = share[np.isfinite(share) & allowed]
+        gone = float(np.ptp(known)) if known.size else 0.0
+        return f"there is no whole turn: {gone:.3g} cycles in {counted(int(allowed.sum()), 'row')}"
+
+    def _check_filter(self, table: Table) -> None:
+        assert self.mapping.filter is not None
+        rate, cut_off = 1.0 / self.line.step, self.mapping.filter.cut_off.value
+        if 2 * cut_off >= rate:
+            what = f"the sampling is too slow for the filter: {rate:.6g} Hz, a cut-off of {cut_off:g} Hz"
+            remedy = f"state a cut-off below {rate / 2:.4g} Hz, or sample faster"
+            raise MechanismError(Finding(what, "filter.cut_off", remedy, file=str(self.path)))
+        if not self.line.even:
+            self.account.warn("filter", "the samples are not evenly spaced in time, as a filter needs them",
+                              "record at a fixed rate, or leave out the filter")  # fmt: skip
+        order = self.mapping.filter.order
+        self.account.say(
+            f"low-pass filter: Butterworth of order {order}, forward and backward, together 3 dB down at {cut_off:g} Hz; "
+            f"gaps up to {100 / cut_off:.3g} ms are bridged for it and stay gaps"
+        )
+
+    def _check_rows(self, cuts: Sequence[tuple[Setting, Turns]]) -> None:
+        """Tell how the turns are sampled, whether they are enough and equally fast, and what the filter leaves of them."""
+        account, mapping = self.account, self.mapping
+        for setting, turns in cuts:
+            where = f"condition {setting.name}" if setting.name else "turns"
+            if turns.numbers.size < 2:
+                account.warn(where, "has one turn: there is no scatter, so no uncertainty", "record two turns or more")
+            steady(turns, setting.name or self.path.stem, account)
+            if turns.density < 1:
+                what = f"the sampling is too slow for {mapping.positions} positions: {turns.density * mapping.positions:.4g} samples a turn"
+                account.warn(
+                    where, f"{what}; between them it is interpolated", "state fewer positions, or sample faster"
+                )
+            length = float(np.mean(turns.end - turns.begin))
+            if mapping.filter is not None and mapping.filter.cut_off.value * length < FEW_HARMONICS:
+                passed = mapping.filter.cut_off.value * length
+                account.note(
+                    where, f"the filter leaves the first {passed:.2g} harmonics of a turn", "state a higher cut-off"
+                )
+        dense = all(turns.density >= DENSE for _, turns in cuts)
+        account.say(
+            "values at a position: mean of the samples within half a position to either side"
+            if dense else "values at a position: interpolated by a cubic between four samples"
+        )  # fmt: skip
+        begin = min(float(turns.begin[0]) for _, turns in cuts)
+        end = max(float(turns.end[-1]) for _, turns in cuts)
+        for name, channel in mapping.channels.items():
+            spans = channel.zero.over if isinstance(channel.zero, Zero) else ()
+            if any(low.value < end and high.value > begin for low, high in spans):
+                account.warn(f"channels.{name}.zero", f"the unloaded stretch reaches into the turns, {begin:.4g} to {end:.4g} s",
+                             "state a stretch in which the sensor is not loaded")  # fmt: skip
+
+    def _channel(self, name: str, zero: Zeroed, parts: Sequence[_Part]) -> Drift | None:
+        """The courses of a channel, put into the parts; the drift that is left in them."""
+        mapping, account, line = self.mapping, self.account, self.line
+        channel, own, where = mapping.channels[name], self.own[name], f"channels.{name}"
+        low = int(np.searchsorted(line.seconds, min(float(part.turns.begin[0]) for part in parts)))
+        high = int(np.searchsorted(line.seconds, max(float(part.turns.end[-1]) for part in parts), side="right"))
+        span = faults.Span(low, high, sum(part.turns.numbers.size for part in parts))
+        readings = self.readings.pop(name)
+        faults.signal(where, readings, line.seconds, span, own.limit, account)
+        values = own.quantity(readings, zero, channel.sign, line.seconds)
+        if mapping.filter is not None:
+            values = filtered(values, line, mapping.filter, account, where)
+        for part in parts:
+            part.courses[name] = resampled(part.turns, values, line)
+        if channel.measures.startswith("rate:"):  # a speed that creeps is one
+            return None
+        found = drift([(part.turns, part.courses[name]) for part in parts])
+        if found is None:
+            return None
+        factor = f"{found.change:.3g} {own.scale.unit} in {found.span:.4g} s"
+        told = f"the mean of a turn drifts by {factor}, {abs(found.change) / found.scatter:.3g} times what turns scatter about the line"
+        if mapping.drift == "report":
+            account.warn(where, told, "let sensor and bearings warm up, or state drift: remove")
+            return None
+        since = self._since(name)
+        account.warn(
+            where, f"{told}; a straight line is taken off, zero at {since:.4g} s", "let sensor and bearings warm up"
+        )
+        for part in parts:
+            part.courses[name] = resampled(part.turns, values - found.slope * (line.seconds - since), line)
+        return found
+
+    def _since(self, name: str) -> float:
+        """When a zero was right: in its unloaded stretch, else at the start of the recording."""
+        zero = self.mapping.channels[name].zero
+        if isinstance(zero, Zero):
+            return float(np.mean([one.value for span in zero.over for one in span]))
+        return float(self.line.seconds[0])
+
+    def _rate(self, turns: Sequence[Turns]) -> float:
+        cycle = float(self.mapping.cycle.evaluate())  # type: ignore[arg-type]
+        return cycle / float(np.mean(np.concatenate([one.end - one.begin for one in turns])))
+
+    def _condition(
+        self, part: _Part, zeros: Mapping[str, Zeroed], drifts: Mapping[str, Drift | None], way: float
+    ) -> Condition:
+        """A condition with its courses, and values that are means of channels."""
+        courses = {}
+        for name, channel in self.mapping.channels.items():
+            own = self.own[name]
+            left = drifts[name]
+            extra = left.error * left.span / 2 if left else 0.0
+            zero = float(np.hypot(np.hypot(own.accuracy_zero, abs(own.scale.factor) * zeros[name].uncertainty), extra))
+            accuracy = Accuracy(zero, own.accuracy_gain)
+            courses[name] = Course(name, channel.measures, own.scale.unit, part.courses[name], accuracy)
+        values = dict(part.setting.values)
+        for path, channel_name in part.setting.means.items():
+            values[path] = float(np.nanmean(courses[channel_name].turns))
+        positions = self.mapping.positions
+        speed = np.nan if self.mapping.timed else way * self._rate([part.turns])
+        name = part.setting.name or self.path.stem
+        return Condition(name, values, np.arange(positions) / positions, courses, (str(self.path),), speed)
+
+
+def _columns(mapping: DataMapping, entry: File) -> tuple[list[str], list[str]]:
+    """Columns that a file must have, and that of time, which it may tell by itself if it is TDMS."""
+    from trunnion.measured.settings import stated
+
+    wanted, optional = [], []
+    if mapping.time is not None and mapping.time.column is not None:
+        (optional if Path(entry.file).suffix.lower() == ".tdms" else wanted).append(mapping.time.column)
+    if mapping.angle is not None:
+        wanted += [one for one in (mapping.angle.column,) if one is not None]
+        wanted += [mapping.angle.index.column] if mapping.angle.index is not None else []
+    wanted += [channel.column for channel in mapping.channels.values()]
+    wanted += [one.column for one in stated(mapping, entry).values() if getattr(one, "column", None) is not None]
+    return wanted, optional

@@ -1,0 +1,102 @@
+"""What was set in a condition: numbers of the mapping, a column that states it, or the mean of a channel."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.errors import Finding, MechanismError
+from trunnion.measured.account import Account
+from trunnion.measured.amounts import dimensions
+from trunnion.measured.mapping import DataMapping, File, FromData
+from trunnion.measured.tables import Table
+from trunnion.measured.timebase import Timeline
+from trunnion.model.quantity import Quantity
+from trunnion.model.units import UnitError
+
+__all__ = ["Setting", "settings", "stated"]
+
+MOST = 500  # values that a column may state; more, and it is a measurement
+DIGITS = 9  # by which two of its values are the same
+
+
+@dataclass(frozen=True)
+class Setting:
+    """values: numbers of the model, SI, by name; means: channels whose mean is the value; rows: where it was set."""
+
+    name: str
+    values: Mapping[str, float]
+    means: Mapping[str, str]
+    rows: NDArray[np.bool_]
+
+
+def stated(mapping: DataMapping, entry: File) -> dict[str, FromData | Quantity]:
+    """What the mapping says was set, for all files and for this one."""
+    return {**mapping.set, **entry.set}
+
+
+def settings(mapping: DataMapping, entry: File, table: Table, line: Timeline, account: Account) -> list[Setting]:
+    """The conditions of a file: one, or as many as the columns that state them take different values."""
+    values: dict[str, float] = {}
+    texts: dict[str, str] = {}
+    means: dict[str, str] = {}
+    columns: dict[str, FromData] = {}
+    for path, one in stated(mapping, entry).items():
+        if isinstance(one, Quantity):
+            values[path] = float(one.evaluate())  # type: ignore[arg-type]
+            texts[path] = str(one.source)
+        elif one.mean is not None:
+            means[path] = one.mean
+        else:
+            columns[path] = one
+    everywhere = np.ones(line.seconds.size, dtype=np.bool_)
+    if not columns:
+        return [Setting(_name(texts), values, means, everywhere)]
+    raw = np.column_stack([line.rows(table.columns[str(one.column)].values) for one in columns.values()])
+    known = np.isfinite(raw).all(axis=1)
+    if not known.any():
+        what = "the columns that state the condition have no numbers"
+        raise MechanismError(Finding(what, "set", "check set: {…: {column: …}}", file=account.file))
+    if not known.all():
+        lost = int(np.count_nonzero(~known))
+        account.warn("set", f"{lost:,} of {known.size:,} rows do not state the condition; left out", "check the column")
+    rounded = _rounded(raw)
+    unique, which = np.unique(rounded[known], axis=0, return_inverse=True)
+    if len(unique) > MOST:
+        what = f"the columns that state the condition take {len(unique):,} different values"
+        remedy = "what is measured is no setting: write {mean: channel}"
+        raise MechanismError(Finding(what, "set", remedy, file=account.file))
+    found = []
+    number = np.full(known.size, -1)
+    number[known] = which.ravel()
+    order = sorted(range(len(unique)), key=lambda k: int(np.argmax(number == k)))
+    for k in order:
+        own, said = dict(values), dict(texts)
+        for (path, one), value in zip(columns.items(), unique[k], strict=True):
+            unit = one.unit or table.columns[str(one.column)].unit
+            own[path] = float(value) * _factor(path, unit, account)
+            said[path] = f"{value:.6g} {unit}".strip()
+        found.append(Setting(_name(said), own, means, number == k))
+    return found
+
+
+def _factor(path: str, unit: str, account: Account) -> float:
+    try:
+        return dimensions(unit)[0] if unit else 1.0
+    except UnitError as error:
+        raise MechanismError(Finding(error.what, f"set.{path}", error.remedy, file=account.file)) from None
+
+
+def _rounded(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Values to so many significant digits."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        digits = np.where(values == 0, 0, np.floor(np.log10(np.abs(values))))
+        scale = 10.0 ** (DIGITS - 1 - np.where(np.isfinite(digits), digits, 0))
+        return np.asarray(np.rint(values * scale) / scale)
+
+
+def _name(texts: Mapping[str, str]) -> str:
+    return ", ".join(f"{path} {text}" for path, text in texts.items())

@@ -1,0 +1,162 @@
+"""Columns of data files as numbers: CSV, Parquet and TDMS by their extension, the same numbers whichever it is.
+
+Only the columns that are asked for are read. What is no number in them is NaN and counted, never replaced.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.errors import Finding, MechanismError
+from trunnion.model.names import nearest
+
+__all__ = ["FORMATS", "Column", "Table", "choose", "failed", "number", "numbers", "read_table"]
+
+Array = NDArray[np.float64]
+SHOWN = 40  # columns named in a message
+
+
+@dataclass(frozen=True)
+class Column:
+    """Numbers of one column. unit: as the file states it; texts: cells that are text, with the first of them."""
+
+    values: Array
+    unit: str = ""
+    texts: int = 0
+    example: str = ""
+
+
+@dataclass(frozen=True)
+class Table:
+    """The columns of a file that were asked for, all of one length.
+
+    interval: (start, step) of evenly spaced samples in s, if the file itself tells; line: of the first row of a text.
+    """
+
+    file: str
+    columns: Mapping[str, Column]
+    interval: tuple[float, float] | None = None
+    notes: Sequence[str] = field(default_factory=tuple)
+
+    @property
+    def rows(self) -> int:
+        """How many rows there are."""
+        return next((column.values.size for column in self.columns.values()), 0)
+
+
+def read_table(path: Path, wanted: Iterable[str], optional: Iterable[str] = ()) -> Table:
+    """The columns of a file by their names; MechanismError lists those that exist if one does not.
+
+    optional: columns that may be missing.
+    """
+    suffix = path.suffix.lower()
+    if suffix not in FORMATS:
+        what = f"the extension '{suffix}' is none of a data file"
+        raise MechanismError(Finding(what, file=str(path), remedy=f"use {', '.join(FORMATS)}"))
+    reader, package, extra = FORMATS[suffix]
+    if package and importlib.util.find_spec(package) is None:
+        what, remedy = f"{suffix} needs {package}", f"pip install 'trunnion[{extra}]'"
+        raise MechanismError(Finding(what, file=str(path), remedy=remedy))
+    if not path.is_file():
+        what = "is not a file" if path.exists() else "cannot be read: there is no such file"
+        raise MechanismError(Finding(what, file=str(path), remedy="check the path"))
+    if path.stat().st_size == 0:
+        raise failed(path, "is empty", "check that the recording was saved")
+    try:
+        table = reader(path, list(dict.fromkeys(wanted)), list(dict.fromkeys(optional)))
+    except OSError as error:
+        raise failed(path, f"cannot be read: {error.strerror or error}", "check the file") from None
+    if table.rows == 0:
+        raise failed(path, "has a header but no rows of numbers", "check that the recording was saved")
+    return table
+
+
+def failed(path: Path, what: str, remedy: str, line: int | None = None) -> MechanismError:
+    return MechanismError(Finding(what, file=str(path), line=line, remedy=remedy))
+
+
+def choose(path: Path, names: Sequence[str], wanted: Sequence[str], optional: Sequence[str]) -> dict[str, int]:
+    """Place of each column that is wanted among those of the file; one finding for all that are missing."""
+    places = {name: place for place, name in reversed(list(enumerate(names)))}
+    missing = [name for name in wanted if name not in places]
+    if missing:
+        told = ", ".join(f"'{name}'" for name in missing)
+        listed = ", ".join(f"'{name}'" for name in names[:SHOWN]) + (", …" if len(names) > SHOWN else "")
+        what = f"there is no column {told}; the file has {listed or 'none'}"
+        near = nearest(missing[0], names)
+        remedy = near if near.startswith("did you mean") else "name one of these in the mapping"
+        raise failed(path, what, remedy)
+    doubled = [name for name in (*wanted, *optional) if names.count(name) > 1]
+    if doubled:
+        raise failed(path, f"the column '{doubled[0]}' stands there {names.count(doubled[0])} times", "rename one")
+    return {name: places[name] for name in (*wanted, *optional) if name in places}
+
+
+def number(text: object) -> float:
+    """The number of a cell; NaN if it is none."""
+    try:
+        return float(text)  # type: ignore[arg-type]
+    except (TypeError, ValueError, OverflowError):
+        return np.nan
+
+
+_NOTHING = frozenset({"", "nan", "n/a", "na", "#n/a", "null", "none", "-nan", "inf", "-inf", "+inf", "infinity"})
+
+
+def numbers(cells: Any, decimal: str = ".") -> tuple[Array, int, str]:
+    """Cells of any kind as floats, infinite ones as they are; how many are texts, and the first of these."""
+    cells = np.asarray(cells)
+    if cells.dtype.kind in "fiub":
+        return np.asarray(cells, dtype=np.float64), 0, ""
+    if cells.dtype.kind in "mM":
+        seconds = cells.astype("datetime64[ns]" if cells.dtype.kind == "M" else "timedelta64[ns]")
+        first = seconds[~np.isnat(seconds)][:1]
+        since = seconds - first[0] if cells.dtype.kind == "M" and first.size else seconds
+        return np.where(np.isnat(seconds), np.nan, since.astype("timedelta64[ns]").astype(np.int64) * 1e-9), 0, ""
+    texts, example = 0, ""
+    values = np.empty(cells.size)
+    for place, cell in enumerate(cells.tolist()):
+        text = cell.strip().replace("−", "-") if isinstance(cell, str) else cell
+        if decimal != "." and isinstance(text, str):
+            text = text.replace(decimal, ".")
+        values[place] = number(text)
+        if np.isnan(values[place]) and isinstance(text, str) and text.casefold() not in _NOTHING:
+            texts, example = texts + 1, example or text[:20]
+    return values, texts, example
+
+
+def _csv(path: Path, wanted: Sequence[str], optional: Sequence[str]) -> Table:
+    from trunnion.measured.text_tables import read_csv
+
+    return read_csv(path, wanted, optional)
+
+
+def _parquet(path: Path, wanted: Sequence[str], optional: Sequence[str]) -> Table:
+    from trunnion.measured.binary_tables import read_parquet
+
+    return read_parquet(path, wanted, optional)
+
+
+def _tdms(path: Path, wanted: Sequence[str], optional: Sequence[str]) -> Table:
+    from trunnion.measured.binary_tables import read_tdms
+
+    return read_tdms(path, wanted, optional)
+
+
+Reader = Callable[[Path, Sequence[str], Sequence[str]], Table]
+
+# extension: reader, the package it needs and the extra that brings it
+FORMATS: dict[str, tuple[Reader, str, str]] = {
+    ".csv": (_csv, "", ""),
+    ".txt": (_csv, "", ""),
+    ".tsv": (_csv, "", ""),
+    ".parquet": (_parquet, "pyarrow", "parquet"),
+    ".tdms": (_tdms, "nptdms", "tdms"),
+}

@@ -1,0 +1,123 @@
+"""Time of every row, and what is wrong with it: gaps, steps backward, repeated and uneven times."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.errors import Finding, MechanismError
+from trunnion.measured.account import Account, counted, times
+from trunnion.measured.amounts import dimensions
+from trunnion.measured.mapping import TimeBase
+from trunnion.measured.tables import Column, Table
+
+__all__ = ["Timeline", "timeline"]
+
+Array = NDArray[np.float64]
+GAP = 1.5  # times the usual step
+UNEVEN = 0.2  # of the usual step, standard deviation
+
+
+@dataclass(frozen=True)
+class Timeline:
+    """Rising times of the rows that are kept.
+
+    seconds: (row,); kept: rows of the table, None if all; step: the usual one, s; breaks: rows that follow a gap.
+    """
+
+    seconds: Array
+    kept: NDArray[np.intp] | None
+    step: float
+    breaks: NDArray[np.intp]
+    even: bool = True
+
+    def rows(self, values: Array) -> Array:
+        """The values of the rows that are kept."""
+        return values if self.kept is None else values[self.kept]
+
+
+def timeline(table: Table, base: TimeBase | None, account: Account) -> Timeline:
+    """Time of the rows of a table by the mapping, else by what the file itself tells of its sampling."""
+    if base is not None and base.rate is not None:
+        step = 1.0 / base.rate.value
+        return Timeline(np.arange(table.rows) * step, None, step, np.empty(0, dtype=np.intp))
+    if base is None or base.column not in table.columns:
+        if table.interval is None:
+            what = "nothing tells the time of its rows"
+            remedy = "add time: {column: …, unit: s} or time: {rate: 2 kHz} to the mapping"
+            raise MechanismError(Finding(what, "time", remedy, file=table.file))
+        start, step = table.interval
+        account.say(f"time is that of the waveforms: every {step:.6g} s")
+        return Timeline(start + np.arange(table.rows) * step, None, step, np.empty(0, dtype=np.intp))
+    column = table.columns[str(base.column)]
+    return _stated(column.values * _factor(base, column, account), account)
+
+
+def _factor(base: TimeBase, column: Column, account: Account) -> float:
+    """Seconds of a unit of the column: by the mapping, else by the file, else seconds."""
+    if base.unit:
+        return dimensions(base.unit)[0]
+    if not column.unit:
+        account.note("time", f"the column '{base.column}' has no unit and is taken for seconds", "state time.unit")
+        return 1.0
+    factor, found = dimensions(column.unit)
+    if found != dimensions("s")[1]:
+        what = f"the column '{base.column}' has the unit '{column.unit}', which is no time"
+        raise MechanismError(Finding(what, "time", "name another column", file=account.file))
+    return factor
+
+
+def _stated(seconds: Array, account: Account) -> Timeline:
+    """Times that rise, from a column: rows whose time does not rise are left out."""
+    finite = np.isfinite(seconds)
+    highest = np.maximum.accumulate(np.where(finite, seconds, -np.inf))
+    rising = finite & (seconds > np.concatenate([[-np.inf], highest[:-1]]))
+    lost, total = np.count_nonzero(~finite), seconds.size
+    if lost:
+        what = f"{counted(lost, 'row')} of {total:,} {'has' if lost == 1 else 'have'} no time"
+        account.warn("time", f"{what}; left out", "check the logger, or state time: {rate: …}")
+    kept = np.flatnonzero(rising)
+    if kept.size < 3:
+        what = f"the time rises in {kept.size} of {counted(total, 'row')}"
+        raise MechanismError(Finding(what, "time", "check that time.column is the right one", file=account.file))
+    _backward(seconds, finite, rising, account)
+    clean = seconds[kept] if kept.size < total else seconds
+    steps = np.diff(clean)
+    step = float(np.median(steps))
+    _tell_gaps(clean, steps, step, account)
+    wide = steps > GAP * step
+    usual = steps[~wide] / step
+    spread = float(np.std(usual)) if usual.size else 0.0
+    return Timeline(clean, kept if kept.size < total else None, step, np.flatnonzero(wide) + 1, spread < UNEVEN)
+
+
+def _backward(seconds: Array, finite: NDArray[np.bool_], rising: NDArray[np.bool_], account: Account) -> None:
+    """Tell of rows whose time repeats or runs backward."""
+    stated = seconds[finite]
+    steps = np.diff(stated)
+    repeated, back = np.flatnonzero(steps == 0), np.flatnonzero(steps < 0)
+    if repeated.size:
+        share = repeated.size / stated.size
+        remedy = "the column is rounded: state time: {rate: …} instead" if share > 0.05 else "check the logger"
+        what = f"the time repeats in {counted(repeated.size, 'row')} of {stated.size:,}, {times(stated[repeated])}"
+        account.warn("time", f"{what}; these rows are left out", remedy)
+    if back.size:
+        out = np.count_nonzero(finite & ~rising) - repeated.size
+        what = (
+            f"the time runs backward {counted(back.size, 'time')}, {times(stated[back])}, by up to {-steps.min():.4g} s"
+        )
+        remedy = "split the file where a new recording begins, or check the logger's clock"
+        account.warn("time", f"{what}; {counted(max(out, 1), 'row')} left out until it has passed", remedy)
+
+
+def _tell_gaps(seconds: Array, steps: Array, step: float, account: Account) -> None:
+    wide = np.flatnonzero(steps > GAP * step)
+    if not wide.size:
+        return
+    missing = int(np.sum(np.rint(steps[wide] / step) - 1))
+    longest = int(wide[np.argmax(steps[wide])])
+    what = f"{counted(wide.size, 'gap')} in time, {counted(missing, 'sample')} missing"
+    where = f"the longest {steps[longest]:.4g} s at {seconds[longest]:.5g} s"
+    account.warn("time", f"{what}, {where}", "the positions in them have fewer turns; check the logger's buffer")

@@ -1,0 +1,337 @@
+"""Figures and tables of sweeps over any number of names: what runs along what, gaps, odd values, nothing cut off."""
+
+from __future__ import annotations
+
+import csv
+
+import numpy as np
+import pytest
+from stand_in_sweeps import ANGLE, DEG, RPM, SPEED, cardan, scale, swept
+
+from trunnion import MechanismError, Status, save
+from trunnion.views.sweep import figure
+from trunnion.views.sweep_panels import on_scale
+from trunnion.views.sweep_tables import tables
+from trunnion.views.swept import Scale, arrange, written
+
+GRID = {"misalignment": ANGLE, "input.speed": SPEED}
+FEW = scale([50, 500, 1000, 1500], "rad/s", "rpm", RPM)
+FRICTION = scale([0.05, 0.1, 0.2])
+RADIUS = scale([10, 20, 30], "m", "mm", 1e-3)
+
+
+def curves(axes, count):
+    """The first curves of a panel, as (x, y)."""
+    return [line.get_xydata() for line in axes.get_lines()[:count]]
+
+
+def names(plan):
+    return (plan.x.name, plan.other.name if plan.other else "", [one.name for one in plan.facets],
+            [one.name for one in plan.fixed])  # fmt: skip
+
+
+# ---- what runs along what -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("x", "family", "expected"),
+    [
+        ("", "", ("a", "b", ["d"], ["c"])),
+        ("b", "", ("b", "a", ["d"], ["c"])),
+        ("", "d", ("a", "d", ["b"], ["c"])),
+        ("", "a", ("b", "a", ["d"], ["c"])),
+        ("d", "b", ("d", "b", ["a"], ["c"])),
+        ("c", "", ("c", "a", ["b", "d"], [])),
+        ("", "c", ("a", "c", ["b", "d"], [])),
+    ],
+)
+def test_names_are_laid_out_in_their_order_or_as_told(x, family, expected):
+    result = swept({"a": scale([1, 2]), "c": scale([7]), "b": scale([3, 4, 5]), "d": scale([6, 8])})
+    assert names(arrange(result, x, family)) == expected
+
+
+def test_names_with_one_value_are_the_axis_if_there_are_no_others():
+    assert names(arrange(swept({"a": scale([1]), "b": scale([2])}))) == ("a", "", [], ["b"])
+
+
+@pytest.mark.parametrize(
+    ("x", "family", "word"),
+    [
+        ("mislignment", "", "did you mean 'misalignment'"),
+        ("", "speed", "is not swept over"),
+        ("r", "r", "cannot be both"),
+    ],
+)
+def test_names_that_are_not_swept_are_refused(x, family, word):
+    with pytest.raises(MechanismError, match=word):
+        arrange(swept({"misalignment": ANGLE, "r": RADIUS}), x, family)
+
+
+# ---- curves ---------------------------------------------------------------------------------------------------
+
+
+def test_both_families_come_from_one_sweep():
+    """The curves of Fig. 9 of Pezzuti et al. (2006), left and right, with units as given."""
+    result = swept(GRID, cardan)
+    left, right = figure(result), figure(result, x="input.speed")
+    for k, line in enumerate(curves(left.axes[0], 20)):
+        assert line[:, 0] == pytest.approx(ANGLE[0])
+        assert line[:, 1] == pytest.approx(result["efficiency"].values[:, k])
+    for k, line in enumerate(curves(right.axes[0], 13)):
+        assert line[:, 0] == pytest.approx(SPEED[0])
+        assert line[:, 1] == pytest.approx(result["efficiency"].values[k])
+    assert [axes.get_ylabel() for axes in left.axes] == ["efficiency", "input.speed [rpm]"]
+    assert [axes.get_ylabel() for axes in right.axes] == ["efficiency", "misalignment [°]"]
+    assert (left.axes[0].get_xlabel(), right.axes[0].get_xlabel()) == ("misalignment [°]", "input.speed [rpm]")
+
+
+def test_further_names_are_panels_and_single_values_stand_in_the_title():
+    grid = {"mu": FRICTION, "misalignment": ANGLE, "r": scale([20], "m", "mm", 1e-3), "input.speed": FEW}
+    result = swept(grid, lambda mu, angle, r, speed: cardan(angle, speed) * (1 - mu))
+    sheet = figure(result, x="misalignment", family="input.speed")
+    assert sheet.get_suptitle() == "Efficiency over misalignment at r\u00a0=\u00a020\u00a0mm"
+    panels = [axes for axes in sheet.axes if axes.get_title(loc="left")]
+    assert [axes.get_title(loc="left") for axes in panels] == ["mu = 0.05", "mu = 0.1", "mu = 0.2"]
+    for i, axes in enumerate(panels):
+        for k, line in enumerate(curves(axes, 4)):
+            assert line[:, 1] == pytest.approx(result["efficiency"].values[i, :, 0, k])
+    told = [text.get_text() for axes in sheet.axes if axes.get_legend() for text in axes.get_legend().get_texts()]
+    assert told == [f"input.speed = {speed} rpm" for speed in (50, 500, 1000, 1500)]
+
+
+def test_of_many_panels_some_are_drawn_and_the_rest_is_said():
+    grid = {"misalignment": scale([0, 10]), "input.speed": FEW, "mu": scale(np.linspace(0, 0.5, 6)), "r": RADIUS}
+    sheet = figure(swept(grid))
+    titles = [axes.get_title(loc="left") for axes in sheet.axes if axes.get_title(loc="left")]
+    assert len(titles) == 12
+    assert (titles[0], titles[-1]) == ("mu = 0, r = 10 mm", "mu = 0.5, r = 30 mm")
+    assert "(12 of 18 panels)" in sheet.get_suptitle()
+
+
+def test_unsorted_values_are_drawn_in_order_and_the_gap_is_told():
+    angles = scale([20, 0, 10, 10, 30], "rad", "deg", DEG)
+    axes = figure(swept({"misalignment": angles}, lambda a: a / 30, lambda a: Status.LOCKED if a > 25 else 0)).axes[0]
+    line = curves(axes, 1)[0]
+    assert line[:, 0] == pytest.approx([0, 10, 10, 20, 30])
+    assert line[:4, 1] == pytest.approx([0, 1 / 3, 1 / 3, 2 / 3])
+    assert np.isnan(line[4, 1])
+    assert [text.get_text() for text in axes.texts] == ["locked"]
+
+
+def test_scales_are_logarithmic_where_the_values_are_spaced_so():
+    kinds = {
+        "log": ([1, 2, 5, 10, 20, 50], [0.001, 0.01, 0.1, 1], [30, 1, 10, 3, 10]),
+        "linear": ([0, 1, 10], [1, 2, 5], [50, 100, 150, 1000], [-1, -10, -100], [5], [1, 100], SPEED[0]),
+    }
+    for kind, rows in kinds.items():
+        for row in rows:
+            assert on_scale(Scale("x", "", np.array(row, float))) == kind, row
+    axes = figure(swept({"c": scale([1, 2, 5, 10, 20], "m", "um", 1e-6)})).axes[0]
+    assert axes.get_xscale() == "log"
+    assert [text.get_text() for text in axes.get_xticklabels()] == ["1", "2", "5", "10", "20"]
+    assert axes.get_xlabel() == "c [µm]"
+
+
+def test_numbers_are_written_as_they_were_given():
+    assert [written(value) for value in (-5.0, 2.5e-6, -0.0, 1234.5, 126.3157894)] == [
+        "−5", "2.5×10⁻⁶", "0", "1234.5", "126.316",
+    ]  # fmt: skip
+
+
+# ---- maps -----------------------------------------------------------------------------------------------------
+
+
+def gappy(angle, speed, *_):
+    if speed > 1000 and angle > 20:
+        return Status.LOCKED
+    return Status.NOT_ASSEMBLED if angle > 26 else Status.CONTACT_LOST if 10 < angle < 15 and speed < 400 else 0
+
+
+def test_no_contour_enters_a_cell_without_a_number_at_each_corner():
+    result = swept(GRID, cardan, gappy)
+    sheet = figure(result, kind="map")
+    axes = sheet.axes[0]
+    x, y = ANGLE[0], SPEED[0]
+    bad = np.isnan(result["efficiency"].values)
+    cells = bad[:-1, :-1] | bad[1:, :-1] | bad[:-1, 1:] | bad[1:, 1:]
+    found = [path for one in axes.collections if type(one).__name__ == "QuadContourSet" for path in one.get_paths()]
+    places = np.concatenate([path.interpolated(7).vertices for path in found])
+    inside = lambda values, grid: (np.searchsorted(grid, values, side="left") - 1).clip(0)  # noqa: E731
+    strictly = (~np.isclose(places[:, :1], x).any(axis=1)) & (~np.isclose(places[:, 1:], y).any(axis=1))
+    rows, columns = inside(places[strictly, 0], x), inside(places[strictly, 1], y)
+    assert strictly.sum() > 100
+    assert not cells[rows, columns].any()
+    told = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert told == ["locked", "cannot be assembled", "contact lost at some position"]
+    hindered = {patch.get_label(): patch for patch in axes.patches if patch.get_label() in told}
+    for code, word in ((Status.LOCKED, "locked"), (Status.NOT_ASSEMBLED, "cannot be assembled")):
+        path = hindered[word].get_path()
+        edge = 1e-6 * np.array([1, 1])
+        centre = np.array([x.mean(), y.mean()])
+        for (i, k), here in np.ndenumerate(result["status"].values == code):
+            point = np.array([x[i], y[k]])
+            assert path.contains_point(point + edge * np.sign(centre - point)) == here
+    assert len(axes.get_lines()[-1].get_xdata()) == (result["status"].values == Status.CONTACT_LOST).sum()
+
+
+def test_lines_of_a_map_lie_where_the_field_has_their_number():
+    """Of a field linear in both, and of one linear in the logarithm of a length."""
+    result = swept(GRID, lambda angle, speed: 0.9 - 0.01 * angle - 0.0001 * speed)
+    lines = figure(result, kind="map").axes[0].collections[-1]
+    for level, path in zip(lines.levels, lines.get_paths(), strict=True):
+        angle, speed = path.vertices.T
+        assert 0.9 - 0.01 * angle - 0.0001 * speed == pytest.approx(level, abs=1e-9)
+    lengths = scale([1, 10, 100, 1000], "m", "um", 1e-6)
+    sheet = figure(swept({"c": lengths, "a": ANGLE}, lambda c, a: np.log10(c) + a / 30), kind="map")
+    lines = sheet.axes[0].collections[-1]
+    for level, path in zip(lines.levels, lines.get_paths(), strict=True):
+        c, angle = path.vertices.T
+        assert np.log10(c) + angle / 30 == pytest.approx(level, abs=6e-3)
+
+
+def test_a_map_has_both_names_with_units_and_a_scale_with_that_of_the_measure():
+    sheet = figure(swept(GRID, cardan), "input.effort_max", x="input.speed", kind="map")
+    axes, bar = sheet.axes
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("input.speed [rpm]", "misalignment [°]")
+    assert bar.get_ylabel() == "largest drive effort of input [kN m]"
+    assert axes.get_xlim() == pytest.approx((50, 1500))
+    assert [text.get_text() for text in bar.get_yticklabels()][:2] == ["7.0", "7.5"]
+
+
+def test_a_margin_that_is_known_where_it_locks_is_drawn_there():
+    result = swept(GRID, cardan, gappy)
+    axes = figure(result, "locking_margin", kind="map").axes[0]
+    look = {patch.get_label(): patch for patch in axes.patches}
+    assert look["locked"].get_facecolor()[3] == 0  # hatched, and the colours are seen
+    assert look["cannot be assembled"].get_facecolor()[3] == 1
+    assert "∞" in look
+
+
+@pytest.mark.parametrize(
+    "names", [{"misalignment": ANGLE}, {"misalignment": ANGLE, "r": scale([1])}, {"a": scale([2, 2]), "b": FEW}]
+)
+def test_a_map_needs_two_names_that_vary(names):
+    with pytest.raises(MechanismError, match="needs two that vary"):
+        figure(swept(names), kind="map")
+
+
+def test_no_such_kind():
+    with pytest.raises(MechanismError, match="did you mean 'map'"):
+        figure(swept(GRID), kind="maps")
+
+
+# ---- odd cases ------------------------------------------------------------------------------------------------
+
+PANELS = {"misalignment": ANGLE, "input.speed": FEW, "joint_defaults.friction.coefficient": FRICTION, "r": RADIUS}
+TINY = scale(np.linspace(-3e-7, 3e-7, 5), "m")
+ONE = {"misalignment": ANGLE}
+TWICE = {"a": scale([3, 1, 2, 1]), "b": scale([5, 4, 4])}
+HUGE = {"k": scale(np.linspace(1e9, 3e9, 4), "N/m"), "a": FEW}
+
+
+def peaked(angle, *_):
+    return 1 / ((angle / 30 - 0.5) ** 2 + 1e-4)
+
+
+def everywhere(*_):
+    return Status.LOCKED
+
+
+def product(*values):
+    return np.prod(values)
+
+
+ODD = {
+    "one point": lambda: figure(swept({"misalignment": scale([5], "rad", "deg", DEG)})),
+    "all locked": lambda: figure(swept(GRID, status=everywhere)),
+    "all locked, map": lambda: figure(swept(GRID, status=everywhere), kind="map"),
+    "no value": lambda: figure(swept(ONE, lambda _: np.nan)),
+    "no value, map": lambda: figure(swept(GRID, lambda *_: np.nan), kind="map"),
+    "all infinite": lambda: figure(swept(ONE, lambda _: 0.9), "locking_margin"),
+    "constant": lambda: figure(swept(GRID, lambda a, _: 1 + 1e-16 * a)),
+    "constant, map": lambda: figure(swept(GRID, lambda *_: 0.83), kind="map"),
+    "zero, map": lambda: figure(swept(GRID, lambda *_: 0), "friction_power_mean", kind="map"),
+    "hundred curves": lambda: figure(swept({"a": scale([1, 2]), "b": scale(range(100))}, product)),
+    "hundred alike": lambda: figure(swept({"a": scale([1, 2]), "b": scale([3.0] * 100)}, product)),
+    "duplicates, map": lambda: figure(swept(TWICE, product), kind="map"),
+    "peak, map": lambda: figure(swept(GRID, peaked), "Ω.effort_max", kind="map"),
+    "peak below, map": lambda: figure(swept(GRID, lambda *place: -peaked(*place)), kind="map"),
+    "odd names": lambda: figure(swept({"offset": TINY, "曲柄_$角$": FRICTION}, product), "$x_1$.reaction_max"),
+    "huge": lambda: figure(swept(HUGE, product), kind="map"),
+    "ideal": lambda: figure(swept({"misalignment": ANGLE, "input.speed": FEW}, cardan, ideal=True)),
+    "gaps": lambda: figure(swept(GRID, cardan, gappy)),
+    "panels": lambda: figure(swept(PANELS, cardan, gappy)),
+    "panels, map": lambda: figure(swept(PANELS, cardan, gappy), kind="map"),
+    "panels, peak": lambda: figure(swept(PANELS, peaked), "input.effort_max"),
+}
+
+
+@pytest.mark.parametrize("case", ODD)
+def test_odd_cases_are_drawn_and_nothing_is_cut_off(case):
+    """Warnings are errors here; all that is drawn lies within the sheet, and no legend on the title."""
+    sheet = ODD[case]()
+    sheet.canvas.draw()
+    drawn, size = sheet.get_tightbbox(), sheet.bbox_inches
+    assert drawn.x0 > 0
+    assert drawn.y0 > 0
+    assert drawn.x1 < size.x1
+    assert drawn.y1 < size.y1
+    title = sheet._suptitle.get_window_extent()
+    for axes in sheet.axes:
+        if axes.get_legend():
+            assert not axes.get_legend().get_window_extent().overlaps(title)
+
+
+# ---- tables and files -----------------------------------------------------------------------------------------
+
+
+def test_a_table_for_each_value_of_further_names():
+    grid = {"misalignment": scale(range(50)), "input.speed": SPEED, "mu": FRICTION, "r": scale([1])}
+    result = swept(grid, lambda a, s, m, r: a + s + m, lambda a, s, *_: 5 if (a, s) == (0, 50) else 0)
+    found = tables(result, ["efficiency"], room=80)
+    assert len(found) == 3
+    assert "at mu = 0.1, r" in found[1].title
+    for table, friction in zip(found, (0.05, 0.1, 0.2), strict=True):
+        assert table.head[0] == "misalignment"
+        assert (table.head[1], table.head[-1]) == ("50 rpm", "1500 rpm")
+        assert table.rows[0][1] == "locked"
+        assert float(table.rows[-1][-1]) == pytest.approx(49 + 1500 + friction)
+        assert sum(3 + max(map(len, column)) for column in zip(table.head, *table.rows, strict=True)) <= 80
+        assert len(table.rows) * (len(table.head) - 1) + table.left_out == 50 * 20
+    many = tables(swept({"a": FEW, "b": FEW, "c": scale(range(50))}))
+    assert len(many) == 6
+    assert sum(len(one.rows) * (len(one.head) - 1) + one.left_out for one in many) == 4 * 4 * 50
+
+
+def test_tables_follow_the_figure_and_take_several_measures():
+    result = swept(GRID, cardan)
+    found = tables(result, ["efficiency", "input.effort_max"], x="input.speed")
+    assert [one.title for one in found] == [
+        "efficiency over input.speed and, in columns, misalignment",
+        "input.effort max [N m] over input.speed and, in columns, misalignment",
+    ]
+    assert found[0].head[:2] == ["input.speed [rpm]", "0 deg"]
+    (one,) = tables(swept({"misalignment": ANGLE}, lambda a: a, margin=False), ["pin-1.reaction_max", "efficiency"])
+    assert one.head[:3] == ["misalignment [deg]", "pin-1.reaction max [N]", "efficiency"]
+    assert "locking margin" not in one.head
+
+
+def test_a_measure_that_the_sweep_lacks_is_told():
+    with pytest.raises(MechanismError, match="does not hold it"):
+        figure(swept(GRID, margin=False), "locking_margin")
+    with pytest.raises(MechanismError, match="no mechanism of the sweep has errors"):
+        figure(swept(GRID), "efficiency_ideal")
+
+
+def test_the_file_has_a_row_a_point_of_any_number_of_names(tmp_path):
+    grid = {"a": scale([1, 2]), "b": scale([3, 4, 5], "m", "mm", 1e-3), "c": scale([6]), "d": scale([7, 8])}
+    result = swept(grid, lambda a, b, c, d: a * b * d)
+    save(result, tmp_path / "grid.csv")
+    with (tmp_path / "grid.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 12
+    assert [row["d"] for row in rows[:3]] == ["7.0", "8.0", "7.0"]  # the last name runs fastest
+    for row in rows:
+        a, b, d = (float(row[name]) for name in "abd")
+        assert float(row["efficiency"]) == pytest.approx(a * b * 1e3 * d)
+        assert float(row["Ω.effort_max"]) == pytest.approx(25000 * a * b * 1e3 * d)

@@ -7,68 +7,27 @@ of its own here: what its numbers are uncertain by is not in the verdict.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from trunnion.analysis.friction import FrictionMethod
-from trunnion.analysis.rig.causes import Cause, best, causes
-from trunnion.analysis.rig.judge import Judged, Verdict, expanded, judge
+from trunnion.analysis.rig.causes import best, causes
+from trunnion.analysis.rig.compared import dataset
+from trunnion.analysis.rig.judge import Verdict, expanded, judge
 from trunnion.analysis.rig.modelled import Modelled, modelled
+from trunnion.analysis.rig.pairs import Compared, Efficient, Pair
 from trunnion.errors import Finding, MechanismError
 from trunnion.measured.efficiency import Pairs, efficiency_of, load_joints, pairs_of
-from trunnion.measured.measurement import Condition, Course, Measurement
+from trunnion.measured.measurement import Condition, Measurement
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.names import nearest
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Compared", "Efficient", "Pair", "compare"]
-
-Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True, eq=False)
-class Pair:
-    """One channel in one condition: what was measured, what the model has, what it comes to."""
-
-    course: Course
-    model: Array
-    comparable: NDArray[np.bool_]
-    judged: Judged
-    cause: Cause | None
-    others: tuple[Cause, ...] = ()
-
-    @property
-    def within(self) -> bool:
-        return self.judged.verdict is Verdict.WITHIN
-
-
-@dataclass(frozen=True)
-class Efficient:
-    """Efficiency of a condition by the channels: measured, its expanded uncertainty, and of the model."""
-
-    measured: float = np.nan
-    expanded: float = np.nan
-    model: float = np.nan
-
-    @property
-    def within(self) -> bool:
-        """Whether the model lies within ±U; not where one of them is unknown."""
-        return bool(abs(self.measured - self.model) <= self.expanded)
-
-
-@dataclass(frozen=True, eq=False)
-class Compared:
-    """A condition with its model and its channels."""
-
-    condition: Condition
-    model: Modelled
-    pairs: Mapping[str, Pair]
-    efficiency: Efficient | None
+__all__ = ["compare"]
 
 
 def compare(
@@ -91,8 +50,6 @@ def compare(
     shift of the crank angle would explain of the residual is fitted and said.
     Raises MechanismError for values, channels or measures that the model does not have.
     """
-    from trunnion.analysis.rig.compared import dataset
-
     if not (np.isfinite(coverage) and 0 < coverage <= 8):
         raise MechanismError(Finding(f"{coverage:g} is no coverage factor", "coverage", "give such as 2, up to 8"))
     wanted = _channels(measurement, channels)

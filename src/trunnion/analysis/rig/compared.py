@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from trunnion import __version__
 from trunnion.analysis.account import PEZZUTI, finding_row, inputs, references
 from trunnion.analysis.friction import FrictionMethod
-from trunnion.analysis.rig.compare import Compared, Pair
 from trunnion.analysis.rig.judge import Verdict, expanded, probability, uncertainty_of
+from trunnion.analysis.rig.pairs import Compared, Pair
 from trunnion.analysis.rig.said import findings_of, gathered, units_set
 from trunnion.errors import Status
 from trunnion.measured.measurement import Measurement

@@ -21,7 +21,7 @@ from trunnion.model.mechanism import Mechanism
 from trunnion.model.units import unit as unit_of
 
 if TYPE_CHECKING:
-    from trunnion.analysis.rig.compare import Compared, Pair
+    from trunnion.analysis.rig.pairs import Compared, Pair
 
 __all__ = ["findings_of", "gathered", "said", "units_set"]
 

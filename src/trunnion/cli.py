@@ -34,6 +34,7 @@ from trunnion.output import folder
 from trunnion.terminal import bar, console, findings_of, say, show_figures, wrote
 from trunnion.verbs.allocate import allocate
 from trunnion.verbs.assemble import assemble
+from trunnion.verbs.compare import compare
 from trunnion.verbs.data import data
 from trunnion.verbs.model import exit_status, lines_of, placed, stated
 from trunnion.verbs.rig import rig
@@ -187,6 +188,7 @@ app.command()(tolerance)
 app.command()(allocate)
 app.command()(data)
 app.command()(rig)
+app.command()(compare)
 app.command()(sweep)
 
 

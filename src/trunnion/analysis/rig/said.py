@@ -56,7 +56,7 @@ def units_set(mechanism: Mechanism, names: Iterable[str]) -> tuple[list[str], li
         row = known.get(mechanism.path_of(name), {"unit": "", "text": ""})
         literal = LITERAL.fullmatch(row["text"].strip().removeprefix("-"))
         text = (literal["unit"] or literal["per"] or "") if literal else ""
-        text = text or {"rad": "deg", "rad/s": "rpm"}.get(row["unit"], row["unit"])
+        text = text or {"rad": "deg"}.get(row["unit"], row["unit"])
         units.append(row["unit"])
         written.append((text, float(unit_of(text)[0]) if text and text != "1" else 1.0))
     return units, written
@@ -219,7 +219,10 @@ def _percent(values: Sequence[float]) -> str:
 
 def _ahead(shares: Sequence[float], found: Sequence[Compared]) -> str:
     spans = [share * one.model.span for share, one in zip(shares, found, strict=True)]
-    return f"the crank angle read off by {_range(spans, found[0].model.unit)}"
+    late = [-share * one.model.run.cycle.duration * 1e3 for share, one in zip(shares, found, strict=True)]
+    return (
+        f"the crank angle read off by {_range(spans, found[0].model.unit)}, or a delay of {_range(late, 'ms', False)},"
+    )
 
 
 def _shifted(found: Sequence[Compared]) -> list[tuple[str, Compared, Cause]]:

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from trunnion.analysis.tolerance.study import tolerance
     from trunnion.errors import Finding, MechanismError, Status
     from trunnion.export import save
+    from trunnion.measured.read import read_measured
     from trunnion.model.file import read_mechanism as read
     from trunnion.model.mechanism import Mechanism
     from trunnion.views.report import report
@@ -46,6 +47,7 @@ _PLACES = {
     "play": "trunnion.analysis.play",
     "prepare": "trunnion.analysis.analyse",
     "read": "trunnion.model.file",
+    "read_measured": "trunnion.measured.read",
     "report": "trunnion.views.report",
     "save": "trunnion.export",
     "sweep": "trunnion.analysis.sweep",
@@ -72,6 +74,7 @@ __all__ = [
     "play",
     "prepare",
     "read",
+    "read_measured",
     "report",
     "save",
     "sweep",

@@ -35,6 +35,7 @@ from trunnion.terminal import bar, console, findings_of, say, show_figures, wrot
 from trunnion.verbs.allocate import allocate
 from trunnion.verbs.assemble import assemble
 from trunnion.verbs.compare import compare
+from trunnion.verbs.data import data
 from trunnion.verbs.model import exit_status, lines_of, placed, stated
 from trunnion.verbs.rig import rig
 from trunnion.verbs.study import tolerance
@@ -185,6 +186,7 @@ def locking(
 app.command()(assemble)
 app.command()(tolerance)
 app.command()(allocate)
+app.command()(data)
 app.command()(rig)
 app.command()(compare)
 app.command()(sweep)

@@ -12,8 +12,9 @@ they were given, then `efficiency`, `<driver>.effort_max`, `<joint>.reaction_max
 `drive`, `<measure>`, `<measure>.worst_case`, `<measure>.rss`, `<measure>.deviation`, `<measure>.<joint>.worst_case`,
 …. Of tolerances the file's name says which table it holds: one row a measure, or of `x.parameters.csv` one a toleranced
 number, see `tolerance_columns`; so it does of a comparison with measurements, see `compare_columns`. What `assemble`
-finds has one row a position: `<driver>.coordinate`, `needed_share`,
-`needed_clearance`, …, `<joint>.uniform_1_x` of end 1, …, `status`.
+finds has one row a position: `<driver>.coordinate`, `needed_share`, `needed_clearance`, …, `<joint>.uniform_1_x` of
+end 1, …, `status`. Measured courses have one row a condition and position: `condition`, what was set, `phase`,
+`<channel>.mean`, `.scatter`, `.uncertainty`, `.turns`.
 """
 
 from __future__ import annotations
@@ -60,6 +61,8 @@ def columns(result: xr.Dataset, table: str = "measures") -> list[Column]:
         return _played(result)
     if "assembling" in result.attrs:
         return _fit(result)
+    if "measured" in result.attrs:
+        return [(name, unit, values.__getitem__) for name, unit, values in _courses(result)]
     stated = json.loads(result.attrs["scene"])
     spatial = stated.get("space") == "spatial"
     kinds = {name: joint["type"] for name, joint in stated["joints"].items()}
@@ -124,6 +127,19 @@ def _fit(result: xr.Dataset) -> list[Column]:
     names = dict(zip(result.attrs["flag_values"].split(), result.attrs["flag_meanings"].split(), strict=True))
     told = np.array([names[str(code)] for code in result["status"].values])
     return [*found, ("status", "", lambda window: told[window])]
+
+
+def _courses(result: xr.Dataset) -> Iterator[tuple[str, str, NDArray[Any]]]:
+    """Of measured courses: condition, what was set, share of the cycle, then each channel; positions run fastest."""
+    positions = result.sizes["position"]
+    yield "condition", "", np.repeat(result["condition"].values, positions)
+    for i, name in enumerate(result["setting"].values):
+        yield str(name), "", np.repeat(result["set"].values[:, i], positions)
+    yield "phase", "1", np.tile(result["phase"].values, result.sizes["condition"])
+    units = json.loads(result["mean"].attrs["member_units"])
+    for i, (channel, unit) in enumerate(zip(result["channel"].values, units, strict=True)):
+        for figure in ("mean", "scatter", "uncertainty", "turns"):
+            yield f"{channel}.{figure}", "1" if figure == "turns" else unit, result[figure].values[:, i].ravel()
 
 
 def _planar_joint(result: xr.Dataset, i: int, joint: str, kind: str) -> list[Column]:
@@ -269,6 +285,8 @@ def _count(result: xr.Dataset, found: list[Column]) -> int:
     """How many rows the columns have; one at least, so that their names are written."""
     if is_tolerance(result) or is_comparison(result):
         return max(len(found[0][2](slice(None))), 1)
+    if "measured" in result.attrs:
+        return result.sizes["condition"] * result.sizes["position"]
     swept = json.loads(result.attrs.get("swept", "[]"))
     return result.sizes.get("position") or int(np.prod([result.sizes[name] for name in swept]))
 

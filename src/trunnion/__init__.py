@@ -19,11 +19,13 @@ if TYPE_CHECKING:
     from trunnion.analysis.inspect import Check, check
     from trunnion.analysis.locking import locking
     from trunnion.analysis.play import play
+    from trunnion.analysis.rig.compare import compare
     from trunnion.analysis.rig.virtual import observe
     from trunnion.analysis.sweep import sweep
     from trunnion.analysis.tolerance.study import tolerance
     from trunnion.errors import Finding, MechanismError, Status
     from trunnion.export import save
+    from trunnion.measured.read import read_measured
     from trunnion.model.file import read_mechanism as read
     from trunnion.model.mechanism import Mechanism
     from trunnion.views.report import report
@@ -39,11 +41,13 @@ _PLACES = {
     "analyse": "trunnion.analysis.analyse",
     "assemble": "trunnion.analysis.assemblability",
     "check": "trunnion.analysis.inspect",
+    "compare": "trunnion.analysis.rig.compare",
     "locking": "trunnion.analysis.locking",
     "observe": "trunnion.analysis.rig.virtual",
     "play": "trunnion.analysis.play",
     "prepare": "trunnion.analysis.analyse",
     "read": "trunnion.model.file",
+    "read_measured": "trunnion.measured.read",
     "report": "trunnion.views.report",
     "save": "trunnion.export",
     "sweep": "trunnion.analysis.sweep",
@@ -63,12 +67,14 @@ __all__ = [
     "analyse",
     "assemble",
     "check",
+    "compare",
     "dual",
     "locking",
     "observe",
     "play",
     "prepare",
     "read",
+    "read_measured",
     "report",
     "save",
     "sweep",

@@ -32,7 +32,7 @@ def is_identification(result: xr.Dataset) -> bool:
     return "identified" in result.attrs
 
 
-def table_of(path: str | os.PathLike[str]) -> str:
+def table_of(path: str | os.PathLike[str], result: xr.Dataset) -> str:
     """The table that a file of this name holds: of `x.fit.csv` fit, else parameters."""
     inner = Path(Path(path).stem).suffix.lstrip(".").lower()
     return inner if inner in ("fit", "residuals") else "parameters"

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.errors import Finding, Severity
 
-__all__ = ["Account", "counted", "places", "runs", "times"]
+__all__ = ["Account", "counted", "places", "runs", "times", "told"]
+
+FILES = 4  # named in a sentence
 
 
 @dataclass
@@ -19,7 +22,7 @@ class Account:
 
     file: str
     findings: list[Finding] = field(default_factory=list)
-    done: list[str] = field(default_factory=list)
+    done: dict[str, list[float]] = field(default_factory=dict)
 
     def warn(self, where: str, what: str, remedy: str, severity: Severity = Severity.WARNING) -> None:
         """A fault of the data."""
@@ -33,10 +36,24 @@ class Account:
         """Why there is no result of this part."""
         self.warn(where, what, remedy, Severity.ERROR)
 
-    def say(self, sentence: str) -> None:
-        """Something that was done; once."""
-        if sentence not in self.done:
-            self.done.append(sentence)
+    def say(self, sentence: str, value: float | None = None) -> None:
+        """Something that was done; `{}` in the sentence stands for a value, which may differ from file to file."""
+        self.done.setdefault(sentence, []).extend([] if value is None else [value])
+
+
+def told(accounts: Sequence[Account]) -> list[str]:
+    """What was done to the files of accounts, each sentence once, with the files where it is not all of them."""
+    sentences = list(dict.fromkeys(sentence for one in accounts for sentence in one.done))
+    found = []
+    for sentence in sentences:
+        said = [one for one in accounts if sentence in one.done]
+        values = [value for one in said for value in one.done[sentence]]
+        low, high = (f"{limit(values):.2g}" for limit in (min, max)) if values else ("", "")
+        text = sentence.replace("{}", low if low == high else f"{low} to {high}")
+        names = [Path(one.file).name for one in said]
+        most = ", ".join(names[:FILES]) + (f" and {len(names) - FILES} more" if len(names) > FILES else "")
+        found.append(text if len(said) == len(accounts) else f"{most}: {text}")
+    return found
 
 
 def counted(count: int, noun: str, plural: str = "") -> str:
@@ -67,4 +84,7 @@ def places(mask: NDArray[np.bool_], time: NDArray[np.float64]) -> str:
     if lengths[longest] < 3:
         return where
     last = min(starts[longest] + lengths[longest], time.size - 1)
-    return f"{where}, the longest {time[last] - time[starts[longest]]:.3g} s at {time[starts[longest]]:.5g} s"
+    span = f"{time[last] - time[starts[longest]]:.3g} s"
+    return (
+        f"{where} for {span}" if starts.size == 1 else f"{where}, the longest {span} at {time[starts[longest]]:.5g} s"
+    )

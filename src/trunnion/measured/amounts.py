@@ -96,7 +96,7 @@ def read_amount(source: object) -> Amount:
     value = float(number) * factor
     if not math.isfinite(value):
         raise UnitError(f"'{str(source)[:40]}' is not a finite number", "give a finite number")
-    return Amount(source, value, text, exponents)  # type: ignore[arg-type]
+    return Amount(source, value, text, exponents)
 
 
 def alike(one: Dimensions, other: Dimensions) -> bool:

@@ -23,7 +23,10 @@ TURN = 2 * np.pi
 
 @dataclass(frozen=True)
 class Coordinate:
-    """Coordinate of the driver by row, rad, NaN where it is not known; spoilt: stretches of time, (stretch, 2), in which it is wrong."""
+    """Coordinate of the driver by row, rad, NaN where it is not known.
+
+    spoilt: stretches of time, (stretch, 2), in which it is wrong.
+    """
 
     values: Array
     spoilt: Array
@@ -31,7 +34,7 @@ class Coordinate:
 
 def coordinate(source: AngleSource, table: Table, line: Timeline, speed: Array | None, account: Account) -> Coordinate:
     """The coordinate by its source; speed: that of the channel, rad/s, of a source `speed`."""
-    zero = float(source.zero.evaluate())  # type: ignore[arg-type]
+    zero = float(source.zero.evaluate())
     index = np.empty(0)
     if source.index is not None:
         index = index_times(table.columns[source.index.column].values, line, source.index.column, account)
@@ -41,7 +44,7 @@ def coordinate(source: AngleSource, table: Table, line: Timeline, speed: Array |
         values = _of_column(source, table, line, account)
     elif source.from_ == "time":
         assert source.speed is not None
-        rate = float(source.speed.evaluate())  # type: ignore[arg-type]
+        rate = float(source.speed.evaluate())
         values = rate * line.seconds
         account.say(f"the angle is that of a constant speed of {rate:.6g} rad/s")
     else:
@@ -101,8 +104,8 @@ def _tied(values: Array, index: Array, line: Timeline, account: Account) -> tupl
     spoilt = np.column_stack([index[:-1], index[1:]])[turns != 1]
     if spoilt.size:
         told = counted(len(spoilt), "interval")
-        account.warn("angle.index", f"{told} of the index, {times(spoilt[:, 0])}, are not one turn of the angle; left out",
-                     "check index pulse and speed")  # fmt: skip
+        what = f"{told} of the index, {times(spoilt[:, 0])}, are not one turn of the angle; left out"
+        account.warn("angle.index", what, "check index pulse and speed")
     exact = way * TURN * np.concatenate([[0.0], np.cumsum(np.maximum(turns, 1))])
     account.say("the angle is tied to the index pulse once a turn")
     inside = (line.seconds >= index[0]) & (line.seconds <= index[-1])
@@ -148,8 +151,8 @@ def _of_pulses(
         values[line.seconds > found.until] = np.nan
     pulse = 360.0 / source.per_turn
     blur = pulse * min(0.5 * line.step / max(float(np.median(np.diff(found.times))), 1e-300), 1.0)
+    known = "" if found.crossings else ", each known to ± {} deg by the sampling"
     account.say(
-        f"the angle is interpolated between pulses {pulse:.4g} deg apart, each known to ± {blur:.2g} deg by the sampling"
-        if not found.crossings else f"the angle is interpolated between pulses {pulse:.4g} deg apart"
-    )  # fmt: skip
+        f"the angle is interpolated between pulses {pulse:.4g} deg apart{known}", None if found.crossings else blur
+    )
     return Coordinate(values + zero, spoilt)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,7 +69,7 @@ def reading(name: str, channel: Channel, column: Column, account: Account) -> Re
         found = scale(channel.measures, unit, channel.gain)
         limit = found.reading(channel.range, "range") if channel.range else None
         return Reading(found, unit, limit, abs(found.factor) * found.reading(channel.accuracy.zero, "accuracy.zero"),
-                       float(channel.accuracy.gain.evaluate()))  # type: ignore[arg-type]  # fmt: skip
+                       float(channel.accuracy.gain.evaluate()))  # fmt: skip
     except UnitError as error:
         raise MechanismError(Finding(error.what, where, error.remedy, file=account.file)) from None
 
@@ -102,19 +103,20 @@ def zeroed(
     mean = float(np.average(means, weights=weights))
     error = float(1 / np.sqrt(weights.sum())) if np.all(errors > 0) else 0.0
     if means.size < 2 or np.ptp(middles) == 0:
-        account.say(f"zero of {name}: mean over the unloaded stretch, ± {abs(raw.factor) * error:.2g} {unit}")
+        account.say(f"zero of {name}: mean over the unloaded stretch, ± {{}} {unit}", abs(raw.factor) * error)
         return Zeroed(mean, error)
     slope = float(np.polyfit(middles, means, 1)[0])
     span = float(np.ptp(middles))
     change = slope * span
     drifts = abs(change) > 5 * float(np.hypot(errors[0], errors[-1])) and change != 0
-    told = f"the zero drifts by {abs(raw.factor) * change * channel.sign:.3g} {unit} in {span:.4g} s, between the unloaded stretches"
+    by = f"{raw.factor * change * channel.sign:.3g} {unit} in {span:.4g} s"
+    told = f"the zero drifts by {by}, between the unloaded stretches"
     if drifts and remove:
         account.warn(where.removesuffix(".zero"), f"{told}; a straight line is taken off", "let the sensor warm up")
         return Zeroed(float(np.mean(means)), error, slope, float(np.mean(middles)))
     if drifts:
         account.warn(where.removesuffix(".zero"), told, "let the sensor warm up, or state drift: remove")
-    account.say(f"zero of {name}: mean over {means.size} unloaded stretches, ± {abs(raw.factor) * error:.2g} {unit}")
+    account.say(f"zero of {name}: mean over {means.size} unloaded stretches, ± {{}} {unit}", abs(raw.factor) * error)
     return Zeroed(mean, error)
 
 
@@ -187,7 +189,7 @@ def filtered(values: Array, line: Timeline, low_pass: Filter, account: Account, 
     for begin, length in zip(*runs(~hole), strict=True):
         cuts = begin + np.flatnonzero(breaks[begin : begin + length])
         bounds = [begin, *cuts[cuts > begin].tolist(), begin + length]
-        for low, high in zip(bounds[:-1], bounds[1:], strict=True):
+        for low, high in pairwise(bounds):
             if high - low < least:
                 lost += high - low
                 continue

@@ -66,17 +66,16 @@ def drift(parts: Sequence[tuple[Turns, Array]]) -> Drift | None:
     return Drift(slope, error, change, scatter, span)
 
 
-def steady(turns: Turns, name: str, account: Account) -> None:
-    """Tell where the turns of a condition are not equally fast."""
+def steady(turns: Turns, step: float, where: str, account: Account) -> None:
+    """Tell where the turns of a condition are not equally fast, by more than the sampling can tell."""
     lengths = turns.end - turns.begin
     if lengths.size < 2:
         return
     spread = float(np.ptp(1 / lengths)) / float(np.mean(1 / lengths))
-    if spread > STEADY:
+    if spread > STEADY + 2 * step / float(np.mean(lengths)):
         slow, fast = 60 / float(lengths.max()), 60 / float(lengths.min())
-        place = f"condition {name}"
         what = f"the speed is not steady: {slow:.4g} to {fast:.4g} cycles a minute, {100 * spread:.3g} % between turns"
-        account.warn(place, what, "state files: over: to use the steady part, or mend the speed control")
+        account.warn(where, what, "state files: over: to use the steady part, or mend the speed control")
 
 
 def signs(
@@ -84,7 +83,7 @@ def signs(
 ) -> list[str]:
     """Channels that are likely to have the wrong sign: power in, or power out, below zero in all turns of a file.
 
-    courses: turns of all conditions; turning: mean speed of the driver by its angle, rad/s with its sign, if there is one.
+    courses: turns of all conditions; turning: mean speed of the driver by its angle, rad/s with its sign.
     """
     rates = {one.measures.partition(":")[2]: key for key, one in channels.items() if one.measures.startswith("rate:")}
     drivers = {

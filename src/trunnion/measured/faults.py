@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
+from trunnion.errors import Severity
 from trunnion.measured.account import Account, counted, places, runs
 from trunnion.measured.tables import Column
 
@@ -52,8 +53,19 @@ def cells(where: str, column: Column, readings: Array, seconds: Array, account: 
     account.warn(where, f"{what}; left out", "check cable and logger")
 
 
-def signal(where: str, readings: Array, seconds: Array, span: Span, limit: float | None, account: Account) -> None:
-    """Look for faults in the rows of a span, and make the readings that they spoil NaN."""
+def signal(
+    where: str,
+    readings: Array,
+    seconds: Array,
+    span: Span,
+    limit: float | None,
+    account: Account,
+    steady: bool = False,
+) -> None:
+    """Look for faults in the rows of a span, and make the readings that they spoil NaN.
+
+    limit: the end of the range, in readings; steady: whether one reading throughout is nothing strange, as of a speed.
+    """
     part, time = readings[span.low : span.high], seconds[span.low : span.high]
     finite = np.isfinite(part)
     if np.count_nonzero(finite) < 10:
@@ -62,12 +74,16 @@ def signal(where: str, readings: Array, seconds: Array, span: Span, limit: float
     low, high = (float(one) for one in np.percentile(known, (1, 99)))
     if known.min() == known.max():
         what = f"reads {known[0]:.6g} in every one of {known.size:,} rows"
-        account.warn(where, what, "check that the sensor is connected, and that the column is the right one")
+        severity = Severity.NOTE if steady else Severity.WARNING
+        account.warn(where, what, "check that the sensor is connected and the column the right one", severity)
         return
     wide = max(high - low, 1e-300)
-    _clipped(where, part, time, limit, account)
+    if limit is not None:
+        _clipped(where, part, time, limit, account)
     _zeros(where, part, time, wide, span, account)
     _stuck(where, part, time, span, account)
+    if limit is None:
+        _plateaus(where, part, time, account)
     _spikes(where, part, time, wide, span, account)
 
 
@@ -80,22 +96,23 @@ def _own(count: int, span: Span) -> bool:
     return span.turns >= 4 and count >= 0.5 * span.turns
 
 
-def _clipped(where: str, part: Array, time: Array, limit: float | None, account: Account) -> None:
-    if limit is not None:
-        mask = np.abs(part) >= CLIP * limit
-        if count := int(np.count_nonzero(mask)):
-            what = (
-                f"clipped: {counted(count, 'reading')} of {part.size:,} at the end of the range, {places(mask, time)}"
-            )
-            account.warn(
-                where, f"{what}; left out, so that means there are too small", "use a larger range or a smaller load"
-            )
-            _leave_out(part, mask)
-        return
+def _clipped(where: str, part: Array, time: Array, limit: float, account: Account) -> None:
+    mask = np.abs(part) >= CLIP * limit
+    if count := int(np.count_nonzero(mask)):
+        what = f"clipped: {counted(count, 'reading')} of {part.size:,} at the end of the range, {places(mask, time)}"
+        what = f"{what}; left out, so that means there are too small"
+        account.warn(where, what, "use a larger range or a smaller load")
+        _leave_out(part, mask)
+
+
+def _plateaus(where: str, part: Array, time: Array, account: Account) -> None:
+    """Readings that gather at the largest or least one, as they do at an end of the range that nobody stated."""
     finite = part[np.isfinite(part)]
+    if not finite.size:
+        return
     for end in (float(finite.max()), float(finite.min())):
         at = int(np.count_nonzero(finite == end))
-        if at < max(5, 2e-4 * finite.size):
+        if end == 0 or at < max(5, 2e-4 * finite.size):
             continue
         mask = part == end
         _, lengths = runs(mask)

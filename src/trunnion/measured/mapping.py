@@ -284,7 +284,7 @@ def _check(mapping: DataMapping) -> Iterator[Finding]:
             yield Finding(f"there is no channel '{value.mean}'", f"{where}.mean", nearest(value.mean, channels))
     if mapping.cycle.names or mapping.cycle.check({}) not in (ANGLE, KINDS["time"].dimensions[0], None):
         yield Finding(f"'{mapping.cycle.source}' is no angle and no time", "cycle", "write it as 360 deg or 0.5 s")
-    elif not float(mapping.cycle.evaluate()) > 0:  # type: ignore[arg-type]
+    elif not float(mapping.cycle.evaluate()) > 0:
         yield Finding("the cycle is not above zero", "cycle", "write it as 360 deg or 0.5 s")
     elif mapping.angle is None and not mapping.timed:
         remedy = "add angle: {from: …}, or write cycle: as a time"

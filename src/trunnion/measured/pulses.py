@@ -23,8 +23,8 @@ TOLD_BY = 5  # samples between pulses from which a lost one shows in the time be
 class Pulses:
     """Times at which counts were reached.
 
-    counts: (pulse,), of a turn `per_turn`; spoilt: from when to when pulses were lost, (stretch, 2); until: from when on pulses were missed;
-    crossings: whether the times are finer than the sampling; slack: counts between two samples.
+    counts: (pulse,), of a turn `per_turn`; spoilt: from when to when pulses were lost, (stretch, 2); until: from when
+    on they were missed; crossings: whether the times are finer than the sampling; slack: counts between two samples.
     """
 
     times: Array
@@ -53,7 +53,7 @@ def pulses_of(source: AngleSource, readings: Array, line: Timeline, indexed: boo
         found = _of_count(source, readings[finite], line.seconds[finite], line.step, account)
     if indexed or found.times.size < 9:
         return found
-    return _missed(found, line.step, account)
+    return _missed(found, line.step, 0.5 * (source.per_turn or 0), account)
 
 
 def _of_count(source: AngleSource, readings: Array, seconds: Array, step: float, account: Account) -> Pulses:
@@ -135,8 +135,11 @@ def _of_level(source: AngleSource, found: Pulses, line: Timeline, indexed: bool,
     return found
 
 
-def _missed(found: Pulses, step: float, account: Account) -> Pulses:
-    """Pulses that are missing or too many, told by the time between their neighbours; the count is set right."""
+def _missed(found: Pulses, step: float, most: float, account: Account) -> Pulses:
+    """Pulses that are missing or too many, told by the time between their neighbours; the count is set right.
+
+    most: pulses in a row that are taken for lost; more, and the shaft stood.
+    """
     between = np.diff(found.times)
     jumps = np.abs(np.diff(found.counts))
     each = between / np.maximum(jumps, 1.0)
@@ -144,10 +147,11 @@ def _missed(found: Pulses, step: float, account: Account) -> Pulses:
     if float(np.median(usual)) < TOLD_BY * step:
         return found
     calm = np.abs(median_filter(each, size=3, mode="nearest") / usual - 1) < 0.25
-    lost = np.where(calm & (each > 1.6 * usual) & (each < 4.5 * usual), np.rint(each / usual) - 1, 0.0)
+    single = jumps == 1
+    lost = np.where(calm & single & (each > 1.6 * usual) & (each < most * usual), np.rint(each / usual) - 1, 0.0)
     pairs = np.zeros(each.size)
     short = (each[:-1] + each[1:] < 1.4 * usual[:-1]) & (each[:-1] + each[1:] > 0.6 * usual[:-1])
-    pairs[1:][short] = -1.0
+    pairs[1:][short & single[1:] & single[:-1]] = -1.0
     pairs[2:][(pairs[1:-1] < 0) & (pairs[2:] < 0)] = 0.0
     change = lost + pairs
     if not np.any(change):
@@ -160,8 +164,8 @@ def _missed(found: Pulses, step: float, account: Account) -> Pulses:
         told.append(f"{counted(int(lost.sum()), 'pulse')} lost")
     if np.any(pairs):
         told.append(f"{counted(int(-pairs.sum()), 'pulse')} too many")
-    account.warn("angle", f"the encoder: {' and '.join(told)}, {times(at)}; the count is set right, these turns are left out",
-                 "check encoder, cable and counter")  # fmt: skip
+    what = f"the encoder: {' and '.join(told)}, {times(at)}; the count is set right, these turns are left out"
+    account.warn("angle", what, "check encoder, cable and counter")
     way = np.sign(found.counts[-1] - found.counts[0]) or 1.0
     mended = found.counts + way * np.concatenate([[0.0], np.cumsum(change)])
     return replace(found, counts=mended, spoilt=np.column_stack([at, found.times[1:][change != 0]]))
@@ -195,8 +199,8 @@ def by_index(found: Pulses, index: Array, per_turn: int, step: float, account: A
         lost, more = -int(change[change < 0].sum()), int(change[change > 0].sum())
         told = [f"{counted(lost, 'pulse')} lost"] * (lost > 0) + [f"{counted(more, 'pulse')} too many"] * (more > 0)
         where = f"in {counted(int(np.count_nonzero(wrong)), 'turn')} of {change.size}, {times(index[:-1][wrong])}"
-        account.warn("angle", f"the encoder: {' and '.join(told)} {where}; the count is set right at the index, these turns "
-                     "are left out", "check encoder, cable and counter")  # fmt: skip
+        what = f"the encoder: {' and '.join(told)} {where}; set right at the index, these turns are left out"
+        account.warn("angle", what, "check encoder, cable and counter")
     place = np.clip(np.searchsorted(index, found.times, side="right") - 1, 0, index.size - 1)
     return found.counts - at[0] - way * usual - way * level[place], np.column_stack(
         [index[:-1][wrong], index[1:][wrong]]

@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.measured import faults
-from trunnion.measured.account import Account, counted
+from trunnion.measured.account import Account, counted, told
 from trunnion.measured.angle import Coordinate, coordinate
 from trunnion.measured.channels import Reading, Zeroed, filtered, reading, zeroed
 from trunnion.measured.courses import Drift, drift, signs, steady
-from trunnion.measured.mapping import DataMapping, File, Mapped, Zero, read_mapping
+from trunnion.measured.mapping import DataMapping, File, FromData, Mapped, Zero, read_mapping
 from trunnion.measured.measurement import Accuracy, Condition, Course, Measurement
-from trunnion.measured.settings import Setting, settings
+from trunnion.measured.settings import Setting, settings, stated
 from trunnion.measured.tables import Table, read_table
 from trunnion.measured.timebase import Timeline, timeline
 from trunnion.measured.turns import DENSE, Turns, cut, resampled
@@ -41,7 +41,7 @@ def read_measured(
     mapped = read_mapping(mapping)
     conditions: list[Condition] = []
     findings: list[Finding] = []
-    done: dict[str, list[str]] = {}
+    accounts: list[Account] = []
     failed = False
     for path, entry in _files(mapped, files):
         account = Account(str(path))
@@ -51,21 +51,20 @@ def read_measured(
             account.findings += [one for one in error.findings if one not in account.findings]
             failed = True
         findings += account.findings
-        for sentence in account.done:
-            done.setdefault(sentence, []).append(path.name)
+        accounts.append(account)
     findings = mapped.placed(findings)
     if failed or not conditions:
         raise MechanismError([one for one in findings if one.severity is not Severity.NOTE])
-    told = [
-        one if len(on) == len(set(p for p in _names(conditions))) else f"{', '.join(on)}: {one}"
-        for one, on in done.items()
-    ]
     name = mapped.mapping.name or Path(mapped.file).stem
-    return Measurement(name, tuple(_distinct(conditions)), tuple(findings), tuple(told))
+    return Measurement(name, tuple(_distinct(conditions)), tuple(findings), (_averaged(conditions), *told(accounts)))
 
 
-def _names(conditions: Sequence[Condition]) -> list[str]:
-    return [Path(file).name for one in conditions for file in one.files]
+def _averaged(conditions: Sequence[Condition]) -> str:
+    """How many turns there are."""
+    counts = [next(iter(one.courses.values())).turns.shape[0] for one in conditions]
+    each = f"{min(counts):,}" if min(counts) == max(counts) else f"{min(counts):,} to {max(counts):,}"
+    where = "" if len(counts) == 1 else f" in each of {len(counts):,} conditions"
+    return f"{each} whole turns{where}; rows before, between and after them are not used"
 
 
 def _files(mapped: Mapped, files: Iterable[str | os.PathLike[str]] | None) -> list[tuple[Path, File]]:
@@ -138,12 +137,12 @@ class _File:
         cuts = []
         for setting in settings(mapping, self.entry, self.table, self.line, account):
             allowed = self._used() & setting.rows
-            turns = cut(share, self.line, allowed, mapping.positions, spoilt, account, setting.name)
+            turns = cut(share, self.line, allowed, mapping.positions, spoilt, account, self._named(setting))
             if turns.numbers.size:
                 cuts.append((setting, turns))
             else:
-                account.error(f"condition {setting.name}" if setting.name else "turns", self._no_turn(share, allowed),
-                              "check angle, or record for longer")  # fmt: skip
+                what = self._no_turn(share, allowed)
+                account.error(f"condition {self._named(setting)}", what, "check angle, or record for longer")
         if not cuts:
             return []
         self._check_rows(cuts)
@@ -154,6 +153,9 @@ class _File:
             signs(mapping.channels, whole, way * self._rate([part.turns for part in parts]), account)
         return [self._condition(part, zeros, drifts, way) for part in parts]
 
+    def _named(self, setting: Setting) -> str:
+        return setting.name or self.path.stem
+
     def _used(self) -> NDArray[np.bool_]:
         if self.entry.over is None:
             return np.ones(self.line.seconds.size, dtype=np.bool_)
@@ -163,7 +165,7 @@ class _File:
     def _share(self, zeros: Mapping[str, Zeroed]) -> tuple[Array, float, Array]:
         """Cycles gone through by row, which way the coordinate runs, and stretches of time in which it is wrong."""
         mapping = self.mapping
-        cycle = float(mapping.cycle.evaluate())  # type: ignore[arg-type]
+        cycle = float(mapping.cycle.evaluate())
         if mapping.timed:
             return self.line.seconds / cycle, 1.0, np.empty((0, 2))
         assert mapping.angle is not None
@@ -180,9 +182,10 @@ class _File:
         if known.size < 3:
             what = "the coordinate of the driver is known in no row that is used"
             raise MechanismError(Finding(what, "angle", "check angle.column", file=self.account.file))
+        clock = np.repeat(self.line.spoilt[:, None], 2, axis=1)
         way = 1.0 if found.values[known[-1]] >= found.values[known[0]] else -1.0
-        start = float(mapping.start.evaluate())  # type: ignore[arg-type]
-        return way * (found.values - start) / cycle, way, found.spoilt
+        start = float(mapping.start.evaluate())
+        return way * (found.values - start) / cycle, way, np.concatenate([found.spoilt, clock])
 
     def _no_turn(self, share: Array, allowed: NDArray[np.bool_]) -> str:
         known = share[np.isfinite(share) & allowed]
@@ -201,41 +204,40 @@ class _File:
                               "record at a fixed rate, or leave out the filter")  # fmt: skip
         order = self.mapping.filter.order
         self.account.say(
-            f"low-pass filter: Butterworth of order {order}, forward and backward, together 3 dB down at {cut_off:g} Hz; "
-            f"gaps up to {100 / cut_off:.3g} ms are bridged for it and stay gaps"
+            f"low-pass filter: Butterworth of order {order}, forward and backward, together 3 dB down at {cut_off:g} Hz"
+            f"; gaps up to {100 / cut_off:.3g} ms are bridged for it and stay gaps"
         )
 
     def _check_rows(self, cuts: Sequence[tuple[Setting, Turns]]) -> None:
-        """Tell how the turns are sampled, whether they are enough and equally fast, and what the filter leaves of them."""
+        """Tell how turns are sampled, whether they are enough and equally fast, and what the filter leaves of them."""
         account, mapping = self.account, self.mapping
         for setting, turns in cuts:
-            where = f"condition {setting.name}" if setting.name else "turns"
+            where = f"condition {self._named(setting)}"
             if turns.numbers.size < 2:
                 account.warn(where, "has one turn: there is no scatter, so no uncertainty", "record two turns or more")
-            steady(turns, setting.name or self.path.stem, account)
+            steady(turns, self.line.step, where, account)
             if turns.density < 1:
-                what = f"the sampling is too slow for {mapping.positions} positions: {turns.density * mapping.positions:.4g} samples a turn"
-                account.warn(
-                    where, f"{what}; between them it is interpolated", "state fewer positions, or sample faster"
-                )
+                samples = f"{turns.density * mapping.positions:.4g} samples a turn for {mapping.positions} positions"
+                what = f"the sampling is slow: {samples}; between them it is interpolated"
+                account.warn(where, what, "state fewer positions, or sample faster")
             length = float(np.mean(turns.end - turns.begin))
-            if mapping.filter is not None and mapping.filter.cut_off.value * length < FEW_HARMONICS:
-                passed = mapping.filter.cut_off.value * length
-                account.note(
-                    where, f"the filter leaves the first {passed:.2g} harmonics of a turn", "state a higher cut-off"
-                )
+            passed = mapping.filter.cut_off.value * length if mapping.filter else np.inf
+            if passed < FEW_HARMONICS:
+                what = f"the filter leaves the first {passed:.2g} harmonics of a turn"
+                account.note(where, what, "state a higher cut-off")
         dense = all(turns.density >= DENSE for _, turns in cuts)
         account.say(
             "values at a position: mean of the samples within half a position to either side"
             if dense else "values at a position: interpolated by a cubic between four samples"
         )  # fmt: skip
-        begin = min(float(turns.begin[0]) for _, turns in cuts)
-        end = max(float(turns.end[-1]) for _, turns in cuts)
         for name, channel in mapping.channels.items():
-            spans = channel.zero.over if isinstance(channel.zero, Zero) else ()
-            if any(low.value < end and high.value > begin for low, high in spans):
-                account.warn(f"channels.{name}.zero", f"the unloaded stretch reaches into the turns, {begin:.4g} to {end:.4g} s",
-                             "state a stretch in which the sensor is not loaded")  # fmt: skip
+            for low, high in channel.zero.over if isinstance(channel.zero, Zero) else ():
+                inside = sum(int(np.sum((one.begin < high.value) & (one.end > low.value))) for _, one in cuts)
+                if inside:
+                    what = (
+                        f"the unloaded stretch {low.value:g} to {high.value:g} s reaches into {counted(inside, 'turn')}"
+                    )
+                    account.warn(f"channels.{name}.zero", what, "state a stretch in which the sensor is not loaded")
 
     def _channel(self, name: str, zero: Zeroed, parts: Sequence[_Part]) -> Drift | None:
         """The courses of a channel, put into the parts; the drift that is left in them."""
@@ -245,26 +247,26 @@ class _File:
         high = int(np.searchsorted(line.seconds, max(float(part.turns.end[-1]) for part in parts), side="right"))
         span = faults.Span(low, high, sum(part.turns.numbers.size for part in parts))
         readings = self.readings.pop(name)
-        faults.signal(where, readings, line.seconds, span, own.limit, account)
+        speed = channel.measures.startswith("rate:")
+        faults.signal(where, readings, line.seconds, span, own.limit, account, speed)
         values = own.quantity(readings, zero, channel.sign, line.seconds)
         if mapping.filter is not None:
             values = filtered(values, line, mapping.filter, account, where)
         for part in parts:
             part.courses[name] = resampled(part.turns, values, line)
-        if channel.measures.startswith("rate:"):  # a speed that creeps is one
+        if speed:  # one that creeps is the drive's
             return None
         found = drift([(part.turns, part.courses[name]) for part in parts])
         if found is None:
             return None
-        factor = f"{found.change:.3g} {own.scale.unit} in {found.span:.4g} s"
-        told = f"the mean of a turn drifts by {factor}, {abs(found.change) / found.scatter:.3g} times what turns scatter about the line"
+        by = f"{found.change:.3g} {own.scale.unit} in {found.span:.4g} s"
+        times = f"{abs(found.change) / max(found.scatter, 1e-300):.3g} times what turns scatter about the line"
+        what, remedy = f"drift: the mean of a turn changes by {by}, {times}", "let sensor and bearings warm up"
         if mapping.drift == "report":
-            account.warn(where, told, "let sensor and bearings warm up, or state drift: remove")
+            account.warn(where, what, f"{remedy}, or state drift: remove")
             return None
         since = self._since(name)
-        account.warn(
-            where, f"{told}; a straight line is taken off, zero at {since:.4g} s", "let sensor and bearings warm up"
-        )
+        account.warn(where, f"{what}; a straight line is taken off, zero at {since:.4g} s", remedy)
         for part in parts:
             part.courses[name] = resampled(part.turns, values - found.slope * (line.seconds - since), line)
         return found
@@ -277,7 +279,7 @@ class _File:
         return float(self.line.seconds[0])
 
     def _rate(self, turns: Sequence[Turns]) -> float:
-        cycle = float(self.mapping.cycle.evaluate())  # type: ignore[arg-type]
+        cycle = float(self.mapping.cycle.evaluate())
         return cycle / float(np.mean(np.concatenate([one.end - one.begin for one in turns])))
 
     def _condition(
@@ -297,20 +299,20 @@ class _File:
             values[path] = float(np.nanmean(courses[channel_name].turns))
         positions = self.mapping.positions
         speed = np.nan if self.mapping.timed else way * self._rate([part.turns])
-        name = part.setting.name or self.path.stem
+        name = self._named(part.setting)
         return Condition(name, values, np.arange(positions) / positions, courses, (str(self.path),), speed)
 
 
 def _columns(mapping: DataMapping, entry: File) -> tuple[list[str], list[str]]:
     """Columns that a file must have, and that of time, which it may tell by itself if it is TDMS."""
-    from trunnion.measured.settings import stated
-
-    wanted, optional = [], []
+    wanted: list[str] = []
+    optional: list[str] = []
     if mapping.time is not None and mapping.time.column is not None:
         (optional if Path(entry.file).suffix.lower() == ".tdms" else wanted).append(mapping.time.column)
     if mapping.angle is not None:
         wanted += [one for one in (mapping.angle.column,) if one is not None]
         wanted += [mapping.angle.index.column] if mapping.angle.index is not None else []
     wanted += [channel.column for channel in mapping.channels.values()]
-    wanted += [one.column for one in stated(mapping, entry).values() if getattr(one, "column", None) is not None]
+    columns = [one.column for one in stated(mapping, entry).values() if isinstance(one, FromData)]
+    wanted += [one for one in columns if one is not None]
     return wanted, optional

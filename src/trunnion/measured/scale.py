@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Annotated
 
 from pydantic import AfterValidator
@@ -15,6 +16,7 @@ from trunnion.model.units import UnitError
 
 __all__ = ["QUANTITIES", "MeasureText", "Scale", "default_unit", "scale"]
 
+NONE = Fraction(0)
 # SI units that a kind of measure may have, the first being what a plain number is taken for
 QUANTITIES: dict[str, tuple[str, ...]] = {
     "effort": ("N m", "N"),
@@ -96,15 +98,17 @@ def scale(measures: str, unit: str, gain: Amount | None) -> Scale:
     if gain.value == 0:
         raise UnitError("the gain is zero", "write reading per quantity, such as 100 mV/(N m)")
     ways = {
-        1: {key: of_reading.get(key, 0) + gain.dimensions.get(key, 0) for key in {*of_reading, *gain.dimensions}},
-        -1: {key: of_reading.get(key, 0) - gain.dimensions.get(key, 0) for key in {*of_reading, *gain.dimensions}},
+        1: {key: of_reading.get(key, NONE) + gain.dimensions.get(key, NONE) for key in {*of_reading, *gain.dimensions}},
+        -1: {
+            key: of_reading.get(key, NONE) - gain.dimensions.get(key, NONE) for key in {*of_reading, *gain.dimensions}
+        },
     }
     kind = _kind(measures)
     for power, found in ways.items():
         known = QUANTITIES.get(kind, ())
         name = next((one for one in known if alike(found, dimensions(one)[1])), "")
         if not kind and not {"ampere", "kelvin"} & {key for key, value in found.items() if value}:
-            name = unit_name({key: value for key, value in found.items() if value})  # type: ignore[misc]
+            name = unit_name({key: value for key, value in found.items() if value})
         if name:
             factor = raw * gain.value**power
             return Scale(factor, name, raw, of_reading, dimensions(name)[1])

@@ -46,7 +46,7 @@ def settings(mapping: DataMapping, entry: File, table: Table, line: Timeline, ac
     columns: dict[str, FromData] = {}
     for path, one in stated(mapping, entry).items():
         if isinstance(one, Quantity):
-            values[path] = float(one.evaluate())  # type: ignore[arg-type]
+            values[path] = float(one.evaluate())
             texts[path] = str(one.source)
         elif one.mean is not None:
             means[path] = one.mean

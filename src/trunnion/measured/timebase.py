@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,8 @@ UNEVEN = 0.2  # of the usual step, standard deviation
 class Timeline:
     """Rising times of the rows that are kept.
 
-    seconds: (row,); kept: rows of the table, None if all; step: the usual one, s; breaks: rows that follow a gap.
+    seconds: (row,); kept: rows of the table, None if all; step: the usual one, s; breaks: rows that follow a gap;
+    even: whether the samples are evenly spaced but for gaps; spoilt: times at which the clock ran backward.
     """
 
     seconds: Array
@@ -32,6 +33,7 @@ class Timeline:
     step: float
     breaks: NDArray[np.intp]
     even: bool = True
+    spoilt: Array = field(default_factory=lambda: np.empty(0))
 
     def rows(self, values: Array) -> Array:
         """The values of the rows that are kept."""
@@ -42,7 +44,7 @@ def timeline(table: Table, base: TimeBase | None, account: Account) -> Timeline:
     """Time of the rows of a table by the mapping, else by what the file itself tells of its sampling."""
     if base is not None and base.rate is not None:
         step = 1.0 / base.rate.value
-        return Timeline(np.arange(table.rows) * step, None, step, np.empty(0, dtype=np.intp))
+        return Timeline(_counted(table.rows) * step, None, step, np.empty(0, dtype=np.intp))
     if base is None or base.column not in table.columns:
         if table.interval is None:
             what = "nothing tells the time of its rows"
@@ -50,9 +52,13 @@ def timeline(table: Table, base: TimeBase | None, account: Account) -> Timeline:
             raise MechanismError(Finding(what, "time", remedy, file=table.file))
         start, step = table.interval
         account.say(f"time is that of the waveforms: every {step:.6g} s")
-        return Timeline(start + np.arange(table.rows) * step, None, step, np.empty(0, dtype=np.intp))
+        return Timeline(start + _counted(table.rows) * step, None, step, np.empty(0, dtype=np.intp))
     column = table.columns[str(base.column)]
     return _stated(column.values * _factor(base, column, account), account)
+
+
+def _counted(rows: int) -> Array:
+    return np.arange(rows, dtype=np.float64)
 
 
 def _factor(base: TimeBase, column: Column, account: Account) -> float:
@@ -74,7 +80,7 @@ def _stated(seconds: Array, account: Account) -> Timeline:
     finite = np.isfinite(seconds)
     highest = np.maximum.accumulate(np.where(finite, seconds, -np.inf))
     rising = finite & (seconds > np.concatenate([[-np.inf], highest[:-1]]))
-    lost, total = np.count_nonzero(~finite), seconds.size
+    lost, total = int(np.count_nonzero(~finite)), seconds.size
     if lost:
         what = f"{counted(lost, 'row')} of {total:,} {'has' if lost == 1 else 'have'} no time"
         account.warn("time", f"{what}; left out", "check the logger, or state time: {rate: …}")
@@ -82,7 +88,7 @@ def _stated(seconds: Array, account: Account) -> Timeline:
     if kept.size < 3:
         what = f"the time rises in {kept.size} of {counted(total, 'row')}"
         raise MechanismError(Finding(what, "time", "check that time.column is the right one", file=account.file))
-    _backward(seconds, finite, rising, account)
+    spoilt = _backward(seconds, finite, rising, account)
     clean = seconds[kept] if kept.size < total else seconds
     steps = np.diff(clean)
     step = float(np.median(steps))
@@ -90,11 +96,11 @@ def _stated(seconds: Array, account: Account) -> Timeline:
     wide = steps > GAP * step
     usual = steps[~wide] / step
     spread = float(np.std(usual)) if usual.size else 0.0
-    return Timeline(clean, kept if kept.size < total else None, step, np.flatnonzero(wide) + 1, spread < UNEVEN)
+    return Timeline(clean, kept if kept.size < total else None, step, np.flatnonzero(wide) + 1, spread < UNEVEN, spoilt)
 
 
-def _backward(seconds: Array, finite: NDArray[np.bool_], rising: NDArray[np.bool_], account: Account) -> None:
-    """Tell of rows whose time repeats or runs backward."""
+def _backward(seconds: Array, finite: NDArray[np.bool_], rising: NDArray[np.bool_], account: Account) -> Array:
+    """Tell of rows whose time repeats or runs backward; the times of the latter."""
     stated = seconds[finite]
     steps = np.diff(stated)
     repeated, back = np.flatnonzero(steps == 0), np.flatnonzero(steps < 0)
@@ -104,12 +110,13 @@ def _backward(seconds: Array, finite: NDArray[np.bool_], rising: NDArray[np.bool
         what = f"the time repeats in {counted(repeated.size, 'row')} of {stated.size:,}, {times(stated[repeated])}"
         account.warn("time", f"{what}; these rows are left out", remedy)
     if back.size:
-        out = np.count_nonzero(finite & ~rising) - repeated.size
+        out = int(np.count_nonzero(finite & ~rising)) - repeated.size
         what = (
             f"the time runs backward {counted(back.size, 'time')}, {times(stated[back])}, by up to {-steps.min():.4g} s"
         )
         remedy = "split the file where a new recording begins, or check the logger's clock"
         account.warn("time", f"{what}; {counted(max(out, 1), 'row')} left out until it has passed", remedy)
+    return np.asarray(stated[back])
 
 
 def _tell_gaps(seconds: Array, steps: Array, step: float, account: Account) -> None:

@@ -28,7 +28,7 @@ class Turns:
     """Whole turns of one condition in a file.
 
     share: (row,), the cycle counted on, rising, whole at the start of each; numbers: of the turns; begin, end: their
-    times, s; rows: those that belong to them; positions: how many a turn.
+    times, s; rows: those that belong to them; positions: how many a turn; step: between samples, s.
     """
 
     share: Array
@@ -37,22 +37,22 @@ class Turns:
     end: Array
     rows: Mask
     positions: int
+    step: float
 
     @property
     def density(self) -> float:
         """Samples a position."""
-        whole = self.numbers.size * self.positions
-        return float(np.count_nonzero(self.rows)) / whole if whole else 0.0
+        return float(np.mean(self.end - self.begin)) / (self.step * self.positions) if self.numbers.size else 0.0
 
 
 def cut(
-    share: Array, line: Timeline, allowed: Mask, positions: int, spoilt: Array, account: Account, name: str = ""
+    share: Array, line: Timeline, allowed: Mask, positions: int, spoilt: Array, account: Account, name: str
 ) -> Turns:
     """The whole turns among the rows that are allowed; those left out are told.
 
     share: cycles gone through, rising with time, NaN where not known; spoilt: stretches of time to leave out.
     """
-    where = f"condition {name}" if name else "turns"
+    where = f"condition {name}"
     known = np.isfinite(share)
     highest = np.maximum.accumulate(np.where(known, share, -np.inf))
     begin, end, numbers = _whole(share, highest, line)
@@ -63,24 +63,22 @@ def cut(
     if numbers.size:
         usual = float(np.median(lengths))
         odd = np.abs(lengths / usual - 1) > APART
-        if np.any(odd):
-            told = f"{counted(int(np.count_nonzero(odd)), 'turn')} of {numbers.size} last" + "s" * (np.sum(odd) == 1)
-            span = (
-                f"{lengths[odd].min():.4g} to {lengths[odd].max():.4g} s"
-                if np.sum(odd) > 1
-                else f"{lengths[odd][0]:.4g} s"
-            )
-            account.note(where, f"{told} {span} where {usual:.4g} s is usual, and {'is' if np.sum(odd) == 1 else 'are'} left out",
-                         "the drive starts, stops or stands there; state files: over: if it should not count")  # fmt: skip
+        if count := int(np.count_nonzero(odd)):
+            low, high = lengths[odd].min(), lengths[odd].max()
+            span = f"{low:.4g} to {high:.4g} s" if count > 1 else f"{low:.4g} s"
+            what = f"{counted(count, 'turn')} of {numbers.size} {'lasts' if count == 1 else 'last'} {span}"
+            what = f"{what} where {usual:.4g} s is usual, and {'is' if count == 1 else 'are'} left out"
+            account.note(where, what, "the drive starts, stops or stands there; files: over: can name what counts")
         keep &= ~odd
     if len(spoilt):
         hit = np.zeros(numbers.size, dtype=np.bool_)
         for low, high in spoilt:
-            hit |= (begin < high) & (end > low)
+            slack = min(line.step, 0.25 * (high - low))  # an index may lie where a turn begins
+            hit |= (begin <= high - slack) & (end >= low + slack)
         keep &= ~hit
     numbers, begin, end = numbers[keep], begin[keep], end[keep]
     rows = _rows_of(share, numbers, begin, end, line, known & allowed, positions)
-    return Turns(share, numbers, begin, end, rows, positions)
+    return Turns(share, numbers, begin, end, rows, positions, line.step)
 
 
 def _whole(share: Array, highest: Array, line: Timeline) -> tuple[Array, Array, NDArray[np.intp]]:
@@ -89,7 +87,10 @@ def _whole(share: Array, highest: Array, line: Timeline) -> tuple[Array, Array, 
     if np.count_nonzero(finite) < 3:
         return np.empty(0), np.empty(0), np.empty(0, dtype=np.intp)
     first = int(np.argmax(finite))
-    rising, seconds = highest[first:], line.seconds[first:]
+    last = int(np.searchsorted(highest, highest[-1]))  # what follows stands, or is not known
+    rising, seconds = highest[first : last + 1], line.seconds[first : last + 1]
+    if rising.size < 3:
+        return np.empty(0), np.empty(0), np.empty(0, dtype=np.intp)
     steps = np.diff(rising)
     usual = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.0
     low, high = int(np.ceil(rising[0] - 1.01 * usual)), int(np.floor(rising[-1] + 1.01 * usual))
@@ -165,7 +166,7 @@ def _averaged(turns: Turns, values: Array) -> Array:
 
 
 def _interpolated(turns: Turns, values: Array, line: Timeline) -> Array:
-    """A cubic through the four samples about each position; a straight line between two where one of them is missing."""
+    """A cubic through the four samples about a position; a straight line between two where one of them is missing."""
     known = np.isfinite(turns.share)
     highest = np.maximum.accumulate(np.where(known, turns.share, -np.inf))
     rows = np.flatnonzero(known & (turns.share > np.concatenate([[-np.inf], highest[:-1]])))
@@ -205,7 +206,8 @@ def _cubic(x: Array, y: Array, at: Array) -> Array:
 def turn_means(course: Array) -> Array:
     """Mean of each turn over the positions that most turns have, (turn,); NaN where one lacks many of them."""
     finite = np.isfinite(course)
-    usual = np.nanmean(np.where(finite.any(axis=0), course, np.nan), axis=0) if course.size else np.empty(0)
-    level = float(np.nanmean(usual)) if usual.size and np.isfinite(usual).any() else np.nan
+    count = finite.sum(axis=0)
+    usual = np.where(finite, course, 0.0).sum(axis=0) / np.maximum(count, 1)
+    level = float(usual[count > 0].mean()) if np.any(count) else np.nan
     left = np.where(finite, course - usual, 0.0).sum(axis=1) / np.maximum(finite.sum(axis=1), 1)
     return np.where(finite.mean(axis=1) > 0.5, level + left, np.nan)

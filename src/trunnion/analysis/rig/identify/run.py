@@ -120,8 +120,8 @@ def identified(
     problem = Problem(model, blocks, sensors_of(blocks, names, delay), guard)
     found = search(problem, starts)
     spread = spread_of(problem, found.fit.x)
-    if spread.test.misfit and problem.sensors:
-        problem.left_over = left_over(problem, spread)
+    problem.left_over = left_over(problem, spread)
+    if problem.left_over > 1 and problem.sensors:
         found = replace(found, fit=fit(problem, found.fit.x))
         spread = spread_of(problem, found.fit.x)
     groups = inseparable(problem, found.fit.x, spread)

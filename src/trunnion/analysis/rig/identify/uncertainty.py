@@ -352,10 +352,13 @@ def _weighed(problem: Problem, x: Array, k: int) -> tuple[float, Array, float]:
 
 
 def left_over(problem: Problem, spread: Spread) -> float:
-    """How much more than the scatter the misfit moves the estimates, as variances; 1 without one."""
-    misfit, scatter = (np.diagonal(spread.parts[key])[: problem.count] for key in ("misfit", "scatter"))
-    known = scatter > 0
-    return 1.0 + float(np.mean(misfit[known] / scatter[known])) if np.any(known) else 1.0
+    """How much more than the scatter the misfit and the conditions move the estimates, as variances; 1 without."""
+    more = np.diagonal(np.sum([spread.parts[key] for key in RANDOM if key in spread.parts], axis=0))
+    scatter = np.diagonal(spread.parts["scatter"])
+    known = scatter[: problem.count] > 0
+    return (
+        float(np.mean((more / np.where(scatter > 0, scatter, 1.0))[: problem.count][known])) if np.any(known) else 1.0
+    )
 
 
 def _left_over(problem: Problem, x: Array, inverse: Array, again: bool) -> tuple[Array, float]:

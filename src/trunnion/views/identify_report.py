@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 __all__ = ["report"]
 
+FEW = 2  # estimates whose correlation needs no picture
 DEFINITIONS = (
     (
         "Estimate",
@@ -101,12 +102,13 @@ def _told(one: Any) -> tuple[str, str]:
 
 def _sections(result: xr.Dataset) -> list[dict[str, Any]]:
     """Parts of the page: a title, what it is about, a picture, tables."""
+    told = [one for one in estimates(result) if one.told]
     several = correlations(result)
     held = held_out(result)
     unheld = "Measured less model over the cycle before and after; of many conditions some."
     found = [
         _section("Estimates", result, "intervals", [estimated(result), budget(result), sensors(result)]),
-        _section("Correlation", result, "correlation", [several]) if several else None,
+        _section("Correlation", result, "correlation" if len(told) > FEW else "", [several]) if several else None,
         _section("Residuals", result, "residuals", [fits(result)], unheld),
         _section("Held out", result, "", [held], "What was not fitted, and how well it is predicted.")
         if held

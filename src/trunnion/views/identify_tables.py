@@ -117,13 +117,16 @@ def sensors(result: xr.Dataset) -> Table | None:
 
 
 def budget(result: xr.Dataset) -> Table | None:
-    """Share of each source in the variance of each estimate."""
+    """Share of each source in the variance of each estimate; of sources that are anything."""
     told = [one for one in estimates(result) if one.told]
+    sources = [name for name in names(result, "source") if any(one.shares[name] >= LEAST for one in told)]
     if not told:
         return None
-    sources = names(result, "source")
-    rows = [[one.short, *(percent(one.shares[name]) for name in sources)] for one in told]
-    return Table("where the uncertainty comes from", ["share of the variance", *sources], rows)
+    rows = [[name, *(percent(one.shares[name]) for one in told)] for name in sources]
+    return Table("where the uncertainty comes from", ["share of the variance", *(one.short for one in told)], rows)
+
+
+LEAST = 0.005
 
 
 def _figure(value: float, factor: float) -> str:

@@ -195,9 +195,10 @@ def _sensors(judged: Judged) -> Iterator[Finding]:
             what = f"comes out {abs(judged.found.x[s]):.1f} standard uncertainties from what is stated of it"
             remedy = "check the sensor, its stated accuracy, and the loads of the model"
             yield Finding(what, sensor.name, remedy, Severity.WARNING)
-    exact = [
-        block.channel for block in problem.blocks if not (block.course.accuracy.zero or block.course.accuracy.gain)
-    ]
+    known = (
+        (one.channel, one.effects or one.course.accuracy.zero or one.course.accuracy.gain) for one in problem.blocks
+    )
+    exact = [channel for channel, told in known if not told]
     if exact:
         channels = _joined(list(dict.fromkeys(exact)))
         what = f"no accuracy is stated of {channels}: zero and gain are taken as exact"
@@ -239,7 +240,7 @@ def _held(judged: Judged) -> Iterator[Finding]:
         yield Finding(what, "hold_out", severity=Severity.NOTE)
     elif trust > POOR:
         what = f"what was held out ({names}) is missed by {trust:.1f} times what its scatter and the estimates explain"
-        yield Finding(what, "hold_out", "the model lacks something that differs there", Severity.WARNING)
+        yield Finding(what, "hold_out", "it lacks something that differs there", Severity.WARNING)
     else:
         what = f"what was held out ({names}) is missed by {trust:.2f} times what its scatter and the estimates explain"
         yield Finding(what, "hold_out", severity=Severity.NOTE)

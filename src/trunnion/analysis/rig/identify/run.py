@@ -62,7 +62,7 @@ def identify(
     hold_out: HoldOut = None,
     sensors: Errors = "channel",
     delay: float | None = None,
-    guard: int = 1,
+    guard: int | None = None,
     starts: int | None = None,
     method: FrictionMethod | None = None,
 ) -> xr.Dataset:
@@ -75,7 +75,8 @@ def identify(
     hold_out: conditions by name, file or setting, or the share of the turns of each (the last), that are not fitted but
     predicted. sensors: whether zero and gain of a channel are off by the same in all conditions, or in each by its own.
     delay: standard uncertainty, s, of the time by which a channel lags behind the angle, as its bandwidth makes it;
-    what it is in fact is estimated too. guard: positions left out on each side of a change of the sense of a friction.
+    what it is in fact is estimated too. guard: positions left out on each side where the sense of a friction changes;
+    one for every 90 of a cycle if not given.
     starts: places to begin at; more than one if the model does not fit and it is not given.
     Method: weighted least squares with exact derivatives, trust region; covariances by the scatter between turns.
     Raises MechanismError for names, channels or conditions that are not there, or where the model has no answer.
@@ -95,7 +96,7 @@ def identified(
     hold_out: HoldOut = None,
     sensors: Errors = "channel",
     delay: float | None = None,
-    guard: int = 1,
+    guard: int | None = None,
     starts: int | None = None,
     method: FrictionMethod | None = None,
 ) -> Identified:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import functools
+import re
 from pathlib import Path
 
 import pytest
 
 from manual.conftest import Run, program
 from trunnion.errors import MechanismError
+from trunnion.measured import rig_file
 from trunnion.measured.rig_file import Rig
 
 __all__ = ["program"]
@@ -117,6 +119,25 @@ def test_examples_of_rigs_are_read(path: Path) -> None:
     rig = Rig.read(path)
     assert rig.name
     assert rig.sensors
+
+
+def test_the_page_tells_every_key() -> None:
+    """Each key of a rig file, and each kind of fault, is on the page."""
+    page = (EXAMPLES.parent / "docs" / "how-to" / "virtual-rig.md").read_text("utf-8")
+    parts = (
+        Rig,
+        rig_file.Schedule,
+        rig_file.Encoder,
+        rig_file.Sensor,
+        rig_file.Accuracy,
+        rig_file.Fault,
+        rig_file.Idle,
+    )
+    for part in parts:
+        for name, field in part.model_fields.items():
+            assert re.search(rf"\b{re.escape(field.alias or name)}\b", page), (part.__name__, name)
+    for kind in rig_file.FAULTS:
+        assert f"kind: {kind}" in page
 
 
 def test_a_range_keeps_its_unit() -> None:

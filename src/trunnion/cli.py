@@ -36,6 +36,7 @@ from trunnion.verbs.allocate import allocate
 from trunnion.verbs.assemble import assemble
 from trunnion.verbs.compare import compare
 from trunnion.verbs.data import data
+from trunnion.verbs.identify import identify
 from trunnion.verbs.model import exit_status, lines_of, placed, stated
 from trunnion.verbs.rig import rig
 from trunnion.verbs.study import tolerance
@@ -189,6 +190,7 @@ app.command()(allocate)
 app.command()(data)
 app.command()(rig)
 app.command()(compare)
+app.command()(identify)
 app.command()(sweep)
 
 

@@ -163,6 +163,16 @@ def test_other_friction_is_not_put_on_a_sensor():
     assert said(result, "efficiency", "not within U", "identify")
 
 
+def test_an_offset_that_changes_with_the_condition_is_the_models():
+    settings = ({"A.speed": 4.0}, {"A.speed": 6.0})
+    found = measured(settings=settings, wrong=wrong_in("torque", lambda true: true + 1.5))
+    second = found.conditions[1]
+    torque = replace(second.courses["torque"], turns=second.courses["torque"].turns + 1.0)
+    courses = {**second.courses, "torque": torque}
+    result = compare(replace(found, conditions=(found.conditions[0], replace(second, courses=courses))))
+    assert said(result, "offset of +1.5 to +2.5 N m", "not at the sensor")
+
+
 def test_a_driver_at_another_speed_is_named():
     other = measured(settings=({"A.speed": 6.0},), channels=("speed", "out"))
     conditions = tuple(replace(one, values={}, speed=6.0) for one in other.conditions)

@@ -142,6 +142,8 @@ def _points(axes: Axes, result: xr.Dataset, over: Scale, where: Indices, look: d
     axes.plot(x, model, linewidth=1.6, marker="" if joined else "_", markersize=12, zorder=2.5,
               **{**look, "linestyle": look["linestyle"] if joined else "none"})  # fmt: skip
     known = np.isfinite(model)
+    if joined and np.count_nonzero(known) == 1:  # a line of one point is none
+        axes.plot(x[known], model[known], "_", markersize=14, markeredgewidth=1.6, color=look["color"], zorder=2.5)
     ends = known & (np.append(False, ~known[:-1]) | np.append(~known[1:], False))
     if joined and ends.any():  # beside a gap, as a sweep draws it
         axes.plot(x[ends], model[ends], "x", markersize=7, color=look["color"], markeredgewidth=1.6, zorder=4)
@@ -256,6 +258,9 @@ def _panel(part: FigureBase, result: xr.Dataset, channel: int, condition: int) -
     residual = np.where(row("compared") > 0, row("residual"), np.nan) * factor
     _band(below, over, 0.0 * wide, wide, True, None)
     curve(below, over, residual, None, color=MEASURED, linewidth=1.1)
+    peak = np.nanmax(np.abs(np.append(measured, row("model") * factor)), initial=0.0)
+    if np.nanmax(np.abs(np.append(residual, wide)), initial=0.0) < 1e-6 * peak:  # nothing to look at closer
+        below.set_ylim(-1e-3 * peak, 1e-3 * peak)
     one = result.isel(condition=condition, position=slice(0, count))
     for axes in (above, below):
         shade(axes, one, over)

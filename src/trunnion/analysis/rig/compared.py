@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from trunnion import __version__
 from trunnion.analysis.account import PEZZUTI, finding_row, inputs, references
 from trunnion.analysis.friction import FrictionMethod
-from trunnion.analysis.rig.judge import Verdict, expanded, probability, uncertainty_of
+from trunnion.analysis.rig.judge import Verdict, difference, expanded, probability, uncertainty_of
 from trunnion.analysis.rig.pairs import Compared, Pair
 from trunnion.analysis.rig.said import findings_of, gathered, units_set
 from trunnion.errors import Status
@@ -143,7 +143,7 @@ def _fill_channel(arrays: dict[str, Array], at: tuple[int, int], one: Compared, 
     rows = {
         "measured": course.mean, "scatter": course.scatter, "uncertainty": of.total,
         "expanded": expanded(of.total, of.freedom, coverage), "model": pair.model,
-        "residual": course.mean - pair.model, "compared": there,
+        "residual": difference(course.mean, pair.model), "compared": there,
     }  # fmt: skip
     for name, row in rows.items():
         arrays[name][(*at, slice(0, count))] = row

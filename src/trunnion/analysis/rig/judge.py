@@ -18,7 +18,10 @@ from numpy.typing import NDArray
 
 from trunnion.measured.measurement import Course
 
-__all__ = ["Judged", "Uncertainty", "Verdict", "expanded", "independent", "judge", "probability", "uncertainty_of"]
+__all__ = [
+    "Judged", "Uncertainty", "Verdict", "difference", "expanded", "independent", "judge", "probability",
+    "uncertainty_of",
+]  # fmt: skip
 
 Array = NDArray[np.float64]
 SURE = 2.326  # standard deviations: the share of a true model falls below its least in 1 % of courses
@@ -122,9 +125,8 @@ def judge(course: Course, model: Array, comparable: NDArray[np.bool_], coverage:
     if not np.any(where):
         return Judged()
     measured, theirs = course.mean[where], model[where]
-    residual = measured - theirs
+    residual = difference(measured, theirs)
     size = float(np.max(np.abs(np.append(measured, theirs))))
-    residual = np.where(np.abs(residual) <= ROUNDING * size, 0.0, residual)
     bias = float(np.mean(residual))
     of = _at(uncertainty_of(course), where)
     worst = int(np.argmax(np.abs(residual)))
@@ -144,6 +146,13 @@ def judge(course: Course, model: Array, comparable: NDArray[np.bool_], coverage:
         int(np.count_nonzero(where)), _rms(residual), float(residual[worst]), int(np.flatnonzero(where)[worst]),
         bias, _bias_expanded(of, coverage), _rms(unbiased), share, least, _correlation(measured, theirs), verdict,
     )  # fmt: skip
+
+
+def difference(measured: Array, model: Array) -> Array:
+    """Measured less model, 0 where it is rounding."""
+    residual = measured - model
+    size = float(np.nanmax(np.abs(np.append(measured, model)), initial=0.0))
+    return np.where(np.abs(residual) <= ROUNDING * size, 0.0, residual)
 
 
 def _rms(values: Array) -> float:

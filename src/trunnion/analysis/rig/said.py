@@ -56,7 +56,7 @@ def units_set(mechanism: Mechanism, names: Iterable[str]) -> tuple[list[str], li
         row = known.get(mechanism.path_of(name), {"unit": "", "text": ""})
         literal = LITERAL.fullmatch(row["text"].strip().removeprefix("-"))
         text = (literal["unit"] or literal["per"] or "") if literal else ""
-        text = text or {"rad": "deg", "rad/s": "rpm"}.get(row["unit"], row["unit"])
+        text = text or {"rad": "deg"}.get(row["unit"], row["unit"])
         units.append(row["unit"])
         written.append((text, float(unit_of(text)[0]) if text and text != "1" else 1.0))
     return units, written
@@ -171,42 +171,50 @@ def _size(pair: Pair, kind: str) -> Cause:
     return Cause("zero", judged.bias, (judged.bias / judged.rms) ** 2)
 
 
+REMEDIES = {
+    "sign": "state sign: -1 of the channel in the mapping, or take it away",
+    "zero": "look at the zero of the channel, or at what loads the model lacks",
+    "gain": "look at the gain of the channel and its unit, or at friction and loads of the model",
+    "shift": "look at the zero of the angle, and at delays of the channel",
+    "zero and gain": "look at zero and gain of the channel",
+}
+MODEL = "it is not the same in all conditions: look at friction and loads of the model, not at the sensor"
+
+
 def _story(
     name: str, measures: str, kind: str, sizes: Sequence[Cause], members: Sequence[tuple[Compared, Pair]]
 ) -> tuple[str, str]:
     """What would explain it, with its size, and what to do about it."""
     first, pair = members[0]
     unit, values = pair.course.unit, [one.size for one in sizes]
-    drives = list(first.model.run.system.mechanism.drivers)
-    if kind == "sign":
-        how = f", correlation {pair.judged.correlation:+.3f}" if np.isfinite(pair.judged.correlation) else ""
-        return f"a wrong sign{how}", "state sign: -1 of the channel in the mapping, or take it away"
-    if measures.partition(":")[0] == "rate" and measures.partition(":")[2] in drives and kind in ("zero", "gain"):
+    subject = measures.removeprefix("rate:")
+    if subject in first.model.run.system.mechanism.drivers and kind in ("zero", "gain"):
         speed = float(np.nanmean(pair.course.mean))
-        remedy = (
-            f"set: {{{measures.partition(':')[2]}.speed: {{mean: {name}}}}} in the mapping takes the speed that was"
-        )
-        told = _range(values, unit if kind == "zero" else "1")
+        told = _range(values, unit) if kind == "zero" else _percent(values)
+        remedy = f"set: {{{subject}.speed: {{mean: {name}}}}} in the mapping takes the speed that was"
         return f"another speed of the driver, measured {said(speed, unit)} ({KINDS[kind]} of {told})", remedy
-    if kind == "zero":
-        return (
-            f"a constant offset of {_range(values, unit)}",
-            "look at the zero of the channel, or at what loads the model lacks",
-        )
-    if kind == "gain":
-        return (
-            f"a gain that is off by {_percent(values)}",
-            "look at the gain of the channel and its unit, or at friction and loads of the model",
-        )
-    if kind == "shift":
-        return _ahead(
-            values, [one for one, _ in members]
-        ), "look at the zero of the angle, and at delays of the channel"
-    gains = [one.gain for one in sizes]
-    return (
-        f"an offset of {_range(values, unit)} and a gain off by {_percent(gains)}",
-        "look at zero and gain of the channel",
-    )
+    if kind == "sign":
+        alike = pair.judged.correlation
+        told = "a wrong sign" + (f", correlation {alike:+.3f}," if np.isfinite(alike) else "")
+    elif kind == "zero":
+        told = f"a constant offset of {_range(values, unit)}"
+    elif kind == "gain":
+        told = f"a gain that is off by {_percent(values)}"
+    elif kind == "shift":
+        told = _ahead(values, [one for one, _ in members])
+    else:
+        told = f"an offset of {_range(values, unit)} and a gain off by {_percent([one.gain for one in sizes])}"
+    return told, MODEL if kind in ("zero", "gain") and _differ(kind, sizes, members) else REMEDIES[kind]
+
+
+def _differ(kind: str, sizes: Sequence[Cause], members: Sequence[tuple[Compared, Pair]]) -> bool:
+    """Whether an offset or a gain changes with the condition by more than its uncertainty, as no sensor's does."""
+    values = [one.size for one in sizes]
+    spread = max(values) - min(values)
+    known = [pair.judged.bias_expanded for _, pair in members]
+    typical = [max(abs(float(np.nanmean(pair.course.mean))), 1e-300) for _, pair in members]
+    wide = [one if kind == "zero" else one / size for one, size in zip(known, typical, strict=True)]
+    return bool(spread > 2 * np.nanmax([*wide, 0.0]) and spread > 0.1 * abs(values[0]))
 
 
 def _percent(values: Sequence[float]) -> str:
@@ -219,7 +227,10 @@ def _percent(values: Sequence[float]) -> str:
 
 def _ahead(shares: Sequence[float], found: Sequence[Compared]) -> str:
     spans = [share * one.model.span for share, one in zip(shares, found, strict=True)]
-    return f"the crank angle read off by {_range(spans, found[0].model.unit)}"
+    late = [-share * one.model.run.cycle.duration * 1e3 for share, one in zip(shares, found, strict=True)]
+    return (
+        f"the crank angle read off by {_range(spans, found[0].model.unit)}, or a delay of {_range(late, 'ms', False)},"
+    )
 
 
 def _shifted(found: Sequence[Compared]) -> list[tuple[str, Compared, Cause]]:

@@ -47,6 +47,11 @@ def test_plan_and_files(run: Run, tmp_path: Path) -> None:
     assert "joints.B.friction.coefficient: 0.05" in (tmp_path / "data" / "truth.yaml").read_text("utf-8")
 
 
+def test_files_in_the_wrong_order(run: Run) -> None:
+    assert "name the model first" in run(RIG, FOUR_BAR).err
+    assert "is no rig file" in run(FOUR_BAR, FOUR_BAR).err
+
+
 def test_left_out_conditions_end_with_1(run: Run, tmp_path: Path) -> None:
     text = RIG.read_text("utf-8").replace("work.resisting_torque: 2 N m", "l2: 80 mm")
     (tmp_path / "rig.yaml").write_text(text, encoding="utf-8")

@@ -221,9 +221,9 @@ def observe(
 ) -> Observation:
     """Put a rig to a mechanism: solve the model in all conditions of the schedule, draw the errors of the sensors.
 
-    rig: a Rig, the entries of a rig file, or its path; seed: of all random numbers: the same seed, the same readings to the last
-    bit; progress: called with the conditions done. A condition that the model cannot be in at every position, because
-    it locks or does not go together, is left out, and a finding says which and why.
+    rig: a Rig, the entries of a rig file, or its path; seed: of all random numbers: the same seed, the same readings to
+    the last bit; progress: called with the conditions done. A condition that the model cannot be in at every position,
+    because it locks or does not go together, is left out, and a finding says which and why.
     Raises MechanismError for a rig that does not fit the mechanism, or if no condition is left.
     """
     check_seed(seed)

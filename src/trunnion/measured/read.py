@@ -15,7 +15,7 @@ from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.measured import faults
 from trunnion.measured.account import Account, counted, told
 from trunnion.measured.angle import Coordinate, coordinate
-from trunnion.measured.channels import Reading, Zeroed, filtered, reading, zeroed
+from trunnion.measured.channels import Reading, Zeroed, filtered, reading, resolution, zeroed
 from trunnion.measured.courses import Drift, drift, signs, steady
 from trunnion.measured.mapping import DataMapping, File, FromData, Mapped, Zero, read_mapping
 from trunnion.measured.measurement import Accuracy, Condition, Course, Measurement
@@ -117,6 +117,7 @@ class _File:
             self._check_filter(table)
         self.own: dict[str, Reading] = {}
         self.readings: dict[str, Array] = {}
+        self.steps: dict[str, float] = {}
         for name, channel in mapping.channels.items():
             column = table.columns[channel.column]
             self.own[name] = reading(name, channel, column, account)
@@ -247,6 +248,7 @@ class _File:
         high = int(np.searchsorted(line.seconds, max(float(part.turns.end[-1]) for part in parts), side="right"))
         span = faults.Span(low, high, sum(part.turns.numbers.size for part in parts))
         readings = self.readings.pop(name)
+        self.steps[name] = abs(own.scale.factor) * resolution(readings[low:high])
         speed = channel.measures.startswith("rate:")
         faults.signal(where, readings, line.seconds, span, own.limit, account, speed)
         values = own.quantity(readings, zero, channel.sign, line.seconds)
@@ -292,7 +294,7 @@ class _File:
             left = drifts[name]
             extra = left.error * left.span / 2 if left else 0.0
             zero = float(np.hypot(np.hypot(own.accuracy_zero, abs(own.scale.factor) * zeros[name].uncertainty), extra))
-            accuracy = Accuracy(zero, own.accuracy_gain)
+            accuracy = Accuracy(zero, own.accuracy_gain, self.steps[name])
             courses[name] = Course(name, channel.measures, own.scale.unit, part.courses[name], accuracy)
         values = dict(part.setting.values)
         for path, channel_name in part.setting.means.items():

@@ -159,9 +159,11 @@ def _averaged(turns: Turns, values: Array) -> Array:
     with np.errstate(invalid="ignore", divide="ignore"):
         mean = np.bincount(number, weights=used, minlength=size) / count
         centre = np.bincount(number, weights=off, minlength=size) / count
-    slope = np.zeros(size)
-    slope[1:-1] = 0.5 * (mean[2:] - mean[:-2])
-    mean = mean - np.where(np.isfinite(slope), slope, 0.0) * centre
+    rise = np.diff(mean) / np.maximum(1.0 + np.diff(centre), 0.5)
+    sides = np.stack([np.append(rise, np.nan), np.insert(rise, 0, np.nan)])
+    there = np.isfinite(sides)
+    slope = np.where(there, sides, 0.0).sum(axis=0) / np.maximum(there.sum(axis=0), 1)
+    mean = mean - slope * centre
     return np.asarray(mean.reshape(-1, turns.positions)[turns.numbers - turns.numbers[0]])
 
 

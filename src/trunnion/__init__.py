@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from trunnion.analysis.inspect import Check, check
     from trunnion.analysis.locking import locking
     from trunnion.analysis.play import play
+    from trunnion.analysis.rig.compare import compare
     from trunnion.analysis.rig.virtual import observe
     from trunnion.analysis.sweep import sweep
     from trunnion.analysis.tolerance.study import tolerance
@@ -40,6 +41,7 @@ _PLACES = {
     "analyse": "trunnion.analysis.analyse",
     "assemble": "trunnion.analysis.assemblability",
     "check": "trunnion.analysis.inspect",
+    "compare": "trunnion.analysis.rig.compare",
     "locking": "trunnion.analysis.locking",
     "observe": "trunnion.analysis.rig.virtual",
     "play": "trunnion.analysis.play",
@@ -65,6 +67,7 @@ __all__ = [
     "analyse",
     "assemble",
     "check",
+    "compare",
     "dual",
     "locking",
     "observe",

@@ -183,67 +183,79 @@ def test_hinges_held_along_their_axis() -> None:
 # ---- four-bar -------------------------------------------------------------------------------------------------
 
 
-def rotation(vector: Array) -> Array:
-    """Rodrigues' formula, (…, 3) → (…, 3, 3)."""
-    angle = np.linalg.norm(vector, axis=-1)[..., None, None]
-    x, y, z = np.moveaxis(vector, -1, 0)
-    o = np.zeros_like(x)
-    cross = np.stack([np.stack(row, axis=-1) for row in ((o, -z, y), (z, o, -x), (-y, x, o))], axis=-2)
-    half = np.sinc(angle / (2 * np.pi))  # sin(a/2)/(a/2)
-    return np.asarray(np.eye(3) + np.sinc(angle / np.pi) * cross + 0.5 * half**2 * (cross @ cross))
-
-
-def matrix(vector: Array, way: Array) -> Array:
-    found = np.zeros((*np.broadcast_shapes(vector.shape[:-1], way.shape[:-1]), 4, 4))
-    found[..., :3, :3], found[..., :3, 3], found[..., 3, 3] = rotation(vector), way, 1.0
+def along(x: float) -> Array:
+    """A way along x."""
+    found = np.eye(4)
+    found[0, 3] = x
     return found
 
 
-def along(x: float) -> Array:
-    return matrix(np.zeros(3), np.array([x, 0, 0]))
-
-
 def turned(angle: Array) -> Array:
-    return matrix(np.stack([0 * angle, 0 * angle, angle], axis=-1), np.zeros(3))
+    """A turn about z."""
+    found = np.zeros((*np.shape(angle), 4, 4))
+    c, s = np.cos(angle), np.sin(angle)
+    found[..., 0, 0], found[..., 1, 1], found[..., 1, 0], found[..., 0, 1] = c, c, s, -s
+    found[..., 2, 2] = found[..., 3, 3] = 1.0
+    return found
+
+
+def leaned_by(slope: Array, way: Array) -> Array:
+    """The least turn that lays z along (s, t, 1), and a way in the plane; slope and way (…, 2).
+
+    Rodrigues' formula about (−t, s, 0) by φ, tan φ = |(s, t)|: with c = cos φ, sin φ = c |(s, t)| and
+    (1 − cos φ)/|(s, t)|² = c²/(1 + c), nothing is divided by an angle that may vanish.
+    """
+    s, t = slope[..., 0], slope[..., 1]
+    c = 1 / np.sqrt(1 + s * s + t * t)
+    k = c * c / (1 + c)
+    found = np.zeros((*np.broadcast_shapes(slope.shape[:-1], way.shape[:-1]), 4, 4))
+    found[..., 0, 0], found[..., 1, 1], found[..., 2, 2] = 1 - k * s * s, 1 - k * t * t, c
+    found[..., 0, 1] = found[..., 1, 0] = -k * s * t
+    found[..., 0, 2], found[..., 1, 2] = c * s, c * t
+    found[..., 2, 0], found[..., 2, 1] = -c * s, -c * t
+    found[..., :2, 3], found[..., 3, 3] = way, 1.0
+    return found
+
+
+def back(there: Array) -> Array:
+    """The inverse of homogeneous matrices."""
+    found = np.array(there)
+    found[..., :3, :3] = np.swapaxes(there[..., :3, :3], -1, -2)
+    found[..., :3, 3:] = -found[..., :3, :3] @ there[..., :3, 3:]
+    return found
 
 
 class Loop:
     """The closure of the four-bar in homogeneous matrices, no code shared with the library; (…, turns or ends)."""
 
     def __init__(self, errors: Data, crank: float) -> None:
-        self.errors, self.crank = errors, crank
+        ground, length, coupler, rocker = LENGTHS
+        self.crank = crank
+        self.holes = {joint: self.leaned(errors.get(joint, {}), rocker * (joint == "C")) for joint in "ABCD"}
+        self.turned, self.driven = turned(np.array(crank)), along(length)
+        self.along, self.ground = along(coupler), along(ground)
 
-    def hole(self, joint: str, x: float, c: Array) -> Array:
-        """Frame of the pin in a link whose hole lies at x: leaned by the error, then as its ends c (…, 2, 2) lie."""
-
-        def lean(slope: Array, way: Array) -> Array:
-            size = np.linalg.norm(slope, axis=-1, keepdims=True)
-            axis = np.stack([-slope[..., 1], slope[..., 0], 0 * slope[..., 0]], axis=-1)
-            bent = axis * np.where(size > 0, np.arctan(size) / np.where(size > 0, size, 1), 1)
-            return matrix(bent, np.concatenate([way, 0 * way[..., :1]], axis=-1))
-
-        error = self.errors.get(joint, {})
+    @staticmethod
+    def leaned(error: Data, x: float) -> Array:
+        """Frame of a hole at x, leaned by its error."""
         way = error.get("towards", 0.0)
         side = np.array([np.cos(way), np.sin(way)])
-        error_ = lean(np.tan(error.get("tilt", 0.0)) * side, error.get("offset", 0.0) * side)
-        return np.asarray(along(x) @ error_ @ lean((c[..., 1, :] - c[..., 0, :]) / PIN, c.mean(axis=-2)))
+        return along(x) @ leaned_by(np.tan(error.get("tilt", 0.0)) * side, error.get("offset", 0.0) * side)
+
+    def hole(self, joint: str, c: Array) -> Array:
+        """Frame of the pin in a link: as its ends c (…, 2, 2) lie in the leaned hole."""
+        one, two = c[..., 0, :], c[..., 1, :]
+        return np.asarray(self.holes[joint] @ leaned_by((two - one) / PIN, (one + two) / 2))
 
     def open(self, q: Array, c: Array) -> Array:
         """Turn and way (over the ground's length) by which the rocker misses its bearing; c (…, joint, end, 2)."""
-        ground, crank, coupler, rocker = LENGTHS
-
-        def back(frame: Array) -> Array:
-            found = np.array(frame)
-            found[..., :3, :3] = np.swapaxes(frame[..., :3, :3], -1, -2)
-            found[..., :3, 3:] = -found[..., :3, :3] @ frame[..., :3, 3:]
-            return found
-
-        at = turned(np.array(self.crank)) @ back(self.hole("A", 0, c[..., 0, :, :]))
-        at = at @ along(crank) @ turned(q[..., 0]) @ back(self.hole("B", 0, c[..., 1, :, :]))
-        at = at @ along(coupler) @ turned(q[..., 1]) @ back(self.hole("C", rocker, c[..., 2, :, :]))
-        missing = back(along(ground) @ turned(q[..., 2])) @ at @ self.hole("D", 0, c[..., 3, :, :])
-        turn = np.stack([missing[..., i, j] - missing[..., j, i] for i, j in ((2, 1), (0, 2), (1, 0))], axis=-1)
-        return np.concatenate([turn / 2, missing[..., :3, 3] / ground], axis=-1)
+        at = self.turned @ back(self.hole("A", c[..., 0, :, :]))
+        at = at @ self.driven @ turned(q[..., 0]) @ back(self.hole("B", c[..., 1, :, :]))
+        at = at @ self.along @ turned(q[..., 1]) @ back(self.hole("C", c[..., 2, :, :]))
+        missing = back(self.ground @ turned(q[..., 2])) @ at @ self.hole("D", c[..., 3, :, :])
+        turn = [missing[..., i, j] - missing[..., j, i] for i, j in ((2, 1), (0, 2), (1, 0))]
+        way = [missing[..., i, 3] / LENGTHS[0] for i in range(3)]
+        return np.stack([*(one / 2 for one in turn), *way], axis=-1)
 
     def home(self) -> Array:
         """Turns of B, C and D of the ideal linkage, the coupler's end above the ground."""

@@ -39,7 +39,7 @@ def swept(names, law=None, status=None, ideal=False, name="Cardan joint", margin
     labels = {"driver": ["input", "Ω"], "joint": ["pin-1", "output", "$x_1$"]}
     given = {}
     for key, one in FIGURES.items():
-        if (one.part and not ideal) or (key == "locking_margin" and not margin):
+        if (one.part == "errors" and not ideal) or (key == "locking_margin" and not margin):
             continue
         count = [len(labels[dim]) for dim in one.dims]
         values = base * np.ones([*count, *shape])

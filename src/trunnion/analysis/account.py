@@ -39,6 +39,7 @@ __all__ = [
     "fill_power",
     "finding_row",
     "finish",
+    "inputs",
     "model_notes",
     "references",
     "sound_positions",
@@ -143,7 +144,7 @@ def finish(run: Run, found_positions: Positions) -> xr.Dataset:
         "spring_units": json.dumps(spring_units(run.system)),
         "findings": json.dumps([finding_row(finding) for finding in found], ensure_ascii=False),
         "summary": json.dumps(_summary(run, arrays, value, time, near, ideal), ensure_ascii=False),
-        "inputs": json.dumps(_inputs(mechanism), ensure_ascii=False),
+        "inputs": json.dumps(inputs(mechanism), ensure_ascii=False),
         "scene": json.dumps(_scene(run), ensure_ascii=False),
         "periodic": int(run.cycle.periodic),
     }
@@ -401,7 +402,7 @@ def _peak(values: NDArray[np.float64]) -> float:
     return float(max(np.nanmax(values, initial=0.0), -np.nanmin(values, initial=0.0)))
 
 
-def _inputs(mechanism: Mechanism) -> list[dict[str, Any]]:
+def inputs(mechanism: Mechanism) -> list[dict[str, Any]]:
     """Every number that was stated: path, SI value, unit, and the text of the model."""
     values = mechanism.parameters()
     dimensions: dict[str, Dimension | None] = {}

@@ -27,7 +27,7 @@ from trunnion.model.contact import motions
 from trunnion.model.expression import MOTION, RESERVED
 from trunnion.model.names import nearest
 from trunnion.model.parameter_names import ERRORS
-from trunnion.model.parameters import ParameterSet, dimension_errors, entries, evaluation_order
+from trunnion.model.parameters import ParameterSet, dimension_errors, evaluation_order
 from trunnion.model.parts import Driver, Friction, Joint, Load, freedoms
 from trunnion.model.quantity import UNREADABLE
 from trunnion.model.units import ANY, Dimension, UnitError
@@ -80,7 +80,7 @@ def _quantities(mechanism: Mechanism, unreadable: set[str]) -> Iterator[Finding]
     yield from tables(mechanism, known)
     moving = {**motion_dimensions(mechanism, known), **known}
     used: set[str] = set()
-    found = entries(mechanism)
+    found = mechanism.entries
     for entry in (*found, *stated_entries(mechanism, found)):
         names = entry.quantity.names
         used.update(names)
@@ -110,7 +110,7 @@ def _dimensions(mechanism: Mechanism, known: dict[str, Dimension | None], unread
     """Names of the dimensions and what each measures: `known` receives it, `unreadable` the paths without a value."""
     dimensions = mechanism.dimensions
     known.update(dict.fromkeys(dimensions))
-    deviations = dimension_errors(entries(mechanism)) if mechanism.errors else {}
+    deviations = dimension_errors(mechanism.entries) if mechanism.errors else {}
     order, circles = evaluation_order(dimensions, deviations)
     for circle in circles:
         unreadable.update(f"{before}dimensions.{name}" for name in circle for before in ("", ERRORS))
@@ -337,7 +337,7 @@ def _joint_load(mechanism: Mechanism, load: Load, where: str) -> Iterator[Findin
 def _tolerances(mechanism: Mechanism) -> Iterator[Finding]:
     """What tolerances and costs name, and what they lack."""
     if mechanism.variations or mechanism.correlations or "tolerance_defaults" in mechanism.model_fields_set:
-        yield from tolerance_names(mechanism, entries(mechanism))
+        yield from tolerance_names(mechanism, mechanism.entries)
     yield from cost_names(mechanism)
 
 

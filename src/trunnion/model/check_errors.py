@@ -15,7 +15,7 @@ from trunnion.model.contact import PLAY_PAIRS, has_guide, has_pin, has_play, pla
 from trunnion.model.joint_parts import Joint, Pin, Seat
 from trunnion.model.merge import stated
 from trunnion.model.parameter_names import ERRORS, ParameterNames
-from trunnion.model.parameters import ParameterSet, entries, nominal_dimensions
+from trunnion.model.parameters import ParameterSet, nominal_dimensions
 
 if TYPE_CHECKING:
     from trunnion.model.mechanism import Mechanism
@@ -35,7 +35,7 @@ def errors(mechanism: Mechanism) -> Iterator[Finding]:
     """Whether each error is of one number, once, and measures what that does."""
     if not mechanism.errors:
         return
-    found = {entry.path: entry for entry in entries(mechanism)}
+    found = {entry.path: entry for entry in mechanism.entries}
     names = ParameterNames(found)
     first: dict[str, str] = {}
     for name in mechanism.errors:

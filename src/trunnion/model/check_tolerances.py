@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
@@ -40,7 +40,7 @@ ROUNDING = 1e-9  # of an eigenvalue, and of limits that touch zero
 # ---- quantities, for the checks of units ----------------------------------------------------------------------
 
 
-def stated_entries(mechanism: Mechanism, found: list[Entry]) -> list[Entry]:
+def stated_entries(mechanism: Mechanism, found: Sequence[Entry]) -> list[Entry]:
     """Every quantity of the sections about tolerances and costs, with where it stands and what it has to measure.
 
     found: the numbers of the mechanism.
@@ -88,7 +88,7 @@ def _entries(value: Any, where: str, location: tuple[str | int, ...], kind: Kind
 # ---- names ----------------------------------------------------------------------------------------------------
 
 
-def tolerance_names(mechanism: Mechanism, found: list[Entry]) -> Iterator[Finding]:
+def tolerance_names(mechanism: Mechanism, found: Sequence[Entry]) -> Iterator[Finding]:
     """Whether each name is of a number that can vary, once, and each distribution gets what it takes."""
     names = ParameterNames(entry.path for entry in found)
     known = {entry.path: entry for entry in found}

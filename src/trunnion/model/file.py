@@ -18,6 +18,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.events import AliasEvent, CollectionEndEvent, CollectionStartEvent
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
+from ruamel.yaml.parser import Parser
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.csv_table import TableFiles, place_findings, with_points
@@ -165,8 +166,11 @@ def _parse_yaml(text: str, kind: str) -> tuple[dict[str, Any], Lines]:
     if kind == "JSON":
         text = text.replace("\t", " ")  # allowed between the tokens of JSON, not of YAML
     try:
-        refused = _refused(YAML(typ="safe", pure=True).parse(text))
-        root = None if refused else YAML(typ="safe", pure=True).compose(text)
+        reader = YAML(typ="safe", pure=True)
+        reader.Parser = _Parser
+        root = reader.compose(text)
+    except MechanismError:
+        raise
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         what = f"is not {kind}: {error.problem or error.context}" + (f" (column {mark.column + 1})" if mark else "")
@@ -179,8 +183,6 @@ def _parse_yaml(text: str, kind: str) -> tuple[dict[str, Any], Lines]:
     except (ValueError, TypeError, LookupError, AttributeError, AssertionError, ArithmeticError) as error:
         # ruamel lets some of Python's own errors pass on text that is no YAML
         raise MechanismError(Finding(f"is not {kind}: {error}", remedy="check that it is a text file")) from error
-    if refused:
-        raise MechanismError(refused)
     if not isinstance(root, MappingNode):
         what = "is not a group of entries (key: value) at its top"
         raise MechanismError(Finding(what, remedy="start from one of the examples", line=1))
@@ -191,21 +193,28 @@ def _parse_yaml(text: str, kind: str) -> tuple[dict[str, Any], Lines]:
     return data, builder.lines
 
 
-def _refused(events: Iterable[Any]) -> Finding | None:
-    """What no model file has: aliases (a few bytes can mean gigabytes), tags (they can name code), deep nesting."""
-    depth = 0
-    for event in events:
+class _Parser(Parser):
+    """The events of a model file; what none has is refused before anything is made of it."""
+
+    def __init__(self, loader: Any) -> None:
+        super().__init__(loader)
+        self.nesting = 0
+
+    def get_event(self) -> Any:
+        """The next event; MechanismError on aliases (a few bytes can mean gigabytes), tags and deep nesting."""
+        event = super().get_event()
         line = event.start_mark.line + 1
-        depth += isinstance(event, CollectionStartEvent) - isinstance(event, CollectionEndEvent)
+        self.nesting += isinstance(event, CollectionStartEvent) - isinstance(event, CollectionEndEvent)
         tag = str(getattr(event, "tag", None) or "")
         if isinstance(event, AliasEvent):
             what = f"the alias *{event.anchor} is not allowed"
-            return Finding(what, remedy="write it out, or name a dimension", line=line)
-        if tag and tag not in _PLAIN_TAGS and tag != "!":
-            return Finding(f"the tag {tag} is not allowed", remedy="remove the tag", line=line)
-        if depth > MAX_DEPTH:
-            return Finding("is nested too deeply", remedy="check brackets and indentation", line=line)
-    return None
+            raise MechanismError(Finding(what, remedy="write it out, or name a dimension", line=line))
+        if tag and tag not in _PLAIN_TAGS and tag != "!":  # a tag can name code
+            raise MechanismError(Finding(f"the tag {tag} is not allowed", remedy="remove the tag", line=line))
+        if self.nesting > MAX_DEPTH:
+            what, remedy = "is nested too deeply", "check brackets and indentation"
+            raise MechanismError(Finding(what, remedy=remedy, line=line))
+        return event
 
 
 class _Builder:

@@ -25,7 +25,7 @@ from trunnion.model.findings import repair, schema_findings
 from trunnion.model.limit_texts import DIGITS
 from trunnion.model.merge import FitChoice, merge_joint
 from trunnion.model.names import nearest
-from trunnion.model.parameters import LIMITS, Location, ParameterSet, nominal_dimensions
+from trunnion.model.parameters import LIMITS, Entry, Location, ParameterSet, entries, nominal_dimensions
 from trunnion.model.parts import (
     Correlation,
     Cost,
@@ -201,6 +201,11 @@ class Mechanism(Part):
         one, two = (self.effective_joints[joint].links for joint in self.gears[gear].joints)
         shared = next((link for link in one if link in two), None)
         return None if shared is None else (one.index(shared), two.index(shared))
+
+    @cached_property
+    def entries(self) -> tuple[Entry, ...]:
+        """Every number of the mechanism and where it stands, defaults filled in; see `model.parameters.entries`."""
+        return tuple(entries(self))
 
     @cached_property
     def parameter_set(self) -> ParameterSet:

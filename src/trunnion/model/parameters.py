@@ -322,7 +322,7 @@ class ParameterSet:
     """The numbers of one mechanism, compiled; `unreadable` paths are nan and so is what depends on them."""
 
     def __init__(self, mechanism: Mechanism, unreadable: Iterable[str] = ()) -> None:
-        found = entries(mechanism)
+        found = list(mechanism.entries)
         order, _ = evaluation_order(mechanism.dimensions, dimension_errors(found))
         place = {f"dimensions.{name}": rank for rank, name in enumerate(order)}
         last = len(place)

@@ -10,6 +10,7 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Annotated, Any
 
 import numpy as np
@@ -72,16 +73,7 @@ class Quantity:
         if not isinstance(source, str):
             source = _plain(source)
             return cls(source, kind)
-        try:
-            main, tolerance = _split(normalise(source), kind)
-            expression = parse(main)
-        except UnitError as error:
-            raise UnitError(error.what, error.remedy or f"write a {kind.name} such as {kind.example}") from None
-        quantity = cls(source, kind, tolerance, expression)
-        if not expression.names:
-            quantity.check({})
-            _finite(quantity.evaluate(), source)
-        return quantity
+        return cls(source, kind, *_read_text(source, kind))
 
     def __repr__(self) -> str:
         return f"Quantity({self.source!r}, {self.kind.name})"
@@ -118,6 +110,24 @@ class Quantity:
                 f"write {_needed(kind)} such as {kind.example}",
             )
         return dimension
+
+
+@lru_cache(maxsize=4096)
+def _read_text(text: str, kind: Kind) -> tuple[tuple[float, float] | None, Expression]:
+    """Tolerance and expression of a text, read once: models made from one another share most of theirs.
+
+    Every quantity is still one of its own: whether a joint's is that of the defaults is told by which object it is.
+    """
+    try:
+        main, tolerance = _split(normalise(text), kind)
+        expression = parse(main)
+    except UnitError as error:
+        raise UnitError(error.what, error.remedy or f"write a {kind.name} such as {kind.example}") from None
+    quantity = Quantity(text, kind, tolerance, expression)
+    if not expression.names:
+        quantity.check({})
+        _finite(quantity.evaluate(), text)
+    return tolerance, expression
 
 
 # Stands for a quantity that could not be read while the rest of the model is checked; every check passes over it.

@@ -64,7 +64,7 @@ class Kind:
     name: str
     unit: str
     example: str
-    dimensions: tuple[Dimension, ...] = field(repr=False)
+    dimensions: tuple[Dimension, ...] = field(repr=False, hash=False)  # fractions are slow to hash
 
     def __or__(self, other: Kind) -> Kind:
         """A quantity that may be either, until its place says which."""

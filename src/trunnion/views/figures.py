@@ -62,8 +62,8 @@ def dress(axes: Axes, x: str = "", y: str = "") -> None:
     axes.set_ylabel(y, fontsize=9, color=INK)
 
 
-def along(axes: Axes, over: Abscissa, y: str) -> None:
-    """Axes over the drive: whole degrees at round angles, limits at the ends of the run."""
+def along(axes: Axes, over: Abscissa, y: str, *, zero: bool = True) -> None:
+    """Axes over the drive: whole degrees at round angles, limits at the ends of the run; zero: with a line there."""
     dress(axes, plain(over.title), y)
     span = _span(over)
     if over.unit == "°" and span >= 90:
@@ -77,7 +77,8 @@ def along(axes: Axes, over: Abscissa, y: str) -> None:
     elif span > 0:
         low = float(over.values.min() if over.period >= 0 else over.values.max() + over.period)
         axes.set_xlim(low, low + span)
-    axes.axhline(0, color=MUTED, linewidth=0.8, zorder=1.5)
+    if zero:
+        axes.axhline(0, color=MUTED, linewidth=0.8, zorder=1.5)
 
 
 def _span(over: Abscissa) -> float:

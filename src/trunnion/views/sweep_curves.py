@@ -12,10 +12,9 @@ from matplotlib.transforms import blended_transform_factory
 
 from trunnion.errors import Status
 from trunnion.views.cycle import Array
-from trunnion.views.error_plot import LOST
 from trunnion.views.figures import INK, MUTED, SHADE, outside, style_of
 from trunnion.views.lettering import plain
-from trunnion.views.sweep_panels import ALIKE, Board, Field, Panel, ends, on_scale, scale_of_colours, tell, ticks
+from trunnion.views.sweep_panels import ALIKE, Board, Field, Panel, ends, on_scale, ring, scale_of_colours, tell, ticks
 from trunnion.views.swept import Scale, cause
 
 if TYPE_CHECKING:
@@ -59,7 +58,7 @@ def _panel(panel: Panel, told: Field, alone: bool) -> None:
         _curve(axes, x, y[:, k] * told.factor, label, look)
         if ideal is not None:
             name = "ideal" if other is None else "ideal, dashed"
-            _curve(axes, x, ideal[:, k] * told.factor, None if k else name, {**look, **IDEAL})
+            _curve(axes, x, ideal[:, k] * told.factor, name if k == count - 1 else None, {**look, **IDEAL})
     _lost(axes, x, y * told.factor, status)
     ticks(axes, told.plan.x)
     if not np.isfinite(y).any() and not (status >= Status.NOT_CONVERGED).any():
@@ -101,15 +100,15 @@ def _curve(axes: Axes, x: Array, y: Array, label: str | None, look: dict[str, An
     known = np.isfinite(y)
     edges = known & (np.append(False, ~known[:-1]) | np.append(~known[1:], False))
     if edges.any():
-        axes.plot(x[edges], y[edges], "x", markersize=7, color=look["color"], markeredgewidth=1.6, zorder=4)
+        size = 7 if "marker" not in look or look["marker"] else 3.5  # of a curve among many
+        axes.plot(x[edges], y[edges], "x", markersize=size, color=look["color"], markeredgewidth=0.23 * size, zorder=4)
 
 
 def _lost(axes: Axes, x: Array, y: Array, status: NDArray[np.int8]) -> None:
     """Rings around points of whose cycle a position loses contact: what stands there is not to be built on."""
     rows, columns = np.nonzero((status == Status.CONTACT_LOST) & np.isfinite(y))
     if rows.size:
-        axes.plot(x[rows], y[rows, columns], "o", markersize=8, color=LOST, markerfacecolor="none", markeredgewidth=1.2,
-                  label="contact lost at some position", zorder=4)  # fmt: skip
+        ring(axes, x[rows], y[rows, columns], float(np.clip(8 * np.sqrt(60 / rows.size), 2, 8)))
 
 
 def _frame(panels: list[Panel], told: Field) -> None:

@@ -21,9 +21,8 @@ from matplotlib.ticker import MaxNLocator
 
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.views.cycle import Array
-from trunnion.views.error_plot import LOST
 from trunnion.views.figures import INK, MUTED, outside
-from trunnion.views.sweep_panels import ALIKE, Board, Field, on_scale, scale_of_colours, tell, ticks
+from trunnion.views.sweep_panels import ALIKE, Board, Field, on_scale, ring, scale_of_colours, tell, ticks
 from trunnion.views.swept import Scale, cause
 
 if TYPE_CHECKING:
@@ -34,7 +33,7 @@ __all__ = ["draw", "need_two"]
 
 Beyond = Literal["neither", "both", "min", "max"]
 
-BANDS = 8
+BANDS = 10
 COLOURS = colormaps["viridis"]
 FINER = 8  # parts of a cell along a logarithmic axis
 NOTHING = -1  # beside the statuses: sound, and yet without a number
@@ -233,8 +232,5 @@ def _hinder(axes: Axes, edges: list[Array], where: NDArray[np.bool_], code: int,
 def _lost(axes: Axes, x: Array, y: Array, where: NDArray[np.bool_]) -> None:
     """Rings around points of whose cycle a position loses contact, as large as there is room."""
     rows, columns = np.nonzero(where)
-    if not rows.size:
-        return
-    size = float(np.clip(160 / max(where.shape), 1.5, 8))
-    axes.plot(x[rows], y[columns], "o", markersize=size, color=LOST, markerfacecolor="none", zorder=3, clip_on=False,
-              markeredgewidth=0.15 * size, label="contact lost at some position")  # fmt: skip
+    if rows.size:
+        ring(axes, x[rows], y[columns], float(np.clip(160 / max(where.shape), 1.5, 8)), beyond=True)

@@ -8,11 +8,13 @@ from textwrap import fill, wrap
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from matplotlib.lines import Line2D
 from matplotlib.ticker import NullLocator, ScalarFormatter
 from numpy.typing import NDArray
 
 from trunnion.views.as_built import angle_scale
 from trunnion.views.cycle import Array, usual_peak
+from trunnion.views.error_plot import LOST
 from trunnion.views.figures import INK, MUTED, dress, legend, new
 from trunnion.views.lettering import plain
 from trunnion.views.quantities import prefixed
@@ -34,6 +36,7 @@ __all__ = [
     "ends",
     "field",
     "on_scale",
+    "ring",
     "scale_of_colours",
     "tell",
     "ticks",
@@ -211,9 +214,9 @@ def tell(shown: Board, least: int = 1) -> None:
         legend(shown.panels[0].axes, least=least)
         return
     named: dict[str, Any] = {}
-    for panel in shown.panels:
-        for handle, label in zip(*panel.axes.get_legend_handles_labels(), strict=True):
-            named.setdefault(label, handle)
+    entries = [entry for axes, _ in shown.panels for entry in zip(*axes.get_legend_handles_labels(), strict=True)]
+    for handle, label in sorted(entries, key=lambda entry: not isinstance(entry[0], Line2D)):  # curves before areas
+        named.setdefault(label, handle)
     if len(named) < least:
         shown.strip.remove()
         return
@@ -238,6 +241,13 @@ def scale_of_colours(shown: Board, colours: ScalarMappable, label: str, ticks: A
     bar.ax.tick_params(labelsize=8.5, colors=MUTED, labelcolor=INK)
     bar.ax.minorticks_off()
     return bar
+
+
+def ring(axes: Axes, x: Array, y: Array, size: float, beyond: bool = False) -> None:
+    """Rings of a size around points at which contact is lost, also over the frame; in the legend one that is seen."""
+    look: dict[str, Any] = {"color": LOST, "markerfacecolor": "none", "linestyle": "", "marker": "o"}
+    axes.plot([], [], markersize=7, markeredgewidth=1.2, label="contact lost at some position", **look)
+    axes.plot(x, y, markersize=size, markeredgewidth=0.15 * size, zorder=4, clip_on=not beyond, **look)
 
 
 # ---- axes -----------------------------------------------------------------------------------------------------

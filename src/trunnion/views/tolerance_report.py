@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from jinja2 import Template
     from matplotlib.figure import Figure
 
-__all__ = ["Section", "report"]
+__all__ = ["Section", "report", "source", "template"]
 
 
 class Section(NamedTuple):
@@ -71,15 +71,18 @@ def report(result: xr.Dataset, first: Sequence[Section] = (), kicker: str = "Wha
         "version": result.attrs.get("trunnion_version", ""), "model_hash": result.attrs.get("model_hash", ""),
         "style": Markup(style), "style_hash": hashed(style),
     }  # fmt: skip
-    return _template().render(context)
+    return template("tolerance.html.j2").render(context)
 
 
 @cache
-def _template() -> Template:
-    from jinja2 import Environment, StrictUndefined
+def template(name: str) -> Template:
+    """A page of `views/web`, which may import the others."""
+    from jinja2 import Environment, FunctionLoader, StrictUndefined
 
-    environment = Environment(autoescape=True, undefined=StrictUndefined, keep_trailing_newline=True)
-    return environment.from_string(web_text("tolerance.html.j2"))
+    environment = Environment(
+        autoescape=True, undefined=StrictUndefined, keep_trailing_newline=True, loader=FunctionLoader(web_text)
+    )
+    return environment.get_template(name)
 
 
 def _facts(result: xr.Dataset, run: Sequence[str]) -> list[tuple[str, str]]:
@@ -107,11 +110,11 @@ def _measure(result: xr.Dataset, read: Reading) -> Section:
 
 
 def _drawn(part: Section) -> dict[str, Any]:
-    pictures = [{"alt": alt, "source": _source(drawn)} for alt, drawn in part.figures]
+    pictures = [{"alt": alt, "source": source(drawn)} for alt, drawn in part.figures]
     return {"title": part.title, "about": part.about, "pictures": pictures, "tables": part.tables}
 
 
-def _source(drawn: Figure) -> str:
+def source(drawn: Figure) -> str:
     """A figure as an address that holds it."""
     buffer = BytesIO()
     with rc_context({"svg.hashsalt": "trunnion"}):

@@ -96,7 +96,7 @@ class Observation:
         """The readings of one condition, faults included."""
         columns = self._readings(case)
         rig = self.rig
-        time = np.arange(case.rows) / self.rate * PER_SECOND[rig.time.unit]
+        time = (np.arange(case.rows) - case.origin) / self.rate * PER_SECOND[rig.time.unit]
         found: dict[str, NDArray[Any]] = {rig.time.column: np.round(time, TIME_DECIMALS[rig.time.unit])}
         if rig.encoder:
             angle, zero = self._angle(case), float(rig.encoder.zero.evaluate())
@@ -132,7 +132,8 @@ class Observation:
     def _angle(self, case: Case) -> Array:
         """Coordinate of the first driver at every sample, rad; it counts on from turn to turn."""
         driver = next(iter(self.mechanism.drivers))
-        time = np.clip(np.arange(case.rows) - case.before, 0, case.running - 1) / self.rate
+        sample = np.clip(np.arange(case.rows) - case.before, 0, case.running - 1)
+        time = (sample - case.lead) / self.rate
         angle: Array = np.asarray(case.run.system.drive(case.run.values, driver, time)[0], float)
         return angle
 
@@ -145,7 +146,7 @@ class Observation:
         channel = self.channels[name]
         longest = max(self.cases, key=lambda case: case.rows)
         parts = [channel.zero, abs(channel.drift) * longest.rows / self.rate / math.sqrt(3)]
-        if channel.at_rest and longest.before:
+        if channel.zeroed and longest.before:
             parts.append(channel.noise / math.sqrt(longest.before))
         else:
             parts.append(channel.offset)
@@ -164,15 +165,16 @@ class Observation:
             found = self._readings(case)
             cycle = case.run.cycle.duration * self.rate
             turns = self.rig.schedule.turns
-            at = case.before + (np.arange(turns)[:, None] + phase) * cycle
+            at = case.before + case.lead + (np.arange(turns)[:, None] + phase) * cycle
             courses = {}
             for name, channel in self.channels.items():
                 values = found[name] / channel.per
-                zero = float(np.mean(values[: case.before])) if channel.at_rest and case.before else 0.0
+                zero = float(np.mean(values[: case.before])) if channel.zeroed and case.before else 0.0
                 by_turn = np.interp(at.ravel(), np.arange(case.rows), values - zero).reshape(at.shape)
                 courses[name] = Course(name, channel.measures, channel.unit, by_turn, self.accuracy(name))
             settings = {name: _si(self.mechanism, name, value) for name, value in case.settings.items()}
-            conditions.append(Condition(case.name, settings, phase, courses))
+            speed = case.drive(self.rate)[1]
+            conditions.append(Condition(case.name, settings, phase, courses, (), speed))
         return Measurement(self.rig.name, tuple(conditions), self.findings, ("made by a virtual rig, not read",))
 
     def mapping(self, form: str = "") -> dict[str, Any]:

@@ -20,7 +20,7 @@ from trunnion.measured.rig_file import Rig, Value
 __all__ = ["Case", "case_of", "channels_of", "findings_of", "measures_of", "placed_at", "speed_differs"]
 
 MOST_ROWS = 20_000_000
-BEYOND = 0.1  # of a cycle that is recorded past the last, so that its end is there
+BEYOND = 0.1  # of a cycle that is recorded before the first and past the last, so that their ends are there
 MOST_NAMED = 20  # conditions in one finding
 SINGLE = ("point", "angle", "rotation", "slide", "rate", "effort", "reaction", "load")
 
@@ -29,7 +29,8 @@ SINGLE = ("point", "angle", "rotation", "slide", "rate", "effort", "reaction", "
 class Case:
     """A working condition that the model can be in: what is set, how it is sampled, what is true.
 
-    before, running, after: samples of the idle stretches and of the run; efficiency: of the model, NaN if it has none.
+    before, running, after: samples of the idle stretches and of the run; lead: sampling intervals from the first sample
+    of the run to the start of its first cycle, a whole number and a half; efficiency: of the model, NaN if it has none.
     """
 
     number: int
@@ -39,6 +40,7 @@ class Case:
     before: int
     running: int
     after: int
+    lead: float
     true: Sampled
     efficiency: float
 
@@ -50,6 +52,25 @@ class Case:
     @property
     def rows(self) -> int:
         return self.before + self.running + self.after
+
+    @property
+    def first(self) -> int:
+        """The first sample of the run that lies in its first cycle."""
+        return math.ceil(self.lead)
+
+    def drive(self, rate: float, sample: int = 0) -> tuple[float, float]:
+        """Coordinate and rate of the first driver at a sample of the run, rad or m."""
+        driver = next(iter(self.run.system.mechanism.drivers))
+        found = self.run.system.drive(self.run.values, driver, (sample - self.lead) / rate)
+        return float(np.ravel(found[0])[0]), float(np.ravel(found[1])[0])
+
+    @property
+    def origin(self) -> float:
+        """Sample, counted from the first of the file, at which time is 0: the first, or, where the driver does not name
+        positions by its coordinate, the start of the first cycle."""
+        driver = next(iter(self.run.system.mechanism.drivers))
+        named = self.run.system.turns(driver) and self.run.system.span(self.run.values, driver).one_way
+        return 0.0 if named else self.before + self.lead
 
     @property
     def part(self) -> slice:
@@ -146,8 +167,11 @@ def case_of(
     rate, cycle = rig.rate.value, run.cycle
     pauses = rig.schedule.pauses
     before, after = (math.ceil(float(one.evaluate()) * rate - 1e-9) for one in (pauses.before, pauses.after))
+    # Samples lie half an interval off the start of the cycle, so that edges of pulses that fall on samples otherwise
+    # lie between them: a sampling clock knows nothing of the shaft.
+    lead = math.ceil(BEYOND * cycle.duration * rate) - 0.5 if cycle.periodic else 0.0
     if cycle.periodic:
-        running = math.ceil((rig.schedule.turns + BEYOND) * cycle.duration * rate)
+        running = math.ceil(lead) + math.ceil((rig.schedule.turns + BEYOND) * cycle.duration * rate)
     else:
         running = math.floor(cycle.duration * rate + 1e-9) + 1
     if before + running + after > MOST_ROWS:
@@ -157,8 +181,8 @@ def case_of(
         what = f"a cycle of condition {number} takes {cycle.duration:.4g} s, no three samples"
         raise MechanismError(Finding(what, "rate", "sample faster"))
     tolerances = {i: max(one.step, one.noise) / 10 for i, one in enumerate(channels.values())}
-    true = sampled(run, measures, rate, running, tolerances)
-    case = Case(number, name, row, run, before, running, after, true, float("nan"))
+    true = sampled(run, measures, rate, running, lead, tolerances)
+    case = Case(number, name, row, run, before, running, after, lead, true, float("nan"))
     if not case.worst.solved:
         return case
     for course, (sensor, channel) in zip(true.values, channels.items(), strict=True):
@@ -193,6 +217,7 @@ def findings_of(cases: Sequence[Case], channels: Mapping[str, Channel], rig: Rig
         )
         yield Finding(what, where, "", Severity.NOTE)
     yield from _lost_pulses(sound, rig)
+    yield from _both_ways(sound, rig)
     driver = next(iter(cases[0].run.system.mechanism.drivers))
     told = rig.encoder or any(one.measures == f"rate:{driver}" for one in channels.values())
     if sound and not told and speed_differs(sound):
@@ -208,6 +233,14 @@ def findings_of(cases: Sequence[Case], channels: Mapping[str, Channel], rig: Rig
             )
             key = "range" if channel.limit == channel.range else "span"
             yield Finding(what, f"sensors.{name}.{key}", "take a sensor with a larger range", Severity.WARNING)
+
+
+def _both_ways(cases: Sequence[Case], rig: Rig) -> Iterator[Finding]:
+    """The level of an encoder where the driver turns either way."""
+    ways = {case.drive(rig.rate.value)[1] > 0 for case in cases}
+    if rig.encoder and rig.encoder.kind == "level" and len(ways) > 1:
+        what = "the conditions turn both ways, and the level of an encoder does not tell which"
+        yield Finding(what, "encoder.kind", "record kind: count")
 
 
 def speed_differs(cases: Sequence[Case]) -> bool:

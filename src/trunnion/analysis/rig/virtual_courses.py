@@ -118,36 +118,43 @@ class Sampled:
         return np.asarray(np.interp(self.phase, self.time, self.values[i], period=self.period))
 
 
-def phases(duration: float, rate: float, count: int) -> tuple[Array, NDArray[np.intp]] | None:
-    """Distinct times (s) in the cycle of `count` samples from its start, ascending, and the place of each sample.
+def phases(duration: float, rate: float, count: int, lead: float = 0.0) -> tuple[Array, NDArray[np.intp]] | None:
+    """Distinct times (s) in the cycle of `count` samples, ascending, and the place of each sample among them.
 
-    None if samples never fall on the same phases within the run.
+    lead: how many sampling intervals the first comes before the start of the cycle. None if samples never fall on the
+    same phases again.
     """
     per_cycle = duration * rate
     for cycles in range(1, int(count / per_cycle) + 2):
         whole = round(cycles * per_cycle)
         if whole and abs(cycles * per_cycle - whole) < ALIKE * max(cycles, 1):
-            # sample k is at k·cycles/whole of a cycle: the same as (k·cycles mod whole)/whole
-            number = (np.arange(count, dtype=np.int64) * cycles) % whole
-            used, place = np.unique(number, return_inverse=True)
-            return used / whole * duration, place
+            # sample k is at (k − lead)·cycles/whole of a cycle, k·cycles mod whole of them after the first
+            number, place = np.unique((np.arange(count, dtype=np.int64) * cycles) % whole, return_inverse=True)
+            time = np.mod((number - lead * cycles) / whole, 1.0) * duration
+            order = np.argsort(time)
+            return time[order], np.argsort(order)[place]
     return None
 
 
 def sampled(
-    run: Run, measures: Sequence[Measure], rate: float, count: int, tolerances: Mapping[int, float] | None = None
+    run: Run,
+    measures: Sequence[Measure],
+    rate: float,
+    count: int,
+    lead: float = 0.0,
+    tolerances: Mapping[int, float] | None = None,
 ) -> Sampled:
-    """The courses at `count` samples from the start of the cycle, at a rate (Hz).
+    """The courses at `count` samples at a rate (Hz), the first `lead` sampling intervals before the start of the cycle.
 
     tolerances: of each measure by its place, SI: how far interpolation may be off.
     """
     duration = run.cycle.duration
-    time = np.arange(count) / rate
+    time: Array = np.asarray((np.arange(count) - lead) / rate, float)
     if not run.cycle.periodic:
         time = np.minimum(time, duration)
         found = (time, np.arange(count))
     else:
-        found = phases(duration, rate, count) or _sorted(np.mod(time, duration))
+        found = phases(duration, rate, count, lead) or _sorted(np.mod(time, duration))
     instants, place = found
     period = duration if run.cycle.periodic else None
     if len(instants) > MOST_EXACT and run.cycle.periodic:

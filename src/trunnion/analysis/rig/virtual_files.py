@@ -31,6 +31,8 @@ __all__ = ["MAPPING", "TRUTH", "check_form", "mapping_of", "truth_of", "write"]
 
 MAPPING, TRUTH = "mapping.yaml", "truth.yaml"
 PACKAGES = {"parquet": "pyarrow", "tdms": "nptdms"}
+POSITIONS = (360, 180, 120, 90, 72, 60, 36, 24, 12)  # of a cycle: fewer than samples
+FEWER = 0.99
 ROWS = 100_000  # of text written at a time
 AT_REST = 0.9  # share of the idle stretch that the zero is taken from: a filter carries the run into the rest
 
@@ -66,7 +68,7 @@ def write(
     for name, data in ((MAPPING, mapping_of(observation, form)), (TRUTH, truth_of(observation))):
         with whole(folder / name) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as stream:
             stream.write(HEADS[name])
-            _yaml().dump(data, stream)
+            _yaml(flowing=name == MAPPING).dump(data, stream)
         names.append(name)
     return names
 
@@ -145,6 +147,10 @@ def mapping_of(observation: Observation, form: str) -> dict[str, Any]:
         found["set"] = dict(rig.set_)
     found["time"] = {"column": rig.time.column, "unit": rig.time.unit}
     found |= angle
+    least = min(case.run.cycle.duration for case in observation.cases) * observation.rate
+    positions = next((one for one in POSITIONS if one < least * FEWER), POSITIONS[-1])
+    if positions != POSITIONS[0]:
+        found["positions"] = positions
     found["channels"] = {name: _channel(observation, name) for name in observation.channels}
     return found
 
@@ -155,7 +161,7 @@ def _file(observation: Observation, case: Case, form: str, timed: bool) -> dict[
     if case.settings:
         found["set"] = dict(case.settings)
     if timed and case.rows > case.running:
-        ends = (case.before, case.before + case.running - 1)
+        ends = (case.before - case.origin, case.before + case.running - 1 - case.origin)
         found["over"] = [f"{end / observation.rate:.9g} s" for end in ends]
     return found
 
@@ -181,12 +187,13 @@ def _angle(observation: Observation) -> dict[str, Any]:
 def _source(observation: Observation, driver: str) -> dict[str, Any]:
     """The encoder if there is one, else a constant speed, else a measured one."""
     case = observation.cases[0]
-    run = case.run
     encoder = observation.rig.encoder
     if encoder:
         found: dict[str, Any] = {"from": "pulses", "column": encoder.column, "per_turn": encoder.per_turn}
         found["kind"] = encoder.kind
-        zero = _first_edge(observation) if encoder.kind == "level" else float(encoder.zero.evaluate())
+        if encoder.kind == "level" and case.drive(observation.rate)[1] < 0:
+            found["sign"] = -1
+        zero = _counted_from(observation)
         if zero:
             found["zero"] = f"{math.degrees(zero):.12g} deg"
         if encoder.index:
@@ -194,23 +201,22 @@ def _source(observation: Observation, driver: str) -> dict[str, Any]:
         return found
     if speed_differs(observation.cases):
         measured = next(name for name, one in observation.channels.items() if one.measures == f"rate:{driver}")
-        start = math.degrees(float(np.ravel(run.system.drive(run.values, driver, 0.0)[0])[0]))
+        start = math.degrees(case.drive(observation.rate)[0])
         return {"from": "speed", "channel": measured} | ({"zero": f"{start:.12g} deg"} if start else {})
-    at_zero = -case.before / observation.rate
-    start, speed, _ = (float(np.ravel(one)[0]) for one in run.system.drive(run.values, driver, at_zero))
+    start, speed = case.drive(observation.rate, -case.before)
     return {"from": "time", "speed": f"{speed:.15g} rad/s", "zero": f"{math.degrees(start):.12g} deg"}
 
 
-def _first_edge(observation: Observation) -> float:
-    """Coordinate, rad, at the index pulse, or without one where the level of the encoder first rises."""
+def _counted_from(observation: Observation) -> float:
+    """Coordinate, rad, where an encoder reads zero: at its index, else where its count is 0, its level rises."""
     encoder, case = observation.rig.encoder, observation.cases[0]
     assert encoder is not None  # asked of encoders only
-    zero = float(encoder.zero.evaluate())
+    zero, pitch = float(encoder.zero.evaluate()), 2 * math.pi / encoder.per_turn
+    start, speed = case.drive(observation.rate)
     if encoder.index:
+        return zero if speed > 0 else zero + pitch  # backward, the first pulse is entered at its far end
+    if encoder.kind == "count":
         return zero
-    driver = next(iter(observation.mechanism.drivers))
-    start, speed, _ = (float(np.ravel(one)[0]) for one in case.run.system.drive(case.run.values, driver, 0.0))
-    pitch = 2 * math.pi / encoder.per_turn
     count = (start - zero) / pitch
     # backward, the level rises in the middle of a pulse
     edge = math.floor(count + 1e-9) + 1 if speed > 0 else math.ceil(count - 0.5 - 1e-9) - 0.5
@@ -223,9 +229,10 @@ def _channel(observation: Observation, name: str) -> dict[str, Any]:
     found: dict[str, Any] = {"column": channel.column, "measures": channel.measures, "unit": channel.reading}
     if stated.sensitivity:
         found["gain"] = stated.sensitivity.source
-    before = min(case.before for case in observation.cases)
-    if channel.at_rest and before > 1 and channel.per_turn == 0:
-        found["zero"] = {"over": ["0 s", f"{AT_REST * before / observation.rate:.6g} s"]}
+    case = observation.cases[0]
+    if channel.zeroed and case.before > 1:
+        rest = (-case.origin, AT_REST * case.before - case.origin)
+        found["zero"] = {"over": [f"{one / observation.rate + 0.0:.6g} s" for one in rest]}
     if stated.range:
         found["range"] = stated.range.source
     accuracy: dict[str, Any] = {}
@@ -261,9 +268,9 @@ def truth_of(observation: Observation) -> dict[str, Any]:
                 "gain_error": observation.drawn[name].gain,
                 "zero_error": observation.drawn[name].zero,
                 "offset": observation.drawn[name].offset,
-                "drift_per_second": channel.drift,
-                "noise": channel.noise,
-                "step": channel.step,
+                "drift_per_second": _short(channel.drift),
+                "noise": _short(channel.noise),
+                "step": _short(channel.step),
             }
             for name, channel in observation.channels.items()
         },
@@ -273,7 +280,7 @@ def truth_of(observation: Observation) -> dict[str, Any]:
                 "set": dict(case.settings),
                 "efficiency": case.efficiency if math.isfinite(case.efficiency) else None,
                 "cycle_seconds": case.run.cycle.duration,
-                "samples": "solved at each" if case.true.exact else "interpolated on a grid of the cycle",
+                "samples": "solved at each" if case.true.exact else f"between {len(case.true.time)} solved a cycle",
                 "mean": {name: _mean(observation, case, i) for i, name in enumerate(observation.channels)},
             }
             for case in observation.cases
@@ -289,10 +296,15 @@ def truth_of(observation: Observation) -> dict[str, Any]:
     return found
 
 
+def _short(value: float) -> float:
+    """Without the rounding of a unit that was taken out."""
+    return float(f"{value:.12g}")
+
+
 def _mean(observation: Observation, case: Case, i: int) -> float:
     """Mean of a true course over the recorded cycles."""
     whole = round(observation.rig.schedule.turns * case.run.cycle.duration * observation.rate)
-    return float(np.mean(case.true.at_samples(i)[:whole]))
+    return float(np.mean(case.true.at_samples(i)[case.first : case.first + whole]))
 
 
 def _fault(data: dict[str, Any]) -> dict[str, Any]:
@@ -310,9 +322,10 @@ HEADS = {
 }
 
 
-def _yaml() -> YAML:
+def _yaml(flowing: bool) -> YAML:
+    """flowing: the innermost groups on one line."""
     yaml = YAML(typ="safe", pure=True)
-    yaml.default_flow_style = None
+    yaml.default_flow_style = None if flowing else False
     yaml.allow_unicode = True
     yaml.width = 118
     yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]  # keys as stated

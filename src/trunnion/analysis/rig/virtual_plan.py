@@ -99,8 +99,8 @@ def _steady(observation: Observation, case: Case) -> dict[str, Array]:
     found = observation.perfect(case)
     cycle = case.run.cycle.duration * observation.rate
     turns = observation.rig.schedule.turns
-    low = case.before + (round(cycle) if turns > 1 else 0)
-    high = case.before + max(round(turns * cycle), 2)
+    low = case.before + case.first + (round(cycle) if turns > 1 else 0)
+    high = case.before + case.first + max(round(turns * cycle), 2)
     return {name: values[low:high] for name, values in found.items()}
 
 

@@ -60,6 +60,11 @@ class Channel:
         return self.measures.partition(":")[0] in ("effort", "load", "reaction", "rate")
 
     @property
+    def zeroed(self) -> bool:
+        """Whether its zero is taken from an idle stretch: pulses have none."""
+        return self.at_rest and not self.per_turn
+
+    @property
     def limit(self) -> float:
         """Largest magnitude that it can tell."""
         return min(self.range, self.span)

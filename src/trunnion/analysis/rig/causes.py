@@ -1,0 +1,118 @@
+"""What one mistake of a sensor, or of the crank angle, would explain of a residual."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["KINDS", "Cause", "best", "causes"]
+
+Array = NDArray[np.float64]
+ENOUGH = 0.8  # of the mean square of the residual that a cause has to explain
+ALIKE = 0.03  # explanations nearer than this are not told apart
+FEWEST = 12  # positions from which a shift is looked for
+GRID = 180
+
+# The simplest first: it is named where others explain no more.
+KINDS = {
+    "sign": "a wrong sign",
+    "zero": "a constant offset",
+    "gain": "a wrong gain",
+    "shift": "a shift of the crank angle",
+    "zero and gain": "an offset and a wrong gain",
+}
+
+
+class Cause(NamedTuple):
+    """One explanation. size: of a zero in the unit of the course, of a gain the relative error, of a shift the share of
+    the cycle by which the measured course is ahead; gain: that of a zero and gain; explains: share of the mean square.
+    """
+
+    kind: str
+    size: float
+    explains: float
+    gain: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class _Pair:
+    """What was measured and what the model has, at the same phases."""
+
+    measured: Array
+    model: Array
+
+    def explained(self, model: Array) -> float:
+        """Share of the mean square of the residual that goes away with another model."""
+        before = float(np.mean((self.measured - self.model) ** 2))
+        return 1.0 - float(np.mean((self.measured - model) ** 2)) / before if before > 0 else 0.0
+
+
+def causes(measured: Array, model: Array, phase: Array, *, closed: bool, turning: bool = False) -> list[Cause]:
+    """Every explanation that can be fitted, in the order of KINDS; finite values only.
+
+    closed: the cycle ends where it starts; turning: the course is an angle, of which a sign or a shift says nothing
+    that a zero does not.
+    """
+    pair, found = _Pair(measured, model), []
+    square = float(np.sum(model**2))
+    if not turning:
+        found.append(Cause("sign", -1.0, pair.explained(-model)))
+    zero = float(np.mean(measured - model))
+    found.append(Cause("zero", zero, pair.explained(model + zero)))
+    if turning or square == 0:
+        return found
+    gain = float(np.sum(measured * model)) / square
+    if gain > 0:
+        found.append(Cause("gain", gain - 1.0, pair.explained(gain * model)))
+    if closed and len(phase) >= FEWEST:
+        found += _shift(pair, phase)
+    around = model - np.mean(model)
+    if float(np.sum(around**2)) > 1e-6 * square:  # of a flat course the two cannot be told apart
+        slope = float(np.sum(measured * around) / np.sum(around**2))
+        offset = float(np.mean(measured) - slope * np.mean(model))
+        if slope > 0:
+            found.append(Cause("zero and gain", offset, pair.explained(slope * model + offset), slope - 1.0))
+    return found
+
+
+def best(found: list[Cause]) -> tuple[Cause | None, list[Cause]]:
+    """The simplest cause that explains enough and as much as any, and the others that explain as much."""
+    single = [one for one in found if one.kind != "zero and gain"]
+    most = max((one.explains for one in single), default=0.0)
+    if most >= ENOUGH:
+        alike = [one for one in single if one.explains >= most - ALIKE]
+        both = next((one for one in found if one.kind == "zero and gain"), None)
+        if both is None or most >= 1 - 2 * ALIKE or 1 - both.explains > 0.25 * (1 - most):
+            return alike[0], alike[1:]
+        return both, []
+    both = next((one for one in found if one.kind == "zero and gain" and one.explains >= 1 - 2 * ALIKE), None)
+    return both, []
+
+
+def _shift(pair: _Pair, phase: Array) -> list[Cause]:
+    """The shift of the phase at which the model fits best: measured(φ) = model(φ + shift); none of a flat course."""
+    from scipy.interpolate import CubicSpline
+    from scipy.optimize import minimize_scalar
+
+    order = np.argsort(phase)
+    at, model = phase[order], pair.model[order]
+    seam, steps = abs(float(model[0] - model[-1])), np.abs(np.diff(model))
+    gap = np.diff(np.append(at, at[0] + 1.0))
+    if np.ptp(model) <= 1e-9 * np.max(np.abs(model)) or np.min(gap) <= 0 or np.max(gap) > 0.1:
+        return []
+    if seam > 5 * np.max(steps, initial=0.0):  # it does not close
+        return []
+    spline = CubicSpline(np.append(at, at[0] + 1.0), np.append(model, model[0]), bc_type="periodic")
+
+    def left(shift: float) -> float:
+        return float(np.mean((pair.measured - spline(phase + shift)) ** 2))
+
+    shifts = np.arange(GRID) / GRID - 0.5
+    coarse = float(shifts[int(np.argmin([left(one) for one in shifts]))])
+    found = minimize_scalar(left, bounds=(coarse - 1 / GRID, coarse + 1 / GRID), method="bounded",
+                            options={"xatol": 1e-7})  # fmt: skip
+    shift = float(found.x)
+    return [Cause("shift", shift, pair.explained(np.asarray(spline(phase + shift))))]

@@ -1,0 +1,45 @@
+"""Numbers with their uncertainty in words: as many digits as it leaves, in the unit that is read most easily."""
+
+from __future__ import annotations
+
+import math
+
+__all__ = ["amount", "decimals", "scaled", "share"]
+
+READ = {"rad": (180 / math.pi, "°"), "m": (1e3, "mm"), "1": (1.0, ""), "": (1.0, "")}
+
+
+def scaled(unit: str) -> tuple[float, str]:
+    """Factor and unit in which a number in SI is read."""
+    return READ.get(unit, (1.0, unit))
+
+
+def decimals(uncertainty: float, digits: int = 2) -> int:
+    """Decimals that leave so many digits of an uncertainty; negative for tens, hundreds."""
+    if not math.isfinite(uncertainty) or uncertainty <= 0:
+        return 6
+    shown = float(f"{uncertainty:.{digits - 1}e}")  # 0.0996 is 0.10
+    return digits - 1 - math.floor(math.log10(shown))
+
+
+def amount(value: float, half: float | None, unit: str) -> str:
+    """A value, ± half if given: `0.3012 ± 0.0034`, `15.02 ± 0.05 °`."""
+    factor, shown = scaled(unit)
+    tail = f" {shown}" if shown else ""
+    size = abs(value * factor)
+    if half is None or not math.isfinite(half) or half <= 0:
+        return f"{value * factor:.6g}{tail}"
+    half = half * factor
+    if half < 1e-5 or max(size, half) >= 1e7:
+        power = math.floor(math.log10(max(size, half)))
+        places = max(decimals(half / 10**power), 0)
+        return f"({value * factor / 10**power:.{places}f} ± {half / 10**power:.{places}f})e{power}{tail}"
+    places = decimals(half)
+    if places < 0:
+        return f"{round(value * factor, places):.0f} ± {round(half, places):.0f}{tail}"
+    return f"{value * factor + 0.0:.{places}f} ± {half:.{places}f}{tail}"
+
+
+def share(part: float) -> str:
+    """A share in whole percent."""
+    return f"{100 * part:.0f} %"

@@ -1,0 +1,185 @@
+"""An identification as a Dataset."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion import __version__
+from trunnion.analysis.account import finding_row, references
+from trunnion.analysis.rig.identify.judged import Judged
+from trunnion.analysis.rig.identify.run import Identified
+from trunnion.analysis.rig.identify.said import sentences
+from trunnion.analysis.rig.identify.uncertainty import CONFIDENCE
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["dataset"]
+
+Array = NDArray[Any]
+Row = tuple[tuple[str, ...], Array, str]
+SOURCES = (
+    "G. A. F. Seber, C. J. Wild, Nonlinear Regression, Wiley, 1989, doi:10.1002/0471725315",
+    "JCGM 100:2008, Evaluation of measurement data: Guide to the expression of uncertainty in measurement",
+)
+
+
+def dataset(found: Identified) -> xr.Dataset:
+    """Estimates with all that is said of them."""
+    import xarray as xr
+
+    judged = Judged(found)
+    problem, measurement = found.problem, found.measurement
+    unknowns = problem.model.unknowns
+    names = [one.name for one in unknowns]
+    rows = _parameters(judged) | _sensors(judged) | _blocks(judged)
+    coordinates: dict[str, Any] = {
+        "parameter": ("parameter", np.array(names, str)),
+        "parameter_2": ("parameter_2", np.array(names, str)),
+        "source": ("source", np.array(judged.budget[0], str)),
+        "sensor": ("sensor", np.array([one.name for one in problem.sensors], str)),
+        "channel": ("channel", np.array(list(problem.model.measures), str)),
+        "condition": ("condition", np.array([one.name for one in measurement.conditions], str)),
+    }
+    variables = {
+        key: xr.Variable(dims, values, {"units": units, "long_name": LONG[key]})
+        for key, (dims, values, units) in rows.items()
+    }
+    system = found.run.system
+    attributes: dict[str, Any] = {
+        "name": found.mechanism.name,
+        "identified": measurement.name,
+        "formula": system.plan.formula,
+        "model_hash": found.mechanism.digest,
+        "trunnion_version": __version__,
+        "confidence": CONFIDENCE,
+        "parameter_paths": json.dumps([one.paths for one in unknowns], ensure_ascii=False),
+        "parameter_units": json.dumps([one.unit for one in unknowns]),
+        "channel_units": json.dumps([one.unit(system) for one in problem.model.measures.values()]),
+        "channel_measures": json.dumps([one.name for one in problem.model.measures.values()]),
+        "drive": _drive(found),
+        "files": json.dumps([list(one.files) for one in measurement.conditions], ensure_ascii=False),
+        "done": json.dumps(list(measurement.done), ensure_ascii=False),
+        "reduced_chi_squared": found.spread.test.reduced,
+        "chi_squared_freedom": found.spread.test.freedom,
+        "chi_squared_chance": found.spread.test.chance,
+        "turn_correlation": found.spread.follows,
+        "hold_out_ratio": judged.trust,
+        "evaluations": problem.evaluations,
+        "starts": found.search.starts,
+        "converged": int(found.search.fit.converged),
+        "references": "\n".join([*SOURCES, *references(found.mechanism)]),
+        "findings": json.dumps([finding_row(one) for one in sentences(judged)], ensure_ascii=False),
+    }
+    return xr.Dataset(variables, coordinates, attributes)
+
+
+def _drive(found: Identified) -> str:
+    """The first driver, if its turns name the positions."""
+    return next(iter(found.mechanism.drivers), "")
+
+
+LONG = {
+    "start": "start of the search",
+    "estimate": "estimate; NaN if the data do not tell it",
+    "standard_uncertainty": "standard uncertainty of the estimate",
+    "lower": "lower end of the 95 % interval",
+    "upper": "upper end of the 95 % interval",
+    "degrees_of_freedom": "effective degrees of freedom of the standard uncertainty",
+    "limit": "−1 on the lower limit, 1 on the upper: the interval is one-sided",
+    "told": "1 if the data tell it, 0 if not",
+    "correlation": "correlation of the estimates",
+    "share": "share of a source in the variance of an estimate",
+    "singular_value": "singular value of the derivatives with columns scaled to 1, the largest first",
+    "sensor_error": "estimated error of a sensor, in its standard uncertainties",
+    "sensor_uncertainty": "standard uncertainty of that, in those stated",
+    "rms_before": "root mean square of the residual at the start",
+    "rms_after": "root mean square of the residual with the estimates",
+    "rms_expected": "what the scatter between turns explains of it",
+    "used": "positions used",
+    "left_out": "positions with data that are not used",
+    "turns": "turns used",
+    "held_out_turns": "turns held out",
+    "held_out_before": "root mean square of the residual of what was held out, at the start",
+    "held_out_after": "the same with the estimates",
+    "held_out_expected": "what its scatter and the uncertainty of the prediction explain of it",
+    "phase": "share of the cycle",
+    "measured": "mean over the turns",
+    "residual_before": "measured less model, at the start",
+    "residual_after": "measured less what the sensor would read with the estimates",
+    "residual_uncertainty": "standard uncertainty of the mean over the turns",
+}
+
+
+def _parameters(judged: Judged) -> dict[str, Row]:
+    n = judged.problem.count
+    low, high = judged.interval
+    own = ("parameter",)
+    return {
+        "start": (own, judged.start[:n], ""),
+        "estimate": (own, judged.estimate, ""),
+        "standard_uncertainty": (own, judged.deviation[:n], ""),
+        "lower": (own, low, ""),
+        "upper": (own, high, ""),
+        "degrees_of_freedom": (own, judged.found.spread.freedom[:n], "1"),
+        "limit": (own, judged.limit, "1"),
+        "told": (own, (~judged.lost[:n]).astype(np.int8), "1"),
+        "correlation": (("parameter", "parameter_2"), judged.correlation, "1"),
+        "share": (("parameter", "source"), judged.budget[1], "1"),
+        "singular_value": (own, judged.singular_values, "1"),
+    }
+
+
+def _sensors(judged: Judged) -> dict[str, Row]:
+    n = judged.problem.count
+    lost = judged.lost[n:]
+    return {
+        "sensor_error": (("sensor",), np.where(lost, np.nan, judged.found.x[n:]), "1"),
+        "sensor_uncertainty": (("sensor",), judged.deviation[n:], "1"),
+    }
+
+
+def _blocks(judged: Judged) -> dict[str, Row]:
+    problem = judged.problem
+    channels = list(problem.model.measures)
+    shape = len(channels), len(judged.found.measurement.conditions)
+    longest = max(len(one.phase) for one in judged.found.measurement.conditions)
+    figures = {key: np.full(shape, np.nan) for key in FIGURES}
+    counts = {key: np.zeros(shape, np.int32) for key in COUNTS}
+    curves = {key: np.full((*shape, longest), np.nan) for key in CURVES}
+    phase = np.full((shape[1], longest), np.nan)
+    for i, condition in enumerate(judged.found.measurement.conditions):
+        phase[i, : len(condition.phase)] = condition.phase
+
+    def place(k: int) -> tuple[int, int]:
+        return channels.index(problem.blocks[k].channel), problem.blocks[k].condition
+
+    for one in judged.misses:
+        at, block = place(one.block), problem.blocks[one.block]
+        for key, value in zip(FIGURES[:3], (one.before, one.after, one.expected), strict=True):
+            figures[key][at] = value
+        for key, number in zip(COUNTS[:3], (one.used, one.out, len(block.turns)), strict=True):
+            counts[key][at] = number
+        for key, row in zip(CURVES, (block.mean, *one.curves), strict=True):
+            curves[key][at][: len(row)] = row
+    for held in judged.held_out:
+        at = place(held.block)
+        counts["held_out_turns"][at] = held.turns
+        for key, value in zip(FIGURES[3:], (held.before, held.after, held.expected), strict=True):
+            figures[key][at] = value
+    own = ("channel", "condition")
+    return {
+        **{key: (own, values, "") for key, values in figures.items()},
+        **{key: (own, values, "1") for key, values in counts.items()},
+        "phase": (("condition", "position"), phase, "1"),
+        **{key: ((*own, "position"), values, "") for key, values in curves.items()},
+    }
+
+
+FIGURES = ("rms_before", "rms_after", "rms_expected", "held_out_before", "held_out_after", "held_out_expected")
+COUNTS = ("used", "left_out", "turns", "held_out_turns")
+CURVES = ("measured", "residual_before", "residual_after", "residual_uncertainty")

@@ -1,0 +1,209 @@
+"""`identify`: numbers of a model from measurements by least squares, with what they are worth."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.analysis.analyse import Run, prepare
+from trunnion.analysis.friction import FrictionMethod
+from trunnion.analysis.measures import Measure, named
+from trunnion.analysis.rig.identify.blocks import Block, blocks_of, channels_of
+from trunnion.analysis.rig.identify.courses import Model
+from trunnion.analysis.rig.identify.fit import Problem, fit, sensors_of
+from trunnion.analysis.rig.identify.held import HoldOut, held_out
+from trunnion.analysis.rig.identify.search import Search, search
+from trunnion.analysis.rig.identify.separate import Group, inseparable
+from trunnion.analysis.rig.identify.uncertainty import Spread, left_over, spread_of
+from trunnion.analysis.rig.identify.unknowns import Parameters, described, unknowns
+from trunnion.errors import Finding, MechanismError
+from trunnion.measured.efficiency import load_joints
+from trunnion.measured.measurement import Measurement
+from trunnion.model.mechanism import Mechanism
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["Identified", "identify", "with_estimates"]
+
+Array = NDArray[np.float64]
+Errors = Literal["channel", "condition"]
+
+
+@dataclass(frozen=True)
+class Identified:
+    """All that an identification found, before it is written down."""
+
+    mechanism: Mechanism
+    measurement: Measurement
+    run: Run
+    problem: Problem
+    search: Search
+    spread: Spread
+    groups: Sequence[Group]
+
+    @property
+    def x(self) -> Array:
+        """Estimates of the unknowns, then of the sensors' errors."""
+        return self.search.fit.x
+
+
+def identify(
+    mechanism: Mechanism,
+    measurement: Measurement,
+    parameters: Parameters,
+    channels: Sequence[str] | None = None,
+    start: Mapping[str, float | str] | None = None,
+    hold_out: HoldOut = None,
+    sensors: Errors = "channel",
+    delay: float | None = None,
+    guard: int = 1,
+    starts: int | None = None,
+    method: FrictionMethod | None = None,
+) -> xr.Dataset:
+    """Numbers of a mechanism from what was measured, with 95 % intervals, correlation, and what cannot be told apart.
+
+    parameters: names as for `Mechanism.with_values`, each an unknown; or by a name of your own the numbers that are to
+    be one unknown: `{"pins": ["pin-1.friction.coefficient", "pin-2.friction.coefficient"]}`. channels: of the
+    measurement, all if not given. start: where the search begins, by name, SI or texts with units; the model's values
+    if not given. hold_out: conditions by name, file or setting, or the share of the turns of each (the last), that are
+    not fitted but predicted. sensors: whether zero and gain of a channel are off by the same in all conditions, or in each by its own.
+    delay: standard uncertainty, s, of the time by which a channel lags behind the angle, as its bandwidth makes it; what
+    it is in fact is estimated too. guard: positions left out on each side of a change of the sense of a friction. starts: places to begin at.
+    Method: weighted least squares with exact derivatives, trust region; covariances by the scatter between turns.
+    Raises MechanismError for names, channels or conditions that are not there, or where the model has no answer.
+    """
+    from trunnion.analysis.rig.identify.result import dataset
+
+    return dataset(identified(mechanism, measurement, parameters, channels, start, hold_out, sensors, delay, guard,
+                              starts, method))  # fmt: skip
+
+
+def identified(
+    mechanism: Mechanism,
+    measurement: Measurement,
+    parameters: Parameters,
+    channels: Sequence[str] | None = None,
+    start: Mapping[str, float | str] | None = None,
+    hold_out: HoldOut = None,
+    sensors: Errors = "channel",
+    delay: float | None = None,
+    guard: int = 1,
+    starts: int | None = None,
+    method: FrictionMethod | None = None,
+) -> Identified:
+    """What `identify` makes its Dataset of."""
+    paths = described(mechanism, parameters)
+    stated = _stated(mechanism, measurement, paths, start or {})
+    settings = _settings(stated, measurement, paths)
+    run = prepare(stated)
+    if run.determinacy is not None:
+        run.determinacy.refuse()
+    joints = load_joints(stated)
+    held, share = held_out(stated, measurement, hold_out)
+    blocks = blocks_of(measurement, channels_of(measurement, channels, joints), held, share, joints)
+    measures = _measures(stated, run, blocks)
+    phases = tuple(np.asarray(one.phase, float) for one in measurement.conditions)
+    model = Model(run, tuple(unknowns(stated, paths, start or {})), measures, settings, phases,
+                  method or FrictionMethod())  # fmt: skip
+    if channels is None:
+        model, blocks = _telling(model, blocks)
+    names = [one.name for one in measurement.conditions] if sensors == "condition" else None
+    problem = Problem(model, blocks, sensors_of(blocks, names, delay), guard)
+    found = search(problem, starts)
+    spread = spread_of(problem, found.fit.x)
+    if spread.test.misfit and problem.sensors:
+        problem.left_over = left_over(problem, spread)
+        found = replace(found, fit=fit(problem, found.fit.x))
+        spread = spread_of(problem, found.fit.x)
+    groups = inseparable(problem, found.fit.x, spread)
+    return Identified(stated, measurement, run, problem, found, spread, groups)
+
+
+def _telling(model: Model, blocks: list[Block]) -> tuple[Model, list[Block]]:
+    """Only the channels that an unknown acts on, as far as the start tells; all if there are none."""
+    courses = model.courses(np.array([one.start for one in model.unknowns]))
+    sizes = np.array([one.size or 1.0 for one in model.unknowns])
+    moved = dict.fromkeys(model.measures, 0.0)
+    for said in courses.said:
+        for name, one in said.items():
+            most = float(np.nanmax(np.abs(one.value), initial=0.0))
+            change = float(np.nanmax(np.abs(np.nan_to_num(one.slope)) * sizes[:, None], initial=0.0))
+            moved[name] = max(moved[name], change / most if most else change)
+    kept = {name: model.measures[name] for name, share in moved.items() if share > NOTHING} or model.measures
+    return replace(model, measures=kept), [block for block in blocks if block.channel in kept]
+
+
+NOTHING = 1e-9  # of a course: what an unknown does to it
+
+
+def _stated(
+    mechanism: Mechanism,
+    measurement: Measurement,
+    paths: Mapping[str, Sequence[str]],
+    start: Mapping[str, float | str],
+) -> Mechanism:
+    """The mechanism with all numbers stated that the conditions set or that are looked for."""
+    entries = mechanism.parameter_set.entries
+    missing: dict[str, float | str] = {}
+    for condition in measurement.conditions:
+        for name, value in condition.values.items():
+            path = mechanism.path_of(name)
+            if path not in entries:
+                missing[path] = float(value)
+    for name, own in paths.items():
+        missing.update({path: start.get(name, 0.0) for path in own if path not in entries})
+    return mechanism.with_values(missing) if missing else mechanism
+
+
+def _settings(
+    mechanism: Mechanism, measurement: Measurement, paths: Mapping[str, Sequence[str]]
+) -> tuple[dict[str, float], ...]:
+    """What each condition sets, by path; MechanismError where that is looked for."""
+    owners = {path: name for name, own in paths.items() for path in own}
+    found, findings = [], []
+    for condition in measurement.conditions:
+        values = {mechanism.path_of(name): float(value) for name, value in condition.values.items()}
+        for path in values:
+            if path in owners:
+                what = f"the condition {condition.name} sets {path}"
+                findings.append(Finding(what, f"parameter {owners[path]}", "leave it out of the conditions"))
+            elif path not in mechanism.parameters():
+                what = f"the condition {condition.name} sets it, but it is no number: it changes with the motion"
+                findings.append(Finding(what, path, "set a dimension in it"))
+        found.append(values)
+    if findings:
+        raise MechanismError(findings[0])
+    return tuple(found)
+
+
+def _measures(mechanism: Mechanism, run: Run, blocks: Sequence[Block]) -> dict[str, Measure]:
+    """What each channel measures; MechanismError for what has no course."""
+    texts: dict[str, str] = {}
+    for block in blocks:
+        if texts.setdefault(block.channel, block.course.measures) != block.course.measures:
+            what = f"measures {texts[block.channel]} in one condition and {block.course.measures} in another"
+            raise MechanismError(Finding(what, f"channel {block.channel}", "give them channels of their own"))
+    found = {name: named(mechanism, [text], run.values)[0] for name, text in texts.items()}
+    for name, measure in found.items():
+        if measure.kind not in COURSES or (measure.of_attitude(run.system)):
+            what = f"measures {texts[name]}, which is no one number at each position"
+            raise MechanismError(Finding(what, f"channel {name}", f"one of {', '.join(COURSES)} is"))
+    return found
+
+
+COURSES = ("effort", "load", "rate", "efficiency", "reaction", "rotation", "slide", "angle", "point")
+
+
+def with_estimates(mechanism: Mechanism, result: xr.Dataset) -> Mechanism:
+    """The mechanism with the estimates of a result in place, rounded to two digits of their standard uncertainty.
+
+    Those that were not told apart stay as they are.
+    """
+    from trunnion.analysis.rig.identify.written import values
+
+    return mechanism.with_values(values(mechanism, result))

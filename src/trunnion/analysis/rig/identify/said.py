@@ -1,0 +1,237 @@
+"""What there is to say of an identification, in sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from trunnion.analysis.rig.identify.amounts import amount, share
+from trunnion.analysis.rig.identify.judged import Judged
+from trunnion.analysis.rig.identify.separate import Combination, Group
+from trunnion.analysis.rig.identify.uncertainty import quantile
+from trunnion.errors import Finding, Severity, Status
+
+__all__ = ["sentences"]
+
+FAR = 3.0  # standard uncertainties from what was stated of a sensor
+MOSTLY = 0.5  # of the variance
+POOR = 2.0  # times what is expected, of predictions
+MOST_NAMED = 3
+FEW = 5.0  # degrees of freedom
+NUMBERS = ("no", "one", "two", "three", "four", "five", "six")
+
+
+def sentences(judged: Judged) -> list[Finding]:
+    """Errors and warnings first."""
+    found = [*_search(judged), *_fit(judged), *_groups(judged), *_limits(judged), *_sensors(judged), *_data(judged),
+             *_held(judged)]  # fmt: skip
+    order = (Severity.ERROR, Severity.WARNING, Severity.NOTE)
+    return sorted(found, key=lambda one: order.index(one.severity))
+
+
+def _joined(names: Sequence[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+def _count(number: int, what: str) -> str:
+    return f"{NUMBERS[number] if number < len(NUMBERS) else f'{number:,}'} {what}{'s' * (number != 1)}"
+
+
+def _search(judged: Judged) -> Iterator[Finding]:
+    """How the search went."""
+    search, problem = judged.found.search, judged.problem
+    if search.shared < 1:
+        what = f"the start has no answer at some positions: the search began with {search.shared:g} of its friction"
+        yield Finding(what, "start", severity=Severity.NOTE)
+    if problem.refused:
+        were = "was" if problem.refused == 1 else "were"
+        what = f"{_count(problem.refused, 'step')} to where the model locks or cannot be assembled {were} taken back"
+        yield Finding(what, "search", severity=Severity.NOTE)
+    if not search.fit.converged:
+        what = f"the search did not end within {search.fit.evaluations} evaluations"
+        yield Finding(what, "search", "give a start that is nearer, or fewer parameters")
+    elif not search.settled:
+        what = "which positions are used changes back and forth with the estimates"
+        yield Finding(what, "search", "give a guard of 2 or more", Severity.WARNING)
+    if search.other is not None:
+        values = (
+            f"{one.name} = {amount(value, None, one.unit)}"
+            for one, value in zip(problem.model.unknowns, search.other, strict=False)
+        )
+        what = f"other values fit as well: {', '.join(values)}"
+        yield Finding(what, "search", "hold out a condition, or measure in more of them", Severity.WARNING)
+
+
+def _fit(judged: Judged) -> Iterator[Finding]:
+    """Whether the model fits, and whether turns repeat."""
+    test, problem = judged.found.spread.test, judged.problem
+    if test.misfit:
+        chance = "less than 0.01 %" if test.chance < 1e-4 else f"{100 * test.chance:.2g} %"
+        what = (
+            f"the model does not fit: its residuals are {test.reduced:.3g} times (reduced χ²) what the scatter between "
+            f"turns explains, chance {chance}; the intervals contain what is left over"
+        )
+        yield Finding(what, "fit", "look at the residuals; free another number, or take another friction law",
+                      Severity.WARNING)  # fmt: skip
+    single = [block for block in problem.blocks if block.fitted and not block.repeats]
+    if single and len(single) == sum(block.fitted for block in problem.blocks):
+        what = "no turn is repeated: the scatter is taken from the residuals, and nothing tests the model"
+        yield Finding(what, "data", "record several turns", Severity.NOTE)
+    freedom = judged.found.spread.freedom[: problem.count][~judged.lost[: problem.count]]
+    if freedom.size and np.min(freedom) < FEW:
+        degrees = _count(round(float(np.min(freedom))), "degree")
+        what = f"the scatter is known from {degrees} of freedom: the intervals are wide for that"
+        yield Finding(what, "data", "record more turns", Severity.NOTE)
+    follows = judged.found.spread.follows
+    pairs = sum(len(block.turns) - 1 for block in problem.blocks if block.fitted)
+    if follows > 2 / np.sqrt(max(pairs, 1)):
+        what = f"each turn resembles the one before it (correlation {follows:.2f}): the intervals are wider for it"
+        yield Finding(what, "data", "look for a drift; warm the rig up", Severity.WARNING)
+
+
+# ---- what cannot be told apart --------------------------------------------------------------------------------
+
+
+def _groups(judged: Judged) -> Iterator[Finding]:
+    for group in judged.found.groups:
+        names = [_name(judged, i) for i in group.members]
+        channels = _joined(list(dict.fromkeys(block.channel for block in judged.problem.blocks if block.fitted)))
+        where = f"parameter {names[0]}"
+        if len(group.members) == 1:
+            what = f"{names[0]} has no effect on {channels}: the data say nothing of it"
+            yield Finding(what, where, "fix it, or measure what it acts on", Severity.WARNING)
+            continue
+        verb = "act on" if group.exact else "act nearly alike on"
+        alike = f"{_joined(names)} {verb} {channels}{' in the same way' if group.exact else ''}"
+        what = f"{alike}: {_known(judged, group, names)}"
+        remedy = f"fix {'one' if len(names) == 2 else 'some'} of them, or measure what tells them apart"
+        yield Finding(what, where, remedy, Severity.WARNING)
+
+
+def _name(judged: Judged, i: int) -> str:
+    problem = judged.problem
+    if i < problem.count:
+        return problem.model.unknowns[i].name
+    return f"the {problem.sensors[i - problem.count].name}"
+
+
+def _known(judged: Judged, group: Group, names: Sequence[str]) -> str:
+    """What of them is known, and that the rest is not."""
+    if not group.known:
+        return "no combination of them is known"
+    units = {judged.problem.model.unknowns[i].unit for i in group.members if i < judged.problem.count}
+    unit = next(iter(units)) if len(units) == 1 and max(group.members) < judged.problem.count else "1"
+    pair = len(names) == 2
+    if pair:
+        one = group.known[0]
+        said = amount(one.value, one.uncertainty, unit if one.form == "sum" else "1")
+        other = {"sum": "difference", "product": "ratio", "ratio": "product"}[one.form]
+        if one.form == "sum" and one.factors == (1.0, 1.0):
+            return f"their sum is known, {said}, their {other} is not"
+        if one.form == "sum" and one.factors == (1.0, -1.0):
+            return f"their difference is known, {said}, their sum is not"
+        if one.form != "sum":
+            return f"their {one.form} is known, {said}, neither alone"
+        return f"{_formula(one, names)} = {said} is known, neither alone"
+    told = "; ".join(f"{_formula(one, names)} = {amount(one.value, one.uncertainty, unit)}" for one in group.known)
+    many = f"{_count(len(group.known), 'combination')} of them {'is' if len(group.known) == 1 else 'are'} known"
+    return f"{many}, none alone: {told}"
+
+
+def _formula(one: Combination, names: Sequence[str]) -> str:
+    parts: list[str] = []
+    for factor, name in zip(one.factors, names, strict=True):
+        if factor == 0:
+            continue
+        size = "" if abs(factor) == 1 else f"{abs(factor):.3g} "
+        sign = ("− " if factor < 0 else "+ ") if parts else ("−" if factor < 0 else "")
+        parts.append(f"{sign}{size}{name}")
+    return " ".join(parts)
+
+
+# ---- limits, sensors, data ------------------------------------------------------------------------------------
+
+
+def _limits(judged: Judged) -> Iterator[Finding]:
+    low, high = judged.interval
+    for p, unknown in enumerate(judged.problem.model.unknowns):
+        where = f"parameter {unknown.name}"
+        if judged.limit[p]:
+            end = judged.estimate[p]
+            far = high[p] if judged.limit[p] < 0 else low[p]
+            side = "at most" if judged.limit[p] < 0 else "at least"
+            ends = [amount(one, None, unknown.unit) for one in (end, far)]
+            what = f"is on its limit {ends[0]}: {side} {ends[1]} (95 %, one-sided)"
+            yield Finding(what, where, severity=Severity.NOTE)
+            continue
+        size = max(abs(judged.estimate[p]), unknown.size)
+        half = quantile(judged.found.spread.freedom[p]) * judged.deviation[p]
+        if size > 0 and half > size:
+            said = amount(judged.estimate[p], half, unknown.unit)
+            what = f"is hardly known: {said}, an interval wider than the number itself"
+            yield Finding(what, where, "record more turns, or conditions in which it does more", Severity.NOTE)
+
+
+def _sensors(judged: Judged) -> Iterator[Finding]:
+    """Which sensor limits what is known, and whether one is off by more than was stated of it."""
+    problem = judged.problem
+    names, shares = judged.budget
+    for p, unknown in enumerate(problem.model.unknowns):
+        for source, part in zip(names, shares[p], strict=True):
+            if source not in ("scatter", "misfit") and part > MOSTLY:
+                what = f"{share(part)} of its variance is the {source}: more turns do not help"
+                yield Finding(what, f"parameter {unknown.name}", "calibrate that sensor better", Severity.NOTE)
+    for s, sensor in enumerate(problem.sensors, problem.count):
+        if sensor.stated and abs(judged.found.x[s]) > FAR:
+            what = f"comes out {abs(judged.found.x[s]):.1f} standard uncertainties from what is stated of it"
+            remedy = "check the sensor, its stated accuracy, and the loads of the model"
+            yield Finding(what, sensor.name, remedy, Severity.WARNING)
+    exact = [
+        block.channel for block in problem.blocks if not (block.course.accuracy.zero or block.course.accuracy.gain)
+    ]
+    if exact:
+        channels = _joined(list(dict.fromkeys(exact)))
+        what = f"no accuracy is stated of {channels}: zero and gain are taken as exact"
+        yield Finding(what, "sensors", "state accuracy: {zero: …, gain: …} in the mapping", Severity.NOTE)
+
+
+def _data(judged: Judged) -> Iterator[Finding]:
+    """What was left out."""
+    problem = judged.problem
+    courses = problem.courses(judged.found.x)
+    used, out = (sum(getattr(one, key) for one in judged.misses) for key in ("used", "out"))
+    if out:
+        what = (
+            f"{out:,} of {used + out:,} positions are left out: a friction turns round or the speed is zero there, the "
+            "position is close to singular, or the model has no answer"
+        )
+        yield Finding(what, "data", severity=Severity.NOTE)
+    locked = sum(int(np.count_nonzero(status == Status.LOCKED)) for status in courses.status)
+    lost = sum(int(np.count_nonzero(status >= Status.NOT_CONVERGED)) for status in courses.status) - locked
+    for number, why in ((locked, "locked by friction"), (lost, "without an answer")):
+        if number:
+            what = f"with the estimates {number:,} positions that were measured are {why} in the model"
+            yield Finding(
+                what, "fit", "look at it with analyse, and at the setting of the conditions", Severity.WARNING
+            )
+
+
+def _held(judged: Judged) -> Iterator[Finding]:
+    """How well what was held out is predicted."""
+    rows = judged.held_out
+    if not rows:
+        return
+    trust = judged.trust
+    conditions = judged.found.measurement.conditions
+    held = list(dict.fromkeys(conditions[judged.problem.blocks[one.block].condition].name for one in rows))
+    names = "; ".join(held) if len(held) <= MOST_NAMED else f"of {len(held)} conditions"
+    if not np.isfinite(trust):
+        what = f"nothing tells how well {names} should be predicted"
+        yield Finding(what, "hold_out", severity=Severity.NOTE)
+    elif trust > POOR:
+        what = f"what was held out ({names}) is missed by {trust:.1f} times what its scatter and the estimates explain"
+        yield Finding(what, "hold_out", "the model lacks something that differs there", Severity.WARNING)
+    else:
+        what = f"what was held out ({names}) is missed by {trust:.2f} times what its scatter and the estimates explain"
+        yield Finding(what, "hold_out", severity=Severity.NOTE)

@@ -1,0 +1,174 @@
+"""The model in one working condition: the course of what each channel measures, at the positions of the measurement."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.analysis.analyse import Run, prepare, status_of
+from trunnion.analysis.friction import FrictionMethod
+from trunnion.analysis.measure_figures import known
+from trunnion.analysis.measures import MEASURES, Measure, coordinate_unit, named
+from trunnion.analysis.seating import settle
+from trunnion.analysis.tolerance.kernel import NumpyKernel
+from trunnion.analysis.travel import lanes
+from trunnion.errors import Finding, MechanismError, Status
+from trunnion.measured.measurement import Condition
+from trunnion.model.mechanism import Mechanism
+
+__all__ = ["Modelled", "measure_of", "modelled", "prepared"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Modelled:
+    """What the model has at the positions of a condition, SI.
+
+    drive: coordinate of the first driver if it runs one way, else time; unit: rad, m or s; span: what `drive` gains
+    over the cycle; status: (position,); courses, units: by channel, NaN where the status rules a course out.
+    """
+
+    run: Run
+    drive: Array
+    unit: str
+    span: float
+    status: NDArray[np.int8]
+    courses: Mapping[str, Array]
+    measures: Mapping[str, Measure]
+
+    @property
+    def sound(self) -> NDArray[np.bool_]:
+        """Positions whose forces can be relied on; all that are solved if there are no such."""
+        best = (self.status == Status.SOLVED) | (self.status == Status.CONTACT_LOST)
+        return best if np.any(best) else self.status < Status.NOT_CONVERGED
+
+    def comparable(self, channel: str) -> NDArray[np.bool_]:
+        """Positions at which the model has one number for a channel.
+
+        A force is an interval where a relative speed is zero, and no number to rely on beside a dead centre.
+        """
+        there = np.isfinite(self.courses[channel])
+        return there if self.measures[channel].of_motion else there & self.sound
+
+
+def measure_of(mechanism: Mechanism, run: Run, channel: str, name: str) -> Measure:
+    """What a channel measures; MechanismError if the model has no such course."""
+    where = f"channels.{channel}.measures"
+    try:
+        measure = named(mechanism, [name], run.values)[0]
+    except MechanismError as error:
+        raise MechanismError([replace(one, where=where) for one in error.findings]) from None
+    kind = MEASURES[measure.kind]
+    course = kind.rule == "deviation" or (measure.kind == "efficiency" and measure.subject == "instant")
+    if measure.statistic or kind.against or not course or measure.of_attitude(run.system):
+        what = f"'{name}' is no number of a single position"
+        remedy = "a channel measures such as effort:DRIVER, rate:JOINT, load:LOAD, rotation:JOINT or link.point.x"
+        raise MechanismError(Finding(what, where, remedy))
+    return measure
+
+
+def modelled(
+    mechanism: Mechanism,
+    condition: Condition,
+    channels: Mapping[str, str],
+    method: FrictionMethod,
+    also: Mapping[str, str] | None = None,
+) -> Modelled:
+    """The model with the values of a condition. channels: what each measures, by name; also: others, if they can be.
+
+    Raises MechanismError for values or measures that the model does not have, all in one go.
+    """
+    run = prepared(mechanism, condition)
+    findings: list[Finding] = []
+    measures: dict[str, Measure] = {}
+    for channel, name in {**(also or {}), **channels}.items():
+        try:
+            measures[channel] = _checked(run, condition, channel, name)
+        except MechanismError as error:
+            findings += error.findings if channel in channels else ()
+    if findings:
+        raise MechanismError(findings)
+    if run.determinacy is not None and not all(one.of_motion for one in measures.values()):
+        run.determinacy.refuse()
+    time = np.asarray(condition.phase, float) * run.cycle.duration
+    courses, status = _courses(run, {one.name: one for one in measures.values()}, time, method)
+    drive, unit, span = _drive(run, time)
+    found = {
+        channel: _beside(measure.turning(run.system), courses[measure.name], condition.courses[channel].mean)
+        for channel, measure in measures.items()
+    }
+    return Modelled(run, drive, unit, span, status, found, measures)
+
+
+def _checked(run: Run, condition: Condition, channel: str, name: str) -> Measure:
+    """What a channel measures; MechanismError if the model has no such course, or has it in another unit."""
+    measure = measure_of(run.system.mechanism, run, channel, name)
+    unit, own = measure.unit(run.system), condition.courses[channel].unit
+    if own != unit:
+        what = f"is in {own}, and {name} is in {unit}"
+        raise MechanismError(Finding(what, f"channels.{channel}", "state its unit and gain, or what else it measures"))
+    return measure
+
+
+def prepared(mechanism: Mechanism, condition: Condition) -> Run:
+    """The mechanism with the values of a condition; what is wrong with it says in which."""
+    with _in(condition):
+        return prepare(mechanism.with_values(dict(condition.values)))
+
+
+@contextmanager
+def _in(condition: Condition) -> Iterator[None]:
+    try:
+        yield
+    except MechanismError as error:
+        told = [replace(one, what=f"{one.what} (in condition {condition.name})") for one in error.findings]
+        raise MechanismError(told) from None
+
+
+def _courses(
+    run: Run, measures: Mapping[str, Measure], time: Array, method: FrictionMethod
+) -> tuple[dict[str, Array], NDArray[np.int8]]:
+    """Each measure at the times, and the statuses; pins with a seat lie in it."""
+    kernel = NumpyKernel(run, tuple(measures.values()), method)
+    if not run.seats:
+        parts, status = kernel.courses(run.values, time)
+        return {name: _row(part[0], time) for name, part in parts.items()}, status
+    seen, quick = lanes(time, run.cycle), replace(method, margin_up_to=0.0)
+    with np.errstate(all="ignore"):
+        seated = settle(run, seen, method, run.ideal(seen.times, quick))
+        status = status_of(seated.back, time.shape)
+        np.maximum(status, np.where(seated.sticks, np.int8(Status.ZERO_SLIP), np.int8(0)), out=status)
+        found = {}
+        for name, measure in measures.items():
+            back = seated.back.walk if measure.of_motion else seated.back
+            course = _row(measure.curve(back)[0], time)
+            found[name] = np.where(known(measure, status), course, np.nan)
+    return found, status
+
+
+def _row(number: object, time: Array) -> Array:
+    return np.array(np.broadcast_to(np.asarray(number, float), time.shape))
+
+
+def _drive(run: Run, time: Array) -> tuple[Array, str, float]:
+    """Coordinate of the first driver, its unit, what it gains in a cycle; time where it names no position."""
+    unit = coordinate_unit(run.system, run.values)
+    if unit == "s":
+        return time, unit, run.cycle.duration
+    first = next(iter(run.system.mechanism.drivers))
+    ends = np.array([0.0, run.cycle.duration * (1 - 1e-12)])
+    drive, low_high = (_row(run.system.drive(run.values, first, at)[0], at) for at in (time, ends))
+    return drive, unit, float(low_high[1] - low_high[0])
+
+
+def _beside(turning: bool, course: Array, measured: Array) -> Array:
+    """The course; an angle within half a turn of what was measured, for both count their turns each in its own way."""
+    if not turning:
+        return course
+    turns = np.round((measured - course) / (2 * np.pi))
+    return course + 2 * np.pi * np.nan_to_num(turns)

@@ -1,0 +1,56 @@
+"""What a comparison is made of: a channel beside the model, an efficiency beside the model's, a condition with both."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.analysis.rig.causes import Cause
+from trunnion.analysis.rig.judge import Judged, Verdict
+from trunnion.analysis.rig.modelled import Modelled
+from trunnion.measured.measurement import Condition, Course
+
+__all__ = ["Compared", "Efficient", "Pair"]
+
+
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """One channel in one condition: what was measured, what the model has, what it comes to."""
+
+    course: Course
+    model: NDArray[np.float64]
+    comparable: NDArray[np.bool_]
+    judged: Judged
+    cause: Cause | None
+    others: tuple[Cause, ...] = ()
+
+    @property
+    def within(self) -> bool:
+        return self.judged.verdict is Verdict.WITHIN
+
+
+@dataclass(frozen=True)
+class Efficient:
+    """Efficiency of a condition by the channels: measured, its expanded uncertainty, and of the model."""
+
+    measured: float = np.nan
+    expanded: float = np.nan
+    model: float = np.nan
+
+    @property
+    def within(self) -> bool:
+        """Whether the model lies within ±U; not where one of them is unknown."""
+        return bool(abs(self.measured - self.model) <= self.expanded)
+
+
+@dataclass(frozen=True, eq=False)
+class Compared:
+    """A condition with its model and its channels."""
+
+    condition: Condition
+    model: Modelled
+    pairs: Mapping[str, Pair]
+    efficiency: Efficient | None

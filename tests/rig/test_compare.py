@@ -1,0 +1,358 @@
+"""A model beside a measurement: verdicts, what is named, and what has no answer."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import trunnion
+from rig_measurements import course, exact, measured, rocker
+from trunnion import MechanismError, Status
+from trunnion.analysis.rig.compared import VARIABLES
+from trunnion.analysis.rig.judge import Verdict, expanded, independent, judge, uncertainty_of
+from trunnion.analysis.rig.said import gathered
+from trunnion.errors import Finding, Severity
+from trunnion.measured.measurement import Accuracy, Condition, Measurement
+
+POWERS = ("torque", "speed", "brake", "out")
+
+
+def compare(measurement, mechanism=None, **options):
+    return trunnion.compare(mechanism or rocker(), measurement, **options)
+
+
+def said(result, *words):
+    """The findings that have all these words."""
+    rows = json.loads(result.attrs["findings"])
+    return [row for row in rows if all(word in " ".join(row.values()) for word in words)]
+
+
+def codes(result):
+    return set(result.verdict.values.ravel().tolist())
+
+
+# ---- judging --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("turns", [3, 12])
+@pytest.mark.parametrize(("zero", "gain"), [(0.0, 0.0), (0.3, 0.0), (0.05, 0.01)])
+@pytest.mark.parametrize("smooth", [1, 9])
+def test_a_true_model_is_within_in_about_95_percent(turns, zero, gain, smooth):
+    """Of courses with noise, correlated or not, and sensors whose zero and gain are off as they are stated to be."""
+    random, count = np.random.default_rng(4), 60
+    true = 10 + 3 * np.sin(2 * np.pi * np.arange(count) / count)
+    kernel = np.fft.rfft(np.ones(smooth) / smooth**0.5, count)
+    shares, within = [], 0
+    for _ in range(150):
+        noise = np.fft.irfft(np.fft.rfft(random.normal(size=(turns, count)), axis=1) * kernel, count)
+        found = true * (1 + gain * random.normal()) + zero * random.normal() + 0.2 * noise
+        one = judge(course("torque", found, Accuracy(zero, gain)), true, np.ones(count, bool))
+        shares.append(one.within)
+        within += one.verdict is Verdict.WITHIN
+    assert np.mean(shares) == pytest.approx(0.9545, abs=0.035)
+    assert within / 150 >= 0.90
+
+
+def test_expanded_uncertainty_is_that_of_the_gum():
+    """k_p for 95.45 %: GUM, Table G.2."""
+    freedom = np.array([1.0, 2.0, 5.0, 10.0, 50.0, np.inf])
+    assert expanded(np.ones(6), freedom, 2.0) == pytest.approx([13.97, 4.53, 2.65, 2.28, 2.05, 2.0], abs=0.005)
+
+
+def test_degrees_of_freedom_count_what_scatters_only():
+    turns = np.random.default_rng(0).normal(size=(4, 10))
+    alone = uncertainty_of(course("torque", turns))
+    assert alone.freedom == pytest.approx(3.0)
+    with_zero = uncertainty_of(course("torque", turns, Accuracy(zero=100.0)))
+    assert (with_zero.freedom > 1e6).all()
+    assert with_zero.total == pytest.approx(np.hypot(alone.total, 100.0))
+    assert with_zero.total == pytest.approx(course("torque", turns, Accuracy(zero=100.0)).uncertainty)
+
+
+def test_positions_that_vary_together_count_as_one():
+    random = np.random.default_rng(2)
+    apart = uncertainty_of(course("torque", random.normal(size=(40, 50))))
+    together = uncertainty_of(course("torque", np.repeat(random.normal(size=(40, 1)), 50, axis=1)))
+    assert independent(apart) > 35
+    assert independent(together) == pytest.approx(1.0, abs=0.2)
+
+
+# ---- what is found --------------------------------------------------------------------------------------------
+
+
+def test_a_model_beside_itself_is_within():
+    result = compare(measured(settings=({"A.speed": 4.0}, {"A.speed": 6.0}), channels=POWERS, noise=0.05, seed=5))
+    assert codes(result) == {Verdict.WITHIN}
+    assert (result.efficiency_within.values == 1).all()
+    assert result.attrs["all_within"] == 1
+    assert not [row for row in json.loads(result.attrs["findings"]) if row["severity"] == "error"]
+    assert result.residual.values == pytest.approx(result.measured.values - result.model.values, nan_ok=True)
+    for name, one in result.data_vars.items():
+        assert one.dims == VARIABLES[name].dims
+        assert one.attrs["long_name"] == VARIABLES[name].long_name
+
+
+def test_model_and_efficiency_are_those_of_analyse():
+    mechanism = rocker().with_values({"A.speed": 6.0})
+    whole = trunnion.analyse(mechanism, 36)
+    result = compare(measured(settings=({"A.speed": 6.0},), channels=POWERS, noise=0.0))
+    assert result.model.sel(channel="torque").values[0] == pytest.approx(whole.drive_effort.values[0], nan_ok=True)
+    assert result.efficiency_model.values[0] == pytest.approx(float(whole.efficiency), rel=1e-9)
+    assert result.efficiency.values[0] == pytest.approx(float(whole.efficiency), rel=1e-9)
+
+
+def wrong_in(name, change):
+    return lambda channel, true: change(true) if channel == name else true
+
+
+def test_a_wrong_sign_is_named():
+    result = compare(measured(wrong=wrong_in("torque", np.negative)))
+    assert result.verdict.sel(channel="torque").values == Verdict.NOT
+    assert result.verdict.sel(channel="out").values == Verdict.WITHIN
+    assert result.correlation.sel(channel="torque").values == pytest.approx(-1, abs=1e-4)
+    assert said(result, "channels.torque", "a wrong sign", "correlation -1.000", "sign: -1")
+
+
+def test_a_wrong_sign_of_a_constant_is_named():
+    result = compare(measured(channels=("brake", "speed"), wrong=wrong_in("speed", np.negative)))
+    assert said(result, "channels.speed", "a wrong sign")
+
+
+def test_an_offset_is_named_with_its_size():
+    settings = ({"A.speed": 4.0}, {"A.speed": 6.0})
+    result = compare(measured(settings=settings, wrong=wrong_in("torque", lambda true: true + 1.5)))
+    assert (result.verdict.sel(channel="torque").values == Verdict.OFFSET).all()
+    assert result.bias.sel(channel="torque").values == pytest.approx([1.5, 1.5], abs=0.01)
+    assert said(result, "within U in every condition apart from a constant offset of +1.5 N m")
+
+
+def test_a_gain_is_named_with_its_size():
+    result = compare(measured(wrong=wrong_in("torque", lambda true: 1.08 * true)))
+    assert said(result, "a gain that is off by +8 %", "explains 100 %")
+
+
+def test_offset_and_gain_together_are_named():
+    result = compare(measured(wrong=wrong_in("torque", lambda true: 1.2 * true + 4.0), noise=0.005))
+    assert said(result, "an offset of +4 N m and a gain off by +20 %")
+
+
+def test_a_shift_of_the_angle_is_named_once_for_all_channels():
+    shifted = measured(positions=72, wrong=lambda channel, true: np.roll(true, 1), noise=0.005)
+    result = compare(shifted)
+    (row,) = said(result, "angle.zero")
+    assert "the crank angle read off by -5 " in row["what"] or "-5.0" in row["what"] or "-4.9" in row["what"]
+    assert "torque, out" in row["what"]
+    assert "add -" in row["remedy"]
+    assert not said(result, "channels.torque", "not within")
+
+
+def test_a_lag_of_one_channel_is_said_of_that_channel():
+    result = compare(measured(positions=72, wrong=wrong_in("out", lambda true: np.roll(true, 2)), noise=0.005))
+    assert said(result, "channels.out", "the crank angle read off by", "delays of the channel")
+
+
+def test_other_friction_is_not_put_on_a_sensor():
+    """Whatever it may look like, the remedy names the model too; the efficiency is off."""
+    other = measured(rocker(friction=0.3), channels=POWERS, noise=0.01)
+    result = compare(other)
+    assert result.verdict.sel(channel="torque").values == Verdict.NOT
+    assert result.efficiency_within.values[0] == 0
+    assert said(result, "efficiency", "not within U", "identify")
+
+
+def test_an_offset_that_changes_with_the_condition_is_the_models():
+    settings = ({"A.speed": 4.0}, {"A.speed": 6.0})
+    found = measured(settings=settings, wrong=wrong_in("torque", lambda true: true + 1.5))
+    second = found.conditions[1]
+    torque = replace(second.courses["torque"], turns=second.courses["torque"].turns + 1.0)
+    courses = {**second.courses, "torque": torque}
+    result = compare(replace(found, conditions=(found.conditions[0], replace(second, courses=courses))))
+    assert said(result, "offset of +1.5 to +2.5 N m", "not at the sensor")
+
+
+def test_a_driver_at_another_speed_is_named():
+    other = measured(settings=({"A.speed": 6.0},), channels=("speed", "out"))
+    conditions = tuple(replace(one, values={}, speed=6.0) for one in other.conditions)
+    result = compare(replace(other, conditions=conditions))
+    assert said(result, "channels.speed", "another speed of the driver, measured 6 rad/s", "A.speed: {mean: speed}")
+    assert said(result, "drivers.A", "6 rad/s measured, 4 rad/s in the model")
+
+
+# ---- no answer ------------------------------------------------------------------------------------------------
+
+
+def test_locked_conditions_are_nan_and_said():
+    fine, locked = {"joint_defaults.friction.coefficient": 0.12}, {"joint_defaults.friction.coefficient": 40.0}
+    result = compare(
+        Measurement(
+            "bench",
+            tuple(
+                replace(one, values=values, name=name)
+                for one, values, name in zip(
+                    measured(settings=({}, {}), channels=POWERS, seed=5).conditions,
+                    (fine, locked),
+                    ("fine", "tight"),
+                    strict=True,
+                )
+            ),
+        )
+    )
+    status = result.status.values
+    assert (status[1] == Status.LOCKED).any()
+    assert np.isnan(result.model.values[0, 1][status[1] == Status.LOCKED]).all()
+    assert np.isnan(result.efficiency_model.values[1])
+    assert result.efficiency_within.values.tolist() == [1, -1]
+    assert said(result, "no answer in 1 of 2 conditions (tight)", "locked by friction", "--set")
+    assert result.verdict.values[0, 0] == Verdict.WITHIN
+    assert result.attrs["all_within"] == 0
+
+
+def test_a_condition_that_cannot_be_assembled_is_said():
+    broken = tuple(replace(one, values={"links.coupler.points.C.x": 3.0}) for one in measured().conditions)
+    result = compare(Measurement("bench", broken))
+    assert np.isnan(result.model.values).all()
+    assert codes(result) == {Verdict.NOTHING}
+    assert said(result, "cannot be assembled")
+
+
+def test_positions_with_a_speed_of_zero_are_left_out_of_forces():
+    result = compare(measured(channels=("torque", "angle")))
+    zero = result.status.values[0] == Status.ZERO_SLIP
+    assert (result.compared.sel(channel="torque").values[0][zero] == 0).all()
+    assert result.compared.sel(channel="angle").values[0].all()
+
+
+# ---- odd input ------------------------------------------------------------------------------------------------
+
+
+def test_one_turn_is_no_uncertainty():
+    result = compare(measured(turns=1, channels=POWERS))
+    assert codes(result) == {Verdict.UNKNOWN}
+    assert np.isfinite(result.rms.values).all()
+    assert np.isnan(result.within.values).all()
+    assert result.efficiency_within.values.tolist() == [-1]
+    assert said(result, "one turn only", "warning")
+
+
+def test_two_turns_are_judged():
+    assert codes(compare(measured(turns=2))) == {Verdict.WITHIN}
+
+
+def test_one_position():
+    result = compare(measured(positions=1, wrong=wrong_in("torque", lambda true: true + 9.0)))
+    assert result.sizes["position"] == 1
+
+
+def test_a_channel_without_a_value_has_nothing_to_compare():
+    whole = measured()
+    condition = whole.conditions[0]
+    empty = course("out", np.full((8, 36), np.nan))
+    result = compare(replace(whole, conditions=(replace(condition, courses={**condition.courses, "out": empty}),)))
+    assert result.verdict.values.ravel().tolist() == [Verdict.WITHIN, Verdict.NOTHING]
+    assert said(result, "channels.out", "nothing to compare")
+
+
+def test_gaps_stay_gaps():
+    whole = measured()
+    condition = whole.conditions[0]
+    turns = condition.courses["torque"].turns.copy()
+    turns[:, 5:9], turns[2, 20] = np.nan, np.nan
+    result = compare(replace(whole, conditions=(replace(condition, courses={"torque": course("torque", turns)}),)))
+    assert np.flatnonzero(np.isnan(result.residual.values[0, 0])).tolist() == [5, 6, 7, 8]
+    assert codes(result) == {Verdict.WITHIN}
+
+
+def test_a_channel_that_one_condition_lacks():
+    whole = measured(settings=({"A.speed": 4.0}, {"A.speed": 6.0}))
+    first = whole.conditions[0]
+    fewer = replace(first, courses={"torque": first.courses["torque"]})
+    result = compare(replace(whole, conditions=(fewer, whole.conditions[1])))
+    assert result.verdict.sel(channel="out").values.tolist() == [Verdict.NOTHING, Verdict.WITHIN]
+    assert result.turns.sel(channel="out").values.tolist() == [0, 8]
+
+
+def test_conditions_may_have_other_positions():
+    one, two = measured(positions=36), measured(positions=24)
+    result = compare(Measurement("bench", (*one.conditions, replace(two.conditions[0], name="few"))))
+    assert np.isfinite(result.phase.values).sum(axis=1).tolist() == [36, 24]
+
+
+@pytest.mark.parametrize(
+    ("measures", "words"),
+    [
+        ("effort:B", ("channels.torque", "'B'")),
+        ("torque:A", ("channels.torque.measures", "no measure")),
+        ("rate:nothing", ("channels.torque", "nothing")),
+        ("maximum:effort:A", ("channels.torque.measures", "no number of a single position")),
+        ("efficiency:cycle", ("channels.torque.measures", "no number of a single position")),
+        ("stroke:D", ("channels.torque.measures", "no number of a single position")),
+        ("rotation:D", ("channels.torque", "is in N m, and rotation:D is in rad")),
+    ],
+)
+def test_a_measure_that_the_model_lacks_is_refused(measures, words):
+    whole = measured()
+    condition = whole.conditions[0]
+    odd = replace(condition.courses["torque"], measures=measures)
+    bad = replace(whole, conditions=(replace(condition, courses={**condition.courses, "torque": odd}),))
+    with pytest.raises(MechanismError) as caught:
+        compare(bad)
+    text = str(caught.value)
+    assert all(word in text for word in words), text
+    assert compare(bad, channels=["out"]).channel.values.tolist() == ["out"]
+
+
+def test_every_bad_channel_is_told_at_once():
+    whole = measured()
+    condition = whole.conditions[0]
+    odd = {name: replace(one, measures="nothing:A") for name, one in condition.courses.items()}
+    with pytest.raises(MechanismError) as caught:
+        compare(replace(whole, conditions=(replace(condition, courses=odd),)))
+    assert len(caught.value.findings) == 2
+
+
+def test_unknown_channels_values_and_factors_are_refused():
+    whole = measured()
+    with pytest.raises(MechanismError, match="did you mean 'torque'"):
+        compare(whole, channels=["torqe"])
+    with pytest.raises(MechanismError, match="coverage factor"):
+        compare(whole, coverage=0.0)
+    odd = tuple(replace(one, values={"A.spede": 1.0}) for one in whole.conditions)
+    with pytest.raises(MechanismError, match=r"in condition run 1"):
+        compare(replace(whole, conditions=odd))
+    with pytest.raises(MechanismError, match="no condition"):
+        compare(Measurement("bench", ()))
+    bare = Condition(
+        "bare", {}, whole.conditions[0].phase, {"x": replace(course("torque", np.zeros((2, 36))), measures="")}
+    )
+    with pytest.raises(MechanismError, match="no channel measures anything"):
+        compare(Measurement("bench", (bare,)))
+
+
+def test_efficiency_does_not_ask_for_channels_that_are_not_wanted():
+    result = compare(measured(channels=POWERS, seed=5), channels=["torque"])
+    assert result.channel.values.tolist() == ["torque"]
+    assert result.efficiency_within.values.tolist() == [1]
+
+
+def test_seats_are_those_of_analyse():
+    """Pins that follow the load lie where `analyse` has them."""
+    mechanism = rocker()
+    stated = mechanism.data()
+    stated["joint_defaults"] |= {"pin": {"radius": "20 mm", "clearance": "0.1 mm"}, "seat": "loaded"}
+    seated = trunnion.Mechanism(**stated)
+    _, theirs = exact(seated, (), ("torque",), 36)
+    whole = trunnion.analyse(seated, 36)
+    assert theirs["torque"] == pytest.approx(whole.drive_effort.values[0], rel=1e-9, nan_ok=True)
+
+
+def test_findings_of_files_that_differ_in_numbers_are_told_once():
+    rows = [
+        Finding(f"reads {k} in every row", "channels.T", "look", Severity.WARNING, file=f"run-{k}.csv")
+        for k in range(6)
+    ]
+    told = gathered([*rows, Finding("is missing", "channels.w")])
+    assert len(told) == 2
+    assert "and so 6 times in all: run-0.csv" in told[0].what

@@ -1,0 +1,144 @@
+"""Efficiency from measured courses: what it is, and whether its uncertainty is what many rigs would scatter by."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from trunnion.errors import MechanismError
+from trunnion.measured.efficiency import efficiency_of
+from trunnion.measured.measurement import Accuracy, Condition, Course
+
+TURNS, POSITIONS = 12, 24
+PHASE = np.arange(POSITIONS) / POSITIONS
+CYCLE = 2 * np.pi * PHASE
+TRUE = {
+    "T1": 12 + 2 * np.sin(2 * CYCLE),
+    "T2": 10 + 0.5 * np.cos(CYCLE),
+    "n1": 50 + 0 * CYCLE,
+    "n2": 50 * (1 + 0.1 * np.cos(2 * CYCLE)),
+}
+MEASURES = {"T1": "effort:a", "T2": "load:brake", "n1": "rate:a", "n2": "rate:out"}
+ACCURACY = {
+    "T1": Accuracy(0.05, 0.002),
+    "T2": Accuracy(0.04, 0.003),
+    "n1": Accuracy(0.1, 0.0005),
+    "n2": Accuracy(0.2, 0.001),
+}
+NOISE = {"T1": 0.3, "T2": 0.2, "n1": 0.5, "n2": 0.5}
+ETA = float(np.mean(TRUE["T2"] * TRUE["n2"]) / np.mean(TRUE["T1"] * TRUE["n1"]))
+
+
+def condition(turns: dict[str, NDArray[np.float64]], accuracy: dict[str, Accuracy] | None = None) -> Condition:
+    known = ACCURACY if accuracy is None else accuracy
+    courses = {
+        name: Course(name, MEASURES[name], "", values, known.get(name, Accuracy())) for name, values in turns.items()
+    }
+    return Condition("one", {}, PHASE, courses)
+
+
+def exact(turns: int = 3) -> dict[str, NDArray[np.float64]]:
+    return {name: np.tile(course, (turns, 1)) for name, course in TRUE.items()}
+
+
+def test_uncertainty_is_the_scatter_of_many_rigs() -> None:
+    """2000 rigs with errors and noise as stated: their standard deviation is u, and 2 u covers 95 %."""
+    random = np.random.default_rng(5)
+    values, uncertainties = [], []
+    for _ in range(2000):
+        turns = {}
+        for name, course in TRUE.items():
+            gain, zero = random.standard_normal(2) * (ACCURACY[name].gain, ACCURACY[name].zero)
+            noise = NOISE[name] * random.standard_normal((TURNS, POSITIONS))
+            turns[name] = course * (1 + gain) + zero + noise
+        found = efficiency_of(condition(turns))
+        values.append(found.value)
+        uncertainties.append(found.uncertainty)
+    spread = float(np.std(values))
+    assert np.mean(uncertainties) == pytest.approx(spread, rel=0.05)
+    assert np.mean(values) == pytest.approx(ETA, abs=4 * spread / 2000**0.5)
+    inside = np.abs(np.array(values) - ETA) < 2 * np.array(uncertainties)
+    assert np.mean(inside) == pytest.approx(0.955, abs=0.02)
+
+
+def test_noise_that_is_planned_is_the_scatter_that_comes() -> None:
+    """The uncertainty worked out from the noise is that found from the scatter between turns."""
+    random = np.random.default_rng(6)
+    none = dict.fromkeys(TRUE, Accuracy())
+    planned = efficiency_of(
+        condition(exact(), none), noise={name: one / (TURNS * POSITIONS) ** 0.5 for name, one in NOISE.items()}
+    )
+    values = []
+    for _ in range(400):
+        turns = {
+            name: course + NOISE[name] * random.standard_normal((TURNS, POSITIONS)) for name, course in TRUE.items()
+        }
+        values.append(efficiency_of(condition(turns, none)).value)
+    assert planned.uncertainty == pytest.approx(float(np.std(values)), rel=0.12)
+    assert {one.source for one in planned.contributions} == {"repeatability"}
+
+
+def test_contributions_are_those_of_small_changes() -> None:
+    """The effect of each gain and zero is what changing the readings by it does, and their squares add up."""
+    found = efficiency_of(condition(exact()))
+    for one in found.contributions:
+        if one.source == "repeatability":
+            continue
+        changed = exact()
+        values = changed[one.channel]
+        changed[one.channel] = values * (1 + 1e-6) if one.source == "gain" else values + 1e-6
+        slope = (efficiency_of(condition(changed)).value - found.value) / 1e-6
+        assert one.sensitivity == pytest.approx(slope, rel=1e-4), (one.channel, one.source)
+    assert found.value == pytest.approx(ETA, rel=1e-12)
+    assert found.uncertainty**2 == pytest.approx(sum(one.effect**2 for one in found.contributions))
+    by_channel = found.by_channel()
+    assert list(by_channel) == sorted(by_channel, key=lambda name: -by_channel[name])
+    assert sum(by_channel.values()) > found.uncertainty == pytest.approx(np.linalg.norm(list(by_channel.values())))
+    assert str(found).endswith("(k = 2)")
+    assert found.expanded == 2 * found.uncertainty
+
+
+def test_one_speed_sensor_for_both_sides_cancels() -> None:
+    """A speed that is measured once stands in both powers: its gain does nothing."""
+    turns = {name: exact()[name] for name in ("T1", "T2", "n1")}
+    found = efficiency_of(condition(turns, {"n1": Accuracy(0.0, 0.01)}))
+    assert found.value == pytest.approx(float(np.mean(TRUE["T2"]) / np.mean(TRUE["T1"])), rel=1e-12)
+    assert found.uncertainty == pytest.approx(0.0, abs=1e-12)
+
+
+def test_gaps_and_single_turns() -> None:
+    """A turn with a gap is left out; of a single one the scatter is not known."""
+    turns = exact(4)
+    turns["T1"][1, 5] = np.nan
+    found = efficiency_of(condition(turns))
+    assert (found.turns, found.left_out) == (3, 1)
+    assert found.value == pytest.approx(ETA)
+    single = efficiency_of(condition(exact(1)))
+    assert single.value == pytest.approx(ETA)
+    assert np.isnan(single.uncertainty)
+    turns["n2"][:] = np.nan
+    with pytest.raises(MechanismError, match="no turn is whole"):
+        efficiency_of(condition(turns))
+
+
+def test_resolution_counts_where_noise_does_not_carry_over_the_steps() -> None:
+    """Readings that never change are known to step/√12; noisy ones average out."""
+    coarse = {"T2": Accuracy(resolution=0.1)}
+    still = efficiency_of(condition(exact(), coarse))
+    assert [(one.channel, one.source) for one in still.contributions] == [("T2", "resolution")]
+    assert still.contributions[0].input == pytest.approx(0.1 / 12**0.5)
+    noisy = exact()
+    noisy["T2"] = noisy["T2"] + 0.2 * np.random.default_rng(1).standard_normal(noisy["T2"].shape)
+    assert "resolution" not in {one.source for one in efficiency_of(condition(noisy, coarse)).contributions}
+
+
+def test_missing_channels_are_told() -> None:
+    """What is measured is listed, and what is needed."""
+    turns = exact()
+    del turns["T2"]
+    with pytest.raises(MechanismError, match=r"T1 \(effort:a\), n1 \(rate:a\), n2 \(rate:out\).*load: of a load"):
+        efficiency_of(condition(turns))
+    with pytest.raises(MechanismError, match="do not tell"):
+        efficiency_of(condition(exact()), joints={"brake": "elsewhere"})
+    assert efficiency_of(condition(exact()), joints={"brake": "out"}).value == pytest.approx(ETA)

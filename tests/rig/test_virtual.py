@@ -1,0 +1,334 @@
+"""The virtual rig: true courses through sensors, files that are read as they were meant, findings, planning."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+import trunnion
+from trunnion.analysis.analyse import prepare
+from trunnion.analysis.rig import virtual_courses
+from trunnion.analysis.rig.virtual import Observation
+from trunnion.analysis.rig.virtual_files import units_of
+from trunnion.analysis.rig.virtual_plan import plan
+from trunnion.errors import MechanismError, Severity
+from trunnion.measured.efficiency import efficiency_of
+from trunnion.measured.rig_file import Rig
+from trunnion.model.mechanism import Mechanism
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+FOUR_BAR = EXAMPLES / "toleranced-fourbar.yaml"
+SENSORS: dict[str, Any] = {
+    "T1": {"measures": "effort:A", "range": "10 N m", "noise": "10 mN m", "bits": 14, "offset": "0.1 N m",
+           "accuracy": {"gain": "0.5 %", "zero": "20 mN m"}},
+    "T2": {"measures": "load:work", "range": "10 N m", "noise": "10 mN m", "bits": 14, "offset": "0.1 N m",
+           "accuracy": {"gain": "0.5 %", "zero": "20 mN m"}},
+    "n1": {"measures": "rate:A", "unit": "rpm", "noise": "0.2 rpm"},
+    "w2": {"measures": "rate:D", "noise": "0.02 rad/s"},
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def mechanism() -> Mechanism:
+    return trunnion.read(FOUR_BAR)
+
+
+def rig(**changes: Any) -> Rig:
+    stated: dict[str, Any] = {
+        "trunnion-rig": 1,
+        "schedule": {"over": {"AB": ["1"]}, "turns": 6, "idle": "0.2 s"},
+        "rate": "500 Hz",
+        "encoder": {"per_turn": 90},
+        "sensors": SENSORS,
+    }
+    stated["schedule"] = {"turns": 6, "idle": "0.2 s"}
+    return Rig(**(stated | changes))
+
+
+@pytest.fixture(scope="module")
+def seen(mechanism: Mechanism) -> Observation:
+    return trunnion.observe(mechanism, rig(), seed=4)
+
+
+def test_perfect_sensors_show_the_model(mechanism: Mechanism) -> None:
+    """Each reading is the model at the instant of its sample; idle forces and speeds are 0, places stay."""
+    sensors = {
+        "T": {"measures": "effort:A"},
+        "n": {"measures": "rate:D"},
+        "x": {"measures": "coupler.C.x"},
+        "R": {"measures": "reaction:B"},
+    }
+    found = trunnion.observe(mechanism, rig(sensors=sensors))
+    (case,) = found.cases
+    assert case.true.exact
+    (record,) = found.records()
+    run = prepare(mechanism)
+    time = (np.arange(case.running) - case.lead) / 500.0
+    back = run.solve(time)
+    part = case.part
+    assert record.columns["T"][part] == pytest.approx(np.broadcast_to(back.efforts["A"], time.shape), abs=1e-8)
+    place = back.walk.point("coupler", "C").place[0]
+    assert record.columns["x"][part] == pytest.approx(place, abs=1e-8)
+    assert np.all(record.columns["x"][: part.start] == record.columns["x"][part.start])
+    for name in ("T", "n", "R"):
+        assert not np.any(record.columns[name][: part.start])
+    angle = (np.arange(case.running) - case.lead) / 500.0 * float(run.values["drivers.A.speed"])
+    assert np.array_equal(record.columns["encoder"][part], np.floor(angle * 90 / (2 * np.pi) + 1e-9))
+    assert record.columns["t"][1] == 0.002
+    result = trunnion.analyse(mechanism, 720)
+    assert case.efficiency == pytest.approx(float(result["efficiency"]), rel=1e-9)
+
+
+def test_interpolated_courses_are_the_exact_ones(mechanism: Mechanism, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With a grid of the cycle, readings differ by no more than what is stated, but at jumps."""
+    stated = rig(
+        rate="517.3 Hz", sensors={"T": {"measures": "effort:A", "noise": "1 mN m"}, "n": {"measures": "rate:D"}}
+    )
+    exact = trunnion.observe(mechanism, stated)
+    monkeypatch.setattr(virtual_courses, "MOST_EXACT", 100)
+    monkeypatch.setattr(virtual_courses, "GRID", 2048)
+    between = trunnion.observe(mechanism, stated)
+    assert exact.cases[0].true.exact
+    assert not between.cases[0].true.exact
+    for i in range(2):
+        error = np.abs(between.cases[0].true.at_samples(i) - exact.cases[0].true.at_samples(i))
+        assert np.quantile(error, 0.99) < 1e-4
+    assert between.cases[0].true.error[0] < 1e-4
+
+
+def test_same_seed_same_bits_and_sensors_of_their_own(mechanism: Mechanism, seen: Observation) -> None:
+    record, again = next(seen.records()), next(trunnion.observe(mechanism, rig(), seed=4).records())
+    for name, values in record.columns.items():
+        assert np.array_equal(values, again.columns[name])
+    fewer = trunnion.observe(mechanism, rig(sensors={"T2": SENSORS["T2"]}), seed=4)
+    assert np.array_equal(next(fewer.records()).columns["T2"], record.columns["T2"])
+    other = next(seen.seeded(5).records())
+    assert not np.array_equal(other.columns["T1"], record.columns["T1"])
+    assert np.array_equal(other.columns["encoder"], record.columns["encoder"])
+    with pytest.raises(MechanismError, match="seed"):
+        seen.seeded(-1)
+
+
+def test_noise_and_offset_are_as_stated(seen: Observation) -> None:
+    (case,), record = seen.cases, next(seen.records())
+    idle = record.columns["T1"][: case.before]
+    assert np.mean(idle) == pytest.approx(seen.drawn["T1"].offset, abs=4 * 0.01 / case.before**0.5)
+    assert np.std(idle) == pytest.approx(0.01, rel=0.2)
+    i = list(seen.channels).index("T1")
+    drawn = seen.drawn["T1"]
+    meant = case.true.at_samples(i) * (1 + drawn.gain) + drawn.zero + drawn.offset
+    error = record.columns["T1"][case.part] - meant
+    assert np.std(error) == pytest.approx(0.01, rel=0.1)
+    assert np.mean(error) == pytest.approx(0.0, abs=4 * 0.01 / len(error) ** 0.5)
+
+
+def test_efficiency_covers_the_true_one(seen: Observation) -> None:
+    """Over 200 rigs with the same statement of accuracy, η ± 2 u has the model's in about 95 %."""
+    deviations = []
+    for seed in range(200):
+        (condition,) = seen.seeded(seed).measurement(125).conditions
+        found = efficiency_of(condition)
+        deviations.append((found.value - seen.cases[0].efficiency) / found.uncertainty)
+    assert np.std(deviations) == pytest.approx(1.0, abs=0.15)
+    assert np.mean(np.abs(deviations) < 2) == pytest.approx(0.95, abs=0.045)
+
+
+@pytest.mark.parametrize("form", ["csv", "parquet", "tdms"])
+def test_files_are_read_as_they_were_meant(seen: Observation, form: str, tmp_path: Path) -> None:
+    """The mapping reads the files; courses are those that the rig hands on itself, the same in all formats."""
+    pytest.importorskip({"csv": "pandas", "parquet": "pyarrow", "tdms": "nptdms"}[form])
+    from trunnion.measured.read import read_measured
+    from trunnion.measured.tables import read_table
+
+    names = seen.write(tmp_path, form)
+    assert names == [f"run-01.{form}", "mapping.yaml", "truth.yaml"]
+    record = next(seen.records())
+    table = read_table(tmp_path / names[0], list(record.columns))
+    for name, values in record.columns.items():
+        assert np.array_equal(table.columns[name].values, values), name
+        assert table.columns[name].unit == units_of(seen).get(name, "")
+    found = read_measured(tmp_path / "mapping.yaml")
+    told = [one.what for one in found.findings if one.severity is not Severity.NOTE]
+    assert not [one for one in told if "spikes" not in one]  # a corner of the torque may look like one
+    (condition,) = found.conditions
+    (direct,) = seen.measurement(len(condition.phase)).conditions
+    assert condition.courses["T1"].turns.shape[0] == 6
+    for name in ("T1", "n1", "w2"):
+        error = condition.courses[name].mean - direct.courses[name].mean
+        assert np.quantile(np.abs(error), 0.9) < 0.02 * np.ptp(direct.courses[name].mean) + 0.02, name
+    own = efficiency_of(condition)
+    assert own.value == pytest.approx(efficiency_of(direct).value, abs=0.1 * own.uncertainty)
+
+
+def test_truth_tells_what_was_drawn(seen: Observation, tmp_path: Path) -> None:
+    seen.write(tmp_path)
+    truth = yaml.safe_load((tmp_path / "truth.yaml").read_text("utf-8"))
+    assert truth["seed"] == 4
+    assert truth["sensors"]["T1"]["gain_error"] == seen.drawn["T1"].gain
+    assert truth["conditions"][0]["efficiency"] == seen.cases[0].efficiency
+    assert truth["parameters"]["joints.B.friction.coefficient"] == 0.1
+    text = (tmp_path / "mapping.yaml").read_text("utf-8")
+    assert str(seen.drawn["T1"].gain) not in text
+
+
+def test_grid_and_rows(mechanism: Mechanism) -> None:
+    over = {"work.resisting_torque": "2 N m:6 N m:3", "A.speed": ["60 rpm", "120 rpm"]}
+    found = trunnion.observe(mechanism, rig(schedule={"over": over, "turns": 1}))
+    assert [dict(case.settings) for case in found.cases][:3] == [
+        {"work.resisting_torque": "2 N m", "A.speed": "60 rpm"},
+        {"work.resisting_torque": "2 N m", "A.speed": "120 rpm"},
+        {"work.resisting_torque": "4 N m", "A.speed": "60 rpm"},
+    ]
+    assert [case.name for case in found.cases] == [f"run-0{k}" for k in range(1, 7)]
+    torque = list(found.channels).index("T2")
+    assert np.max(found.cases[4].true.values[torque]) == pytest.approx(6.0)
+    (condition, *_) = found.measurement(36).conditions
+    assert condition.values == pytest.approx({"work.resisting_torque": 2.0, "A.speed": 2 * np.pi})
+    assert condition.speed == pytest.approx(2 * np.pi)
+    files = found.mapping()["files"]
+    assert files[1] == {"file": "run-02.csv", "set": {"work.resisting_torque": "2 N m", "A.speed": "120 rpm"}}
+
+
+def test_conditions_that_lock_are_left_out_and_told(mechanism: Mechanism) -> None:
+    rows = [{"joint_defaults.friction.coefficient": 0.1}, {"l2": "80 mm"}, {"l2": "85 mm"}]
+    rows[0] = {"work.resisting_torque": "5 N m"}
+    found = trunnion.observe(mechanism, rig(schedule={"conditions": rows, "turns": 2}))
+    assert found.skipped == (2, 3)
+    assert [case.number for case in found.cases] == [1]
+    (finding,) = [one for one in found.findings if one.severity is Severity.WARNING]
+    assert "condition 2 (l2 = 80 mm) and condition 3 are left out: cannot be assembled" in finding.what
+    assert finding.where == "schedule.conditions"
+    assert not any(np.isnan(values).any() for values in next(found.records()).columns.values())
+    assert found.truth()["left_out"] == [2, 3]
+    with pytest.raises(MechanismError, match="none of the 2 conditions can be measured"):
+        trunnion.observe(mechanism, rig(schedule={"conditions": rows[1:], "turns": 2}))
+
+
+def test_clipped_readings_and_lost_pulses_are_told(mechanism: Mechanism) -> None:
+    sensors = SENSORS | {"T1": SENSORS["T1"] | {"range": "1 N m"}}
+    found = trunnion.observe(mechanism, rig(sensors=sensors, encoder={"per_turn": 360, "kind": "level"}))
+    told = {one.where: one.what for one in found.findings}
+    assert "readings are clipped" in told["sensors.T1.range"]
+    assert "some are lost" in told["encoder.kind"]
+    assert np.max(np.abs(next(found.records()).columns["T1"])) <= 1.0
+    assert plan(found).sensors[0].clipped == (1,)
+
+
+@pytest.mark.parametrize(
+    ("changes", "where", "what"),
+    [
+        ({"sensors": {"a": {"measures": "effort:Q"}}}, "sensors.a.measures", "Q"),
+        ({"sensors": {"a": {"measures": "efficiency:cycle"}}}, "sensors.a.measures", "no number that a sensor shows"),
+        ({"sensors": {"a": {"measures": "rate:D", "per_turn": 60}}}, "sensors.a.per_turn", "changes its sign"),
+        ({"schedule": {"conditions": [{"speeed": 1}]}}, "schedule.conditions.0", "speeed"),
+        ({"schedule": {"over": {"A.speed": ["60 rpm", "90 rpm"]}}, "encoder": None,
+          "sensors": {"a": {"measures": "effort:A"}}}, "encoder", "nothing measured tells where A is"),
+        ({"set": {"l7": 2}}, "set", "l7"),
+        ({"faults": [{"kind": "drift", "sensor": "T1", "by": "3 rpm"}]}, "faults.0.by", "not in N m"),
+        ({"rate": "0.4 Hz", "schedule": {"turns": 1}}, "rate", "no three samples"),
+        ({"rate": "300 MHz"}, "rate", "rows, a file at most"),
+    ],
+)  # fmt: skip
+def test_rigs_that_do_not_fit_the_mechanism(
+    mechanism: Mechanism, changes: dict[str, Any], where: str, what: str
+) -> None:
+    changes = {"encoder": None} | changes
+    with pytest.raises(MechanismError) as error:
+        trunnion.observe(mechanism, rig(**changes))
+    found = [one for one in error.value.findings if one.where == where]
+    assert found, error.value
+    assert what in str(found[0])
+    assert found[0].remedy
+
+
+def test_a_range_is_run_through_once() -> None:
+    """A driver that ends elsewhere than it starts; its time tells the position."""
+    mechanism = trunnion.read(EXAMPLES / "inverted-slider-crank.yaml")
+    driver = next(iter(mechanism.drivers))
+    sensors = {"e": {"measures": f"effort:{driver}"}}
+    stated = rig(sensors=sensors, encoder=None, rate="20 Hz")
+    with pytest.raises(MechanismError, match="state turns: 1"):
+        trunnion.observe(mechanism, stated)
+    stated = rig(sensors=sensors, encoder=None, rate="20 Hz", schedule={"turns": 1, "idle": "1 s"})
+    found = trunnion.observe(mechanism, stated)
+    mapping = found.mapping()
+    assert "angle" not in mapping
+    record = next(found.records())
+    assert record.columns["t"][found.cases[0].before] == 0.0
+    assert mapping["channels"]["e"]["zero"]["over"][0] == "-1 s"
+
+
+def test_plan_expects_what_comes(seen: Observation) -> None:
+    """Readings of the plan are those without random errors, its uncertainty is that of the data."""
+    found = plan(seen)
+    torque = found.sensors[0]
+    true = seen.cases[0].true.values[0]
+    assert (torque.least, torque.most) == pytest.approx((true.min(), true.max()), abs=1e-4)
+    assert torque.share == pytest.approx(np.max(np.abs(true)) / 10)
+    assert torque.steps == pytest.approx(np.ptp(true) / (20 / 2**14), rel=1e-3)
+    (forecast,) = found.conditions
+    assert forecast.measured is not None
+    (condition,) = seen.measurement(250).conditions
+    own = efficiency_of(condition)
+    assert forecast.measured.uncertainty == pytest.approx(own.uncertainty, rel=0.03)
+    assert forecast.model == pytest.approx(seen.cases[0].efficiency)
+    assert abs(forecast.bias) < 0.05 * own.uncertainty
+    assert forecast.dominant.startswith(("T1 ", "T2 "))
+
+
+def test_plan_tells_slow_sensors_and_coarse_converters(mechanism: Mechanism) -> None:
+    slow = {name: one | {"bandwidth": "2 Hz"} for name, one in SENSORS.items()}
+    slow["w2"] = slow["w2"] | {"bits": 6, "range": "1000 rad/s"}
+    told = {one.where: one for one in plan(trunnion.observe(mechanism, rig(sensors=slow))).findings}
+    assert "too slow for the cycle" in told["sensors"].what
+    assert "steps of the converter" in told["sensors.w2.bits"].what
+    assert "of the range" in told["sensors.w2.range"].what
+    alone = plan(trunnion.observe(mechanism, rig(sensors={"T1": SENSORS["T1"]})))
+    assert alone.conditions[0].measured is None
+    assert "no efficiency to expect" in alone.findings[-1].what
+
+
+FAULTS = [
+    {"kind": "dropouts", "sensor": "T1", "share": "2 %", "length": 3},
+    {"kind": "gap", "from": "1 s", "to": "1.1 s"},
+    {"kind": "wrong-sign", "sensor": "T2"},
+    {"kind": "drift", "sensor": "w2", "by": "1 rad/s"},
+    {"kind": "spikes", "sensor": "n1", "share": "0.5 %", "by": "40 rpm"},
+    {"kind": "stuck", "sensor": "T1", "from": "2 s", "to": "2.2 s"},
+    {"kind": "lost-pulses", "share": "1 %"},
+]
+
+
+def test_faults_do_what_they_say(mechanism: Mechanism, seen: Observation) -> None:
+    clean = next(seen.records()).columns
+    for fault in FAULTS:
+        faulty = next(trunnion.observe(mechanism, rig(faults=[fault]), seed=4).records()).columns
+        kind = fault["kind"]
+        if kind == "gap":
+            assert len(faulty["t"]) == len(clean["t"]) - 50
+            assert np.max(np.diff(faulty["t"])) == pytest.approx(0.102)
+            continue
+        changed = {name for name in clean if not np.array_equal(clean[name], faulty[name], equal_nan=True)}
+        assert changed == {fault.get("sensor", "encoder")}
+        name = changed.pop()
+        if kind == "dropouts":
+            assert np.mean(np.isnan(faulty[name])) == pytest.approx(0.02, rel=0.4)
+        elif kind == "wrong-sign":
+            assert np.array_equal(faulty[name], -clean[name])
+        elif kind == "drift":
+            assert (faulty[name] - clean[name])[[0, -1]] == pytest.approx([0, 1], abs=1e-3)
+        elif kind == "spikes":
+            moved = np.abs(faulty[name] - clean[name])
+            assert set(np.round(moved, 6)) == {0.0, 40.0}
+        elif kind == "stuck":
+            assert len(set(faulty[name][1000:1100])) == 1
+        else:
+            assert 0 < clean[name][-1] - faulty[name][-1] < 30
+    other = trunnion.observe(mechanism, rig(faults=[{**FAULTS[2], "conditions": [2]}]), seed=4)
+    assert np.array_equal(next(other.records()).columns["T2"], clean["T2"])
+    assert trunnion.observe(mechanism, rig(faults=FAULTS)).truth()["faults"][1] == {"kind": "gap", "sensor": [],
+        "conditions": [], "length": 1, "from": "1 s", "to": "1.1 s"}  # fmt: skip

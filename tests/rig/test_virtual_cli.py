@@ -1,0 +1,131 @@
+"""Rig files and `trunnion rig` as a user meets them."""
+
+from __future__ import annotations
+
+import functools
+from pathlib import Path
+
+import pytest
+
+from manual.conftest import Run, program
+from trunnion.errors import MechanismError
+from trunnion.measured.rig_file import Rig
+
+__all__ = ["program"]
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+FOUR_BAR = EXAMPLES / "toleranced-fourbar.yaml"
+RIG = EXAMPLES / "rig" / "fourbar-rig.yaml"
+
+
+@pytest.fixture
+def run(program: Run) -> Run:
+    return functools.partial(program, "rig")
+
+
+def test_plan_and_files(run: Run, tmp_path: Path) -> None:
+    planned = run(FOUR_BAR, RIG)
+    assert planned.code == 0
+    assert "Readings to expect" in planned.out
+    assert "Efficiency to expect" in planned.out
+    assert "torque-rocker" in planned.out
+    assert not list(tmp_path.iterdir())
+    done = run(FOUR_BAR, RIG, "--out", "data", "--seed", 3, "--set", "schedule.turns=2")
+    assert done.code == 2
+    assert "schedule" in done.err
+    done = run(FOUR_BAR, RIG, "--out", "data", "--seed", 3, "--set", "joint_defaults.friction.coefficient=0.05")
+    assert done.code == 0
+    assert "Readings" not in done.out
+    assert "wrote data" in done.out
+    assert {path.name for path in (tmp_path / "data").iterdir()} == {
+        "run-01.csv", "run-02.csv", "run-03.csv", "mapping.yaml", "truth.yaml",
+    }  # fmt: skip
+    head = (tmp_path / "data" / "run-01.csv").read_text("utf-8").splitlines()[0]
+    assert head == "t [s],count,z,T1 [V],T2 [V],n1 [rpm],w2 [V]"
+    assert "joints.B.friction.coefficient: 0.05" in (tmp_path / "data" / "truth.yaml").read_text("utf-8")
+
+
+def test_left_out_conditions_end_with_1(run: Run, tmp_path: Path) -> None:
+    text = RIG.read_text("utf-8").replace("work.resisting_torque: 2 N m", "l2: 80 mm")
+    (tmp_path / "rig.yaml").write_text(text, encoding="utf-8")
+    done = run(FOUR_BAR, "rig.yaml", "--out", "data")
+    assert done.code == 1
+    assert (
+        "rig.yaml:7: warning: schedule.conditions: condition 1 (l2 = 80 mm, A.speed = 60 rpm) is left out" in done.err
+    )
+    assert not (tmp_path / "data" / "run-01.csv").exists()
+    assert (tmp_path / "data" / "run-02.csv").exists()
+
+
+GOOD = """trunnion-rig: 1
+schedule: {turns: 2}
+rate: 1 kHz
+encoder: {per_turn: 60}
+sensors:
+  T: {measures: "effort:A", range: 10 N m}
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "what", "remedy"),
+    [
+        ("turns: 2", "turrns: 2", 2, "the key 'turrns' is unknown", "'turns'"),
+        ("1 kHz", "1 kg", 3, "'1 kg' is not a frequency", "2 kHz"),
+        ("1 kHz", "fast", 3, "not a number", "12 mV"),
+        ("per_turn: 60", "per_turn: 0", 4, "greater than or equal to 1", ""),
+        ("trunnion-rig: 1", "trunnion-rig: 2", 1, "version 2", "trunnion-rig: 1"),
+        ("trunnion-rig: 1", "trunnion: 1", 1, "is no rig file", "trunnion-rig: 1"),
+        ("range: 10 N m", "range: -10 N m", 6, "not positive", "positive"),
+        ("range: 10 N m", "bits: 12", 6, "neither span nor range", "span"),
+        ("range: 10 N m", "rangee: 10 N m", 6, "'rangee' is unknown", "'range'"),
+        ("range: 10 N m", "per_turn: 60", 6, "a speed only", "rate:"),
+        ("range: 10 N m", "column: t", 6, "that of time too", "column"),
+        ("turns: 2", "over: {l2: 3:2}", 2, "no range", "FROM:TO:COUNT"),
+        ("turns: 2", "over: {l2: 3 mm:2 cm:4}", 2, "different units", "same unit"),
+        ("turns: 2", "over: {l2: [1]}, conditions: [{l2: 3 mm}]", 2, "a grid and rows", "not both"),
+        ("sensors:", "faults: [{kind: gap}]\nsensors:", 5, "needs 'from'", "state from"),
+        ("sensors:", "faults: [{kind: stuk}]\nsensors:", 5, "stuk", "'stuck'"),
+        ("sensors:", "faults: [{kind: drift, sensor: U, by: 1}]\nsensors:", 5, "no sensor 'U'", "known: 'T'"),
+        ("effort:A", "effort:B", 6, "no driver 'B'", "known: 'A'"),
+        ("range: 10 N m", "range: 10 V", 6, "'10 V' is not in N m", "state it in N m"),
+    ],
+)
+def test_findings_have_line_and_remedy(
+    run: Run, tmp_path: Path, old: str, new: str, line: int, what: str, remedy: str
+) -> None:
+    assert old in GOOD
+    (tmp_path / "rig.yaml").write_text(GOOD.replace(old, new, 1), encoding="utf-8")
+    done = run(FOUR_BAR, "rig.yaml")
+    assert done.code == 2, done.out
+    first = done.err.splitlines()[0]
+    assert first.startswith(f"rig.yaml:{line}: error:"), done.err
+    assert what in done.err
+    assert remedy in done.err
+
+
+def test_formats(run: Run, tmp_path: Path) -> None:
+    done = run(FOUR_BAR, RIG, "--format", "xlsx", "--out", "data")
+    assert done.code == 2
+    assert "csv, parquet, tdms" in done.err
+    assert not (tmp_path / "data").exists()
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    assert "cannot be made a folder" in run(FOUR_BAR, RIG, "--out", "file").err
+
+
+@pytest.mark.parametrize("path", sorted((EXAMPLES / "rig").glob("*-rig.yaml")), ids=lambda path: path.stem)
+def test_examples_of_rigs_are_read(path: Path) -> None:
+    rig = Rig.read(path)
+    assert rig.name
+    assert rig.sensors
+
+
+def test_a_range_keeps_its_unit() -> None:
+    rig = Rig(**{"trunnion-rig": 1, "rate": 100, "sensors": {"a": {"measures": "effort:A"}},
+                 "schedule": {"over": {"x": "0 deg:30 deg:4", "y": "-1:1:3", "z": ["1 mm"]}}})  # fmt: skip
+    rows = rig.schedule.rows()
+    assert len(rows) == 12
+    assert rows[0] == {"x": "0 deg", "y": -1.0, "z": "1 mm"}
+    assert [row["x"] for row in rows[::3]] == ["0 deg", "10 deg", "20 deg", "30 deg"]
+    with pytest.raises(MechanismError, match="more than"):
+        Rig(**{"trunnion-rig": 1, "rate": 100, "sensors": {"a": {"measures": "effort:A"}},
+               "schedule": {"over": {"x": "0:1:500", "y": "0:1:500"}}}).schedule.rows()  # fmt: skip

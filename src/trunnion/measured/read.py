@@ -135,15 +135,16 @@ class _File:
             for name, channel in mapping.channels.items()
         }
         share, way, spoilt = self._share(zeros)
-        cuts = []
+        cuts, used = [], self._used()
         for setting in settings(mapping, self.entry, self.table, self.line, account):
-            allowed = self._used() & setting.rows
-            turns = cut(share, self.line, allowed, mapping.positions, spoilt, account, self._named(setting))
+            allowed = used[setting.window] & setting.rows
+            name = self._named(setting)
+            turns = cut(share, self.line, setting.window, allowed, mapping.positions, spoilt, account, name)
             if turns.numbers.size:
                 cuts.append((setting, turns))
             else:
-                what = self._no_turn(share, allowed)
-                account.error(f"condition {self._named(setting)}", what, "check angle, or record for longer")
+                what = self._no_turn(share[setting.window], allowed)
+                account.error(f"condition {name}", what, "check angle, or record for longer")
         if not cuts:
             return []
         self._check_rows(cuts)
@@ -255,7 +256,7 @@ class _File:
         if mapping.filter is not None:
             values = filtered(values, line, mapping.filter, account, where)
         for part in parts:
-            part.courses[name] = resampled(part.turns, values, line)
+            part.courses[name] = resampled(part.turns, values)
         if speed:  # one that creeps is the drive's
             return None
         found = drift([(part.turns, part.courses[name]) for part in parts])
@@ -270,7 +271,7 @@ class _File:
         since = self._since(name)
         account.warn(where, f"{what}; a straight line is taken off, zero at {since:.4g} s", remedy)
         for part in parts:
-            part.courses[name] = resampled(part.turns, values - found.slope * (line.seconds - since), line)
+            part.courses[name] = resampled(part.turns, values - found.slope * (line.seconds - since))
         return found
 
     def _since(self, name: str) -> float:

@@ -36,6 +36,7 @@ from trunnion.verbs.allocate import allocate
 from trunnion.verbs.assemble import assemble
 from trunnion.verbs.compare import compare
 from trunnion.verbs.data import data
+from trunnion.verbs.identify import identify
 from trunnion.verbs.model import exit_status, lines_of, placed, stated
 from trunnion.verbs.rig import rig
 from trunnion.verbs.study import tolerance
@@ -189,6 +190,7 @@ app.command()(allocate)
 app.command()(data)
 app.command()(rig)
 app.command()(compare)
+app.command()(identify)
 app.command()(sweep)
 
 
@@ -286,7 +288,7 @@ def examples(
     to: Annotated[Path, typer.Option("--to", help="Folder to copy it into.")] = Path(),
     force: Annotated[bool, typer.Option("--force", help="Overwrite a file of that name.")] = False,
 ) -> None:
-    """List the example models, or copy one out."""
+    """List the example models and rig files, or copy one out."""
     found = _examples()
     if name is None:
         for path in found.values():
@@ -408,10 +410,10 @@ def _summary(result: xr.Dataset, file: Path) -> None:
 
 
 def _examples() -> dict[str, Path]:
-    """Example models by name: beside the installed package, or in the source tree."""
+    """Example models and rigs by name: beside the installed package, or in the source tree."""
     here = Path(__file__).resolve().parent
     folder = here / "examples" if (here / "examples").is_dir() else here.parents[1] / "examples"
-    return {path.stem: path for path in sorted(folder.glob("*.yaml"))}
+    return {path.stem: path for path in (*sorted(folder.glob("*.yaml")), *sorted(folder.glob("rig/*-rig.yaml")))}
 
 
 if __name__ == "__main__":

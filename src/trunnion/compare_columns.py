@@ -31,7 +31,7 @@ def is_comparison(result: xr.Dataset) -> bool:
     return "comparing" in result.attrs
 
 
-def table_of(path: str | os.PathLike[str]) -> str:
+def table_of(path: str | os.PathLike[str], result: xr.Dataset) -> str:
     """The table that a file of this name holds: of `x.figures.csv` the figures, else the courses."""
     return "figures" if Path(Path(path).stem).suffix.lower() == ".figures" else "courses"
 

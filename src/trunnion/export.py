@@ -11,10 +11,10 @@ CSV (and Parquet) have one row a position and flat columns: `time`, `<joint>.rot
 they were given, then `efficiency`, `<driver>.effort_max`, `<joint>.reaction_max`, …, `status`. The play of joints has
 `drive`, `<measure>`, `<measure>.worst_case`, `<measure>.rss`, `<measure>.deviation`, `<measure>.<joint>.worst_case`,
 …. Of tolerances the file's name says which table it holds: one row a measure, or of `x.parameters.csv` one a toleranced
-number, see `tolerance_columns`; so it does of a comparison with measurements, see `compare_columns`. What `assemble`
-finds has one row a position: `<driver>.coordinate`, `needed_share`, `needed_clearance`, …, `<joint>.uniform_1_x` of
-end 1, …, `status`. Measured courses have one row a condition and position: `condition`, what was set, `phase`,
-`<channel>.mean`, `.scatter`, `.uncertainty`, `.turns`.
+number, see `tolerance_columns`; so it does of a comparison with measurements and of what `identify` finds, see
+`compare_columns` and `identified_columns`. What `assemble` finds has one row a position: `<driver>.coordinate`,
+`needed_share`, `needed_clearance`, …, `<joint>.uniform_1_x` of end 1, …, `status`. Measured courses have one row a
+condition and position: `condition`, what was set, `phase`, `<channel>.mean`, `.scatter`, `.uncertainty`, `.turns`.
 """
 
 from __future__ import annotations
@@ -31,11 +31,9 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion import compare_columns
-from trunnion.compare_columns import is_comparison
+from trunnion import compare_columns, identified_columns, tolerance_columns
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.output import whole
-from trunnion.tolerance_columns import flat, is_tolerance, table_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -49,12 +47,19 @@ ROWS = 20_000  # written at a time, so that memory does not grow with the number
 Column = tuple[str, str, Callable[[slice], NDArray[Any]]]
 
 
+def tables_of(result: xr.Dataset) -> Any:
+    """The module that knows the tables of a result; None of one that has a single table."""
+    if tolerance_columns.is_tolerance(result):
+        return tolerance_columns
+    if compare_columns.is_comparison(result):
+        return compare_columns
+    return identified_columns if identified_columns.is_identification(result) else None
+
+
 def columns(result: xr.Dataset, table: str = "measures") -> list[Column]:
     """(name, unit, values of a window of rows) of every flat column; table: which one, of a result of `tolerance`."""
-    if is_tolerance(result):
-        return [(name, unit, values.__getitem__) for name, unit, values in flat(result, table)]
-    if is_comparison(result):
-        return [(name, unit, values.__getitem__) for name, unit, values in compare_columns.flat(result, table)]
+    if (tables := tables_of(result)) is not None:
+        return [(name, unit, values.__getitem__) for name, unit, values in tables.flat(result, table)]
     if "swept" in result.attrs:
         return [(name, unit, values.__getitem__) for name, (unit, values) in figures(result).items()]
     if "measure" in result.dims:
@@ -283,7 +288,7 @@ def frames(result: xr.Dataset, table: str = "measures") -> Iterator[pd.DataFrame
 
 def _count(result: xr.Dataset, found: list[Column]) -> int:
     """How many rows the columns have; one at least, so that their names are written."""
-    if is_tolerance(result) or is_comparison(result):
+    if tables_of(result) is not None:
         return max(len(found[0][2](slice(None))), 1)
     if "measured" in result.attrs:
         return result.sizes["condition"] * result.sizes["position"]
@@ -384,5 +389,6 @@ def save(result: xr.Dataset, path: str | os.PathLike[str], units_row: bool = Fal
     if Path(path).suffix.lower() == ".zarr" and Path(path).is_dir():
         raise MechanismError(Finding("exists already", str(path), "remove it or choose another name"))
     with whole(path) as temporary:
-        table = compare_columns.table_of(path) if is_comparison(result) else table_of(path, result)
+        tables = tables_of(result)
+        table = "" if tables is None else tables.table_of(path, result)
         writer(result, temporary, units_row, table)

@@ -113,23 +113,7 @@ def solve(bodies: Mapping[str, Body], joints: Mapping[str, Joint], gravity: Arra
     Raises ValueError if the equations are not as many as the unknowns.
     """
     equations = _Equations(bodies)
-    owners = []
-    for name, joint in joints.items():
-        units, effort = wrenches(joint)
-        for unit in units:
-            owners.append((name, "reaction", unit))
-            equations.column(joint, unit)
-        if joint.driven:
-            owners.append((name, "effort", effort))
-            equations.column(joint, effort)
-    for name, body in bodies.items():
-        if body.free_spin is not None:
-            held = Joint("fixed", None, name, body.centre)
-            owners.append((name, "spin", np.zeros(6)))
-            equations.column(held, np.concatenate([NONE, _vector(body.free_spin)]))
-    A = np.array(equations.columns).T
-    if A.shape[0] != A.shape[1]:
-        raise ValueError(f"{A.shape[0]} equations but {A.shape[1]} unknowns: not determinate")
+    owners, A = equations.left(joints)
     b = equations.right(joints, _vector(gravity))
     x = np.linalg.solve(A, b)
     force, moment = ({name: np.zeros(3) for name in joints} for _ in range(2))
@@ -151,6 +135,30 @@ class _Equations:
         self.bodies = bodies
         self.rows = {name: 6 * k for k, name in enumerate(bodies)}
         self.columns: list[Vector] = []
+
+    def left(self, joints: Mapping[str, Joint]) -> tuple[list[tuple[str, str, Vector]], Vector]:
+        """Of every unknown its owner, what it is and its unit wrench; and the matrix. ValueError if it is not square.
+
+        Friction is no part of it.
+        """
+        owners = []
+        for name, joint in joints.items():
+            units, effort = wrenches(joint)
+            for unit in units:
+                owners.append((name, "reaction", unit))
+                self.column(joint, unit)
+            if joint.driven:
+                owners.append((name, "effort", effort))
+                self.column(joint, effort)
+        for name, body in self.bodies.items():
+            if body.free_spin is not None:
+                held = Joint("fixed", None, name, body.centre)
+                owners.append((name, "spin", np.zeros(6)))
+                self.column(held, np.concatenate([NONE, _vector(body.free_spin)]))
+        A = np.array(self.columns).T
+        if A.shape[0] != A.shape[1]:
+            raise ValueError(f"{A.shape[0]} equations but {A.shape[1]} unknowns: not determinate")
+        return owners, A
 
     def column(self, joint: Joint, wrench: Vector) -> None:
         """What a wrench of the joint does to the bodies."""
@@ -206,33 +214,55 @@ def solve_with_friction(
 ) -> tuple[Solution, dict[str, Vector]]:
     """The same with friction that obeys its law: sizes n with n = size(reactions(n)), by Newton.
 
-    What the joints state as friction stays as a given load beside it. The Jacobian is by central differences. Returns
-    friction (6) by joint too. AssertionError if it does not settle, as where the mechanism is locked.
+    What the joints state as friction stays as a given load beside it. For given sizes the equations are linear, so the
+    reactions are those without friction and, times its size, those to each bearing's friction alone. The Jacobian is by
+    central differences. Returns friction (6) by joint too. AssertionError if it does not settle, as where the
+    mechanism is locked.
     """
-
-    def at(sizes: Vector) -> tuple[Solution, dict[str, Vector]]:
-        friction = {name: np.zeros(6) for name in joints}
-        for one, size in zip(rubbing, sizes, strict=True):
-            friction[one.joint] = friction[one.joint] + size * one.wrench
-        whole = {name: _vector(joint.friction) + friction[name] for name, joint in joints.items()}
-        loaded = {name: replace(joint, friction=whole[name]) for name, joint in joints.items()}
-        return solve(bodies, loaded, gravity), friction
+    alone, each = _reactions(bodies, joints, rubbing, gravity)
 
     def asked(sizes: Vector) -> Vector:
-        found, friction = at(sizes)
-        loads = {name: np.concatenate([found.force[name], found.moment[name]]) for name in joints}
-        return np.array([one.size(*np.split(loads[one.joint] + one.felt * friction[one.joint], 2)) for one in rubbing])
+        felt = alone + each @ sizes  # (bearing, 6)
+        return np.array([one.size(*np.split(load, 2)) for one, load in zip(rubbing, felt, strict=True)])
 
     n = asked(np.zeros(len(rubbing)))
     for _ in range(60):
         wanted = asked(n)
         scale = max(float(np.max(np.abs(wanted), initial=0.0)), np.finfo(float).tiny)
         if np.max(np.abs(wanted - n), initial=0.0) <= limit * scale:
-            return at(wanted)
+            friction = {name: np.zeros(6) for name in joints}
+            for one, size in zip(rubbing, wanted, strict=True):
+                friction[one.joint] = friction[one.joint] + size * one.wrench
+            whole = {name: _vector(joint.friction) + friction[name] for name, joint in joints.items()}
+            loaded = {name: replace(joint, friction=whole[name]) for name, joint in joints.items()}
+            return solve(bodies, loaded, gravity), friction
         steps = 1e-6 * scale * np.eye(len(n))
         slope = np.array([(asked(n + h) - asked(n - h)) / (2e-6 * scale) for h in steps]).T
         n = n + np.linalg.solve(np.eye(len(n)) - slope, wanted - n)
     raise AssertionError("friction does not settle")
+
+
+def _reactions(
+    bodies: Mapping[str, Body], joints: Mapping[str, Joint], rubbing: Sequence[Rubbing], gravity: ArrayLike
+) -> tuple[Vector, Vector]:
+    """What a bearing feels without friction (bearing, 6), and to friction of size 1 in each (bearing, 6, bearing)."""
+    equations = _Equations(bodies)
+    owners, A = equations.left(joints)
+    sides = [equations.right(joints, _vector(gravity))]
+    for one in rubbing:
+        side = np.zeros(len(A))
+        equations.add(side, joints[one.joint], -one.wrench)
+        sides.append(side)
+    x = np.linalg.solve(A, np.array(sides).T)
+    felt = np.zeros((len(rubbing), 6, len(sides)))
+    for row, one in enumerate(rubbing):
+        for (name, what, unit), values in zip(owners, x, strict=True):
+            if what == "reaction" and name == one.joint:
+                felt[row] += np.outer(unit, values)
+        for column, other in enumerate(rubbing, start=1):
+            if one.felt and other.joint == one.joint:
+                felt[row, :, column] += other.wrench
+    return felt[..., 0], felt[..., 1:]
 
 
 def _vector(value: ArrayLike) -> Vector:

@@ -6,9 +6,11 @@ An entry is any number of `algebra.namespace`, so dual numbers flow through a so
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
@@ -17,6 +19,9 @@ from trunnion.algebra.traced import kept
 __all__ = ["condition", "cross", "determinant", "dot", "inverse", "quick_inverse", "solve", "weighted"]
 
 Vector = tuple[Number, Number]
+Table = NDArray[np.float64]
+SEVERAL, FEW_LANES = 4, 512  # rows from which, and lanes up to which whole rows are quicker
+_SCALARS = frozenset({float, int, np.float64})
 
 
 def dot(a: Vector, b: Vector) -> Number:
@@ -48,6 +53,8 @@ def solve(matrix: Sequence[Sequence[Number]], *sides: Sequence[Number], pivoting
     n = len(matrix)
     columns = n + len(sides)
     rows = [[*row, *(side[i] for side in sides)] for i, row in enumerate(matrix)]
+    if (table := _table(rows)) is not None:
+        return _solved(table, pivoting)
     xp = namespace(*(entry for row in rows for entry in row))
     rows = _quiet(rows)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
@@ -68,6 +75,73 @@ def solve(matrix: Sequence[Sequence[Number]], *sides: Sequence[Number], pivoting
                 x[i] = total / rows[i][i]
             solutions.append(x)
     return solutions
+
+
+def _table(rows: Sequence[Sequence[Number]]) -> Table | None:
+    """Entries (row, column, …lanes) of several rows of plain numbers with few lanes; None of anything else.
+
+    There calls cost more than numbers do, and whole rows are eliminated at a time. What is done to each number and in
+    which order is the same as entry by entry, so that the bits do not depend on how many lanes there are.
+    """
+    if len(rows) < SEVERAL:
+        return None
+    entries = [entry for row in rows for entry in row]
+    arrays = [entry for entry in entries if type(entry) is np.ndarray]
+    plain = len(arrays) + sum(type(entry) in _SCALARS for entry in entries) == len(entries)
+    if not plain or any(array.dtype != np.float64 for array in arrays):
+        return None
+    shapes = {array.shape for array in arrays}
+    shape = shapes.pop() if len(shapes) == 1 else np.broadcast_shapes(*shapes)
+    if math.prod(shape) > FEW_LANES:
+        return None
+    table = np.empty((len(rows), len(rows[0]), *shape))
+    for i, row in enumerate(rows):
+        for j, entry in enumerate(row):
+            table[i, j] = entry
+    return table
+
+
+def _solved(table: Table, pivoting: bool) -> list[list[Number]]:
+    """`solve` of a table, the sides in its last columns."""
+    n = len(table)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        for k in range(n - 1):
+            if pivoting:
+                _pivot_rows(table, k)
+            _clear_below(table, k)
+        x = np.empty_like(table[:, n:])
+        for i in reversed(range(n)):
+            total = table[i, n:]
+            for j in range(i + 1, n):
+                total = total - table[i, j] * x[j]
+            x[i] = total / table[i, i]
+    return [[x[i, side] for i in range(n)] for side in range(table.shape[1] - n)]
+
+
+def _clear_below(table: Table, k: int) -> None:
+    """Subtract row k from those below, so that nothing stays in column k."""
+    factor = table[k + 1 :, k] / table[k, k]
+    table[k + 1 :, k + 1 :] -= factor[:, None] * table[k, k + 1 :]
+
+
+def _pivot_rows(table: Table, k: int) -> Number:
+    """`_pivot` of a table."""
+    sign: Number = 1.0
+    sizes = np.abs(table[k:, k])
+    largest = sizes[0]
+    if not (sizes[1:] > largest).any():
+        return sign
+    for i in range(k + 1, len(table)):
+        swap = sizes[i - k] > largest
+        if not swap.any():
+            continue
+        sign, largest = np.where(swap, -sign, sign), np.where(swap, sizes[i - k], largest)
+        upper, lower = table[k, k:], table[i, k:]
+        if swap.all():
+            table[k, k:], table[i, k:] = lower.copy(), upper.copy()
+        else:
+            table[k, k:], table[i, k:] = np.where(swap, lower, upper), np.where(swap, upper, lower)
+    return sign
 
 
 def _quiet(rows: list[list[Number]]) -> list[list[Number]]:
@@ -126,10 +200,16 @@ def quick_inverse(matrix: Sequence[Sequence[Number]]) -> list[list[Number]]:
 def determinant(matrix: Sequence[Sequence[Number]]) -> Number:
     """Determinant by elimination with row pivoting per lane; NaN or 0 where a lane is singular."""
     n = len(matrix)
+    product: Number = 1.0
+    if (table := _table(matrix)) is not None:
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            for k in range(n):
+                product = product * _pivot_rows(table, k) * table[k, k]
+                _clear_below(table, k)
+        return product
     rows = [list(row) for row in matrix]
     xp = namespace(*(entry for row in rows for entry in row))
     rows = _quiet(rows)
-    product: Number = 1.0
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         for k in range(n):
             product = product * _pivot(rows, k, n, xp) * rows[k][k]

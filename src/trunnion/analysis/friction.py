@@ -423,11 +423,11 @@ def _follow(problem: Problem, forces: Sequence[Number], lanes: Number) -> tuple[
     return result, shares
 
 
-Weights = Callable[[NDArray[np.float64]], Sequence[Number]]
+Weights = Callable[[NDArray[np.float64], NDArray[np.intp]], Sequence[Number]]
 
 
 def scaled(problem: Problem, weights: Weights | None = None) -> continuation.Family:
-    """Residual φ − w(s) law(N(φ)) and its Jacobian; w(s): multiple of each contact's friction, s if not given."""
+    """Residual φ − w(s) law(N(φ)) and its Jacobian; w(s, lanes): multiple of each contact's friction, or s."""
 
     def family(lanes: NDArray[np.intp]) -> continuation.System:
         part = problem.mapped(lambda number: number[lanes])
@@ -435,7 +435,7 @@ def scaled(problem: Problem, weights: Weights | None = None) -> continuation.Fam
         def system(
             forces: Sequence[NDArray[np.float64]], share: NDArray[np.float64]
         ) -> tuple[list[Number], list[list[Number]]]:
-            found = [share] * len(part.contacts) if weights is None else weights(share)
+            found = [share] * len(part.contacts) if weights is None else weights(share, lanes)
             shares = [weight if contact.rubs else 1.0 for weight, contact in zip(found, part.contacts, strict=True)]
             state = part.state(forces)
             residual = [f - s * t for f, s, t in zip(forces, shares, part.target(state.normals), strict=True)]

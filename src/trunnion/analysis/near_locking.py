@@ -55,30 +55,34 @@ def critical_multiples(back: Backward, most: float) -> dict[str, Array]:
         if settled.problem is None:
             continue
         contacts = settled.problem.contacts
-        for place in dict.fromkeys(contact.joint for contact in contacts if contact.rubs):
-            own = [contact.joint == place for contact in contacts]
-            joint = system.places[number][place].joint
-            found[joint] = np.broadcast_to(_alone(settled.problem, own, most), positions)
+        places = list(dict.fromkeys(contact.joint for contact in contacts if contact.rubs))
+        own = np.array([[contact.joint == place for contact in contacts] for place in places], bool)
+        for place, multiple in zip(places, _alone(settled.problem, own, most), strict=True):
+            found[system.places[number][place].joint] = np.broadcast_to(multiple, positions)
     return {joint: found[joint] for joint in system.joints if joint in found}
 
 
-def _alone(problem: Problem, own: Sequence[bool], most: float) -> Array:
-    """The multiple for the contacts of one joint: the others' friction is raised to full first, then theirs."""
-    multiples = [most if mine else 1.0 for mine in own]
-    bound = problem.bound(multiples)
-    doubtful = np.isfinite(bound) & (bound >= 1.0)
-    part, chosen = problem.picked(doubtful)
-    result = np.full(chosen.shape, np.inf)
-    if not np.any(chosen):
-        return result
+def _alone(problem: Problem, own: NDArray[np.bool_], most: float) -> list[Array]:
+    """The multiples for the contacts of each joint: the others' friction is raised to full first, then theirs.
 
-    def weights(share: Array) -> Sequence[Array]:
-        others_, theirs = np.minimum(share, 1.0), np.maximum(share - 1.0, 0.0)
-        return [theirs if mine else others_ for mine in own]
+    own: (joint, contact). The joints are followed side by side, each in lanes of its own.
+    """
+    every, all_ = problem.picked(True)
+    bounds = [np.asarray(problem.bound([most if mine else 1.0 for mine in row])) for row in own]
+    doubtful = np.array([np.broadcast_to(np.isfinite(bound) & (bound >= 1.0), all_.shape) for bound in bounds])
+    result = np.full(doubtful.shape, np.inf)
+    joint, lane = np.nonzero(doubtful.reshape(len(own), -1))
+    if len(lane):
+        part, mine = every.mapped(lambda number: number[lane]), own[joint].T
 
-    _, reached = continuation.follow(scaled(part, weights), frictionless(part, chosen), 1.0 + most)
-    result[chosen] = np.where(reached >= 1.0 + most, np.inf, np.maximum(reached - 1.0, 0.0))
-    return result
+        def weights(share: Array, lanes: NDArray[np.intp]) -> Sequence[Array]:
+            others_, theirs = np.minimum(share, 1.0), np.maximum(share - 1.0, 0.0)
+            return list(np.where(mine[:, lanes], theirs, others_))
+
+        start = frictionless(part, np.ones(len(lane), bool))
+        _, reached = continuation.follow(scaled(part, weights), start, 1.0 + most)
+        result[doubtful] = np.where(reached >= 1.0 + most, np.inf, np.maximum(reached - 1.0, 0.0))
+    return list(result)
 
 
 # ---- other solutions ------------------------------------------------------------------------------------------

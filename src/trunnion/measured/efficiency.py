@@ -83,7 +83,7 @@ class Efficiency:
         return dict(sorted(((name, value**0.5) for name, value in squares.items()), key=lambda item: -item[1]))
 
     def __str__(self) -> str:
-        return f"η = {self.value:.4f} ± {self.expanded:.2g} (k = {COVERAGE:g})"
+        return f"η = {self.value:.4f} ± {self.expanded:#.2g} (k = {COVERAGE:g})"
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,7 @@ FEWEST = 20  # conditions from which a progress bar is worth it
 
 def rig(
     file: File,
-    rig_file: Annotated[Path, typer.Argument(metavar="RIG", help="Rig file: YAML, JSON or TOML.", show_default=False)],
+    rig_file: Annotated[Path, typer.Argument(help="Rig file: YAML, JSON or TOML.", show_default=False)],
     out: Annotated[
         Path | None,
         typer.Option("--out", help="Folder for data files, mapping.yaml and truth.yaml.", show_default=False),

@@ -31,7 +31,8 @@ __all__ = ["MAPPING", "TRUTH", "check_form", "mapping_of", "truth_of", "write"]
 
 MAPPING, TRUTH = "mapping.yaml", "truth.yaml"
 PACKAGES = {"parquet": "pyarrow", "tdms": "nptdms"}
-POSITIONS = (360, 180, 120, 90, 72, 60, 36, 24, 12)  # of a cycle: as many as there are samples
+POSITIONS = (360, 180, 120, 90, 72, 60, 36, 24, 12)  # of a cycle: fewer than samples
+FEWER = 0.99
 ROWS = 100_000  # of text written at a time
 AT_REST = 0.9  # share of the idle stretch that the zero is taken from: a filter carries the run into the rest
 
@@ -67,7 +68,7 @@ def write(
     for name, data in ((MAPPING, mapping_of(observation, form)), (TRUTH, truth_of(observation))):
         with whole(folder / name) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as stream:
             stream.write(HEADS[name])
-            _yaml().dump(data, stream)
+            _yaml(flowing=name == MAPPING).dump(data, stream)
         names.append(name)
     return names
 
@@ -147,7 +148,7 @@ def mapping_of(observation: Observation, form: str) -> dict[str, Any]:
     found["time"] = {"column": rig.time.column, "unit": rig.time.unit}
     found |= angle
     least = min(case.run.cycle.duration for case in observation.cases) * observation.rate
-    positions = next((one for one in POSITIONS if one <= least * (1 + 1e-9)), POSITIONS[-1])
+    positions = next((one for one in POSITIONS if one < least * FEWER), POSITIONS[-1])
     if positions != POSITIONS[0]:
         found["positions"] = positions
     found["channels"] = {name: _channel(observation, name) for name in observation.channels}
@@ -267,9 +268,9 @@ def truth_of(observation: Observation) -> dict[str, Any]:
                 "gain_error": observation.drawn[name].gain,
                 "zero_error": observation.drawn[name].zero,
                 "offset": observation.drawn[name].offset,
-                "drift_per_second": channel.drift,
-                "noise": channel.noise,
-                "step": channel.step,
+                "drift_per_second": _short(channel.drift),
+                "noise": _short(channel.noise),
+                "step": _short(channel.step),
             }
             for name, channel in observation.channels.items()
         },
@@ -295,6 +296,11 @@ def truth_of(observation: Observation) -> dict[str, Any]:
     return found
 
 
+def _short(value: float) -> float:
+    """Without the rounding of a unit that was taken out."""
+    return float(f"{value:.12g}")
+
+
 def _mean(observation: Observation, case: Case, i: int) -> float:
     """Mean of a true course over the recorded cycles."""
     whole = round(observation.rig.schedule.turns * case.run.cycle.duration * observation.rate)
@@ -316,9 +322,10 @@ HEADS = {
 }
 
 
-def _yaml() -> YAML:
+def _yaml(flowing: bool) -> YAML:
+    """flowing: the innermost groups on one line."""
     yaml = YAML(typ="safe", pure=True)
-    yaml.default_flow_style = None
+    yaml.default_flow_style = None if flowing else False
     yaml.allow_unicode = True
     yaml.width = 118
     yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]  # keys as stated

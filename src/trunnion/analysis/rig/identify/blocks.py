@@ -17,10 +17,9 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.measured.efficiency import efficiency_of, pairs_of
 from trunnion.measured.measurement import Condition, Course, Measurement
 
-__all__ = ["EFFICIENCY", "Block", "HoldOut", "blocks_of", "channels_of"]
+__all__ = ["EFFICIENCY", "Block", "blocks_of", "channels_of"]
 
 Array = NDArray[np.float64]
-HoldOut = float | str | Sequence[str] | None
 EFFICIENCY = "efficiency"  # the channel that is computed from torques and speeds, one figure a turn
 
 
@@ -121,13 +120,12 @@ def _efficiency(condition: Condition, joints: Mapping[str, str]) -> tuple[Course
 
 
 def blocks_of(
-    measurement: Measurement, channels: Sequence[str], hold_out: HoldOut, joints: Mapping[str, str]
+    measurement: Measurement, channels: Sequence[str], held: frozenset[str], share: float, joints: Mapping[str, str]
 ) -> list[Block]:
-    """The blocks, with what is held out: whole conditions by name, or a share of the turns of each, the last ones.
+    """The blocks, with what is held out: whole conditions by name, and a share of the turns of each, the last ones.
 
     joints: of the loads, for the efficiency.
     """
-    held, share = _held(measurement, hold_out)
     found = []
     for index, condition in enumerate(measurement.conditions):
         for channel in channels:
@@ -142,23 +140,6 @@ def blocks_of(
     if not any(block.fitted for block in found):
         raise MechanismError(Finding("all conditions are held out", "hold_out", "leave some to fit"))
     return found
-
-
-def _held(measurement: Measurement, hold_out: HoldOut) -> tuple[frozenset[str], float]:
-    if hold_out is None:
-        return frozenset(), 0.0
-    if isinstance(hold_out, (int, float)):
-        if not 0 < hold_out < 1:
-            what = f"a share of {hold_out:g} of the turns cannot be held out"
-            raise MechanismError(Finding(what, "hold_out", "give a share between 0 and 1, or names of conditions"))
-        return frozenset(), float(hold_out)
-    names = [hold_out] if isinstance(hold_out, str) else list(hold_out)
-    known = [one.name for one in measurement.conditions]
-    for name in names:
-        if name not in known:
-            what = f"there is no condition '{name}'"
-            raise MechanismError(Finding(what, "hold_out", f"the measurement has {', '.join(known)}"))
-    return frozenset(names), 0.0
 
 
 def _share(turns: Array, share: float, condition: Condition) -> int:

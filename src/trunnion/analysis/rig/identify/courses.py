@@ -143,6 +143,19 @@ class Model:
             found |= differs | np.roll(differs, 1, axis=-1)
         return found
 
+    def rate(self, condition: int, row: Array) -> Array:
+        """Derivative by time of courses in a condition, (…, position), by differences of neighbours, with units of 1/s.
+
+        Linear in the course, so that what is exact of the course stays so.
+        """
+        phase, duration = self.phases[condition], self._started[condition]
+        if row.shape[-1] < 3 or row.shape[-1] != len(phase) or duration == 0:
+            return np.zeros_like(row)
+        if not self.run.cycle.periodic:
+            return np.asarray(np.gradient(row, phase * duration, axis=-1))
+        gap = (np.roll(phase, -1) - np.roll(phase, 1)) % 1.0
+        return np.asarray((np.roll(row, -1, axis=-1) - np.roll(row, 1, axis=-1)) / (gap * duration))
+
     # ---- the batch --------------------------------------------------------------------------------------------
 
     @cached_property

@@ -1,7 +1,8 @@
 """Least squares with exact derivatives: residuals of all blocks, and of the errors that are stated of the sensors.
 
 A sensor reads (1 + g) f + z of what there is: f of the model, g and z its errors, the same at every position. They
-are unknowns too, in units of their standard uncertainties, each with the observation 0 ± 1: what is stated of it.
+are unknowns too, in units of their standard uncertainties, each with the observation 0 ± 1: what is stated of it. So is
+a delay τ of the sensor behind the angle, of which f − τ df/dt is read.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ GUESS = 0.01  # of a course: the scatter of one without repetitions, until its r
 
 @dataclass(frozen=True)
 class Sensor:
-    """One error of a sensor: its zero or its gain.
+    """One error of a sensor: its zero, its gain, or by how much it lags behind.
 
     sizes: its standard uncertainty in each block, in the unit of the course or relative, 0 in blocks of other sensors;
     of a sensor behind a course that is computed, what it does to that, with its sign.
@@ -42,10 +43,11 @@ class Sensor:
     stated: bool
 
 
-def sensors_of(blocks: Sequence[Block], own: Sequence[str] | None = None) -> list[Sensor]:
+def sensors_of(blocks: Sequence[Block], own: Sequence[str] | None = None, delay: float | None = None) -> list[Sensor]:
     """Errors of the sensors of all blocks: one for each channel, or of each condition if these have names.
 
-    An infinite standard uncertainty says that nothing is known of it.
+    An infinite standard uncertainty says that nothing is known of it. delay: by which a channel may lag behind the
+    angle, standard uncertainty, s; none if not given.
     """
     found: list[Sensor] = []
     for kind in ("zero", "gain"):
@@ -71,6 +73,11 @@ def sensors_of(blocks: Sequence[Block], own: Sequence[str] | None = None) -> lis
         for name, size in block.effects.items():
             name = f"{name} in {own[block.condition]}" if own else name
             effects.setdefault((name, block.channel), [0.0] * len(blocks))[k] = size
+    for channel in dict.fromkeys(block.channel for block in blocks) if delay else ():
+        size = 1e-3 if np.isinf(delay or 0.0) else float(delay or 0.0)
+        sizes = [size * (block.channel == channel and block.turns.shape[1] > 2) for block in blocks]
+        if any(sizes):
+            found.append(Sensor(f"delay of {channel}", channel, "delay", tuple(sizes), bool(np.isfinite(delay or 0.0))))
     return found + [Sensor(name, channel, "zero", tuple(sizes), True) for (name, channel), sizes in effects.items()]
 
 
@@ -132,17 +139,23 @@ class Problem:
         one = self.courses(x).said[block.condition][block.channel]
         size = block.turns.shape[1]
         value, slope = one.value[:size], one.slope[:, :size]
-        gain, read = 1.0, np.zeros(size)
+        gain, late, read = 1.0, 0.0, np.zeros(size)
         columns = np.zeros((len(x), size))
         for s, sensor in enumerate(self.sensors, self.count):
             u = sensor.sizes[k]
-            if sensor.kind == "gain":
+            if sensor.kind == "delay" and u:
+                late += u * x[s]
+                columns[s] = -u * self.model.rate(block.condition, value)
+            elif sensor.kind == "gain":
                 gain += u * x[s]
                 columns[s] = u * value
             else:
                 read += u * x[s]
                 columns[s] = u
         columns[: self.count] = gain * slope
+        if late:
+            columns[: self.count] -= late * self.model.rate(block.condition, slope)
+            read = read - late * self.model.rate(block.condition, value)
         return gain * value + read, columns
 
     def misses(self, x: Array, k: int, data: Array) -> Array:

@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from trunnion.analysis.analyse import Run, prepare
 from trunnion.analysis.friction import FrictionMethod
 from trunnion.analysis.measures import Measure, named
-from trunnion.analysis.rig.identify.blocks import Block, HoldOut, blocks_of, channels_of
+from trunnion.analysis.rig.identify.blocks import Block, blocks_of, channels_of
 from trunnion.analysis.rig.identify.courses import Model
 from trunnion.analysis.rig.identify.fit import Problem, fit, sensors_of
+from trunnion.analysis.rig.identify.held import HoldOut, held_out
 from trunnion.analysis.rig.identify.search import Search, search
 from trunnion.analysis.rig.identify.separate import Group, inseparable
 from trunnion.analysis.rig.identify.uncertainty import Spread, left_over, spread_of
@@ -44,7 +45,6 @@ class Identified:
     search: Search
     spread: Spread
     groups: Sequence[Group]
-    held: HoldOut
 
     @property
     def x(self) -> Array:
@@ -60,6 +60,7 @@ def identify(
     start: Mapping[str, float | str] | None = None,
     hold_out: HoldOut = None,
     sensors: Errors = "channel",
+    delay: float | None = None,
     guard: int = 1,
     starts: int | None = None,
     method: FrictionMethod | None = None,
@@ -69,16 +70,17 @@ def identify(
     parameters: names as for `Mechanism.with_values`, each an unknown; or by a name of your own the numbers that are to
     be one unknown: `{"pins": ["pin-1.friction.coefficient", "pin-2.friction.coefficient"]}`. channels: of the
     measurement, all if not given. start: where the search begins, by name, SI or texts with units; the model's values
-    if not given. hold_out: names of conditions, or the share of the turns of each (the last), that are not fitted but
-    predicted. sensors: whether zero and gain of a channel are off by the same in all conditions, or in each by its own.
-    guard: positions left out on each side of a change of the sense of a friction. starts: places to begin at.
+    if not given. hold_out: conditions by name, file or setting, or the share of the turns of each (the last), that are
+    not fitted but predicted. sensors: whether zero and gain of a channel are off by the same in all conditions, or in each by its own.
+    delay: standard uncertainty, s, of the time by which a channel lags behind the angle, as its bandwidth makes it; what
+    it is in fact is estimated too. guard: positions left out on each side of a change of the sense of a friction. starts: places to begin at.
     Method: weighted least squares with exact derivatives, trust region; covariances by the scatter between turns.
     Raises MechanismError for names, channels or conditions that are not there, or where the model has no answer.
     """
     from trunnion.analysis.rig.identify.result import dataset
 
-    return dataset(identified(mechanism, measurement, parameters, channels, start, hold_out, sensors, guard, starts,
-                              method))  # fmt: skip
+    return dataset(identified(mechanism, measurement, parameters, channels, start, hold_out, sensors, delay, guard,
+                              starts, method))  # fmt: skip
 
 
 def identified(
@@ -89,6 +91,7 @@ def identified(
     start: Mapping[str, float | str] | None = None,
     hold_out: HoldOut = None,
     sensors: Errors = "channel",
+    delay: float | None = None,
     guard: int = 1,
     starts: int | None = None,
     method: FrictionMethod | None = None,
@@ -101,7 +104,8 @@ def identified(
     if run.determinacy is not None:
         run.determinacy.refuse()
     joints = load_joints(stated)
-    blocks = blocks_of(measurement, channels_of(measurement, channels, joints), hold_out, joints)
+    held, share = held_out(stated, measurement, hold_out)
+    blocks = blocks_of(measurement, channels_of(measurement, channels, joints), held, share, joints)
     measures = _measures(stated, run, blocks)
     phases = tuple(np.asarray(one.phase, float) for one in measurement.conditions)
     model = Model(run, tuple(unknowns(stated, paths, start or {})), measures, settings, phases,
@@ -109,7 +113,7 @@ def identified(
     if channels is None:
         model, blocks = _telling(model, blocks)
     names = [one.name for one in measurement.conditions] if sensors == "condition" else None
-    problem = Problem(model, blocks, sensors_of(blocks, names), guard)
+    problem = Problem(model, blocks, sensors_of(blocks, names, delay), guard)
     found = search(problem, starts)
     spread = spread_of(problem, found.fit.x)
     if spread.test.misfit and problem.sensors:
@@ -117,7 +121,7 @@ def identified(
         found = replace(found, fit=fit(problem, found.fit.x))
         spread = spread_of(problem, found.fit.x)
     groups = inseparable(problem, found.fit.x, spread)
-    return Identified(stated, measurement, run, problem, found, spread, groups, hold_out)
+    return Identified(stated, measurement, run, problem, found, spread, groups)
 
 
 def _telling(model: Model, blocks: list[Block]) -> tuple[Model, list[Block]]:

@@ -17,6 +17,7 @@ __all__ = ["sentences"]
 FAR = 3.0  # standard uncertainties from what was stated of a sensor
 MOSTLY = 0.5  # of the variance
 POOR = 2.0  # times what is expected, of predictions
+MOST_NAMED = 3
 FEW = 5.0  # degrees of freedom
 NUMBERS = ("no", "one", "two", "three", "four", "five", "six")
 
@@ -223,7 +224,8 @@ def _held(judged: Judged) -> Iterator[Finding]:
         return
     trust = judged.trust
     conditions = judged.found.measurement.conditions
-    names = _joined(list(dict.fromkeys(conditions[judged.problem.blocks[one.block].condition].name for one in rows)))
+    held = list(dict.fromkeys(conditions[judged.problem.blocks[one.block].condition].name for one in rows))
+    names = "; ".join(held) if len(held) <= MOST_NAMED else f"of {len(held)} conditions"
     if not np.isfinite(trust):
         what = f"nothing tells how well {names} should be predicted"
         yield Finding(what, "hold_out", severity=Severity.NOTE)

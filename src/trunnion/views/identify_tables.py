@@ -1,0 +1,129 @@
+"""An identification as tables of texts, for the terminal and the report."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from trunnion.views.cycle import names
+from trunnion.views.identified import Estimate, channels, conditions, estimates, percent
+from trunnion.views.quantities import prefixed
+from trunnion.views.tolerance_tables import Table
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["budget", "correlations", "estimated", "fits", "held_out", "sensors", "tables"]
+
+
+def tables(result: xr.Dataset) -> list[Table]:
+    """What was found, how it hangs together, how the model fits, and what was held out."""
+    found = [estimated(result), correlations(result), fits(result), held_out(result)]
+    return [one for one in found if one is not None]
+
+
+def estimated(result: xr.Dataset) -> Table:
+    """A row for each parameter: start, estimate ± expanded uncertainty, interval, and what most of that is due to."""
+    rows = [
+        [
+            one.short,
+            f"{one.start:.4g}{one.tail}".replace("-", "−"),
+            _value(one),
+            _interval(one),
+            "" if not one.told or not math.isfinite(one.freedom) else f"{one.freedom:.0f}",
+            one.source,
+        ]
+        for one in estimates(result)
+    ]
+    head = ["parameter", "start", "estimate ± U", "95\u00a0% interval", "degrees of freedom", "most of its variance"]
+    return Table(f"{result.attrs['identified']}: what was found", head, rows)
+
+
+def _value(one: Estimate) -> str:
+    if not one.told:
+        return "not told"
+    if one.limit:
+        return f"{one.say(one.value)} (limit)"
+    return f"{one.say(one.value, unit=False)} ± {one.say(one.half)}"
+
+
+def _interval(one: Estimate) -> str:
+    if not one.told:
+        return "—"
+    if one.limit:
+        return f"up to {one.say(one.upper)}" if one.limit < 0 else f"from {one.say(one.lower)}"
+    return f"{one.say(one.lower, unit=False)} to {one.say(one.upper)}"
+
+
+def correlations(result: xr.Dataset) -> Table | None:
+    """Between the estimates, of several."""
+    told = [p for p, one in enumerate(estimates(result)) if one.told]
+    if len(told) < 2:
+        return None
+    short = [one.short for one in estimates(result)]
+    values = result["correlation"].values
+    rows = [[short[p], *(f"{values[p, q]:.2f}".replace("-", "−") if q <= p else "" for q in told)] for p in told]
+    return Table("correlation", ["", *(short[p] for p in told)], rows)
+
+
+def fits(result: xr.Dataset) -> Table | None:
+    """A row for each channel and condition: rms before and after, and what the scatter explains of it."""
+    rows = []
+    names_of = names(result, "condition")
+    for i, name, unit in channels(result):
+        values = {key: result[key].values[i] for key in ("rms_before", "rms_after", "rms_expected", "used", "turns")}
+        own = [k for k in conditions(result, i) if values["turns"][k] > 0]
+        peak = float(np.nanmax(np.concatenate([values["rms_before"][own], values["rms_after"][own]]), initial=0.0))
+        factor, shown = prefixed(peak, unit)
+        for k in own:
+            numbers = [_figure(values[key][k], factor) for key in ("rms_before", "rms_after", "rms_expected")]
+            counts = [f"{int(values['turns'][k])}", f"{int(values['used'][k]):,}"]
+            rows.append([name, names_of[k], *numbers, shown, *counts])
+    if not rows:
+        return None
+    head = ["channel", "condition", "rms before", "rms after", "by scatter", "unit", "turns", "positions"]
+    return Table("how the model fits", head, rows)
+
+
+def held_out(result: xr.Dataset) -> Table | None:
+    """What was not fitted but predicted."""
+    rows = []
+    names_of = names(result, "condition")
+    for i, name, unit in channels(result):
+        turns = result["held_out_turns"].values[i]
+        for k in np.flatnonzero(turns > 0):
+            keys = ("held_out_before", "held_out_after", "held_out_expected")
+            values = [float(result[key].values[i, k]) for key in keys]
+            factor, shown = prefixed(float(np.nanmax(np.nan_to_num(values))), unit)
+            rows.append([name, names_of[k], f"{int(turns[k])}", *(_figure(one, factor) for one in values), shown])
+    if not rows:
+        return None
+    head = ["channel", "condition", "turns", "rms before", "rms after", "to be expected", "unit"]
+    return Table("what was held out", head, rows)
+
+
+def sensors(result: xr.Dataset) -> Table | None:
+    """Estimated errors of the sensors, in what is stated of them."""
+    rows = [
+        [name, f"{error:.2f} ± {2 * u:.2f}".replace("-", "−") if math.isfinite(error) else "not told"]
+        for name, error, u in zip(
+            names(result, "sensor"), result["sensor_error"].values, result["sensor_uncertainty"].values, strict=True
+        )
+    ]
+    return Table("errors of the sensors", ["", "in stated standard uncertainties, ± 2 u"], rows) if rows else None
+
+
+def budget(result: xr.Dataset) -> Table | None:
+    """Share of each source in the variance of each estimate."""
+    told = [one for one in estimates(result) if one.told]
+    if not told:
+        return None
+    sources = names(result, "source")
+    rows = [[one.short, *(percent(one.shares[name]) for name in sources)] for one in told]
+    return Table("where the uncertainty comes from", ["share of the variance", *sources], rows)
+
+
+def _figure(value: float, factor: float) -> str:
+    return "—" if not math.isfinite(value) else f"{value * factor:.3g}"

@@ -64,11 +64,6 @@ def dataset(found: Identified) -> xr.Dataset:
         "drive": _drive(found),
         "files": json.dumps([list(one.files) for one in measurement.conditions], ensure_ascii=False),
         "done": json.dumps(list(measurement.done), ensure_ascii=False),
-        "reduced_chi_squared": found.spread.test.reduced,
-        "chi_squared_freedom": found.spread.test.freedom,
-        "chi_squared_chance": found.spread.test.chance,
-        "turn_correlation": found.spread.follows,
-        "hold_out_ratio": judged.trust,
         "evaluations": problem.evaluations,
         "starts": found.search.starts,
         "converged": int(found.search.fit.converged),
@@ -130,6 +125,11 @@ VARIABLES = {
         "of the channel",
         "what its scatter and the uncertainty of the prediction explain of it",
     ),
+    "reduced_chi_squared": Variable((), "1", "χ² of the residuals over what the scatter between turns explains"),
+    "chi_squared_freedom": Variable((), "1", "degrees of freedom of that χ²"),
+    "chi_squared_chance": Variable((), "1", "chance of a larger one if the model is right"),
+    "turn_correlation": Variable((), "1", "correlation of what each turn adds with the turn before it"),
+    "hold_out_ratio": Variable((), "1", "residuals of what was held out over what is expected of them"),
     "phase": Variable(("condition", "position"), "1", "share of the cycle"),
     "measured": Variable(("channel", "condition", "position"), "of the channel", "mean over the turns"),
     "residual_before": Variable(
@@ -161,6 +161,11 @@ def _parameters(judged: Judged) -> dict[str, Array]:
         "correlation": judged.correlation,
         "share": judged.budget[1],
         "singular_value": judged.singular_values,
+        "reduced_chi_squared": np.asarray(judged.found.spread.test.reduced),
+        "chi_squared_freedom": np.asarray(judged.found.spread.test.freedom),
+        "chi_squared_chance": np.asarray(judged.found.spread.test.chance),
+        "turn_correlation": np.asarray(judged.found.spread.follows),
+        "hold_out_ratio": np.asarray(judged.trust),
     }
 
 

@@ -101,6 +101,7 @@ def identified(
     method: FrictionMethod | None = None,
 ) -> Identified:
     """What `identify` makes its Dataset of."""
+    _check(sensors, delay, guard, starts)
     paths = described(mechanism, parameters)
     stated = _stated(mechanism, measurement, paths, start or {})
     settings = _settings(stated, measurement, paths)
@@ -127,6 +128,19 @@ def identified(
         spread = spread_of(problem, found.fit.x)
     groups = inseparable(problem, found.fit.x, spread)
     return Identified(stated, measurement, run, problem, found, spread, groups)
+
+
+def _check(sensors: str, delay: float | None, guard: int | None, starts: int | None) -> None:
+    """MechanismError for options that mean nothing."""
+    if sensors not in ("channel", "condition"):
+        what = f"errors of sensors are not alike by '{sensors}'"
+        raise MechanismError(Finding(what, "sensors", "give channel or condition"))
+    if delay is not None and not delay > 0:
+        raise MechanismError(Finding(f"a delay of {delay:g} s is not above 0", "delay", "give a standard uncertainty"))
+    if guard is not None and guard < 0:
+        raise MechanismError(Finding(f"{guard} positions cannot be left out", "guard", "give 0 or more"))
+    if starts is not None and starts < 1:
+        raise MechanismError(Finding(f"{starts} starts find nothing", "starts", "give 1 or more"))
 
 
 def _telling(model: Model, blocks: list[Block]) -> tuple[Model, list[Block]]:

@@ -21,6 +21,7 @@ from trunnion.analysis.rig.identify.unknowns import described, unknowns
 from trunnion.errors import MechanismError
 from trunnion.measured.measurement import Accuracy, Condition, Course, Measurement
 from trunnion.model.file import read_mechanism
+from trunnion.views.identify import KINDS, figure
 
 FRICTION = "joint_defaults.friction.coefficient"
 SPEEDS = [{"A.speed": speed} for speed in (2.0, 4.0, 6.0, 8.0, 10.0)]
@@ -76,13 +77,13 @@ def covered(model: trunnion.Mechanism, data: True_, true: float, seeds: int, sen
 def test_the_interval_of_a_four_bar_holds_the_true_coefficient(
     four_bar: trunnion.Mechanism, torque: True_, sensors: Sensors
 ) -> None:
-    # of 40 fewer than 34 come out with a chance of 1 in 500 if the interval holds 95 %; of 1000 it was measured
-    assert covered(four_bar, torque, 0.3, 40, sensors) >= 34
+    # of 30 fewer than 24 come out with a chance of 1 in 300 if it holds 95 %; of 1000 it was 95.1, 95.4 and 94.7 %
+    assert covered(four_bar, torque, 0.3, 30, sensors) >= 24
 
 
 def test_the_interval_of_a_cardan_joint_holds_the_true_coefficient(cardan: trunnion.Mechanism, shaft: True_) -> None:
     sensors = Sensors(noise=0.01, zero=0.002, gain=0.002, step=0.002)
-    assert covered(cardan, shaft, 0.35, 20, sensors) >= 16
+    assert covered(cardan, shaft, 0.35, 12, sensors) >= 9
 
 
 def test_more_turns_make_it_narrower_but_not_beyond_the_sensor(cardan: trunnion.Mechanism, shaft: True_) -> None:
@@ -141,6 +142,8 @@ def test_a_product_is_not_taken_apart(four_bar: trunnion.Mechanism, torque: True
     text = said(found, "warning")
     assert "coefficient and pair act on torque in the same way: their product is known, 0." in text
     assert "neither alone" in text
+    for kind in KINDS:
+        assert figure(found, kind).get_size_inches()[0] > 3
 
 
 def test_two_pins_are_told_by_the_course_but_not_by_the_efficiency(cardan: trunnion.Mechanism, shaft: True_) -> None:

@@ -32,10 +32,11 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     place = tmp_path_factory.mktemp("rig")
     shutil.copy(ROOT / "examples" / MODEL, place)
     (place / "rig.yaml").write_text(RIG)
-    with pytest.raises(SystemExit) as ended, pytest.MonkeyPatch.context() as patch:
+    with pytest.MonkeyPatch.context() as patch:
         patch.chdir(place)
         patch.setattr("sys.argv", ["trunnion", "rig", MODEL, "rig.yaml", "--out", "data", "--set", f"{FRICTION}=0.35"])
-        main()
+        with pytest.raises(SystemExit) as ended:
+            main()
     assert ended.value.code == 0
     return place
 
@@ -79,8 +80,8 @@ def test_tables_files_and_the_model(folder: Path, call) -> None:  # type: ignore
     assert "http" not in page.replace("http-equiv", "")
 
 
-@pytest.mark.parametrize("kind", ["intervals", "correlation", "residuals"])
-def test_figures_of_numbers_that_are_not_told_apart(folder: Path, call, kind: str) -> None:  # type: ignore[no-untyped-def]
+def test_numbers_that_are_not_told_apart_are_not_written(folder: Path, call) -> None:  # type: ignore[no-untyped-def]
+    kind = "correlation"
     pair = ",".join(f"{name}.friction.pair_factor" for name in ("input", "pin-1", "pin-2", "output"))
     status, text = call("--parameter", f"mu={FRICTION}", "--parameter", f"pair={pair}", "--kind", kind, "--out",
                         f"{kind}.png", "--write", "none.yaml")  # fmt: skip

@@ -5,7 +5,7 @@
   `assemblies` or `assemble`; MODEL is a file of `examples/`, a block of a page titled `MODEL.yaml`, or an entry of
   `VARIANTS`.
 - `figures/sweeps/NAME.svg`, `figures/plays/NAME.svg`, `figures/assembles/NAME.svg`, `figures/tolerances/NAME.svg` and
-  `figures/allocates/NAME.svg` are drawn by the command of a page, `trunnion sweep … --out NAME.svg` and so on.
+  `figures/allocates/NAME.svg`, `figures/compares/NAME.svg` are drawn by the command of a page, `trunnion sweep … --out NAME.svg` and so on.
 - The line that says that a page has no tables in the repository is left out.
 - The gallery is made of the examples and of `tests/gallery/facts.py`; see `gallery_page.py`.
 - `$x$` and `$$x$$` become MathML, which browsers set without any script.
@@ -38,7 +38,7 @@ ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
 EXAMPLES = ROOT / "examples"
 
-COMMANDS = ("sweeps", "plays", "assembles", "tolerances", "allocates")  # folders of figures that a command draws
+COMMANDS = ("sweeps", "plays", "assembles", "tolerances", "allocates", "compares")  # folders of figures that a command draws
 
 # model: (the model it is made from, what is replaced in it)
 VARIANTS: dict[str, tuple[str, dict[str, float | str]]] = {
@@ -151,11 +151,19 @@ def _swept(verb: str, name: str, text: str, models: dict[str, str]) -> bytes:
         for model, content in models.items():
             for place in ("", "examples"):
                 (Path(folder) / place / f"{model}.yaml").write_text(content, encoding="utf-8")
-        call = [sys.executable, "-m", "trunnion.cli", *shlex.split(command[1], comments=True)]
-        done = subprocess.run(call, cwd=folder, capture_output=True, text=True, check=False)
-        if done.returncode not in (0, 1):
-            raise PluginError(f"{command[0]}: {done.stderr}")
+        wanted = [*(_measured(text, command[1]) if verb == "compare" else ()), command[1]]
+        for one in wanted:
+            call = [sys.executable, "-m", "trunnion.cli", *shlex.split(one, comments=True)]
+            done = subprocess.run(call, cwd=folder, capture_output=True, text=True, check=False)
+            if done.returncode not in (0, 1):
+                raise PluginError(f"trunnion {one}: {done.stderr}")
         return (Path(folder) / f"{name}.svg").read_bytes()
+
+
+def _measured(text: str, command: str) -> list[str]:
+    """The command of a page that writes the data that another reads: `FOLDER/mapping.yaml` is of `rig … --out FOLDER`."""
+    folder = shlex.split(command)[2].partition("/")[0]
+    return re.findall(rf"^trunnion (rig .*--out {re.escape(folder)})$", text, re.MULTILINE)[:1]
 
 
 def _gallery() -> Any:
@@ -335,6 +343,18 @@ def costs_table() -> str:
         for name, model in COST_MODELS.items()
     ]
     return _rows(("`model`", "cost of the half width t", "parameters", "source"), rows)
+
+
+def comparisons_table() -> str:
+    """Every variable of a comparison with a measurement."""
+    from trunnion.analysis.rig.compared import VARIABLES
+
+    told = {"": "of the channel", "set": "of what is set", "drive": "rad, m or s"}
+    rows = [
+        (_code(name), ", ".join(one.dims), told.get(one.units) or _unit(one.units), one.long_name)
+        for name, one in VARIABLES.items()
+    ]
+    return _rows(("variable", "dimensions", "unit", "meaning"), rows)
 
 
 def assembling_table() -> str:
@@ -629,6 +649,7 @@ TABLES: dict[str, Callable[..., str]] = {
     "distributions": distributions_table,
     "cost-models": costs_table,
     "assembling": assembling_table,
+    "comparisons": comparisons_table,
     "statuses": status_table,
     "laws": laws_table,
     "motion": motion_table,

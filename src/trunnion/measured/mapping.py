@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field, Tag, ValidationError, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, Tag, ValidationError, WithJsonSchema, model_validator
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.measured.amounts import Amount, Frequency, Number, UnitText, alike, dimensions
@@ -68,6 +68,9 @@ def _span(value: object) -> object:
     if isinstance(value, (list, tuple)) and value and not isinstance(value[0], (list, tuple)):
         return [value]
     return value
+
+
+_PAIR = {"type": "array", "items": {"type": ["number", "string"]}, "minItems": 2, "maxItems": 2}
 
 
 class File(Part):
@@ -151,7 +154,12 @@ _KEYS = {
 class Zero(Part):
     """The zero of a channel as the mean over stretches of time in which nothing loads the sensor."""
 
-    over: Annotated[tuple[tuple[Number, Number], ...], BeforeValidator(_span), Field(min_length=1, max_length=20)]
+    over: Annotated[
+        tuple[tuple[Number, Number], ...],
+        BeforeValidator(_span),
+        Field(min_length=1, max_length=20),
+        WithJsonSchema({"anyOf": [_PAIR, {"type": "array", "items": _PAIR, "minItems": 1, "maxItems": 20}]}),
+    ]
 
     @model_validator(mode="after")
     def _ordered(self) -> Zero:

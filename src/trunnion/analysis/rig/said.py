@@ -99,7 +99,7 @@ def _in(names: Sequence[str], of: int) -> str:
     """In which conditions."""
     if len(names) == of:
         return "in every condition" if of > 1 else f"in {names[0]}"
-    first = ", ".join(names[:3]) + (", …" if len(names) > 3 else "")
+    first = "; ".join(names[:3]) + ("; …" if len(names) > 3 else "")
     return f"in {len(names)} of {of} conditions ({first})"
 
 

@@ -331,6 +331,16 @@ def test_unknown_channels_values_and_factors_are_refused():
         compare(Measurement("bench", (bare,)))
 
 
+def test_another_cycle_or_start_is_refused():
+    whole = measured()
+    for start, cycle, words in ((0.5, 2 * np.pi, "state start: 0 deg"), (0.0, 4 * np.pi, "state cycle: 360 deg")):
+        other = tuple(replace(one, start=start, cycle=cycle) for one in whole.conditions)
+        with pytest.raises(MechanismError, match=words):
+            compare(replace(whole, conditions=other))
+    same = tuple(replace(one, start=2 * np.pi, cycle=2 * np.pi) for one in whole.conditions)
+    assert codes(compare(replace(whole, conditions=same))) == {Verdict.WITHIN}
+
+
 def test_efficiency_does_not_ask_for_channels_that_are_not_wanted():
     result = compare(measured(channels=POWERS, seed=5), channels=["torque"])
     assert result.channel.values.tolist() == ["torque"]

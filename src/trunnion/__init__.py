@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from trunnion.analysis.locking import locking
     from trunnion.analysis.play import play
     from trunnion.analysis.rig.compare import compare
+    from trunnion.analysis.rig.identify import identify
     from trunnion.analysis.rig.virtual import observe
     from trunnion.analysis.sweep import sweep
     from trunnion.analysis.tolerance.study import tolerance
@@ -42,6 +43,7 @@ _PLACES = {
     "assemble": "trunnion.analysis.assemblability",
     "check": "trunnion.analysis.inspect",
     "compare": "trunnion.analysis.rig.compare",
+    "identify": "trunnion.analysis.rig.identify",
     "locking": "trunnion.analysis.locking",
     "observe": "trunnion.analysis.rig.virtual",
     "play": "trunnion.analysis.play",
@@ -69,6 +71,7 @@ __all__ = [
     "check",
     "compare",
     "dual",
+    "identify",
     "locking",
     "observe",
     "play",

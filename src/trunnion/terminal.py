@@ -46,12 +46,21 @@ def show_figures(title: str, rows: list[dict[str, Any]]) -> None:
 
 
 def show_rows(title: str, head: list[str], rows: list[list[str]]) -> None:
-    """Rows of texts under their heads, broken between words where they are too wide, but not before a unit."""
+    """Rows of texts under their heads, broken between words where they are too wide, but not before a unit.
+
+    A table whose words do not fit is wider than the terminal: a number is never broken.
+    """
+    from rich.cells import cell_len
     from rich.table import Table
 
     out = console()
     out.print(title, style="italic", markup=False, highlight=False, soft_wrap=True)
-    cells = _fitted([head, *rows], out.width - 3 * len(head) + 1)
+    frame = 3 * len(head) - 1
+    words = (
+        max(cell_len(word) for cell in column for word in cell.split(" ")) for column in zip(head, *rows, strict=True)
+    )
+    out.width = max(out.width, sum(words) + frame)
+    cells = _fitted([head, *rows], out.width - frame)
     table = Table(show_edge=False)
     for name in cells[0]:
         table.add_column(name, justify="right", overflow="fold", no_wrap=cells[0] is not head)
@@ -61,14 +70,14 @@ def show_rows(title: str, head: list[str], rows: list[list[str]]) -> None:
 
 
 def _fitted(rows: list[list[str]], room: int) -> list[list[str]]:
-    """The cells broken into lines at plain spaces so that all columns take so much room; as they are if they do, or
-    cannot. rich itself breaks at spaces that are not to be broken, too."""
+    """The cells broken into lines at plain spaces so that all columns take so much room; as they are if they do. rich
+    itself breaks at spaces that are not to be broken, too."""
     from rich.cells import cell_len
 
     columns = list(zip(*rows, strict=True))
     widths = [max(cell_len(cell) for cell in column) for column in columns]
     least = [max(cell_len(word) for cell in column for word in cell.split(" ")) for column in columns]
-    if sum(widths) <= room or sum(least) > room:
+    if sum(widths) <= room:
         return rows
     while sum(widths) > room:
         widest = max((k for k in range(len(widths)) if widths[k] > least[k]), key=widths.__getitem__)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import functools
+import re
 from pathlib import Path
 
 import pytest
 
 from manual.conftest import Run, program
 from trunnion.errors import MechanismError
+from trunnion.measured import rig_file
 from trunnion.measured.rig_file import Rig
 
 __all__ = ["program"]
@@ -43,6 +45,11 @@ def test_plan_and_files(run: Run, tmp_path: Path) -> None:
     head = (tmp_path / "data" / "run-01.csv").read_text("utf-8").splitlines()[0]
     assert head == "t [s],count,z,T1 [V],T2 [V],n1 [rpm],w2 [V]"
     assert "joints.B.friction.coefficient: 0.05" in (tmp_path / "data" / "truth.yaml").read_text("utf-8")
+
+
+def test_files_in_the_wrong_order(run: Run) -> None:
+    assert "name the model first" in run(RIG, FOUR_BAR).err
+    assert "is no rig file" in run(FOUR_BAR, FOUR_BAR).err
 
 
 def test_left_out_conditions_end_with_1(run: Run, tmp_path: Path) -> None:
@@ -117,6 +124,25 @@ def test_examples_of_rigs_are_read(path: Path) -> None:
     rig = Rig.read(path)
     assert rig.name
     assert rig.sensors
+
+
+def test_the_page_tells_every_key() -> None:
+    """Each key of a rig file, and each kind of fault, is on the page."""
+    page = (EXAMPLES.parent / "docs" / "how-to" / "virtual-rig.md").read_text("utf-8")
+    parts = (
+        Rig,
+        rig_file.Schedule,
+        rig_file.Encoder,
+        rig_file.Sensor,
+        rig_file.Accuracy,
+        rig_file.Fault,
+        rig_file.Idle,
+    )
+    for part in parts:
+        for name, field in part.model_fields.items():
+            assert re.search(rf"\b{re.escape(field.alias or name)}\b", page), (part.__name__, name)
+    for kind in rig_file.FAULTS:
+        assert f"kind: {kind}" in page
 
 
 def test_a_range_keeps_its_unit() -> None:

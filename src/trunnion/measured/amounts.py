@@ -19,7 +19,7 @@ from pydantic_core import core_schema
 from trunnion.model.expression import normalise
 from trunnion.model.names import nearest
 from trunnion.model.part import problem
-from trunnion.model.units import UnitError, root, unit
+from trunnion.model.units import UnitError, root, si_unit, unit
 
 __all__ = ["Amount", "Dimensions", "Frequency", "Number", "UnitText", "alike", "dimensions", "read_amount", "unit_name"]
 
@@ -48,6 +48,7 @@ _USUAL = (
     "%",
 )
 _SYMBOLS = {"meter": "m", "gram": "kg", "second": "s", "radian": "rad", "ampere": "A", "kelvin": "K"}
+_MECHANICS = ("meter", "gram", "second", "radian")
 _VOLT: Dimensions = {"gram": Fraction(1), "meter": Fraction(2), "second": Fraction(-3), "ampere": Fraction(-1)}
 
 
@@ -88,7 +89,7 @@ def read_amount(source: object) -> Amount:
         what = "is empty" if source is None else "is not a number with a unit"
         raise UnitError(what, "write a number with its unit such as 12 mV")
     found = _AMOUNT.fullmatch(normalise(source)) if isinstance(source, str) else None
-    if isinstance(source, str) and not found:
+    if isinstance(source, str) and (not found or found[2].startswith(",")):
         remedy = "write a decimal point, not a comma" if re.search(r"[0-9],[0-9]", source) else "write it as 12 mV"
         raise UnitError(f"'{source[:40]}' is not a number with a unit", remedy)
     number, text = (found[1], found[2]) if found else (str(source), "")
@@ -112,6 +113,9 @@ def unit_name(exponents: Dimensions) -> str:
     """SI unit of dimensions, in short."""
     if dict(exponents) == dict(_VOLT):
         return "V"
+    if not set(exponents) - set(_MECHANICS):
+        length, mass, time, angle = (Fraction(exponents.get(name, 0)) for name in _MECHANICS)
+        return si_unit((length, mass, time, angle))
     parts = [
         _SYMBOLS.get(name, name) + ("" if power == 1 else f"^{power}") for name, power in exponents.items() if power
     ]

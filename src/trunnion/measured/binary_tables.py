@@ -43,7 +43,7 @@ def read_tdms(path: Path, wanted: Sequence[str], optional: Sequence[str]) -> Tab
     from nptdms import TdmsFile
 
     try:
-        with TdmsFile.open(path) as file:
+        with path.open("rb") as stream, TdmsFile.open(stream) as file:
             return _channels(path, file, wanted, optional)
     except MechanismError:
         raise

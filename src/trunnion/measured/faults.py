@@ -117,6 +117,8 @@ def _plateaus(where: str, part: Array, time: Array, account: Account) -> None:
         mask = part == end
         _, lengths = runs(mask)
         others = finite[finite != end]
+        if not others.size:  # the rest was left out as something else
+            continue
         beside = others.max() if end == finite.max() else others.min()
         if lengths.max() >= 3 and at > 5 * np.count_nonzero(others == beside) and np.mean(lengths) > 1.5:
             what = (

@@ -15,7 +15,7 @@ from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.measured import faults
 from trunnion.measured.account import Account, counted, told
 from trunnion.measured.angle import Coordinate, coordinate
-from trunnion.measured.channels import Reading, Zeroed, filtered, reading, zeroed
+from trunnion.measured.channels import Reading, Zeroed, filtered, reading, resolution, zeroed
 from trunnion.measured.courses import Drift, drift, signs, steady
 from trunnion.measured.mapping import DataMapping, File, FromData, Mapped, Zero, read_mapping
 from trunnion.measured.measurement import Accuracy, Condition, Course, Measurement
@@ -117,6 +117,7 @@ class _File:
             self._check_filter(table)
         self.own: dict[str, Reading] = {}
         self.readings: dict[str, Array] = {}
+        self.steps: dict[str, float] = {}
         for name, channel in mapping.channels.items():
             column = table.columns[channel.column]
             self.own[name] = reading(name, channel, column, account)
@@ -134,15 +135,16 @@ class _File:
             for name, channel in mapping.channels.items()
         }
         share, way, spoilt = self._share(zeros)
-        cuts = []
+        cuts, used = [], self._used()
         for setting in settings(mapping, self.entry, self.table, self.line, account):
-            allowed = self._used() & setting.rows
-            turns = cut(share, self.line, allowed, mapping.positions, spoilt, account, self._named(setting))
+            allowed = used[setting.window] & setting.rows
+            name = self._named(setting)
+            turns = cut(share, self.line, setting.window, allowed, mapping.positions, spoilt, account, name)
             if turns.numbers.size:
                 cuts.append((setting, turns))
             else:
-                what = self._no_turn(share, allowed)
-                account.error(f"condition {self._named(setting)}", what, "check angle, or record for longer")
+                what = self._no_turn(share[setting.window], allowed)
+                account.error(f"condition {name}", what, "check angle, or record for longer")
         if not cuts:
             return []
         self._check_rows(cuts)
@@ -247,13 +249,14 @@ class _File:
         high = int(np.searchsorted(line.seconds, max(float(part.turns.end[-1]) for part in parts), side="right"))
         span = faults.Span(low, high, sum(part.turns.numbers.size for part in parts))
         readings = self.readings.pop(name)
+        self.steps[name] = abs(own.scale.factor) * resolution(readings[low:high])
         speed = channel.measures.startswith("rate:")
         faults.signal(where, readings, line.seconds, span, own.limit, account, speed)
         values = own.quantity(readings, zero, channel.sign, line.seconds)
         if mapping.filter is not None:
             values = filtered(values, line, mapping.filter, account, where)
         for part in parts:
-            part.courses[name] = resampled(part.turns, values, line)
+            part.courses[name] = resampled(part.turns, values)
         if speed:  # one that creeps is the drive's
             return None
         found = drift([(part.turns, part.courses[name]) for part in parts])
@@ -268,7 +271,7 @@ class _File:
         since = self._since(name)
         account.warn(where, f"{what}; a straight line is taken off, zero at {since:.4g} s", remedy)
         for part in parts:
-            part.courses[name] = resampled(part.turns, values - found.slope * (line.seconds - since), line)
+            part.courses[name] = resampled(part.turns, values - found.slope * (line.seconds - since))
         return found
 
     def _since(self, name: str) -> float:
@@ -292,7 +295,7 @@ class _File:
             left = drifts[name]
             extra = left.error * left.span / 2 if left else 0.0
             zero = float(np.hypot(np.hypot(own.accuracy_zero, abs(own.scale.factor) * zeros[name].uncertainty), extra))
-            accuracy = Accuracy(zero, own.accuracy_gain)
+            accuracy = Accuracy(zero, own.accuracy_gain, self.steps[name])
             courses[name] = Course(name, channel.measures, own.scale.unit, part.courses[name], accuracy)
         values = dict(part.setting.values)
         for path, channel_name in part.setting.means.items():

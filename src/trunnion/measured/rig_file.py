@@ -93,8 +93,8 @@ class Sensor(Part):
 
     range: ± full scale; sensitivity: reading per quantity, or the other way round, as its dimensions tell; noise:
     white, standard deviation; bits over ± span, the range if not stated; offset: standard deviation of what it reads at
-    rest; drift of its zero per time; bandwidth: of a first-order low-pass; per_turn: pulses of a speed sensor, which
-    tells the pitch over the time from pulse to pulse.
+    rest; drift of its zero per time; bandwidth: of a first-order low-pass; per_turn: pulses of a speed sensor, told
+    by the time from each to the next.
     """
 
     measures: str

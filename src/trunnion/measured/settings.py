@@ -25,11 +25,15 @@ DIGITS = 9  # by which two of its values are the same
 
 @dataclass(frozen=True)
 class Setting:
-    """values: numbers of the model, SI, by name; means: channels whose mean is the value; rows: where it was set."""
+    """values: numbers of the model, SI, by name; means: channels whose mean is the value.
+
+    window: rows from the first to the last for which it was set; rows: those of the window for which it was.
+    """
 
     name: str
     values: Mapping[str, float]
     means: Mapping[str, str]
+    window: slice
     rows: NDArray[np.bool_]
 
 
@@ -52,9 +56,9 @@ def settings(mapping: DataMapping, entry: File, table: Table, line: Timeline, ac
             means[path] = one.mean
         else:
             columns[path] = one
-    everywhere = np.ones(line.seconds.size, dtype=np.bool_)
     if not columns:
-        return [Setting(_name(texts), values, means, everywhere)]
+        everywhere = np.ones(line.seconds.size, dtype=np.bool_)
+        return [Setting(_name(texts), values, means, slice(0, everywhere.size), everywhere)]
     raw = np.column_stack([line.rows(table.columns[str(one.column)].values) for one in columns.values()])
     known = np.isfinite(raw).all(axis=1)
     if not known.any():
@@ -64,7 +68,8 @@ def settings(mapping: DataMapping, entry: File, table: Table, line: Timeline, ac
         lost = int(np.count_nonzero(~known))
         account.warn("set", f"{lost:,} of {known.size:,} rows do not state the condition; left out", "check the column")
     rounded = _rounded(raw)
-    unique, which = np.unique(rounded[known], axis=0, return_inverse=True)
+    at = np.flatnonzero(known)
+    unique, first, which = np.unique(rounded[known], axis=0, return_index=True, return_inverse=True)
     if len(unique) > MOST:
         what = f"the columns that state the condition take {len(unique):,} different values"
         remedy = "what is measured is no setting: write {mean: channel}"
@@ -72,14 +77,16 @@ def settings(mapping: DataMapping, entry: File, table: Table, line: Timeline, ac
     found = []
     number = np.full(known.size, -1)
     number[known] = which.ravel()
-    order = sorted(range(len(unique)), key=lambda k: int(np.argmax(number == k)))
-    for k in order:
+    ends = np.full(len(unique), -1)
+    ends[which.ravel()] = at  # the last of each stays
+    for k in np.argsort(first, kind="stable"):
+        window = slice(int(at[first[k]]), int(ends[k]) + 1)
         own, said = dict(values), dict(texts)
         for (path, one), value in zip(columns.items(), unique[k], strict=True):
             unit = one.unit or table.columns[str(one.column)].unit
             own[path] = float(value) * _factor(path, unit, account)
             said[path] = f"{value:.6g} {unit}".strip()
-        found.append(Setting(_name(said), own, means, number == k))
+        found.append(Setting(_name(said), own, means, window, number[window] == k))
     return found
 
 

@@ -1,4 +1,4 @@
-"""A measurement as a Dataset, and as the tables that the command line shows."""
+"""A measurement as a Dataset."""
 
 from __future__ import annotations
 
@@ -7,15 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from trunnion.measured.measurement import Course, Measurement
+from trunnion.measured.measurement import Measurement
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Rows", "dataset", "tables"]
-
-Rows = tuple[str, list[str], list[list[str]]]
-MOST = 40  # conditions shown
+__all__ = ["dataset"]
 
 
 def dataset(measurement: Measurement) -> xr.Dataset:
@@ -71,52 +68,3 @@ def dataset(measurement: Measurement) -> xr.Dataset:
             ),
         },
     )  # fmt: skip
-
-
-def tables(measurement: Measurement) -> list[Rows]:
-    """The conditions with the mean of each channel, then the channels with scatter and uncertainty over all of them."""
-    conditions = measurement.conditions
-    channels = list(conditions[0].courses)
-    speeds = np.isfinite([one.speed for one in conditions]).any()
-    head = ["condition", "turns", *(["speed rpm"] if speeds else [])]
-    head += [f"{name} {_unit(conditions[0].courses[name].unit)}".strip() for name in channels]
-    rows = []
-    for one in conditions[:MOST]:
-        turns = max(course.turns.shape[0] for course in one.courses.values())
-        speed = [f"{one.speed * 30 / np.pi:.5g}"] if speeds else []
-        rows.append([one.name, f"{turns:,}", *speed, *(_figure(_overall(one.courses[name])) for name in channels)])
-    if len(conditions) > MOST:
-        rows.append([f"{len(conditions) - MOST} more", *[""] * (len(head) - 1)])
-    shown: list[Rows] = [(f"{measurement.name}\nconditions: mean over turns and positions", head, rows)]
-    head = ["channel", "measures", "unit", "least", "largest", "scatter", "uncertainty"]
-    rows = [[name, *_channel([one.courses[name] for one in conditions])] for name in channels]
-    shown.append(("channels: mean courses, what turns scatter, standard uncertainty of the mean", head, rows))
-    return shown
-
-
-def _channel(courses: list[Course]) -> list[str]:
-    """Measure and unit of a channel; extremes of its mean courses; RMS of scatter and of uncertainty."""
-    means = np.concatenate([one.mean for one in courses])
-    known = means[np.isfinite(means)]
-    extremes = [_figure(float(known.min())), _figure(float(known.max()))] if known.size else ["none", "none"]
-    spreads = [np.concatenate([getattr(one, figure) for one in courses]) for figure in ("scatter", "uncertainty")]
-    return [courses[0].measures, _unit(courses[0].unit), *extremes, *(_figure(_rms(one), 3) for one in spreads)]
-
-
-def _overall(course: Course) -> float:
-    known = course.mean[np.isfinite(course.mean)]
-    return float(known.mean()) if known.size else np.nan
-
-
-def _rms(values: np.ndarray) -> float:
-    known = values[np.isfinite(values)]
-    return float(np.sqrt(np.mean(known**2))) if known.size else np.nan
-
-
-def _figure(value: float, digits: int = 5) -> str:
-    return "not known" if not np.isfinite(value) else f"{value + 0.0:.{digits}g}"
-
-
-def _unit(unit: str) -> str:
-    """A unit that is not broken between lines."""
-    return "" if unit == "1" else unit.replace(" ", "\u00a0")

@@ -25,6 +25,7 @@ __all__ = ["read_csv"]
 
 HEAD = 1 << 16  # bytes in which the header and the first rows are looked for
 ROWS = 250_000  # read at a time, so that memory does not grow with the columns that are not wanted
+WIDE = 40  # columns from which those that are not wanted are passed over, and too many cells in a row not seen
 _UNIT = re.compile(r"^(.*?)\s*\[([^\[\]]*)\]\s*$", re.DOTALL)
 _COMMA = re.compile(r"[-+]?\d*,\d+(?:[eE][-+]?\d+)?")
 _NO_UNIT = ("", "-", "–", "1")
@@ -74,8 +75,9 @@ def _frames(path: Path, layout: _Layout, places: list[int]) -> Any:
     try:
         found = pd.read_csv(
             path, sep=layout.separator, decimal=layout.decimal, header=None, names=list(range(layout.width)),
-            index_col=False, usecols=places, skiprows=layout.skip, comment="#", encoding=layout.encoding,
-            chunksize=ROWS, low_memory=False, skipinitialspace=True, encoding_errors="replace", **exact,
+            usecols=places if layout.width > WIDE else None, skiprows=layout.skip, comment="#",
+            encoding=layout.encoding, encoding_errors="replace", chunksize=ROWS, low_memory=False,
+            skipinitialspace=True, **exact,
         )  # fmt: skip
         yield from found
     except pd.errors.EmptyDataError:
@@ -134,7 +136,13 @@ def _layout(path: Path, wanted: set[str]) -> _Layout:
         rows, skip = rows[1:], header + 1
     sample = [cell for _, line in rows[:200] for cell in _cells(line, separator)]
     comma = separator != "," and any(_COMMA.fullmatch(cell) for cell in sample)
-    width = max(len(cells), 1)
+    width = len(cells)
+    for place, line in rows[:200]:
+        found = _cells(line, separator)
+        if any(found[len(cells) :]):
+            remedy = "correct that line; numbers with a decimal comma need a semicolon or tab between them"
+            raise failed(path, f"has {len(found)} cells, the header has {len(cells)}", remedy, place + 1)
+        width = max(width, len(found))  # separators at the end of lines
     return _Layout([name for name, _ in named], units, separator, "," if comma else ".", encoding,
                    stated[skip][0] + 1, width)  # fmt: skip
 

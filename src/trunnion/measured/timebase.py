@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,12 @@ class Timeline:
     breaks: NDArray[np.intp]
     even: bool = True
     spoilt: Array = field(default_factory=lambda: np.empty(0))
+
+    def part(self, window: slice) -> Timeline:
+        """The rows of a window, those of all that are kept."""
+        low, high, _ = window.indices(self.seconds.size)
+        inside = (self.breaks > low) & (self.breaks < high)
+        return replace(self, seconds=self.seconds[window], kept=None, breaks=self.breaks[inside] - low)
 
     def rows(self, values: Array) -> Array:
         """The values of the rows that are kept."""

@@ -25,10 +25,10 @@ APART = 0.5  # of the usual length of a turn, by which one may differ from it
 
 @dataclass(frozen=True)
 class Turns:
-    """Whole turns of one condition in a file.
+    """Whole turns of one condition in a file, among the rows of a window.
 
-    share: (row,), the cycle counted on, rising, whole at the start of each; numbers: of the turns; begin, end: their
-    times, s; rows: those that belong to them; positions: how many a turn; step: between samples, s.
+    share: (row of the window,), the cycle counted on, rising, whole at the start of each; numbers: of the turns;
+    begin, end: their times, s; rows: those that belong to them; positions: how many a turn; line: time of the rows.
     """
 
     share: Array
@@ -37,22 +37,30 @@ class Turns:
     end: Array
     rows: Mask
     positions: int
-    step: float
+    line: Timeline
+    window: slice
 
     @property
     def density(self) -> float:
         """Samples a position."""
-        return float(np.mean(self.end - self.begin)) / (self.step * self.positions) if self.numbers.size else 0.0
+        return float(np.mean(self.end - self.begin)) / (self.line.step * self.positions) if self.numbers.size else 0.0
 
 
 def cut(
-    share: Array, line: Timeline, allowed: Mask, positions: int, spoilt: Array, account: Account, name: str
+    shares: Array,
+    times: Timeline,
+    window: slice,
+    allowed: Mask,
+    positions: int,
+    spoilt: Array,
+    account: Account,
+    name: str,
 ) -> Turns:
-    """The whole turns among the rows that are allowed; those left out are told.
+    """The whole turns among the rows of a window that are allowed; those left out are told.
 
-    share: cycles gone through, rising with time, NaN where not known; spoilt: stretches of time to leave out.
+    shares: cycles gone through, rising with time, NaN where not known; spoilt: stretches of time to leave out.
     """
-    where = f"condition {name}"
+    where, share, line = f"condition {name}", shares[window], times.part(window)
     known = np.isfinite(share)
     highest = np.maximum.accumulate(np.where(known, share, -np.inf))
     begin, end, numbers = _whole(share, highest, line)
@@ -78,7 +86,7 @@ def cut(
         keep &= ~hit
     numbers, begin, end = numbers[keep], begin[keep], end[keep]
     rows = _rows_of(share, numbers, begin, end, line, known & allowed, positions)
-    return Turns(share, numbers, begin, end, rows, positions, line.step)
+    return Turns(share, numbers, begin, end, rows, positions, line, window)
 
 
 def _whole(share: Array, highest: Array, line: Timeline) -> tuple[Array, Array, NDArray[np.intp]]:
@@ -136,13 +144,14 @@ def _rows_of(
     return np.asarray(rows & ~(moved < STANDING / usual))
 
 
-def resampled(turns: Turns, values: Array, line: Timeline) -> Array:
-    """Values of a channel, (turn, position), NaN where no sample has one."""
+def resampled(turns: Turns, channel: Array) -> Array:
+    """Values of a channel, which has one a row of the file, as (turn, position); NaN where no sample has one."""
+    values = channel[turns.window]
     if not turns.numbers.size:
         return np.empty((0, turns.positions))
     if turns.density >= DENSE:
         return _averaged(turns, values)
-    return _interpolated(turns, values, line)
+    return _interpolated(turns, values, turns.line)
 
 
 def _averaged(turns: Turns, values: Array) -> Array:
@@ -159,9 +168,11 @@ def _averaged(turns: Turns, values: Array) -> Array:
     with np.errstate(invalid="ignore", divide="ignore"):
         mean = np.bincount(number, weights=used, minlength=size) / count
         centre = np.bincount(number, weights=off, minlength=size) / count
-    slope = np.zeros(size)
-    slope[1:-1] = 0.5 * (mean[2:] - mean[:-2])
-    mean = mean - np.where(np.isfinite(slope), slope, 0.0) * centre
+    rise = np.diff(mean) / np.maximum(1.0 + np.diff(centre), 0.5)
+    sides = np.stack([np.append(rise, np.nan), np.insert(rise, 0, np.nan)])
+    there = np.isfinite(sides)
+    slope = np.where(there, sides, 0.0).sum(axis=0) / np.maximum(there.sum(axis=0), 1)
+    mean = mean - slope * centre
     return np.asarray(mean.reshape(-1, turns.positions)[turns.numbers - turns.numbers[0]])
 
 

@@ -139,7 +139,7 @@ def _registry() -> pint.UnitRegistry[Fraction]:
     return registry
 
 
-_TORQUE = re.compile(r"(?<![\w])([mkM]?)Nm(?![\w])")
+_TORQUE = re.compile(r"(?<![\w])([mkM]?)Nm(?!\w)([\^*]?)")
 # Those that a misspelt one is compared with; pint knows many more.
 _USUAL = "mm cm m µm km in ft deg rad mrad kg g mg t lb s ms min N mN kN MN lbf Pa kPa MPa GPa bar psi J kJ W kW rpm"
 
@@ -157,12 +157,17 @@ def _meant(text: str) -> str:
     return product
 
 
+def _torque(found: re.Match[str]) -> str:
+    """`N m` for `Nm`, which pint reads as a measure of yarn; in `mV/Nm` both are below the stroke."""
+    return f"{found[1]}N m{found[2]}" if found[2] else f"({found[1]}N m)"
+
+
 @cache
 def root(text: str) -> tuple[Fraction, dict[str, Fraction], tuple[str, ...]]:
     """Factor to SI, exponents by base unit of pint, and the units named, of any unit pint knows; UnitError if none."""
     registry = _registry()
     try:
-        spaced = _TORQUE.sub(r"\1N m", text)  # pint reads Nm as a measure of yarn
+        spaced = _TORQUE.sub(_torque, text)
         parsed = registry.parse_units(spaced.replace("·", "*").replace("⋅", "*"))
         factor, base = registry.get_root_units(parsed)
     except Exception as error:  # pint raises its own, tokenizer and arithmetic errors on text that is no unit

@@ -29,7 +29,8 @@ def data(
     """Measured files, read by a mapping: conditions, channels, scatter and uncertainty, and faults by name."""
     from trunnion.export import check_format, save
     from trunnion.measured.read import read_measured
-    from trunnion.measured.table import dataset, tables
+    from trunnion.measured.table import dataset
+    from trunnion.views.measured import tables
 
     for path in out or []:
         check_format(path)

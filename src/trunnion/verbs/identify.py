@@ -11,6 +11,7 @@ from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.options import IMAGES, File, FrictionLaw, Out, Seats, Set, TableFile, UnitsRow, setting
 from trunnion.terminal import console, findings_of, say, show_rows, wrote
 from trunnion.verbs.model import exit_status, lines_of, placed, stated
+from trunnion.verbs.tolerance import PAGES
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
 __all__ = ["identify"]
 
 MOST_ROWS = 24
-PAGES = (".html", ".htm")
 
 
 def identify(
@@ -42,7 +42,7 @@ def identify(
         list[str] | None,
         typer.Option(
             "--channel",
-            help="A channel by its name in the mapping, or efficiency. Repeatable; all that tell something if not given.",
+            help="A channel by its name in the mapping, or efficiency. Repeatable; if not given, all that tell.",
             show_default=False,
         ),
     ] = None,
@@ -100,6 +100,7 @@ def identify(
 ) -> None:
     """Numbers of the model from measured data: estimates, 95 % intervals, what the data cannot tell apart."""
     from trunnion.analysis.rig.identify import identify as run
+    from trunnion.analysis.rig.said import gathered
     from trunnion.measured.read import read_measured
 
     _check(file, write, force, out or [], report, kind)
@@ -112,7 +113,7 @@ def identify(
     written = _write(result, out or [], report, kind, units_row)
     _tables(result)
     findings = findings_of(result)
-    found = [one for one in measurement.findings if one.severity is not Severity.NOTE]
+    found = gathered(one for one in measurement.findings if one.severity is not Severity.NOTE)
     if write is not None:
         findings += _write_model(mechanism, result, file, write, force, written)
     for path in written:

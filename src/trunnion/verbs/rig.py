@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from trunnion.errors import MechanismError
+from trunnion.errors import Finding, MechanismError
 from trunnion.options import File, FrictionLaw, Seats, Set, TableFile
 from trunnion.terminal import bar, console, say, show_rows, wrote
 from trunnion.verbs.model import exit_status, lines_of, stated
@@ -18,7 +18,6 @@ from trunnion.verbs.model import exit_status, lines_of, stated
 if TYPE_CHECKING:
     from trunnion.analysis.rig.virtual import Observation
     from trunnion.analysis.rig.virtual_plan import Expected, Forecast
-    from trunnion.errors import Finding
 
 __all__ = ["rig"]
 
@@ -54,6 +53,7 @@ def rig(
 
     if format_:
         check_form(format_)
+    _in_order(file)
     mechanism = stated(file, set_, table, friction, seat)
     stated_rig = Rig.read(rig_file)
     if out and not format_:
@@ -75,6 +75,14 @@ def rig(
         console().print(f"  {span}, {', '.join(names[-2:])}", markup=False, highlight=False, soft_wrap=True)
     say(_placed(found, rig_file))
     raise typer.Exit(exit_status(found) or int(bool(observation.skipped)))
+
+
+def _in_order(file: Path) -> None:
+    """MechanismError where the rig is named before the model."""
+    from trunnion.model.file import read_entries
+
+    if "trunnion-rig" in read_entries(file)[0]:
+        raise MechanismError(Finding("is a rig file", remedy="name the model first, then the rig", file=str(file)))
 
 
 @contextmanager

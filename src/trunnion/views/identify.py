@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from trunnion.errors import Finding, MechanismError
+from trunnion.views.conditions import shortened
 from trunnion.views.cycle import names
 from trunnion.views.figures import INK, MUTED, PALETTE, SHADE, dress, legend, new
 from trunnion.views.identified import Estimate, channels, conditions, curve_of, estimates
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 __all__ = ["KINDS", "MOST_PANELS", "check_kind", "figure"]
 
 MOST_PANELS = 6
+FEW = 5  # conditions whose names stand side by side
 MOST_TOLD = 12  # parameters whose correlations have room for their numbers
 COVERED = 2.0  # standard uncertainties of the band
 BEFORE, AFTER = PALETTE[4], PALETTE[0]
@@ -158,15 +160,15 @@ def _residual(axes: Axes, result: xr.Dataset, channel: int, condition: int) -> N
     axes.plot(phase, before * factor, color=BEFORE, label="before", **look)
     axes.plot(phase, after * factor, color=AFTER, label="after", **look)
     axes.set_xlim(0, 1)
-    axes.text(0.995, 0.96, plain(names(result, "condition")[condition]), transform=axes.transAxes, ha="right", va="top",
-              fontsize=8, color=MUTED)  # fmt: skip
+    axes.set_title(plain(names(result, "condition")[condition]), loc="right", fontsize=8, color=MUTED, pad=3)
 
 
 def _figures(result: xr.Dataset) -> Figure:
-    """Residuals of data with one figure a condition, over the conditions."""
+    """Residuals of data with one figure a condition."""
     there = channels(result)
-    sheet = new("Residuals, before and after", result, height=1.0 + 2.6 * len(there))
+    sheet = new("Residuals, before and after", result, height=1.6 + 2.6 * len(there))
     rows = sheet.subplots(len(there), 1, sharex=True, squeeze=False)[:, 0]
+    title, short = shortened(names(result, "condition"))
     for axes, (i, name, unit) in zip(rows, there, strict=True):
         own = conditions(result, i)
         before, after, spread = (
@@ -174,15 +176,14 @@ def _figures(result: xr.Dataset) -> Figure:
             for key in ("residual_before", "residual_after", "residual_uncertainty")
         )
         factor, shown = prefixed(float(np.nanmax(np.abs([before, after]), initial=0.0)), unit)
-        dress(axes, "condition", plain(f"{name} [{shown}]" if shown else name))
+        dress(axes, plain(title), plain(f"{name} [{shown}]" if shown else name))
         axes.axhline(0, color=MUTED, linewidth=0.8, zorder=1.5)
         x = np.arange(len(own))
         axes.plot(x, before * factor, "D", color=BEFORE, markerfacecolor="none", markersize=5, label="before")
         axes.errorbar(x, after * factor, COVERED * np.nan_to_num(spread) * factor, fmt="o", color=AFTER, markersize=5,
                       capsize=3, label=f"after, ±{COVERED:g} u by scatter")  # fmt: skip
-        axes.set_xticks(
-            x, [plain(names(result, "condition")[k]) for k in own], fontsize=8, rotation=40 * (len(own) > 8)
-        )
+        many = len(own) > FEW
+        axes.set_xticks(x, [plain(short[k]) for k in own], fontsize=7.5, rotation=90 if many else 0)
     legend(rows[0], least=1)
     return sheet
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from trunnion.views.conditions import shortened
 from trunnion.views.cycle import names
 from trunnion.views.identified import Estimate, channels, conditions, estimates, percent
 from trunnion.views.quantities import prefixed
@@ -71,7 +72,7 @@ def correlations(result: xr.Dataset) -> Table | None:
 def fits(result: xr.Dataset) -> Table | None:
     """A row for each channel and condition: rms before and after, and what the scatter explains of it."""
     rows = []
-    names_of = names(result, "condition")
+    title, names_of = shortened(names(result, "condition"))
     for i, name, unit in channels(result):
         values = {key: result[key].values[i] for key in ("rms_before", "rms_after", "rms_expected", "used", "turns")}
         own = [k for k in conditions(result, i) if values["turns"][k] > 0]
@@ -83,14 +84,14 @@ def fits(result: xr.Dataset) -> Table | None:
             rows.append([name, names_of[k], *numbers, shown, *counts])
     if not rows:
         return None
-    head = ["channel", "condition", "rms before", "rms after", "by scatter", "unit", "turns", "positions"]
+    head = ["channel", title, "rms before", "rms after", "by scatter", "unit", "turns", "positions"]
     return Table("how the model fits", head, rows)
 
 
 def held_out(result: xr.Dataset) -> Table | None:
     """What was not fitted but predicted."""
     rows = []
-    names_of = names(result, "condition")
+    title, names_of = shortened(names(result, "condition"))
     for i, name, unit in channels(result):
         turns = result["held_out_turns"].values[i]
         for k in np.flatnonzero(turns > 0):
@@ -100,7 +101,7 @@ def held_out(result: xr.Dataset) -> Table | None:
             rows.append([name, names_of[k], f"{int(turns[k])}", *(_figure(one, factor) for one in values), shown])
     if not rows:
         return None
-    head = ["channel", "condition", "turns", "rms before", "rms after", "to be expected", "unit"]
+    head = ["channel", title, "turns", "rms before", "rms after", "to be expected", "unit"]
     return Table("what was held out", head, rows)
 
 
@@ -116,13 +117,16 @@ def sensors(result: xr.Dataset) -> Table | None:
 
 
 def budget(result: xr.Dataset) -> Table | None:
-    """Share of each source in the variance of each estimate."""
+    """Share of each source in the variance of each estimate; of sources that are anything."""
     told = [one for one in estimates(result) if one.told]
+    sources = [name for name in names(result, "source") if any(one.shares[name] >= LEAST for one in told)]
     if not told:
         return None
-    sources = names(result, "source")
-    rows = [[one.short, *(percent(one.shares[name]) for name in sources)] for one in told]
-    return Table("where the uncertainty comes from", ["share of the variance", *sources], rows)
+    rows = [[name, *(percent(one.shares[name]) for one in told)] for name in sources]
+    return Table("where the uncertainty comes from", ["share of the variance", *(one.short for one in told)], rows)
+
+
+LEAST = 0.005
 
 
 def _figure(value: float, factor: float) -> str:

@@ -215,19 +215,20 @@ def check_seed(seed: int) -> None:
 
 def observe(
     mechanism: Mechanism,
-    rig: Rig | str | os.PathLike[str],
+    rig: Rig | Mapping[str, Any] | str | os.PathLike[str],
     seed: int = 1,
     progress: Callable[[int], None] | None = None,
 ) -> Observation:
     """Put a rig to a mechanism: solve the model in all conditions of the schedule, draw the errors of the sensors.
 
-    rig: a Rig, or the path of a rig file; seed: of all random numbers: the same seed, the same readings to the last
-    bit; progress: called with the conditions done. A condition that the model cannot be in at every position, because
-    it locks or does not go together, is left out, and a finding says which and why.
+    rig: a Rig, the entries of a rig file, or its path; seed: of all random numbers: the same seed, the same readings to
+    the last bit; progress: called with the conditions done. A condition that the model cannot be in at every position,
+    because it locks or does not go together, is left out, and a finding says which and why.
     Raises MechanismError for a rig that does not fit the mechanism, or if no condition is left.
     """
     check_seed(seed)
-    rig = rig if isinstance(rig, Rig) else Rig.read(rig)
+    if not isinstance(rig, Rig):
+        rig = Rig(**rig) if isinstance(rig, Mapping) else Rig.read(rig)
     with placed_at("set"):
         mechanism = mechanism.with_values(dict(rig.set_)) if rig.set_ else mechanism
     rows = rig.schedule.rows()

@@ -208,7 +208,8 @@ def smoothed(true: Array, bandwidth: float | None, rate: float) -> Array:
 
 
 def pulsed(true: Array, running: slice, per_turn: int, rate: float) -> Array:
-    """A speed as counted from pulses: one pulse over the time since the pulse before, held until the next."""
+    """A speed as worked out from recorded pulses: the pitch over the time from one to the next, at the middle between
+    them, and straight in between; before the first and after the last pulses as there."""
     part = np.abs(true[running])
     turned = np.concatenate([[0.0], np.cumsum((part[1:] + part[:-1]) / (2 * rate))])
     pitch = 2 * np.pi / per_turn
@@ -217,10 +218,10 @@ def pulsed(true: Array, running: slice, per_turn: int, rate: float) -> Array:
     if count < 2:
         found[running] = 0.0
         return found
-    passed = np.interp(pitch * np.arange(count), turned, np.arange(len(part)) / rate)
-    speeds = pitch / np.diff(passed)
-    last = np.clip(np.floor(turned / pitch).astype(np.intp) - 1, 0, len(speeds) - 1)
-    found[running] = speeds[last] * np.sign(true[running][len(part) // 2])
+    time = np.arange(len(part)) / rate
+    passed = np.interp(pitch * np.arange(count), turned, time)
+    speeds = np.interp(time, (passed[1:] + passed[:-1]) / 2, pitch / np.diff(passed))
+    found[running] = speeds * np.sign(true[running][len(part) // 2])
     return found
 
 

@@ -129,7 +129,8 @@ def blocks_of(
     found = []
     for index, condition in enumerate(measurement.conditions):
         for channel in channels:
-            course, effects = condition.courses.get(channel), {}
+            course = condition.courses.get(channel)
+            effects: dict[str, float] = {}
             if course is None and channel == EFFICIENCY and pairs_of(condition, joints):
                 course, effects = _efficiency(condition, joints)
             if course is None:

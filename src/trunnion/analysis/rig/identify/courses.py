@@ -178,7 +178,7 @@ class Model:
             for path in unknown.paths:
                 overrides[path] = Dual(np.full((len(seed), 1), at[p] + self._errors.get(path, 0.0)), seed)
         values = self.run.system.mechanism.parameters(overrides)
-        for seat in self.run.seats:
+        for seat in self.run.seats:  # given ones: those that follow their loads are in `seated`
             play = shifts.play_of(self.run.system.mechanism.space, self.run.system.joints[seat.joint][0], values,
                                   seat.joint)  # fmt: skip
             if play is not None:

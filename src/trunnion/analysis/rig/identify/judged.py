@@ -133,7 +133,8 @@ class Judged:
         """Of the derivatives with every column scaled to 1, the largest first: near 0 something is not told apart."""
         rows = self.problem.jacobian(self.found.x)[:, : self.problem.count]
         size = np.linalg.norm(rows, axis=0)
-        return np.asarray(np.linalg.svd(rows / np.where(size > 0, size, 1.0), compute_uv=False))
+        found = np.linalg.svd(rows / np.where(size > 0, size, 1.0), compute_uv=False)
+        return np.concatenate([found, np.zeros(len(size) - len(found))])  # fewer data than unknowns
 
     # ---- residuals --------------------------------------------------------------------------------------------
 

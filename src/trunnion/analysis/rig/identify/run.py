@@ -17,6 +17,7 @@ from trunnion.analysis.rig.identify.courses import Model
 from trunnion.analysis.rig.identify.fit import Problem, fit, sensors_of
 from trunnion.analysis.rig.identify.held import HoldOut, held_out
 from trunnion.analysis.rig.identify.search import Search, search
+from trunnion.analysis.rig.identify.seated import SeatedModel
 from trunnion.analysis.rig.identify.separate import Group, inseparable
 from trunnion.analysis.rig.identify.uncertainty import Spread, left_over, spread_of
 from trunnion.analysis.rig.identify.unknowns import Parameters, described, unknowns
@@ -68,12 +69,14 @@ def identify(
     """Numbers of a mechanism from what was measured, with 95 % intervals, correlation, and what cannot be told apart.
 
     parameters: names as for `Mechanism.with_values`, each an unknown; or by a name of your own the numbers that are to
-    be one unknown: `{"pins": ["pin-1.friction.coefficient", "pin-2.friction.coefficient"]}`. channels: of the
-    measurement, all if not given. start: where the search begins, by name, SI or texts with units; the model's values
-    if not given. hold_out: conditions by name, file or setting, or the share of the turns of each (the last), that are
-    not fitted but predicted. sensors: whether zero and gain of a channel are off by the same in all conditions, or in each by its own.
-    delay: standard uncertainty, s, of the time by which a channel lags behind the angle, as its bandwidth makes it; what
-    it is in fact is estimated too. guard: positions left out on each side of a change of the sense of a friction. starts: places to begin at.
+    be one unknown: `{"pins": ["pin-1.friction.coefficient", "pin-2.friction.coefficient"]}`.
+    channels: of the measurement; all that an unknown acts on if not given; `efficiency` is computed of torques and
+    speeds. start: where the search begins, by name, SI or texts with units; the model's values if not given.
+    hold_out: conditions by name, file or setting, or the share of the turns of each (the last), that are not fitted but
+    predicted. sensors: whether zero and gain of a channel are off by the same in all conditions, or in each by its own.
+    delay: standard uncertainty, s, of the time by which a channel lags behind the angle, as its bandwidth makes it;
+    what it is in fact is estimated too. guard: positions left out on each side of a change of the sense of a friction.
+    starts: places to begin at; more than one if the model does not fit and it is not given.
     Method: weighted least squares with exact derivatives, trust region; covariances by the scatter between turns.
     Raises MechanismError for names, channels or conditions that are not there, or where the model has no answer.
     """
@@ -108,16 +111,17 @@ def identified(
     blocks = blocks_of(measurement, channels_of(measurement, channels, joints), held, share, joints)
     measures = _measures(stated, run, blocks)
     phases = tuple(np.asarray(one.phase, float) for one in measurement.conditions)
-    model = Model(run, tuple(unknowns(stated, paths, start or {})), measures, settings, phases,
-                  method or FrictionMethod())  # fmt: skip
+    kind = SeatedModel if any(seat.given is None for seat in run.seats) else Model
+    model = kind(run, tuple(unknowns(stated, paths, start or {})), measures, settings, phases,
+                 method or FrictionMethod())  # fmt: skip
     if channels is None:
         model, blocks = _telling(model, blocks)
     names = [one.name for one in measurement.conditions] if sensors == "condition" else None
     problem = Problem(model, blocks, sensors_of(blocks, names, delay), guard)
     found = search(problem, starts)
     spread = spread_of(problem, found.fit.x)
-    if spread.test.misfit and problem.sensors:
-        problem.left_over = left_over(problem, spread)
+    problem.left_over = left_over(problem, spread)
+    if problem.left_over > 1 and problem.sensors:
         found = replace(found, fit=fit(problem, found.fit.x))
         spread = spread_of(problem, found.fit.x)
     groups = inseparable(problem, found.fit.x, spread)

@@ -9,7 +9,7 @@ import numpy as np
 from trunnion.analysis.rig.identify.amounts import amount, share
 from trunnion.analysis.rig.identify.judged import Judged
 from trunnion.analysis.rig.identify.separate import Combination, Group
-from trunnion.analysis.rig.identify.uncertainty import quantile
+from trunnion.analysis.rig.identify.uncertainty import RANDOM, quantile
 from trunnion.errors import Finding, Severity, Status
 
 __all__ = ["sentences"]
@@ -74,6 +74,14 @@ def _fit(judged: Judged) -> Iterator[Finding]:
         )
         yield Finding(what, "fit", "look at the residuals; free another number, or take another friction law",
                       Severity.WARNING)  # fmt: skip
+    apart = judged.found.spread.apart
+    for p in np.flatnonzero((apart > 1) & ~judged.lost[: problem.count]):
+        what = (
+            f"the conditions disagree: what each says of it varies by {np.sqrt(apart[p]):.2g} times what the scatter "
+            "between turns explains; the interval is wider for it"
+        )
+        where = f"parameter {problem.model.unknowns[p].name}"
+        yield Finding(what, where, "look for what differs between them: settings, speed, temperature", Severity.WARNING)
     single = [block for block in problem.blocks if block.fitted and not block.repeats]
     if single and len(single) == sum(block.fitted for block in problem.blocks):
         what = "no turn is repeated: the scatter is taken from the residuals, and nothing tests the model"
@@ -179,7 +187,7 @@ def _sensors(judged: Judged) -> Iterator[Finding]:
     names, shares = judged.budget
     for p, unknown in enumerate(problem.model.unknowns):
         for source, part in zip(names, shares[p], strict=True):
-            if source not in ("scatter", "misfit") and part > MOSTLY:
+            if source not in (*RANDOM, "resolution") and part > MOSTLY:
                 what = f"{share(part)} of its variance is the {source}: more turns do not help"
                 yield Finding(what, f"parameter {unknown.name}", "calibrate that sensor better", Severity.NOTE)
     for s, sensor in enumerate(problem.sensors, problem.count):
@@ -187,9 +195,10 @@ def _sensors(judged: Judged) -> Iterator[Finding]:
             what = f"comes out {abs(judged.found.x[s]):.1f} standard uncertainties from what is stated of it"
             remedy = "check the sensor, its stated accuracy, and the loads of the model"
             yield Finding(what, sensor.name, remedy, Severity.WARNING)
-    exact = [
-        block.channel for block in problem.blocks if not (block.course.accuracy.zero or block.course.accuracy.gain)
-    ]
+    known = (
+        (one.channel, one.effects or one.course.accuracy.zero or one.course.accuracy.gain) for one in problem.blocks
+    )
+    exact = [channel for channel, told in known if not told]
     if exact:
         channels = _joined(list(dict.fromkeys(exact)))
         what = f"no accuracy is stated of {channels}: zero and gain are taken as exact"
@@ -231,7 +240,7 @@ def _held(judged: Judged) -> Iterator[Finding]:
         yield Finding(what, "hold_out", severity=Severity.NOTE)
     elif trust > POOR:
         what = f"what was held out ({names}) is missed by {trust:.1f} times what its scatter and the estimates explain"
-        yield Finding(what, "hold_out", "the model lacks something that differs there", Severity.WARNING)
+        yield Finding(what, "hold_out", "it lacks something that differs there", Severity.WARNING)
     else:
         what = f"what was held out ({names}) is missed by {trust:.2f} times what its scatter and the estimates explain"
         yield Finding(what, "hold_out", severity=Severity.NOTE)

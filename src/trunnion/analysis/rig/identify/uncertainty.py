@@ -17,11 +17,12 @@ from scipy import special
 from trunnion.analysis.rig.identify.blocks import Block
 from trunnion.analysis.rig.identify.fit import Problem
 
-__all__ = ["CONFIDENCE", "Spread", "Test", "correlation_factors", "left_over", "quantile", "spread_of"]
+__all__ = ["CONFIDENCE", "RANDOM", "Spread", "Test", "correlation_factors", "left_over", "quantile", "spread_of"]
 
 Array = NDArray[np.float64]
 CONFIDENCE = 0.95
 NEIGHBOURS = 5  # frequencies that a power is smoothed over
+RANDOM = ("scatter", "conditions", "misfit")
 FLOOR = 0.05  # of the mean power: what is below it decides nothing
 UNLIKELY = 0.01  # a chance below which the model is said not to fit
 WORTH = 1.05  # reduced χ² up to which it is not
@@ -51,7 +52,8 @@ class Spread:
 
     information: Jᵀ W J + Λ; inverse: its inverse, pseudo where it is singular; null: (direction, unknown and sensor),
     what nothing is known of; parts: covariance by source; freedom: degrees of freedom, (unknown and sensor,);
-    follows: how much a turn resembles the one before it, −1 to 1, NaN if not known.
+    follows: how much a turn resembles the one before it, −1 to 1, NaN if not known; apart: (unknown,), how much more
+    than turns the conditions differ in what they say of it, as variances, 1 if not.
     """
 
     information: Array
@@ -61,6 +63,7 @@ class Spread:
     freedom: Array
     test: Test
     follows: float
+    apart: Array
 
     @property
     def covariance(self) -> Array:
@@ -147,27 +150,34 @@ def spread_of(problem: Problem, x: Array) -> Spread:
     rows = problem.jacobian(x)
     information = rows.T @ rows
     inverse, null = _inverse(information)
-    turns, freedom, follows = _between_turns(problem, x, inverse)
+    turns, freedom, follows, own = _between_turns(problem, x, inverse)
     test = lack_of_fit(problem, x)
     parts = {"scatter": turns}
+    apart = _apart(problem, x, inverse, own)
+    if np.any(apart > 1):
+        wider = np.sqrt(apart - 1)
+        parts["conditions"] = turns * np.outer(wider, wider)
+        between = np.full(count, max(len(own) - 1.0, 1.0))
+        freedom = _joined([(turns, freedom), (parts["conditions"], between)])
     steps = _steps(problem, x, inverse)
     if np.any(steps):
         parts["resolution"] = steps
     left, pieces = _left_over(problem, x, inverse, again=False)
     if np.any(left):
+        freedom = _joined([(turns + parts.get("conditions", 0.0), freedom), (left, np.full(count, pieces))])
         parts["scatter"] = turns + left
-        freedom = _joined([(turns, freedom), (left, np.full(count, pieces))])
     if test.misfit:
-        parts["misfit"], pieces = _left_over(problem, x, inverse, again=True)
-        freedom = _joined([(parts["scatter"], freedom), (parts["misfit"], np.full(count, pieces))])
+        found, pieces = _left_over(problem, x, inverse, again=True)
+        freedom = _joined([(parts["scatter"] + parts.get("conditions", 0.0), freedom), (found, np.full(count, pieces))])
+        parts["misfit"] = found
     for s, sensor in enumerate(problem.sensors, problem.count):
         if sensor.stated:
             parts[sensor.name] = np.outer(inverse[:, s], inverse[:, s])
     whole = np.diagonal(np.sum(list(parts.values()), axis=0))
-    random = np.diagonal(parts["scatter"] + parts.get("misfit", 0.0))
+    random = np.diagonal(np.sum([parts[key] for key in RANDOM if key in parts], axis=0))
     with np.errstate(all="ignore"):  # Welch and Satterthwaite; what was stated has infinite freedom
         freedom = np.where(random > 0, freedom * (whole / random) ** 2, np.inf)
-    return Spread(information, inverse, null, parts, freedom, test, follows)
+    return Spread(information, inverse, null, parts, freedom, test, follows, apart[: problem.count])
 
 
 def _steps(problem: Problem, x: Array, inverse: Array) -> Array:
@@ -204,11 +214,13 @@ def _joined(parts: Sequence[tuple[Array, Array]]) -> Array:
     return np.asarray(found)
 
 
-def _between_turns(problem: Problem, x: Array, inverse: Array) -> tuple[Array, Array, float]:
-    """Covariance by what each turn would have changed, its freedom, and how turns follow each other."""
+def _between_turns(problem: Problem, x: Array, inverse: Array) -> tuple[Array, Array, float, dict[int, Array]]:
+    """Covariance by what each turn would have changed, its freedom, how turns follow each other, and its variances
+    by condition, with their freedom last."""
     count = len(x)
     total, fourth = np.zeros((count, count)), np.zeros(count)
     products, squares, pairs = 0.0, 0.0, 0
+    alone: dict[int, Array] = {}
     for condition in dict.fromkeys(block.condition for block in problem.blocks):
         own = [k for k, one in enumerate(problem.blocks) if one.condition == condition and one.fitted and one.repeats]
         if not own:
@@ -224,6 +236,7 @@ def _between_turns(problem: Problem, x: Array, inverse: Array) -> tuple[Array, A
         if np.all(np.diagonal(seamed) >= 0.5 * np.diagonal(covariance)):
             covariance = seamed
         total += covariance
+        alone[condition] = np.append(np.diagonal(covariance), turns - 1.0)
         fourth += np.diagonal(covariance) ** 2 / (turns - 1)
         size = np.sqrt(np.maximum(np.sum(moved**2, axis=0), 1e-300))
         unit = np.where(size > 1e-140, moved / size, 0.0)[:, : problem.count]
@@ -236,8 +249,35 @@ def _between_turns(problem: Problem, x: Array, inverse: Array) -> tuple[Array, A
     follows = products / squares if pairs >= ENOUGH_PAIRS else float("nan")
     if follows > 2 / np.sqrt(max(pairs, 1)):  # as if there were fewer turns, for a first-order process
         wider = (1 + min(follows, 0.95)) / (1 - min(follows, 0.95))
-        return total * wider, np.maximum(freedom / wider, 1.0), follows
-    return total, freedom, follows if np.isfinite(follows) else float("nan")
+        return total * wider, np.maximum(freedom / wider, 1.0), follows, alone
+    return total, freedom, follows, alone
+
+
+def _apart(problem: Problem, x: Array, inverse: Array, alone: dict[int, Array]) -> Array:
+    """How much the conditions disagree in what they add to each unknown, over what their turns explain; 1 if by chance.
+
+    What they add is 0 in all, so that of C conditions the sum of squares over variances is χ² of C − 1, or F for
+    variances from few turns.
+    """
+    count = len(x)
+    found = np.ones(count)
+    if len(alone) < 3:
+        return found
+    squares = np.zeros(count)
+    for condition, variances in alone.items():
+        added = np.zeros(count)
+        for k, block in enumerate(problem.blocks):
+            if block.condition == condition and block.fitted and block.repeats:
+                gap = np.where(problem.masks[k], problem.misses(x, k, block.mean), 0.0)
+                added += inverse @ (np.nan_to_num(problem.said(x, k)[1]) * problem.weight(k)) @ gap
+        freedom = variances[-1]
+        fair = (freedom - 2) / freedom if freedom > 2 else 0.3
+        steps = np.where(variances[:-1] > 0, variances[:-1], np.inf)
+        squares += fair * added**2 / steps
+    freedom = len(alone) - 1.0
+    turns = float(np.median([one[-1] for one in alone.values()]))
+    chance = special.fdtrc(freedom, max(freedom * turns, 4.0), squares / freedom)
+    return np.asarray(np.where(chance < UNLIKELY, np.maximum(squares / freedom, 1.0), 1.0))
 
 
 ENOUGH_PAIRS = 10  # of turns, to see whether they follow each other
@@ -312,10 +352,13 @@ def _weighed(problem: Problem, x: Array, k: int) -> tuple[float, Array, float]:
 
 
 def left_over(problem: Problem, spread: Spread) -> float:
-    """How much more than the scatter the misfit moves the estimates, as variances; 1 without one."""
-    misfit, scatter = (np.diagonal(spread.parts[key])[: problem.count] for key in ("misfit", "scatter"))
-    known = scatter > 0
-    return 1.0 + float(np.mean(misfit[known] / scatter[known])) if np.any(known) else 1.0
+    """How much more than the scatter the misfit and the conditions move the estimates, as variances; 1 without."""
+    more = np.diagonal(np.sum([spread.parts[key] for key in RANDOM if key in spread.parts], axis=0))
+    scatter = np.diagonal(spread.parts["scatter"])
+    known = scatter[: problem.count] > 0
+    return (
+        float(np.mean((more / np.where(scatter > 0, scatter, 1.0))[: problem.count][known])) if np.any(known) else 1.0
+    )
 
 
 def _left_over(problem: Problem, x: Array, inverse: Array, again: bool) -> tuple[Array, float]:

@@ -1,0 +1,191 @@
+"""Every source of the angle gives the same courses, and resampling gives back what is known as closely as stated."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from measured_data.recording import IDLE, RPM, ZERO, Columns, faults, mapping, off, read, recorded
+from trunnion.errors import MechanismError
+from trunnion.measured.read import read_measured
+
+OMEGA = RPM * np.pi / 30
+
+
+@pytest.fixture(scope="module")
+def clean() -> Columns:
+    columns = recorded(noise=0.0)
+    columns["deg"] = np.degrees(columns["angle"]) % 360
+    columns["fine"] = np.floor(columns["angle"] / (2 * np.pi) * 1440)
+    columns["wrapped"] = columns["encoder"] % 256
+    columns["each turn"] = columns["encoder"] % 60
+    columns["level"] = (columns["angle"] / (2 * np.pi) * 60 % 1 < 0.5) * 5.0
+    columns["sinus"] = np.sin(60 * columns["angle"])
+    columns["z"] = (columns["angle"] / (2 * np.pi) % 1 < 0.02) * 1.0
+    columns["down"] = np.floor(-columns["angle"] / (2 * np.pi) * 60)
+    return columns
+
+
+SOURCES: dict[str, tuple[dict[str, Any], float]] = {
+    "count": ({"from": "pulses", "column": "encoder", "per_turn": 60}, 0.05),
+    "many a sample": ({"from": "pulses", "column": "fine", "per_turn": 1440}, 0.05),
+    "wraps at 256": ({"from": "pulses", "column": "wrapped", "per_turn": 60}, 0.05),
+    "set back each turn": ({"from": "pulses", "column": "each turn", "per_turn": 60}, 0.05),
+    "stated wrap": ({"from": "pulses", "column": "wrapped", "per_turn": 60, "wrap": 256}, 0.05),
+    "index": ({"from": "pulses", "column": "encoder", "per_turn": 60, "index": {"column": "z"}}, 0.08),
+    "level": ({"from": "pulses", "column": "level", "per_turn": 60, "kind": "level", "zero": "24 deg"}, 0.05),
+    # its level passes the middle at 24° + 0: sin(60 θ) rises through zero at multiples of 6°
+    "analog": ({"from": "pulses", "column": "sinus", "per_turn": 60, "kind": "level", "zero": "24 deg"}, 0.05),
+    "counts down": ({"from": "pulses", "column": "down", "per_turn": 60, "sign": -1}, 0.05),
+    "column": ({"from": "column", "column": "deg", "unit": "deg"}, 4e-3),
+    "column in rad": ({"from": "column", "column": "angle"}, 4e-3),
+    "time": ({"from": "time", "speed": "600 rpm", "zero": f"{ZERO - OMEGA * IDLE} rad"}, 4e-3),
+    "speed": ({"from": "speed", "channel": "speed-in", "zero": f"{ZERO} rad"}, 0.1),
+    "speed and index": ({"from": "speed", "channel": "speed-in", "index": {"column": "z"}}, 0.1),
+}
+
+
+@pytest.mark.parametrize("source", SOURCES)
+def test_sources(clean: Columns, tmp_path: Path, source: str) -> None:
+    angle, within = SOURCES[source]
+    changes: dict[str, Any] = {"angle": angle}
+    if source == "time":  # which has turns while it stands, too
+        columns = {name: values[1000:] for name, values in clean.items()}
+        changes["channels/torque-in/zero"] = "50 mV"
+    else:
+        columns = clean
+    found = read(columns, tmp_path, changes)
+    assert not [one for one in found.findings if "no unit" not in one.what]
+    (one,) = found.conditions
+    assert one.courses["torque-in"].turns.shape[0] >= 18
+    assert one.speed == pytest.approx(OMEGA, rel=2e-4)
+    assert off(one) < within
+
+
+def test_a_driver_that_runs_backward(clean: Columns, tmp_path: Path) -> None:
+    """Its cycle is gone through from the start of the model's in the direction in which it runs."""
+    changes = {"angle": {"from": "pulses", "column": "down", "per_turn": 60}, "channels/speed-in/sign": -1}
+    (one,) = read(
+        {**clean, "T1": -(clean["T1"] - 0.05)}, tmp_path, {**changes, "channels/torque-in/zero": 0}
+    ).conditions
+    assert one.speed == pytest.approx(-OMEGA, rel=1e-4)
+    course = one.courses["torque-in"].mean
+    angle = 2 * np.pi * one.phase
+    assert np.nanmax(np.abs(course + (20 + 5 * np.sin(angle) + 2 * np.cos(2 * angle)))) < 0.05
+
+
+def test_cycles_of_other_lengths(clean: Columns, tmp_path: Path) -> None:
+    clean = {**clean, "T1": 0.1 * np.sin(clean["angle"] / 2)}
+    base = {"angle": {"from": "column", "column": "angle"}, "channels/torque-in/zero": 0}
+    (one,) = read(clean, tmp_path, {**base, "cycle": "720 deg"}).conditions
+    assert one.courses["torque-in"].mean == pytest.approx(np.sin(2 * np.pi * one.phase), abs=1e-3)
+    (two,) = read(clean, tmp_path, {**base, "cycle": "2 turn", "start": "180 deg"}).conditions
+    assert two.courses["torque-in"].mean == pytest.approx(np.cos(2 * np.pi * two.phase), abs=1e-3)
+    timed = {name: values[1000:] for name, values in clean.items()}
+    (three,) = read(timed, tmp_path, {"angle": None, "cycle": "0.2 s", "channels/torque-in/zero": 0}).conditions
+    assert np.isnan(three.speed)
+    assert three.courses["torque-in"].mean == pytest.approx(
+        np.sin(2 * np.pi * three.phase + ZERO / 2 - np.pi * 2), abs=1e-3
+    )
+
+
+@pytest.mark.parametrize("positions", [36, 90, 360, 500])
+@pytest.mark.parametrize("harmonic", [1, 3, 8])
+def test_resampling_of_a_known_sinus(clean: Columns, tmp_path: Path, harmonic: int, positions: int) -> None:
+    """Mean about a position: too small by (π h/p)²/6; interpolated: by less than (2π h/n)⁴/40, n samples a turn."""
+    columns = {**clean, "T1": 0.1 * np.sin(harmonic * clean["angle"])}
+    changes = {"angle": {"from": "column", "column": "angle"}, "channels/torque-in/zero": 0, "positions": positions}
+    (one,) = read(columns, tmp_path, changes).conditions
+    samples = 500
+    error = np.abs(one.courses["torque-in"].mean - np.sin(2 * np.pi * harmonic * one.phase)).max()
+    averaged = samples >= 4 * positions
+    bound = 1.5 * (np.pi * harmonic / positions) ** 2 / 6 if averaged else (2 * np.pi * harmonic / samples) ** 4 / 40
+    assert error < bound + 1e-9
+
+
+def test_averaging_lessens_noise(tmp_path: Path) -> None:
+    """Of n samples a position and N turns the mean scatters by σ/√(n N), and the standard uncertainty says so."""
+    columns = recorded(turns=60, noise=0.5, seed=3)
+    (one,) = read(columns, tmp_path, {"positions": 36, "channels/torque-in/zero": "50 mV"}).conditions
+    course = one.courses["torque-in"]
+    expected = 0.5 / np.sqrt(500 / 36)
+    assert np.sqrt(np.mean(course.scatter**2)) == pytest.approx(expected, rel=0.05)
+    angle = 2 * np.pi * one.phase
+    error = course.mean - (20 + 5 * np.sin(angle) + 2 * np.cos(2 * angle))
+    assert np.sqrt(np.mean((error / course.uncertainty) ** 2)) == pytest.approx(1, abs=0.4)
+
+
+def test_filter_has_no_delay_and_halves_the_power_at_its_cut_off(clean: Columns, tmp_path: Path) -> None:
+    columns = {**clean, "T1": 0.1 * (np.sin(clean["angle"]) + np.sin(20 * clean["angle"]))}
+    changes = {"angle": {"from": "column", "column": "angle"}, "channels/torque-in/zero": 0}
+    found = read(columns, tmp_path, {**changes, "positions": 360, "filter": {"cut_off": "200 Hz"}})
+    course = found.conditions[0].courses["torque-in"].turns[5:-3].mean(axis=0)
+    phase = 2 * np.pi * found.conditions[0].phase
+    parts = [2 * np.mean(course * np.exp(-1j * h * phase)) * 1j for h in (1, 20)]
+    assert abs(parts[0]) == pytest.approx(1, abs=2e-3)
+    assert abs(parts[1]) == pytest.approx(np.sqrt(0.5), abs=0.02)  # 20 turns of 10 a second: at the cut-off
+    assert np.abs(np.angle(parts)).max() < 5e-3
+    assert any("200 Hz" in sentence for sentence in found.done)
+
+
+def test_filter_keeps_gaps(clean: Columns, tmp_path: Path) -> None:
+    """Nothing is carried over a long gap, short ones are bridged, and all stay gaps."""
+    columns = {**clean, "T1": clean["T1"].copy()}
+    columns["T1"][5000:5400] = np.nan
+    columns["T1"][7000] = np.nan
+    changes = {"angle": {"from": "column", "column": "angle"}, "filter": {"cut_off": "100 Hz"}}
+    (one,) = read(columns, tmp_path, changes).conditions
+    course = one.courses["torque-in"]
+    assert np.count_nonzero(np.isnan(course.turns)) == pytest.approx(400 / 500 * 90, abs=2)
+    assert off(one) < 0.03
+
+
+def test_zero_of_an_unloaded_stretch(tmp_path: Path) -> None:
+    """Its uncertainty is that of the mean of samples that depend on each other."""
+    rng = np.random.default_rng(5)
+    columns = recorded(noise=0.0)
+    slow = np.zeros(columns["t"].size)
+    for k in range(1, slow.size):
+        slow[k] = 0.95 * slow[k - 1] + 0.01 * rng.normal()
+    columns["T1"] = columns["T1"] + slow
+    (one,) = read(columns, tmp_path, {"channels/torque-in/accuracy": {"zero": "0.3 N m", "gain": "0.1 %"}}).conditions
+    accuracy = one.courses["torque-in"].accuracy
+    # of an AR(1): σ²/n · (1 + ρ)/(1 − ρ), n = 950, σ² = 1e-4/(1 − ρ²); 10 N m a volt
+    expected = 10 * np.sqrt(1e-4 / (1 - 0.95**2) / 950 * (1.95 / 0.05))
+    assert np.sqrt(accuracy.zero**2 - 0.3**2) == pytest.approx(expected, rel=0.6)
+    assert accuracy.gain == pytest.approx(0.001)
+
+
+def test_conditions_of_a_column(clean: Columns, tmp_path: Path) -> None:
+    columns = {**clean, "beta": np.where(clean["t"] < 0.8, 15.0, np.where(clean["t"] < 1.5, 20.0, 15.0))}
+    settings = {"misalignment": {"column": "beta", "unit": "deg"}, "input.speed": {"mean": "speed-in"}, "load": "3 N m"}
+    found = read(columns, tmp_path, {"set": settings})
+    assert [one.name for one in found.conditions] == [
+        "load 3 N m, misalignment 15 deg",
+        "load 3 N m, misalignment 20 deg",
+    ]
+    first, second = found.conditions
+    assert first.values["misalignment"] == pytest.approx(np.radians(15))
+    assert first.values["input.speed"] == pytest.approx(OMEGA, rel=1e-4)
+    assert first.values["load"] == 3
+    assert [one.courses["brake"].turns.shape[0] for one in (first, second)] == [11, 6]
+    with pytest.raises(MechanismError, match="what is measured is no setting"):
+        read({**columns, "beta": clean["angle"]}, tmp_path, {"set": settings})
+
+
+def test_part_of_a_file(clean: Columns, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    changes = {"files": [{"file": "run.csv", "over": ["0.5 s", "1.05 s"]}]}
+    whole = read(clean, tmp_path, changes)  # a file of that name elsewhere
+    assert whole.conditions[0].courses["brake"].turns.shape[0] == 19
+    monkeypatch.chdir(tmp_path)
+    (one,) = read_measured(mapping(changes)).conditions
+    assert one.courses["brake"].turns.shape[0] == 4
+
+
+def test_no_pulse(clean: Columns, tmp_path: Path) -> None:
+    with pytest.raises(MechanismError, match="has 0 pulses: there are no turns"):
+        read({**clean, "encoder": 0 * clean["t"]}, tmp_path)
+    assert faults(read({**clean, "z": 0 * clean["t"]}, tmp_path, {"angle/index": {"column": "z"}}), "has no pulse")

@@ -1,0 +1,202 @@
+"""The mapping file: strict, with file and line, all that is wrong in one go; units either way round."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from measured_data.recording import Columns, mapping, off, read, recorded
+from trunnion.errors import MechanismError
+from trunnion.measured.mapping import read_mapping
+from trunnion.measured.read import read_measured
+
+
+@pytest.fixture(scope="module")
+def columns() -> Columns:
+    return recorded(turns=5, noise=0.0)
+
+
+WRONG = """\
+trunnion-data: 1
+files:
+  - {file: ../run.csv}
+  - {file: /etc/passwd.csv, set: {misalignment: 15 dge}}
+time: {column: t, unit: mm}
+angle: {from: pulses, colum: encoder, per_turn: 60}
+channels:
+  torque-in:
+    column: T1
+    measures: efort:input
+    unit: V
+  b: {column: T1, measures: effort:input, unit: V}
+  c: {column: T1, measures: effort:input, unit: V, gain: 0.01 (N m)/mV, range: 3 kg}
+  d: {column: T1, measures: effort:input, unit: V, gain: 0.01 (N m)/mV, zero: [1, 2]}
+  e: {column: T1, measures: effort:input, unit: N m, sign: 2}
+  f: {column: T1, measures: "rate:x", unit: Hz}
+  g: {column: T1, measures: effort:input, unit: N m, zero: {over: [2 s, 1 s]}}
+  h: {column: T1, measures: effort:input, unit: N m, accuracy: {gain: -1 %}}
+  i: {column: T1, measures: "maximum:effort:input", unit: N m}
+filter: {cut_off: 50 mHzz}
+positions: 1
+drift: maybe
+"""
+
+
+def test_everything_at_once_with_its_line(tmp_path: Path) -> None:
+    path = tmp_path / "m.yaml"
+    path.write_text(WRONG, encoding="utf-8")
+    with pytest.raises(MechanismError) as failure:
+        read_mapping(path)
+    found = {one.line: one for one in failure.value.findings}
+    told = {
+        4: "'dge' is not known",
+        5: "'mm' is not a unit of time",
+        6: "'colum' is unknown",
+        10: "nothing a sensor follows",
+        12: "do not give effort:input in N m or N",
+        13: "'3 kg' is neither of the readings (V) nor",
+        14: "takes a number",
+        15: "none of 1 or -1",
+        16: "readings in 'Hz' do not give rate:x",
+        17: "ends before it begins",
+        18: "below zero",
+        19: "nothing a sensor follows",
+        20: "'mHzz' is not known",
+        21: "greater than or equal to 2",
+        22: "none of 'report'",
+    }
+    assert {line: text in found[line].what for line, text in told.items() if line in found} == dict.fromkeys(told, True)
+    assert all(one.file == str(path) and one.remedy for one in found.values())
+    assert "did you mean 'column'" in found[6].remedy
+    assert "did you mean 'effort'" in found[10].remedy
+    assert "state the gain, such as 100 mV/(N m)" in found[12].remedy
+
+
+CHANGES: list[tuple[dict[str, Any], str, str]] = [
+    ({"trunnion-data": 2}, "trunnion-data", "version 2"),
+    ({"trunnion-data": None}, "", "'trunnion-data' is missing"),
+    ({"channels": {}}, "channels", "at least 1"),
+    ({"angle": None}, "", "'angle' is missing"),
+    ({"angle": {"from": "pulses", "column": "encoder"}}, "angle", "needs per_turn"),
+    ({"angle": {"from": "column", "column": "a", "per_turn": 60}}, "angle", "does not take per_turn"),
+    ({"angle": {"from": "speed", "channel": "speed"}}, "angle.channel", "no channel 'speed'"),
+    ({"angle": {"from": "speed", "channel": "brake"}}, "angle.channel", "not a speed"),
+    ({"angle": {"from": "time", "speed": 0}}, "angle", "the speed is zero"),
+    ({"angle/wrap": 9, "angle/kind": "level"}, "angle", "only a running count wraps"),
+    ({"time": {"column": "t", "rate": "1 kHz"}}, "time", "either a column or a rate"),
+    ({"time": {"rate": "0 Hz"}}, "time.rate", "not a frequency above zero"),
+    ({"time": {"rate": "1 kHz"}, "filter": {"cut_off": "500 Hz"}}, "filter.cut_off", "samples come at 1000 Hz"),
+    ({"set": {"a": {"mean": "speed"}}}, "set.a.mean", "no channel 'speed'"),
+    ({"set": {"a": {"mean": "brake", "column": "x"}}}, "set.a", "one of mean and column"),
+    ({"set": {"a": "2 * AB"}}, "set.a", "speaks of AB"),
+    ({"cycle": "3 N"}, "cycle", "no angle and no time"),
+    ({"cycle": 0}, "cycle", "not above zero"),
+    ({"cycle": "-1 turn"}, "cycle", "not above zero"),
+    ({"channels/brake/gain": 0}, "channels.brake", "the gain is zero"),
+    ({"channels/brake/range": "0 N m"}, "channels.brake", "range is not above zero"),
+    ({"channels/brake/gain": "1,5"}, "channels.brake.gain", "not a number with a unit"),
+    ({"channels/brake/unit": 5}, "channels.brake.unit", "is not a unit"),
+]
+
+
+@pytest.mark.parametrize(("changes", "where", "told"), CHANGES, ids=[f"{k}" for k in range(len(CHANGES))])
+def test_what_a_mapping_cannot_say(changes: dict[str, Any], where: str, told: str) -> None:
+    with pytest.raises(MechanismError) as failure:
+        read_mapping(mapping(changes))
+    assert [one.where for one in failure.value.findings] == [where]
+    assert told in failure.value.findings[0].what
+    assert failure.value.findings[0].remedy
+
+
+def test_a_model_is_no_mapping(tmp_path: Path) -> None:
+    with pytest.raises(MechanismError, match="is a model file, not a mapping file"):
+        read_mapping({"trunnion": 1, "channels": mapping()["channels"]})
+
+
+@pytest.mark.parametrize("name", ["../run.csv", "/run.csv", "a/../../run.csv", "link/run.csv"])
+def test_only_files_below_its_folder(tmp_path: Path, name: str, columns: Columns) -> None:
+    """A mapping is data from a stranger, and so is a link beside it; the command line may name any file."""
+    (tmp_path / "inner").mkdir()
+    (tmp_path / "inner" / "link").symlink_to(tmp_path)
+    path = tmp_path / "inner" / "m.json"
+    import json
+
+    path.write_text(json.dumps(mapping({"files": [{"file": name}]})), encoding="utf-8")
+    read(columns, tmp_path)
+    with pytest.raises(MechanismError, match="is not below the folder of the mapping"):
+        read_measured(path)
+
+
+def test_files_beside_the_mapping(tmp_path: Path, columns: Columns) -> None:
+    import json
+
+    read(columns, tmp_path)
+    path = tmp_path / "m.json"
+    path.write_text(json.dumps(mapping({"files": [{"file": "run.csv", "set": {"beta": "15 deg"}}]})), encoding="utf-8")
+    for found in (read_measured(path), read_measured(path, [tmp_path / "run.csv"])):
+        (one,) = found.conditions
+        assert one.name == "beta 15 deg"
+        assert one.values == {"beta": pytest.approx(np.radians(15))}
+    with pytest.raises(MechanismError, match="no data file is named"):
+        read_measured(mapping())
+
+
+UNITS: list[dict[str, Any]] = [
+    {"unit": "V", "gain": "100 mV/(N m)"},
+    {"unit": "V", "gain": "0.1 V/N/m"},
+    {"unit": "V", "gain": "10 N m/V"},
+    {"unit": "V", "gain": "0.01 (N m)/mV"},
+    {"unit": "kV", "gain": "0.1 kV/(kN m)", "scale": 1},
+    {"gain": "10"},
+    {"unit": "N m", "gain": 10},
+    {"unit": "kN m", "gain": 0.01},
+    {"unit": "N mm", "gain": "1e4"},
+    {"unit": "V", "gain": "100 mV/Nm", "zero": "50 mV"},
+    {"unit": "V", "gain": "100 mV/(N m)", "zero": "0.5 N m"},
+    {"unit": "V", "gain": "100 mV/(N m)", "zero": 0.05},
+    {"unit": "V", "gain": "-100 mV/(N m)", "sign": -1, "zero": "50 mV"},
+]
+
+
+@pytest.mark.parametrize("stated", UNITS, ids=[str(one) for one in UNITS])
+def test_units_and_gains(tmp_path: Path, columns: Columns, stated: dict[str, Any]) -> None:
+    stated = dict(stated)
+    changed = dict(columns)
+    if stated.pop("scale", None):
+        changed["T1"] = changed["T1"] / 1000  # kV; 0.1 kV/(kN m) is 0.1 V/(N m)
+    channel = {"column": "T1", "measures": "effort:input", "zero": {"over": ["0 s", "0.19 s"]}, **stated}
+    found = read(changed, tmp_path, {"channels/torque-in": channel})
+    assert found.conditions[0].courses["torque-in"].unit == "N m"
+    assert off(found.conditions[0]) < 0.05
+
+
+def test_units_of_the_file(tmp_path: Path, columns: Columns) -> None:
+    """The mapping's unit is taken; one of the file serves where it has none; where both differ it is told."""
+    named = {("n1 [rpm]" if name == "n1" else name): values for name, values in columns.items()}
+    one = read(named, tmp_path, {"channels/speed-in/unit": None})
+    assert np.nanmean(one.conditions[0].courses["speed-in"].mean) == pytest.approx(20 * np.pi, rel=1e-4)
+    assert one.findings == ()
+    other = read(named, tmp_path, {"channels/speed-in/unit": "deg/s"})
+    assert "the file has the unit 'rpm' for 'n1', the mapping 'deg/s'" in other.findings[0].what
+    bare = read(columns, tmp_path, {"channels/brake/unit": None})
+    assert "taken for SI (N m)" in bare.findings[0].what
+    volts = {("n1 [V]" if name == "n1" else name): values for name, values in columns.items()}
+    with pytest.raises(MechanismError, match="readings in 'V' do not give rate:input"):
+        read(volts, tmp_path, {"channels/speed-in/unit": None})
+
+
+def test_forces_and_slides(tmp_path: Path, columns: Columns) -> None:
+    """What is measured may be a force or a speed along a line; the unit tells."""
+    changes = {
+        "channels/brake/unit": "kN",
+        "channels/speed-out/unit": "mm/s",
+        "channels/x": {"column": "T2", "measures": "piston.Q.x", "unit": "mm"},
+        "channels/own": {"column": "T2", "measures": "torque", "unit": "N m"},
+    }
+    found = read(columns, tmp_path, changes)
+    units = [one.unit for one in found.conditions[0].courses.values()]
+    assert units == ["N m", "rad/s", "N", "m/s", "m", "N m"]
+    assert found.conditions[0].courses["x"].mean == pytest.approx(found.conditions[0].courses["brake"].mean * 1e-6)

@@ -1,0 +1,204 @@
+"""Data files of every kind and shape: the same numbers from CSV, Parquet and TDMS; a finding for what is no data."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from nptdms import ChannelObject, RootObject, TdmsWriter
+
+from measured_data.recording import mapping, read, recorded
+from trunnion.errors import MechanismError
+from trunnion.measured.measurement import Measurement
+from trunnion.measured.read import read_measured
+from trunnion.measured.tables import read_table
+
+
+def _tdms(
+    path: Path, columns: Mapping[str, Any], properties: Mapping[str, Any] | None = None, group: str = "rig"
+) -> None:
+    with TdmsWriter(path) as writer:
+        channels = [
+            ChannelObject(group, name, np.asarray(one), dict(properties or {})) for name, one in columns.items()
+        ]
+        writer.write_segment([RootObject({}), *channels])
+
+
+def _same(one: Measurement, other: Measurement) -> bool:
+    return all(
+        np.array_equal(a.turns, b.turns, equal_nan=True) and a.accuracy == b.accuracy
+        for left, right in zip(one.conditions, other.conditions, strict=True)
+        for a, b in zip(left.courses.values(), right.courses.values(), strict=True)
+    )
+
+
+def test_formats_give_the_same_bits(tmp_path: Path) -> None:
+    columns = recorded(turns=6, noise=0.3)
+    columns["T1"][3000:3050] = np.nan
+    columns["T2"][2000] = np.inf
+    changes = {"filter": {"cut_off": "300 Hz"}}
+    text = read(columns, tmp_path, changes)
+    pd.DataFrame(columns).to_parquet(tmp_path / "run.parquet")
+    _tdms(tmp_path / "run.tdms", columns)
+    for name in ("run.parquet", "run.tdms"):
+        found = read_measured(mapping(changes), [tmp_path / name])
+        assert _same(text, found), name
+        assert [one.what for one in found.findings] == [one.what for one in text.findings]
+
+
+TEXTS: dict[str, str] = {
+    "comma": "t,T 1\n0,1.5\n1,-2e3\n",
+    "semicolon and decimal comma": "t;T 1\n0;1,5\n1;-2e3\n",
+    "tab": "t\tT 1\n0\t1.5\n1\t-2000\n",
+    "tab and decimal comma": "t\tT 1\n0,0\t1,5\n1,0\t-2000,0\n",
+    "units in brackets": "t [s],T 1 [mV]\n0,1.5\n1,-2e3\n",
+    "row of units": "t,T 1\ns,mV\n0,1.5\n1,-2e3\n",
+    "row of units in brackets": "t;T 1\n[s];[mV]\n0;1.5\n1;-2e3\n",
+    "remarks": "# a rig\nt,T 1\n# begins\n0,1.5\n1,-2e3\n",
+    "byte order mark": "\ufefft,T 1\n0,1.5\n1,-2e3\n",
+    "quotes and spaces": '"t", "T 1"\n 0, 1.5\n 1, -2e3\n',
+    "above the header": "Logger 7\nDate;2026-01-01\nt,T 1\n0,1.5\n1,-2e3\n",
+    "other columns": "note,t,x,T 1\nabc,0,,1.5\nd,1,9,-2e3\n",
+    "lines of Windows": "t,T 1\r\n0,1.5\r\n1,-2e3\r\n",
+    "separators at the end of lines": "t;T 1\n0;1,5;\n1;-2e3;\n",
+    "also of the header": "t;T 1;\n0;1,5;\n1;-2e3;\n",
+    "no last line end": "t,T 1\n0,1.5\n1,-2e3",
+}
+
+
+@pytest.mark.parametrize("kind", TEXTS)
+def test_shapes_of_text(tmp_path: Path, kind: str) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(TEXTS[kind], encoding="utf-8", newline="")
+    found = read_table(path, ["t", "T 1"])
+    assert found.columns["t"].values.tolist() == [0.0, 1.0]
+    assert found.columns["T 1"].values.tolist() == [1.5, -2000.0]
+    assert found.columns["T 1"].unit == ("mV" if "units" in kind else "")
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "cp1252", "utf-16"])
+def test_names_beyond_ascii(tmp_path: Path, encoding: str) -> None:
+    path = tmp_path / "Prüfstand é.csv"
+    path.write_text("Zeit;Drehmoment µ [N·m]\n0;1,5\n1;2,5\n", encoding=encoding)
+    found = read_table(path, ["Drehmoment µ"]).columns["Drehmoment µ"]
+    assert found.values.tolist() == [1.5, 2.5]
+    assert found.unit == "N·m"
+
+
+def test_numbers_that_are_none(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(
+        "t,x\n0,\n1,nan\n2,inf\n3,ERR\n4,1e400\n5,-1e308\n6,99999999999999999999\n7,True\n8\n", encoding="utf-8"
+    )
+    found = read_table(path, ["t", "x"]).columns["x"]
+    assert found.texts == 2  # ERR and True
+    assert found.example == "ERR"
+    np.testing.assert_array_equal(found.values, [np.nan, np.nan, np.inf, np.nan, np.inf, -1e308, 1e20, np.nan, np.nan])
+
+
+def test_waveforms_tell_time_and_unit(tmp_path: Path) -> None:
+    columns = recorded(turns=5)
+    columns.pop("t")
+    properties = {"wf_increment": 1 / 5000.0, "wf_start_offset": 0.0, "wf_samples": 100}
+    _tdms(tmp_path / "run.tdms", columns, properties)
+    found = read_measured(mapping(), [tmp_path / "run.tdms"])  # it has no column t
+    assert found.findings == ()
+    assert any("waveforms" in sentence for sentence in found.done)
+    read_measured(mapping({"time": None}), [tmp_path / "run.tdms"])
+    _tdms(tmp_path / "unit.tdms", {"T1": [1.0, 2.0]}, {"unit_string": "mV"})
+    assert read_table(tmp_path / "unit.tdms", ["T1"]).columns["T1"].unit == "mV"
+
+
+def test_groups_of_tdms(tmp_path: Path) -> None:
+    path = tmp_path / "two.tdms"
+    with TdmsWriter(path) as writer:
+        for group, name, values in (("in", "T", [1.0, 2.0]), ("out", "T", [3.0, 4.0]), ("out", "n", [5, 6])):
+            writer.write_segment([ChannelObject(group, name, np.array(values))])
+    found = read_table(path, ["in/T", "out/T", "n", "out/n"])
+    assert [one.values.tolist() for one in found.columns.values()] == [[1, 2], [3, 4], [5, 6], [5, 6]]
+    with pytest.raises(MechanismError, match=r"there is no column 'T'; the file has 'in/T', 'out/T', 'n'"):
+        read_table(path, ["T"])
+    _tdms(path, {"a": [1.0, 2.0], "b": [1.0]})
+    with pytest.raises(MechanismError, match=r"different numbers of samples: 'a' 2, 'b' 1"):
+        read_table(path, ["a", "b"])
+
+
+def test_kinds_of_parquet(tmp_path: Path) -> None:
+    path = tmp_path / "a.parquet"
+    fields = [
+        pa.field("n", pa.int16(), metadata={"unit": "rpm"}),
+        pa.field("f", pa.float32()),
+        pa.field("when", pa.timestamp("us")),
+    ]
+    rows = {"n": [1, None], "f": [0.5, 2.0], "when": [1_000_000, 1_250_000]}
+    pq.write_table(pa.table(rows, schema=pa.schema(fields)), path)
+    found = read_table(path, ["n", "f", "when"]).columns
+    np.testing.assert_array_equal(found["n"].values, [1, np.nan])
+    assert found["n"].unit == "rpm"
+    assert found["when"].values.tolist() == [0.0, 0.25]
+
+
+BAD: dict[str, tuple[str, bytes, str]] = {
+    "empty": ("a.csv", b"", "is empty"),
+    "blank": ("a.csv", b"\n\n", "has nothing but remarks"),
+    "header only": ("a.csv", b"t,T1\n", "has a header but no rows"),
+    "no header": ("a.csv", b"0,1\n1,2\n", "has no header: its first line is 0, 1"),
+    "too many cells": ("a.csv", b"t,T1\n0,1\n1,2,3\n", "has 3 cells, the header has 2"),
+    "decimal commas": ("a.csv", b"t,T1\n0,5,1,5\n1,0,2,5\n", "has 4 cells, the header has 2"),
+    "far below": ("a.csv", b"t,T1\n" + b"0,1\n" * 500 + b"1,2,3\n", "has 3 cells, the header has 2"),
+    "binary": ("a.csv", b"\x00\x01\x02PK", "is not a text file"),
+    "not parquet": ("a.parquet", b"t,T1\n0,1\n", "is not Parquet"),
+    "not tdms": ("a.tdms", b"t,T1\n0,1\n" * 20, "is not TDMS"),
+    "extension": ("a.xlsx", b"PK", "the extension '.xlsx' is none of a data file"),
+    "twice": ("a.csv", b"t,T1,T1\n0,1,2\n", "the column 'T1' stands there 2 times"),
+    "missing": ("a.csv", b"t,T2,n\n0,1,2\n", "there is no column 'T1'; the file has 't', 'T2', 'n'"),
+}
+
+
+@pytest.mark.parametrize("kind", BAD)
+def test_what_is_no_data(tmp_path: Path, kind: str) -> None:
+    name, content, told = BAD[kind]
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(MechanismError) as failure:
+        read_table(tmp_path / name, ["t", "T1"])
+    (finding,) = failure.value.findings
+    assert told in finding.what
+    assert finding.file.endswith(name)
+    assert finding.remedy
+
+
+def test_no_such_file(tmp_path: Path) -> None:
+    (tmp_path / "b.csv").mkdir()
+    with pytest.raises(MechanismError, match="there is no such file"):
+        read_table(tmp_path / "a.csv", ["t"])
+    with pytest.raises(MechanismError, match="is not a file"):
+        read_table(tmp_path / "b.csv", ["t"])
+
+
+@pytest.mark.parametrize(("name", "extra"), [("a.tdms", "tdms"), ("a.parquet", "parquet")])
+def test_package_not_installed(tmp_path: Path, name: str, extra: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(importlib.util, "find_spec", lambda package: None)
+    with pytest.raises(MechanismError, match=rf"pip install 'trunnion\[{extra}\]'"):
+        read_table(tmp_path / name, ["t"])
+
+
+@pytest.mark.parametrize("rows", [1, 2, 3])
+def test_a_few_rows(tmp_path: Path, rows: int) -> None:
+    columns = {name: values[:rows] for name, values in recorded(turns=1).items()}
+    with pytest.raises(MechanismError) as failure:
+        read(columns, tmp_path, {"channels/torque-in/zero": 0})
+    assert all(one.file.endswith("run.csv") and one.remedy for one in failure.value.findings)
+
+
+def test_huge_numbers(tmp_path: Path) -> None:
+    columns = recorded(turns=4)
+    columns["T1"] *= 1e150
+    found = read(columns, tmp_path)
+    assert np.isfinite(found.conditions[0].courses["torque-in"].mean).all()

@@ -1,0 +1,93 @@
+"""`trunnion data` as a user meets it: tables, files, findings, and nothing half-written."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+
+import trunnion
+from manual.conftest import Run, program
+from measured_data.recording import mapping, recorded
+
+__all__ = ["program"]  # a fixture
+
+
+@pytest.fixture
+def rig(tmp_path: Path) -> Path:
+    pd.DataFrame(recorded()).to_csv(tmp_path / "a.csv", index=False)
+    entry = {"file": "a.csv", "set": {"beta": "15 deg"}}
+    text = json.dumps(mapping({"files": [entry], "set": {"input.speed": {"mean": "speed-in"}}}))
+    (tmp_path / "rig.json").write_text(text, encoding="utf-8")
+    return tmp_path / "rig.json"
+
+
+def test_tables_and_files(program: Run, rig: Path, tmp_path: Path) -> None:
+    code, out, err = program(
+        "data", "rig.json", "--units-row", *(f"--out=c{end}" for end in (".csv", ".nc", ".parquet", ".json"))
+    )
+    assert (code, err) == (0, "")
+    for text in (
+        "beta 15 deg",
+        "19",
+        "600",
+        "torque-in",
+        "effort:input",
+        "19 whole turns",
+        "zero of torque-in",
+        "wrote c.nc",
+    ):
+        assert text in out
+    read = trunnion.read_measured(rig)
+    course = read.conditions[0].courses["torque-in"]
+    table = pd.read_csv(tmp_path / "c.csv", skiprows=[1])
+    assert len(table) == 90
+    assert table["torque-in.mean"].to_numpy() == pytest.approx(course.mean)
+    assert table["torque-in.uncertainty"].to_numpy() == pytest.approx(course.uncertainty)
+    assert table["beta"].to_numpy() == pytest.approx(np.radians(15))
+    assert table["input.speed"].to_numpy() == pytest.approx(20 * np.pi, rel=1e-4)
+    assert set(table["condition"]) == {"beta 15 deg"}
+    pd.testing.assert_frame_equal(pd.read_parquet(tmp_path / "c.parquet"), table, check_dtype=False)
+    with xr.open_dataset(tmp_path / "c.nc") as whole:
+        assert whole["mean"].dims == ("condition", "channel", "position")
+        np.testing.assert_array_equal(whole["mean"].sel(channel="torque-in")[0], course.mean)
+        assert json.loads(whole.attrs["measured"])[0] == "effort:input"
+
+
+def test_faults_and_bad_input(program: Run, rig: Path, tmp_path: Path) -> None:
+    columns = recorded()
+    columns["T2"] *= -1
+    pd.DataFrame(columns).to_csv(tmp_path / "b.csv", index=False)
+    code, out, err = program("data", "rig.json", "a.csv", "b.csv")
+    assert code == 1
+    assert "beta 15 deg" in out
+    assert err.startswith(
+        "b.csv: warning: channels.brake: sign: the power that brake takes is below zero in all 19 turns"
+    )
+    pd.DataFrame(columns).drop(columns=["T1", "n2"]).to_csv(tmp_path / "b.csv", index=False)
+    code, out, err = program("data", "rig.json", "a.csv", "b.csv", "--out", "c.csv")
+    assert (code, out) == (2, "")
+    assert "there is no column 'T1', 'n2'; the file has 't', 'T2', 'n1', 'encoder', 'angle'" in err
+    assert not (tmp_path / "c.csv").exists()
+    code, _, err = program("data", "rig.json", "--out", "c.xlsx")
+    assert code == 2
+    assert "cannot write" in err
+    code, _, err = program("data", "missing.yaml")
+    assert code == 2
+    assert "cannot be read" in err
+
+
+def test_many_files(program: Run, rig: Path, tmp_path: Path) -> None:
+    """Conditions of many files: names that tell them apart, sentences once."""
+    for k in range(3):
+        pd.DataFrame(recorded(turns=4 + k, seed=k)).to_csv(tmp_path / f"r{k}.csv", index=False)
+    code, out, _ = program("data", "rig.json", "r0.csv", "r1.csv", "r2.csv")
+    assert code == 0
+    assert "3 to 5 whole turns in each of 3 conditions" in out
+    assert out.count("zero of torque-in") == 1
+    found = trunnion.read_measured(rig, [tmp_path / "r0.csv", tmp_path / "r0.csv"])
+    assert len({one.name for one in found.conditions}) == 2

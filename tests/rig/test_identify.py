@@ -1,0 +1,357 @@
+"""Identification: what is known beforehand is found again, with intervals that hold it as often as they say."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import trunnion
+from rigged import Sensors, True_, truth
+from trunnion.analysis.analyse import prepare
+from trunnion.analysis.friction import FrictionMethod
+from trunnion.analysis.measures import named
+from trunnion.analysis.rig.identify import identify, with_estimates
+from trunnion.analysis.rig.identify.courses import Model
+from trunnion.analysis.rig.identify.run import identified
+from trunnion.analysis.rig.identify.unknowns import described, unknowns
+from trunnion.errors import MechanismError
+from trunnion.measured.measurement import Accuracy, Condition, Course, Measurement
+from trunnion.model.file import read_mechanism
+
+FRICTION = "joint_defaults.friction.coefficient"
+SPEEDS = [{"A.speed": speed} for speed in (2.0, 4.0, 6.0, 8.0, 10.0)]
+TURNED = [{"misalignment": np.radians(a), "input.speed": v} for a in (5.0, 15.0, 25.0) for v in (20.0, 100.0)]
+
+
+@pytest.fixture(scope="module")
+def four_bar() -> trunnion.Mechanism:
+    return read_mechanism("examples/durango-fourbar.yaml")
+
+
+@pytest.fixture(scope="module")
+def cardan() -> trunnion.Mechanism:
+    return read_mechanism("examples/pezzuti-cardan.yaml")
+
+
+@pytest.fixture(scope="module")
+def torque(four_bar: trunnion.Mechanism) -> True_:
+    return truth(four_bar, SPEEDS, {"torque": "effort:A"}, {FRICTION: 0.3})
+
+
+@pytest.fixture(scope="module")
+def shaft(cardan: trunnion.Mechanism) -> True_:
+    channels = {"torque-in": "effort:input", "speed-in": "rate:input", "torque-out": "load:brake",
+                "speed-out": "rate:output"}  # fmt: skip
+    return truth(cardan, TURNED, channels, {FRICTION: 0.35})
+
+
+def said(result: Any, severity: str = "") -> str:
+    rows = json.loads(result.attrs["findings"])
+    return "\n".join(
+        f"{row['where']}: {row['what']}" for row in rows if row["severity"] in (severity or row["severity"])
+    )
+
+
+def covered(model: trunnion.Mechanism, data: True_, true: float, seeds: int, sensors: Sensors) -> int:
+    """How often the interval of the friction coefficient holds the true one."""
+    hits = 0
+    for seed in range(seeds):
+        found = identify(model, data.measured(seed, sensors=sensors), [FRICTION], channels=[next(iter(data.measures))])
+        hits += bool(found["lower"].values[0] <= true <= found["upper"].values[0])
+    return hits
+
+
+# ---- intervals ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "sensors",
+    [Sensors(), Sensors(step=0.004), Sensors(cut_off=0.15)],
+    ids=["white noise", "steps of twice the noise", "low-pass"],
+)
+def test_the_interval_of_a_four_bar_holds_the_true_coefficient(
+    four_bar: trunnion.Mechanism, torque: True_, sensors: Sensors
+) -> None:
+    # of 40 fewer than 34 come out with a chance of 1 in 500 if the interval holds 95 %; of 1000 it was measured
+    assert covered(four_bar, torque, 0.3, 40, sensors) >= 34
+
+
+def test_the_interval_of_a_cardan_joint_holds_the_true_coefficient(cardan: trunnion.Mechanism, shaft: True_) -> None:
+    sensors = Sensors(noise=0.01, zero=0.002, gain=0.002, step=0.002)
+    assert covered(cardan, shaft, 0.35, 20, sensors) >= 16
+
+
+def test_more_turns_make_it_narrower_but_not_beyond_the_sensor(cardan: trunnion.Mechanism, shaft: True_) -> None:
+    sensors = Sensors(noise=0.002, zero=0.05, gain=0.0)
+    one = replace(shaft, conditions=shaft.conditions[:1], courses=shaft.courses[:1])
+    few, many = (
+        identify(cardan, one.measured(1, turns, sensors), ["brake.resisting_torque"], channels=["torque-out"])
+        for turns in (5, 40)
+    )
+    stated = 0.05 * 10.0
+    for found in (few, many):
+        assert found["standard_uncertainty"].values[0] == pytest.approx(stated, rel=0.02)
+    assert "% of its variance is the zero of torque-out: more turns do not help" in said(many)
+    assert float(many["share"].sel(source="zero of torque-out")[0]) > 0.99
+
+
+def test_a_coefficient_on_its_limit_has_a_one_sided_interval(four_bar: trunnion.Mechanism) -> None:
+    slippery = truth(four_bar, SPEEDS[:2], {"torque": "effort:A"}, {FRICTION: 0.0})
+    found = [identify(four_bar, slippery.measured(seed, 6), [FRICTION], start={FRICTION: 0.1}) for seed in range(4)]
+    limits = [int(one["limit"].values[0]) for one in found]
+    assert -1 in limits
+    for one, limit in zip(found, limits, strict=True):
+        assert one["lower"].values[0] >= 0.0
+        assert one["upper"].values[0] > 0.0
+        assert (limit == -1) == ("on its limit 0: at most" in said(one))
+
+
+def test_derivatives_are_those_of_differences(cardan: trunnion.Mechanism) -> None:
+    names = [FRICTION, "misalignment", "brake.resisting_torque", "input-shaft.mass", "drivers.input.speed"]
+    run = prepare(cardan)
+    sought = tuple(unknowns(cardan, described(cardan, names), {}))
+    measures = {"effort:input": named(cardan, ["effort:input"], run.values)[0],
+                "efficiency:cycle": named(cardan, ["efficiency:cycle"], run.values)[0]}  # fmt: skip
+    phases = (np.arange(12) / 12 + 0.01,) * 2
+    model = Model(run, sought, measures, ({"dimensions.bearing": 0.07}, {}), phases, FrictionMethod())
+    at = np.array([one.start for one in sought])
+    exact = model.courses(at)
+    for p in range(len(names)):
+        step = 1e-6 * at[p] * (np.arange(len(at)) == p)
+        low, high = model.courses(at - step), model.courses(at + step)
+        for k in range(2):
+            for name in measures:
+                slope = (high.said[k][name].value - low.said[k][name].value) / (2 * step[p])
+                scale = np.max(np.abs(exact.said[k][name].value)) / at[p]
+                assert exact.said[k][name].slope[p] == pytest.approx(slope, abs=1e-6 * scale)
+
+
+# ---- what cannot be told apart --------------------------------------------------------------------------------
+
+
+def test_a_product_is_not_taken_apart(four_bar: trunnion.Mechanism, torque: True_) -> None:
+    pairs = {"coefficient": [FRICTION], "pair": [f"joints.{one}.friction.pair_factor" for one in "ABCD"]}
+    found = identify(four_bar, torque.measured(3, sensors=Sensors(noise=0.001)), pairs)
+    assert np.isnan(found["estimate"].values).all()
+    assert np.isnan(found["upper"].values).all()
+    text = said(found, "warning")
+    assert "coefficient and pair act on torque in the same way: their product is known, 0." in text
+    assert "neither alone" in text
+
+
+def test_two_pins_are_told_by_the_course_but_not_by_the_efficiency(cardan: trunnion.Mechanism, shaft: True_) -> None:
+    pins = ["pin-1.friction.coefficient", "pin-2.friction.coefficient"]
+    exact = Sensors(noise=0.002, zero=0.0, gain=0.0)
+    one = replace(shaft, conditions=shaft.conditions[2:3], courses=shaft.courses[2:3])
+    rest = {"output.friction.coefficient": 0.35, "input.friction.coefficient": 0.35}
+    model = cardan.with_values(rest)
+    course = identify(model, one.measured(1, sensors=exact), pins, channels=["torque-in"])
+    assert course["told"].values.tolist() == [1, 1]
+    assert np.all(np.abs(course["estimate"].values - 0.35) < 4 * course["standard_uncertainty"].values)
+    figure = identify(model, one.measured(1, sensors=exact), pins, channels=["efficiency"])
+    assert figure["told"].values.tolist() == [0, 0]
+    assert "pin-1.friction.coefficient and pin-2.friction.coefficient act on efficiency in the same way" in said(figure)
+
+
+def test_two_loads_in_one_place_are_known_as_their_sum(cardan: trunnion.Mechanism, shaft: True_) -> None:
+    loads = {**cardan.data()["loads"], "fan": {"joint": "output", "resisting_torque": "4 N m"}}
+    model = trunnion.Mechanism(**{**cardan.data(), "loads": loads}).with_values({FRICTION: 0.35})
+    names = ["brake.resisting_torque", "fan.resisting_torque"]
+    found = identify(model, shaft.measured(5), names, channels=["torque-in"])
+    assert found["told"].values.tolist() == [0, 0]
+    assert "their sum is known, 10.0" in said(found, "warning")
+
+
+def test_what_has_no_effect_is_said_and_a_zero_that_is_not_known(cardan: trunnion.Mechanism, shaft: True_) -> None:
+    names = [FRICTION, "cross.inertia.xx", "brake.resisting_torque"]
+    data = shaft.measured(2)
+    free = tuple(
+        replace(
+            one, courses={**one.courses, "torque-out": replace(one.courses["torque-out"], accuracy=Accuracy(np.inf))}
+        )
+        for one in data.conditions[:2]
+    )
+    found = identify(cardan, replace(data, conditions=free), names[1:], channels=["torque-out"])
+    assert np.isnan(found["estimate"].values).all()
+    text = said(found, "warning")
+    assert "cross.inertia.xx has no effect on torque-out" in text
+    assert "brake.resisting_torque and the zero of torque-out act on torque-out in the same way" in text
+
+
+# ---- misfit, conditions, what is held out ---------------------------------------------------------------------
+
+
+def test_a_model_that_does_not_fit_is_said_and_its_intervals_are_wider(
+    four_bar: trunnion.Mechanism, torque: True_
+) -> None:
+    data = torque.measured(1, sensors=Sensors(noise=0.001))
+    true = identify(four_bar, data, [FRICTION])
+    heavy = identify(four_bar.with_values({"coupler.mass": "31 kg"}), data, [FRICTION])
+    assert "does not fit" in said(heavy, "warning")
+    assert "does not fit" not in said(true)
+    assert heavy["standard_uncertainty"].values[0] > 3 * true["standard_uncertainty"].values[0]
+    assert heavy.attrs["reduced_chi_squared"] > 2
+
+
+def test_what_is_held_out_is_predicted(four_bar: trunnion.Mechanism, torque: True_) -> None:
+    data = torque.measured(4)
+    found = identify(four_bar, data, [FRICTION], hold_out=["run-2", "A.speed=8"])
+    assert np.flatnonzero(found["held_out_turns"].values[0]).tolist() == [1, 3]
+    assert 0.7 < found.attrs["hold_out_ratio"] < 1.3
+    assert np.nanmax(found["held_out_after"].values) < np.nanmin(found["held_out_before"].values)
+    turns = identify(four_bar, data, [FRICTION], hold_out=0.3)
+    assert turns["turns"].values.tolist() == [[7] * 5]
+    assert turns["held_out_turns"].values.tolist() == [[3] * 5]
+
+
+def test_conditions_that_disagree_make_it_wider(four_bar: trunnion.Mechanism, torque: True_) -> None:
+    data = torque.measured(1, sensors=Sensors(noise=0.002, zero=0.0, gain=0.0))
+    drawn = np.random.default_rng(1).normal(size=5) * 40.0
+    moved = tuple(
+        replace(one, courses={"torque": replace(one.courses["torque"], turns=one.courses["torque"].turns + zero)})
+        for one, zero in zip(data.conditions, drawn, strict=True)
+    )
+    plain, apart = (identify(four_bar, one, [FRICTION]) for one in (data, replace(data, conditions=moved)))
+    assert "conditions disagree" in said(apart, "warning")
+    assert "conditions disagree" not in said(plain)
+    assert apart["standard_uncertainty"].values[0] > 1.5 * plain["standard_uncertainty"].values[0]
+
+
+def test_a_sensor_that_lags_is_allowed_for(cardan: trunnion.Mechanism, shaft: True_) -> None:
+    late = 2e-4
+    data = shaft.measured(1, sensors=Sensors(noise=0.002, zero=0.0, gain=0.0))
+    conditions = []
+    for one in data.conditions:
+        turns = one.courses["torque-in"].turns
+        ahead = (one.phase - late * one.values["input.speed"] / (2 * np.pi)) % 1.0
+        noise = turns - turns.mean(axis=0)
+        read = np.interp(ahead, np.append(one.phase, 1.0), np.append(turns.mean(axis=0), turns.mean(axis=0)[0]))
+        conditions.append(replace(one, courses={"torque-in": replace(one.courses["torque-in"], turns=read + noise)}))
+    lagging = replace(data, conditions=tuple(conditions))
+    plain = identify(cardan, lagging, [FRICTION], guard=2)
+    found = identify(cardan, lagging, [FRICTION], guard=2, delay=5e-4)
+    assert "does not fit" in said(plain)
+    assert float(found["sensor_error"].sel(sensor="delay of torque-in")) * 5e-4 == pytest.approx(late, rel=0.1)
+    assert found.attrs["reduced_chi_squared"] < 0.5 * plain.attrs["reduced_chi_squared"]
+    assert found["standard_uncertainty"].values[0] < plain["standard_uncertainty"].values[0]
+
+
+def test_one_turn_alone_takes_its_scatter_from_the_residuals(four_bar: trunnion.Mechanism, torque: True_) -> None:
+    found = identify(four_bar, torque.measured(1, turns=1, sensors=Sensors(noise=0.0005)), [FRICTION])
+    assert "no turn is repeated" in said(found)
+    assert np.isnan(found.attrs["reduced_chi_squared"])
+    assert found["lower"].values[0] < 0.3 < found["upper"].values[0]
+
+
+# ---- the search -----------------------------------------------------------------------------------------------
+
+
+def test_a_start_that_locks_is_left(cardan: trunnion.Mechanism) -> None:
+    short = cardan.with_values({"bearing": "10 mm"})
+    true = truth(short, TURNED[:2], {"torque-in": "effort:input"}, {FRICTION: 0.1})
+    found = identify(short, true.measured(1), [FRICTION])
+    assert found["lower"].values[0] < 0.1 < found["upper"].values[0]
+    assert "began with" in said(found)
+
+
+def test_a_clearance_by_the_seat_it_is_given(four_bar: trunnion.Mechanism) -> None:
+    data = four_bar.data()
+    data["joints"] = {**data["joints"], "B": {**data["joints"]["B"], "pin": {"radius": "7.5 mm", "clearance": "1 mm"},
+                                              "seat": {"xi": "0 deg"}}}  # fmt: skip
+    model = trunnion.Mechanism(**data)
+    true = truth(model, SPEEDS[:1], {"angle": "rotation:D"}, {})
+    loose = trunnion.analyse(model.with_values({"B.pin.clearance": "0.8 mm"}), steps=72)
+    true = replace(true, courses=({"angle": loose["joint_rotation"].sel(joint="D").values},))
+    found = identify(model, true.measured(1, sensors=Sensors(noise=1e-4, zero=1e-6)), ["B.pin.clearance"])
+    assert found["lower"].values[0] < 0.8e-3 < found["upper"].values[0]
+    assert found["standard_uncertainty"].values[0] < 0.1e-3
+
+
+def test_a_clearance_by_pins_that_lie_as_they_are_loaded() -> None:
+    model = read_mechanism("examples/fourbar-with-play.yaml")
+    joint = next(iter(model.seated))
+    path = model.path_of(f"joints.{joint}.pin.clearance")
+    true, output = float(model.parameters()[path]), next(iter(model.drivers))
+    course = trunnion.analyse(model, steps=24)["drive_effort"].sel(driver=output).values
+    noise = np.random.default_rng(1).normal(size=(6, 24)) * 1e-7 * np.max(np.abs(course))
+    data = Course("torque", f"effort:{output}", "N m", course + noise)
+    measured = Measurement("play", (Condition("one", {}, np.arange(24) / 24, {"torque": data}),))
+    found = identify(model, measured, [path], start={path: 0.7 * true})
+    assert found["estimate"].values[0] == pytest.approx(true, rel=0.02)
+
+
+def test_terms_of_a_law_with_speed(four_bar: trunnion.Mechanism) -> None:
+    law = {"law": "viscous", "coefficient": 0.1, "viscous": "0.5 s/m"}
+    model = trunnion.Mechanism(**{**four_bar.data(), "joint_defaults": {"pin": {"radius": "75 mm"}, "friction": law}})
+    wanted = [FRICTION, "joint_defaults.friction.viscous"]
+    true = truth(model, SPEEDS, {"torque": "effort:A"}, {FRICTION: 0.15, wanted[1]: 0.3})
+    found = identify(model, true.measured(1, sensors=Sensors(noise=0.0005)), wanted)
+    off = (found["estimate"].values - [0.15, 0.3]) / found["standard_uncertainty"].values
+    assert np.all(np.abs(off) < 4)
+    assert -1 < found["correlation"].values[0, 1] < -0.3
+
+
+# ---- written back, refused ------------------------------------------------------------------------------------
+
+
+def test_estimates_are_written_with_the_digits_they_have(cardan: trunnion.Mechanism, shaft: True_) -> None:
+    names = [FRICTION, "brake.resisting_torque", "misalignment"]
+    fixed = replace(shaft, conditions=tuple({"input.speed": one["input.speed"]} for one in shaft.conditions[2:4]),
+                    courses=shaft.courses[2:4])  # fmt: skip
+    found = identify(cardan, fixed.measured(1), names, channels=["torque-in", "torque-out"],
+                     start={"misalignment": "12 deg"})  # fmt: skip
+    written = with_estimates(cardan, found)
+    values = written.parameters()
+    spread = found["standard_uncertainty"].values
+    for p, name in enumerate(names):
+        path = cardan.path_of(name)
+        assert abs(values[path] - found["estimate"].values[p]) <= 0.1 * spread[p]
+        assert found["lower"].values[p] < found["upper"].values[p]
+    assert str(written.dimensions["misalignment"].source).endswith(" deg")
+    assert str(written.loads["brake"].resisting_torque.source).endswith(" N m")  # type: ignore[union-attr]
+    assert len(str(written.joint_defaults.friction.parameters["coefficient"].source)) <= 7  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"parameters": ["friction"]}, "not one number"),
+        ({"parameters": {"a": [FRICTION], "b": [FRICTION]}}, "is in 'a' already"),
+        ({"parameters": ["A.speed"]}, "sets drivers.A.speed"),
+        ({"parameters": []}, "nothing to identify"),
+        ({"parameters": {"a": ["AB", "gamma"]}}, "not of one kind"),
+        ({"channels": ["force"]}, "the measurement has torque"),
+        ({"hold_out": ["run-9"]}, "there is no condition 'run-9'"),
+        ({"hold_out": 1.5}, "cannot be held out"),
+        ({"hold_out": [f"run-{k}" for k in range(1, 6)]}, "all conditions are held out"),
+        ({"start": {"mass": 1.0}}, "is none of the parameters"),
+        ({"start": {FRICTION: -1.0}}, "least is 0"),
+    ],
+)
+def test_what_is_wrong_is_said(
+    four_bar: trunnion.Mechanism, torque: True_, change: dict[str, Any], message: str
+) -> None:
+    options: dict[str, Any] = {"parameters": [FRICTION], **change}
+    with pytest.raises(MechanismError, match=message):
+        identify(four_bar, torque.measured(1), **options)
+
+
+def test_a_channel_without_a_course_is_refused(four_bar: trunnion.Mechanism, torque: True_) -> None:
+    data = torque.measured(1)
+    course = replace(data.conditions[0].courses["torque"], measures="locking_margin:mechanism")
+    odd = Measurement("odd", (replace(data.conditions[0], courses={"torque": course}),))
+    with pytest.raises(MechanismError, match="no one number at each position"):
+        identify(four_bar, odd, [FRICTION])
+
+
+def test_positions_where_a_friction_turns_round_are_left_out(four_bar: trunnion.Mechanism, torque: True_) -> None:
+    found = identified(four_bar, torque.measured(1), [FRICTION])
+    out = [np.flatnonzero(~mask) for mask in found.problem.masks]
+    assert all(len(one) == 9 for one in out)
+    assert not np.isfinite(
+        identify(four_bar, torque.measured(1), [FRICTION])["residual_after"].values[0, 0, out[0]]
+    ).any()

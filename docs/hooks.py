@@ -265,6 +265,14 @@ def tolerances_table() -> str:
     return _toleranced(VARIABLES)
 
 
+def identification_table() -> str:
+    """Every variable of an identification."""
+    from trunnion.analysis.rig.identify.result import VARIABLES
+
+    rows = [(_code(name), ", ".join(one.dims), _unit(one.units), one.long_name) for name, one in VARIABLES.items()]
+    return _rows(("variable", "dimension", "unit", "meaning"), rows)
+
+
 def allocations_table() -> str:
     """Every variable of an allocation beside those of the tolerance analysis."""
     from trunnion.analysis.allocation.result import VARIABLES
@@ -647,6 +655,7 @@ TABLES: dict[str, Callable[..., str]] = {
     "plays": plays_table,
     "tolerances": tolerances_table,
     "allocations": allocations_table,
+    "identification": identification_table,
     "measures": measures_table,
     "distributions": distributions_table,
     "cost-models": costs_table,

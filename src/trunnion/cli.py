@@ -6,6 +6,7 @@ Exit status: 0 fine, 1 findings (cannot be assembled somewhere, locks, dead cent
 from __future__ import annotations
 
 import sys
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -56,6 +57,14 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
+
+
+class FileKind(StrEnum):
+    """Files that have a JSON Schema."""
+
+    MODEL = "model"
+    DATA = "data"
+
 
 INTERRUPTED = 130  # exit status after Ctrl-C
 
@@ -313,12 +322,20 @@ def examples(
 
 @app.command()
 def schema(
+    of: Annotated[
+        FileKind, typer.Option("--of", help="Of which file: a model, or data: the mapping.")
+    ] = FileKind.MODEL,
     out: Annotated[Path | None, typer.Option("--out", help="Write it to a file.", show_default=False)] = None,
 ) -> None:
-    """The JSON Schema of the model file, for editors that complete and check as you type."""
-    from trunnion.model.schema import SCHEMA_FILE
+    """The JSON Schema of the model file or the mapping file, for editors that complete and check as you type."""
+    if of is FileKind.DATA:
+        from trunnion.measured.schema import schema_text
 
-    text = SCHEMA_FILE.read_text("utf-8")
+        text = schema_text()
+    else:
+        from trunnion.model.schema import SCHEMA_FILE
+
+        text = SCHEMA_FILE.read_text("utf-8")
     if out is None:
         print(text, end="")
         return

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from manual.conftest import Run, program
 from measured_data.recording import Columns, mapping, off, read, recorded
 from trunnion.errors import MechanismError
 from trunnion.measured.mapping import read_mapping
 from trunnion.measured.read import read_measured
+
+__all__ = ["program"]  # a fixture
 
 
 @pytest.fixture(scope="module")
@@ -122,8 +126,6 @@ def test_only_files_below_its_folder(tmp_path: Path, name: str, columns: Columns
     (tmp_path / "inner").mkdir()
     (tmp_path / "inner" / "link").symlink_to(tmp_path)
     path = tmp_path / "inner" / "m.json"
-    import json
-
     path.write_text(json.dumps(mapping({"files": [{"file": name}]})), encoding="utf-8")
     read(columns, tmp_path)
     with pytest.raises(MechanismError, match="is not below the folder of the mapping"):
@@ -131,8 +133,6 @@ def test_only_files_below_its_folder(tmp_path: Path, name: str, columns: Columns
 
 
 def test_files_beside_the_mapping(tmp_path: Path, columns: Columns) -> None:
-    import json
-
     read(columns, tmp_path)
     path = tmp_path / "m.json"
     path.write_text(json.dumps(mapping({"files": [{"file": "run.csv", "set": {"beta": "15 deg"}}]})), encoding="utf-8")
@@ -200,3 +200,15 @@ def test_forces_and_slides(tmp_path: Path, columns: Columns) -> None:
     units = [one.unit for one in found.conditions[0].courses.values()]
     assert units == ["N m", "rad/s", "N", "m/s", "m", "N m"]
     assert found.conditions[0].courses["x"].mean == pytest.approx(found.conditions[0].courses["brake"].mean * 1e-6)
+
+
+def test_schema(program: Run) -> None:
+    """The JSON Schema takes a mapping that the program takes, and has its keys."""
+    jsonschema = pytest.importorskip("jsonschema")
+    code, text, _ = program("schema", "--of", "data")
+    assert code == 0
+    schema = json.loads(text)
+    jsonschema.validate(mapping({"filter": {"cut_off": "50 Hz"}, "set": {"a": {"mean": "brake"}, "b": "3 N"}}), schema)
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(mapping({"filtre": {"cut_off": "50 Hz"}}), schema)
+    assert schema["required"] == ["trunnion-data", "channels"]

@@ -13,6 +13,7 @@ import xarray as xr
 import trunnion
 from manual.conftest import Run, program
 from measured_data.recording import mapping, recorded
+from trunnion.measured.table import dataset
 
 __all__ = ["program"]  # a fixture
 
@@ -32,7 +33,7 @@ def test_tables_and_files(program: Run, rig: Path, tmp_path: Path) -> None:
     )
     assert (code, err) == (0, "")
     for text in (
-        "beta 15 deg",
+        "15\u00a0deg",
         "19",
         "600",
         "torque-in",
@@ -64,7 +65,7 @@ def test_faults_and_bad_input(program: Run, rig: Path, tmp_path: Path) -> None:
     pd.DataFrame(columns).to_csv(tmp_path / "b.csv", index=False)
     code, out, err = program("data", "rig.json", "a.csv", "b.csv")
     assert code == 1
-    assert "beta 15 deg" in out
+    assert "beta 15 deg" in out  # the other condition has its file for a name
     assert err.startswith(
         "b.csv: warning: channels.brake: sign: the power that brake takes is below zero in all 19 turns"
     )
@@ -91,3 +92,11 @@ def test_many_files(program: Run, rig: Path, tmp_path: Path) -> None:
     assert out.count("zero of torque-in") == 1
     found = trunnion.read_measured(rig, [tmp_path / "r0.csv", tmp_path / "r0.csv"])
     assert len({one.name for one in found.conditions}) == 2
+
+
+def test_nothing_was_set(tmp_path: Path) -> None:
+    pd.DataFrame(recorded(turns=3)).to_csv(tmp_path / "a.csv", index=False)
+    found = dataset(trunnion.read_measured(mapping(), [tmp_path / "a.csv"]))
+    assert found["set"].shape == (1, 0)
+    trunnion.save(found, tmp_path / "c.csv")
+    assert list(pd.read_csv(tmp_path / "c.csv").columns[:3]) == ["condition", "phase", "torque-in.mean"]

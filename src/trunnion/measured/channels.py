@@ -195,7 +195,11 @@ def filtered(values: Array, line: Timeline, low_pass: Filter, account: Account, 
                 lost += high - low
                 continue
             pad = min(high - low - 1, max(least - 1, int(rate / cut_off)))
-            result[low:high] = sosfiltfilt(sections, bridged[low:high], padlen=pad)
+            try:
+                result[low:high] = sosfiltfilt(sections, bridged[low:high], padlen=pad)
+            except np.linalg.LinAlgError:
+                what = f"order {low_pass.order} at {cut_off:g} Hz of {rate:.4g} Hz cannot be computed"
+                raise MechanismError(Finding(what, "filter", "lower the order", file=account.file)) from None
     if lost:
         what = f"{counted(lost, 'sample')} between gaps too close together for the filter; left out"
         account.warn(where, what, "raise the cut-off, or mend what makes the gaps")

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, Tag, ValidationError, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, Tag, ValidationError, WithJsonSchema, model_validator
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.measured.amounts import Amount, Frequency, Number, UnitText, alike, dimensions
@@ -45,8 +45,20 @@ class FromData(Part):
         return self
 
 
+def _fixed(quantity: Quantity) -> Quantity:
+    """A number with its unit; there are no dimensions here that an expression could speak of."""
+    if quantity.names:
+        what = f"'{quantity.source}' speaks of {', '.join(quantity.names)}"
+        raise problem(what, "write a number with its unit")
+    return quantity
+
+
+FixedAngle = Annotated[Angle, AfterValidator(_fixed)]
+FixedNumber = Annotated[Dimensionless, AfterValidator(_fixed)]
+FixedRate = Annotated[Rate, AfterValidator(_fixed)]
+FixedQuantity = Annotated[AnyQuantity, AfterValidator(_fixed)]
 Setting = Annotated[
-    Annotated[FromData, Tag(":group")] | Annotated[AnyQuantity, Tag(":value")],
+    Annotated[FromData, Tag(":group")] | Annotated[FixedQuantity, Tag(":value")],
     forms("a number with its unit, {mean: channel} or {column: name, unit: deg}"),
 ]
 
@@ -56,6 +68,9 @@ def _span(value: object) -> object:
     if isinstance(value, (list, tuple)) and value and not isinstance(value[0], (list, tuple)):
         return [value]
     return value
+
+
+_PAIR = {"type": "array", "items": {"type": ["number", "string"]}, "minItems": 2, "maxItems": 2}
 
 
 class File(Part):
@@ -102,9 +117,9 @@ class AngleSource(Part):
     per_turn: Annotated[int, Field(ge=1, le=10_000_000)] | None = None
     kind: Literal["count", "level"] | None = None
     wrap: Annotated[int, Field(ge=2)] | None = None
-    speed: Rate | None = None
+    speed: FixedRate | None = None
     channel: str | None = None
-    zero: Angle = Quantity(0.0, KINDS["angle"])
+    zero: FixedAngle = Quantity(0.0, KINDS["angle"])
     index: Index | None = None
     sign: Sign = 1
 
@@ -139,7 +154,12 @@ _KEYS = {
 class Zero(Part):
     """The zero of a channel as the mean over stretches of time in which nothing loads the sensor."""
 
-    over: Annotated[tuple[tuple[Number, Number], ...], BeforeValidator(_span), Field(min_length=1, max_length=20)]
+    over: Annotated[
+        tuple[tuple[Number, Number], ...],
+        BeforeValidator(_span),
+        Field(min_length=1, max_length=20),
+        WithJsonSchema({"anyOf": [_PAIR, {"type": "array", "items": _PAIR, "minItems": 1, "maxItems": 20}]}),
+    ]
 
     @model_validator(mode="after")
     def _ordered(self) -> Zero:
@@ -150,7 +170,7 @@ class Zero(Part):
 class Accuracies(Part):
     """Standard uncertainties of a sensor: of its gain, relative, and of its zero."""
 
-    gain: Dimensionless = Quantity(0.0, KINDS["number"])
+    gain: FixedNumber = Quantity(0.0, KINDS["number"])
     zero: Number = Amount(0.0, 0.0, "", {})
 
     @model_validator(mode="after")
@@ -217,8 +237,8 @@ class DataMapping(Part):
     channels: Annotated[Mapping[Name, Channel], Field(min_length=1)]
     set: Mapping[str, Setting] = {}
     filter: Filter | None = None
-    cycle: AnyQuantity = Quantity.read("1 turn")
-    start: Angle = Quantity(0.0, KINDS["angle"])
+    cycle: FixedQuantity = Quantity.read("1 turn")
+    start: FixedAngle = Quantity(0.0, KINDS["angle"])
     positions: Annotated[int, Field(ge=2, le=100_000)] = 360
     drift: Literal["report", "remove"] = "report"
 
@@ -277,12 +297,9 @@ def _check(mapping: DataMapping) -> Iterator[Finding]:
     for number, file in enumerate(mapping.files):
         settings |= {f"files.{number}.set.{key}": value for key, value in file.set.items()}
     for where, value in settings.items():
-        if isinstance(value, Quantity) and value.names:
-            what = f"'{value.source}' speaks of {', '.join(value.names)}; a value that was set is a number"
-            yield Finding(what, where, "write a number with its unit")
-        elif isinstance(value, FromData) and value.mean is not None and value.mean not in channels:
+        if isinstance(value, FromData) and value.mean is not None and value.mean not in channels:
             yield Finding(f"there is no channel '{value.mean}'", f"{where}.mean", nearest(value.mean, channels))
-    if mapping.cycle.names or mapping.cycle.check({}) not in (ANGLE, KINDS["time"].dimensions[0], None):
+    if mapping.cycle.check({}) not in (ANGLE, KINDS["time"].dimensions[0], None):
         yield Finding(f"'{mapping.cycle.source}' is no angle and no time", "cycle", "write it as 360 deg or 0.5 s")
     elif not float(mapping.cycle.evaluate()) > 0:
         yield Finding("the cycle is not above zero", "cycle", "write it as 360 deg or 0.5 s")

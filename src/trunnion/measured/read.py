@@ -46,7 +46,8 @@ def read_measured(
     for path, entry in _files(mapped, files):
         account = Account(str(path))
         try:
-            conditions += _File(mapped.mapping, path, entry, account).conditions()
+            with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # of numbers near the end of the floats
+                conditions += _File(mapped.mapping, path, entry, account).conditions()
         except MechanismError as error:
             account.findings += [one for one in error.findings if one not in account.findings]
             failed = True
@@ -201,6 +202,9 @@ class _File:
             what = f"the sampling is too slow for the filter: {rate:.6g} Hz, a cut-off of {cut_off:g} Hz"
             remedy = f"state a cut-off below {rate / 2:.4g} Hz, or sample faster"
             raise MechanismError(Finding(what, "filter.cut_off", remedy, file=str(self.path)))
+        if cut_off * float(np.ptp(self.line.seconds)) < 2:
+            what = f"the cut-off of {cut_off:g} Hz is slower than the recording of {np.ptp(self.line.seconds):.4g} s"
+            raise MechanismError(Finding(what, "filter.cut_off", "state a higher one", file=str(self.path)))
         if not self.line.even:
             self.account.warn("filter", "the samples are not evenly spaced in time, as a filter needs them",
                               "record at a fixed rate, or leave out the filter")  # fmt: skip
@@ -303,7 +307,10 @@ class _File:
         positions = self.mapping.positions
         speed = np.nan if self.mapping.timed else way * self._rate([part.turns])
         name = self._named(part.setting)
-        return Condition(name, values, np.arange(positions) / positions, courses, (str(self.path),), speed)
+        timed = self.mapping.timed
+        start, cycle = (np.nan if timed else float(one.evaluate()) for one in (self.mapping.start, self.mapping.cycle))  # type: ignore[arg-type]
+        phase = np.arange(positions) / positions
+        return Condition(name, values, phase, courses, (str(self.path),), speed, start, cycle)
 
 
 def _columns(mapping: DataMapping, entry: File) -> tuple[list[str], list[str]]:

@@ -43,7 +43,7 @@ def dataset(measurement: Measurement) -> xr.Dataset:
             "turns": (dims, every("count"), {"units": "1", "long_name": count}),
             "set": (
                 ("condition", "setting"),
-                values.reshape(-1, len(names)),
+                values.reshape(len(conditions), len(names)),
                 {"units": "SI", "long_name": "what was set"},
             ),
             "speed": (

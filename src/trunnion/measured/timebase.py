@@ -129,8 +129,8 @@ def _tell_gaps(seconds: Array, steps: Array, step: float, account: Account) -> N
     wide = np.flatnonzero(steps > GAP * step)
     if not wide.size:
         return
-    missing = int(np.sum(np.rint(steps[wide] / step) - 1))
+    missing = float(np.sum(np.rint(steps[wide] / step) - 1))
     longest = int(wide[np.argmax(steps[wide])])
-    what = f"{counted(wide.size, 'gap')} in time, {counted(missing, 'sample')} missing"
+    what = f"{counted(wide.size, 'gap')} in time, {missing:,.0f} {'sample' if missing == 1 else 'samples'} missing"
     where = f"the longest {steps[longest]:.4g} s at {seconds[longest]:.5g} s"
     account.warn("time", f"{what}, {where}", "the positions in them have fewer turns; check the logger's buffer")

@@ -161,7 +161,10 @@ def _walk(value: object, path: str, location: Location) -> Iterator[Entry]:
 
 
 # of anything but coordinates
-_LISTS = ("points", "references", "links", "joints", "between", "loop", "correlations", "of", "values", "files")
+_LISTS = (
+    *("points", "references", "links", "joints", "between", "loop", "correlations", "of", "values"),
+    *("files", "faults", "conditions"),
+)
 
 
 def item_name(location: Location, index: int) -> str:

@@ -15,12 +15,12 @@ from pydantic.json_schema import GenerateJsonSchema
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.quantity import Quantity
 
-__all__ = ["SCHEMA_FILE", "json_schema", "schema_text"]
+__all__ = ["SCHEMA_FILE", "SchemaGenerator", "json_schema", "schema_text"]
 
 SCHEMA_FILE = Path(__file__).with_name("mechanism.schema.json")
 
 
-class _Generator(GenerateJsonSchema):
+class SchemaGenerator(GenerateJsonSchema):
     """Defaults as they would be written in a file; no titles that repeat the keys."""
 
     def encode_default(self, dft: Any) -> Any:
@@ -32,7 +32,7 @@ class _Generator(GenerateJsonSchema):
 
 def json_schema() -> dict[str, Any]:
     """The JSON Schema (2020-12) of a model file."""
-    schema = Mechanism.model_json_schema(schema_generator=_Generator)
+    schema = Mechanism.model_json_schema(schema_generator=SchemaGenerator)
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         **schema,

@@ -26,7 +26,7 @@ def tables(measurement: Measurement) -> list[Rows]:
     for one, name in list(zip(conditions, short, strict=True))[:MOST]:
         turns = max(course.turns.shape[0] for course in one.courses.values())
         speed = [f"{one.speed * 30 / np.pi:.5g}"] if speeds else []
-        own = [part.replace(" ", "\u00a0") for part in (name.split(", ") if len(settings) > 1 else [name])]
+        own = [name] if named == "condition" else [part.replace(" ", "\u00a0") for part in name.split(", ")]
         rows.append([*own, f"{turns:,}", *speed, *(_figure(_overall(one.courses[key])) for key in channels)])
     if len(conditions) > MOST:
         rows.append([f"{len(conditions) - MOST} more", *[""] * (len(head) - 1)])
@@ -48,12 +48,14 @@ def _channel(courses: list[Course]) -> list[str]:
 
 def _overall(course: Course) -> float:
     known = course.mean[np.isfinite(course.mean)]
-    return float(known.mean()) if known.size else np.nan
+    with np.errstate(over="ignore"):
+        return float(known.mean()) if known.size else np.nan
 
 
 def _rms(values: np.ndarray) -> float:
     known = values[np.isfinite(values)]
-    return float(np.sqrt(np.mean(known**2))) if known.size else np.nan
+    with np.errstate(over="ignore"):
+        return float(np.sqrt(np.mean(known**2))) if known.size else np.nan
 
 
 def _figure(value: float, digits: int = 5) -> str:

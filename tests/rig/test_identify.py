@@ -224,6 +224,21 @@ def test_conditions_that_disagree_make_it_wider(four_bar: trunnion.Mechanism, to
     assert apart["standard_uncertainty"].values[0] > 1.5 * plain["standard_uncertainty"].values[0]
 
 
+def test_a_zero_that_each_file_has_is_an_unknown_of_each(four_bar: trunnion.Mechanism, torque: True_) -> None:
+    data = torque.measured(1, sensors=Sensors(noise=0.001, zero=0.0, gain=0.0))
+    drawn = np.random.default_rng(1).normal(size=5) * 40.0
+    moved = []
+    for one, zero in zip(data.conditions, drawn, strict=True):
+        course = one.courses["torque"]
+        course = replace(course, turns=course.turns + zero, accuracy=Accuracy(zero=40.0, own=40.0))
+        moved.append(replace(one, courses={"torque": course}, files=(f"{one.name}.csv",)))
+    found = identify(four_bar, replace(data, conditions=tuple(moved)), [FRICTION])
+    assert found["lower"].values[0] < 0.3 < found["upper"].values[0]
+    assert "disagree" not in said(found)
+    assert found["sensor_error"].values * 40 == pytest.approx(drawn, abs=10)
+    assert found["source"].values.tolist() == ["scatter", "zero of each file of torque"]
+
+
 def test_a_sensor_that_lags_is_allowed_for(cardan: trunnion.Mechanism, shaft: True_) -> None:
     late = 2e-4
     data = shaft.measured(1, sensors=Sensors(noise=0.002, zero=0.0, gain=0.0))

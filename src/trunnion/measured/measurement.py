@@ -26,11 +26,14 @@ class Accuracy:
 
     zero: of its zero, in the unit of the course; gain: of its gain, relative; they are the same at every position of
     all turns of a file. resolution: step from one reading to the next, in the unit of the course, 0 if it is not known.
+    own: the part of `zero` that each file has by itself, such as that of the mean of its unloaded stretch; what is left
+    of `zero` is the same in all files.
     """
 
     zero: float = 0.0
     gain: float = 0.0
     resolution: float = 0.0
+    own: float = 0.0
 
 
 @dataclass(frozen=True)

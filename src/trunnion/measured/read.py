@@ -298,8 +298,9 @@ class _File:
             own = self.own[name]
             left = drifts[name]
             extra = left.error * left.span / 2 if left else 0.0
-            zero = float(np.hypot(np.hypot(own.accuracy_zero, abs(own.scale.factor) * zeros[name].uncertainty), extra))
-            accuracy = Accuracy(zero, own.accuracy_gain, self.steps[name])
+            of_file = float(np.hypot(abs(own.scale.factor) * zeros[name].uncertainty, extra))
+            zero = float(np.hypot(own.accuracy_zero, of_file))
+            accuracy = Accuracy(zero, own.accuracy_gain, self.steps[name], of_file)
             courses[name] = Course(name, channel.measures, own.scale.unit, part.courses[name], accuracy)
         values = dict(part.setting.values)
         for path, channel_name in part.setting.means.items():

@@ -112,6 +112,7 @@ def sensors(result: xr.Dataset) -> Table | None:
         for name, error, u in zip(
             names(result, "sensor"), result["sensor_error"].values, result["sensor_uncertainty"].values, strict=True
         )
+        if not name.startswith("zero of each file")  # as many as there are files
     ]
     return Table("errors of the sensors", ["", "in stated standard uncertainties, ± 2 u"], rows) if rows else None
 

@@ -155,7 +155,10 @@ class Observation:
     def accuracy(self, name: str) -> Accuracy:
         """What a laboratory that knows its sensors states of one."""
         channel = self.channels[name]
-        return Accuracy(self.zero_uncertainty(name), channel.gain, channel.step)
+        zero = self.zero_uncertainty(name)
+        rests = channel.at_rest and all(case.before for case in self.cases)  # else all files have one offset
+        own = math.sqrt(max(zero**2 - channel.zero**2, 0.0)) if rests else 0.0
+        return Accuracy(zero, channel.gain, channel.step, own)
 
     def measurement(self, positions: int = 360) -> Measurement:
         """The readings as a Measurement, faults left out, without files in between: the angle is the true one."""

@@ -28,7 +28,8 @@ class Block:
     """One channel in one condition.
 
     condition: its index; turns, held: (turn, position), those to fit and those held out; effects: of a course that is
-    computed from others, what a standard uncertainty of each of their errors does to it, by the name of the error.
+    computed from others, what a standard uncertainty of each of their errors does to it, by the name of the error;
+    files: where it comes from.
     """
 
     condition: int
@@ -37,6 +38,7 @@ class Block:
     turns: Array
     held: Array
     effects: Mapping[str, float] = field(default_factory=dict)
+    files: tuple[str, ...] = ()
 
     @property
     def unresolved(self) -> float:
@@ -137,7 +139,7 @@ def blocks_of(
                 continue
             turns = np.atleast_2d(np.asarray(course.turns, float))
             keep = 0 if condition.name in held else len(turns) - _share(turns, share, condition)
-            found.append(Block(index, channel, course, turns[:keep], turns[keep:], effects))
+            found.append(Block(index, channel, course, turns[:keep], turns[keep:], effects, tuple(condition.files)))
     if not any(block.fitted for block in found):
         raise MechanismError(Finding("all conditions are held out", "hold_out", "leave some to fit"))
     return found

@@ -25,6 +25,7 @@ Mask = NDArray[np.bool_]
 MOST_EVALUATIONS = 100
 TOLERANCE = 1e-10  # of cost and step: far below what data of any scatter tell
 PER_GUARD = 90  # positions of a cycle for each that is left out beside a jump, which resampling smears
+OWN = "zero of each file"
 GUESS = 0.01  # of a course: the scatter of one without repetitions, until its residuals are known
 
 
@@ -34,7 +35,7 @@ class Sensor:
 
     sizes: its standard uncertainty in each block, in the unit of the course or relative, 0 in blocks of other sensors;
     of a sensor behind a course that is computed, what it does to that, with its sign.
-    stated: whether anything is known of it; one that is not is free.
+    stated: whether anything is known of it; one that is not is free. group: of one of many, what they are together.
     """
 
     name: str
@@ -42,6 +43,12 @@ class Sensor:
     kind: str
     sizes: tuple[float, ...]
     stated: bool
+    group: str = ""
+
+    @property
+    def source(self) -> str:
+        """What it counts as in the variance of an estimate."""
+        return self.group or self.name
 
 
 def sensors_of(blocks: Sequence[Block], own: Sequence[str] | None = None, delay: float | None = None) -> list[Sensor]:
@@ -54,11 +61,11 @@ def sensors_of(blocks: Sequence[Block], own: Sequence[str] | None = None, delay:
     for kind in ("zero", "gain"):
         groups: dict[tuple[str, str], list[int]] = {}
         for k, block in enumerate(blocks):
-            if getattr(block.course.accuracy, kind) > 0:
+            if _stated(block, kind) > 0:
                 place = own[block.condition] if own else ""
                 groups.setdefault((block.channel, place), []).append(k)
         for (channel, place), members in groups.items():
-            stated = [getattr(blocks[k].course.accuracy, kind) for k in members]
+            stated = [_stated(blocks[k], kind) for k in members]
             free = any(np.isinf(stated))
             if free:
                 turns = [np.vstack([blocks[k].turns, blocks[k].held]) for k in members]
@@ -69,17 +76,54 @@ def sensors_of(blocks: Sequence[Block], own: Sequence[str] | None = None, delay:
                 sizes[k] = float(size)
             name = f"{kind} of {channel}" + (f" in {place}" if place else "")
             found.append(Sensor(name, channel, kind, tuple(sizes), not free))
+    return [*found, *([] if own else _of_files(blocks)), *_late(blocks, delay), *_behind(blocks, own)]
+
+
+def _of_files(blocks: Sequence[Block]) -> list[Sensor]:
+    """The zero that each file has by itself."""
+    single: dict[tuple[str, tuple[str, ...]], list[float]] = {}
+    for k, block in enumerate(blocks):
+        if block.course.accuracy.own > 0:
+            key = block.channel, block.files or (str(block.condition),)
+            single.setdefault(key, [0.0] * len(blocks))[k] = float(block.course.accuracy.own)
+    return [
+        Sensor(f"{OWN} of {channel}: {' '.join(files)}", channel, "zero", tuple(sizes), True, f"{OWN} of {channel}")
+        for (channel, files), sizes in single.items()
+    ]
+
+
+def _late(blocks: Sequence[Block], delay: float | None) -> list[Sensor]:
+    """By how much each channel with a course lags behind the angle."""
+    if not delay:
+        return []
+    size = float(delay) if np.isfinite(delay) else 1e-3
+    rows = {
+        channel: tuple(size * (one.channel == channel and one.turns.shape[1] > 2) for one in blocks)
+        for channel in dict.fromkeys(one.channel for one in blocks)
+    }
+    return [
+        Sensor(f"delay of {channel}", channel, "delay", sizes, bool(np.isfinite(delay)))
+        for channel, sizes in rows.items()
+        if any(sizes)
+    ]
+
+
+def _behind(blocks: Sequence[Block], own: Sequence[str] | None) -> list[Sensor]:
+    """Errors of the sensors behind courses that are computed."""
     effects: dict[tuple[str, str], list[float]] = {}
     for k, block in enumerate(blocks):
         for name, size in block.effects.items():
             name = f"{name} in {own[block.condition]}" if own else name
             effects.setdefault((name, block.channel), [0.0] * len(blocks))[k] = size
-    for channel in dict.fromkeys(block.channel for block in blocks) if delay else ():
-        size = 1e-3 if np.isinf(delay or 0.0) else float(delay or 0.0)
-        sizes = [size * (block.channel == channel and block.turns.shape[1] > 2) for block in blocks]
-        if any(sizes):
-            found.append(Sensor(f"delay of {channel}", channel, "delay", tuple(sizes), bool(np.isfinite(delay or 0.0))))
-    return found + [Sensor(name, channel, "zero", tuple(sizes), True) for (name, channel), sizes in effects.items()]
+    return [Sensor(name, channel, "zero", tuple(sizes), True) for (name, channel), sizes in effects.items()]
+
+
+def _stated(block: Block, kind: str) -> float:
+    """What is stated of an error that a channel has in all conditions."""
+    accuracy = block.course.accuracy
+    if kind == "zero" and np.isfinite(accuracy.zero):
+        return float(np.sqrt(max(accuracy.zero**2 - accuracy.own**2, 0.0)))
+    return float(getattr(accuracy, kind))
 
 
 @dataclass

@@ -173,7 +173,7 @@ def spread_of(problem: Problem, x: Array) -> Spread:
         parts["misfit"] = found
     for s, sensor in enumerate(problem.sensors, problem.count):
         if sensor.stated:
-            parts[sensor.name] = np.outer(inverse[:, s], inverse[:, s])
+            parts[sensor.source] = parts.get(sensor.source, 0.0) + np.outer(inverse[:, s], inverse[:, s])
     whole = np.diagonal(np.sum(list(parts.values()), axis=0))
     random = np.diagonal(np.sum([parts[key] for key in RANDOM if key in parts], axis=0))
     with np.errstate(all="ignore"):  # Welch and Satterthwaite; what was stated has infinite freedom

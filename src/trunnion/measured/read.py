@@ -308,7 +308,7 @@ class _File:
         speed = np.nan if self.mapping.timed else way * self._rate([part.turns])
         name = self._named(part.setting)
         timed = self.mapping.timed
-        start, cycle = (np.nan if timed else float(one.evaluate()) for one in (self.mapping.start, self.mapping.cycle))  # type: ignore[arg-type]
+        start, cycle = (np.nan if timed else float(one.evaluate()) for one in (self.mapping.start, self.mapping.cycle))
         phase = np.arange(positions) / positions
         return Condition(name, values, phase, courses, (str(self.path),), speed, start, cycle)
 

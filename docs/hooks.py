@@ -4,8 +4,9 @@
 - `figures/MODEL/KIND.svg` and `figures/MODEL/report.html` are drawn when a page refers to them. KIND is a plot,
   `assemblies` or `assemble`; MODEL is a file of `examples/`, a block of a page titled `MODEL.yaml`, or an entry of
   `VARIANTS`.
-- `figures/sweeps/NAME.svg`, `figures/plays/NAME.svg`, `figures/assembles/NAME.svg`, `figures/tolerances/NAME.svg` and
-  `figures/allocates/NAME.svg`, `figures/compares/NAME.svg` are drawn by the command of a page, `trunnion sweep … --out NAME.svg` and so on.
+- `figures/sweeps/NAME.svg`, `figures/plays/NAME.svg`, `figures/assembles/NAME.svg`, `figures/tolerances/NAME.svg`,
+  `figures/allocates/NAME.svg` and `figures/compares/NAME.svg` are drawn by the command of a page,
+  `trunnion sweep … --out NAME.svg` and so on.
 - The line that says that a page has no tables in the repository is left out.
 - The gallery is made of the examples and of `tests/gallery/facts.py`; see `gallery_page.py`.
 - `$x$` and `$$x$$` become MathML, which browsers set without any script.
@@ -38,7 +39,8 @@ ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
 EXAMPLES = ROOT / "examples"
 
-COMMANDS = ("sweeps", "plays", "assembles", "tolerances", "allocates", "compares")  # folders of figures that a command draws
+# folders of figures that a command draws
+COMMANDS = ("sweeps", "plays", "assembles", "tolerances", "allocates", "compares")
 
 # model: (the model it is made from, what is replaced in it)
 VARIANTS: dict[str, tuple[str, dict[str, float | str]]] = {
@@ -161,7 +163,7 @@ def _swept(verb: str, name: str, text: str, models: dict[str, str]) -> bytes:
 
 
 def _measured(text: str, command: str) -> list[str]:
-    """The command of a page that writes the data that another reads: `FOLDER/mapping.yaml` is of `rig … --out FOLDER`."""
+    """The command that writes the data that another reads: `FOLDER/mapping.yaml` is of `rig … --out FOLDER`."""
     folder = shlex.split(command)[2].partition("/")[0]
     return re.findall(rf"^trunnion (rig .*--out {re.escape(folder)})$", text, re.MULTILINE)[:1]
 
@@ -261,6 +263,14 @@ def tolerances_table() -> str:
     from trunnion.analysis.tolerance.result import VARIABLES
 
     return _toleranced(VARIABLES)
+
+
+def identification_table() -> str:
+    """Every variable of an identification."""
+    from trunnion.analysis.rig.identify.result import VARIABLES
+
+    rows = [(_code(name), ", ".join(one.dims), _unit(one.units), one.long_name) for name, one in VARIABLES.items()]
+    return _rows(("variable", "dimension", "unit", "meaning"), rows)
 
 
 def allocations_table() -> str:
@@ -645,6 +655,7 @@ TABLES: dict[str, Callable[..., str]] = {
     "plays": plays_table,
     "tolerances": tolerances_table,
     "allocations": allocations_table,
+    "identification": identification_table,
     "measures": measures_table,
     "distributions": distributions_table,
     "cost-models": costs_table,

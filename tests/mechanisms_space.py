@@ -6,6 +6,8 @@ of its pair takes it. So every kind of pair can stand anywhere in a chain.
 
 from __future__ import annotations
 
+import copy
+import functools
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
@@ -78,8 +80,15 @@ TENSOR = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "xz": (0, 2), 
 def draw(seed: int, joints: Mapping[str, tuple[str, str, str]], drivers: tuple[str, ...] = ("A",)) -> Drawn:
     """A random mechanism of joints {name: (kind, first link, second link)}, with masses and loads on all links.
 
-    A link with two ball joints and no other is a slender rod: its mass is spread evenly along their line.
+    A link with two ball joints and no other is a slender rod: its mass is spread evenly along their line. Each is drawn
+    once in a run of the tests; everyone gets a copy of its own.
     """
+    return copy.deepcopy(_drawn(seed, tuple(joints.items()), drivers))
+
+
+@functools.cache
+def _drawn(seed: int, stated: tuple[tuple[str, tuple[str, str, str]], ...], drivers: tuple[str, ...]) -> Drawn:
+    joints = dict(stated)
     rng = np.random.default_rng(seed)
     names = list(dict.fromkeys(link for _, *ends in joints.values() for link in ends if link != "ground"))
     home = {link: frame_of(rng.uniform(-1, 1, 3), random_rotation(rng)) for link in names}

@@ -80,11 +80,11 @@ def test_duals_equal_central_differences(name: str, friction: float | Data | Non
         )
         # where nothing depends on the number, the differences show rounding, 1e-13 over 2e-5
         scale = np.maximum(np.abs(expected).max(axis=1), np.abs(value).max(axis=1) / (5000 * step))
-        for i, path in enumerate(paths):
-            np.testing.assert_allclose(
-                found[i], expected[i], rtol=0, atol=accuracy * scale[i] + 1e-8, err_msg=f"∂({output})/∂({path})"
-            )
-            checked += 1
+        limit = accuracy * scale + 1e-8
+        off = [path for path, row in zip(paths, np.abs(found - expected) > limit[:, None], strict=True) if row.any()]
+        assert not off, f"∂({output})/∂({', '.join(off)})"
+        np.testing.assert_array_equal(np.isnan(found), np.isnan(expected))
+        checked += len(paths)
     assert checked > 100
 
 

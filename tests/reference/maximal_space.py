@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Data = dict[str, Any]
 TURN = 2 * np.pi
-Row = tuple[float, float, float]
+Row = tuple[Any, Any, Any]  # numbers, or one for each of several motions
 
 __all__ = ["Drive", "Frame", "Linkage", "Motion", "cross", "element", "gap", "point", "rotation", "turned", "unrolled"]
 
@@ -53,6 +53,7 @@ class Drive(NamedTuple):
 
 
 REST = Motion(Frame(np.zeros(3), np.eye(3)), *np.zeros((4, 3)))
+TWISTS = np.eye(6).reshape(2, 3, 6)  # velocities and spins of the six unit twists
 
 
 def rotation(axis: Any, angle: float) -> Array:
@@ -125,6 +126,9 @@ class Linkage:
         self.data, self.joints, self.links = data, data["joints"], data["links"]
         self.moving = [link for link in self.links if link != "ground"]
         self.drivers = list(data.get("drivers", {}))
+        self.placed = {
+            (link, name): element(self.links[link], name) for name in self.joints for link in self.joints[name]["links"]
+        }
         self.free = {link: ends for link in self.moving if (ends := self._ball_ends(link))}
 
     def _ball_ends(self, link: str) -> list[str]:
@@ -134,14 +138,12 @@ class Linkage:
 
     def elements(self, motions: Mapping[str, Motion], joint: str) -> tuple[Motion, Motion]:
         """The two elements of a joint as they move."""
-        first, second = (
-            carried(motions.get(n, REST), element(self.links[n], joint)) for n in self.joints[joint]["links"]
-        )
+        first, second = (carried(motions.get(n, REST), self.placed[n, joint]) for n in self.joints[joint]["links"])
         return first, second
 
     def line(self, motions: Mapping[str, Motion], link: str) -> Array:
         """Unit vector along the line of the free spin of a link."""
-        one, two = (motions[link].frame.axes @ element(self.links[link], joint).place for joint in self.free[link])
+        one, two = (motions[link].frame.axes @ self.placed[link, joint].place for joint in self.free[link])
         return (two - one) / np.linalg.norm(two - one)
 
     def equations(
@@ -211,15 +213,13 @@ class Linkage:
         blocks = []
         for name, joint in self.joints.items():
             moving = [link for link in joint["links"] if link != "ground"]
-            columns = {}
-            for link in moving:
-                for n, unit in enumerate(np.eye(6)):
-                    motions = {other: Motion(frames[other], *np.zeros((4, 3))) for other in moving}
-                    motions[link] = Motion(frames[link], unit[:3], unit[3:], *np.zeros((2, 3)))
-                    columns[6 * self.moving.index(link) + n] = [row[1] for row in self.rows(name, motions, drive)]
-            block = np.zeros((len(next(iter(columns.values()))), 6 * len(self.moving)))
-            for n, column in columns.items():
-                block[:, n] = column
+            still = {link: Motion(frames[link], *np.zeros((4, 3, 1))) for link in moving}
+            still["ground"] = Motion(REST.frame, *np.zeros((4, 3, 1)))
+            block = np.zeros((len(self.rows(name, still, drive)), 6 * len(self.moving)))
+            for link in moving:  # its six unit twists at once
+                motions = {**still, link: Motion(frames[link], *TWISTS, *np.zeros((2, 3, 1)))}
+                first = 6 * self.moving.index(link)
+                block[:, first : first + 6] = [row[1] for row in self.rows(name, motions, drive)]
             blocks.append(block)
         still = {link: Motion(frames[link], *np.zeros((4, 3))) for link in self.moving}
         for link in self.free:
@@ -233,6 +233,11 @@ def cross(a: Array, b: Array) -> Array:
     """a × b; what NumPy has takes ten times as long on three numbers."""
     (p, q, r), (x, y, z) = a, b
     return np.array([q * z - r * y, r * x - p * z, p * y - q * x])
+
+
+def dot(a: Array, b: Array) -> Any:
+    """a · b over the first axis."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def carried(motion: Motion, element: Frame) -> Motion:
@@ -255,14 +260,14 @@ def gap(one: Motion, two: Motion, axis: int) -> Row:
     """Distance of the origins along an axis of the first, with its derivatives."""
     e, de, dde = fixed_vector(one, axis)
     d, v, a = two.frame.place - one.frame.place, two.velocity - one.velocity, two.acceleration - one.acceleration
-    return float(e @ d), float(de @ d + e @ v), float(dde @ d + 2 * de @ v + e @ a)
+    return dot(e, d), dot(de, d) + dot(e, v), dot(dde, d) + 2 * dot(de, v) + dot(e, a)
 
 
 def square(one: Motion, two: Motion, first: int, second: int) -> Row:
     """Cosine between an axis of the first and one of the second, with its derivatives."""
     e, de, dde = fixed_vector(one, first)
     f, df, ddf = fixed_vector(two, second)
-    return float(e @ f), float(de @ f + e @ df), float(dde @ f + 2 * de @ df + e @ ddf)
+    return dot(e, f), dot(de, f) + dot(e, df), dot(dde, f) + 2 * dot(de, df) + dot(e, ddf)
 
 
 def turned(one: Motion, two: Motion) -> Row:
@@ -270,7 +275,7 @@ def turned(one: Motion, two: Motion) -> Row:
     x, y, z = one.frame.axes.T
     angle = float(np.arctan2(y @ two.frame.axes[:, 0], x @ two.frame.axes[:, 0]))
     relative = two.spin - one.spin
-    return angle, float(z @ relative), float(cross(one.spin, z) @ relative + z @ (two.spin_rate - one.spin_rate))
+    return angle, dot(z, relative), dot(cross(one.spin, z), relative) + dot(z, two.spin_rate - one.spin_rate)
 
 
 def wrapped(angle: float) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,8 +16,9 @@ from trunnion.analysis.rig.compared import VARIABLES
 from trunnion.analysis.rig.judge import Verdict, expanded, independent, judge, uncertainty_of
 from trunnion.analysis.rig.said import gathered
 from trunnion.errors import Finding, Severity
-from trunnion.measured.measurement import Accuracy, Condition, Measurement
+from trunnion.measured.measurement import Accuracy, Condition, Course, Measurement
 
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 POWERS = ("torque", "speed", "brake", "out")
 
 
@@ -331,6 +333,16 @@ def test_unknown_channels_values_and_factors_are_refused():
         compare(Measurement("bench", (bare,)))
 
 
+def test_another_cycle_or_start_is_refused():
+    whole = measured()
+    for start, cycle, words in ((0.5, 2 * np.pi, "state start: 0 deg"), (0.0, 4 * np.pi, "state cycle: 360 deg")):
+        other = tuple(replace(one, start=start, cycle=cycle) for one in whole.conditions)
+        with pytest.raises(MechanismError, match=words):
+            compare(replace(whole, conditions=other))
+    same = tuple(replace(one, start=2 * np.pi, cycle=2 * np.pi) for one in whole.conditions)
+    assert codes(compare(replace(whole, conditions=same))) == {Verdict.WITHIN}
+
+
 def test_efficiency_does_not_ask_for_channels_that_are_not_wanted():
     result = compare(measured(channels=POWERS, seed=5), channels=["torque"])
     assert result.channel.values.tolist() == ["torque"]
@@ -356,3 +368,18 @@ def test_findings_of_files_that_differ_in_numbers_are_told_once():
     told = gathered([*rows, Finding("is missing", "channels.w")])
     assert len(told) == 2
     assert "and so 6 times in all: run-0.csv" in told[0].what
+
+
+def test_a_load_that_rests_takes_no_power():
+    """A load has no torque where its joint stands still: the efficiency of the model is known all the same."""
+    mechanism = trunnion.read(EXAMPLES / "scotch-yoke.yaml")
+    name, load = next((name, load) for name, load in mechanism.loads.items() if load.joint)
+    force = "N" if load.resisting_torque is None else "N m"
+    speed = "m/s" if force == "N" else "rad/s"
+    driver = next(iter(mechanism.drivers))
+    kinds = {"T": (f"effort:{driver}", "N m"), "w": (f"rate:{driver}", "rad/s"), "L": (f"load:{name}", force),
+             "v": (f"rate:{load.joint}", speed)}  # fmt: skip
+    blank = {key: Course(key, what, unit, np.ones((3, 24))) for key, (what, unit) in kinds.items()}
+    result = compare(Measurement("bench", (Condition("a", {}, np.arange(24) / 24, blank),)), mechanism)
+    assert np.isnan(result.model.sel(channel="L").values).any()
+    assert np.isfinite(result.efficiency_model.values).all()

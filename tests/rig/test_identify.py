@@ -194,14 +194,14 @@ def test_a_model_that_does_not_fit_is_said_and_its_intervals_are_wider(
     assert "does not fit" in said(heavy, "warning")
     assert "does not fit" not in said(true)
     assert heavy["standard_uncertainty"].values[0] > 3 * true["standard_uncertainty"].values[0]
-    assert heavy.attrs["reduced_chi_squared"] > 2
+    assert float(heavy["reduced_chi_squared"]) > 2
 
 
 def test_what_is_held_out_is_predicted(four_bar: trunnion.Mechanism, torque: True_) -> None:
     data = torque.measured(4)
     found = identify(four_bar, data, [FRICTION], hold_out=["run-2", "A.speed=8"])
     assert np.flatnonzero(found["held_out_turns"].values[0]).tolist() == [1, 3]
-    assert 0.7 < found.attrs["hold_out_ratio"] < 1.3
+    assert 0.7 < float(found["hold_out_ratio"]) < 1.3
     assert np.nanmax(found["held_out_after"].values) < np.nanmin(found["held_out_before"].values)
     turns = identify(four_bar, data, [FRICTION], hold_out=0.3)
     assert turns["turns"].values.tolist() == [[7] * 5]
@@ -236,14 +236,14 @@ def test_a_sensor_that_lags_is_allowed_for(cardan: trunnion.Mechanism, shaft: Tr
     found = identify(cardan, lagging, [FRICTION], guard=2, delay=5e-4)
     assert "does not fit" in said(plain)
     assert float(found["sensor_error"].sel(sensor="delay of torque-in")) * 5e-4 == pytest.approx(late, rel=0.1)
-    assert found.attrs["reduced_chi_squared"] < 0.5 * plain.attrs["reduced_chi_squared"]
+    assert float(found["reduced_chi_squared"]) < 0.5 * float(plain["reduced_chi_squared"])
     assert found["standard_uncertainty"].values[0] < plain["standard_uncertainty"].values[0]
 
 
 def test_one_turn_alone_takes_its_scatter_from_the_residuals(four_bar: trunnion.Mechanism, torque: True_) -> None:
     found = identify(four_bar, torque.measured(1, turns=1, sensors=Sensors(noise=0.0005)), [FRICTION])
     assert "no turn is repeated" in said(found)
-    assert np.isnan(found.attrs["reduced_chi_squared"])
+    assert np.isnan(float(found["reduced_chi_squared"]))
     assert found["lower"].values[0] < 0.3 < found["upper"].values[0]
 
 

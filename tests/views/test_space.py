@@ -41,8 +41,9 @@ def test_every_figure_of_every_spatial_result(name, spatial, tmp_path):
         with pytest.raises(MechanismError, match="nothing to draw"):
             PLOTS[name](result, None)
         return
+    figure = PLOTS[name](result, result)
     for suffix in ("png", "svg"):
-        path = save(PLOTS[name](result, result), tmp_path / f"figure.{suffix}")
+        path = save(figure, tmp_path / f"figure.{suffix}")
         assert 5_000 < path.stat().st_size < 3_000_000
 
 

@@ -16,7 +16,17 @@ from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.traced import kept
 
-__all__ = ["condition", "cross", "determinant", "dot", "inverse", "quick_inverse", "solve", "weighted"]
+__all__ = [
+    "condition",
+    "cross",
+    "determinant",
+    "dot",
+    "inverse",
+    "quick_inverse",
+    "solve",
+    "solve_and_determinant",
+    "weighted",
+]
 
 Vector = tuple[Number, Number]
 Table = NDArray[np.float64]
@@ -50,17 +60,30 @@ def solve(matrix: Sequence[Sequence[Number]], *sides: Sequence[Number], pivoting
     Without pivoting the diagonal must outweigh the rest of each row. A singular lane comes out non-finite (a zero
     pivot divides).
     """
+    return _solve(matrix, sides, pivoting)[0]
+
+
+def solve_and_determinant(matrix: Sequence[Sequence[Number]], side: Sequence[Number]) -> tuple[list[Number], Number]:
+    """`solve` for one side, and `determinant`, from one elimination."""
+    (solution,), determinant_ = _solve(matrix, (side,), True)
+    return solution, determinant_
+
+
+def _solve(
+    matrix: Sequence[Sequence[Number]], sides: Sequence[Sequence[Number]], pivoting: bool
+) -> tuple[list[list[Number]], Number]:
     n = len(matrix)
     columns = n + len(sides)
     rows = [[*row, *(side[i] for side in sides)] for i, row in enumerate(matrix)]
     if (table := _table(rows)) is not None:
-        return _solved(table, pivoting)
+        return _solve_table(table, pivoting)
     xp = namespace(*(entry for row in rows for entry in row))
     rows = _quiet(rows)
+    product: Number = 1.0
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        for k in range(n - 1):
-            if pivoting:
-                _pivot(rows, k, columns, xp)
+        for k in range(n):
+            sign = _pivot(rows, k, columns, xp) if pivoting else 1.0
+            product = product * sign * rows[k][k]
             for i in range(k + 1, n):
                 factor = rows[i][k] / rows[k][k]
                 for j in range(k + 1, columns):
@@ -74,7 +97,7 @@ def solve(matrix: Sequence[Sequence[Number]], *sides: Sequence[Number], pivoting
                     total = total - rows[i][j] * x[j]
                 x[i] = total / rows[i][i]
             solutions.append(x)
-    return solutions
+    return solutions, product
 
 
 def _table(rows: Sequence[Sequence[Number]]) -> Table | None:
@@ -101,13 +124,13 @@ def _table(rows: Sequence[Sequence[Number]]) -> Table | None:
     return table
 
 
-def _solved(table: Table, pivoting: bool) -> list[list[Number]]:
-    """`solve` of a table, the sides in its last columns."""
+def _solve_table(table: Table, pivoting: bool) -> tuple[list[list[Number]], Number]:
+    """`_solve` of a table, the sides in its last columns."""
     n = len(table)
+    product: Number = 1.0
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        for k in range(n - 1):
-            if pivoting:
-                _pivot_rows(table, k)
+        for k in range(n):
+            product = product * (_pivot_rows(table, k) if pivoting else 1.0) * table[k, k]
             _clear_below(table, k)
         x = np.empty_like(table[:, n:])
         for i in reversed(range(n)):
@@ -115,7 +138,7 @@ def _solved(table: Table, pivoting: bool) -> list[list[Number]]:
             for j in range(i + 1, n):
                 total = total - table[i, j] * x[j]
             x[i] = total / table[i, i]
-    return [[x[i, side] for i in range(n)] for side in range(table.shape[1] - n)]
+    return [[x[i, side] for i in range(n)] for side in range(table.shape[1] - n)], product
 
 
 def _clear_below(table: Table, k: int) -> None:
@@ -199,25 +222,7 @@ def quick_inverse(matrix: Sequence[Sequence[Number]]) -> list[list[Number]]:
 
 def determinant(matrix: Sequence[Sequence[Number]]) -> Number:
     """Determinant by elimination with row pivoting per lane; NaN or 0 where a lane is singular."""
-    n = len(matrix)
-    product: Number = 1.0
-    if (table := _table(matrix)) is not None:
-        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            for k in range(n):
-                product = product * _pivot_rows(table, k) * table[k, k]
-                _clear_below(table, k)
-        return product
-    rows = [list(row) for row in matrix]
-    xp = namespace(*(entry for row in rows for entry in row))
-    rows = _quiet(rows)
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        for k in range(n):
-            product = product * _pivot(rows, k, n, xp) * rows[k][k]
-            for i in range(k + 1, n):
-                factor = rows[i][k] / rows[k][k]
-                for j in range(k + 1, n):
-                    rows[i][j] = kept(rows[i][j] - factor * rows[k][j])
-    return product
+    return _solve(matrix, (), True)[1]
 
 
 def condition(matrix: Sequence[Sequence[Number]]) -> np.ndarray:

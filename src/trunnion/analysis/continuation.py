@@ -80,8 +80,8 @@ def _correct(system: System, start: Sequence[Array], share: Array) -> tuple[list
     with np.errstate(all="ignore"):
         for round_ in range(NEWTON_LIMIT):
             residual, jacobian = system(x, share)
-            calm &= linalg.determinant(jacobian) > 0
-            (move,) = linalg.solve(jacobian, residual)
+            move, determinant = linalg.solve_and_determinant(jacobian, residual)
+            calm &= determinant > 0
             x = [value - delta for value, delta in zip(x, move, strict=True)]
             size = np.maximum.reduce([np.abs(value) for value in x])
             error = np.maximum.reduce([np.abs(delta) for delta in move])

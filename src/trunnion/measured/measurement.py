@@ -96,6 +96,7 @@ class Condition:
     values: numbers of the model that were set or measured once, by name, SI, for `Mechanism.with_values`;
     phase: (position,), share of the cycle from the start of the model's, in [0, 1); files: where it comes from;
     speed: of the driver, mean over the turns, rad/s, below zero where its coordinate falls; NaN if the cycle is a time.
+    start, cycle: coordinate of the driver at phase 0, and how far it goes in a cycle, rad; NaN where that is not known.
     """
 
     name: str
@@ -104,6 +105,8 @@ class Condition:
     courses: Mapping[str, Course]
     files: Sequence[str] = ()
     speed: float = float("nan")
+    start: float = float("nan")
+    cycle: float = float("nan")
 
 
 @dataclass(frozen=True)

@@ -307,7 +307,10 @@ class _File:
         positions = self.mapping.positions
         speed = np.nan if self.mapping.timed else way * self._rate([part.turns])
         name = self._named(part.setting)
-        return Condition(name, values, np.arange(positions) / positions, courses, (str(self.path),), speed)
+        timed = self.mapping.timed
+        start, cycle = (np.nan if timed else float(one.evaluate()) for one in (self.mapping.start, self.mapping.cycle))  # type: ignore[arg-type]
+        phase = np.arange(positions) / positions
+        return Condition(name, values, phase, courses, (str(self.path),), speed, start, cycle)
 
 
 def _table(path: Path, mapping: DataMapping, entry: File) -> Table:

@@ -71,8 +71,11 @@ def identify(
         ),
     ] = None,
     guard: Annotated[
-        int, typer.Option("--guard", help="Positions left out on each side where a friction turns round.")
-    ] = 1,
+        int | None,
+        typer.Option(
+            "--guard", help="Positions left out on each side where a friction turns round.", show_default=False
+        ),
+    ] = None,
     starts: Annotated[
         int | None,
         typer.Option(

@@ -169,8 +169,9 @@ def _silent(axes: Axes, result: xr.Dataset, over: Scale) -> None:
     for k in np.flatnonzero(silent):
         axes.axvspan(edges[k], edges[k + 1], color=SHADE, linewidth=0, zorder=0.5)
         mine = at == places[k]
-        told = cause(int(status[mine][there[mine]].max()))
-        if told != said and status[mine][there[mine]].max() >= Status.NOT_CONVERGED:
+        gravest = int(status[mine][there[mine]].max())
+        told = cause(gravest) if gravest >= Status.NOT_CONVERGED else "no efficiency"
+        if told != said:
             said = told
             axes.text(
                 (edges[k] + edges[k + 1]) / 2, 0.5, f"model: {told}", transform=axes.get_xaxis_transform(), rotation=90,

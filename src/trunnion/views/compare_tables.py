@@ -9,6 +9,7 @@ import numpy as np
 
 from trunnion.analysis.rig.judge import Verdict
 from trunnion.views.compared import coverage_of, scale_of, sets, setting, text, units, verdict
+from trunnion.views.conditions import shortened
 from trunnion.views.cycle import Array, attribute, names
 from trunnion.views.quantities import number, prefixed
 from trunnion.views.tolerance_tables import Table
@@ -24,14 +25,15 @@ NONE = "—"
 def results(result: xr.Dataset, channel: int | None = None) -> Table:
     """Residual and verdict of every channel in every condition, or of one channel."""
     wanted = range(result.sizes["channel"]) if channel is None else [channel]
+    what, told = shortened(names(result, "condition"))
     rows = []
-    for k, name in enumerate(names(result, "condition")):
+    for k, name in enumerate(told):
         for i in wanted:
             if int(result["turns"].values[i, k]) == 0:
                 continue
             head = [name] if channel is not None else [name, names(result, "channel")[i]]
             rows.append([*head, *_figures(result, i, k)])
-    first = ["condition"] if channel is not None else ["condition", "channel"]
+    first = [what] if channel is not None else [what, "channel"]
     head = ["RMS", "largest", "at", "bias", "within ±U", "at least", "correlation", "verdict"]
     return Table("results", [*first, *head], rows)
 
@@ -39,11 +41,12 @@ def results(result: xr.Dataset, channel: int | None = None) -> Table:
 def verdicts(result: xr.Dataset) -> Table:
     """The verdict of every channel in every condition."""
     channels = names(result, "channel")
+    what, told = shortened(names(result, "condition"))
     rows = []
-    for k, name in enumerate(names(result, "condition")):
+    for k, name in enumerate(told):
         cells = [verdict(result, i, k).text if result["turns"].values[i, k] else NONE for i in range(len(channels))]
         rows.append([name, *cells])
-    return Table("verdicts", ["condition", *channels], rows)
+    return Table("verdicts", [what, *channels], rows)
 
 
 def _figures(result: xr.Dataset, i: int, k: int) -> list[str]:
@@ -77,7 +80,8 @@ def _beside(value: float, wide: float, unit: str) -> str:
     places = 1 - math.floor(math.log10(wide)) if wide > 0 else 3
     if not 0 <= places <= 6:
         return f"{number(value, 3)}\u00a0±\u00a0{text(wide, unit, 2)}"
-    digits = f"{value:.{places}f}".replace("-", "−"), f"{wide:.{places}f}"
+    shown = round(value, places) + 0.0  # no negative zero
+    digits = f"{shown:.{places}f}".replace("-", "−"), f"{wide:.{places}f}"
     return f"{digits[0]}\u00a0±\u00a0{digits[1]}\u00a0{unit}".rstrip().replace(" ", "\u00a0")
 
 
@@ -98,14 +102,15 @@ def efficiencies(result: xr.Dataset) -> Table | None:
     if "efficiency" not in result:
         return None
     words = {1: "within", 0: "not within", -1: "not known"}
+    what, told = shortened(names(result, "condition"))
     rows = []
-    for k, name in enumerate(names(result, "condition")):
+    for k, name in enumerate(told):
         measured, wide, model = (
             float(result[one].values[k]) for one in ("efficiency", "efficiency_expanded", "efficiency_model")
         )
         within = words[int(result["efficiency_within"].values[k])]
         rows.append([name, *(_plain(value) for value in (measured, wide, model, measured - model)), within])
-    head = ["condition", "η measured", f"U ({coverage_of(result)})", "η model", "difference", "model within ±U"]
+    head = [what, "η measured", f"U ({coverage_of(result)})", "η model", "difference", "model within ±U"]
     return Table("efficiency", head, rows)
 
 

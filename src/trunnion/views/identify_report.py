@@ -86,7 +86,7 @@ def _facts(result: xr.Dataset) -> list[tuple[str, str]]:
 def _summary(result: xr.Dataset) -> list[tuple[str, list[tuple[str, str]]]]:
     """The first estimates, and whether the model fits."""
     rows = [(one.short, [_told(one)]) for one in estimates(result)[:3]]
-    chi = float(result.attrs["reduced_chi_squared"])
+    chi = float(result["reduced_chi_squared"])
     if np.isfinite(chi):
         rows.append(("reduced χ²", [(number(chi, 3), "near 1 if the model fits")]))
     return rows

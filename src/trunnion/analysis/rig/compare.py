@@ -18,7 +18,7 @@ from trunnion.analysis.rig.compared import dataset
 from trunnion.analysis.rig.judge import Verdict, expanded, judge
 from trunnion.analysis.rig.modelled import Modelled, modelled
 from trunnion.analysis.rig.pairs import Compared, Efficient, Pair
-from trunnion.errors import Finding, MechanismError
+from trunnion.errors import Finding, MechanismError, Status
 from trunnion.measured.efficiency import Pairs, efficiency_of, load_joints, pairs_of
 from trunnion.measured.measurement import Condition, Measurement
 from trunnion.model.mechanism import Mechanism
@@ -125,8 +125,10 @@ def _efficiency(condition: Condition, model: Modelled, joints: Mapping[str, str]
 
 def _of_model(condition: Condition, model: Modelled, joints: Mapping[str, str]) -> float:
     """The efficiency of the model's courses; NaN where it has no answer at some position."""
-    courses = {
-        name: replace(condition.courses[name], turns=course[np.newaxis]) for name, course in model.courses.items()
+    solved = model.status < Status.NOT_CONVERGED
+    courses = {  # a load has no torque where its joint rests, and takes no power
+        name: replace(condition.courses[name], turns=np.where(solved, np.nan_to_num(course), course)[np.newaxis])
+        for name, course in model.courses.items()
     }
     try:
         return efficiency_of(replace(condition, courses=courses), joints).value

@@ -191,7 +191,7 @@ def independent(of: Uncertainty) -> float:
         return 1.0
     unit = np.where(total > 0, total, 1.0)
     rows = turns / unit / np.sqrt(len(turns) * freedom)  # Σ rows² is the random share of the variance of each position
-    gram = rows @ rows.T
+    gram = rows @ rows.T if len(rows) < count else rows.T @ rows  # the smaller has the same trace, and its square
     trace, square = float(np.trace(gram)), float(np.sum(gram**2))
     scatter = freedom**2 / ((freedom - 1) * (freedom + 2)) * (square - trace**2 / freedom)
     parts = of.shared / unit

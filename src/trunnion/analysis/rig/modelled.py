@@ -98,6 +98,7 @@ def modelled(
     time = np.asarray(condition.phase, float) * run.cycle.duration
     courses, status = _courses(run, {one.name: one for one in measures.values()}, time, method)
     drive, unit, span = _drive(run, time)
+    _same_cycle(run, condition, unit, span)
     found = {
         channel: _beside(measure.turning(run.system), courses[measure.name], condition.courses[channel].mean)
         for channel, measure in measures.items()
@@ -164,6 +165,30 @@ def _drive(run: Run, time: Array) -> tuple[Array, str, float]:
     ends = np.array([0.0, run.cycle.duration * (1 - 1e-12)])
     drive, low_high = (_row(run.system.drive(run.values, first, at)[0], at) for at in (time, ends))
     return drive, unit, float(low_high[1] - low_high[0])
+
+
+def _same_cycle(run: Run, condition: Condition, unit: str, span: float) -> None:
+    """MechanismError where the cycle that was cut out of the data is not the model's, or starts elsewhere."""
+    if unit != "rad" or not np.isfinite([condition.start, condition.cycle]).all():
+        return
+    findings: list[Finding] = []
+    if abs(condition.cycle - abs(span)) > 1e-6 * abs(span):
+        what = f"the cycle of the data is {_degrees(condition.cycle)}, that of the model {_degrees(abs(span))}"
+        findings.append(Finding(what, "cycle", f"state cycle: {_degrees(abs(span))} in the mapping"))
+    begin = float(
+        _row(run.system.drive(run.values, next(iter(run.system.mechanism.drivers)), np.zeros(1))[0], np.zeros(1))[0]
+    )
+    apart = condition.start - begin
+    apart -= 2 * np.pi * np.round(apart / (2 * np.pi)) if run.cycle.periodic else 0.0
+    if abs(apart) > 1e-6:
+        what = f"the cycle of the data starts at {_degrees(condition.start)}, that of the model at {_degrees(begin)}"
+        findings.append(Finding(what, "start", f"state start: {_degrees(begin)} in the mapping"))
+    if findings:
+        raise MechanismError(findings)
+
+
+def _degrees(angle: float) -> str:
+    return f"{np.degrees(angle) + 0.0:.10g} deg"
 
 
 def _beside(turning: bool, course: Array, measured: Array) -> Array:

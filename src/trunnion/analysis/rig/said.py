@@ -276,9 +276,10 @@ def _efficiencies(found: Sequence[Compared]) -> Iterator[Finding]:
     off = [(one, of) for one, of in told if not of.within]
     if off:
         one, of = max(off, key=lambda case: abs(case[1].measured - case[1].model))
+        most = f"; the most in {one.condition.name}" if len(off) > 1 else ""
         what = (
-            f"the model's is not within U {_in([case.condition.name for case, _ in off], len(known))}; the most in "
-            f"{one.condition.name}: measured {of.measured:.4f} ± {of.expanded:.2g}, model {of.model:.4f}"
+            f"the model's is not within U {_in([case.condition.name for case, _ in off], len(known))}{most}: "
+            f"measured {of.measured:.4f} ± {of.expanded:.2g}, model {of.model:.4f}"
         )
         yield Finding(what, "efficiency", "look at the channels; `trunnion identify` fits friction to them")
 

@@ -24,6 +24,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 MOST_EVALUATIONS = 100
 TOLERANCE = 1e-10  # of cost and step: far below what data of any scatter tell
+PER_GUARD = 90  # positions of a cycle for each that is left out beside a jump, which resampling smears
 GUESS = 0.01  # of a course: the scatter of one without repetitions, until its residuals are known
 
 
@@ -93,7 +94,7 @@ class Problem:
     model: Model
     blocks: Sequence[Block]
     sensors: Sequence[Sensor]
-    guard: int = 1
+    guard: int | None = None
     masks: list[Mask] = field(default_factory=list)
     variances: list[Array] = field(default_factory=list)
     factors: dict[str, float] = field(default_factory=dict)
@@ -187,7 +188,8 @@ class Problem:
             elif measure.of_motion:
                 good = (status < Status.SINGULAR) & (status != Status.NEAR_SINGULAR)
             else:
-                good = (status == Status.SOLVED) & ~_widened(turned, self.guard)
+                guard = -(-size // PER_GUARD) if self.guard is None else self.guard
+                good = (status == Status.SOLVED) & ~_widened(turned, guard)
             value = courses.said[block.condition][block.channel].value[:size]
             there = np.isfinite(block.mean) if block.fitted else np.isfinite(block.held_mean)
             found.append(good & there & np.isfinite(value))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,10 +19,9 @@ from trunnion.analysis.rig.identify.uncertainty import CONFIDENCE
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["dataset"]
+__all__ = ["VARIABLES", "dataset"]
 
 Array = NDArray[Any]
-Row = tuple[tuple[str, ...], Array, str]
 SOURCES = (
     "G. A. F. Seber, C. J. Wild, Nonlinear Regression, Wiley, 1989, doi:10.1002/0471725315",
     "JCGM 100:2008, Evaluation of measurement data: Guide to the expression of uncertainty in measurement",
@@ -46,8 +46,8 @@ def dataset(found: Identified) -> xr.Dataset:
         "condition": ("condition", np.array([one.name for one in measurement.conditions], str)),
     }
     variables = {
-        key: xr.Variable(dims, values, {"units": units, "long_name": LONG[key]})
-        for key, (dims, values, units) in rows.items()
+        key: xr.Variable(one.dims, rows[key], {"units": one.units, "long_name": one.long_name})
+        for key, one in VARIABLES.items()
     }
     system = found.run.system
     attributes: dict[str, Any] = {
@@ -64,11 +64,6 @@ def dataset(found: Identified) -> xr.Dataset:
         "drive": _drive(found),
         "files": json.dumps([list(one.files) for one in measurement.conditions], ensure_ascii=False),
         "done": json.dumps(list(measurement.done), ensure_ascii=False),
-        "reduced_chi_squared": found.spread.test.reduced,
-        "chi_squared_freedom": found.spread.test.freedom,
-        "chi_squared_chance": found.spread.test.chance,
-        "turn_correlation": found.spread.follows,
-        "hold_out_ratio": judged.trust,
         "evaluations": problem.evaluations,
         "starts": found.search.starts,
         "converged": int(found.search.fit.converged),
@@ -83,67 +78,107 @@ def _drive(found: Identified) -> str:
     return next(iter(found.mechanism.drivers), "")
 
 
-LONG = {
-    "start": "start of the search",
-    "estimate": "estimate; NaN if the data do not tell it",
-    "standard_uncertainty": "standard uncertainty of the estimate",
-    "lower": "lower end of the 95 % interval",
-    "upper": "upper end of the 95 % interval",
-    "degrees_of_freedom": "effective degrees of freedom of the standard uncertainty",
-    "limit": "−1 on the lower limit, 1 on the upper: the interval is one-sided",
-    "told": "1 if the data tell it, 0 if not",
-    "correlation": "correlation of the estimates",
-    "share": "share of a source in the variance of an estimate",
-    "singular_value": "singular value of the derivatives with columns scaled to 1, the largest first",
-    "sensor_error": "estimated error of a sensor, in its standard uncertainties",
-    "sensor_uncertainty": "standard uncertainty of that, in those stated",
-    "rms_before": "root mean square of the residual at the start",
-    "rms_after": "root mean square of the residual with the estimates",
-    "rms_expected": "what the scatter between turns explains of it",
-    "used": "positions used",
-    "left_out": "positions with data that are not used",
-    "turns": "turns used",
-    "held_out_turns": "turns held out",
-    "held_out_before": "root mean square of the residual of what was held out, at the start",
-    "held_out_after": "the same with the estimates",
-    "held_out_expected": "what its scatter and the uncertainty of the prediction explain of it",
-    "phase": "share of the cycle",
-    "measured": "mean over the turns",
-    "residual_before": "measured less model, at the start",
-    "residual_after": "measured less what the sensor would read with the estimates",
-    "residual_uncertainty": "standard uncertainty of the mean over the turns",
+@dataclass(frozen=True)
+class Variable:
+    """A variable of the result: its dimensions, unit, and what it is."""
+
+    dims: tuple[str, ...]
+    units: str
+    long_name: str
+
+
+VARIABLES = {
+    "start": Variable(("parameter",), "of the parameter", "start of the search"),
+    "estimate": Variable(("parameter",), "of the parameter", "estimate; NaN if the data do not tell it"),
+    "standard_uncertainty": Variable(("parameter",), "of the parameter", "standard uncertainty of the estimate"),
+    "lower": Variable(("parameter",), "of the parameter", "lower end of the 95 % interval"),
+    "upper": Variable(("parameter",), "of the parameter", "upper end of the 95 % interval"),
+    "degrees_of_freedom": Variable(("parameter",), "1", "effective degrees of freedom of the standard uncertainty"),
+    "limit": Variable(("parameter",), "1", "−1 on the lower limit, 1 on the upper: the interval is one-sided"),
+    "told": Variable(("parameter",), "1", "1 if the data tell it, 0 if not"),
+    "correlation": Variable(("parameter", "parameter_2"), "1", "correlation of the estimates"),
+    "share": Variable(("parameter", "source"), "1", "share of a source in the variance of an estimate"),
+    "singular_value": Variable(
+        ("parameter",), "1", "singular value of the derivatives with columns scaled to 1, the largest first"
+    ),
+    "sensor_error": Variable(("sensor",), "1", "estimated error of a sensor, in its standard uncertainties"),
+    "sensor_uncertainty": Variable(("sensor",), "1", "standard uncertainty of that, in those stated"),
+    "rms_before": Variable(("channel", "condition"), "of the channel", "root mean square of the residual at the start"),
+    "rms_after": Variable(
+        ("channel", "condition"), "of the channel", "root mean square of the residual with the estimates"
+    ),
+    "rms_expected": Variable(
+        ("channel", "condition"), "of the channel", "what the scatter between turns explains of it"
+    ),
+    "used": Variable(("channel", "condition"), "1", "positions used"),
+    "left_out": Variable(("channel", "condition"), "1", "positions with data that are not used"),
+    "turns": Variable(("channel", "condition"), "1", "turns used"),
+    "held_out_turns": Variable(("channel", "condition"), "1", "turns held out"),
+    "held_out_before": Variable(
+        ("channel", "condition"),
+        "of the channel",
+        "root mean square of the residual of what was held out, at the start",
+    ),
+    "held_out_after": Variable(("channel", "condition"), "of the channel", "the same with the estimates"),
+    "held_out_expected": Variable(
+        ("channel", "condition"),
+        "of the channel",
+        "what its scatter and the uncertainty of the prediction explain of it",
+    ),
+    "reduced_chi_squared": Variable((), "1", "χ² of the residuals over what the scatter between turns explains"),
+    "chi_squared_freedom": Variable((), "1", "degrees of freedom of that χ²"),
+    "chi_squared_chance": Variable((), "1", "chance of a larger one if the model is right"),
+    "turn_correlation": Variable((), "1", "correlation of what each turn adds with the turn before it"),
+    "hold_out_ratio": Variable((), "1", "residuals of what was held out over what is expected of them"),
+    "phase": Variable(("condition", "position"), "1", "share of the cycle"),
+    "measured": Variable(("channel", "condition", "position"), "of the channel", "mean over the turns"),
+    "residual_before": Variable(
+        ("channel", "condition", "position"), "of the channel", "measured less model, at the start"
+    ),
+    "residual_after": Variable(
+        ("channel", "condition", "position"),
+        "of the channel",
+        "measured less what the sensor would read with the estimates",
+    ),
+    "residual_uncertainty": Variable(
+        ("channel", "condition", "position"), "of the channel", "standard uncertainty of the mean over the turns"
+    ),
 }
 
 
-def _parameters(judged: Judged) -> dict[str, Row]:
+def _parameters(judged: Judged) -> dict[str, Array]:
     n = judged.problem.count
     low, high = judged.interval
-    own = ("parameter",)
     return {
-        "start": (own, judged.start[:n], ""),
-        "estimate": (own, judged.estimate, ""),
-        "standard_uncertainty": (own, judged.deviation[:n], ""),
-        "lower": (own, low, ""),
-        "upper": (own, high, ""),
-        "degrees_of_freedom": (own, judged.found.spread.freedom[:n], "1"),
-        "limit": (own, judged.limit, "1"),
-        "told": (own, (~judged.lost[:n]).astype(np.int8), "1"),
-        "correlation": (("parameter", "parameter_2"), judged.correlation, "1"),
-        "share": (("parameter", "source"), judged.budget[1], "1"),
-        "singular_value": (own, judged.singular_values, "1"),
+        "start": judged.start[:n],
+        "estimate": judged.estimate,
+        "standard_uncertainty": judged.deviation[:n],
+        "lower": low,
+        "upper": high,
+        "degrees_of_freedom": judged.found.spread.freedom[:n],
+        "limit": judged.limit,
+        "told": (~judged.lost[:n]).astype(np.int8),
+        "correlation": judged.correlation,
+        "share": judged.budget[1],
+        "singular_value": judged.singular_values,
+        "reduced_chi_squared": np.asarray(judged.found.spread.test.reduced),
+        "chi_squared_freedom": np.asarray(judged.found.spread.test.freedom),
+        "chi_squared_chance": np.asarray(judged.found.spread.test.chance),
+        "turn_correlation": np.asarray(judged.found.spread.follows),
+        "hold_out_ratio": np.asarray(judged.trust),
     }
 
 
-def _sensors(judged: Judged) -> dict[str, Row]:
+def _sensors(judged: Judged) -> dict[str, Array]:
     n = judged.problem.count
     lost = judged.lost[n:]
     return {
-        "sensor_error": (("sensor",), np.where(lost, np.nan, judged.found.x[n:]), "1"),
-        "sensor_uncertainty": (("sensor",), judged.deviation[n:], "1"),
+        "sensor_error": np.where(lost, np.nan, judged.found.x[n:]),
+        "sensor_uncertainty": judged.deviation[n:],
     }
 
 
-def _blocks(judged: Judged) -> dict[str, Row]:
+def _blocks(judged: Judged) -> dict[str, Array]:
     problem = judged.problem
     channels = list(problem.model.measures)
     shape = len(channels), len(judged.found.measurement.conditions)
@@ -171,12 +206,11 @@ def _blocks(judged: Judged) -> dict[str, Row]:
         counts["held_out_turns"][at] = held.turns
         for key, value in zip(FIGURES[3:], (held.before, held.after, held.expected), strict=True):
             figures[key][at] = value
-    own = ("channel", "condition")
     return {
-        **{key: (own, values, "") for key, values in figures.items()},
-        **{key: (own, values, "1") for key, values in counts.items()},
-        "phase": (("condition", "position"), phase, "1"),
-        **{key: ((*own, "position"), values, "") for key, values in curves.items()},
+        **figures,
+        **counts,
+        "phase": phase,
+        **curves,
     }
 
 

@@ -62,7 +62,7 @@ def identify(
     hold_out: HoldOut = None,
     sensors: Errors = "channel",
     delay: float | None = None,
-    guard: int = 1,
+    guard: int | None = None,
     starts: int | None = None,
     method: FrictionMethod | None = None,
 ) -> xr.Dataset:
@@ -75,7 +75,8 @@ def identify(
     hold_out: conditions by name, file or setting, or the share of the turns of each (the last), that are not fitted but
     predicted. sensors: whether zero and gain of a channel are off by the same in all conditions, or in each by its own.
     delay: standard uncertainty, s, of the time by which a channel lags behind the angle, as its bandwidth makes it;
-    what it is in fact is estimated too. guard: positions left out on each side of a change of the sense of a friction.
+    what it is in fact is estimated too. guard: positions left out on each side where the sense of a friction changes;
+    one for every 90 of a cycle if not given.
     starts: places to begin at; more than one if the model does not fit and it is not given.
     Method: weighted least squares with exact derivatives, trust region; covariances by the scatter between turns.
     Raises MechanismError for names, channels or conditions that are not there, or where the model has no answer.
@@ -95,11 +96,12 @@ def identified(
     hold_out: HoldOut = None,
     sensors: Errors = "channel",
     delay: float | None = None,
-    guard: int = 1,
+    guard: int | None = None,
     starts: int | None = None,
     method: FrictionMethod | None = None,
 ) -> Identified:
     """What `identify` makes its Dataset of."""
+    _check(sensors, delay, guard, starts)
     paths = described(mechanism, parameters)
     stated = _stated(mechanism, measurement, paths, start or {})
     settings = _settings(stated, measurement, paths)
@@ -126,6 +128,19 @@ def identified(
         spread = spread_of(problem, found.fit.x)
     groups = inseparable(problem, found.fit.x, spread)
     return Identified(stated, measurement, run, problem, found, spread, groups)
+
+
+def _check(sensors: str, delay: float | None, guard: int | None, starts: int | None) -> None:
+    """MechanismError for options that mean nothing."""
+    if sensors not in ("channel", "condition"):
+        what = f"errors of sensors are not alike by '{sensors}'"
+        raise MechanismError(Finding(what, "sensors", "give channel or condition"))
+    if delay is not None and not delay > 0:
+        raise MechanismError(Finding(f"a delay of {delay:g} s is not above 0", "delay", "give a standard uncertainty"))
+    if guard is not None and guard < 0:
+        raise MechanismError(Finding(f"{guard} positions cannot be left out", "guard", "give 0 or more"))
+    if starts is not None and starts < 1:
+        raise MechanismError(Finding(f"{starts} starts find nothing", "starts", "give 1 or more"))
 
 
 def _telling(model: Model, blocks: list[Block]) -> tuple[Model, list[Block]]:

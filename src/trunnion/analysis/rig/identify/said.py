@@ -8,12 +8,14 @@ import numpy as np
 
 from trunnion.analysis.rig.identify.amounts import amount, share
 from trunnion.analysis.rig.identify.judged import Judged
-from trunnion.analysis.rig.identify.separate import Combination, Group
+from trunnion.analysis.rig.identify.separate import Combination, Group, known_of, sizes_of
 from trunnion.analysis.rig.identify.uncertainty import RANDOM, quantile
 from trunnion.errors import Finding, Severity, Status
 
 __all__ = ["sentences"]
 
+ALIKE = 0.95  # correlation from which two are hardly told apart
+MUCH = 3.0  # times what scatter explains, between conditions
 FAR = 3.0  # standard uncertainties from what was stated of a sensor
 MOSTLY = 0.5  # of the variance
 POOR = 2.0  # times what is expected, of predictions
@@ -24,8 +26,8 @@ NUMBERS = ("no", "one", "two", "three", "four", "five", "six")
 
 def sentences(judged: Judged) -> list[Finding]:
     """Errors and warnings first."""
-    found = [*_search(judged), *_fit(judged), *_groups(judged), *_limits(judged), *_sensors(judged), *_data(judged),
-             *_held(judged)]  # fmt: skip
+    parts = (_search, _fit, _groups, _near, _limits, _sensors, _data, _held)
+    found = [one for part in parts for one in part(judged)]
     order = (Severity.ERROR, Severity.WARNING, Severity.NOTE)
     return sorted(found, key=lambda one: order.index(one.severity))
 
@@ -54,7 +56,8 @@ def _search(judged: Judged) -> Iterator[Finding]:
     elif not search.settled:
         what = "which positions are used changes back and forth with the estimates"
         yield Finding(what, "search", "give a guard of 2 or more", Severity.WARNING)
-    if search.other is not None:
+    lost = judged.lost[: problem.count]
+    if search.other is not None and not np.any(lost):
         values = (
             f"{one.name} = {amount(value, None, one.unit)}"
             for one, value in zip(problem.model.unknowns, search.other, strict=False)
@@ -81,7 +84,8 @@ def _fit(judged: Judged) -> Iterator[Finding]:
             "between turns explains; the interval is wider for it"
         )
         where = f"parameter {problem.model.unknowns[p].name}"
-        yield Finding(what, where, "look for what differs between them: settings, speed, temperature", Severity.WARNING)
+        remedy = "look for what differs between them: settings, speed, temperature, the zero of each file"
+        yield Finding(what, where, remedy, Severity.WARNING if apart[p] > MUCH**2 else Severity.NOTE)
     single = [block for block in problem.blocks if block.fitted and not block.repeats]
     if single and len(single) == sum(block.fitted for block in problem.blocks):
         what = "no turn is repeated: the scatter is taken from the residuals, and nothing tests the model"
@@ -117,6 +121,25 @@ def _groups(judged: Judged) -> Iterator[Finding]:
         yield Finding(what, where, remedy, Severity.WARNING)
 
 
+def _near(judged: Judged) -> Iterator[Finding]:
+    """Pairs that are told apart, but badly: what of them is known far better than either."""
+    n = judged.problem.count
+    size = sizes_of(judged.problem, judged.found.x)
+    for p in range(n):
+        for q in range(p):
+            if not abs(judged.correlation[p, q]) > ALIKE:  # NaN of what is not told
+                continue
+            pair = (q, p)
+            known = known_of(judged.problem, judged.found.x, judged.found.spread, pair, size)
+            names = [_name(judged, i) for i in pair]
+            together = f"{judged.correlation[p, q]:.3f}".replace("-", "−")
+            what = f"is hardly told from {names[0]} (correlation {together})"
+            if known:
+                what += f": {_known(judged, Group(pair, known, exact=False), names, short=True)}"
+            remedy = "fix one of them, or measure what tells them apart"
+            yield Finding(what, f"parameter {names[1]}", remedy, Severity.NOTE)
+
+
 def _name(judged: Judged, i: int) -> str:
     problem = judged.problem
     if i < problem.count:
@@ -124,8 +147,8 @@ def _name(judged: Judged, i: int) -> str:
     return f"the {problem.sensors[i - problem.count].name}"
 
 
-def _known(judged: Judged, group: Group, names: Sequence[str]) -> str:
-    """What of them is known, and that the rest is not."""
+def _known(judged: Judged, group: Group, names: Sequence[str], short: bool = False) -> str:
+    """What of them is known, and that the rest is not; short: of what is known only."""
     if not group.known:
         return "no combination of them is known"
     units = {judged.problem.model.unknowns[i].unit for i in group.members if i < judged.problem.count}
@@ -134,6 +157,9 @@ def _known(judged: Judged, group: Group, names: Sequence[str]) -> str:
     if pair:
         one = group.known[0]
         said = amount(one.value, one.uncertainty, unit if one.form == "sum" else "1")
+        if short:
+            subject = f"their {one.form}" if one.form != "sum" else _formula(one, names)
+            return f"{subject} = {said} is known best"
         other = {"sum": "difference", "product": "ratio", "ratio": "product"}[one.form]
         if one.form == "sum" and one.factors == (1.0, 1.0):
             return f"their sum is known, {said}, their {other} is not"

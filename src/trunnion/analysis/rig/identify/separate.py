@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from trunnion.analysis.rig.identify.fit import Problem
 from trunnion.analysis.rig.identify.uncertainty import Spread, quantile
 
-__all__ = ["Combination", "Group", "inseparable", "sizes_of"]
+__all__ = ["Combination", "Group", "inseparable", "known_of", "sizes_of"]
 
 Array = NDArray[np.float64]
 PART = 0.05  # of the largest share in a direction: what is below it takes no part
@@ -68,10 +68,10 @@ def inseparable(problem: Problem, x: Array, spread: Spread) -> list[Group]:
     found: list[Group] = []
     lost: set[int] = set()
     for members in _connected(spread.null * 1.0, sizes):
-        found.append(Group(members, _known(problem, x, spread, members, sizes), exact=True))
+        found.append(Group(members, known_of(problem, x, spread, members, sizes), exact=True))
         lost |= set(members)
     vague = _vague(problem, spread, sizes, lost)
-    return [*found, *(Group(members, _known(problem, x, spread, members, sizes), exact=False) for members in vague)]
+    return [*found, *(Group(members, known_of(problem, x, spread, members, sizes), exact=False) for members in vague)]
 
 
 def _connected(null: Array, sizes: Array) -> list[tuple[int, ...]]:
@@ -118,7 +118,9 @@ def _vague(problem: Problem, spread: Spread, sizes: Array, lost: set[int]) -> li
 # ---- what is known --------------------------------------------------------------------------------------------
 
 
-def _known(problem: Problem, x: Array, spread: Spread, members: Sequence[int], sizes: Array) -> tuple[Combination, ...]:
+def known_of(
+    problem: Problem, x: Array, spread: Spread, members: Sequence[int], sizes: Array
+) -> tuple[Combination, ...]:
     """Combinations of the members that the data know, the best known first."""
     index = np.array(members)
     marginal = _marginal(spread.information, index)

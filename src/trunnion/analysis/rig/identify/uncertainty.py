@@ -24,7 +24,8 @@ CONFIDENCE = 0.95
 NEIGHBOURS = 5  # frequencies that a power is smoothed over
 RANDOM = ("scatter", "conditions", "misfit")
 FLOOR = 0.05  # of the mean power: what is below it decides nothing
-UNLIKELY = 0.01  # a chance below which the model is said not to fit
+UNLIKELY = 0.001  # a chance below which the model is said not to fit
+RARE = 0.01  # one below which conditions are said to disagree
 WORTH = 1.05  # reduced χ² up to which it is not
 
 
@@ -277,7 +278,7 @@ def _apart(problem: Problem, x: Array, inverse: Array, alone: dict[int, Array]) 
     freedom = len(alone) - 1.0
     turns = float(np.median([one[-1] for one in alone.values()]))
     chance = special.fdtrc(freedom, max(freedom * turns, 4.0), squares / freedom)
-    return np.asarray(np.where(chance < UNLIKELY, np.maximum(squares / freedom, 1.0), 1.0))
+    return np.asarray(np.where(chance < RARE, np.maximum(squares / freedom, 1.0), 1.0))
 
 
 ENOUGH_PAIRS = 10  # of turns, to see whether they follow each other

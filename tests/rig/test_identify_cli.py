@@ -1,0 +1,117 @@
+"""`trunnion identify` as it is called: tables, files, figures, report, the model written back, and what is refused."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+import xarray as xr
+
+from trunnion.cli import main
+from trunnion.model.file import read_mechanism
+
+ROOT = Path(__file__).resolve().parents[2]
+MODEL = "pezzuti-cardan.yaml"
+FRICTION = "joint_defaults.friction.coefficient"
+RIG = """
+trunnion-rig: 1
+name: small
+schedule: {over: {misalignment: [5 deg, 25 deg]}, turns: 4, idle: 0.2 s}
+set: {input.speed: 600 rpm}
+rate: 2 kHz
+encoder: {per_turn: 60}
+sensors:
+  torque-in: {measures: "effort:input", range: 20 N m, noise: 20 mN m, accuracy: {gain: 0.1 %, zero: 10 mN m}}
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The model, and measurements of it with a friction coefficient of 0.35."""
+    place = tmp_path_factory.mktemp("rig")
+    shutil.copy(ROOT / "examples" / MODEL, place)
+    (place / "rig.yaml").write_text(RIG)
+    with pytest.raises(SystemExit) as ended, pytest.MonkeyPatch.context() as patch:
+        patch.chdir(place)
+        patch.setattr("sys.argv", ["trunnion", "rig", MODEL, "rig.yaml", "--out", "data", "--set", f"{FRICTION}=0.35"])
+        main()
+    assert ended.value.code == 0
+    return place
+
+
+@pytest.fixture
+def call(folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):  # type: ignore[no-untyped-def]
+    def run(*options: str) -> tuple[int, str]:
+        monkeypatch.chdir(folder)
+        monkeypatch.setenv("COLUMNS", "160")
+        monkeypatch.setattr("sys.argv", ["trunnion", "identify", MODEL, "data/mapping.yaml", *options])
+        capsys.readouterr()
+        with pytest.raises(SystemExit) as ended:
+            main()
+        told = capsys.readouterr()
+        return int(ended.value.code or 0), told.out + told.err
+
+    return run
+
+
+def test_tables_files_and_the_model(folder: Path, call) -> None:  # type: ignore[no-untyped-def]
+    files = ["x.csv", "x.fit.csv", "x.residuals.csv", "x.nc", "x.json", "x.svg"]
+    outs = [part for name in files for part in ("--out", name)]
+    status, text = call("--parameter", f"mu={FRICTION}", "--start", "mu=0.3", "--hold-out", "0.25", "--write",
+                        "found.yaml", "--report", "x.html", *outs)  # fmt: skip
+    assert status == 0, text
+    assert "mu │   0.3 │ 0.3" in text
+    assert "what was held out" in text
+    assert (folder / "x.csv").read_text().startswith("parameter,paths,unit,start,estimate,standard_uncertainty,lower")
+    assert (folder / "x.fit.csv").read_text().count("\n") == 3
+    assert (folder / "x.residuals.csv").read_text().count("\n") > 100
+    with xr.open_dataset(folder / "x.nc") as kept:
+        low, high = (float(kept[end].values[0]) for end in ("lower", "upper"))
+    assert low < 0.35 < high
+    written = read_mechanism(folder / "found.yaml")
+    assert low < float(written.parameters()[FRICTION]) < high
+    before, after = ((folder / name).read_text().splitlines() for name in (MODEL, "found.yaml"))
+    assert sum(a != b for a, b in zip(before, after, strict=True)) == 1
+    page = (folder / "x.html").read_text()
+    assert "Content-Security-Policy" in page
+    assert "<script" not in page
+    assert "http" not in page.replace("http-equiv", "")
+
+
+@pytest.mark.parametrize("kind", ["intervals", "correlation", "residuals"])
+def test_figures_of_numbers_that_are_not_told_apart(folder: Path, call, kind: str) -> None:  # type: ignore[no-untyped-def]
+    pair = ",".join(f"{name}.friction.pair_factor" for name in ("input", "pin-1", "pin-2", "output"))
+    status, text = call("--parameter", f"mu={FRICTION}", "--parameter", f"pair={pair}", "--kind", kind, "--out",
+                        f"{kind}.png", "--write", "none.yaml")  # fmt: skip
+    assert status == 1
+    assert "not told" in text
+    assert "their product is known, 0.3" in text
+    assert "'none.yaml' is not written: the data tell none of the parameters" in text
+    assert not (folder / "none.yaml").exists()
+    assert (folder / f"{kind}.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ([], "there is nothing to identify"),
+        (["--parameter", "=A"], "names no number"),
+        (["--parameter", "mu=friction"], "is not one number"),
+        (["--parameter", FRICTION, "--channel", "torque-out"], "the measurement has torque-in"),
+        (["--parameter", FRICTION, "--hold-out", "run-7"], "there is no condition 'run-7'"),
+        (["--parameter", FRICTION, "--kind", "histogram"], "use one of intervals, correlation, residuals"),
+        (["--parameter", FRICTION, "--delay", "3mm"], "time"),
+        (["--parameter", FRICTION, "--write", MODEL], "is the model itself"),
+        (["--parameter", FRICTION, "--write", "x.toml"], "write .yaml or .json"),
+        (["--parameter", FRICTION, "--report", "x.pdf"], "a report is HTML"),
+        (["--parameter", FRICTION, "--sensors", "file"], "channel or condition"),
+        (["--parameter", FRICTION, "--guard", "-1"], "guard"),
+        (["--parameter", FRICTION, "--starts", "0"], "starts"),
+    ],
+)
+def test_bad_input_is_told(call, options: list[str], message: str) -> None:  # type: ignore[no-untyped-def]
+    status, text = call(*options)
+    assert status == 2
+    assert message in text
+    assert "Traceback" not in text

@@ -22,6 +22,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 from xml.etree.ElementTree import Element
@@ -87,15 +88,20 @@ def on_files(files: Files, config: Any) -> Files:
     told -= swept
     wanted = told | _gallery().wanted()
     models = models_of(pages.values())
-    for model in sorted({name for name, _, _ in wanted}):
-        kinds = [kind for name, kind, suffix in sorted(wanted) if name == model and suffix == "svg"]
-        steps = 360 if any(name == model for name, _, _ in told) else _gallery().STEPS
-        drawn = _drawn(model, models, kinds, steps, report=(model, "report", "html") in wanted)
-        for name, content in drawn.items():
-            files.append(File.generated(config, f"figures/{model}/{name}", content=content))
-    for verbs, name, _ in sorted(swept):
-        content = _swept(verbs.removesuffix("s"), name, "\n".join(pages.values()), models)
-        files.append(File.generated(config, f"figures/{verbs}/{name}.svg", content=content))
+    text = "\n".join(pages.values())
+    with ThreadPoolExecutor(1) as beside:  # the commands are processes of their own: one runs while this one draws
+        told_by_commands = {
+            f"figures/{verbs}/{name}.svg": beside.submit(_swept, verbs.removesuffix("s"), name, text, models)
+            for verbs, name, _ in sorted(swept)
+        }
+        for model in sorted({name for name, _, _ in wanted}):
+            kinds = [kind for name, kind, suffix in sorted(wanted) if name == model and suffix == "svg"]
+            steps = 360 if any(name == model for name, _, _ in told) else _gallery().STEPS
+            drawn = _drawn(model, models, kinds, steps, report=(model, "report", "html") in wanted)
+            for name, content in drawn.items():
+                files.append(File.generated(config, f"figures/{model}/{name}", content=content))
+        for place, content in told_by_commands.items():
+            files.append(File.generated(config, place, content=content.result()))
     for path in sorted(EXAMPLES.glob("*.yaml")):
         files.append(File.generated(config, f"examples/{path.name}", abs_src_path=str(path)))
     schema = ROOT / "src" / "trunnion" / "model" / "mechanism.schema.json"

@@ -72,7 +72,8 @@ def test_faults_and_bad_input(program: Run, rig: Path, tmp_path: Path) -> None:
     pd.DataFrame(columns).drop(columns=["T1", "n2"]).to_csv(tmp_path / "b.csv", index=False)
     code, out, err = program("data", "rig.json", "a.csv", "b.csv", "--out", "c.csv")
     assert (code, out) == (2, "")
-    assert "there is no column 'T1', 'n2'; the file has 't', 'T2', 'n1', 'encoder', 'angle'" in err
+    assert "channels.torque-in.column, channels.speed-out.column: there is no column 'T1', 'n2'; the file has" in err
+    assert "'t', 'T2', 'n1', 'encoder', 'angle' — name one of these" in err
     assert not (tmp_path / "c.csv").exists()
     code, _, err = program("data", "rig.json", "--out", "c.xlsx")
     assert code == 2

@@ -7,7 +7,7 @@ from trunnion.views.conditions import shortened
 
 def test_what_all_set_goes_into_the_head() -> None:
     names = ["misalignment 0 deg, input.speed 250 rpm", "misalignment 5 deg, input.speed 250 rpm"]
-    assert shortened(names) == ("misalignment, input.speed", ["0 deg, 250 rpm", "5 deg, 250 rpm"])
+    assert shortened(names) == ("misalignment, input.speed", ["0\u00a0deg, 250\u00a0rpm", "5\u00a0deg, 250\u00a0rpm"])
 
 
 def test_other_names_stay_whole() -> None:

@@ -18,6 +18,7 @@ Array = NDArray[np.float64]
 STEADY = 0.03  # of the mean speed, between the slowest and the fastest turn
 CERTAIN = 6.0  # standard errors from which a slope is one
 PLAIN = 3.0  # times what turns scatter about the line, that a drift amounts to
+MOST = 0.95  # of the turns, in which a power has the wrong sign if the channel has it
 SHARE = 0.002  # of the largest value over the turn, that a drift amounts to
 
 
@@ -97,18 +98,18 @@ def signs(
         against = courses[rate] if rate else np.full_like(courses[effort], turning or 0.0)
         power = turn_means(courses[effort] * against)
         power = power[np.isfinite(power)]
-        if power.size and np.all(power < 0):
+        if _against(power):
             opposed = (
                 rate and turning is not None and float(np.nanmean(courses[rate])) * turning < 0 and len(drivers) == 1
             )
             likely = str(rate) if opposed else effort
             other = "the angle turns the other way" if opposed else "or it drives the motor: then nothing is wrong"
-            what = f"sign: the power into {driver} is below zero in all {counted(power.size, 'turn')}"
+            what = f"sign: the power into {driver} is below zero in {_of(power)}"
             account.warn(
                 f"channels.{likely}", f"{what} ({power.mean():.4g} W), {other}", f"write sign: {-channels[likely].sign}"
             )
             suspects.append(likely)
-        gives = gives or bool(power.size and np.all(power > 0)) or effort in suspects
+        gives = gives or bool(power.size and np.mean(power > 0) > MOST) or effort in suspects
     loads = {one.measures.partition(":")[2]: key for key, one in channels.items() if one.measures.startswith("load:")}
     out = [key for joint, key in rates.items() if joint not in drivers]
     for load, key in loads.items():
@@ -117,9 +118,18 @@ def signs(
             continue
         power = turn_means(courses[key] * courses[rate])
         power = power[np.isfinite(power)]
-        if power.size and np.all(power < 0):
-            what = f"sign: the power that {load} takes is below zero in all {counted(power.size, 'turn')}"
+        if _against(power):
+            what = f"sign: the power that {load} takes is below zero in {_of(power)}"
             account.warn(f"channels.{key}", f"{what} ({power.mean():.4g} W) while the drive gives power",
                          f"write sign: {-channels[key].sign} (or turn that of {rate})")  # fmt: skip
             suspects.append(key)
     return suspects
+
+
+def _against(power: Array) -> bool:
+    return bool(power.size and np.mean(power < 0) > MOST)
+
+
+def _of(power: Array) -> str:
+    below = int(np.count_nonzero(power < 0))
+    return f"all {counted(below, 'turn')}" if below == power.size else f"{below:,} of {counted(power.size, 'turn')}"

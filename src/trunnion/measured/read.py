@@ -110,7 +110,7 @@ class _File:
 
     def __init__(self, mapping: DataMapping, path: Path, entry: File, account: Account) -> None:
         self.mapping, self.entry, self.account, self.path = mapping, entry, account, path
-        table = read_table(path, *_columns(mapping, entry))
+        table = _table(path, mapping, entry)
         for note in table.notes:
             account.say(note)
         self.line: Timeline = timeline(table, mapping.time, account)
@@ -309,21 +309,31 @@ class _File:
         speed = np.nan if self.mapping.timed else way * self._rate([part.turns])
         name = self._named(part.setting)
         timed = self.mapping.timed
-        start, cycle = (np.nan if timed else float(one.evaluate()) for one in (self.mapping.start, self.mapping.cycle))  # type: ignore[arg-type]
+        start, cycle = (np.nan if timed else float(one.evaluate()) for one in (self.mapping.start, self.mapping.cycle))
         phase = np.arange(positions) / positions
         return Condition(name, values, phase, courses, (str(self.path),), speed, start, cycle)
 
 
-def _columns(mapping: DataMapping, entry: File) -> tuple[list[str], list[str]]:
-    """Columns that a file must have, and that of time, which it may tell by itself if it is TDMS."""
-    wanted: list[str] = []
-    optional: list[str] = []
-    if mapping.time is not None and mapping.time.column is not None:
-        (optional if Path(entry.file).suffix.lower() == ".tdms" else wanted).append(mapping.time.column)
+def _table(path: Path, mapping: DataMapping, entry: File) -> Table:
+    """The columns of a file that the mapping names; a missing one is told with the entry that names it."""
+    named = _columns(mapping, entry)
+    own = "time.column" if path.suffix.lower() == ".tdms" else ""  # which may tell its time by itself
+    wanted = [column for where, column in named.items() if where != own]
+    try:
+        return read_table(path, wanted, [named[own]] if own in named else [])
+    except MechanismError as error:
+        told = error.findings[0].what.partition(";")[0] if "there is no column" in error.findings[0].what else ""
+        where = ", ".join(key for key, column in named.items() if f"'{column}'" in told)
+        raise MechanismError([replace(one, where=where) for one in error.findings]) from None
+
+
+def _columns(mapping: DataMapping, entry: File) -> dict[str, str]:
+    """Columns that are read, by the entries of the mapping that name them."""
+    found: dict[str, str | None] = {"time.column": mapping.time.column if mapping.time else None}
     if mapping.angle is not None:
-        wanted += [one for one in (mapping.angle.column,) if one is not None]
-        wanted += [mapping.angle.index.column] if mapping.angle.index is not None else []
-    wanted += [channel.column for channel in mapping.channels.values()]
-    columns = [one.column for one in stated(mapping, entry).values() if isinstance(one, FromData)]
-    wanted += [one for one in columns if one is not None]
-    return wanted, optional
+        found["angle.column"] = mapping.angle.column
+        found["angle.index.column"] = mapping.angle.index.column if mapping.angle.index else None
+    found |= {f"channels.{name}.column": channel.column for name, channel in mapping.channels.items()}
+    for name, one in stated(mapping, entry).items():
+        found[f"set.{name}.column"] = one.column if isinstance(one, FromData) else None
+    return {where: column for where, column in found.items() if column is not None}

@@ -91,7 +91,8 @@ def choose(path: Path, names: Sequence[str], wanted: Sequence[str], optional: Se
         listed = ", ".join(f"'{name}'" for name in names[:SHOWN]) + (", …" if len(names) > SHOWN else "")
         what = f"there is no column {told}; the file has {listed or 'none'}"
         near = nearest(missing[0], names)
-        remedy = near if near.startswith("did you mean") else "name one of these in the mapping"
+        like = near.startswith("did you mean") and len(missing[0]) > 3  # T1 is not meant where T2 is written
+        remedy = near if like else "name one of these in the mapping"
         raise failed(path, what, remedy)
     doubled = [name for name in (*wanted, *optional) if names.count(name) > 1]
     if doubled:

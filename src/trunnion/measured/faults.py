@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
+from scipy.stats import binom
 
 from trunnion.errors import Severity
 from trunnion.measured.account import Account, counted, places, runs
@@ -22,16 +23,28 @@ CLIP = 0.9995  # of the range, from which a reading is at it: the top code of 12
 STUCK = 30  # equal readings in a row at least
 WIDTH = 7  # samples of the median that spikes are told from: up to three in a row are found
 FAR = 12.0  # robust standard deviations from it
+NEAR = 0.01  # of a turn: what recurs that close is in the same place
+CHANCE = 0.02
 SEEN = 0.05  # of the span from the 1st to the 99th percentile, that a spike or a fall to zero exceeds
 
 
 @dataclass(frozen=True)
 class Span:
-    """The rows in which the drive runs, and how many turns they are."""
+    """The rows in which the drive runs, and when its turns begin and end there, s."""
 
     low: int
     high: int
-    turns: int
+    begin: Array
+    end: Array
+
+    @property
+    def turns(self) -> int:
+        return int(self.begin.size)
+
+    def phase(self, time: Array) -> Array:
+        """Share of its turn that has passed at a time, s."""
+        turn = np.clip(np.searchsorted(self.begin, time, side="right") - 1, 0, self.turns - 1)
+        return np.asarray(((time - self.begin[turn]) / (self.end - self.begin)[turn]) % 1.0)
 
 
 def cells(where: str, column: Column, readings: Array, seconds: Array, account: Account) -> None:
@@ -94,6 +107,18 @@ def _leave_out(part: Array, mask: Mask) -> None:
 def _own(count: int, span: Span) -> bool:
     """Whether something happens in so many places that it belongs to the signal."""
     return span.turns >= 4 and count >= 0.5 * span.turns
+
+
+def _recurring(phase: Array) -> Mask:
+    """What comes back in the same place of the turn more often than chance would have it: the signal's own.
+
+    So many others lie within NEAR of it, of turns taken at random, in CHANCE of all cases only (binomial).
+    """
+    if phase.size < 2:
+        return np.zeros(phase.size, dtype=np.bool_)
+    around = np.sort(np.concatenate([phase - 1, phase, phase + 1]))
+    others = np.searchsorted(around, phase + NEAR, side="right") - np.searchsorted(around, phase - NEAR) - 1
+    return np.asarray(binom.sf(others - 1, phase.size - 1, 2 * NEAR) < CHANCE)
 
 
 def _clipped(where: str, part: Array, time: Array, limit: float, account: Account) -> None:
@@ -182,11 +207,14 @@ def _spikes(where: str, part: Array, time: Array, wide: float, span: Span, accou
     spread = 1.4826 * float(np.median(off))
     usual = float(np.percentile(off, 99))
     far = off > max(FAR * spread, 2.5 * usual, SEEN * wide)
-    count = int(runs(far)[0].size)
-    if not count or _own(count, span):
+    if _own(int(runs(far)[0].size), span):
         return
     bad = np.zeros(part.size, dtype=np.bool_)
     bad[np.flatnonzero(finite)[far]] = True
+    bad[np.flatnonzero(bad)[_recurring(span.phase(time[bad]))]] = False
+    far = bad[finite]
+    if not far.any():
+        return
     what = f"spikes: {counted(int(far.sum()), 'reading')} of {part.size:,} up to {off[far].max() / wide:.2g} times the "
     what += f"usual span off their neighbours, {places(bad, time)}"
     account.warn(where, f"{what}; left out", "check shielding and earth")

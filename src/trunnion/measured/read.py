@@ -249,9 +249,9 @@ class _File:
         """The courses of a channel, put into the parts; the drift that is left in them."""
         mapping, account, line = self.mapping, self.account, self.line
         channel, own, where = mapping.channels[name], self.own[name], f"channels.{name}"
-        low = int(np.searchsorted(line.seconds, min(float(part.turns.begin[0]) for part in parts)))
-        high = int(np.searchsorted(line.seconds, max(float(part.turns.end[-1]) for part in parts), side="right"))
-        span = faults.Span(low, high, sum(part.turns.numbers.size for part in parts))
+        begin, end = (np.sort(np.concatenate([getattr(part.turns, one) for part in parts])) for one in ("begin", "end"))
+        low, high = int(np.searchsorted(line.seconds, begin[0])), int(np.searchsorted(line.seconds, end[-1], "right"))
+        span = faults.Span(low, high, begin, end)
         readings = self.readings.pop(name)
         self.steps[name] = abs(own.scale.factor) * resolution(readings[low:high])
         speed = channel.measures.startswith("rate:")

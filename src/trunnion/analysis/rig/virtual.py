@@ -175,7 +175,9 @@ class Observation:
                 zero = float(np.mean(values[: case.before])) if channel.zeroed and case.before else 0.0
                 by_turn = np.interp(at.ravel(), np.arange(case.rows), values - zero).reshape(at.shape)
                 courses[name] = Course(name, channel.measures, channel.unit, by_turn, self.accuracy(name))
-            settings = {name: _si(self.mechanism, name, value) for name, value in case.settings.items()}
+            settings = {
+                name: _si(self.mechanism, name, value) for name, value in {**self.rig.set_, **case.settings}.items()
+            }
             speed = case.drive(self.rate)[1]
             conditions.append(Condition(case.name, settings, phase, courses, (), speed))
         return Measurement(self.rig.name, tuple(conditions), self.findings, ("made by a virtual rig, not read",))

@@ -24,8 +24,8 @@ STUCK = 30  # equal readings in a row at least
 WIDTH = 7  # samples of the median that spikes are told from: up to three in a row are found
 FAR = 12.0  # robust standard deviations from it
 NEAR = 0.01  # of a turn: what recurs that close is in the same place
-CHANCE = 0.02
-SEEN = 0.05  # of the span from the 1st to the 99th percentile, that a spike or a fall to zero exceeds
+CHANCE = 0.025
+SEEN = 0.1  # of the span from the 1st to the 99th percentile, that a spike or a fall to zero exceeds
 
 
 @dataclass(frozen=True)
@@ -112,13 +112,19 @@ def _own(count: int, span: Span) -> bool:
 def _recurring(phase: Array) -> Mask:
     """What comes back in the same place of the turn more often than chance would have it: the signal's own.
 
-    So many others lie within NEAR of it, of turns taken at random, in CHANCE of all cases only (binomial).
+    So many others lie within NEAR of it, of turns taken at random, in CHANCE of all cases only (binomial). Once found,
+    they do not count any more when the rest is looked at.
     """
-    if phase.size < 2:
-        return np.zeros(phase.size, dtype=np.bool_)
-    around = np.sort(np.concatenate([phase - 1, phase, phase + 1]))
-    others = np.searchsorted(around, phase + NEAR, side="right") - np.searchsorted(around, phase - NEAR) - 1
-    return np.asarray(binom.sf(others - 1, phase.size - 1, 2 * NEAR) < CHANCE)
+    own = np.zeros(phase.size, dtype=np.bool_)
+    while np.count_nonzero(~own) > 1:
+        rest = phase[~own]
+        around = np.sort(np.concatenate([rest - 1, rest, rest + 1]))
+        others = np.searchsorted(around, rest + NEAR, side="right") - np.searchsorted(around, rest - NEAR) - 1
+        found = np.asarray(binom.sf(others - 1, rest.size - 1, 2 * NEAR) < CHANCE)
+        if not found.any():
+            break
+        own[np.flatnonzero(~own)[found]] = True
+    return own
 
 
 def _clipped(where: str, part: Array, time: Array, limit: float, account: Account) -> None:

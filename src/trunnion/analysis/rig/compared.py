@@ -168,11 +168,12 @@ def _attributes(
     drivers = list(mechanism.drivers)
     units = {name: next(one.condition.courses[name].unit for one in found if name in one.pairs) for name in channels}
     sets = list(dict.fromkeys(name for one in found for name in one.condition.values))
+    written = units_set(mechanism, sets, [one.condition.name for one in found])
     told = findings_of(mechanism, channels, found, coverage)
     rows: dict[str, Any] = {
         "channel_units": list(units.values()),
         "channel_measures": list(channels.values()),
-        **dict(zip(("set_units", "set_written"), units_set(mechanism, sets), strict=True)),
+        **dict(zip(("set_units", "set_written"), written, strict=True)),
         "findings": [finding_row(finding) for finding in told],
         "data_findings": [{**finding_row(one), "file": one.file} for one in gathered(measurement.findings)],
         "done": list(measurement.done),

@@ -48,14 +48,20 @@ def findings_of(
     return sorted(rows, key=lambda one: order.index(one.severity))
 
 
-def units_set(mechanism: Mechanism, names: Iterable[str]) -> tuple[list[str], list[tuple[str, float]]]:
-    """SI unit of each number that is set, and the unit with its factor that the model states it in."""
+def units_set(
+    mechanism: Mechanism, names: Iterable[str], conditions: Iterable[str]
+) -> tuple[list[str], list[tuple[str, float]]]:
+    """SI unit of each number that is set, and the unit with its factor that it is read in.
+
+    That of the names of the conditions, such as `input.speed 250 rpm`, else the one that the model states it in.
+    """
     known = {row["path"]: row for row in inputs(mechanism)}
+    told = dict(part.partition(" ")[::2] for name in conditions for part in name.split(", "))
     units, written = [], []
     for name in names:
         row = known.get(mechanism.path_of(name), {"unit": "", "text": ""})
-        literal = LITERAL.fullmatch(row["text"].strip().removeprefix("-"))
-        text = (literal["unit"] or literal["per"] or "") if literal else ""
+        literals = (LITERAL.fullmatch(one.strip().removeprefix("-")) for one in (told.get(name, ""), row["text"]))
+        text = next((one["unit"] or one["per"] or "" for one in literals if one and (one["unit"] or one["per"])), "")
         text = text or {"rad": "deg"}.get(row["unit"], row["unit"])
         units.append(row["unit"])
         written.append((text, float(unit_of(text)[0]) if text and text != "1" else 1.0))

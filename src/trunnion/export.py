@@ -11,8 +11,8 @@ CSV (and Parquet) have one row a position and flat columns: `time`, `<joint>.rot
 they were given, then `efficiency`, `<driver>.effort_max`, `<joint>.reaction_max`, …, `status`. The play of joints has
 `drive`, `<measure>`, `<measure>.worst_case`, `<measure>.rss`, `<measure>.deviation`, `<measure>.<joint>.worst_case`,
 …. Of tolerances the file's name says which table it holds: one row a measure, or of `x.parameters.csv` one a toleranced
-number, see `tolerance_columns`; so it does of a comparison with measurements and of what `identify` finds, see
-`compare_columns` and `identified_columns`. What `assemble` finds has one row a position: `<driver>.coordinate`,
+number, see `columns.tolerances`; so it does of a comparison with measurements and of what `identify` finds, see
+`columns.comparison` and `columns.identification`. What `assemble` finds has one row a position: `<driver>.coordinate`,
 `needed_share`, `needed_clearance`, …, `<joint>.uniform_1_x` of end 1, …, `status`. Measured courses have one row a
 condition and position: `condition`, what was set, `phase`, `<channel>.mean`, `.scatter`, `.uncertainty`, `.turns`.
 """
@@ -31,7 +31,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion import compare_columns, identified_columns, tolerance_columns
+from trunnion.columns import tables_of
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.output import whole
 
@@ -45,15 +45,6 @@ SLIDING = ("prismatic", "cylindrical", "helical")
 ROWS = 20_000  # written at a time, so that memory does not grow with the number of positions
 
 Column = tuple[str, str, Callable[[slice], NDArray[Any]]]
-
-
-def tables_of(result: xr.Dataset) -> Any:
-    """The module that knows the tables of a result; None of one that has a single table."""
-    if tolerance_columns.is_tolerance(result):
-        return tolerance_columns
-    if compare_columns.is_comparison(result):
-        return compare_columns
-    return identified_columns if identified_columns.is_identification(result) else None
 
 
 def columns(result: xr.Dataset, table: str = "measures") -> list[Column]:

@@ -58,7 +58,7 @@ def test_left_out_conditions_end_with_1(run: Run, tmp_path: Path) -> None:
     done = run(FOUR_BAR, "rig.yaml", "--out", "data")
     assert done.code == 1
     assert (
-        "rig.yaml:7: warning: schedule.conditions: condition 1 (l2 = 80 mm, A.speed = 60 rpm) is left out" in done.err
+        "rig.yaml:7: warning: schedule.conditions: condition 1 (l2 = 80 mm, A.speed = 61 rpm) is left out" in done.err
     )
     assert not (tmp_path / "data" / "run-01.csv").exists()
     assert (tmp_path / "data" / "run-02.csv").exists()

@@ -28,7 +28,7 @@ def test_a_sound_recording_has_no_finding(run: Columns, tmp_path: Path) -> None:
     assert found.findings == ()
     (one,) = found.conditions
     assert one.courses["torque-in"].turns.shape == (19, 90)  # of 20 turns from 21° on
-    assert one.speed == pytest.approx(600 * np.pi / 30, rel=1e-6)
+    assert one.speed == pytest.approx(600 * np.pi / 30, rel=2e-6)  # of 1.9 s, pulses known to a part of 0.2 ms
     assert off(one) < 0.06  # noise of 0.05 N m
     assert any("whole turns" in sentence for sentence in found.done)
     assert any("zero of torque-in" in sentence for sentence in found.done)

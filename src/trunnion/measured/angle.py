@@ -12,6 +12,7 @@ from trunnion.measured.account import Account, counted, times
 from trunnion.measured.amounts import alike, dimensions
 from trunnion.measured.mapping import AngleSource
 from trunnion.measured.pulses import by_index, index_times, pulses_of
+from trunnion.measured.smoothing import seen_edges, smoothed, unresolved
 from trunnion.measured.tables import Table
 from trunnion.measured.timebase import Timeline
 
@@ -25,11 +26,13 @@ TURN = 2 * np.pi
 class Coordinate:
     """Coordinate of the driver by row, rad, NaN where it is not known.
 
-    spoilt: stretches of time, (stretch, 2), in which it is wrong.
+    spoilt: stretches of time, (stretch, 2), in which it is wrong; lag: standard uncertainty, s, of the time at which it
+    passes a value, in the mean over many pulses.
     """
 
     values: Array
     spoilt: Array
+    lag: float = 0.0
 
 
 def coordinate(source: AngleSource, table: Table, line: Timeline, speed: Array | None, account: Account) -> Coordinate:
@@ -141,18 +144,33 @@ def _of_pulses(
         )  # fmt: skip
     counts, spoilt = found.counts, found.spoilt
     if index.size > 1:
+        at = np.interp(index[[0, -1]], found.times, counts)
+        index = seen_edges(index, float(np.abs(at[1] - at[0])) / source.per_turn, line.step)
         counts, lost = by_index(found, index, source.per_turn, line.step, account)
         spoilt = np.concatenate([spoilt, lost])
     elif index.size == 1:
         counts = counts - np.interp(index[0], found.times, counts)
     turned = source.sign * TURN / source.per_turn * counts
-    values = np.interp(line.seconds, found.times, turned, left=np.nan, right=np.nan)
+    pulse = 360.0 / source.per_turn
+    blur = pulse * min(0.5 * found.slack(line.step), 0.5)
+    when, spans, lag = found.times, np.zeros(0), 0.0
+    if not found.crossings and found.slack(line.step) < 1:  # a count for each event: its time is not known
+        when, spans = smoothed(when, 0.5 * line.step, source.per_turn)
+        lag = unresolved((found.times - when)[spans > 0], line.step)
+    elif not found.crossings:  # an event for each sample: its count is not known
+        jump = float(np.median(np.abs(np.diff(counts))))
+        raw = turned
+        turned, spans = smoothed(raw, float(np.radians(blur)), source.per_turn / jump)
+        per_pulse = line.step / found.slack(line.step)
+        lag = unresolved((raw - turned)[spans > 0], float(np.radians(pulse))) / np.radians(pulse) * per_pulse
+    values = np.interp(line.seconds, when, turned, left=np.nan, right=np.nan)
     if found.until is not None:
         values[line.seconds > found.until] = np.nan
-    pulse = 360.0 / source.per_turn
-    blur = pulse * min(0.5 * line.step / max(float(np.median(np.diff(found.times))), 1e-300), 1.0)
     known = "" if found.crossings else ", each known to ± {} deg by the sampling"
+    usual = float(np.median(spans)) if spans.size else 0.0
+    even = f"; it is smoothed over {usual:.3g} turns, with which all pulses agree" if usual > 0 else ""
     account.say(
-        f"the angle is interpolated between pulses {pulse:.4g} deg apart{known}", None if found.crossings else blur
+        f"the angle is interpolated between pulses {pulse:.4g} deg apart{known}{even}",
+        None if found.crossings else blur,
     )
-    return Coordinate(values + zero, spoilt)
+    return Coordinate(values + zero, spoilt, lag)

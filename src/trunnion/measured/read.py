@@ -117,6 +117,7 @@ class _File:
         if mapping.filter is not None:
             self._check_filter(table)
         self.own: dict[str, Reading] = {}
+        self.lag = 0.0
         self.readings: dict[str, Array] = {}
         self.steps: dict[str, float] = {}
         for name, channel in mapping.channels.items():
@@ -181,6 +182,7 @@ class _File:
                 raise MechanismError(Finding(what, "angle.channel", "name one in rpm or rad/s", file=self.account.file))
             speed = own.quantity(self.readings[name], zeros[name], mapping.channels[name].sign, self.line.seconds)
         found: Coordinate = coordinate(source, self.table, self.line, speed, self.account)
+        self.lag = found.lag
         known = np.flatnonzero(np.isfinite(found.values) & self._used())
         if known.size < 3:
             what = "the coordinate of the driver is known in no row that is used"
@@ -311,7 +313,7 @@ class _File:
         timed = self.mapping.timed
         start, cycle = (np.nan if timed else float(one.evaluate()) for one in (self.mapping.start, self.mapping.cycle))
         phase = np.arange(positions) / positions
-        return Condition(name, values, phase, courses, (str(self.path),), speed, start, cycle)
+        return Condition(name, values, phase, courses, (str(self.path),), speed, start, cycle, lag=self.lag)
 
 
 def _table(path: Path, mapping: DataMapping, entry: File) -> Table:

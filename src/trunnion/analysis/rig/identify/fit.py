@@ -7,7 +7,7 @@ a delay τ of the sensor behind the angle, of which f − τ df/dt is read.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf
 
@@ -26,6 +26,7 @@ MOST_EVALUATIONS = 100
 TOLERANCE = 1e-10  # of cost and step: far below what data of any scatter tell
 PER_GUARD = 90  # positions of a cycle for each that is left out beside a jump, which resampling smears
 OWN = "zero of each file"
+ANGLE = "angle of each condition"  # by the sampling of pulses
 GUESS = 0.01  # of a course: the scatter of one without repetitions, until its residuals are known
 
 
@@ -51,11 +52,17 @@ class Sensor:
         return self.group or self.name
 
 
-def sensors_of(blocks: Sequence[Block], own: Sequence[str] | None = None, delay: float | None = None) -> list[Sensor]:
+def sensors_of(
+    blocks: Sequence[Block],
+    own: Sequence[str] | None = None,
+    delay: float | None = None,
+    lags: Mapping[str, float] | None = None,
+) -> list[Sensor]:
     """Errors of the sensors of all blocks: one for each channel, or of each condition if these have names.
 
     An infinite standard uncertainty says that nothing is known of it. delay: by which a channel may lag behind the
-    angle, standard uncertainty, s; none if not given.
+    angle, standard uncertainty, s; none if not given. lags: the same of all channels of each condition together, by
+    its name in the order of the conditions.
     """
     found: list[Sensor] = []
     for kind in ("zero", "gain"):
@@ -76,7 +83,13 @@ def sensors_of(blocks: Sequence[Block], own: Sequence[str] | None = None, delay:
                 sizes[k] = float(size)
             name = f"{kind} of {channel}" + (f" in {place}" if place else "")
             found.append(Sensor(name, channel, kind, tuple(sizes), not free))
-    return [*found, *([] if own else _of_files(blocks)), *_late(blocks, delay), *_behind(blocks, own)]
+    return [
+        *found,
+        *([] if own else _of_files(blocks)),
+        *_late(blocks, delay),
+        *_sampled(blocks, lags or {}),
+        *_behind(blocks, own),
+    ]
 
 
 def _of_files(blocks: Sequence[Block]) -> list[Sensor]:
@@ -106,6 +119,16 @@ def _late(blocks: Sequence[Block], delay: float | None) -> list[Sensor]:
         for channel, sizes in rows.items()
         if any(sizes)
     ]
+
+
+def _sampled(blocks: Sequence[Block], lags: Mapping[str, float]) -> list[Sensor]:
+    """By how much all channels of a condition lag together, since its angle is known to the sampling only."""
+    found = []
+    for index, (name, lag) in enumerate(lags.items()):
+        sizes = tuple(lag * (one.condition == index and one.turns.shape[1] > 2) for one in blocks)
+        if any(sizes):
+            found.append(Sensor(f"{ANGLE}: {name}", "", "delay", sizes, True, ANGLE))
+    return found
 
 
 def _behind(blocks: Sequence[Block], own: Sequence[str] | None) -> list[Sensor]:

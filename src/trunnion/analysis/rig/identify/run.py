@@ -119,7 +119,8 @@ def identified(
     if channels is None:
         model, blocks = _telling(model, blocks)
     names = [one.name for one in measurement.conditions] if sensors == "condition" else None
-    problem = Problem(model, blocks, sensors_of(blocks, names, delay), guard)
+    lags = {one.name: one.lag for one in measurement.conditions}
+    problem = Problem(model, blocks, sensors_of(blocks, names, delay, lags), guard)
     found = search(problem, starts)
     spread = spread_of(problem, found.fit.x)
     problem.left_over = left_over(problem, spread)

@@ -1,0 +1,64 @@
+"""Pulses that are known to a sample: what the smoothest values that agree with them are off."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from trunnion.measured.smoothing import seen_edges, smoothed, unresolved
+
+Array = NDArray[np.float64]
+STEP = 1 / 5000
+
+
+def sampled(times: Array) -> Array:
+    """In the middle between the two samples that a pulse lies between."""
+    return np.asarray((np.floor(times / STEP) + 0.5) * STEP)
+
+
+@pytest.mark.parametrize(("per_turn", "rate"), [(360, 5.0), (360, 10.0), (60, 5.0), (60, 15.167), (100, 10.0)])
+def test_steady_pulses_in_step_with_the_sampling(per_turn: int, rate: float) -> None:
+    """What is left is a shift of all pulses alike, and as large as it is said to be at most; exactly 5 samples a pulse
+    leave half a sample.
+    """
+    true = 0.0123456 + np.arange(20 * per_turn) / (per_turn * rate)
+    raw = sampled(true)
+    found, spans = smoothed(raw, 0.5 * STEP, per_turn)
+    assert np.all(spans == 2.0)
+    off = (found - true)[per_turn:-per_turn]
+    assert np.std(off) < 0.06 * STEP
+    assert abs(off.mean()) < 1.8 * unresolved(raw - found, STEP)  # a rectangle is √3 wide
+
+
+def test_uneven_running_stays() -> None:
+    """A ripple of the speed of 3 % twice a turn is the shaft's: it is followed to a fraction of a sample."""
+    angle = np.arange(0, 40 * np.pi, np.pi / 180)
+    true = (angle + 0.03 * np.sin(2 * angle) / 2) / (2 * np.pi * 5) + 0.1
+    raw = sampled(true)
+    found, spans = smoothed(raw, 0.5 * STEP, 360)
+    assert 0 < np.median(spans) < 1
+    assert np.abs(found - true)[20:-20].max() < 0.6 * STEP
+    assert np.std(found - true) < np.std(raw - true) / 2
+
+
+def test_pulses_without_errors_stay_as_they_are() -> None:
+    rough = np.cumsum(np.random.default_rng(1).uniform(0.5, 1.5, 1000)) * 1e-3
+    found, spans = smoothed(rough, 1e-6, 60)
+    assert np.array_equal(found, rough)
+    assert not spans.any()
+
+
+@pytest.mark.parametrize("width", [0.2, 0.6])
+def test_an_index_narrower_than_a_sample(width: float) -> None:
+    """Seen in some turns only; the edges are right in the mean."""
+    true = 0.05 + np.arange(4000) * 0.100013
+    first = np.ceil(true / STEP) * STEP
+    seen = first < true + width * STEP
+    edges = seen_edges(first[seen] - 0.5 * STEP, (true[seen][-1] - true[seen][0]) / 0.100013, STEP)
+    assert abs(np.mean(edges - true[seen])) < 0.02 * STEP
+
+
+def test_an_index_that_is_seen_in_every_turn_stays() -> None:
+    index = np.arange(1.0, 11.0)
+    assert seen_edges(index, 9.0, STEP) is index

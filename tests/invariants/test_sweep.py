@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -152,6 +153,22 @@ def test_points_solved_together_equal_points_solved_alone(model: str, monkeypatc
     power = float(alone["drive_effort_rms"].max()) * 1e-9
     for name, values in alone.data_vars.items():
         np.testing.assert_allclose(both[name].values, values.values, rtol=1e-9, atol=power, err_msg=str(name))
+
+
+def test_errors_of_followed_groups_are_those_of_analyse() -> None:
+    """Whatever point comes first: what spherical joints are turned by an error is told from each point's own start."""
+    mechanism = read("rssr").with_values({"joints.D.misalignment.tilt": 0.00125})
+    both = trunnion.sweep(mechanism, {"a": ["30 mm", "14 mm"]}, STEPS)
+    alone = trunnion.sweep(mechanism, {"a": ["14 mm"]}, STEPS)
+    found, expected = (one["transmission_error_max"].values[:, -1] for one in (both, alone))
+    np.testing.assert_allclose(found, expected, rtol=1e-9)
+
+
+def test_points_looked_at_are_counted_once() -> None:
+    swept = trunnion.sweep(read("durango-fourbar"), {"AB": ("1.6 m", "2.6 m", 11), "A.speed": (1, 5, 5)}, STEPS)
+    said = [row["what"] for row in json.loads(swept.attrs["findings"]) if "points looked at" in row["what"]]
+    counts = [int(re.search(r"of (\d+) points looked at", text)[1]) for text in said]  # type: ignore[index]
+    assert all(count <= 55 for count in counts)
 
 
 def test_errors_of_points_solved_together() -> None:

@@ -17,6 +17,7 @@ from trunnion.algebra.namespace import Number
 from trunnion.algebra.nested import flat
 from trunnion.analysis import account, contact_loss, diagnosis
 from trunnion.analysis.asbuilt import COMPARED, fill_errors, fill_seats
+from trunnion.analysis.blanks import blank
 from trunnion.analysis.branches import Chosen, choose
 from trunnion.analysis.bristles import History, histories
 from trunnion.analysis.engine import build
@@ -316,7 +317,7 @@ def _fill_as_built(
     else:
         _fill(arrays, run.solve(part, method=method), part, window, causes)
     fill_errors(arrays, scratch, _link_numbers(run.system), window)
-    _blank(arrays, arrays["status"][window].astype(np.int8), window)
+    blank(arrays, arrays["status"][window].astype(np.int8), window)
 
 
 def filled(
@@ -340,7 +341,7 @@ def filled(
     _fill(arrays, back, time, everything)
     _fill(ideal, meant, time, everything)
     fill_errors(arrays, ideal, _link_numbers(system), everything)
-    _blank(arrays, arrays["status"].astype(np.int8), everything)
+    blank(arrays, arrays["status"].astype(np.int8), everything)
     return arrays, ideal
 
 
@@ -375,7 +376,7 @@ def _fill(
         engine.fill_forces(arrays, back, window)
         _fill_settled(arrays, back, window)
         account.fill_power(arrays, back, time, window)
-    _blank(arrays, status, window)
+    blank(arrays, status, window)
 
 
 def status_of(back: Backward, shape: tuple[int, ...]) -> NDArray[np.int8]:
@@ -451,41 +452,6 @@ def _fill_settled(arrays: Arrays, back: Backward, window: slice) -> None:
         worst = functools.reduce(np.maximum, (getattr(one, field) for one in settled), 0.0)
         arrays[key][window] = worst
     arrays["locking_margin"][window] = functools.reduce(np.minimum, (one.margin for one in settled), np.inf)
-
-
-FORCES = [
-    *("reaction_force", "reaction_moment", "friction_torque", "friction_force", "friction_moment", "friction_power"),
-    *("drive_effort", "drive_power", "power_residual", "friction_change", "friction_contraction"),
-    *("spring_force", "spring_power", "damping_power", "gear_torque", "gear_force"),
-    *("reaction_force_change", "drive_effort_change", "friction_power_change"),
-    # where the load is not known, neither is the seat
-    *("seat_offset", "seat_beta", "seat_xi", "seat_xi_pin", "end_force", "contact_position"),
-    *("point_error", "link_error", "joint_rotation_error", "joint_slide_error"),
-]
-POSES = [
-    *("point_position", "link_angle", "link_position", "link_rotation", "joint_rotation", "joint_slide"),
-    *("spring_elongation", "closure_residual", "condition"),
-]
-RATES = [name for name in results.VARIABLES if name.endswith(("velocity", "acceleration"))]
-
-
-def _blank(arrays: Arrays, status: NDArray[np.int8], window: slice) -> None:
-    """NaN for every number that a status rules out."""
-    if not np.any(status >= Status.NOT_CONVERGED):
-        return
-    for names, where in (
-        (FORCES, status >= Status.NOT_CONVERGED),
-        (RATES, status >= Status.SINGULAR),
-        (["locking_margin"], status >= Status.LOAD_UNDEFINED),
-        (["useful_power", "efficiency_instant"], status >= Status.NOT_CONVERGED),
-    ):
-        for name in names:
-            if name in arrays and arrays[name].flags.writeable:
-                arrays[name][..., window][..., where] = np.nan
-    # a driver's own link is known where the rest is not; a whole position is either assembled or not
-    for name in POSES:
-        if name in arrays and arrays[name].flags.writeable:
-            arrays[name][..., window][..., status == Status.NOT_ASSEMBLED] = np.nan
 
 
 def _bracket(

@@ -77,11 +77,11 @@ def sweep(
 
 def _shared(points: Points) -> Iterator[Finding]:
     """What the points have to say that were looked at by themselves, each once; notes only if all have them."""
-    total = int(np.prod(points.shape))
-    whole = f"{total:,} points" if points.looked == total else f"{points.looked:,} points looked at"
+    total, looked = int(np.prod(points.shape)), len(points.looked)
+    whole = f"{total:,} points" if looked == total else f"{looked:,} points looked at"
     for found in points.said.values():
-        one, count = found[0], len(found)
-        if count == points.looked:
+        one, count = next(iter(found.values())), len(found)
+        if count == looked:
             yield one
         elif one.severity is not Severity.NOTE:
             yield replace(one, what=f"{one.what} (at {count:,} of {whole})")

@@ -54,8 +54,8 @@ Index = tuple[int, ...]
 class Points:
     """The points of a grid and how their cycles are run.
 
-    looked: how many mechanisms were prepared by themselves; said: what they have to say, by place and text; erring:
-    whether any point has errors; run: of the first point.
+    looked: points that were prepared by themselves; said: what they have to say, by place and text and then by point;
+    erring: whether any point has errors; run: of the first point.
     """
 
     mechanism: Mechanism
@@ -66,8 +66,8 @@ class Points:
 
     def __post_init__(self) -> None:
         check_steps(self.steps)
-        self.said: dict[tuple[str, str], list[Finding]] = {}
-        self.looked = 0
+        self.said: dict[tuple[str, str], dict[Index, Finding]] = {}
+        self.looked: set[Index] = set()
         self.erring = False
         self.run = self._prepared(tuple(0 for _ in self.swept))
 
@@ -102,10 +102,10 @@ class Points:
             run = prepare(changed)
             if run.determinacy is not None:
                 run.determinacy.refuse()
-            self.looked += 1
+            self.looked.add(index)
             self.erring = self.erring or run.erring
             for finding in _findings(run):
-                self.said.setdefault((finding.where, finding.what), []).append(finding)
+                self.said.setdefault((finding.where, finding.what), {})[index] = finding
         return run
 
     def _alone(self, index: Index, run: Run | None = None) -> Reduced:
@@ -133,7 +133,9 @@ class Points:
             return False
         if any(module.redundant for module in run.system.plan.modules):
             return False
-        return all(self._like(index) for index in self._probes())
+        alike = all(self._like(index) for index in self._probes())
+        # what a joint is turned by its errors is told from the start of its own cycle, which a followed group has alone
+        return alike and not (self._followed and self.erring)
 
     @cached_property
     def _followed(self) -> bool:

@@ -10,6 +10,7 @@ import typer
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.options import IMAGES, File, FrictionLaw, Out, Seats, Set, TableFile, UnitsRow
 from trunnion.terminal import bar, console, findings_of, say, show_rows, wrote
+from trunnion.verbs.inputs import spare_data
 from trunnion.verbs.model import lines_of, placed, stated
 from trunnion.verbs.tolerance import PAGES
 
@@ -58,6 +59,7 @@ def compare(
     from trunnion.measured.read import read_measured
 
     _check(out or [], report, kind)
+    spare_data(mapping, data, out, report, file, table)
     mechanism = stated(file, set_, table, friction, seat)
     measurement = read_measured(mapping, [str(path) for path in data] if data else None)
     with lines_of(file), bar("conditions", len(measurement.conditions)) as progress:

@@ -10,6 +10,7 @@ import typer
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.options import IMAGES, File, FrictionLaw, Out, Seats, Set, TableFile, UnitsRow, setting
 from trunnion.terminal import console, findings_of, say, show_rows, wrote
+from trunnion.verbs.inputs import spare_data
 from trunnion.verbs.model import exit_status, lines_of, placed, stated
 from trunnion.verbs.tolerance import PAGES
 
@@ -107,6 +108,7 @@ def identify(
     from trunnion.measured.read import read_measured
 
     _check(file, write, force, out or [], report, kind)
+    spare_data(mapping, data, out, report, file, table, write)
     mechanism = stated(file, set_, table, friction, seat)
     with lines_of(file):
         wanted, begin = parameters(parameter or []), dict(setting(text) for text in start or ())

@@ -17,7 +17,7 @@ from trunnion.analysis.rig.virtual_sensors import Channel, resolved
 from trunnion.errors import Finding, MechanismError, Severity, Status
 from trunnion.measured.rig_file import Rig, Value
 
-__all__ = ["Case", "case_of", "channels_of", "findings_of", "measures_of", "placed_at", "speed_differs"]
+__all__ = ["Case", "case_names", "case_of", "channels_of", "findings_of", "measures_of", "placed_at", "speed_differs"]
 
 MOST_ROWS = 20_000_000
 BEYOND = 0.1  # of a cycle that is recorded before the first and past the last, so that their ends are there
@@ -152,6 +152,12 @@ def _of_the_drive(rig: Rig, run: Run) -> Iterator[Finding]:
     if rig.encoder and not (run.system.turns(driver) and run.system.span(run.values, driver).one_way):
         what = f"an encoder counts the turns of a driver that turns one way, {driver} does not"
         yield Finding(what, "encoder", "remove the encoder: positions then follow from the time")
+
+
+def case_names(count: int) -> list[str]:
+    """Names of conditions, and of their files."""
+    width = max(2, len(str(count)))
+    return [f"run-{number:0{width}d}" for number in range(1, count + 1)]
 
 
 def case_of(

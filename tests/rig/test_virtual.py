@@ -280,6 +280,22 @@ def test_plan_expects_what_comes(seen: Observation) -> None:
     assert forecast.dominant.startswith(("T1 ", "T2 "))
 
 
+def test_negative_sensitivity_is_planned_and_read_back(mechanism: Mechanism, seen: Observation, tmp_path: Path) -> None:
+    """Both torques by sensors that read downward: the same shares, the same courses from the files."""
+    mirrored = {
+        name: one | {"sensitivity": "-100 mV/(N m)"} if name.startswith("T") else one for name, one in SENSORS.items()
+    }
+    down = trunnion.observe(mechanism, rig(sensors=mirrored), seed=4)
+    for one, other in zip(plan(down).sensors[:2], plan(seen).sensors[:2], strict=True):
+        assert (one.share, one.steps, one.noise) == pytest.approx(
+            (other.share, other.steps, 100 * other.noise), rel=1e-3
+        )
+        assert (one.least, one.most) == pytest.approx((-100 * other.most, -100 * other.least), rel=1e-3)
+    down.write(tmp_path)
+    read = trunnion.read_measured(tmp_path / "mapping.yaml").conditions[0].courses["T1"]
+    assert read.mean.mean() == pytest.approx(seen.measurement(360).conditions[0].courses["T1"].mean.mean(), abs=0.02)
+
+
 def test_plan_tells_slow_sensors_and_coarse_converters(mechanism: Mechanism) -> None:
     slow = {name: one | {"bandwidth": "2 Hz"} for name, one in SENSORS.items()}
     slow["w2"] = slow["w2"] | {"bits": 6, "range": "1000 rad/s"}

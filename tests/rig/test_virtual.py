@@ -164,6 +164,14 @@ def test_files_are_read_as_they_were_meant(seen: Observation, form: str, tmp_pat
     assert own.value == pytest.approx(efficiency_of(direct).value, abs=0.1 * own.uncertainty)
 
 
+@pytest.mark.parametrize("name", ["T, in", "T; in", 'T "in"', "#T", "T [a]", "'T'", "Drehmoment ä"])
+def test_names_with_separators_are_read_back(mechanism: Mechanism, name: str, tmp_path: Path) -> None:
+    changes = {"sensors": {name: SENSORS["T1"], "n1": SENSORS["n1"]}, "time": {"column": f"{name} t"}}
+    trunnion.observe(mechanism, rig(**changes)).write(tmp_path)
+    read = trunnion.read_measured(tmp_path / "mapping.yaml")
+    assert set(read.conditions[0].courses) == {name, "n1"}
+
+
 def test_truth_tells_what_was_drawn(seen: Observation, tmp_path: Path) -> None:
     seen.write(tmp_path)
     truth = yaml.safe_load((tmp_path / "truth.yaml").read_text("utf-8"))

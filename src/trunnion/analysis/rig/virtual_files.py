@@ -114,15 +114,20 @@ def units_of(observation: Observation) -> dict[str, str]:
 
 
 def _csv(record: Record, units: Mapping[str, str], path: Path, observation: Observation) -> None:
-    """Text, a column's unit in brackets behind its name; an empty cell where there is no reading."""
+    """Text, a column's unit in brackets behind its name, in quotes where it needs them; an empty cell: no reading."""
     head = [f"{name} [{units[name]}]" if name in units else name for name in record.columns]
     count = len(next(iter(record.columns.values())))
     with path.open("w", encoding="utf-8", newline="") as stream:
-        stream.write(",".join(head) + "\n")
+        stream.write(",".join(map(_quoted, head)) + "\n")
         for low in range(0, count, ROWS):
             cells = [_texts(values[low : low + ROWS]) for values in record.columns.values()]
             stream.write("\n".join(map(",".join, zip(*cells, strict=True))))
             stream.write("\n")
+
+
+def _quoted(name: str) -> str:
+    """A cell of the header, in quotes if it has a sign that may separate cells or begin a remark."""
+    return '"{}"'.format(name.replace('"', '""')) if set(name) & set(',;"#') else name
 
 
 def _texts(values: NDArray[Any]) -> list[str]:

@@ -172,6 +172,28 @@ def test_names_with_separators_are_read_back(mechanism: Mechanism, name: str, tm
     assert set(read.conditions[0].courses) == {name, "n1"}
 
 
+def test_a_load_at_rest_reads_nothing(tmp_path: Path) -> None:
+    """The strip of the press rests two thirds of the cycle: no cell is empty, the course is read back, and planned."""
+    press = trunnion.read(EXAMPLES / "indexing-press.yaml")
+    sensors = {"T": {"measures": "effort:R"}, "v": {"measures": "rate:R"}, "L": {"measures": "load:strip"},
+               "vF": {"measures": "rate:F"}}  # fmt: skip
+    seen = trunnion.observe(press, rig(sensors=sensors, encoder=None, schedule={"turns": 5}, rate="200 Hz"))
+    assert "given 0 in a rest" in seen.findings[0].what
+    (case,) = seen.cases
+    load, speed = case.true.at_samples(2), case.true.at_samples(3)
+    assert np.isfinite(load).all()
+    assert np.count_nonzero(speed == 0) > 0.3 * len(speed)
+    assert not np.any(load[speed == 0])
+    assert np.abs(load[np.abs(speed) > 1e-3]) == pytest.approx(30)
+    assert plan(seen).conditions[0].measured is not None
+    seen.write(tmp_path)
+    rows = (tmp_path / "run-01.csv").read_text("utf-8")
+    assert ",," not in rows
+    assert ",\n" not in rows
+    read = trunnion.read_measured(tmp_path / "mapping.yaml")
+    assert not [one for one in read.findings if "dropouts" in one.what]
+
+
 def test_truth_tells_what_was_drawn(seen: Observation, tmp_path: Path) -> None:
     seen.write(tmp_path)
     truth = yaml.safe_load((tmp_path / "truth.yaml").read_text("utf-8"))

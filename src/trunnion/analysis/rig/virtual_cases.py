@@ -219,7 +219,7 @@ def findings_of(cases: Sequence[Case], channels: Mapping[str, Channel], rig: Rig
         most = max(case.true.mended for case in mended)
         what = (
             f"{_named(mended)}: a load has no single value at up to {most} positions, its joint being at rest there; "
-            "sensors are given the mean of the neighbours"
+            "sensors are given 0 in a rest, the mean of the neighbours at a single position"
         )
         yield Finding(what, where, "", Severity.NOTE)
     yield from _lost_pulses(sound, rig)

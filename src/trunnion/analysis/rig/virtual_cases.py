@@ -68,9 +68,13 @@ class Case:
     def origin(self) -> float:
         """Sample, counted from the first of the file, at which time is 0: the first, or, where the driver does not name
         positions by its coordinate, the start of the first cycle."""
+        return 0.0 if self.named else self.before + self.lead
+
+    @property
+    def named(self) -> bool:
+        """Whether the first driver turns one way, so that its coordinate names positions."""
         driver = next(iter(self.run.system.mechanism.drivers))
-        named = self.run.system.turns(driver) and self.run.system.span(self.run.values, driver).one_way
-        return 0.0 if named else self.before + self.lead
+        return self.run.system.turns(driver) and self.run.system.span(self.run.values, driver).one_way
 
     @property
     def part(self) -> slice:
@@ -242,9 +246,14 @@ def findings_of(cases: Sequence[Case], channels: Mapping[str, Channel], rig: Rig
 
 
 def _both_ways(cases: Sequence[Case], rig: Rig) -> Iterator[Finding]:
-    """The level of an encoder where the driver turns either way."""
-    ways = {case.drive(rig.rate.value)[1] > 0 for case in cases}
-    if rig.encoder and rig.encoder.kind == "level" and len(ways) > 1:
+    """Drivers that turn either way, where there is no count of an encoder: files then begin at other coordinates."""
+    one_way = [case for case in cases if case.named]
+    if len({case.drive(rig.rate.value)[1] > 0 for case in one_way}) < 2:
+        return
+    if rig.encoder is None:
+        what = "the conditions turn both ways, and nothing measured tells where the driver is"
+        yield Finding(what, "encoder", "state an encoder of kind: count, or a rig for each way")
+    elif rig.encoder.kind == "level":
         what = "the conditions turn both ways, and the level of an encoder does not tell which"
         yield Finding(what, "encoder.kind", "record kind: count")
 

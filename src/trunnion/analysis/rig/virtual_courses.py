@@ -63,7 +63,7 @@ def solved(run: Run, measures: Sequence[Measure], time: Array, method: FrictionM
     if not np.any(status >= Status.NOT_CONVERGED):
         gaps = ~np.isfinite(values)
         mended = len(np.flatnonzero(gaps.any(axis=0)))
-        for row in np.flatnonzero(gaps.any(axis=1)):
+        for row in np.flatnonzero(gaps.any(axis=1)).tolist():
             if measures[row].kind == "load":
                 values[row, _rests(gaps[row], run.cycle.periodic)] = 0.0
             values[row] = _bridged(values[row], time, run.cycle.duration if run.cycle.periodic else None)

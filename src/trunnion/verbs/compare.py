@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from trunnion.errors import Finding, MechanismError, Severity
-from trunnion.options import IMAGES, File, FrictionLaw, Out, Seats, Set, TableFile, UnitsRow
+from trunnion.options import IMAGES, DataFiles, File, FrictionLaw, MappingFile, Out, Seats, Set, TableFile, UnitsRow
 from trunnion.terminal import bar, console, findings_of, say, show_rows, wrote
 from trunnion.verbs.inputs import spare_data
 from trunnion.verbs.model import lines_of, placed, stated
@@ -24,11 +24,8 @@ MOST_ROWS = 40
 
 def compare(
     file: File,
-    mapping: Annotated[Path, typer.Argument(help="Mapping of the data: YAML.", show_default=False)],
-    data: Annotated[
-        list[Path] | None,
-        typer.Argument(help="Data files in place of the mapping's: CSV, Parquet, TDMS.", show_default=False),
-    ] = None,
+    mapping: MappingFile,
+    data: DataFiles = None,
     channel: Annotated[
         list[str] | None,
         typer.Option("--channel", help="A channel by its name in the mapping. Repeatable.", show_default=False),

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.options import File, FrictionLaw, Seats, Set, TableFile
+from trunnion.options import File, FrictionLaw, Seats, Seed, Set, TableFile
 from trunnion.terminal import bar, console, say, show_rows, wrote
 from trunnion.verbs.inputs import tables_read
 from trunnion.verbs.model import exit_status, lines_of, stated
@@ -41,7 +41,7 @@ def rig(
         str | None,
         typer.Option("--format", help="csv, parquet or tdms; that of the rig file if not given.", show_default=False),
     ] = None,
-    seed: Annotated[int, typer.Option("--seed", help="Of the random numbers: the same seed, the same bits.")] = 1,
+    seed: Seed = 1,
     set_: Set = None,
     table: TableFile = None,
     friction: FrictionLaw = None,

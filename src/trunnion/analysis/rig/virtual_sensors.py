@@ -179,7 +179,7 @@ def _reading(sensor: Sensor, unit: str) -> tuple[str, float]:
         if known:
             reading = sensor.unit or _written(given.unit, known)
             return reading, value / dimensions(reading)[0]
-    what = f"'{given.source}' does not turn {unit} into {sensor.unit or 'a reading in volt or ampere'}"
+    what = f"'{given.source}' does not turn {unit} into {sensor.unit or 'a reading in volt, ampere or hertz'}"
     raise UnitError(what, f"write a reading per {unit}, such as 100 mV/({unit}), and the `unit` of the reading")
 
 

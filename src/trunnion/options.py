@@ -13,16 +13,22 @@ from trunnion.errors import Finding, MechanismError
 
 __all__ = [
     "IMAGES",
+    "At",
     "Criterion",
+    "DataFiles",
     "File",
+    "Force",
     "FrictionLaw",
+    "Jobs",
     "Kinds",
+    "MappingFile",
     "Measures",
     "Method",
     "Out",
     "Report",
     "Rounds",
     "Seats",
+    "Seed",
     "Set",
     "Steps",
     "TableFile",
@@ -61,6 +67,21 @@ Criterion = Annotated[
     ),
 ]
 Rounds = Annotated[int, typer.Option("--iterations", help="Most rounds of the friction iteration.")]
+At = Annotated[
+    str | None,
+    typer.Option("--at", help="Place of measures that state none: 60deg, 20mm, 0.1s.", show_default=False),
+]
+Seed = Annotated[int, typer.Option("--seed", help="Of the random numbers: the same seed, the same bits.")]
+Jobs = Annotated[
+    int | None,
+    typer.Option("--jobs", help="Processes; one a core if not given and the work is worth it.", show_default=False),
+]
+MappingFile = Annotated[Path, typer.Argument(help="Mapping of the data: YAML.", show_default=False)]
+DataFiles = Annotated[
+    list[Path] | None,
+    typer.Argument(help="Data files in place of the mapping's: CSV, Parquet, TDMS.", show_default=False),
+]
+Force = Annotated[bool, typer.Option("--force", help="With --write: also over the model itself.")]
 Report = Annotated[
     Path | None, typer.Option("--report", help="Also write the report, one HTML file.", show_default=False)
 ]

@@ -1,17 +1,17 @@
-"""Files written whole or not at all."""
+"""Files written whole or not at all, and never over what is read."""
 
 from __future__ import annotations
 
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from trunnion.errors import Finding, MechanismError
 
-__all__ = ["folder", "whole"]
+__all__ = ["folder", "spare", "whole"]
 
 
 def _umask() -> int:
@@ -50,6 +50,21 @@ def whole(path: str | os.PathLike[str]) -> Iterator[Path]:
         if temporary.is_dir():
             shutil.rmtree(temporary, ignore_errors=True)
         temporary.unlink(missing_ok=True)
+
+
+def spare(read: Iterable[Path], written: Iterable[tuple[str, Path]]) -> None:
+    """MechanismError if a file that is to be written, by the option that names it, is one of those that are read.
+
+    A link to one counts as well.
+    """
+    kept = [one for one in read if one.exists()]
+    findings = []
+    for option, path in written:
+        if path.exists() and any(path.samefile(one) for one in kept):
+            what = f"'{path}' is read here, and would be written over"
+            findings.append(Finding(what, option, "name another file"))
+    if findings:
+        raise MechanismError(findings)
 
 
 def folder(path: Path) -> None:

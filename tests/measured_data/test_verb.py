@@ -101,3 +101,18 @@ def test_nothing_was_set(tmp_path: Path) -> None:
     assert found["set"].shape == (1, 0)
     trunnion.save(found, tmp_path / "c.csv")
     assert list(pd.read_csv(tmp_path / "c.csv").columns[:3]) == ["condition", "phase", "torque-in.mean"]
+
+
+def test_results_are_not_written_over_what_is_read(program: Run, rig: Path, tmp_path: Path) -> None:
+    (tmp_path / "link.csv").symlink_to(tmp_path / "a.csv")
+    before = (tmp_path / "a.csv").read_bytes(), rig.read_bytes()
+    for name in ("a.csv", "link.csv", "rig.json"):
+        code, _, err = program("data", "rig.json", "--out", name)
+        assert code == 2
+        assert f"--out: '{name}' is read here, and would be written over — name another file" in err
+    (tmp_path / "b.csv").write_bytes(before[0])
+    code, _, err = program("data", "rig.json", "b.csv", "--out", "b.csv")
+    assert code == 2
+    assert ((tmp_path / "a.csv").read_bytes(), rig.read_bytes()) == before
+    assert (tmp_path / "b.csv").read_bytes() == before[0]
+    assert program("data", "rig.json", "b.csv", "--out", "a.csv").code == 0  # it is not read here

@@ -164,6 +164,36 @@ def test_files_are_read_as_they_were_meant(seen: Observation, form: str, tmp_pat
     assert own.value == pytest.approx(efficiency_of(direct).value, abs=0.1 * own.uncertainty)
 
 
+@pytest.mark.parametrize("name", ["T, in", "T; in", 'T "in"', "#T", "T [a]", "'T'", "Drehmoment ä"])
+def test_names_with_separators_are_read_back(mechanism: Mechanism, name: str, tmp_path: Path) -> None:
+    changes = {"sensors": {name: SENSORS["T1"], "n1": SENSORS["n1"]}, "time": {"column": f"{name} t"}}
+    trunnion.observe(mechanism, rig(**changes)).write(tmp_path)
+    read = trunnion.read_measured(tmp_path / "mapping.yaml")
+    assert set(read.conditions[0].courses) == {name, "n1"}
+
+
+def test_a_load_at_rest_reads_nothing(tmp_path: Path) -> None:
+    """The strip of the press rests two thirds of the cycle: no cell is empty, the course is read back, and planned."""
+    press = trunnion.read(EXAMPLES / "indexing-press.yaml")
+    sensors = {"T": {"measures": "effort:R"}, "v": {"measures": "rate:R"}, "L": {"measures": "load:strip"},
+               "vF": {"measures": "rate:F"}}  # fmt: skip
+    seen = trunnion.observe(press, rig(sensors=sensors, encoder=None, schedule={"turns": 5}, rate="200 Hz"))
+    assert "given 0 in a rest" in seen.findings[0].what
+    (case,) = seen.cases
+    load, speed = case.true.at_samples(2), case.true.at_samples(3)
+    assert np.isfinite(load).all()
+    assert np.count_nonzero(speed == 0) > 0.3 * len(speed)
+    assert not np.any(load[speed == 0])
+    assert np.abs(load[np.abs(speed) > 1e-3]) == pytest.approx(30)
+    assert plan(seen).conditions[0].measured is not None
+    seen.write(tmp_path)
+    rows = (tmp_path / "run-01.csv").read_text("utf-8")
+    assert ",," not in rows
+    assert ",\n" not in rows
+    read = trunnion.read_measured(tmp_path / "mapping.yaml")
+    assert not [one for one in read.findings if "dropouts" in one.what]
+
+
 def test_truth_tells_what_was_drawn(seen: Observation, tmp_path: Path) -> None:
     seen.write(tmp_path)
     truth = yaml.safe_load((tmp_path / "truth.yaml").read_text("utf-8"))
@@ -227,6 +257,9 @@ def test_clipped_readings_and_lost_pulses_are_told(mechanism: Mechanism) -> None
         ({"schedule": {"conditions": [{"speeed": 1}]}}, "schedule.conditions.0", "speeed"),
         ({"schedule": {"over": {"A.speed": ["60 rpm", "90 rpm"]}}, "encoder": None,
           "sensors": {"a": {"measures": "effort:A"}}}, "encoder", "nothing measured tells where A is"),
+        ({"schedule": {"over": {"A.speed": ["-60 rpm", "60 rpm"]}}}, "encoder", "turn both ways"),
+        ({"schedule": {"over": {"A.speed": ["-60 rpm", "60 rpm"]}}, "encoder": {"per_turn": 60, "kind": "level"}},
+         "encoder.kind", "turn both ways"),
         ({"set": {"l7": 2}}, "set", "l7"),
         ({"faults": [{"kind": "drift", "sensor": "T1", "by": "3 rpm"}]}, "faults.0.by", "not in N m"),
         ({"rate": "0.4 Hz", "schedule": {"turns": 1}}, "rate", "no three samples"),
@@ -278,6 +311,22 @@ def test_plan_expects_what_comes(seen: Observation) -> None:
     assert forecast.model == pytest.approx(seen.cases[0].efficiency)
     assert abs(forecast.bias) < 0.05 * own.uncertainty
     assert forecast.dominant.startswith(("T1 ", "T2 "))
+
+
+def test_negative_sensitivity_is_planned_and_read_back(mechanism: Mechanism, seen: Observation, tmp_path: Path) -> None:
+    """Both torques by sensors that read downward: the same shares, the same courses from the files."""
+    mirrored = {
+        name: one | {"sensitivity": "-100 mV/(N m)"} if name.startswith("T") else one for name, one in SENSORS.items()
+    }
+    down = trunnion.observe(mechanism, rig(sensors=mirrored), seed=4)
+    for one, other in zip(plan(down).sensors[:2], plan(seen).sensors[:2], strict=True):
+        assert (one.share, one.steps, one.noise) == pytest.approx(
+            (other.share, other.steps, 100 * other.noise), rel=1e-3
+        )
+        assert (one.least, one.most) == pytest.approx((-100 * other.most, -100 * other.least), rel=1e-3)
+    down.write(tmp_path)
+    read = trunnion.read_measured(tmp_path / "mapping.yaml").conditions[0].courses["T1"]
+    assert read.mean.mean() == pytest.approx(seen.measurement(360).conditions[0].courses["T1"].mean.mean(), abs=0.02)
 
 
 def test_plan_tells_slow_sensors_and_coarse_converters(mechanism: Mechanism) -> None:

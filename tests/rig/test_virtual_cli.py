@@ -155,3 +155,21 @@ def test_a_range_keeps_its_unit() -> None:
     with pytest.raises(MechanismError, match="more than"):
         Rig(**{"trunnion-rig": 1, "rate": 100, "sensors": {"a": {"measures": "effort:A"}},
                "schedule": {"over": {"x": "0:1:500", "y": "0:1:500"}}}).schedule.rows()  # fmt: skip
+
+
+def test_files_that_no_rig_has_written_stay(run: Run, tmp_path: Path) -> None:
+    """Neither the rig file itself nor data of a real rig are written over; those of an earlier run are."""
+    small = GOOD.replace("rate: 1 kHz", "rate: 500 Hz")
+    for name, there in (("mapping.yaml", small), ("truth.yaml", "a: 1\n"), ("run-01.csv", "t\n"), ("rig.yaml", small)):
+        own = tmp_path / name.partition(".")[0]
+        own.mkdir()
+        (own / name).write_text(there, encoding="utf-8")
+        (tmp_path / "rig.yaml").write_text(small, encoding="utf-8")
+        done = run(FOUR_BAR, own / name if there is small else "rig.yaml", "--out", own)
+        assert (own / name).read_text("utf-8") == there
+        assert done.code == (0 if name == "rig.yaml" else 2), done.err
+        assert (
+            "is read here" if name == "mapping.yaml" else "" if done.code == 0 else "is of no virtual rig"
+        ) in done.err
+        assert len(list(own.iterdir())) == (4 if done.code == 0 else 1)
+    assert run(FOUR_BAR, "rig.yaml", "--out", "rig", "--seed", 2).code == 0

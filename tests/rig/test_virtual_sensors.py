@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from trunnion.analysis.rig import virtual_sensors
 from trunnion.analysis.rig.virtual_courses import phases
 from trunnion.analysis.rig.virtual_sensors import Drawn, converted, draw, pulsed, readings, resolved, smoothed, stream
 from trunnion.errors import MechanismError
+from trunnion.measured.amounts import read_amount
 from trunnion.measured.rig_file import Sensor
+from trunnion.measured.scale import scale
 
 NONE = Drawn(0.0, 0.0, 0.0)
 
@@ -32,6 +35,21 @@ def test_sensitivity_either_way_round(given: str) -> None:
     assert found.drift == pytest.approx(0.001)
     assert found.step == pytest.approx(200 / 4096)
     assert channel(sensitivity=given, unit="V").reading == "V"
+
+
+@pytest.mark.parametrize("given", ["60 Hz/(rev/s)", "1 Hz/rpm", "1 rpm/Hz", "0.001 kHz/rpm"])
+def test_speed_by_pulse_frequency(given: str) -> None:
+    """60 pulses a turn give 60 Hz at a turn a second, and the mapping reads them so."""
+    found = channel("rad/s", measures="rate:A", sensitivity=given, range="4000 rpm", noise="0.5 Hz", unit="Hz")
+    assert found.per == pytest.approx(60 / (2 * np.pi))
+    assert found.noise == pytest.approx(0.5 * 2 * np.pi / 60)
+    assert found.range == pytest.approx(4000 * 2 * np.pi / 60)
+    assert scale("rate:A", "Hz", read_amount(given)).factor == pytest.approx(2 * np.pi / 60)
+    along = channel("m/s", measures="rate:S", sensitivity="1 kHz/(m/s)")
+    assert (along.reading, along.per) == ("kHz", pytest.approx(1.0))
+    for other in ("1 Hz/N", "1 Hz s", "1 N m/Hz"):
+        with pytest.raises((MechanismError, ValidationError)):
+            channel("rad/s", measures="rate:A", sensitivity=other)
 
 
 def test_units_of_a_sensor_without_sensitivity() -> None:
@@ -104,6 +122,20 @@ def test_converter() -> None:
     assert converted(channel(span="10 N m", bits=4, range="20 N m"), np.array([11.0, -11.0])).tolist() == [8.75, -10.0]
     assert channel().decimals == 9
     assert channel(noise="0.05 N m").decimals == 5
+
+
+def test_negative_sensitivity_mirrors_the_readings() -> None:
+    """Magnitudes keep their sign, a drift of the readings does not; the short end of the converter is the other."""
+    stated = {"range": "10 V", "noise": "5 mV", "offset": "20 mV", "span": "10 V", "bits": 12, "drift": "1 mV/s"}
+    up, down = (channel(sensitivity=f"{sign}100 mV/(N m)", **stated) for sign in ("", "-"))
+    assert down.per == -up.per
+    for key in ("range", "noise", "offset", "span", "step", "decimals", "unit", "reading"):
+        assert getattr(down, key) == getattr(up, key), key
+    assert down.drift == -up.drift
+    values = np.linspace(-120, 120, 100)
+    assert np.array_equal(converted(down, values), converted(up, -values))
+    plain = channel(sensitivity="-100 mV/(N m)")
+    assert converted(plain, np.array([1.0, -2.0])).tolist() == [-100.0, 200.0]
 
 
 def test_order_of_the_chain() -> None:

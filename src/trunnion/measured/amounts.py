@@ -49,6 +49,7 @@ _USUAL = (
 )
 _SYMBOLS = {"meter": "m", "gram": "kg", "second": "s", "radian": "rad", "ampere": "A", "kelvin": "K"}
 _MECHANICS = ("meter", "gram", "second", "radian")
+_COUNTED = {"radian", "meter"}  # Hz over a speed, 60 Hz/(rev/s), are pulses over an angle or length
 _VOLT: Dimensions = {"gram": Fraction(1), "meter": Fraction(2), "second": Fraction(-3), "ampere": Fraction(-1)}
 
 
@@ -78,7 +79,8 @@ def dimensions(text: str) -> tuple[float, Dimensions]:
     unknown = set(exponents) - set(_SYMBOLS)
     if unknown or any(name.endswith("bel") for name in names):
         raise UnitError(f"the unit '{text}' is none of a sensor", "use units of mechanics, volts, ampere or kelvin")
-    if not {"ampere", "kelvin"} & exponents.keys() and exponents != HERTZ:
+    pulses = any(name.endswith("hertz") for name in names) and exponents and exponents.keys() <= _COUNTED
+    if not {"ampere", "kelvin"} & exponents.keys() and exponents != HERTZ and not pulses:
         unit(normalise(text))
     return float(factor), exponents
 

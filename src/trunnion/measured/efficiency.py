@@ -75,13 +75,6 @@ class Efficiency:
         """Whole turns that it is made of."""
         return len(self.per_turn)
 
-    def by_channel(self) -> dict[str, float]:
-        """Standard uncertainty of η by each channel, the largest first; "" is the scatter between turns."""
-        squares: dict[str, float] = {}
-        for one in self.contributions:
-            squares[one.channel] = squares.get(one.channel, 0.0) + one.effect**2
-        return dict(sorted(((name, value**0.5) for name, value in squares.items()), key=lambda item: -item[1]))
-
     def __str__(self) -> str:
         return f"η = {self.value:.4f} ± {self.expanded:#.2g} (k = {COVERAGE:g})"
 

@@ -60,6 +60,13 @@ def read_measured(
     return Measurement(name, tuple(_distinct(conditions)), tuple(findings), (_averaged(conditions), *told(accounts)))
 
 
+def files_read(mapping: Path, files: Iterable[Path] | None = None) -> list[Path]:
+    """What `read_measured` reads: the mapping file, the data files that it names or that are given in their place."""
+    mapped = read_mapping(mapping)
+    named = list(files or ()) or [mapped.folder / entry.file for entry in mapped.mapping.files]
+    return [mapping, *named]
+
+
 def _averaged(conditions: Sequence[Condition]) -> str:
     """How many turns there are."""
     counts = [next(iter(one.courses.values())).turns.shape[0] for one in conditions]

@@ -28,6 +28,7 @@ ROWS = 250_000  # read at a time, so that memory does not grow with the columns 
 WIDE = 40  # columns from which those that are not wanted are passed over, and too many cells in a row not seen
 _UNIT = re.compile(r"^(.*?)\s*\[([^\[\]]*)\]\s*$", re.DOTALL)
 _COMMA = re.compile(r"[-+]?\d*,\d+(?:[eE][-+]?\d+)?")
+_QUOTED = re.compile(r'"[^"]*"')
 _NO_UNIT = ("", "-", "–", "1")
 
 
@@ -118,7 +119,8 @@ def _layout(path: Path, wanted: set[str]) -> _Layout:
         raise failed(path, "has nothing but remarks", "check that the recording was saved", 1)
     best, header, cells, separator = -1, 0, [""], ","
     for order, (_, line) in enumerate(stated[:200]):  # loggers write some lines above the header
-        sign = next((one for one in ";\t" if one in line), ",")
+        bare = _QUOTED.sub("", line)
+        sign = next((one for one in ";\t" if one in bare), ",")
         found = _cells(line, sign)
         hits = len({_named(cell)[0] for cell in found} & wanted)
         if hits > max(best, 0) or best < 0:

@@ -10,7 +10,22 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from trunnion.errors import Finding, MechanismError, Severity
-from trunnion.options import IMAGES, File, FrictionLaw, Measures, Out, Report, Set, Steps, TableFile, UnitsRow
+from trunnion.options import (
+    IMAGES,
+    At,
+    File,
+    Force,
+    FrictionLaw,
+    Jobs,
+    Measures,
+    Out,
+    Report,
+    Seed,
+    Set,
+    Steps,
+    TableFile,
+    UnitsRow,
+)
 from trunnion.terminal import bar, console, findings_of, say, show_rows, wrote
 from trunnion.verbs.model import exit_status, lines_of, placed, stated
 
@@ -58,17 +73,11 @@ def allocate(
         bool, typer.Option("--exact", help="Worst case of the mechanism itself, not of first order.")
     ] = False,
     curve: Annotated[int, typer.Option("--curve", help="Points of cost over accuracy; none if 0.")] = 0,
-    at: Annotated[
-        str | None,
-        typer.Option("--at", help="Place of measures that state none: 60deg, 20mm, 0.1s.", show_default=False),
-    ] = None,
+    at: At = None,
     steps: Steps = 360,
     samples: Annotated[int, typer.Option("--samples", help="Random mechanisms that verify it; none if 0.")] = 10_000,
-    seed: Annotated[int, typer.Option("--seed", help="Of the random numbers: the same seed, the same bits.")] = 1,
-    jobs: Annotated[
-        int | None,
-        typer.Option("--jobs", help="Processes; one a core if not given and the work is worth it.", show_default=False),
-    ] = None,
+    seed: Seed = 1,
+    jobs: Jobs = None,
     set_: Set = None,
     table: TableFile = None,
     friction: FrictionLaw = None,
@@ -76,7 +85,7 @@ def allocate(
         Path | None,
         typer.Option("--write", help="Write the model with the tolerances found: .yaml or .json.", show_default=False),
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="With --write: also over the model itself.")] = False,
+    force: Force = False,
     kind: Annotated[
         str | None, typer.Option("--kind", help="Which figure: cost, trade-off, or one of `tolerance`.")
     ] = None,
@@ -100,19 +109,28 @@ def allocate(
         )  # fmt: skip
     written = _show(result, out or [], units_row, kind, report)
     findings = findings_of(result)
-    if write is not None and result.attrs["found"] and not result.attrs["stopped"] and not exit_status(findings):
-        from trunnion.model.rewrite import rewrite_mechanism
-
-        rewrite_mechanism(_bought(mechanism, result), file, write, force)
-        written.append(write)
-    elif write is not None:
-        why = "the limits are not kept with the tolerances found" if result.attrs["found"] else "there is no allocation"
-        why = "stopped before the tolerances were verified" if result.attrs["stopped"] else why
-        findings.append(Finding(f"'{write}' is not written: {why}", "--write", "", Severity.ERROR))
+    if write is not None:
+        lost = _write_model(mechanism, result, file, write, force, bool(exit_status(findings)))
+        findings += lost
+        written += [] if lost else [write]
     for path in written:
         wrote(path)
     say(placed(_named(findings, mechanism), file, ["measures", "joints", "tolerances", "costs"]))
     raise typer.Exit(STOPPED if result.attrs["stopped"] else exit_status(findings))
+
+
+def _write_model(
+    mechanism: Mechanism, result: xr.Dataset, file: Path, write: Path, force: bool, failed: bool
+) -> list[Finding]:
+    """Write the model with what was found, or say why it is not written."""
+    from trunnion.model.rewrite import rewrite_mechanism
+
+    if result.attrs["found"] and not result.attrs["stopped"] and not failed:
+        rewrite_mechanism(_bought(mechanism, result), file, write, force)
+        return []
+    why = "the limits are not kept with the tolerances found" if result.attrs["found"] else "there is no allocation"
+    why = "stopped before the tolerances were verified" if result.attrs["stopped"] else why
+    return [Finding(f"'{write}' is not written: {why}", "--write", "", Severity.ERROR)]
 
 
 def _bought(mechanism: Mechanism, result: xr.Dataset) -> Mechanism:

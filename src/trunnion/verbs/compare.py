@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from trunnion.errors import Finding, MechanismError, Severity
-from trunnion.options import IMAGES, File, FrictionLaw, Out, Seats, Set, TableFile, UnitsRow
+from trunnion.options import IMAGES, DataFiles, File, FrictionLaw, MappingFile, Out, Seats, Set, TableFile, UnitsRow
 from trunnion.terminal import bar, console, findings_of, say, show_rows, wrote
+from trunnion.verbs.inputs import spare_data
 from trunnion.verbs.model import lines_of, placed, stated
 from trunnion.verbs.tolerance import PAGES
 
@@ -23,11 +24,8 @@ MOST_ROWS = 40
 
 def compare(
     file: File,
-    mapping: Annotated[Path, typer.Argument(help="Mapping of the data: YAML.", show_default=False)],
-    data: Annotated[
-        list[Path] | None,
-        typer.Argument(help="Data files in place of the mapping's: CSV, Parquet, TDMS.", show_default=False),
-    ] = None,
+    mapping: MappingFile,
+    data: DataFiles = None,
     channel: Annotated[
         list[str] | None,
         typer.Option("--channel", help="A channel by its name in the mapping. Repeatable.", show_default=False),
@@ -58,6 +56,7 @@ def compare(
     from trunnion.measured.read import read_measured
 
     _check(out or [], report, kind)
+    spare_data(mapping, data, out, report, file, table)
     mechanism = stated(file, set_, table, friction, seat)
     measurement = read_measured(mapping, [str(path) for path in data] if data else None)
     with lines_of(file), bar("conditions", len(measurement.conditions)) as progress:

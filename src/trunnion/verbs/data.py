@@ -10,6 +10,7 @@ import typer
 from trunnion.errors import Severity
 from trunnion.options import UnitsRow
 from trunnion.terminal import console, say, show_rows, wrote
+from trunnion.verbs.inputs import spare_data
 
 __all__ = ["data"]
 
@@ -34,6 +35,7 @@ def data(
 
     for path in out or []:
         check_format(path)
+    spare_data(mapping, files, out)
     measurement = read_measured(mapping, files)
     for i, one in enumerate(tables(measurement)):
         if i:

@@ -8,8 +8,23 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from trunnion.errors import Finding, MechanismError, Severity
-from trunnion.options import IMAGES, File, FrictionLaw, Out, Seats, Set, TableFile, UnitsRow, setting
+from trunnion.options import (
+    IMAGES,
+    DataFiles,
+    File,
+    Force,
+    FrictionLaw,
+    MappingFile,
+    Out,
+    Report,
+    Seats,
+    Set,
+    TableFile,
+    UnitsRow,
+    setting,
+)
 from trunnion.terminal import console, findings_of, say, show_rows, wrote
+from trunnion.verbs.inputs import spare_data
 from trunnion.verbs.model import exit_status, lines_of, placed, stated
 from trunnion.verbs.tolerance import PAGES
 
@@ -22,83 +37,85 @@ __all__ = ["identify"]
 
 MOST_ROWS = 24
 
+Parameters = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--parameter",
+        help="A number of the model, as in --set; NAME=PATH,PATH,… for several that are one unknown. Repeatable.",
+        show_default=False,
+    ),
+]
+Channels = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--channel",
+        help="A channel by its name in the mapping, or efficiency. Repeatable; if not given, all that tell.",
+        show_default=False,
+    ),
+]
+Starting = Annotated[
+    list[str] | None,
+    typer.Option("--start", help="NAME=VALUE: where the search begins; the model's value if not given."),
+]
+HeldOut = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--hold-out",
+        help="A condition by its name, or a share of the turns such as 0.2, to predict instead of fit. Repeatable.",
+        show_default=False,
+    ),
+]
+Sensors = Annotated[
+    str,
+    typer.Option("--sensors", help="Zero and gain of a channel are off alike in a whole channel, or condition."),
+]
+Delay = Annotated[
+    str | None,
+    typer.Option(
+        "--delay",
+        help="By which channels may lag behind the angle: 0.2ms, a standard uncertainty.",
+        show_default=False,
+    ),
+]
+Guard = Annotated[
+    int | None,
+    typer.Option("--guard", help="Positions left out on each side where a friction turns round.", show_default=False),
+]
+Starts = Annotated[
+    int | None,
+    typer.Option("--starts", help="Places to begin at; more than one if the model does not fit.", show_default=False),
+]
+Write = Annotated[
+    Path | None,
+    typer.Option("--write", help="Write the model with the estimates: .yaml or .json.", show_default=False),
+]
+Kind = Annotated[
+    str | None,
+    typer.Option("--kind", help="Which figure: intervals, correlation or residuals.", show_default=False),
+]
+
 
 def identify(
     file: File,
-    mapping: Annotated[Path, typer.Argument(help="Mapping of the data: YAML.", show_default=False)],
-    data: Annotated[
-        list[Path] | None,
-        typer.Argument(help="Data files in place of the mapping's: CSV, Parquet, TDMS.", show_default=False),
-    ] = None,
-    parameter: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--parameter",
-            help="A number of the model, as in --set; NAME=PATH,PATH,… for several that are one unknown. Repeatable.",
-            show_default=False,
-        ),
-    ] = None,
-    channel: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--channel",
-            help="A channel by its name in the mapping, or efficiency. Repeatable; if not given, all that tell.",
-            show_default=False,
-        ),
-    ] = None,
-    start: Annotated[
-        list[str] | None,
-        typer.Option("--start", help="NAME=VALUE: where the search begins; the model's value if not given."),
-    ] = None,
-    hold_out: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--hold-out",
-            help="A condition by its name, or a share of the turns such as 0.2, to predict instead of fit. Repeatable.",
-            show_default=False,
-        ),
-    ] = None,
-    sensors: Annotated[
-        str,
-        typer.Option("--sensors", help="Zero and gain of a channel are off alike in a whole channel, or condition."),
-    ] = "channel",
-    delay: Annotated[
-        str | None,
-        typer.Option(
-            "--delay",
-            help="By which channels may lag behind the angle: 0.2ms, a standard uncertainty.",
-            show_default=False,
-        ),
-    ] = None,
-    guard: Annotated[
-        int | None,
-        typer.Option(
-            "--guard", help="Positions left out on each side where a friction turns round.", show_default=False
-        ),
-    ] = None,
-    starts: Annotated[
-        int | None,
-        typer.Option(
-            "--starts", help="Places to begin at; more than one if the model does not fit.", show_default=False
-        ),
-    ] = None,
+    mapping: MappingFile,
+    data: DataFiles = None,
+    parameter: Parameters = None,
+    channel: Channels = None,
+    start: Starting = None,
+    hold_out: HeldOut = None,
+    sensors: Sensors = "channel",
+    delay: Delay = None,
+    guard: Guard = None,
+    starts: Starts = None,
     set_: Set = None,
     table: TableFile = None,
     friction: FrictionLaw = None,
     seat: Seats = None,
-    write: Annotated[
-        Path | None,
-        typer.Option("--write", help="Write the model with the estimates: .yaml or .json.", show_default=False),
-    ] = None,
-    force: Annotated[bool, typer.Option("--force", help="With --write: also over the model itself.")] = False,
-    kind: Annotated[
-        str | None,
-        typer.Option("--kind", help="Which figure: intervals, correlation or residuals.", show_default=False),
-    ] = None,
+    write: Write = None,
+    force: Force = False,
+    kind: Kind = None,
     out: Out = None,
-    report: Annotated[
-        Path | None, typer.Option("--report", help="Also write the report, one HTML file.", show_default=False)
-    ] = None,
+    report: Report = None,
     units_row: UnitsRow = False,
 ) -> None:
     """Numbers of the model from measured data: estimates, 95 % intervals, what the data cannot tell apart."""
@@ -107,6 +124,7 @@ def identify(
     from trunnion.measured.read import read_measured
 
     _check(file, write, force, out or [], report, kind)
+    spare_data(mapping, data, out, report, file, table, write)
     mechanism = stated(file, set_, table, friction, seat)
     with lines_of(file):
         wanted, begin = parameters(parameter or []), dict(setting(text) for text in start or ())

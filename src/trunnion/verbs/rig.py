@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.options import File, FrictionLaw, Seats, Set, TableFile
+from trunnion.options import File, FrictionLaw, Seats, Seed, Set, TableFile
 from trunnion.terminal import bar, console, say, show_rows, wrote
+from trunnion.verbs.inputs import tables_read
 from trunnion.verbs.model import exit_status, lines_of, stated
 
 if TYPE_CHECKING:
@@ -40,7 +41,7 @@ def rig(
         str | None,
         typer.Option("--format", help="csv, parquet or tdms; that of the rig file if not given.", show_default=False),
     ] = None,
-    seed: Annotated[int, typer.Option("--seed", help="Of the random numbers: the same seed, the same bits.")] = 1,
+    seed: Seed = 1,
     set_: Set = None,
     table: TableFile = None,
     friction: FrictionLaw = None,
@@ -48,7 +49,7 @@ def rig(
 ) -> None:
     """A virtual test rig: plan what sensors will show, or write data files as a rig would, with their mapping."""
     from trunnion.analysis.rig.virtual import observe
-    from trunnion.analysis.rig.virtual_files import check_form
+    from trunnion.analysis.rig.virtual_files import check_folder, check_form
     from trunnion.measured.rig_file import Rig
 
     if format_:
@@ -60,6 +61,8 @@ def rig(
         check_form(stated_rig.format)
     with lines_of(file), _lines_of_rig(rig_file):
         count = len(stated_rig.schedule.rows())
+        if out:
+            check_folder(stated_rig, out, format_ or "", [rig_file, file, *tables_read(table)])
         with bar("conditions", count, least=FEWEST) as progress:
             observation = observe(mechanism, stated_rig, seed, progress)
     found = list(observation.findings)

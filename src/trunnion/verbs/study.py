@@ -7,7 +7,21 @@ from typing import Annotated
 
 import typer
 
-from trunnion.options import File, FrictionLaw, Measures, Out, Report, Set, Steps, TableFile, UnitsRow, named_file
+from trunnion.options import (
+    At,
+    File,
+    FrictionLaw,
+    Jobs,
+    Measures,
+    Out,
+    Report,
+    Seed,
+    Set,
+    Steps,
+    TableFile,
+    UnitsRow,
+    named_file,
+)
 from trunnion.terminal import bar, findings_of, say
 from trunnion.verbs.model import exit_status, lines_of, placed, stated
 
@@ -15,37 +29,42 @@ __all__ = ["tolerance"]
 
 STOPPED = 130
 
+Methods = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--method",
+        help="linear, worst-case, monte-carlo, quasi-monte-carlo, sobol. Repeatable; the first three if not given.",
+        show_default=False,
+    ),
+]
+Samples = Annotated[
+    list[str] | None,
+    typer.Option("--sample", help="NAME=FILE.csv: measured deviations of a number, one column. Repeatable."),
+]
+Cluster = Annotated[
+    str | None,
+    typer.Option("--cluster", help="Address of a Dask scheduler, or local.", show_default=False),
+]
+Kind = Annotated[
+    str | None,
+    typer.Option("--kind", help="One figure alone: histogram, contributions, envelope, convergence or sobol."),
+]
+
 
 def tolerance(
     file: File,
     measure: Measures = None,
-    at: Annotated[
-        str | None,
-        typer.Option("--at", help="Place of measures that state none: 60deg, 20mm, 0.1s.", show_default=False),
-    ] = None,
-    method: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--method",
-            help="linear, worst-case, monte-carlo, quasi-monte-carlo, sobol. Repeatable; the first three if not given.",
-            show_default=False,
-        ),
-    ] = None,
+    at: At = None,
+    method: Methods = None,
     samples: Annotated[int, typer.Option("--samples", help="Random mechanisms.")] = 10_000,
-    seed: Annotated[int, typer.Option("--seed", help="Of the random numbers: the same seed, the same bits.")] = 1,
+    seed: Seed = 1,
     steps: Steps = 360,
-    jobs: Annotated[
-        int | None,
-        typer.Option("--jobs", help="Processes; one a core if not given and the work is worth it.", show_default=False),
-    ] = None,
+    jobs: Jobs = None,
     chunk: Annotated[
         int | None, typer.Option("--chunk", help="Samples handed out at a time; about a second's.", show_default=False)
     ] = None,
     engine: Annotated[str, typer.Option("--engine", help="numpy, or jax: compiled, for large batches.")] = "numpy",
-    cluster: Annotated[
-        str | None,
-        typer.Option("--cluster", help="Address of a Dask scheduler, or local.", show_default=False),
-    ] = None,
+    cluster: Cluster = None,
     checkpoint: Annotated[
         Path | None, typer.Option("--checkpoint", help="File that keeps what is done.", show_default=False)
     ] = None,
@@ -53,14 +72,8 @@ def tolerance(
     set_: Set = None,
     table: TableFile = None,
     friction: FrictionLaw = None,
-    sample: Annotated[
-        list[str] | None,
-        typer.Option("--sample", help="NAME=FILE.csv: measured deviations of a number, one column. Repeatable."),
-    ] = None,
-    kind: Annotated[
-        str | None,
-        typer.Option("--kind", help="One figure alone: histogram, contributions, envelope, convergence or sobol."),
-    ] = None,
+    sample: Samples = None,
+    kind: Kind = None,
     out: Out = None,
     report: Report = None,
     units_row: UnitsRow = False,

@@ -21,7 +21,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.analysis.analyse import prepare
-from trunnion.analysis.rig.virtual_cases import Case, case_of, channels_of, findings_of, measures_of, placed_at
+from trunnion.analysis.rig.virtual_cases import (
+    Case,
+    case_names,
+    case_of,
+    channels_of,
+    findings_of,
+    measures_of,
+    placed_at,
+)
 from trunnion.analysis.rig.virtual_faults import faulty
 from trunnion.analysis.rig.virtual_sensors import (
     Channel,
@@ -239,14 +247,13 @@ def observe(
     rows = rig.schedule.rows()
     channels: dict[str, Channel] = {}
     cases: list[Case] = []
-    width = max(2, len(str(len(rows))))
-    for number, row in enumerate(rows, 1):
+    for number, (name, row) in enumerate(zip(case_names(len(rows)), rows, strict=True), 1):
         key = f"conditions.{number - 1}" if rig.schedule.conditions else "over"
         with placed_at(f"schedule.{key}", number):
             run = prepare(mechanism.with_values(dict(row)) if row else mechanism)
         measures = measures_of(rig, run)
         channels = channels or channels_of(rig, run, measures)
-        case = case_of(number, f"run-{number:0{width}d}", row, run, rig, measures, channels)
+        case = case_of(number, name, row, run, rig, measures, channels)
         cases.append(case)
         if progress:
             progress(number)

@@ -17,7 +17,7 @@ from trunnion.analysis.rig.virtual_sensors import Channel, resolved
 from trunnion.errors import Finding, MechanismError, Severity, Status
 from trunnion.measured.rig_file import Rig, Value
 
-__all__ = ["Case", "case_of", "channels_of", "findings_of", "measures_of", "placed_at", "speed_differs"]
+__all__ = ["Case", "case_names", "case_of", "channels_of", "findings_of", "measures_of", "placed_at", "speed_differs"]
 
 MOST_ROWS = 20_000_000
 BEYOND = 0.1  # of a cycle that is recorded before the first and past the last, so that their ends are there
@@ -68,9 +68,13 @@ class Case:
     def origin(self) -> float:
         """Sample, counted from the first of the file, at which time is 0: the first, or, where the driver does not name
         positions by its coordinate, the start of the first cycle."""
+        return 0.0 if self.named else self.before + self.lead
+
+    @property
+    def named(self) -> bool:
+        """Whether the first driver turns one way, so that its coordinate names positions."""
         driver = next(iter(self.run.system.mechanism.drivers))
-        named = self.run.system.turns(driver) and self.run.system.span(self.run.values, driver).one_way
-        return 0.0 if named else self.before + self.lead
+        return self.run.system.turns(driver) and self.run.system.span(self.run.values, driver).one_way
 
     @property
     def part(self) -> slice:
@@ -154,6 +158,12 @@ def _of_the_drive(rig: Rig, run: Run) -> Iterator[Finding]:
         yield Finding(what, "encoder", "remove the encoder: positions then follow from the time")
 
 
+def case_names(count: int) -> list[str]:
+    """Names of conditions, and of their files."""
+    width = max(2, len(str(count)))
+    return [f"run-{number:0{width}d}" for number in range(1, count + 1)]
+
+
 def case_of(
     number: int,
     name: str,
@@ -213,7 +223,7 @@ def findings_of(cases: Sequence[Case], channels: Mapping[str, Channel], rig: Rig
         most = max(case.true.mended for case in mended)
         what = (
             f"{_named(mended)}: a load has no single value at up to {most} positions, its joint being at rest there; "
-            "sensors are given the mean of the neighbours"
+            "sensors are given 0 in a rest, the mean of the neighbours at a single position"
         )
         yield Finding(what, where, "", Severity.NOTE)
     yield from _lost_pulses(sound, rig)
@@ -236,9 +246,14 @@ def findings_of(cases: Sequence[Case], channels: Mapping[str, Channel], rig: Rig
 
 
 def _both_ways(cases: Sequence[Case], rig: Rig) -> Iterator[Finding]:
-    """The level of an encoder where the driver turns either way."""
-    ways = {case.drive(rig.rate.value)[1] > 0 for case in cases}
-    if rig.encoder and rig.encoder.kind == "level" and len(ways) > 1:
+    """Drivers that turn either way, where there is no count of an encoder: files then begin at other coordinates."""
+    one_way = [case for case in cases if case.named]
+    if len({case.drive(rig.rate.value)[1] > 0 for case in one_way}) < 2:
+        return
+    if rig.encoder is None:
+        what = "the conditions turn both ways, and nothing measured tells where the driver is"
+        yield Finding(what, "encoder", "state an encoder of kind: count, or a rig for each way")
+    elif rig.encoder.kind == "level":
         what = "the conditions turn both ways, and the level of an encoder does not tell which"
         yield Finding(what, "encoder.kind", "record kind: count")
 

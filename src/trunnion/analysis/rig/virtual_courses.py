@@ -46,7 +46,8 @@ class Solved:
 def solved(run: Run, measures: Sequence[Measure], time: Array, method: FrictionMethod | None = None) -> Solved:
     """The courses of measures at ascending times (s) of the cycle, with pins in their seats.
 
-    Where a load or friction is an interval, at a speed of zero, a course is the mean of its neighbours.
+    Where a load or friction is an interval, at a speed of zero, a course is the mean of its neighbours; a load whose
+    joint rests at several positions on end is 0 there: nothing moves against it.
     """
     values = np.empty((len(measures), len(time)))
     status = np.empty(len(time), np.int8)
@@ -62,7 +63,9 @@ def solved(run: Run, measures: Sequence[Measure], time: Array, method: FrictionM
     if not np.any(status >= Status.NOT_CONVERGED):
         gaps = ~np.isfinite(values)
         mended = len(np.flatnonzero(gaps.any(axis=0)))
-        for row in np.flatnonzero(gaps.any(axis=1)) if mended < len(time) // 2 else ():
+        for row in np.flatnonzero(gaps.any(axis=1)).tolist():
+            if measures[row].kind == "load":
+                values[row, _rests(gaps[row], run.cycle.periodic)] = 0.0
             values[row] = _bridged(values[row], time, run.cycle.duration if run.cycle.periodic else None)
     return Solved(values, status, mended)
 
@@ -84,8 +87,19 @@ def cycle_efficiency(run: Run) -> float:
     return useful / driven if driven > 0 else float("nan")
 
 
+def _rests(gaps: NDArray[np.bool_], periodic: bool) -> NDArray[np.bool_]:
+    """Gaps of more than one position; those at the ends of a period are one."""
+    before, after = np.roll(gaps, 1), np.roll(gaps, -1)
+    if not periodic:
+        before[0] = after[-1] = False
+    found: NDArray[np.bool_] = gaps & (before | after)
+    return found
+
+
 def _bridged(row: Array, time: Array, period: float | None) -> Array:
     there = np.isfinite(row)
+    if not np.any(there):
+        return row
     found: Array = np.where(there, row, np.interp(time, time[there], row[there], period=period))
     return found
 

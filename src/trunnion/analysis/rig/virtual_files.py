@@ -9,7 +9,7 @@ from __future__ import annotations
 import importlib.util
 import math
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,16 +18,16 @@ from numpy.typing import NDArray
 from ruamel.yaml import YAML
 
 from trunnion import __version__
-from trunnion.analysis.rig.virtual_cases import Case, speed_differs
+from trunnion.analysis.rig.virtual_cases import Case, case_names, speed_differs
 from trunnion.errors import Finding, MechanismError
-from trunnion.measured.rig_file import FORMATS
-from trunnion.output import whole
+from trunnion.measured.rig_file import FORMATS, Rig
+from trunnion.output import spare, whole
 
 if TYPE_CHECKING:
     from trunnion.analysis.rig.virtual import Observation, Record
     from trunnion.analysis.rig.virtual_sensors import Channel
 
-__all__ = ["MAPPING", "TRUTH", "check_form", "mapping_of", "truth_of", "write"]
+__all__ = ["MAPPING", "TRUTH", "check_folder", "check_form", "mapping_of", "truth_of", "write"]
 
 MAPPING, TRUTH = "mapping.yaml", "truth.yaml"
 PACKAGES = {"parquet": "pyarrow", "tdms": "nptdms"}
@@ -46,17 +46,46 @@ def check_form(form: str) -> None:
         raise MechanismError(Finding(f"{form} needs {package}", "format", f"pip install 'trunnion[{form}]'"))
 
 
+def check_folder(rig: Rig, folder: str | os.PathLike[str], form: str, read: Iterable[Path] = ()) -> None:
+    """MechanismError if a file of a rig would be written over one that is read, or over one that no rig has written.
+
+    A folder in which mapping and truth, as far as they are there, are those of a rig, and the truth is there, is a
+    rig's: its files are written anew.
+    """
+    folder = Path(folder)
+    files = [f"{name}.{form or rig.format}" for name in case_names(len(rig.schedule.rows()))]
+    spare(read, (("--out", folder / name) for name in (*files, MAPPING, TRUTH)))
+    strange = [name for name in (MAPPING, TRUTH) if (folder / name).exists() and not _of_a_rig(folder / name)]
+    if not (folder / TRUTH).exists():
+        strange += [name for name in files if (folder / name).exists()]
+    if strange:
+        what = f"{', '.join(strange[:3])}{' …' * (len(strange) > 3)} would be written over, and is of no virtual rig"
+        raise MechanismError(Finding(what, str(folder), "name another folder, or move away what is there"))
+
+
+def _of_a_rig(path: Path) -> bool:
+    """Whether a mapping or truth begins as those do that are written here."""
+    head = HEADS[path.name].encode()
+    try:
+        with path.open("rb") as stream:
+            return stream.read(len(head)) == head
+    except OSError:
+        return False
+
+
 def write(
     observation: Observation, folder: str | os.PathLike[str], form: str, progress: Callable[[int], None] | None = None
 ) -> list[str]:
     """Write everything into a folder, which is made if it is not there; the names of the files."""
     check_form(form)
+    check_folder(observation.rig, folder, form)
     folder = Path(folder)
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         what = f"cannot be made a folder: {error.strerror or error}"
         raise MechanismError(Finding(what, str(folder), "name a folder")) from None
+    _write_yaml(folder / TRUTH, truth_of(observation))  # first: it marks the folder as a rig's if this is broken off
     names = []
     units = units_of(observation)
     for done, record in enumerate(observation.records(), 1):
@@ -65,12 +94,14 @@ def write(
             WRITERS[form](record, units, temporary, observation)
         if progress:
             progress(done)
-    for name, data in ((MAPPING, mapping_of(observation, form)), (TRUTH, truth_of(observation))):
-        with whole(folder / name) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as stream:
-            stream.write(HEADS[name])
-            _yaml(flowing=name == MAPPING).dump(data, stream)
-        names.append(name)
-    return names
+    _write_yaml(folder / MAPPING, mapping_of(observation, form))
+    return [*names, MAPPING, TRUTH]
+
+
+def _write_yaml(path: Path, data: dict[str, Any]) -> None:
+    with whole(path) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as stream:
+        stream.write(HEADS[path.name])
+        _yaml(flowing=path.name == MAPPING).dump(data, stream)
 
 
 def units_of(observation: Observation) -> dict[str, str]:
@@ -83,15 +114,20 @@ def units_of(observation: Observation) -> dict[str, str]:
 
 
 def _csv(record: Record, units: Mapping[str, str], path: Path, observation: Observation) -> None:
-    """Text, a column's unit in brackets behind its name; an empty cell where there is no reading."""
+    """Text, a column's unit in brackets behind its name, in quotes where it needs them; an empty cell: no reading."""
     head = [f"{name} [{units[name]}]" if name in units else name for name in record.columns]
     count = len(next(iter(record.columns.values())))
     with path.open("w", encoding="utf-8", newline="") as stream:
-        stream.write(",".join(head) + "\n")
+        stream.write(",".join(map(_quoted, head)) + "\n")
         for low in range(0, count, ROWS):
             cells = [_texts(values[low : low + ROWS]) for values in record.columns.values()]
             stream.write("\n".join(map(",".join, zip(*cells, strict=True))))
             stream.write("\n")
+
+
+def _quoted(name: str) -> str:
+    """A cell of the header, in quotes if it has a sign that may separate cells or begin a remark."""
+    return '"{}"'.format(name.replace('"', '""')) if set(name) & set(',;"#') else name
 
 
 def _texts(values: NDArray[Any]) -> list[str]:

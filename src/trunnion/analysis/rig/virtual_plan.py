@@ -128,13 +128,12 @@ def _forecast(observation: Observation, case: Case, steady: dict[str, Array]) ->
 def _expected(observation: Observation, name: str, rows: list[tuple[int, float, float, bool]]) -> Expected:
     channel = observation.channels[name]
     least, most = min(row[1] for row in rows), max(row[2] for row in rows)
-    limit = channel.limit * channel.per
+    per = abs(channel.per)
+    limit = channel.limit * per
     share = max(abs(least), abs(most)) / limit if math.isfinite(limit) else float("nan")
-    steps = (most - least) / (channel.step * channel.per) if channel.step else float("nan")
+    steps = (most - least) / (channel.step * per) if channel.step else float("nan")
     clipped = tuple(row[0] for row in rows if row[3])
-    return Expected(
-        name, channel.measures, channel.reading, least, most, share, steps, channel.noise * channel.per, clipped
-    )
+    return Expected(name, channel.measures, channel.reading, least, most, share, steps, channel.noise * per, clipped)
 
 
 def _said(observation: Observation, sensors: tuple[Expected, ...], forecasts: list[Forecast]) -> list[Finding]:

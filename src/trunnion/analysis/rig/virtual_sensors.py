@@ -31,7 +31,8 @@ FINE = 1e-3  # of a step of the converter, or of the noise: decimals of a readin
 class Channel:
     """A sensor put to a mechanism: its numbers in the SI unit of what it measures.
 
-    unit: SI, of what is measured; reading: unit of the file; per: readings per SI unit; zero: standard uncertainty
+    unit: SI, of what is measured; reading: unit of the file; per: readings per SI unit, below 0 where the sensitivity
+    is; zero: standard uncertainty
     while it runs; offset: of what it reads at rest; drift: per second; step: 0 without a converter; range and span:
     inf without one; per_turn: pulses, 0 of a sensor that tells at once; stated: as in the file.
     """
@@ -72,8 +73,8 @@ class Channel:
     @property
     def decimals(self) -> int:
         """Of a reading in its unit, so that what is left out is nothing beside step and noise."""
-        least = min((one for one in (self.step, self.noise) if one > 0), default=0.0) * self.per * FINE
-        whole = self.limit * self.per * 1e-9 if math.isfinite(self.limit) else 1e-9
+        least = min((one for one in (self.step, self.noise) if one > 0), default=0.0) * abs(self.per) * FINE
+        whole = self.limit * abs(self.per) * 1e-9 if math.isfinite(self.limit) else 1e-9
         return int(np.clip(-math.floor(math.log10(least or whole)), 0, 15))
 
 
@@ -115,6 +116,7 @@ def resolved(name: str, sensor: Sensor, column: str, unit: str) -> Channel:
         raise MechanismError(Finding(error.what, f"{where}.{key}", error.remedy)) from None
 
     def number(key: str, amount: Amount | None, absent: float = 0.0, over: str = "") -> float:
+        size = per if over else abs(per)  # a drift has a sign, all others are magnitudes
         if amount is None:
             return absent
         if amount.plain:
@@ -124,7 +126,7 @@ def resolved(name: str, sensor: Sensor, column: str, unit: str) -> Channel:
             return amount.value
         factor, of_reading = dimensions(reading)
         if alike(own, of_reading):
-            return amount.value / (per * factor)
+            return amount.value / (size * factor)
         units = dict.fromkeys(f"{one}/{over}" if over else one for one in (unit, reading))
         what = f"'{amount.source}' is not in {' or in '.join(units)}"
         remedy = f"state it in {', or as a reading in '.join(units)}"
@@ -177,7 +179,7 @@ def _reading(sensor: Sensor, unit: str) -> tuple[str, float]:
         if known:
             reading = sensor.unit or _written(given.unit, known)
             return reading, value / dimensions(reading)[0]
-    what = f"'{given.source}' does not turn {unit} into {sensor.unit or 'a reading in volt or ampere'}"
+    what = f"'{given.source}' does not turn {unit} into {sensor.unit or 'a reading in volt, ampere or hertz'}"
     raise UnitError(what, f"write a reading per {unit}, such as 100 mV/({unit}), and the `unit` of the reading")
 
 
@@ -245,8 +247,9 @@ def converted(channel: Channel, value: Array) -> Array:
     """Clipped, in steps, in the unit of the reading, with the decimals that a file has."""
     value = np.clip(value, -channel.range, channel.range)
     if channel.step:
+        way = math.copysign(1.0, channel.per)
         most = channel.span - channel.step  # the upper end of a converter is one step short
-        value = np.clip(np.rint(value / channel.step) * channel.step, -channel.span, most)
+        value = way * np.clip(np.rint(way * value / channel.step) * channel.step, -channel.span, most)
     return np.round(value * channel.per, channel.decimals) + 0.0  # + 0.0: no negative zero
 
 

@@ -11,6 +11,7 @@ import pytest
 from measured_data.recording import IDLE, RPM, ZERO, Columns, faults, mapping, off, read, recorded
 from trunnion.errors import MechanismError
 from trunnion.measured.read import read_measured
+from trunnion.model.units import KINDS
 
 OMEGA = RPM * np.pi / 30
 
@@ -189,3 +190,15 @@ def test_no_pulse(clean: Columns, tmp_path: Path) -> None:
     with pytest.raises(MechanismError, match="has 0 pulses: there are no turns"):
         read({**clean, "encoder": 0 * clean["t"]}, tmp_path)
     assert faults(read({**clean, "z": 0 * clean["t"]}, tmp_path, {"angle/index": {"column": "z"}}), "has no pulse")
+
+
+def test_units_of_what_is_set_stay_with_it(clean: Columns, tmp_path: Path) -> None:
+    columns = {**clean, "beta": np.full(clean["t"].size, 15.0)}
+    settings = {"misalignment": {"column": "beta", "unit": "deg"}, "load": "3 N m", "a": {"mean": "brake"}, "b": 2}
+    (one,) = read(columns, tmp_path, {"set": settings}).conditions
+    kinds = {"misalignment": "angle", "load": "moment", "a": "moment"}
+    assert one.dimensions == {name: KINDS[kind].dimensions[0] for name, kind in kinds.items()}
+    with pytest.raises(MechanismError, match="'degC' is none that a number of a model has"):
+        read(columns, tmp_path, {"set": {"misalignment": {"column": "beta", "unit": "degC"}}})
+    with pytest.raises(MechanismError, match="has a tolerance, which means nothing here"):
+        read(columns, tmp_path, {"set": {"misalignment": "15 ± 1 deg"}})

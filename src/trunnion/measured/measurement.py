@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.errors import Finding
+from trunnion.model.units import Dimension
 
 __all__ = ["Accuracy", "Condition", "Course", "Measurement"]
 
@@ -100,6 +101,7 @@ class Condition:
     phase: (position,), share of the cycle from the start of the model's, in [0, 1); files: where it comes from;
     speed: of the driver, mean over the turns, rad/s, below zero where its coordinate falls; NaN if the cycle is a time.
     start, cycle: coordinate of the driver at phase 0, and how far it goes in a cycle, rad; NaN where that is not known.
+    dimensions: of those of `values` that were stated with a unit; the others are plain numbers, SI.
     """
 
     name: str
@@ -110,6 +112,7 @@ class Condition:
     speed: float = float("nan")
     start: float = float("nan")
     cycle: float = float("nan")
+    dimensions: Mapping[str, Dimension] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from trunnion.measured.channels import Reading, Zeroed, filtered, reading, resol
 from trunnion.measured.courses import Drift, drift, signs, steady
 from trunnion.measured.mapping import DataMapping, File, FromData, Mapped, Zero, read_mapping
 from trunnion.measured.measurement import Accuracy, Condition, Course, Measurement
-from trunnion.measured.settings import Setting, settings, stated
+from trunnion.measured.settings import Setting, dimension_of, settings, stated
 from trunnion.measured.tables import Table, read_table
 from trunnion.measured.timebase import Timeline, timeline
 from trunnion.measured.turns import DENSE, Turns, cut, resampled
@@ -302,16 +302,17 @@ class _File:
             zero = float(np.hypot(own.accuracy_zero, of_file))
             accuracy = Accuracy(zero, own.accuracy_gain, self.steps[name], of_file)
             courses[name] = Course(name, channel.measures, own.scale.unit, part.courses[name], accuracy)
-        values = dict(part.setting.values)
+        values, known_as = dict(part.setting.values), dict(part.setting.dimensions)
         for path, channel_name in part.setting.means.items():
             values[path] = float(np.nanmean(courses[channel_name].turns))
+            known_as[path] = dimension_of(self.own[channel_name].scale.of_quantity, courses[channel_name].unit)
         positions = self.mapping.positions
         speed = np.nan if self.mapping.timed else way * self._rate([part.turns])
         name = self._named(part.setting)
         timed = self.mapping.timed
         start, cycle = (np.nan if timed else float(one.evaluate()) for one in (self.mapping.start, self.mapping.cycle))
         phase = np.arange(positions) / positions
-        return Condition(name, values, phase, courses, (str(self.path),), speed, start, cycle)
+        return Condition(name, values, phase, courses, (str(self.path),), speed, start, cycle, known_as)
 
 
 def _table(path: Path, mapping: DataMapping, entry: File) -> Table:

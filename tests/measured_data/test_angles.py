@@ -202,3 +202,44 @@ def test_units_of_what_is_set_stay_with_it(clean: Columns, tmp_path: Path) -> No
         read(columns, tmp_path, {"set": {"misalignment": {"column": "beta", "unit": "degC"}}})
     with pytest.raises(MechanismError, match="has a tolerance, which means nothing here"):
         read(columns, tmp_path, {"set": {"misalignment": "15 ± 1 deg"}})
+
+
+@pytest.mark.parametrize("wrap", [50, 60, 61, 100, 250, 256, 300, 360])
+@pytest.mark.parametrize("per_turn", [60, 1440])
+@pytest.mark.parametrize("way", [1, -1])
+def test_a_counter_that_wraps_anywhere(clean: Columns, tmp_path: Path, wrap: int, per_turn: int, way: int) -> None:
+    """Where is told by the steps around; with three counts a sample as well as with one in eight."""
+    counts = np.floor(way * clean["angle"] / (2 * np.pi) * per_turn)
+    changes = {"angle": {"from": "pulses", "column": "encoder", "per_turn": per_turn, "sign": way}}
+    found = read({**clean, "encoder": counts % wrap}, tmp_path, changes)
+    shift = way * 2 * np.pi * np.floor(counts[0] / wrap) * wrap / per_turn  # nothing tells what was lost before
+    assert not found.findings
+    (one,) = found.conditions
+    assert one.speed == pytest.approx(OMEGA, rel=2e-4)
+    assert one.courses["torque-in"].turns.shape[0] >= 18
+    if abs(shift) < 1e-9:
+        assert off(one) < 0.08
+
+
+def test_a_wild_count_is_named(clean: Columns, tmp_path: Path) -> None:
+    counts = clean["encoder"].copy()
+    counts[[3000, 5000]] = 1e9, 0
+    found = read({**clean, "encoder": counts}, tmp_path)
+    (one,) = faults(found, "far off the ones before and after")
+    assert "2 counts of 'encoder'" in one.what
+    assert "at 0.6, 1 s, such as 1e+09" in one.what
+    assert off(found.conditions[0]) < 0.05
+
+
+def test_a_counter_that_is_set_back(clean: Columns, tmp_path: Path) -> None:
+    """What follows has no zero; an index gives it one."""
+    counts = clean["encoder"].copy()
+    counts[6000:] -= counts[6000]
+    found = read({**clean, "encoder": counts}, tmp_path)
+    (one,) = faults(found, "is set back 1 time, at 1.1998 s")
+    assert "to 0; without an index the turns from there on are left out" in one.what
+    assert found.conditions[0].courses["torque-in"].turns.shape[0] == 9
+    assert off(found.conditions[0]) < 0.05
+    tied = read({**clean, "encoder": counts}, tmp_path, {"angle/index": {"column": "z"}})
+    assert tied.conditions[0].courses["torque-in"].turns.shape[0] >= 17
+    assert off(tied.conditions[0]) < 0.08

@@ -243,3 +243,38 @@ def test_a_counter_that_is_set_back(clean: Columns, tmp_path: Path) -> None:
     tied = read({**clean, "encoder": counts}, tmp_path, {"angle/index": {"column": "z"}})
     assert tied.conditions[0].courses["torque-in"].turns.shape[0] >= 17
     assert off(tied.conditions[0]) < 0.08
+
+
+def test_the_angle_beside_the_speed_of_its_driver(clean: Columns, tmp_path: Path) -> None:
+    (one,) = read(clean, tmp_path, {"angle/per_turn": 30}).findings
+    assert one.where == "channels.speed-in"
+    assert "the angle turns at 125.7 rad/s, 'speed-in' reads 62.83 rad/s, 2 times" in one.what
+    changes = {"angle/sign": -1, "channels/torque-in/zero": 0}
+    found = read({**clean, "T1": clean["T1"] - 0.05}, tmp_path, changes).findings
+    assert [(item.where, item.what[:38]) for item in found] == [
+        ("channels.speed-in", "sign: the angle turns at -62.83 rad/s,")
+    ]
+
+
+def test_an_index_that_does_not_fit_the_pulses_of_a_turn(clean: Columns, tmp_path: Path) -> None:
+    for stated in (30, 59, 15, 61):
+        try:
+            findings = read(clean, tmp_path, {"angle/index": {"column": "z"}, "angle/per_turn": stated}).findings
+        except MechanismError as error:  # pulses too many in every turn
+            findings = tuple(error.findings)
+        (one,) = (item for item in findings if "from one index pulse to the next the encoder counts 60" in item.what)
+        assert one.where == "angle.per_turn"
+        assert one.remedy.startswith("state per_turn: 60")
+    twice = {"angle": {"from": "column", "column": "angle", "unit": "deg", "index": {"column": "z"}}, "cycle": "5 deg"}
+    assert faults(read(clean, tmp_path, twice), "the angle goes 0.0175 turns")
+
+
+def test_turns_that_are_not_used_are_told(clean: Columns, tmp_path: Path) -> None:
+    assert read(clean, tmp_path).done[0].startswith("19 whole turns; rows before")
+    index = {**clean, "z": np.where(clean["t"] > 1.2, np.roll(clean["z"], 40), clean["z"])}
+    counts = clean["encoder"] + np.floor(clean["angle"] / (2 * np.pi)) * (clean["t"] < 1.6)
+    found = read({**index, "encoder": counts}, tmp_path, {"angle/index": {"column": "z"}})
+    used = found.conditions[0].courses["brake"].turns.shape[0]
+    assert used < 8
+    assert f"{used} of 21 recorded" in found.done[0]
+    assert faults(found, "of 21 recorded can be used")

@@ -177,6 +177,7 @@ def by_index(found: Pulses, index: Array, per_turn: int, step: float, account: A
     """
     at = np.interp(index, found.times, found.counts)
     way = np.sign(at[-1] - at[0]) or 1.0
+    _check_per_turn(np.diff(at) * way, per_turn, account)
     turns = np.concatenate([[0.0], np.cumsum(np.maximum(np.rint(np.diff(at) * way / per_turn), 1.0))])
     over = (at - at[0]) * way - per_turn * turns
     usual = float(np.angle(np.mean(np.exp(2j * np.pi * over)))) / (2 * np.pi)
@@ -196,3 +197,17 @@ def by_index(found: Pulses, index: Array, per_turn: int, step: float, account: A
     return found.counts - at[0] - way * usual - way * level[place], np.column_stack(
         [index[:-1][wrong], index[1:][wrong]]
     )
+
+
+def _check_per_turn(between: Array, per_turn: int, account: Account) -> None:
+    """Tell where most turns of the index have another number of pulses than is stated.
+
+    between: counts from one index pulse to the next.
+    """
+    usual = float(np.median(between))
+    alike = np.abs(between - usual) < max(1.5, 0.01 * abs(usual))
+    if between.size < 2 or np.mean(alike) <= 0.5 or abs(usual - per_turn) < max(0.75, 0.01 * per_turn):
+        return
+    found = float(np.mean(between[alike]))
+    what = f"from one index pulse to the next the encoder counts {found:.4g}, angle.per_turn is {per_turn:,}"
+    account.warn("angle.per_turn", what, f"state per_turn: {found:.0f}, if the index comes once a turn")

@@ -10,6 +10,7 @@ import pytest
 
 from measured_data.recording import IDLE, RPM, ZERO, Columns, faults, mapping, off, read, recorded
 from trunnion.errors import MechanismError
+from trunnion.measured.channels import resolution
 from trunnion.measured.read import read_measured
 from trunnion.model.units import KINDS
 
@@ -278,3 +279,21 @@ def test_turns_that_are_not_used_are_told(clean: Columns, tmp_path: Path) -> Non
     assert used < 8
     assert f"{used} of 21 recorded" in found.done[0]
     assert faults(found, "of 21 recorded can be used")
+
+
+def test_a_zero_in_the_unit_of_the_quantity_has_the_sign_of_the_gain(clean: Columns, tmp_path: Path) -> None:
+    """Quantity = (reading − zero)·gain, whichever unit the zero is in."""
+    changes = {"channels/torque-in/gain": "-100 mV/(N m)"}
+    first, second = (
+        read(clean, tmp_path, {**changes, "channels/torque-in/zero": zero}).conditions[0].courses["torque-in"].mean
+        for zero in ("0.5 N m", "-50 mV")
+    )
+    assert first == pytest.approx(second, rel=1e-12)
+
+
+def test_levels_of_a_signal_are_no_steps_of_a_converter() -> None:
+    time = np.arange(4000) / 4000
+    assert resolution(np.where(np.sin(40 * time) > 0, 12.0, 6.0)) == 0
+    assert resolution(np.select([time < 0.2, time < 0.7], [3.0, 5.0], 9.0)) == 0
+    assert resolution(np.repeat(np.arange(20) ** 2, 200).astype(float)) == 0
+    assert resolution(np.rint(10 * np.sin(20 * time)) * 0.5) == pytest.approx(0.5)

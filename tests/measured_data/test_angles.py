@@ -10,7 +10,9 @@ import pytest
 
 from measured_data.recording import IDLE, RPM, ZERO, Columns, faults, mapping, off, read, recorded
 from trunnion.errors import MechanismError
+from trunnion.measured.channels import resolution
 from trunnion.measured.read import read_measured
+from trunnion.model.units import KINDS
 
 OMEGA = RPM * np.pi / 30
 
@@ -189,3 +191,109 @@ def test_no_pulse(clean: Columns, tmp_path: Path) -> None:
     with pytest.raises(MechanismError, match="has 0 pulses: there are no turns"):
         read({**clean, "encoder": 0 * clean["t"]}, tmp_path)
     assert faults(read({**clean, "z": 0 * clean["t"]}, tmp_path, {"angle/index": {"column": "z"}}), "has no pulse")
+
+
+def test_units_of_what_is_set_stay_with_it(clean: Columns, tmp_path: Path) -> None:
+    columns = {**clean, "beta": np.full(clean["t"].size, 15.0)}
+    settings = {"misalignment": {"column": "beta", "unit": "deg"}, "load": "3 N m", "a": {"mean": "brake"}, "b": 2}
+    (one,) = read(columns, tmp_path, {"set": settings}).conditions
+    kinds = {"misalignment": "angle", "load": "moment", "a": "moment"}
+    assert one.dimensions == {name: KINDS[kind].dimensions[0] for name, kind in kinds.items()}
+    with pytest.raises(MechanismError, match="'degC' is none that a number of a model has"):
+        read(columns, tmp_path, {"set": {"misalignment": {"column": "beta", "unit": "degC"}}})
+    with pytest.raises(MechanismError, match="has a tolerance, which means nothing here"):
+        read(columns, tmp_path, {"set": {"misalignment": "15 ± 1 deg"}})
+
+
+@pytest.mark.parametrize("wrap", [50, 60, 61, 100, 250, 256, 300, 360])
+@pytest.mark.parametrize("per_turn", [60, 1440])
+@pytest.mark.parametrize("way", [1, -1])
+def test_a_counter_that_wraps_anywhere(clean: Columns, tmp_path: Path, wrap: int, per_turn: int, way: int) -> None:
+    """Where is told by the steps around; with three counts a sample as well as with one in eight."""
+    counts = np.floor(way * clean["angle"] / (2 * np.pi) * per_turn)
+    changes = {"angle": {"from": "pulses", "column": "encoder", "per_turn": per_turn, "sign": way}}
+    found = read({**clean, "encoder": counts % wrap}, tmp_path, changes)
+    shift = way * 2 * np.pi * np.floor(counts[0] / wrap) * wrap / per_turn  # nothing tells what was lost before
+    assert not found.findings
+    (one,) = found.conditions
+    assert one.speed == pytest.approx(OMEGA, rel=2e-4)
+    assert one.courses["torque-in"].turns.shape[0] >= 18
+    if abs(shift) < 1e-9:
+        assert off(one) < 0.08
+
+
+def test_a_wild_count_is_named(clean: Columns, tmp_path: Path) -> None:
+    counts = clean["encoder"].copy()
+    counts[[3000, 5000]] = 1e9, 0
+    found = read({**clean, "encoder": counts}, tmp_path)
+    (one,) = faults(found, "far off the ones before and after")
+    assert "2 counts of 'encoder'" in one.what
+    assert "at 0.6, 1 s, such as 1e+09" in one.what
+    assert off(found.conditions[0]) < 0.05
+
+
+def test_a_counter_that_is_set_back(clean: Columns, tmp_path: Path) -> None:
+    """What follows has no zero; an index gives it one."""
+    counts = clean["encoder"].copy()
+    counts[6000:] -= counts[6000]
+    found = read({**clean, "encoder": counts}, tmp_path)
+    (one,) = faults(found, "is set back 1 time, at 1.1998 s")
+    assert "to 0; without an index the turns from there on are left out" in one.what
+    assert found.conditions[0].courses["torque-in"].turns.shape[0] == 9
+    assert off(found.conditions[0]) < 0.05
+    tied = read({**clean, "encoder": counts}, tmp_path, {"angle/index": {"column": "z"}})
+    assert tied.conditions[0].courses["torque-in"].turns.shape[0] >= 17
+    assert off(tied.conditions[0]) < 0.08
+
+
+def test_the_angle_beside_the_speed_of_its_driver(clean: Columns, tmp_path: Path) -> None:
+    (one,) = read(clean, tmp_path, {"angle/per_turn": 30}).findings
+    assert one.where == "channels.speed-in"
+    assert "the angle turns at 125.7 rad/s, 'speed-in' reads 62.83 rad/s, 2 times" in one.what
+    changes = {"angle/sign": -1, "channels/torque-in/zero": 0}
+    found = read({**clean, "T1": clean["T1"] - 0.05}, tmp_path, changes).findings
+    assert [(item.where, item.what[:38]) for item in found] == [
+        ("channels.speed-in", "sign: the angle turns at -62.83 rad/s,")
+    ]
+
+
+def test_an_index_that_does_not_fit_the_pulses_of_a_turn(clean: Columns, tmp_path: Path) -> None:
+    for stated in (30, 59, 15, 61):
+        try:
+            findings = read(clean, tmp_path, {"angle/index": {"column": "z"}, "angle/per_turn": stated}).findings
+        except MechanismError as error:  # pulses too many in every turn
+            findings = tuple(error.findings)
+        (one,) = (item for item in findings if "from one index pulse to the next the encoder counts 60" in item.what)
+        assert one.where == "angle.per_turn"
+        assert one.remedy.startswith("state per_turn: 60")
+    twice = {"angle": {"from": "column", "column": "angle", "unit": "deg", "index": {"column": "z"}}, "cycle": "5 deg"}
+    assert faults(read(clean, tmp_path, twice), "the angle goes 0.0175 turns")
+
+
+def test_turns_that_are_not_used_are_told(clean: Columns, tmp_path: Path) -> None:
+    assert read(clean, tmp_path).done[0].startswith("19 whole turns; rows before")
+    index = {**clean, "z": np.where(clean["t"] > 1.2, np.roll(clean["z"], 40), clean["z"])}
+    counts = clean["encoder"] + np.floor(clean["angle"] / (2 * np.pi)) * (clean["t"] < 1.6)
+    found = read({**index, "encoder": counts}, tmp_path, {"angle/index": {"column": "z"}})
+    used = found.conditions[0].courses["brake"].turns.shape[0]
+    assert used < 8
+    assert f"{used} of 21 recorded" in found.done[0]
+    assert faults(found, "of 21 recorded can be used")
+
+
+def test_a_zero_in_the_unit_of_the_quantity_has_the_sign_of_the_gain(clean: Columns, tmp_path: Path) -> None:
+    """Quantity = (reading − zero)·gain, whichever unit the zero is in."""
+    changes = {"channels/torque-in/gain": "-100 mV/(N m)"}
+    first, second = (
+        read(clean, tmp_path, {**changes, "channels/torque-in/zero": zero}).conditions[0].courses["torque-in"].mean
+        for zero in ("0.5 N m", "-50 mV")
+    )
+    assert first == pytest.approx(second, rel=1e-12)
+
+
+def test_levels_of_a_signal_are_no_steps_of_a_converter() -> None:
+    time = np.arange(4000) / 4000
+    assert resolution(np.where(np.sin(40 * time) > 0, 12.0, 6.0)) == 0
+    assert resolution(np.select([time < 0.2, time < 0.7], [3.0, 5.0], 9.0)) == 0
+    assert resolution(np.repeat(np.arange(20) ** 2, 200).astype(float)) == 0
+    assert resolution(np.rint(10 * np.sin(20 * time)) * 0.5) == pytest.approx(0.5)

@@ -242,3 +242,20 @@ def test_few_turns(run: Columns, tmp_path: Path) -> None:
 def test_a_sensor_that_never_changes(run: Columns, tmp_path: Path) -> None:
     run["T2"][:] = 3.3
     assert faults(read(run, tmp_path), "reads 3.3 in every one")
+
+
+@pytest.mark.parametrize("turns", [2, 3])
+def test_with_few_turns_nothing_is_left_out_that_may_be_the_signals_own(
+    run: Columns, tmp_path: Path, turns: int
+) -> None:
+    """A load that works over half a turn, without noise, is zero or constant there and steps."""
+    phase = run["angle"] % (2 * np.pi)
+    run["T2"] = np.where(run["t"] < 0.2, 0.0, np.where(phase < 2, 30.0 + np.sin(phase), 0.0))
+    run["T1"][np.diff(np.floor(run["angle"] / (2 * np.pi)), append=3) > 0] += 5.0  # a knock once a turn
+    short = {name: values[: 1500 + 500 * turns] for name, values in run.items()}
+    found = read(short, tmp_path)
+    assert found.conditions[0].courses["brake"].turns.shape[0] == turns
+    assert bool(faults(found, "left in: in 2 turns nothing tells whether it is the signal's own")) is (turns == 2)
+    assert not faults(found, "left out")
+    for course in found.conditions[0].courses.values():
+        assert np.isfinite(course.turns).all()

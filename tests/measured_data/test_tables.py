@@ -202,3 +202,19 @@ def test_huge_numbers(tmp_path: Path) -> None:
     columns["T1"] *= 1e150
     found = read(columns, tmp_path)
     assert np.isfinite(found.conditions[0].courses["torque-in"].mean).all()
+
+
+@pytest.mark.parametrize(("separator", "thousands", "decimal"), [("\t", ",", "."), (";", ".", ",")])
+def test_signs_between_thousands_are_no_decimals(tmp_path: Path, separator: str, thousands: str, decimal: str) -> None:
+    """999.5 and 1,500 beside each other: one of the two would be read wrong."""
+    rows = [f"{k}{decimal}5{separator}{999 - k if k % 2 else f'1{thousands}500'}{separator}x 1,5" for k in range(20)]
+    path = tmp_path / "run.csv"
+    path.write_text("\n".join([separator.join(("t", "T1", "remark")), *rows]))
+    with pytest.raises(MechanismError, match="decimal and thousands signs are mixed"):
+        read_table(path, ["t", "T1"])
+
+
+def test_a_comma_in_another_column_is_no_sign_of_decimals(tmp_path: Path) -> None:
+    path = tmp_path / "run.csv"
+    path.write_text("t;T1;remark\n" + "".join(f"{k}.5;{k}.25;1,5\n" for k in range(20)))
+    assert read_table(path, ["t", "T1"]).columns["T1"].values[3] == 3.25

@@ -17,6 +17,7 @@ from trunnion.analysis.rig.judge import Verdict, expanded, independent, judge, u
 from trunnion.analysis.rig.said import gathered
 from trunnion.errors import Finding, Severity
 from trunnion.measured.measurement import Accuracy, Condition, Course, Measurement
+from trunnion.model.units import KINDS
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 POWERS = ("torque", "speed", "brake", "out")
@@ -383,3 +384,21 @@ def test_a_load_that_rests_takes_no_power():
     result = compare(Measurement("bench", (Condition("a", {}, np.arange(24) / 24, blank),)), mechanism)
     assert np.isnan(result.model.sel(channel="L").values).any()
     assert np.isfinite(result.efficiency_model.values).all()
+
+
+@pytest.mark.parametrize("verb", [trunnion.compare, lambda model, data: trunnion.identify(model, data, ["A.friction"])])
+def test_units_of_what_is_set_are_those_of_the_model(verb):
+    mechanism = rocker()
+    whole = measured(mechanism, ({"A.speed": 20.0},))
+    for kind, fitting in (("angular speed", True), ("length", False), ("moment", False)):
+        dimensions = {"A.speed": KINDS[kind].dimensions[0]}
+        other = replace(whole, conditions=tuple(replace(one, dimensions=dimensions) for one in whole.conditions))
+        if fitting:
+            compare(other, mechanism)
+            continue
+        with pytest.raises(MechanismError, match=rf"a {kind} is set where the model has an angular speed") as caught:
+            verb(mechanism, other)
+        (finding,) = caught.value.findings
+        assert finding.where == "set.A.speed"
+        assert "such as 1500 rpm" in finding.remedy
+        assert finding.file == "run-1.csv"

@@ -18,11 +18,12 @@ FILES = 4  # named in a sentence
 
 @dataclass
 class Account:
-    """Findings about one data file, and what was done to its data."""
+    """Findings about one data file, and what was done to its data. recorded: turns that the driver goes through."""
 
     file: str
     findings: list[Finding] = field(default_factory=list)
     done: dict[str, list[float]] = field(default_factory=dict)
+    recorded: float = 0.0
 
     def warn(self, where: str, what: str, remedy: str, severity: Severity = Severity.WARNING) -> None:
         """A fault of the data."""

@@ -121,6 +121,10 @@ def _check_index(values: Array, index: Array, line: Timeline, account: Account) 
     if index.size < 2:
         return
     at = np.interp(index, line.seconds, np.where(np.isfinite(values), values, np.nan))
+    usual = float(np.nanmedian(np.abs(np.diff(at)))) / TURN if np.isfinite(np.diff(at)).any() else 1.0
+    if abs(usual - 1) > 0.5:
+        what = f"from one index pulse to the next the angle goes {usual:.3g} turns"
+        account.warn("angle.index", what, "check the unit of the angle, and whether both turn with the driver")
     offsets = np.angle(np.exp(1j * (at - at[0])))
     far = np.flatnonzero(np.abs(offsets) > np.radians(5.0))
     if far.size:

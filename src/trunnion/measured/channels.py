@@ -23,6 +23,7 @@ __all__ = ["Reading", "Zeroed", "filtered", "mean_uncertainty", "reading", "reso
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 LOOKED_AT = 50_000  # readings of which the step is told
+LEVELS = 8  # of readings, from which they tell a step
 BRIDGED = 0.1  # of the period of the cut-off: gaps up to this are bridged for the filter
 
 
@@ -211,13 +212,15 @@ def resolution(readings: Array) -> float:
     """Step from one reading to the next, in readings; 0 where there is none, or noise carries the readings over it.
 
     Of readings that are all multiples of a step apart, of which noise from sample to sample is less than half a step.
+    A few levels are a signal that is switched, not the steps of a converter: of these many are one step apart.
     """
     part = readings[np.isfinite(readings)][:LOOKED_AT]
     levels = np.unique(part)
-    if levels.size < 2 or levels.size > part.size / 4:
+    if levels.size < LEVELS or levels.size > part.size / 4:
         return 0.0
     apart = np.diff(levels)
     step = float(apart[apart > 1e-9 * float(np.ptp(levels))].min())
     whole = apart / step
     noise = float(np.mean(np.abs(np.diff(part)))) / 1.128  # of normal deviates |a − b| is 2σ/√π in the mean
-    return step if np.all(np.abs(whole - np.rint(whole)) < 0.01) and noise < step / 2 else 0.0
+    adjacent = np.mean(np.rint(whole) == 1) > 0.5
+    return step if adjacent and np.all(np.abs(whole - np.rint(whole)) < 0.01) and noise < step / 2 else 0.0

@@ -12,13 +12,14 @@ from trunnion.measured.account import Account, counted
 from trunnion.measured.mapping import Channel
 from trunnion.measured.turns import Turns, turn_means
 
-__all__ = ["Drift", "drift", "signs", "steady"]
+__all__ = ["Drift", "drift", "signs", "speeds", "steady"]
 
 Array = NDArray[np.float64]
 STEADY = 0.03  # of the mean speed, between the slowest and the fastest turn
 CERTAIN = 6.0  # standard errors from which a slope is one
 PLAIN = 3.0  # times what turns scatter about the line, that a drift amounts to
 MOST = 0.95  # of the turns, in which a power has the wrong sign if the channel has it
+APART = 0.03  # of a mean speed, between the angle and the channel that reads it
 SHARE = 0.002  # of the largest value over the turn, that a drift amounts to
 
 
@@ -124,6 +125,36 @@ def signs(
                          f"write sign: {-channels[key].sign} (or turn that of {rate})")  # fmt: skip
             suspects.append(key)
     return suspects
+
+
+def speeds(
+    channels: Mapping[str, Channel], courses: Mapping[str, Array], turning: float, told: Sequence[str], account: Account
+) -> None:
+    """Tell where the angle turns at another mean speed than the channel of its driver reads, or the other way.
+
+    turning: mean speed by the angle, rad/s with its sign; told: channels whose sign is said to be wrong.
+    """
+    drivers = [one.measures.partition(":")[2] for one in channels.values() if one.measures.startswith("effort:")]
+    names = [key for key, one in channels.items() if one.measures in {f"rate:{driver}" for driver in drivers}]
+    if len(set(drivers)) != 1 or not names or names[0] in told or not turning:
+        return
+    course = courses[names[0]]
+    known = course[np.isfinite(course)]
+    if not known.size or not known.any():
+        return
+    # over equal angles the mean of a speed in time is the harmonic one
+    one_way = np.all(known > 0) or np.all(known < 0)
+    read = float(1 / np.mean(1 / known)) if one_way else float(np.mean(known))
+    ratio = turning / read if read else np.inf
+    if abs(ratio - 1) <= APART:
+        return
+    where, both = f"channels.{names[0]}", f"the angle turns at {turning:.4g} rad/s, '{names[0]}' reads {read:.4g} rad/s"
+    if abs(ratio + 1) <= APART:
+        account.warn(where, f"sign: {both}", f"write sign: {-channels[names[0]].sign}, or turn angle.sign")
+        return
+    account.warn(
+        where, f"{both}, {ratio:.4g} times", "check unit and gain of the channel, and per_turn or unit of angle"
+    )
 
 
 def _against(power: Array) -> bool:

@@ -25,6 +25,7 @@ WIDTH = 7  # samples of the median that spikes are told from: up to three in a r
 FAR = 12.0  # robust standard deviations from it
 NEAR = 0.01  # of a turn: what recurs that close is in the same place
 CHANCE = 0.025
+FEW = 4  # turns from which what comes back can be told from faults
 SEEN = 0.1  # of the span from the 1st to the 99th percentile, that a spike or a fall to zero exceeds
 
 
@@ -104,9 +105,17 @@ def _leave_out(part: Array, mask: Mask) -> None:
     part[mask] = np.nan
 
 
+def _doubtful(part: Array, mask: Mask, span: Span) -> str:
+    """Leave out what may be the signal's own only where there are turns enough to tell; what was done."""
+    if span.turns < FEW:
+        return f"left in: in {counted(span.turns, 'turn')} nothing tells whether it is the signal's own"
+    _leave_out(part, mask)
+    return "left out"
+
+
 def _own(count: int, span: Span) -> bool:
     """Whether something happens in so many places that it belongs to the signal."""
-    return span.turns >= 4 and count >= 0.5 * span.turns
+    return span.turns >= FEW and count >= 0.5 * span.turns
 
 
 def _recurring(phase: Array) -> Mask:
@@ -178,8 +187,8 @@ def _zeros(where: str, part: Array, time: Array, wide: float, span: Span, accoun
     for begin, length in zip(starts[fallen], lengths[fallen], strict=True):
         bad[begin : begin + length] = True
     what = f"dropouts: {counted(int(bad.sum()), 'reading')} of {part.size:,} zero in the middle of the signal"
-    account.warn(where, f"{what}, {places(bad, time)}; left out", "check cable and connector")
-    _leave_out(part, bad)
+    done = _doubtful(part, bad, span)
+    account.warn(where, f"{what}, {places(bad, time)}; {done}", "check cable and connector")
 
 
 def _stuck(where: str, part: Array, time: Array, span: Span, account: Account) -> None:
@@ -199,8 +208,7 @@ def _stuck(where: str, part: Array, time: Array, span: Span, account: Account) -
     for begin, length in zip(starts[long], lengths[long], strict=True):
         bad[begin + 1 : begin + length + 1] = True
     what = f"stuck: the reading does not change for {counted(held, 'sample')}, {places(bad, time)}"
-    account.warn(where, f"{what}; left out", "check sensor and logger")
-    _leave_out(part, bad)
+    account.warn(where, f"{what}; {_doubtful(part, bad, span)}", "check sensor and logger")
 
 
 def _spikes(where: str, part: Array, time: Array, wide: float, span: Span, account: Account) -> None:
@@ -223,5 +231,4 @@ def _spikes(where: str, part: Array, time: Array, wide: float, span: Span, accou
         return
     what = f"spikes: {counted(int(far.sum()), 'reading')} of {part.size:,} up to {off[far].max() / wide:.2g} times the "
     what += f"usual span off their neighbours, {places(bad, time)}"
-    account.warn(where, f"{what}; left out", "check shielding and earth")
-    _leave_out(part, bad)
+    account.warn(where, f"{what}; {_doubtful(part, bad, span)}", "check shielding and earth")

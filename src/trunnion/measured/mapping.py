@@ -50,6 +50,8 @@ def _fixed(quantity: Quantity) -> Quantity:
     if quantity.names:
         what = f"'{quantity.source}' speaks of {', '.join(quantity.names)}"
         raise problem(what, "write a number with its unit")
+    if quantity.tolerance is not None:
+        raise problem(f"'{quantity.source}' has a tolerance, which means nothing here", "write the value alone")
     return quantity
 
 

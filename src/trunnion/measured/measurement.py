@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.errors import Finding
+from trunnion.model.units import Dimension
 
 __all__ = ["Accuracy", "Condition", "Course", "Measurement"]
 
@@ -101,6 +102,7 @@ class Condition:
     speed: of the driver, mean over the turns, rad/s, below zero where its coordinate falls; NaN if the cycle is a time.
     start, cycle: coordinate of the driver at phase 0, and how far it goes in a cycle, rad; NaN where that is not known.
     lag: standard uncertainty, s, of when the coordinate is passed, of all channels together, by the sampling of pulses.
+    dimensions: of those of `values` that were stated with a unit; the others are plain numbers, SI.
     """
 
     name: str
@@ -112,6 +114,7 @@ class Condition:
     start: float = float("nan")
     cycle: float = float("nan")
     lag: float = 0.0
+    dimensions: Mapping[str, Dimension] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

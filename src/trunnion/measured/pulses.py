@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from trunnion.measured.account import Account, counted, times
+from trunnion.measured.counter import unwrapped
 from trunnion.measured.mapping import AngleSource
 from trunnion.measured.timebase import GAP, Timeline
 
 __all__ = ["Pulses", "by_index", "index_times", "pulses_of"]
 
 Array = NDArray[np.float64]
-MODULI = (1 << 8, 1 << 16, 1 << 24, 1 << 32)  # at which counters wrap
 TOLD_BY = 5  # samples between pulses from which a lost one shows in the time between its neighbours
 
 
@@ -50,40 +50,31 @@ def pulses_of(source: AngleSource, readings: Array, line: Timeline, indexed: boo
         if found.times.size > 2:
             found = _of_level(source, found, line, indexed, account)
     else:
-        found = _of_count(source, readings[finite], line.seconds[finite], line.step, account)
+        found = _of_count(source, readings[finite], line.seconds[finite], line.step, indexed, account)
     if indexed or found.times.size < 9:
         return found
     return _missed(found, line.step, 0.5 * (source.per_turn or 0), account)
 
 
-def _of_count(source: AngleSource, readings: Array, seconds: Array, step: float, account: Account) -> Pulses:
+def _of_count(
+    source: AngleSource, readings: Array, seconds: Array, step: float, indexed: bool, account: Account
+) -> Pulses:
     """The rows where the count changes; the edge lies between two samples, its time is taken in the middle.
 
     From a to b it passes b if it counts on by one; if it jumps, half way the count is (a + b + 1)/2 in the mean.
     """
     if readings.size < 2:
         return Pulses(np.empty(0), np.empty(0), np.empty((0, 2)))
-    counts = _unwrapped(source, readings, account)
+    counts, back = unwrapped(source, readings, seconds, account)
     at = np.flatnonzero(np.diff(counts) != 0)
     at = at[np.diff(seconds)[at] <= GAP * step]
     before, after = counts[at], counts[at + 1]
-    return Pulses(0.5 * (seconds[at] + seconds[at + 1]), 0.5 * (before + after + 1.0), np.empty((0, 2)))
-
-
-def _unwrapped(source: AngleSource, readings: Array, account: Account) -> Array:
-    """A count without the jumps back of a counter that is full or is set back every turn."""
-    steps = np.diff(readings)
-    if source.wrap is not None:
-        return np.unwrap(readings, period=float(source.wrap))
-    way = np.sign(np.sum(np.sign(steps))) or 1.0
-    span = float(np.ptp(readings))
-    back = np.flatnonzero((steps * way < 0) & (np.abs(steps) > 0.5 * span))
-    if not back.size or span < 2:
-        return readings
-    moduli = [one for one in (source.per_turn or 0, *MODULI) if one >= span + 1]
-    modulus = moduli[0] if moduli else span + 1
-    account.say(f"the count of '{source.column}' wraps at {modulus:,.0f}, {counted(back.size, 'time')}")
-    return np.unwrap(readings, period=float(modulus))
+    found = Pulses(0.5 * (seconds[at] + seconds[at + 1]), 0.5 * (before + after + 1.0), np.empty((0, 2)))
+    if not back.size:
+        return found
+    if indexed:
+        return replace(found, spoilt=np.column_stack([seconds[back], seconds[back + 1]]))
+    return replace(found, until=float(seconds[back[0]]))
 
 
 def _edges(readings: Array, line: Timeline) -> Pulses:
@@ -186,6 +177,7 @@ def by_index(found: Pulses, index: Array, per_turn: int, step: float, account: A
     """
     at = np.interp(index, found.times, found.counts)
     way = np.sign(at[-1] - at[0]) or 1.0
+    _check_per_turn(np.diff(at) * way, per_turn, account)
     turns = np.concatenate([[0.0], np.cumsum(np.maximum(np.rint(np.diff(at) * way / per_turn), 1.0))])
     over = (at - at[0]) * way - per_turn * turns
     usual = float(np.angle(np.mean(np.exp(2j * np.pi * over)))) / (2 * np.pi)
@@ -205,3 +197,17 @@ def by_index(found: Pulses, index: Array, per_turn: int, step: float, account: A
     return found.counts - at[0] - way * usual - way * level[place], np.column_stack(
         [index[:-1][wrong], index[1:][wrong]]
     )
+
+
+def _check_per_turn(between: Array, per_turn: int, account: Account) -> None:
+    """Tell where most turns of the index have another number of pulses than is stated.
+
+    between: counts from one index pulse to the next.
+    """
+    usual = float(np.median(between))
+    alike = np.abs(between - usual) < max(1.5, 0.01 * abs(usual))
+    if between.size < 2 or np.mean(alike) <= 0.5 or abs(usual - per_turn) < max(0.75, 0.01 * per_turn):
+        return
+    found = float(np.mean(between[alike]))
+    what = f"from one index pulse to the next the encoder counts {found:.4g}, angle.per_turn is {per_turn:,}"
+    account.warn("angle.per_turn", what, f"state per_turn: {found:.0f}, if the index comes once a turn")

@@ -16,10 +16,10 @@ from trunnion.measured import faults
 from trunnion.measured.account import Account, counted, told
 from trunnion.measured.angle import Coordinate, coordinate
 from trunnion.measured.channels import Reading, Zeroed, filtered, reading, resolution, zeroed
-from trunnion.measured.courses import Drift, drift, signs, steady
+from trunnion.measured.courses import Drift, drift, signs, speeds, steady
 from trunnion.measured.mapping import DataMapping, File, FromData, Mapped, Zero, read_mapping
 from trunnion.measured.measurement import Accuracy, Condition, Course, Measurement
-from trunnion.measured.settings import Setting, settings, stated
+from trunnion.measured.settings import Setting, dimension_of, settings, stated
 from trunnion.measured.tables import Table, read_table
 from trunnion.measured.timebase import Timeline, timeline
 from trunnion.measured.turns import DENSE, Turns, cut, resampled
@@ -28,6 +28,7 @@ __all__ = ["read_measured"]
 
 Array = NDArray[np.float64]
 FEW_HARMONICS = 5.0
+UNUSED = 0.5  # of the turns recorded, below which it is told how few are used
 
 
 def read_measured(
@@ -57,7 +58,12 @@ def read_measured(
     if failed or not conditions:
         raise MechanismError([one for one in findings if one.severity is not Severity.NOTE])
     name = mapped.mapping.name or Path(mapped.file).stem
-    return Measurement(name, tuple(_distinct(conditions)), tuple(findings), (_averaged(conditions), *told(accounts)))
+    return Measurement(
+        name,
+        tuple(_distinct(conditions)),
+        tuple(findings),
+        (_averaged(conditions, sum(one.recorded for one in accounts)), *told(accounts)),
+    )
 
 
 def files_read(mapping: Path, files: Iterable[Path] | None = None) -> list[Path]:
@@ -67,11 +73,13 @@ def files_read(mapping: Path, files: Iterable[Path] | None = None) -> list[Path]
     return [mapping, *named]
 
 
-def _averaged(conditions: Sequence[Condition]) -> str:
-    """How many turns there are."""
+def _averaged(conditions: Sequence[Condition], recorded: float) -> str:
+    """How many turns there are, and of how many if some are not used."""
     counts = [next(iter(one.courses.values())).turns.shape[0] for one in conditions]
     each = f"{min(counts):,}" if min(counts) == max(counts) else f"{min(counts):,} to {max(counts):,}"
     where = "" if len(counts) == 1 else f" in each of {len(counts):,} conditions"
+    if sum(counts) < recorded - 2 * len(counts):
+        where += f", {sum(counts):,} of {recorded:,.0f} recorded"
     return f"{each} whole turns{where}; rows before, between and after them are not used"
 
 
@@ -149,8 +157,13 @@ class _File:
             allowed = used[setting.window] & setting.rows
             name = self._named(setting)
             turns = cut(share, self.line, setting.window, allowed, mapping.positions, spoilt, account, name)
+            gone = _gone(share[setting.window], allowed)
+            account.recorded += gone
             if turns.numbers.size:
                 cuts.append((setting, turns))
+                if turns.numbers.size < UNUSED * gone - 2:
+                    what = f"{counted(turns.numbers.size, 'turn')} of {gone:,.0f} recorded can be used"
+                    account.warn(f"condition {name}", what, "mend what the other findings name")
             else:
                 what = self._no_turn(share[setting.window], allowed)
                 account.error(f"condition {name}", what, "check angle, or record for longer")
@@ -161,7 +174,9 @@ class _File:
         drifts = {name: self._channel(name, zeros[name], parts) for name in mapping.channels}
         whole = {name: np.concatenate([part.courses[name] for part in parts]) for name in mapping.channels}
         if not mapping.timed:
-            signs(mapping.channels, whole, way * self._rate([part.turns for part in parts]), account)
+            turning = way * self._rate([part.turns for part in parts])
+            told = signs(mapping.channels, whole, turning, account)
+            speeds(mapping.channels, whole, turning, told, account)
         return [self._condition(part, zeros, drifts, way) for part in parts]
 
     def _named(self, setting: Setting) -> str:
@@ -311,16 +326,25 @@ class _File:
             zero = float(np.hypot(own.accuracy_zero, of_file))
             accuracy = Accuracy(zero, own.accuracy_gain, self.steps[name], of_file)
             courses[name] = Course(name, channel.measures, own.scale.unit, part.courses[name], accuracy)
-        values = dict(part.setting.values)
+        values, known_as = dict(part.setting.values), dict(part.setting.dimensions)
         for path, channel_name in part.setting.means.items():
             values[path] = float(np.nanmean(courses[channel_name].turns))
+            known_as[path] = dimension_of(self.own[channel_name].scale.of_quantity, courses[channel_name].unit)
         positions = self.mapping.positions
         speed = np.nan if self.mapping.timed else way * self._rate([part.turns])
         name = self._named(part.setting)
         timed = self.mapping.timed
         start, cycle = (np.nan if timed else float(one.evaluate()) for one in (self.mapping.start, self.mapping.cycle))
         phase = np.arange(positions) / positions
-        return Condition(name, values, phase, courses, (str(self.path),), speed, start, cycle, lag=self.lag)
+        return Condition(
+            name, values, phase, courses, (str(self.path),), speed, start, cycle, lag=self.lag, dimensions=known_as
+        )
+
+
+def _gone(share: Array, allowed: NDArray[np.bool_]) -> float:
+    """Cycles gone through in the rows that are allowed."""
+    steps = np.diff(share)[allowed[1:] & allowed[:-1]]
+    return float(np.sum(np.abs(steps[np.isfinite(steps)])))
 
 
 def _table(path: Path, mapping: DataMapping, entry: File) -> Table:

@@ -69,13 +69,16 @@ class Scale:
     of_quantity: Dimensions
 
     def reading(self, amount: Amount, key: str) -> float:
-        """An amount stated as readings or as quantity, in readings; UnitError if it is neither."""
+        """An amount stated as readings or as quantity, in readings; UnitError if it is neither.
+
+        key: which it is; a zero lies on the side that the gain has it, of ranges and accuracies only the size counts.
+        """
         if amount.plain:
             return amount.value
         if alike(amount.dimensions, self.of_reading):
             return amount.value / self.raw
         if alike(amount.dimensions, self.of_quantity):
-            return amount.value / abs(self.factor)
+            return amount.value / (self.factor if key == "zero" else abs(self.factor))
         raise UnitError(
             f"{key}: '{amount.source}' is neither of the readings ({unit_name(self.of_reading)}) nor of what they "
             f"measure ({self.unit})",

@@ -4,20 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from fractions import Fraction
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.measured.account import Account
-from trunnion.measured.amounts import dimensions
+from trunnion.measured.amounts import Dimensions, dimensions
 from trunnion.measured.mapping import DataMapping, File, FromData
 from trunnion.measured.tables import Table
 from trunnion.measured.timebase import Timeline
 from trunnion.model.quantity import Quantity
-from trunnion.model.units import UnitError
+from trunnion.model.units import Dimension, UnitError
 
-__all__ = ["Setting", "settings", "stated"]
+__all__ = ["Setting", "dimension_of", "settings", "stated"]
 
 MOST = 500  # values that a column may state; more, and it is a measurement
 DIGITS = 9  # by which two of its values are the same
@@ -27,12 +28,14 @@ DIGITS = 9  # by which two of its values are the same
 class Setting:
     """values: numbers of the model, SI, by name; means: channels whose mean is the value.
 
+    dimensions: of the values that were stated with a unit.
     window: rows from the first to the last for which it was set; rows: those of the window for which it was.
     """
 
     name: str
     values: Mapping[str, float]
     means: Mapping[str, str]
+    dimensions: Mapping[str, Dimension]
     window: slice
     rows: NDArray[np.bool_]
 
@@ -48,17 +51,23 @@ def settings(mapping: DataMapping, entry: File, table: Table, line: Timeline, ac
     texts: dict[str, str] = {}
     means: dict[str, str] = {}
     columns: dict[str, FromData] = {}
+    known_as: dict[str, Dimension] = {}
     for path, one in stated(mapping, entry).items():
         if isinstance(one, Quantity):
             values[path] = float(one.evaluate())
             texts[path] = str(one.source)
+            dimension = one.check({})
+            if dimension is not None and not (one.expression and one.expression.bare):
+                known_as[path] = dimension
         elif one.mean is not None:
             means[path] = one.mean
         else:
             columns[path] = one
     if not columns:
         everywhere = np.ones(line.seconds.size, dtype=np.bool_)
-        return [Setting(_name(texts), values, means, slice(0, everywhere.size), everywhere)]
+        return [Setting(_name(texts), values, means, known_as, slice(0, everywhere.size), everywhere)]
+    units = {path: one.unit or table.columns[str(one.column)].unit for path, one in columns.items()}
+    factors = {path: _factor(path, unit, known_as, account) for path, unit in units.items()}
     raw = np.column_stack([line.rows(table.columns[str(one.column)].values) for one in columns.values()])
     known = np.isfinite(raw).all(axis=1)
     if not known.any():
@@ -82,19 +91,33 @@ def settings(mapping: DataMapping, entry: File, table: Table, line: Timeline, ac
     for k in np.argsort(first, kind="stable"):
         window = slice(int(at[first[k]]), int(ends[k]) + 1)
         own, said = dict(values), dict(texts)
-        for (path, one), value in zip(columns.items(), unique[k], strict=True):
-            unit = one.unit or table.columns[str(one.column)].unit
-            own[path] = float(value) * _factor(path, unit, account)
+        for path, value in zip(columns, unique[k], strict=True):
+            unit = units[path]
+            own[path] = float(value) * factors[path]
             said[path] = f"{value:.6g} {unit}".strip()
-        found.append(Setting(_name(said), own, means, window, number[window] == k))
+        found.append(Setting(_name(said), own, means, known_as, window, number[window] == k))
     return found
 
 
-def _factor(path: str, unit: str, account: Account) -> float:
+def _factor(path: str, unit: str, known_as: dict[str, Dimension], account: Account) -> float:
+    """Factor to SI of the unit of a column, whose dimension is noted."""
+    if not unit:
+        return 1.0
     try:
-        return dimensions(unit)[0] if unit else 1.0
+        factor, exponents = dimensions(unit)
+        known_as[path] = dimension_of(exponents, unit)
     except UnitError as error:
         raise MechanismError(Finding(error.what, f"set.{path}", error.remedy, file=account.file)) from None
+    return factor
+
+
+def dimension_of(exponents: Dimensions, unit: str) -> Dimension:
+    """Exponents of a unit as a dimension of the model; UnitError for volts, degrees of temperature and the like."""
+    order = ("meter", "gram", "second", "radian")
+    if any(power for name, power in exponents.items() if name not in order):
+        raise UnitError(f"the unit '{unit}' is none that a number of a model has", "write one such as deg, mm or N m")
+    length, mass, time, angle = (Fraction(exponents.get(name, 0)) for name in order)
+    return length, mass, time, angle
 
 
 def _rounded(values: NDArray[np.float64]) -> NDArray[np.float64]:

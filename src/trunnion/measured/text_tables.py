@@ -29,6 +29,7 @@ WIDE = 40  # columns from which those that are not wanted are passed over, and t
 _UNIT = re.compile(r"^(.*?)\s*\[([^\[\]]*)\]\s*$", re.DOTALL)
 _COMMA = re.compile(r"[-+]?\d*,\d+(?:[eE][-+]?\d+)?")
 _QUOTED = re.compile(r'"[^"]*"')
+_POINT = re.compile(r"[-+]?\d*\.\d+(?:[eE][-+]?\d+)?")
 _NO_UNIT = ("", "-", "–", "1")
 
 
@@ -54,7 +55,10 @@ def read_csv(path: Path, wanted: Sequence[str], optional: Sequence[str]) -> Tabl
     texts, examples = dict.fromkeys(places, 0), dict.fromkeys(places, "")
     for frame in _frames(path, layout, sorted(set(places.values()))):
         for name, place in places.items():
-            values, found, example = numbers(frame[place].to_numpy(), layout.decimal)
+            cells = frame[place].to_numpy()
+            if layout.decimal == ",":
+                _check_signs(path, name, cells)
+            values, found, example = numbers(cells, layout.decimal)
             pieces[name].append(values)
             texts[name] += found
             examples[name] = examples[name] or example
@@ -64,6 +68,16 @@ def read_csv(path: Path, wanted: Sequence[str], optional: Sequence[str]) -> Tabl
         columns[name] = Column(values, units[name], texts[name], examples[name])
     notes = [] if layout.encoding.startswith("utf-8") else [f"{path.name}: read as {layout.encoding}"]
     return Table(str(path), columns, notes=notes)
+
+
+def _check_signs(path: Path, name: str, cells: Any) -> None:
+    """MechanismError for a decimal point in a file that has decimal commas: one of them parts thousands."""
+    if cells.dtype.kind in "fiub":
+        return
+    found = next((one for one in cells.tolist() if isinstance(one, str) and _POINT.fullmatch(one.strip())), None)
+    if found is not None:
+        what = f"decimal and thousands signs are mixed: '{found.strip()[:20]}' in '{name}' beside decimal commas"
+        raise failed(path, what, "export it without a sign between thousands, and with one sign for decimals")
 
 
 def _frames(path: Path, layout: _Layout, places: list[int]) -> Any:
@@ -136,7 +150,8 @@ def _layout(path: Path, wanted: set[str]) -> _Layout:
     if rows and (row := _unit_row(_cells(rows[0][1], separator))):
         units = [own or (row[k] if k < len(row) else "") for k, own in enumerate(units)]
         rows, skip = rows[1:], header + 1
-    sample = [cell for _, line in rows[:200] for cell in _cells(line, separator)]
+    read = [k for k, (name, _) in enumerate(named) if name in wanted]
+    sample = [cell for _, line in rows[:200] for k, cell in enumerate(_cells(line, separator)) if k in read]
     comma = separator != "," and any(_COMMA.fullmatch(cell) for cell in sample)
     width = len(cells)
     for place, line in rows[:200]:

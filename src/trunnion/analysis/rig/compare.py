@@ -18,6 +18,7 @@ from trunnion.analysis.rig.compared import dataset
 from trunnion.analysis.rig.judge import Verdict, expanded, judge
 from trunnion.analysis.rig.modelled import Modelled, modelled
 from trunnion.analysis.rig.pairs import Compared, Efficient, Pair
+from trunnion.analysis.rig.settings import check_settings
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.measured.efficiency import Pairs, efficiency_of, load_joints, pairs_of
 from trunnion.measured.measurement import Condition, Measurement
@@ -53,6 +54,7 @@ def compare(
     if not (np.isfinite(coverage) and 0 < coverage <= 8):
         raise MechanismError(Finding(f"{coverage:g} is no coverage factor", "coverage", "give such as 2, up to 8"))
     wanted = _channels(measurement, channels)
+    check_settings(mechanism, measurement)
     method, joints = friction or FrictionMethod(), load_joints(mechanism)
     found: list[Compared] = []
     for done, condition in enumerate(measurement.conditions, 1):

@@ -21,6 +21,7 @@ from trunnion.analysis.rig.identify.seated import SeatedModel
 from trunnion.analysis.rig.identify.separate import Group, inseparable
 from trunnion.analysis.rig.identify.uncertainty import Spread, left_over, spread_of
 from trunnion.analysis.rig.identify.unknowns import Parameters, described, unknowns
+from trunnion.analysis.rig.settings import check_settings
 from trunnion.errors import Finding, MechanismError
 from trunnion.measured.efficiency import load_joints
 from trunnion.measured.measurement import Measurement
@@ -102,6 +103,7 @@ def identified(
 ) -> Identified:
     """What `identify` makes its Dataset of."""
     _check(sensors, delay, guard, starts)
+    check_settings(mechanism, measurement)
     paths = described(mechanism, parameters)
     stated = _stated(mechanism, measurement, paths, start or {})
     settings = _settings(stated, measurement, paths)

@@ -1,6 +1,8 @@
 """Efficiency as a test rig finds it, η = P_out/P_in = T_out ω_out/(T_in ω_in) [P 22], with its uncertainty.
 
-Powers are means over whole turns of the product of torque and speed at each position. The uncertainty follows the Guide
+Powers are means over the time of whole turns of the product of torque and speed at each position. Positions are equal
+steps of the crank angle: each counts by the time that the driver dwells there, 1/ω of its mean course, for the mean over
+equal angles would be off by the first order of a speed that varies within the turn. The uncertainty follows the Guide
 to the expression of uncertainty in measurement (JCGM 100:2008): type A from the ratios of the single turns (4.2), type
 B from gain, zero and resolution of every channel, each with its sensitivity ∂η/∂x (5.1). A channel that stands on both
 sides, such as one speed sensor for both, has its errors in both. Gain, zero and resolution of different channels are
@@ -53,7 +55,7 @@ class Contribution:
 class Efficiency:
     """An efficiency measured in one condition.
 
-    value: mean power out over mean power in, of all whole turns; uncertainty: standard; power_in, power_out: W;
+    value: mean power out over mean power in, over the time of all whole turns; uncertainty: standard; power_in, power_out: W;
     per_turn: ratios of the single turns; left_out: turns that have a gap in a channel that is needed.
     """
 
@@ -138,7 +140,8 @@ def efficiency_of(
         what = f"the channels do not tell the power in and out; there are {there}"
         remedy = "measure effort: and rate: of the driver, load: of a load on a joint and rate: of that joint"
         raise MechanismError(Finding(what, condition.name, remedy))
-    powers_in, powers_out = _powers(pairs.driven), _powers(pairs.loaded)
+    clock = _clock(pairs, condition)
+    powers_in, powers_out = _powers(pairs.driven, clock.dwell), _powers(pairs.loaded, clock.dwell)
     whole = np.isfinite(powers_in) & np.isfinite(powers_out)
     left_out = int(np.count_nonzero(~whole))
     powers_in, powers_out = powers_in[whole], powers_out[whole]
@@ -149,7 +152,7 @@ def efficiency_of(
     value = power_out / power_in if power_in else float("nan")
     with np.errstate(all="ignore"):
         per_turn = powers_out / powers_in
-    weights = _weights(pairs, value, power_in, whole)
+    weights = _weights(pairs, value, power_in, whole, clock)
     if noise is None:
         several = len(per_turn) > 1
         scatter = float(np.std(per_turn, ddof=1)) / len(per_turn) ** 0.5 if several else float("nan")
@@ -164,23 +167,55 @@ def efficiency_of(
     return Efficiency(value, uncertainty, power_in, power_out, per_turn, contributions, left_out)
 
 
-def _powers(pairs: Sequence[tuple[Course, Course]]) -> Array:
-    """Mean power of each turn, W, (turn,); NaN of a turn with a gap."""
-    total: Array = np.sum([np.mean(force.turns * speed.turns, axis=1) for force, speed in pairs], axis=0)
+@dataclass(frozen=True, eq=False)
+class _Clock:
+    """Time that the driver spends at each position, (position,), 1 in the mean, and the course it was taken from, with
+    its mean; none where positions are equal steps of time."""
+
+    dwell: Array
+    course: Course | None = None
+    speed: Array | None = None
+
+
+def _clock(pairs: Pairs, condition: Condition) -> _Clock:
+    """The dwell by the driver whose mean speed is that of the angle; equal if it does not turn one way throughout.
+
+    By the mean course, not that of each turn: 1/ω of a noisy ω is too large by its variance.
+    """
+    size = len(condition.phase)
+    if not np.isfinite(condition.speed):  # the cycle is a time
+        return _Clock(np.ones(size))
+    speeds = [(abs(abs(float(np.mean(speed.mean))) - abs(condition.speed)), speed) for _, speed in pairs.driven]
+    driver = min(speeds, key=lambda one: one[0])[1]
+    mean = driver.mean
+    if not np.isfinite(mean).all() or np.min(mean) * np.max(mean) <= 0:
+        return _Clock(np.ones(size))
+    dwell = 1 / np.abs(mean)
+    return _Clock(dwell / np.mean(dwell), driver, mean)
+
+
+def _powers(pairs: Sequence[tuple[Course, Course]], dwell: Array) -> Array:
+    """Mean power of each turn over its time, W, (turn,); NaN of a turn with a gap."""
+    total: Array = np.sum([np.mean(dwell * force.turns * speed.turns, axis=1) for force, speed in pairs], axis=0)
     return total
 
 
-def _weights(pairs: Pairs, value: float, power_in: float, whole: NDArray[np.bool_]) -> dict[str, tuple[Course, Array]]:
+def _weights(
+    pairs: Pairs, value: float, power_in: float, whole: NDArray[np.bool_], clock: _Clock
+) -> dict[str, tuple[Course, Array]]:
     """∂η/∂x of the readings of each channel, at every position of all whole turns; its mean is that of a zero.
 
-    η = P_out/P_in: dη = (dP_out − η dP_in)/P_in, and a power changes with a torque by ω, with a speed by T. A channel
-    in several powers has the sum.
+    η = P_out/P_in: dη = (dP_out − η dP_in)/P_in, and a power changes with a torque by ω, with a speed by T, each by the
+    dwell there; the dwell itself with 1/ω of its channel. A channel in several powers has the sum.
     """
     found: dict[str, tuple[Course, Array]] = {}
     for side, factor in ((pairs.driven, -value), (pairs.loaded, 1.0)):
-        for pair in side:
-            for own, other in (pair, pair[::-1]):
-                weight = factor / power_in * other.turns[whole]
+        for force, speed in side:
+            by = factor / power_in * clock.dwell
+            parts = [(force, by * speed.turns[whole]), (speed, by * force.turns[whole])]
+            if clock.course is not None:
+                parts.append((clock.course, -by * force.turns[whole] * speed.turns[whole] / clock.speed))
+            for own, weight in parts:
                 before = found.get(own.channel)
                 found[own.channel] = (own, weight if before is None else before[1] + weight)
     return {name: (Course(name, one.measures, one.unit, one.turns[whole], one.accuracy), weight)

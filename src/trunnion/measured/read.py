@@ -22,7 +22,7 @@ from trunnion.measured.measurement import Accuracy, Condition, Course, Measureme
 from trunnion.measured.settings import Setting, settings, stated
 from trunnion.measured.tables import Table, read_table
 from trunnion.measured.timebase import Timeline, timeline
-from trunnion.measured.turns import DENSE, Turns, cut, resampled
+from trunnion.measured.turns import DENSE, Turns, cut, resampled, time_mean
 
 __all__ = ["read_measured"]
 
@@ -304,7 +304,7 @@ class _File:
             courses[name] = Course(name, channel.measures, own.scale.unit, part.courses[name], accuracy)
         values = dict(part.setting.values)
         for path, channel_name in part.setting.means.items():
-            values[path] = float(np.nanmean(courses[channel_name].turns))
+            values[path] = time_mean(part.turns, courses[channel_name].turns)
         positions = self.mapping.positions
         speed = np.nan if self.mapping.timed else way * self._rate([part.turns])
         name = self._named(part.setting)

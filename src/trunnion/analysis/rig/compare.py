@@ -131,6 +131,7 @@ def _of_model(condition: Condition, model: Modelled, joints: Mapping[str, str]) 
         for name, course in model.courses.items()
     }
     try:
-        return efficiency_of(replace(condition, courses=courses), joints).value
+        # its positions are equal steps of time, whatever those of the measurement are
+        return efficiency_of(replace(condition, courses=courses, speed=np.nan), joints).value
     except MechanismError:
         return float("nan")

@@ -236,7 +236,15 @@ def test_one_turn_is_no_uncertainty():
     assert np.isfinite(result.rms.values).all()
     assert np.isnan(result.within.values).all()
     assert result.efficiency_within.values.tolist() == [-1]
-    assert said(result, "one turn only", "warning")
+    assert said(result, "channels.torque", "one turn only", "warning")
+    assert said(result, "efficiency", "is not known in run 1: there is one turn only", "more turns")
+
+
+def test_a_dead_sensor_leaves_the_efficiency_unknown_and_says_why():
+    result = compare(measured(channels=POWERS, wrong=wrong_in("torque", np.zeros_like), noise=0.0))
+    assert result.efficiency_within.values.tolist() == [-1]
+    assert said(result, "efficiency", "is not known in run 1: no power goes in", "may be dead", "warning")
+    assert said(result, "channels.torque", "not within")
 
 
 def test_two_turns_are_judged():

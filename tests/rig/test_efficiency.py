@@ -110,9 +110,15 @@ def test_one_speed_sensor_for_both_sides_cancels() -> None:
 
 
 def test_gaps_and_single_turns() -> None:
-    """A turn with a gap is left out; of a single one the scatter is not known."""
+    """A turn that lacks much is left out, one that lacks little has it of the others; one turn has no scatter."""
     turns = exact(4)
-    turns["T1"][1, 5] = np.nan
+    turns["T1"][1, 5] = turns["n2"][2, 7] = np.nan  # where power in and out are not those of the mean
+    found = efficiency_of(condition(turns))
+    assert (found.turns, found.left_out) == (4, 0)
+    assert found.value == pytest.approx(ETA, rel=1e-12)
+    assert found.per_turn == pytest.approx([ETA] * 4, rel=1e-12)
+    assert np.isfinite(found.uncertainty)
+    turns["T1"][1, 5:9] = np.nan
     found = efficiency_of(condition(turns))
     assert (found.turns, found.left_out) == (3, 1)
     assert found.value == pytest.approx(ETA)
@@ -122,6 +128,13 @@ def test_gaps_and_single_turns() -> None:
     turns["n2"][:] = np.nan
     with pytest.raises(MechanismError, match="no turn is whole"):
         efficiency_of(condition(turns))
+    with pytest.raises(MechanismError, match="no turn is whole"):
+        efficiency_of(condition({**exact(), "T1": np.where(np.arange(POSITIONS) == 3, np.nan, exact()["T1"])}))
+
+
+def test_a_dead_sensor_is_told() -> None:
+    with pytest.raises(MechanismError, match="no power goes in: T1 or n1 reads 0 throughout"):
+        efficiency_of(condition({**exact(), "T1": np.zeros((3, POSITIONS))}))
 
 
 def test_resolution_counts_where_noise_does_not_carry_over_the_steps() -> None:

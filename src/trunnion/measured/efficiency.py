@@ -1,8 +1,8 @@
 """Efficiency as a test rig finds it, η = P_out/P_in = T_out ω_out/(T_in ω_in) [P 22], with its uncertainty.
 
 Powers are means over the time of whole turns of the product of torque and speed at each position. Positions are equal
-steps of the crank angle: each counts by the time that the driver dwells there, 1/ω of its mean course, for the mean over
-equal angles would be off by the first order of a speed that varies within the turn. The uncertainty follows the Guide
+steps of the crank angle: each counts by the time that the driver dwells there, 1/ω of its mean course, for a mean over
+equal angles is off by the first order of a speed that varies within the turn. The uncertainty follows the Guide
 to the expression of uncertainty in measurement (JCGM 100:2008): type A from the ratios of the single turns (4.2), type
 B from gain, zero and resolution of every channel, each with its sensitivity ∂η/∂x (5.1). A channel that stands on both
 sides, such as one speed sensor for both, has its errors in both. Gain, zero and resolution of different channels are
@@ -28,6 +28,9 @@ __all__ = ["COVERAGE", "Contribution", "Efficiency", "Pairs", "efficiency_of", "
 
 COVERAGE = 2.0
 """Factor k of the expanded uncertainty U = k u: about 95 % of a normal distribution (GUM 6.3.3)."""
+
+LACKING = 0.1
+"""Share of its positions that a turn may lack and still count."""
 
 Array = NDArray[np.float64]
 Source = Literal["gain", "zero", "resolution", "repeatability"]
@@ -55,8 +58,8 @@ class Contribution:
 class Efficiency:
     """An efficiency measured in one condition.
 
-    value: mean power out over mean power in, over the time of all whole turns; uncertainty: standard; power_in, power_out: W;
-    per_turn: ratios of the single turns; left_out: turns that have a gap in a channel that is needed.
+    value: mean power out over mean power in, over the time of all whole turns; uncertainty: standard; power_in,
+    power_out: W; per_turn: ratios of the single turns; left_out: turns that lack more than LACKING of their positions.
     """
 
     value: float
@@ -132,7 +135,7 @@ def efficiency_of(
     joints: see `pairs_of`. With fewer than two whole turns the scatter is not known, and the uncertainty is NaN. noise:
     of each channel, the standard deviation of the mean of as many readings as there are positions and turns together;
     it then takes the place of the scatter between turns, for an experiment that is planned.
-    Raises MechanismError where the channels do not tell both powers, or no turn is whole.
+    Raises MechanismError where the channels do not tell both powers, no turn is whole, or no power goes in.
     """
     pairs = pairs_of(condition, joints)
     if pairs is None:
@@ -141,15 +144,18 @@ def efficiency_of(
         remedy = "measure effort: and rate: of the driver, load: of a load on a joint and rate: of that joint"
         raise MechanismError(Finding(what, condition.name, remedy))
     clock = _clock(pairs, condition)
-    powers_in, powers_out = _powers(pairs.driven, clock.dwell), _powers(pairs.loaded, clock.dwell)
-    whole = np.isfinite(powers_in) & np.isfinite(powers_out)
+    powers_in, powers_out, whole = _filled(_powers(pairs.driven, clock.dwell), _powers(pairs.loaded, clock.dwell))
     left_out = int(np.count_nonzero(~whole))
-    powers_in, powers_out = powers_in[whole], powers_out[whole]
-    if not len(powers_in):
+    if not np.any(whole):
         what = f"no turn is whole in all channels of {len(whole)}"
         raise MechanismError(Finding(what, condition.name, "look at the gaps that `trunnion data` reports"))
     power_in, power_out = float(np.mean(powers_in)), float(np.mean(powers_out))
-    value = power_out / power_in if power_in else float("nan")
+    if not power_in:
+        what = (
+            f"no power goes in: {' or '.join(one.channel for pair in pairs.driven for one in pair)} reads 0 throughout"
+        )
+        raise MechanismError(Finding(what, condition.name, "look at these channels: a sensor may be dead"))
+    value = power_out / power_in
     with np.errstate(all="ignore"):
         per_turn = powers_out / powers_in
     weights = _weights(pairs, value, power_in, whole, clock)
@@ -159,7 +165,7 @@ def efficiency_of(
         repeated = [Contribution("", "repeatability", scatter, 1.0)]
     else:
         repeated = [
-            Contribution(name, "repeatability", noise.get(name, 0.0), float(np.sqrt(np.mean(weight**2))))
+            Contribution(name, "repeatability", noise.get(name, 0.0), float(np.sqrt(np.nanmean(weight**2))))
             for name, (_, weight) in weights.items()
         ]
     contributions = (*(one for one in repeated if one.input != 0), *_type_b(weights))
@@ -195,9 +201,26 @@ def _clock(pairs: Pairs, condition: Condition) -> _Clock:
 
 
 def _powers(pairs: Sequence[tuple[Course, Course]], dwell: Array) -> Array:
-    """Mean power of each turn over its time, W, (turn,); NaN of a turn with a gap."""
-    total: Array = np.sum([np.mean(dwell * force.turns * speed.turns, axis=1) for force, speed in pairs], axis=0)
+    """Power times dwell at each position, W, (turn, position); NaN where one of the channels has a gap."""
+    total: Array = np.sum([dwell * force.turns * speed.turns for force, speed in pairs], axis=0)
     return total
+
+
+def _filled(powers_in: Array, powers_out: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Mean powers of each whole turn, W, and which turns are.
+
+    A position that few of a turn lack is given both powers of the other turns there, in the mean: to leave it out would
+    put the turn's mean off by what a course has of its own there. A turn that lacks more is left out.
+    """
+    there = np.isfinite(powers_in) & np.isfinite(powers_out)
+    whole = np.mean(~there, axis=1) <= LACKING
+    whole &= np.any(there[whole], axis=0).all()  # else nothing is known of a position
+    found = []
+    for powers in (powers_in[whole], powers_out[whole]):
+        known = there[whole]
+        usual = np.sum(powers, axis=0, where=known) / np.maximum(np.sum(known, axis=0), 1)
+        found.append(np.mean(np.where(known, powers, usual), axis=1))
+    return found[0], found[1], whole
 
 
 def _weights(
@@ -226,9 +249,9 @@ def _type_b(weights: Mapping[str, tuple[Course, Array]]) -> list[Contribution]:
     """Contributions of gain, zero and resolution, channel by channel: x → (1 + gain) x + zero."""
     found = []
     for name, (course, weight) in weights.items():
-        by_zero = float(np.mean(weight))
+        by_zero = float(np.nanmean(weight))
         found += [
-            Contribution(name, "gain", course.accuracy.gain, float(np.mean(weight * course.turns))),
+            Contribution(name, "gain", course.accuracy.gain, float(np.nanmean(weight * course.turns))),
             Contribution(name, "zero", course.accuracy.zero, by_zero),
             Contribution(name, "resolution", course.unresolved, by_zero),
         ]

@@ -113,8 +113,12 @@ def _efficiency(condition: Condition, model: Modelled, joints: Mapping[str, str]
     """Efficiency as a rig computes it: of the measured courses, and of the model's in their place."""
     try:
         measured = efficiency_of(condition, joints)
-    except MechanismError:  # no turn is whole
-        return Efficient(model=_of_model(condition, model, joints))
+    except MechanismError as error:  # no turn is whole, or no power goes in
+        first = error.findings[0]
+        return Efficient(model=_of_model(condition, model, joints), reason=(first.what, first.remedy))
+    if measured.turns < 2:
+        once = "there is one turn only: without scatter its uncertainty is not known", "measure more turns"
+        return Efficient(measured.value, model=_of_model(condition, model, joints), reason=once)
     scatter = sum(one.effect**2 for one in measured.contributions if one.source == "repeatability")
     standard = np.array([measured.uncertainty])
     share = np.array([scatter]) / np.where(standard > 0, standard, np.nan) ** 2

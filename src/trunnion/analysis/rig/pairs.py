@@ -34,11 +34,15 @@ class Pair:
 
 @dataclass(frozen=True)
 class Efficient:
-    """Efficiency of a condition by the channels: measured, its expanded uncertainty, and of the model."""
+    """Efficiency of a condition by the channels: measured, its expanded uncertainty, and of the model.
+
+    reason: why one of them is not known, with what to do about it; both empty if they are.
+    """
 
     measured: float = np.nan
     expanded: float = np.nan
     model: float = np.nan
+    reason: tuple[str, str] = ("", "")
 
     @property
     def within(self) -> bool:

@@ -288,6 +288,9 @@ def _efficiencies(found: Sequence[Compared]) -> Iterator[Finding]:
             f"measured {of.measured:.4f} ± {of.expanded:.2g}, model {of.model:.4f}"
         )
         yield Finding(what, "efficiency", "look at the channels; `trunnion identify` fits friction to them")
+    for reason in dict.fromkeys(of.reason for _, of in known if of.reason[0]):
+        where = _in([one.condition.name for one, of in known if of.reason == reason], len(known))
+        yield Finding(f"is not known {where}: {reason[0]}", "efficiency", reason[1], Severity.WARNING)
 
 
 def _speeds(found: Sequence[Compared]) -> Iterator[Finding]:

@@ -240,6 +240,18 @@ def test_one_turn_is_no_uncertainty():
     assert said(result, "efficiency", "is not known in run 1: there is one turn only", "more turns")
 
 
+def test_a_part_of_the_power_is_no_efficiency():
+    """A second useful load that no channel measures is in the model's efficiency, not in the rig's."""
+    mechanism = rocker()
+    data = mechanism.model_dump(exclude_unset=True)
+    data["loads"] = {**data["loads"], "second": {"joint": "D", "resisting_torque": 2.0, "useful": True}}
+    two = trunnion.Mechanism(**data)
+    result = compare(measured(two, channels=POWERS), two)
+    assert "efficiency" not in result
+    assert said(result, "is not compared in run 1: the power of loads.second is not measured", "warning")
+    assert result.attrs["all_within"] == 1
+
+
 def test_a_dead_sensor_leaves_the_efficiency_unknown_and_says_why():
     result = compare(measured(channels=POWERS, wrong=wrong_in("torque", np.zeros_like), noise=0.0))
     assert result.efficiency_within.values.tolist() == [-1]

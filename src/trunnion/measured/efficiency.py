@@ -175,12 +175,11 @@ def efficiency_of(
 
 @dataclass(frozen=True, eq=False)
 class _Clock:
-    """Time that the driver spends at each position, (position,), 1 in the mean, and the course it was taken from, with
-    its mean; none where positions are equal steps of time."""
+    """Time that the driver spends at each position, (position,), 1 in the mean, and the courses it was taken from: one,
+    or none where positions are equal steps of time."""
 
     dwell: Array
-    course: Course | None = None
-    speed: Array | None = None
+    courses: tuple[Course, ...] = ()
 
 
 def _clock(pairs: Pairs, condition: Condition) -> _Clock:
@@ -197,7 +196,7 @@ def _clock(pairs: Pairs, condition: Condition) -> _Clock:
     if not np.isfinite(mean).all() or np.min(mean) * np.max(mean) <= 0:
         return _Clock(np.ones(size))
     dwell = 1 / np.abs(mean)
-    return _Clock(dwell / np.mean(dwell), driver, mean)
+    return _Clock(dwell / np.mean(dwell), (driver,))
 
 
 def _powers(pairs: Sequence[tuple[Course, Course]], dwell: Array) -> Array:
@@ -236,8 +235,8 @@ def _weights(
         for force, speed in side:
             by = factor / power_in * clock.dwell
             parts = [(force, by * speed.turns[whole]), (speed, by * force.turns[whole])]
-            if clock.course is not None:
-                parts.append((clock.course, -by * force.turns[whole] * speed.turns[whole] / clock.speed))
+            power = force.turns[whole] * speed.turns[whole]
+            parts += [(one, -by * power / one.mean) for one in clock.courses]
             for own, weight in parts:
                 before = found.get(own.channel)
                 found[own.channel] = (own, weight if before is None else before[1] + weight)

@@ -17,7 +17,7 @@ from trunnion.analysis.rig.causes import best, causes
 from trunnion.analysis.rig.compared import dataset
 from trunnion.analysis.rig.judge import Verdict, expanded, judge
 from trunnion.analysis.rig.modelled import Modelled, modelled
-from trunnion.analysis.rig.pairs import Compared, Efficient, Pair
+from trunnion.analysis.rig.pairs import Compared, Efficient, Pair, unmeasured
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.measured.efficiency import Pairs, efficiency_of, load_joints, pairs_of
 from trunnion.measured.measurement import Condition, Measurement
@@ -61,8 +61,10 @@ def compare(
         also = _of_powers(powers) if powers else {}
         model = modelled(mechanism, condition, there, method, also)
         pairs = {name: _pair(condition, model, name, coverage) for name in there}
-        efficiency = _efficiency(condition, model, joints, coverage) if also.keys() <= model.courses.keys() else None
-        found.append(Compared(condition, model, pairs, efficiency if powers else None))
+        missing = unmeasured(mechanism, condition) if powers else ()
+        whole = powers is not None and not missing and also.keys() <= model.courses.keys()
+        efficiency = _efficiency(condition, model, joints, coverage) if whole else None
+        found.append(Compared(condition, model, pairs, efficiency, missing))
         if progress:
             progress(done)
     return dataset(mechanism, measurement, wanted, found, coverage, method)

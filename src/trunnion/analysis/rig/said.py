@@ -288,6 +288,11 @@ def _efficiencies(found: Sequence[Compared]) -> Iterator[Finding]:
             f"measured {of.measured:.4f} ± {of.expanded:.2g}, model {of.model:.4f}"
         )
         yield Finding(what, "efficiency", "look at the channels; `trunnion identify` fits friction to them")
+    for missing in dict.fromkeys(one.unmeasured for one in found if one.unmeasured):
+        where = _in([one.condition.name for one in found if one.unmeasured == missing], len(found))
+        what = f"is not compared {where}: the power of {', '.join(missing)} is not measured"
+        remedy = "measure effort: of every driver and load: of every useful load, each with its rate:"
+        yield Finding(what, "efficiency", remedy, Severity.WARNING)
     for reason in dict.fromkeys(of.reason for _, of in known if of.reason[0]):
         where = _in([one.condition.name for one, of in known if of.reason == reason], len(known))
         yield Finding(f"is not known {where}: {reason[0]}", "efficiency", reason[1], Severity.WARNING)

@@ -12,6 +12,7 @@ import pytest
 import trunnion
 from rig_measurements import course, exact, measured, rocker
 from trunnion import MechanismError, Status
+from trunnion.analysis.rig.causes import best, causes
 from trunnion.analysis.rig.compared import VARIABLES
 from trunnion.analysis.rig.judge import Verdict, expanded, independent, judge, uncertainty_of
 from trunnion.analysis.rig.said import gathered
@@ -134,6 +135,43 @@ def test_an_offset_is_named_with_its_size():
 def test_a_gain_is_named_with_its_size():
     result = compare(measured(wrong=wrong_in("torque", lambda true: 1.08 * true)))
     assert said(result, "a gain that is off by +8 %", "explains 100 %")
+
+
+@pytest.mark.parametrize(
+    ("gain", "words"), [(1.05, "off by +5 %"), (10.0, "10 times what"), (1e-3, "0.001 times what")]
+)
+def test_a_gain_is_told_from_an_offset_by_what_is_left(gain, words):
+    """A course that varies by a tenth of its mean: an offset explains 99 % of a wrong gain's residual too."""
+
+    phase = np.arange(36) / 36
+    true = 7 + 0.7 * np.sin(4 * np.pi * phase)
+    found = causes(gain * true + 1e-4 * np.random.default_rng(3).normal(size=36), true, phase, closed=True)
+    zero = next(one for one in found if one.kind == "zero")
+    assert zero.explains > 0.98
+    cause, others = best(found)
+    assert (cause.kind, [one.kind for one in others]) == ("gain", [])
+    result = compare(measured(wrong=wrong_in("out", lambda course: gain * course), noise=1e-6))
+    assert said(result, "channels.out", f"a gain that is {words}")
+
+
+def test_a_flat_reading_is_said_to_be_flat():
+    result = compare(measured(wrong=wrong_in("torque", lambda true: np.full_like(true, 12.0))))
+    assert said(result, "channels.torque", "a reading that stays at +12 N m", "sensor and its cable")
+
+
+def test_a_crank_angle_that_runs_backwards_is_named():
+    result = compare(measured(positions=72, wrong=lambda channel, true: np.roll(true[::-1], 1), noise=0.005))
+    assert said(result, "channels.torque", "a crank angle that runs the other way", "angle: {sign: -1}")
+
+
+def test_a_driver_that_swings_has_no_speed_to_set():
+    mechanism = rocker()
+    data = mechanism.model_dump(exclude_unset=True)
+    data["drivers"] = {"A": {"law": "harmonic", "amplitude": 0.4, "mean": 1.0, "period": 2.0}}
+    swings = trunnion.Mechanism(**data)
+    result = compare(measured(swings, channels=("speed",), wrong=lambda _, true: true + 0.2), swings)
+    assert said(result, "channels.speed", "apart from a constant offset of +0.")
+    assert not said(result, "another speed of the driver")
 
 
 def test_offset_and_gain_together_are_named():

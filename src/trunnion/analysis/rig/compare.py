@@ -15,7 +15,7 @@ import numpy as np
 from trunnion.analysis.friction import FrictionMethod
 from trunnion.analysis.rig.causes import best, causes
 from trunnion.analysis.rig.compared import dataset
-from trunnion.analysis.rig.judge import Verdict, expanded, judge
+from trunnion.analysis.rig.judge import Verdict, expanded, judge, uncertainty_of
 from trunnion.analysis.rig.modelled import Modelled, modelled
 from trunnion.analysis.rig.pairs import Compared, Efficient, Pair, unmeasured
 from trunnion.errors import Finding, MechanismError, Status
@@ -107,7 +107,9 @@ def _pair(condition: Condition, model: Modelled, channel: str, coverage: float) 
         course.mean[where], theirs[where], np.asarray(condition.phase)[where],
         closed=model.run.cycle.periodic, turning=model.measures[channel].turning(model.run.system),
     )  # fmt: skip
-    cause, others = best(found)
+    random = uncertainty_of(course).random[where]
+    noise = float(np.nanmean(random**2)) / judged.rms**2 if np.isfinite(random).any() and judged.rms > 0 else 0.0
+    cause, others = best(found, noise)
     return replace(pair, cause=cause, others=tuple(others))
 
 

@@ -297,6 +297,28 @@ def test_a_dead_sensor_leaves_the_efficiency_unknown_and_says_why():
     assert said(result, "channels.torque", "not within")
 
 
+def test_turns_that_faults_left_are_told_from_those_measured():
+    """Three turns were measured, and each position has a value in one."""
+    whole = measured(turns=3)
+    condition = whole.conditions[0]
+    turns = condition.courses["torque"].turns.copy()
+    turns[1:] = np.nan
+    result = compare(replace(whole, conditions=(replace(condition, courses={"torque": course("torque", turns)}),)))
+    assert said(result, "no more than one turn at a position, of up to 3 that were measured", "look at the gaps")
+
+
+def test_a_timed_cycle_is_the_models():
+    """A turn at 4 rad/s lasts π/2 s."""
+    whole = measured()
+
+    def lasting(seconds):
+        return compare(replace(whole, conditions=tuple(replace(one, duration=seconds) for one in whole.conditions)))
+
+    assert codes(lasting(np.pi / 2 * 1.001)) == {Verdict.WITHIN}
+    with pytest.raises(MechanismError, match=r"the cycle of the data is 1\.7 s, that of the model 1\.5708 s"):
+        lasting(1.7)
+
+
 def test_two_turns_are_judged():
     assert codes(compare(measured(turns=2))) == {Verdict.WITHIN}
 

@@ -100,6 +100,7 @@ class Condition:
     phase: (position,), share of the cycle from the start of the model's, in [0, 1); files: where it comes from;
     speed: of the driver, mean over the turns, rad/s, below zero where its coordinate falls; NaN if the cycle is a time.
     start, cycle: coordinate of the driver at phase 0, and how far it goes in a cycle, rad; NaN where that is not known.
+    duration: of a cycle that is a time, s; NaN of one that is an angle.
     """
 
     name: str
@@ -110,6 +111,7 @@ class Condition:
     speed: float = float("nan")
     start: float = float("nan")
     cycle: float = float("nan")
+    duration: float = float("nan")
 
 
 @dataclass(frozen=True)

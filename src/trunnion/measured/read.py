@@ -311,7 +311,8 @@ class _File:
         timed = self.mapping.timed
         start, cycle = (np.nan if timed else float(one.evaluate()) for one in (self.mapping.start, self.mapping.cycle))
         phase = np.arange(positions) / positions
-        return Condition(name, values, phase, courses, (str(self.path),), speed, start, cycle)
+        duration = float(self.mapping.cycle.evaluate()) if timed else np.nan
+        return Condition(name, values, phase, courses, (str(self.path),), speed, start, cycle, duration)
 
 
 def _table(path: Path, mapping: DataMapping, entry: File) -> Table:

@@ -131,11 +131,15 @@ def _of_channel(name: str, measures: str, found: Sequence[Compared]) -> Iterator
                 )
     for kind, members in by_cause.items():
         yield _explained(name, measures, kind, members, len(cases))
+    unknown = [len(pair.course.turns) for _, pair in cases if pair.judged.verdict is Verdict.UNKNOWN]
+    once = "was measured in one turn only"
+    if max(unknown, default=1) > 1:
+        once = f"has values of no more than one turn at a position, of up to {max(unknown)} that were measured"
     for verdict, what, remedy in (
         (
             Verdict.UNKNOWN,
-            "was measured in one turn only: without scatter its uncertainty is not known",
-            "measure more turns",
+            f"{once}: without scatter its uncertainty is not known",
+            "look at the gaps that `trunnion data` reports" if max(unknown, default=1) > 1 else "measure more turns",
         ),
         (Verdict.NOTHING, "has nothing to compare: nothing measured, or no answer of the model", ""),
     ):

@@ -178,6 +178,24 @@ def test_conditions_of_a_column(clean: Columns, tmp_path: Path) -> None:
         read({**columns, "beta": clean["angle"]}, tmp_path, {"set": settings})
 
 
+def test_a_mean_of_a_channel_is_over_time(tmp_path: Path) -> None:
+    """Of a speed that varies within the turn the mean over equal angles is too high, by half its share squared."""
+    angle = np.linspace(0, 40 * np.pi, 400_001)
+    speed = OMEGA * (1 + 0.3 * np.sin(2 * angle))
+    at = np.concatenate([[0.0], np.cumsum(np.diff(angle) * 2 / (speed[1:] + speed[:-1]))])
+    t = np.arange(0, at[-1], 1 / 5000)
+    there = np.interp(t, at, angle)
+    columns = {"t": t, "angle": np.degrees(there), "n": OMEGA * (1 + 0.3 * np.sin(2 * there))}
+    changes = {
+        "angle": {"from": "column", "column": "angle", "unit": "deg"},
+        "channels": {"speed-in": {"column": "n", "measures": "rate:input", "unit": "rad/s"}},
+        "set": {"input.speed": {"mean": "speed-in"}},
+    }
+    (one,) = read(columns, tmp_path, changes).conditions
+    assert one.values["input.speed"] == pytest.approx(40 * np.pi / at[-1], rel=3e-4)
+    assert one.courses["speed-in"].turns.mean() == pytest.approx(OMEGA, rel=3e-4)
+
+
 def test_part_of_a_file(clean: Columns, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     changes = {"files": [{"file": "run.csv", "over": ["0.5 s", "1.05 s"]}]}
     whole = read(clean, tmp_path, changes)  # a file of that name elsewhere

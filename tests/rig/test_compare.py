@@ -12,6 +12,7 @@ import pytest
 import trunnion
 from rig_measurements import course, exact, measured, rocker
 from trunnion import MechanismError, Status
+from trunnion.analysis.rig.causes import best, causes
 from trunnion.analysis.rig.compared import VARIABLES
 from trunnion.analysis.rig.judge import Verdict, expanded, independent, judge, uncertainty_of
 from trunnion.analysis.rig.said import gathered
@@ -137,6 +138,43 @@ def test_a_gain_is_named_with_its_size():
     assert said(result, "a gain that is off by +8 %", "explains 100 %")
 
 
+@pytest.mark.parametrize(
+    ("gain", "words"), [(1.05, "off by +5 %"), (10.0, "10 times what"), (1e-3, "0.001 times what")]
+)
+def test_a_gain_is_told_from_an_offset_by_what_is_left(gain, words):
+    """A course that varies by a tenth of its mean: an offset explains 99 % of a wrong gain's residual too."""
+
+    phase = np.arange(36) / 36
+    true = 7 + 0.7 * np.sin(4 * np.pi * phase)
+    found = causes(gain * true + 1e-4 * np.random.default_rng(3).normal(size=36), true, phase, closed=True)
+    zero = next(one for one in found if one.kind == "zero")
+    assert zero.explains > 0.98
+    cause, others = best(found)
+    assert (cause.kind, [one.kind for one in others]) == ("gain", [])
+    result = compare(measured(wrong=wrong_in("out", lambda course: gain * course), noise=1e-6))
+    assert said(result, "channels.out", f"a gain that is {words}")
+
+
+def test_a_flat_reading_is_said_to_be_flat():
+    result = compare(measured(wrong=wrong_in("torque", lambda true: np.full_like(true, 12.0))))
+    assert said(result, "channels.torque", "a reading that stays at +12 N m", "sensor and its cable")
+
+
+def test_a_crank_angle_that_runs_backwards_is_named():
+    result = compare(measured(positions=72, wrong=lambda channel, true: np.roll(true[::-1], 1), noise=0.005))
+    assert said(result, "channels.torque", "a crank angle that runs the other way", "angle: {sign: -1}")
+
+
+def test_a_driver_that_swings_has_no_speed_to_set():
+    mechanism = rocker()
+    data = mechanism.model_dump(exclude_unset=True)
+    data["drivers"] = {"A": {"law": "harmonic", "amplitude": 0.4, "mean": 1.0, "period": 2.0}}
+    swings = trunnion.Mechanism(**data)
+    result = compare(measured(swings, channels=("speed",), wrong=lambda _, true: true + 0.2), swings)
+    assert said(result, "channels.speed", "apart from a constant offset of +0.")
+    assert not said(result, "another speed of the driver")
+
+
 def test_offset_and_gain_together_are_named():
     result = compare(measured(wrong=wrong_in("torque", lambda true: 1.2 * true + 4.0), noise=0.005))
     assert said(result, "an offset of +4 N m and a gain off by +20 %")
@@ -237,7 +275,49 @@ def test_one_turn_is_no_uncertainty():
     assert np.isfinite(result.rms.values).all()
     assert np.isnan(result.within.values).all()
     assert result.efficiency_within.values.tolist() == [-1]
-    assert said(result, "one turn only", "warning")
+    assert said(result, "channels.torque", "one turn only", "warning")
+    assert said(result, "efficiency", "is not known in run 1: there is one turn only", "more turns")
+
+
+def test_a_part_of_the_power_is_no_efficiency():
+    """A second useful load that no channel measures is in the model's efficiency, not in the rig's."""
+    mechanism = rocker()
+    data = mechanism.model_dump(exclude_unset=True)
+    data["loads"] = {**data["loads"], "second": {"joint": "D", "resisting_torque": 2.0, "useful": True}}
+    two = trunnion.Mechanism(**data)
+    result = compare(measured(two, channels=POWERS), two)
+    assert "efficiency" not in result
+    assert said(result, "is not compared in run 1: the power of loads.second is not measured", "warning")
+    assert result.attrs["all_within"] == 1
+
+
+def test_a_dead_sensor_leaves_the_efficiency_unknown_and_says_why():
+    result = compare(measured(channels=POWERS, wrong=wrong_in("torque", np.zeros_like), noise=0.0))
+    assert result.efficiency_within.values.tolist() == [-1]
+    assert said(result, "efficiency", "is not known in run 1: no power goes in", "may be dead", "warning")
+    assert said(result, "channels.torque", "not within")
+
+
+def test_turns_that_faults_left_are_told_from_those_measured():
+    """Three turns were measured, and each position has a value in one."""
+    whole = measured(turns=3)
+    condition = whole.conditions[0]
+    turns = condition.courses["torque"].turns.copy()
+    turns[1:] = np.nan
+    result = compare(replace(whole, conditions=(replace(condition, courses={"torque": course("torque", turns)}),)))
+    assert said(result, "no more than one turn at a position, of up to 3 that were measured", "look at the gaps")
+
+
+def test_a_timed_cycle_is_the_models():
+    """A turn at 4 rad/s lasts π/2 s."""
+    whole = measured()
+
+    def lasting(seconds):
+        return compare(replace(whole, conditions=tuple(replace(one, duration=seconds) for one in whole.conditions)))
+
+    assert codes(lasting(np.pi / 2 * 1.001)) == {Verdict.WITHIN}
+    with pytest.raises(MechanismError, match=r"the cycle of the data is 1\.7 s, that of the model 1\.5708 s"):
+        lasting(1.7)
 
 
 def test_two_turns_are_judged():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -105,9 +107,15 @@ def test_one_speed_sensor_for_both_sides_cancels() -> None:
 
 
 def test_gaps_and_single_turns() -> None:
-    """A turn with a gap is left out; of a single one the scatter is not known."""
+    """A turn that lacks much is left out, one that lacks little has it of the others; one turn has no scatter."""
     turns = exact(4)
-    turns["T1"][1, 5] = np.nan
+    turns["T1"][1, 5] = turns["n2"][2, 7] = np.nan  # where power in and out are not those of the mean
+    found = efficiency_of(condition(turns))
+    assert (found.turns, found.left_out) == (4, 0)
+    assert found.value == pytest.approx(ETA, rel=1e-12)
+    assert found.per_turn == pytest.approx([ETA] * 4, rel=1e-12)
+    assert np.isfinite(found.uncertainty)
+    turns["T1"][1, 5:9] = np.nan
     found = efficiency_of(condition(turns))
     assert (found.turns, found.left_out) == (3, 1)
     assert found.value == pytest.approx(ETA)
@@ -117,6 +125,13 @@ def test_gaps_and_single_turns() -> None:
     turns["n2"][:] = np.nan
     with pytest.raises(MechanismError, match="no turn is whole"):
         efficiency_of(condition(turns))
+    with pytest.raises(MechanismError, match="no turn is whole"):
+        efficiency_of(condition({**exact(), "T1": np.where(np.arange(POSITIONS) == 3, np.nan, exact()["T1"])}))
+
+
+def test_a_dead_sensor_is_told() -> None:
+    with pytest.raises(MechanismError, match="no power goes in: T1 or n1 reads 0 throughout"):
+        efficiency_of(condition({**exact(), "T1": np.zeros((3, POSITIONS))}))
 
 
 def test_resolution_counts_where_noise_does_not_carry_over_the_steps() -> None:
@@ -139,3 +154,33 @@ def test_missing_channels_are_told() -> None:
     with pytest.raises(MechanismError, match="do not tell"):
         efficiency_of(condition(exact()), joints={"brake": "elsewhere"})
     assert efficiency_of(condition(exact()), joints={"brake": "out"}).value == pytest.approx(ETA)
+
+
+@pytest.mark.parametrize("swing", [0.02, 0.1, 0.3])
+def test_powers_are_means_over_time_where_the_speed_varies(swing: float) -> None:
+    """Against energies over a turn, integrated in time: positions are equal steps of the angle."""
+    fine = 2 * np.pi * (np.arange(20_000) + 0.5) / 20_000
+    torque, speed = (lambda at: 10 + 8 * np.sin(2 * at)), (lambda at: 19 * (1 + swing * np.sin(2 * at)))
+    duration = np.mean(1 / speed(fine))
+    turns = {
+        "T1": torque(CYCLE), "T2": np.full(POSITIONS, 9.0), "n1": speed(CYCLE), "n2": speed(CYCLE)
+    }  # fmt: skip
+    one = condition({name: np.tile(course, (3, 1)) for name, course in turns.items()})
+    found = efficiency_of(replace(one, speed=1 / duration))
+    assert found.value == pytest.approx(np.mean(9.0) / np.mean(torque(fine)), abs=1e-5)  # ∫ T ω dt = ∫ T dθ
+    assert found.power_in == pytest.approx(np.mean(torque(fine)) / duration, rel=1e-5)
+    timed = efficiency_of(one)  # positions are equal steps of time, and no speed is known of the angle
+    assert timed.value == pytest.approx(9 * np.mean(speed(CYCLE)) / np.mean(torque(CYCLE) * speed(CYCLE)))
+
+
+def test_contributions_count_what_a_speed_does_to_the_time() -> None:
+    """Where the driver's speed gives each position its time, small changes of it are those of the ratio too."""
+    turns = exact()
+    turns["n1"] = turns["n1"] * (1 + 0.2 * np.sin(2 * CYCLE + 0.4))
+    found = efficiency_of(replace(condition(turns), speed=-50.0))
+    for one in found.contributions:
+        changed = {**turns}
+        values = changed[one.channel]
+        changed[one.channel] = values * (1 + 1e-6) if one.source == "gain" else values + 1e-6
+        slope = (efficiency_of(replace(condition(changed), speed=-50.0)).value - found.value) / 1e-6
+        assert one.sensitivity == pytest.approx(slope, rel=1e-4, abs=1e-7), (one.channel, one.source)

@@ -103,6 +103,7 @@ class Condition:
     start, cycle: coordinate of the driver at phase 0, and how far it goes in a cycle, rad; NaN where that is not known.
     lag: standard uncertainty, s, of when the coordinate is passed, of all channels together, by the sampling of pulses.
     dimensions: of those of `values` that were stated with a unit; the others are plain numbers, SI.
+    duration: of a cycle that is a time, s; NaN of one that is an angle.
     """
 
     name: str
@@ -115,6 +116,7 @@ class Condition:
     cycle: float = float("nan")
     lag: float = 0.0
     dimensions: Mapping[str, Dimension] = field(default_factory=dict)
+    duration: float = float("nan")
 
 
 @dataclass(frozen=True)

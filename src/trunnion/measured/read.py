@@ -22,7 +22,7 @@ from trunnion.measured.measurement import Accuracy, Condition, Course, Measureme
 from trunnion.measured.settings import Setting, dimension_of, settings, stated
 from trunnion.measured.tables import Table, read_table
 from trunnion.measured.timebase import Timeline, timeline
-from trunnion.measured.turns import DENSE, Turns, cut, resampled
+from trunnion.measured.turns import DENSE, Turns, cut, resampled, time_mean
 
 __all__ = ["read_measured"]
 
@@ -328,7 +328,7 @@ class _File:
             courses[name] = Course(name, channel.measures, own.scale.unit, part.courses[name], accuracy)
         values, known_as = dict(part.setting.values), dict(part.setting.dimensions)
         for path, channel_name in part.setting.means.items():
-            values[path] = float(np.nanmean(courses[channel_name].turns))
+            values[path] = time_mean(part.turns, courses[channel_name].turns)
             known_as[path] = dimension_of(self.own[channel_name].scale.of_quantity, courses[channel_name].unit)
         positions = self.mapping.positions
         speed = np.nan if self.mapping.timed else way * self._rate([part.turns])
@@ -336,9 +336,11 @@ class _File:
         timed = self.mapping.timed
         start, cycle = (np.nan if timed else float(one.evaluate()) for one in (self.mapping.start, self.mapping.cycle))
         phase = np.arange(positions) / positions
+        duration = float(self.mapping.cycle.evaluate()) if timed else np.nan
         return Condition(
-            name, values, phase, courses, (str(self.path),), speed, start, cycle, lag=self.lag, dimensions=known_as
-        )
+            name, values, phase, courses, (str(self.path),), speed, start, cycle,
+            lag=self.lag, dimensions=known_as, duration=duration,
+        )  # fmt: skip
 
 
 def _gone(share: Array, allowed: NDArray[np.bool_]) -> float:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from trunnion.measured.account import Account, counted
 from trunnion.measured.timebase import GAP, Timeline
 
-__all__ = ["Turns", "cut", "resampled", "turn_means"]
+__all__ = ["Turns", "cut", "resampled", "time_mean", "turn_means"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -222,3 +222,18 @@ def turn_means(course: Array) -> Array:
     level = float(usual[count > 0].mean()) if np.any(count) else np.nan
     left = np.where(finite, course - usual, 0.0).sum(axis=1) / np.maximum(finite.sum(axis=1), 1)
     return np.where(finite.mean(axis=1) > 0.5, level + left, np.nan)
+
+
+def time_mean(turns: Turns, course: Array) -> float:
+    """Mean of a course over the time of the turns, each position by how long it took; NaN if it has no value.
+
+    The mean over the positions is that over the angle: of a speed that varies within the turn it is too high.
+    """
+    known = np.isfinite(turns.share)
+    highest = np.maximum.accumulate(turns.share[known])
+    rising = np.flatnonzero(np.diff(highest, prepend=-np.inf) > 0)
+    edges = turns.numbers[:, None] + (np.arange(turns.positions + 1) - 0.5) / turns.positions
+    dwell = np.diff(np.interp(edges, highest[rising], turns.line.seconds[known][rising]), axis=1)
+    there = np.isfinite(course)
+    total = float(np.sum(dwell, where=there))
+    return float(np.sum(dwell * course, where=there)) / total if total > 0 else float("nan")

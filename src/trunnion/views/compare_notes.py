@@ -59,9 +59,9 @@ def definitions(result: xr.Dataset) -> list[tuple[str, str]]:
         found.append(
             (
                 "Efficiency",
-                "η = P_out/P_in = T_out ω_out/(T_in ω_in), powers being means over whole turns of torque times "
-                "speed (Pezzuti et al. 2006, eq. 22). Its uncertainty is of the scatter of η between turns, and of "
-                "zero, gain and resolution of every channel, each with its sensitivity (GUM 5.1). η of the model "
+                "η = P_out/P_in = T_out ω_out/(T_in ω_in), powers being means over the time of whole turns of torque "
+                "times speed (Pezzuti et al. 2006, eq. 22). Its uncertainty is of the scatter of η between turns, and "
+                "of zero, gain and resolution of every channel, each with its sensitivity (GUM 5.1). η of the model "
                 "is made of the model's courses in the same way.",
             )
         )

@@ -12,23 +12,29 @@ __all__ = ["KINDS", "Cause", "best", "causes"]
 
 Array = NDArray[np.float64]
 ENOUGH = 0.8  # of the mean square of the residual that a cause has to explain
-ALIKE = 0.03  # explanations nearer than this are not told apart
+MOST = 0.94  # from this an offset and a gain together are not looked for
+ALIKE = 2.0  # explanations that leave no more than this times what the best leaves are not told apart
+BOTH = 4.0  # an offset and a gain together are to leave so much less than one of them
+FLAT = 0.05  # of the variation of the model: a reading that varies less, and not like it, is flat
 FEWEST = 12  # positions from which a shift is looked for
 GRID = 180
 
 # The simplest first: it is named where others explain no more.
 KINDS = {
+    "flat": "a reading that does not change",
     "sign": "a wrong sign",
     "zero": "a constant offset",
     "gain": "a wrong gain",
     "shift": "a shift of the crank angle",
+    "mirror": "a crank angle that runs the other way",
     "zero and gain": "an offset and a wrong gain",
 }
 
 
 class Cause(NamedTuple):
     """One explanation. size: of a zero in the unit of the course, of a gain the relative error, of a shift the share of
-    the cycle by which the measured course is ahead; gain: that of a zero and gain; explains: share of the mean square.
+    the cycle by which the measured course is ahead, of a mirror too, run backwards, of what is flat the reading; gain:
+    that of a zero and gain; explains: share of the mean square.
     """
 
     kind: str
@@ -44,6 +50,15 @@ class _Pair:
     measured: Array
     model: Array
 
+    @property
+    def flat(self) -> bool:
+        """Whether the reading stands while the model varies: a small gain would have the model's shape."""
+        own, theirs = self.measured - np.mean(self.measured), self.model - np.mean(self.model)
+        varies, most = float(np.sum(own**2)), float(np.sum(theirs**2))
+        if varies > FLAT**2 * most or most <= 1e-6 * float(np.sum(self.model**2)):
+            return False
+        return bool(varies <= 1e-18 * most or np.sum(own * theirs) ** 2 < 0.5 * varies * most)
+
     def explained(self, model: Array) -> float:
         """Share of the mean square of the residual that goes away with another model."""
         before = float(np.mean((self.measured - self.model) ** 2))
@@ -58,6 +73,9 @@ def causes(measured: Array, model: Array, phase: Array, *, closed: bool, turning
     """
     pair, found = _Pair(measured, model), []
     square = float(np.sum(model**2))
+    if not turning and pair.flat:
+        level = float(np.mean(measured))
+        return [Cause("flat", level, pair.explained(np.full_like(model, level)))]
     if not turning:
         found.append(Cause("sign", -1.0, pair.explained(-model)))
     zero = float(np.mean(measured - model))
@@ -68,7 +86,7 @@ def causes(measured: Array, model: Array, phase: Array, *, closed: bool, turning
     if gain > 0:
         found.append(Cause("gain", gain - 1.0, pair.explained(gain * model)))
     if closed and len(phase) >= FEWEST:
-        found += _shift(pair, phase)
+        found += [*_shift(pair, phase, 1), *_shift(pair, phase, -1)]
     around = model - np.mean(model)
     if float(np.sum(around**2)) > 1e-6 * square:  # of a flat course the two cannot be told apart
         slope = float(np.sum(measured * around) / np.sum(around**2))
@@ -78,22 +96,31 @@ def causes(measured: Array, model: Array, phase: Array, *, closed: bool, turning
     return found
 
 
-def best(found: list[Cause]) -> tuple[Cause | None, list[Cause]]:
-    """The simplest cause that explains enough and as much as any, and the others that explain as much."""
+def best(found: list[Cause], noise: float = 0.0) -> tuple[Cause | None, list[Cause]]:
+    """The simplest cause that explains enough and leaves as little as any, and the others that leave as little.
+
+    noise: share of the mean square that scatter alone leaves. What is left is compared, not what is explained: of a
+    large residual an offset may explain 99 % and leave a thousand times what the gain does, which is the cause.
+    """
+
+    def left(one: Cause) -> float:
+        return max(1.0 - one.explains, noise, 1e-9)
+
     single = [one for one in found if one.kind != "zero and gain"]
-    most = max((one.explains for one in single), default=0.0)
-    if most >= ENOUGH:
-        alike = [one for one in single if one.explains >= most - ALIKE]
-        both = next((one for one in found if one.kind == "zero and gain"), None)
-        if both is None or most >= 1 - 2 * ALIKE or 1 - both.explains > 0.25 * (1 - most):
+    both = next((one for one in found if one.kind == "zero and gain"), None)
+    first = min(single, key=left, default=None)
+    if first is not None and first.explains >= ENOUGH:
+        alike = [one for one in single if one.explains >= ENOUGH and left(one) <= ALIKE * left(first)]
+        if both is None or first.explains >= MOST or BOTH * left(both) > left(first):
             return alike[0], alike[1:]
         return both, []
-    both = next((one for one in found if one.kind == "zero and gain" and one.explains >= 1 - 2 * ALIKE), None)
-    return both, []
+    return both if both is not None and both.explains >= MOST else None, []
 
 
-def _shift(pair: _Pair, phase: Array) -> list[Cause]:
-    """The shift of the phase at which the model fits best: measured(φ) = model(φ + shift); none of a flat course."""
+def _shift(pair: _Pair, phase: Array, way: int) -> list[Cause]:
+    """The shift of the phase at which the model fits best: measured(φ) = model(way · φ + shift); none of a flat course.
+
+    way: −1 for a model that is gone through backwards."""
     from scipy.interpolate import CubicSpline
     from scipy.optimize import minimize_scalar
 
@@ -108,11 +135,12 @@ def _shift(pair: _Pair, phase: Array) -> list[Cause]:
     spline = CubicSpline(np.append(at, at[0] + 1.0), np.append(model, model[0]), bc_type="periodic")
 
     def left(shift: float) -> float:
-        return float(np.mean((pair.measured - spline(phase + shift)) ** 2))
+        return float(np.mean((pair.measured - spline(way * phase + shift)) ** 2))
 
     shifts = np.arange(GRID) / GRID - 0.5
     coarse = float(shifts[int(np.argmin([left(one) for one in shifts]))])
     found = minimize_scalar(left, bounds=(coarse - 1 / GRID, coarse + 1 / GRID), method="bounded",
                             options={"xatol": 1e-7})  # fmt: skip
     shift = float(found.x)
-    return [Cause("shift", shift, pair.explained(np.asarray(spline(phase + shift))))]
+    kind = "shift" if way > 0 else "mirror"
+    return [Cause(kind, shift, pair.explained(np.asarray(spline(way * phase + shift))))]

@@ -15,9 +15,9 @@ import numpy as np
 from trunnion.analysis.friction import FrictionMethod
 from trunnion.analysis.rig.causes import best, causes
 from trunnion.analysis.rig.compared import dataset
-from trunnion.analysis.rig.judge import Verdict, expanded, judge
+from trunnion.analysis.rig.judge import Verdict, expanded, judge, uncertainty_of
 from trunnion.analysis.rig.modelled import Modelled, modelled
-from trunnion.analysis.rig.pairs import Compared, Efficient, Pair
+from trunnion.analysis.rig.pairs import Compared, Efficient, Pair, unmeasured
 from trunnion.analysis.rig.settings import check_settings
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.measured.efficiency import Pairs, efficiency_of, load_joints, pairs_of
@@ -63,8 +63,10 @@ def compare(
         also = _of_powers(powers) if powers else {}
         model = modelled(mechanism, condition, there, method, also)
         pairs = {name: _pair(condition, model, name, coverage) for name in there}
-        efficiency = _efficiency(condition, model, joints, coverage) if also.keys() <= model.courses.keys() else None
-        found.append(Compared(condition, model, pairs, efficiency if powers else None))
+        missing = unmeasured(mechanism, condition) if powers else ()
+        whole = powers is not None and not missing and also.keys() <= model.courses.keys()
+        efficiency = _efficiency(condition, model, joints, coverage) if whole else None
+        found.append(Compared(condition, model, pairs, efficiency, missing))
         if progress:
             progress(done)
     return dataset(mechanism, measurement, wanted, found, coverage, method)
@@ -107,7 +109,9 @@ def _pair(condition: Condition, model: Modelled, channel: str, coverage: float) 
         course.mean[where], theirs[where], np.asarray(condition.phase)[where],
         closed=model.run.cycle.periodic, turning=model.measures[channel].turning(model.run.system),
     )  # fmt: skip
-    cause, others = best(found)
+    random = uncertainty_of(course).random[where]
+    noise = float(np.nanmean(random**2)) / judged.rms**2 if np.isfinite(random).any() and judged.rms > 0 else 0.0
+    cause, others = best(found, noise)
     return replace(pair, cause=cause, others=tuple(others))
 
 
@@ -115,8 +119,12 @@ def _efficiency(condition: Condition, model: Modelled, joints: Mapping[str, str]
     """Efficiency as a rig computes it: of the measured courses, and of the model's in their place."""
     try:
         measured = efficiency_of(condition, joints)
-    except MechanismError:  # no turn is whole
-        return Efficient(model=_of_model(condition, model, joints))
+    except MechanismError as error:  # no turn is whole, or no power goes in
+        first = error.findings[0]
+        return Efficient(model=_of_model(condition, model, joints), reason=(first.what, first.remedy))
+    if measured.turns < 2:
+        once = "there is one turn only: without scatter its uncertainty is not known", "measure more turns"
+        return Efficient(measured.value, model=_of_model(condition, model, joints), reason=once)
     scatter = sum(one.effect**2 for one in measured.contributions if one.source == "repeatability")
     standard = np.array([measured.uncertainty])
     share = np.array([scatter]) / np.where(standard > 0, standard, np.nan) ** 2
@@ -133,6 +141,7 @@ def _of_model(condition: Condition, model: Modelled, joints: Mapping[str, str]) 
         for name, course in model.courses.items()
     }
     try:
-        return efficiency_of(replace(condition, courses=courses), joints).value
+        # its positions are equal steps of time, whatever those of the measurement are
+        return efficiency_of(replace(condition, courses=courses, speed=np.nan), joints).value
     except MechanismError:
         return float("nan")

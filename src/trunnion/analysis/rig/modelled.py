@@ -23,6 +23,7 @@ from trunnion.model.mechanism import Mechanism
 __all__ = ["Modelled", "measure_of", "modelled", "prepared"]
 
 Array = NDArray[np.float64]
+SLOWER = 0.01  # of the duration of a cycle: a machine that keeps time runs no farther off
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,6 +170,10 @@ def _drive(run: Run, time: Array) -> tuple[Array, str, float]:
 
 def _same_cycle(run: Run, condition: Condition, unit: str, span: float) -> None:
     """MechanismError where the cycle that was cut out of the data is not the model's, or starts elsewhere."""
+    if abs(condition.duration - run.cycle.duration) > SLOWER * run.cycle.duration:
+        what = f"the cycle of the data is {condition.duration:g} s, that of the model {run.cycle.duration:g} s"
+        remedy = f"state cycle: {run.cycle.duration:g} s in the mapping, or set: the number of the model that makes it"
+        raise MechanismError(Finding(what, "cycle", remedy))
     if unit != "rad" or not np.isfinite([condition.start, condition.cycle]).all():
         return
     findings: list[Finding] = []

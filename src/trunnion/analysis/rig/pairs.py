@@ -8,12 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.analysis.account import useful_loads
 from trunnion.analysis.rig.causes import Cause
 from trunnion.analysis.rig.judge import Judged, Verdict
 from trunnion.analysis.rig.modelled import Modelled
 from trunnion.measured.measurement import Condition, Course
+from trunnion.model.mechanism import Mechanism
 
-__all__ = ["Compared", "Efficient", "Pair"]
+__all__ = ["Compared", "Efficient", "Pair", "unmeasured"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,11 +36,15 @@ class Pair:
 
 @dataclass(frozen=True)
 class Efficient:
-    """Efficiency of a condition by the channels: measured, its expanded uncertainty, and of the model."""
+    """Efficiency of a condition by the channels: measured, its expanded uncertainty, and of the model.
+
+    reason: why one of them is not known, with what to do about it; both empty if they are.
+    """
 
     measured: float = np.nan
     expanded: float = np.nan
     model: float = np.nan
+    reason: tuple[str, str] = ("", "")
 
     @property
     def within(self) -> bool:
@@ -48,9 +54,20 @@ class Efficient:
 
 @dataclass(frozen=True, eq=False)
 class Compared:
-    """A condition with its model and its channels."""
+    """A condition with its model and its channels.
+
+    unmeasured: drivers and useful loads whose power no channel tells, where others do: there is no efficiency then.
+    """
 
     condition: Condition
     model: Modelled
     pairs: Mapping[str, Pair]
     efficiency: Efficient | None
+    unmeasured: tuple[str, ...] = ()
+
+
+def unmeasured(mechanism: Mechanism, condition: Condition) -> tuple[str, ...]:
+    """Drivers and useful loads that no channel tells the effort of, by their entries in the model."""
+    told = {course.measures for course in condition.courses.values()}
+    drivers = (f"drivers.{name}" for name in mechanism.drivers if f"effort:{name}" not in told)
+    return (*drivers, *(f"loads.{name}" for name in useful_loads(mechanism) if f"load:{name}" not in told))

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 __all__ = ["findings_of", "gathered", "said", "units_set"]
 
+FAR = 0.5  # of a gain: told as a factor from here on
 SLOWER = 0.01  # of a speed: a difference to speak of
 AGREE = np.radians(1.0)  # shifts that differ by less, or by less than a fifth, are one
 
@@ -130,11 +131,15 @@ def _of_channel(name: str, measures: str, found: Sequence[Compared]) -> Iterator
                 )
     for kind, members in by_cause.items():
         yield _explained(name, measures, kind, members, len(cases))
+    unknown = [len(pair.course.turns) for _, pair in cases if pair.judged.verdict is Verdict.UNKNOWN]
+    once = "was measured in one turn only"
+    if max(unknown, default=1) > 1:
+        once = f"has values of no more than one turn at a position, of up to {max(unknown)} that were measured"
     for verdict, what, remedy in (
         (
             Verdict.UNKNOWN,
-            "was measured in one turn only: without scatter its uncertainty is not known",
-            "measure more turns",
+            f"{once}: without scatter its uncertainty is not known",
+            "look at the gaps that `trunnion data` reports" if max(unknown, default=1) > 1 else "measure more turns",
         ),
         (Verdict.NOTHING, "has nothing to compare: nothing measured, or no answer of the model", ""),
     ):
@@ -178,6 +183,8 @@ def _size(pair: Pair, kind: str) -> Cause:
 
 
 REMEDIES = {
+    "flat": "look at the sensor and its cable, and at the column in the mapping",
+    "mirror": "state angle: {sign: -1} in the mapping, or take it away, and look at the zero of the angle",
     "sign": "state sign: -1 of the channel in the mapping, or take it away",
     "zero": "look at the zero of the channel, or at what loads the model lacks",
     "gain": "look at the gain of the channel and its unit, or at friction and loads of the model",
@@ -194,7 +201,8 @@ def _story(
     first, pair = members[0]
     unit, values = pair.course.unit, [one.size for one in sizes]
     subject = measures.removeprefix("rate:")
-    if subject in first.model.run.system.mechanism.drivers and kind in ("zero", "gain"):
+    driver = first.model.run.system.mechanism.drivers.get(subject)
+    if driver is not None and driver.speed is not None and kind in ("zero", "gain"):  # not one that swings
         speed = float(np.nanmean(pair.course.mean))
         told = _range(values, unit) if kind == "zero" else _percent(values)
         remedy = f"set: {{{subject}.speed: {{mean: {name}}}}} in the mapping takes the speed that was"
@@ -205,9 +213,13 @@ def _story(
     elif kind == "zero":
         told = f"a constant offset of {_range(values, unit)}"
     elif kind == "gain":
-        told = f"a gain that is off by {_percent(values)}"
+        told = f"a gain that is {_times(values) or f'off by {_percent(values)}'}"
+    elif kind == "flat":
+        told = f"a reading that stays at {_range(values, unit)} whatever the crank angle"
     elif kind == "shift":
         told = _ahead(values, [one for one, _ in members])
+    elif kind == "mirror":
+        told = KINDS[kind]
     else:
         told = f"an offset of {_range(values, unit)} and a gain off by {_percent([one.gain for one in sizes])}"
     return told, MODEL if kind in ("zero", "gain") and _differ(kind, sizes, members) else REMEDIES[kind]
@@ -221,6 +233,14 @@ def _differ(kind: str, sizes: Sequence[Cause], members: Sequence[tuple[Compared,
     typical = [max(abs(float(np.nanmean(pair.course.mean))), 1e-300) for _, pair in members]
     wide = [one if kind == "zero" else one / size for one, size in zip(known, typical, strict=True)]
     return bool(spread > 2 * np.nanmax([*wide, 0.0]) and spread > 0.1 * abs(values[0]))
+
+
+def _times(values: Sequence[float]) -> str:
+    """A gain that is far off, as a factor; empty of others."""
+    if max(abs(one) for one in values) < FAR:
+        return ""
+    low, high = f"{1 + min(values):.3g}", f"{1 + max(values):.3g}"
+    return f"{low if low == high else f'{low} to {high}'} times what it should be"
 
 
 def _percent(values: Sequence[float]) -> str:
@@ -288,6 +308,14 @@ def _efficiencies(found: Sequence[Compared]) -> Iterator[Finding]:
             f"measured {of.measured:.4f} ± {of.expanded:.2g}, model {of.model:.4f}"
         )
         yield Finding(what, "efficiency", "look at the channels; `trunnion identify` fits friction to them")
+    for missing in dict.fromkeys(one.unmeasured for one in found if one.unmeasured):
+        where = _in([one.condition.name for one in found if one.unmeasured == missing], len(found))
+        what = f"is not compared {where}: the power of {', '.join(missing)} is not measured"
+        remedy = "measure effort: of every driver and load: of every useful load, each with its rate:"
+        yield Finding(what, "efficiency", remedy, Severity.WARNING)
+    for reason in dict.fromkeys(of.reason for _, of in known if of.reason[0]):
+        where = _in([one.condition.name for one, of in known if of.reason == reason], len(known))
+        yield Finding(f"is not known {where}: {reason[0]}", "efficiency", reason[1], Severity.WARNING)
 
 
 def _speeds(found: Sequence[Compared]) -> Iterator[Finding]:

@@ -14,7 +14,10 @@ Array = NDArray[np.float64]
 ENOUGH = 0.8  # of the mean square of the residual that a cause has to explain
 MOST = 0.94  # from this an offset and a gain together are not looked for
 ALIKE = 2.0  # explanations that leave no more than this times what the best leaves are not told apart
-ROUGH, NEAR = 0.01, 0.03  # where the best leaves more than this, nor are those that explain nearly as much
+ROUGH, NEAR = (
+    0.003,
+    0.03,
+)  # where the best leaves more, as of a wrong model, those explain it too that explain nearly as much
 BOTH = 4.0  # an offset and a gain together are to leave so much less than one of them
 FLAT = 0.05  # of the variation of the model: a reading that varies less, and not like it, is flat
 FEWEST = 12  # positions from which a shift is looked for

@@ -157,7 +157,7 @@ def test_a_gain_is_told_from_an_offset_by_what_is_left(gain, words):
 
 def test_a_flat_reading_is_said_to_be_flat():
     result = compare(measured(wrong=wrong_in("torque", lambda true: np.full_like(true, 12.0))))
-    assert said(result, "channels.torque", "a reading that stays at +12 N m", "sensor and its cable")
+    assert said(result, "channels.torque", "a reading that stays at 12 N m", "sensor and its cable")
 
 
 def test_a_crank_angle_that_runs_backwards_is_named():
@@ -306,6 +306,24 @@ def test_turns_that_faults_left_are_told_from_those_measured():
     turns[1:] = np.nan
     result = compare(replace(whole, conditions=(replace(condition, courses={"torque": course("torque", turns)}),)))
     assert said(result, "no more than one turn at a position, of up to 3 that were measured", "look at the gaps")
+
+
+def test_errors_that_go_on_from_turn_to_turn_are_said():
+    """Of an AR(1) over turns; independent turns are not said to be so."""
+    random, settings = np.random.default_rng(7), ({"A.speed": 4.0}, {"A.speed": 6.0})
+    whole = measured(turns=30, settings=settings)
+    assert not said(compare(whole), "neighbouring turns")
+    conditions = []
+    for one in whole.conditions:
+        steps = random.normal(size=30)
+        for k in range(1, 30):
+            steps[k] += 0.72 * steps[k - 1]
+        torque = one.courses["torque"]
+        wandering = replace(torque, turns=torque.turns + 0.1 * steps[:, None])
+        conditions.append(replace(one, courses={**one.courses, "torque": wandering}))
+    result = compare(replace(whole, conditions=tuple(conditions)))
+    (row,) = said(result, "neighbouring turns are alike")
+    assert (row["where"], row["severity"]) == ("channels.torque", "warning")
 
 
 def test_a_timed_cycle_is_the_models():

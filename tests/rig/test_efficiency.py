@@ -184,3 +184,16 @@ def test_contributions_count_what_a_speed_does_to_the_time() -> None:
         changed[one.channel] = values * (1 + 1e-6) if one.source == "gain" else values + 1e-6
         slope = (efficiency_of(replace(condition(changed), speed=-50.0)).value - found.value) / 1e-6
         assert one.sensitivity == pytest.approx(slope, rel=1e-4, abs=1e-7), (one.channel, one.source)
+
+
+def test_few_turns_have_the_factor_of_student() -> None:
+    """GUM, Table G.2: 13.97 for one degree of freedom, 4.53 for two; 2 where a sensor's own uncertainty prevails."""
+    noise = np.random.default_rng(3).standard_normal((3, POSITIONS))
+    turns = {**exact(), "T1": exact()["T1"] + noise}
+    alone = efficiency_of(condition(turns, {}))
+    assert alone.freedom == pytest.approx(2)
+    assert alone.expanded == pytest.approx(4.53 * alone.uncertainty, rel=2e-3)
+    assert str(alone).endswith("(k = 4.5)")
+    two = efficiency_of(condition({name: course[:2] for name, course in turns.items()}, {}))
+    assert two.factor() == pytest.approx(13.97, rel=1e-3)
+    assert efficiency_of(condition(turns, {"T2": Accuracy(zero=10.0)})).factor() == pytest.approx(2, abs=1e-3)

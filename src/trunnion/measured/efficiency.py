@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtr, stdtrit
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.measured.measurement import Condition, Course
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 __all__ = ["COVERAGE", "Contribution", "Efficiency", "Pairs", "efficiency_of", "load_joints", "pairs_of"]
 
 COVERAGE = 2.0
-"""Factor k of the expanded uncertainty U = k u: about 95 % of a normal distribution (GUM 6.3.3)."""
+"""Factor k of the expanded uncertainty U = k u where turns are many: 95.45 % of a normal distribution (GUM 6.3.3)."""
 
 LACKING = 0.1
 """Share of its positions that a turn may lack and still count."""
@@ -71,9 +72,21 @@ class Efficiency:
     left_out: int = 0
 
     @property
+    def freedom(self) -> float:
+        """Effective degrees of freedom: those of the scatter between turns by its share of u². GUM, G.4.1."""
+        scatter = sum(one.effect**2 for one in self.contributions if one.source == "repeatability" and not one.channel)
+        return (self.turns - 1) * (self.uncertainty**2 / scatter) ** 2 if scatter > 0 else float("inf")
+
+    def factor(self, coverage: float = COVERAGE) -> float:
+        """k of U = k u: Student's for the freedom, with the probability that `coverage` has of a normal one."""
+        if not np.isfinite(self.freedom):
+            return coverage
+        return float(stdtrit(self.freedom, ndtr(coverage)))
+
+    @property
     def expanded(self) -> float:
-        """U = k u with k = COVERAGE."""
-        return COVERAGE * self.uncertainty
+        """U = k u with k for 95.45 %."""
+        return self.factor() * self.uncertainty
 
     @property
     def turns(self) -> int:
@@ -81,7 +94,7 @@ class Efficiency:
         return len(self.per_turn)
 
     def __str__(self) -> str:
-        return f"η = {self.value:.4f} ± {self.expanded:#.2g} (k = {COVERAGE:g})"
+        return f"η = {self.value:.4f} ± {self.expanded:#.2g} (k = {self.factor():.2g})"
 
 
 @dataclass(frozen=True)

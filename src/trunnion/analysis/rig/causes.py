@@ -14,6 +14,10 @@ Array = NDArray[np.float64]
 ENOUGH = 0.8  # of the mean square of the residual that a cause has to explain
 MOST = 0.94  # from this an offset and a gain together are not looked for
 ALIKE = 2.0  # explanations that leave no more than this times what the best leaves are not told apart
+ROUGH, NEAR = (
+    0.003,
+    0.03,
+)  # where the best leaves more, as of a wrong model, those explain it too that explain nearly as much
 BOTH = 4.0  # an offset and a gain together are to leave so much less than one of them
 FLAT = 0.05  # of the variation of the model: a reading that varies less, and not like it, is flat
 FEWEST = 12  # positions from which a shift is looked for
@@ -110,7 +114,8 @@ def best(found: list[Cause], noise: float = 0.0) -> tuple[Cause | None, list[Cau
     both = next((one for one in found if one.kind == "zero and gain"), None)
     first = min(single, key=left, default=None)
     if first is not None and first.explains >= ENOUGH:
-        alike = [one for one in single if one.explains >= ENOUGH and left(one) <= ALIKE * left(first)]
+        most = max(ALIKE * left(first), left(first) + NEAR if left(first) > ROUGH else 0.0)
+        alike = [one for one in single if one.explains >= ENOUGH and left(one) <= most]
         if both is None or first.explains >= MOST or BOTH * left(both) > left(first):
             return alike[0], alike[1:]
         return both, []

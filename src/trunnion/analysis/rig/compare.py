@@ -15,7 +15,7 @@ import numpy as np
 from trunnion.analysis.friction import FrictionMethod
 from trunnion.analysis.rig.causes import best, causes
 from trunnion.analysis.rig.compared import dataset
-from trunnion.analysis.rig.judge import Verdict, expanded, judge, uncertainty_of
+from trunnion.analysis.rig.judge import Verdict, judge, uncertainty_of
 from trunnion.analysis.rig.modelled import Modelled, modelled
 from trunnion.analysis.rig.pairs import Compared, Efficient, Pair, unmeasured
 from trunnion.analysis.rig.settings import check_settings
@@ -125,11 +125,7 @@ def _efficiency(condition: Condition, model: Modelled, joints: Mapping[str, str]
     if measured.turns < 2:
         once = "there is one turn only: without scatter its uncertainty is not known", "measure more turns"
         return Efficient(measured.value, model=_of_model(condition, model, joints), reason=once)
-    scatter = sum(one.effect**2 for one in measured.contributions if one.source == "repeatability")
-    standard = np.array([measured.uncertainty])
-    share = np.array([scatter]) / np.where(standard > 0, standard, np.nan) ** 2
-    freedom = np.where(share > 0, (measured.turns - 1) / np.where(share > 0, share, 1.0) ** 2, np.inf)  # GUM, G.4.1
-    wide = float(expanded(standard, freedom, coverage)[0])
+    wide = measured.factor(coverage) * measured.uncertainty
     return Efficient(measured.value, wide, _of_model(condition, model, joints))
 
 

@@ -19,12 +19,13 @@ from numpy.typing import NDArray
 from trunnion.measured.measurement import Course
 
 __all__ = [
-    "Judged", "Uncertainty", "Verdict", "difference", "expanded", "independent", "judge", "probability",
+    "Judged", "Uncertainty", "Verdict", "difference", "expanded", "going_on", "independent", "judge", "probability",
     "uncertainty_of",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
 SURE = 2.326  # standard deviations: the share of a true model falls below its least in 1 % of courses
+FEWEST_TURNS = 5  # that tell whether errors go on from turn to turn
 ROUNDING = 1e-9  # of the size of a course: differences below it are none
 
 
@@ -216,6 +217,21 @@ def _bias_expanded(of: Uncertainty, coverage: float) -> float:
     shared = np.mean(of.shared, axis=1, keepdims=True)
     own = Uncertainty(random, local, shared, np.array([len(means)]), of.turns[:, :1])
     return float(expanded(own.total, own.freedom, coverage)[0])
+
+
+def going_on(course: Course) -> tuple[float, int]:
+    """Correlation of the mean error of a turn with that of the next, and of how many; (NaN, 0) of fewer than five.
+
+    That of n independent turns is −1/n in the mean, which is taken off, and scatters by 1/√n.
+    """
+    turns = _nearly_whole(course.turns - course.mean)
+    if len(turns) < FEWEST_TURNS:
+        return float("nan"), 0
+    means = np.mean(turns, axis=1) - np.mean(turns)
+    square = float(np.sum(means**2))
+    if square <= (ROUNDING * float(np.nanmax(np.abs(course.mean), initial=0.0))) ** 2:
+        return float("nan"), 0
+    return float(np.sum(means[1:] * means[:-1])) / square + 1 / len(means), len(means)
 
 
 def _correlation(measured: Array, model: Array) -> float:

@@ -14,7 +14,7 @@ import numpy as np
 
 from trunnion.analysis.account import inputs, model_notes
 from trunnion.analysis.rig.causes import KINDS, Cause
-from trunnion.analysis.rig.judge import Verdict
+from trunnion.analysis.rig.judge import Verdict, going_on
 from trunnion.errors import Finding, Severity, Status
 from trunnion.model.expression import LITERAL
 from trunnion.model.mechanism import Mechanism
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 __all__ = ["findings_of", "gathered", "said", "units_set"]
 
 FAR = 0.5  # of a gain: told as a factor from here on
+SIGNIFICANT = 3.5  # standard deviations: of a correlation of turns that is none, in 1 of 4000 channels
 SLOWER = 0.01  # of a speed: a difference to speak of
 AGREE = np.radians(1.0)  # shifts that differ by less, or by less than a fifth, are one
 
@@ -42,6 +43,7 @@ def findings_of(
         *_speeds(found),
         *_of_the_model(found),
         *_left_out(found),
+        *_going_on(channels, found),
         *_accuracies(channels, found),
         _exact(mechanism),
     ]
@@ -215,7 +217,7 @@ def _story(
     elif kind == "gain":
         told = f"a gain that is {_times(values) or f'off by {_percent(values)}'}"
     elif kind == "flat":
-        told = f"a reading that stays at {_range(values, unit)} whatever the crank angle"
+        told = f"a reading that stays at {_range(values, unit, False)} whatever the crank angle"
     elif kind == "shift":
         told = _ahead(values, [one for one, _ in members])
     elif kind == "mirror":
@@ -379,6 +381,23 @@ def _left_out(found: Sequence[Compared]) -> Iterator[Finding]:
         told = ", ".join(f"{name} {count:,}" for name, count in left.items())
         what = f"positions left out of the figures: {told}; a relative speed is zero there, or a dead centre near"
         yield Finding(what, "", "the model has an interval there and not one number", Severity.NOTE)
+
+
+def _going_on(channels: Mapping[str, str], found: Sequence[Compared]) -> Iterator[Finding]:
+    """Channels whose errors go on from turn to turn, in all conditions together."""
+    for name in channels:
+        told = [going_on(pair.course) for _, pair in _cases(name, found)]
+        count = sum(turns for _, turns in told)
+        if not count:
+            continue
+        mean = sum(value * turns for value, turns in told if turns) / count
+        if mean * math.sqrt(count) > SIGNIFICANT:
+            what = (
+                f"the errors of neighbouring turns are alike, correlation {mean:+.2f}: U, which takes turns as "
+                "independent, is too small, and so is that of the efficiency"
+            )
+            remedy = "measure many more turns, or apart from each other; state a zero that wanders in accuracy:"
+            yield Finding(what, f"channels.{name}", remedy, Severity.WARNING)
 
 
 def _accuracies(channels: Mapping[str, str], found: Sequence[Compared]) -> Iterator[Finding]:

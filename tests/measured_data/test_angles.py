@@ -309,3 +309,13 @@ def test_a_gain_that_no_sensor_has_is_refused(clean: Columns, tmp_path: Path) ->
     for gain in ("1e308 V/(N m)", "1e-150 V/(N m)"):
         with pytest.raises(MechanismError, match="a reading of 1 is"):
             read(clean, tmp_path, {"channels/torque-in/gain": gain})
+
+
+def test_cells_of_the_angle_that_fall_to_zero_are_named(clean: Columns, tmp_path: Path) -> None:
+    angle = clean["deg"].copy()
+    angle[97::97] = 0
+    found = read({**clean, "deg": angle}, tmp_path, {"angle": {"from": "column", "column": "deg", "unit": "deg"}})
+    (one,) = faults(found, "zero far off the ones before and after")
+    assert "of 'deg' of 11,000" in one.what
+    assert [item for item in found.findings if item is not one and "no number" not in item.what] == []
+    assert off(found.conditions[0]) < 0.02

@@ -295,7 +295,7 @@ def test_turns_that_are_not_used_are_told(clean: Columns, tmp_path: Path) -> Non
     found = read({**index, "encoder": counts}, tmp_path, {"angle/index": {"column": "z"}})
     used = found.conditions[0].courses["brake"].turns.shape[0]
     assert used < 8
-    assert f"{used} of 21 recorded" in found.done[0]
+    assert f"{used} whole turns of 21 recorded" in found.done[0]
     assert faults(found, "of 21 recorded can be used")
 
 
@@ -315,3 +315,25 @@ def test_levels_of_a_signal_are_no_steps_of_a_converter() -> None:
     assert resolution(np.select([time < 0.2, time < 0.7], [3.0, 5.0], 9.0)) == 0
     assert resolution(np.repeat(np.arange(20) ** 2, 200).astype(float)) == 0
     assert resolution(np.rint(10 * np.sin(20 * time)) * 0.5) == pytest.approx(0.5)
+
+
+def test_a_mean_of_a_channel_without_a_value_is_refused(clean: Columns, tmp_path: Path) -> None:
+    changes = {"set": {"misalignment": {"mean": "brake"}}}
+    with pytest.raises(MechanismError, match=r"set.misalignment: the channel 'brake', whose mean it is, has no value"):
+        read({**clean, "T2": np.full(clean["t"].size, np.nan)}, tmp_path, changes)
+
+
+def test_a_gain_that_no_sensor_has_is_refused(clean: Columns, tmp_path: Path) -> None:
+    for gain in ("1e308 V/(N m)", "1e-150 V/(N m)"):
+        with pytest.raises(MechanismError, match="a reading of 1 is"):
+            read(clean, tmp_path, {"channels/torque-in/gain": gain})
+
+
+def test_cells_of_the_angle_that_fall_to_zero_are_named(clean: Columns, tmp_path: Path) -> None:
+    angle = clean["deg"].copy()
+    angle[97::97] = 0
+    found = read({**clean, "deg": angle}, tmp_path, {"angle": {"from": "column", "column": "deg", "unit": "deg"}})
+    (one,) = faults(found, "zero far off the ones before and after")
+    assert "of 'deg' of 11,000" in one.what
+    assert [item for item in found.findings if item is not one and "no number" not in item.what] == []
+    assert off(found.conditions[0]) < 0.02

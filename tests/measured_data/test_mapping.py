@@ -12,8 +12,10 @@ import pytest
 from manual.conftest import Run, program
 from measured_data.recording import Columns, mapping, off, read, recorded
 from trunnion.errors import MechanismError
+from trunnion.measured.amounts import read_amount
 from trunnion.measured.mapping import read_mapping
 from trunnion.measured.read import read_measured
+from trunnion.model.units import UnitError
 
 __all__ = ["program"]  # a fixture
 
@@ -212,3 +214,27 @@ def test_schema(program: Run) -> None:
     with pytest.raises(jsonschema.ValidationError):
         jsonschema.validate(mapping({"filtre": {"cut_off": "50 Hz"}}), schema)
     assert schema["required"] == ["trunnion-data", "channels"]
+
+
+@pytest.mark.parametrize(
+    ("text", "same"),
+    [
+        ("1 V/(1000 rpm)", "1 mV/rpm"),
+        ("20 mA/(100 N m)", "0.2 mA/(N m)"),
+        ("10 V / (50 mm)", "0.2 V/mm"),
+        ("-5 V/(2e3 N)", "-2.5 mV/N"),
+    ],
+)
+def test_gains_as_data_sheets_have_them(text: str, same: str) -> None:
+    first, second = read_amount(text), read_amount(same)
+    assert first.value == pytest.approx(second.value, rel=1e-12)
+    assert first.dimensions == second.dimensions
+    with pytest.raises(UnitError):
+        read_amount("1 V/(0 rpm)")
+
+
+def test_remedies_speak_of_mappings() -> None:
+    with pytest.raises(MechanismError) as caught:
+        read_mapping(mapping({"positions": 1, "files": [{"file": ""}]}))
+    assert caught.value.findings
+    assert not [one for one in caught.value.findings if "model files" in one.remedy]

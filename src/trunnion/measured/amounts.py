@@ -27,6 +27,7 @@ Dimensions = Mapping[str, Fraction]
 
 HERTZ: Dimensions = {"second": Fraction(-1)}
 _AMOUNT = re.compile(r"\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*(.*?)\s*", re.DOTALL)
+_RATIO = re.compile(r"([^/()]+?)\s*/\s*\(\s*([0-9]+\.?[0-9]*(?:[eE][-+]?[0-9]+)?)\s*([^/()0-9][^()]*)\)", re.DOTALL)
 _USUAL = (
     "s",
     "ms",
@@ -91,6 +92,12 @@ def read_amount(source: object) -> Amount:
         what = "is empty" if source is None else "is not a number with a unit"
         raise UnitError(what, "write a number with its unit such as 12 mV")
     found = _AMOUNT.fullmatch(normalise(source)) if isinstance(source, str) else None
+    if found and (ratio := _RATIO.fullmatch(found[2])):
+        amount = read_amount(f"{found[1]} {ratio[1]}/({ratio[3]})")
+        value = amount.value / float(ratio[2]) if float(ratio[2]) else math.inf
+        if not math.isfinite(value):
+            raise UnitError(f"'{str(source)[:40]}' is not a finite number", "give a finite number")
+        return Amount(source, value, amount.unit, amount.dimensions)
     if isinstance(source, str) and (not found or found[2].startswith(",")):
         remedy = "write a decimal point, not a comma" if re.search(r"[0-9],[0-9]", source) else "write it as 12 mV"
         raise UnitError(f"'{source[:40]}' is not a number with a unit", remedy)

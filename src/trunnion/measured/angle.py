@@ -20,6 +20,7 @@ __all__ = ["Coordinate", "coordinate"]
 
 Array = NDArray[np.float64]
 TURN = 2 * np.pi
+JUMP = 8.0  # times the usual step, by which a cell is off its neighbours
 
 
 @dataclass(frozen=True)
@@ -71,7 +72,7 @@ def _of_column(source: AngleSource, table: Table, line: Timeline, account: Accou
     if not alike(found, dimensions("rad")[1]):
         what = f"the column '{source.column}' has the unit '{unit}', which is no angle"
         raise MechanismError(Finding(what, "angle", "name another column", file=account.file))
-    values = line.rows(column.values) * factor
+    values = _without_jumps(source, line.rows(column.values) * factor, line, account)
     finite = np.flatnonzero(np.isfinite(values))
     if finite.size < values.size:
         what = f"{counted(values.size - finite.size, 'cell')} of '{source.column}' of {values.size:,} are no number"
@@ -86,6 +87,27 @@ def _of_column(source: AngleSource, table: Table, line: Timeline, account: Accou
         account.warn("angle", what, "sample at least 8 times a turn")
     values[finite] = told
     return values
+
+
+def _without_jumps(source: AngleSource, values: Array, line: Timeline, account: Account) -> Array:
+    """The angle without single cells that are far off both neighbours, which are close to each other."""
+    if values.size < 9:
+        return values
+    steps = np.abs(np.angle(np.exp(1j * np.diff(values))))
+    over = np.abs(np.angle(np.exp(1j * (values[2:] - values[:-2]))))
+    usual = float(np.nanmedian(steps)) if np.isfinite(steps).any() else 0.0
+    far = max(JUMP * usual, np.radians(5.0))
+    out = 1 + np.flatnonzero((steps[:-1] > far) & (steps[1:] > far) & (over < far / 2))
+    if not out.size or out.size > 0.1 * values.size:
+        return values
+    zeros = " zero" if np.all(values[out] == 0) else ""
+    what = (
+        f"{counted(out.size, 'cell')} of '{source.column}' of {values.size:,}{zeros} far off the ones before and after"
+    )
+    account.warn("angle", f"{what}, {times(line.seconds[out])}; left out", "check the angle sensor and its cable")
+    mended = values.copy()
+    mended[out] = np.nan
+    return mended
 
 
 def _integrated(speed: Array, line: Timeline, account: Account) -> Array:

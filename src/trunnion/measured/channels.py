@@ -23,6 +23,7 @@ __all__ = ["Reading", "Zeroed", "filtered", "mean_uncertainty", "reading", "reso
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 LOOKED_AT = 50_000  # readings of which the step is told
+MOST = 1e100  # SI units that a reading of 1 may mean
 LEVELS = 8  # of readings, from which they tell a step
 BRIDGED = 0.1  # of the period of the cut-off: gaps up to this are bridged for the filter
 
@@ -69,6 +70,9 @@ def reading(name: str, channel: Channel, column: Column, account: Account) -> Re
         )
     try:
         found = scale(channel.measures, unit, channel.gain)
+        if not MOST > abs(found.factor) > 1 / MOST:
+            what = f"a reading of 1 is {found.factor:.3g} {found.unit}, which no sensor has"
+            raise MechanismError(Finding(what, f"{where}.gain", "check unit and gain", file=account.file))
         limit = found.reading(channel.range, "range") if channel.range else None
         return Reading(found, unit, limit, abs(found.factor) * found.reading(channel.accuracy.zero, "accuracy.zero"),
                        float(channel.accuracy.gain.evaluate()))  # fmt: skip

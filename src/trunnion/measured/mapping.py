@@ -289,6 +289,8 @@ def _explained(finding: Finding, data: Mapping[str, Any]) -> Finding:
         return Finding("is a model file, not a mapping file", "trunnion", "name the mapping, then the data files")
     if finding.what == "'trunnion-data' is missing":
         return Finding(finding.what, finding.where, "begin the file with trunnion-data: 1")
+    if finding.remedy == "see the examples of model files":
+        return Finding(finding.what, finding.where, "see the examples of mappings in docs/how-to/measured-data.md")
     return finding
 
 

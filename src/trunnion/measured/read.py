@@ -79,7 +79,8 @@ def _averaged(conditions: Sequence[Condition], recorded: float) -> str:
     each = f"{min(counts):,}" if min(counts) == max(counts) else f"{min(counts):,} to {max(counts):,}"
     where = "" if len(counts) == 1 else f" in each of {len(counts):,} conditions"
     if sum(counts) < recorded - 2 * len(counts):
-        where += f", {sum(counts):,} of {recorded:,.0f} recorded"
+        where += f", {sum(counts):,}" if len(counts) > 1 else ""
+        where += f" of {recorded:,.0f} recorded"
     return f"{each} whole turns{where}; rows before, between and after them are not used"
 
 
@@ -328,7 +329,11 @@ class _File:
             courses[name] = Course(name, channel.measures, own.scale.unit, part.courses[name], accuracy)
         values, known_as = dict(part.setting.values), dict(part.setting.dimensions)
         for path, channel_name in part.setting.means.items():
-            values[path] = time_mean(part.turns, courses[channel_name].turns)
+            turns = courses[channel_name].turns
+            if not np.isfinite(turns).any():
+                what = f"the channel '{channel_name}', whose mean it is, has no value in any turn"
+                raise MechanismError(Finding(what, f"set.{path}", "mend the channel, or state it", file=str(self.path)))
+            values[path] = time_mean(part.turns, turns)
             known_as[path] = dimension_of(self.own[channel_name].scale.of_quantity, courses[channel_name].unit)
         positions = self.mapping.positions
         speed = np.nan if self.mapping.timed else way * self._rate([part.turns])

@@ -100,6 +100,35 @@ def test_more_turns_make_it_narrower_but_not_beyond_the_sensor(cardan: trunnion.
     assert float(many["share"].sel(source="zero of torque-out")[0]) > 0.99
 
 
+@pytest.mark.parametrize("sensors", ["channel", "condition"])
+def test_the_zero_of_each_file_counts_however_the_sensors_are_grouped(
+    cardan: trunnion.Mechanism, shaft: True_, sensors: Any
+) -> None:
+    data = own_zeros(replace(shaft, conditions=shaft.conditions[:2], courses=shaft.courses[:2]).measured(2), 0.1)
+    found = identify(cardan, data, ["brake.resisting_torque"], channels=["torque-out"], sensors=sensors)
+    assert found["standard_uncertainty"].values[0] == pytest.approx(0.1 / np.sqrt(2), rel=0.05)
+    assert found["share"].sel(source="zero of each file of torque-out").values[0] > 0.9
+
+
+def test_the_zero_of_each_file_is_not_shared_by_the_efficiencies(cardan: trunnion.Mechanism, shaft: True_) -> None:
+    data = own_zeros(shaft.measured(2), 0.1)
+    one, many = (
+        identify(cardan, replace(data, conditions=data.conditions[:k]), [FRICTION], channels=["efficiency"])
+        for k in (2, 6)
+    )
+    assert many["standard_uncertainty"].values[0] < 0.8 * one["standard_uncertainty"].values[0]
+
+
+def own_zeros(data: Measurement, zero: float) -> Measurement:
+    """The measurement with a zero of torque-out that each file has by itself, and no other error of a sensor."""
+    found = []
+    for one in data.conditions:
+        courses = {name: replace(course, accuracy=Accuracy()) for name, course in one.courses.items()}
+        courses["torque-out"] = replace(courses["torque-out"], accuracy=Accuracy(zero=zero, own=zero))
+        found.append(replace(one, courses=courses))
+    return replace(data, conditions=tuple(found))
+
+
 def test_a_coefficient_on_its_limit_has_a_one_sided_interval(four_bar: trunnion.Mechanism) -> None:
     slippery = truth(four_bar, SPEEDS[:2], {"torque": "effort:A"}, {FRICTION: 0.0})
     found = [identify(four_bar, slippery.measured(seed, 6), [FRICTION], start={FRICTION: 0.1}) for seed in range(4)]

@@ -15,12 +15,13 @@ from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.measured.efficiency import efficiency_of, pairs_of
-from trunnion.measured.measurement import Condition, Course, Measurement
+from trunnion.measured.measurement import Accuracy, Condition, Course, Measurement
 
-__all__ = ["EFFICIENCY", "Block", "blocks_of", "channels_of"]
+__all__ = ["EFFICIENCY", "OWN", "Block", "blocks_of", "channels_of", "shared_zero"]
 
 Array = NDArray[np.float64]
 EFFICIENCY = "efficiency"  # the channel that is computed from torques and speeds, one figure a turn
+OWN = "zero of each file"
 
 
 @dataclass(frozen=True)
@@ -113,12 +114,23 @@ def channels_of(measurement: Measurement, wanted: Sequence[str] | None, joints: 
 def _efficiency(condition: Condition, joints: Mapping[str, str]) -> tuple[Course, dict[str, float]]:
     """The efficiency of each turn as a course of one position, and what the errors of its sensors do to it."""
     found = efficiency_of(condition, joints)
-    effects = {
-        f"{one.source} of {one.channel}": one.sensitivity * one.input
-        for one in found.contributions
-        if one.source in ("gain", "zero")
-    }
+    effects: dict[str, float] = {}
+    for one in found.contributions:
+        accuracy = condition.courses[one.channel].accuracy if one.channel in condition.courses else Accuracy()
+        if one.source == "gain":
+            effects[f"gain of {one.channel}"] = one.sensitivity * one.input
+        elif one.source == "zero":
+            shared = shared_zero(accuracy)
+            effects |= {f"zero of {one.channel}": one.sensitivity * shared} if shared else {}
+            effects |= {f"{OWN} of {one.channel}": one.sensitivity * accuracy.own} if accuracy.own else {}
     return Course(EFFICIENCY, "efficiency:cycle", "1", found.per_turn[:, None]), effects
+
+
+def shared_zero(accuracy: Accuracy) -> float:
+    """Standard uncertainty of the zero that all files share: without what each has by itself."""
+    if not np.isfinite(accuracy.zero):
+        return float(accuracy.zero)
+    return float(np.sqrt(max(accuracy.zero**2 - accuracy.own**2, 0.0)))
 
 
 def blocks_of(

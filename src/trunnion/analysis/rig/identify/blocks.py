@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -17,11 +17,13 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.measured.efficiency import efficiency_of, pairs_of
 from trunnion.measured.measurement import Accuracy, Condition, Course, Measurement
 
-__all__ = ["EFFICIENCY", "OWN", "Block", "blocks_of", "channels_of", "shared_zero"]
+__all__ = ["EFFICIENCY", "OWN", "Block", "blocks_of", "channels_of", "finite", "shared_zero"]
 
 Array = NDArray[np.float64]
 EFFICIENCY = "efficiency"  # the channel that is computed from torques and speeds, one figure a turn
 OWN = "zero of each file"
+ROUNDING = 1e-9  # of a course, by interpolation and sums
+FAR_ABOVE = 100.0
 
 
 @dataclass(frozen=True)
@@ -43,8 +45,14 @@ class Block:
 
     @property
     def unresolved(self) -> float:
-        """Standard uncertainty by steps between readings that the scatter does not carry it over."""
-        return float(self.course.unresolved)
+        """Standard uncertainty by steps between readings that the scatter does not carry it over, or by rounding."""
+        return max(float(self.course.unresolved), self._rounding)
+
+    @cached_property
+    def _rounding(self) -> float:
+        """What computing rounds off; 0 where the scatter is far above it."""
+        least = ROUNDING * float(np.nanmax(np.abs(self.turns), initial=0.0))
+        return 0.0 if self.repeats and float(self.variance[0]) > (FAR_ABOVE * least) ** 2 else least
 
     @property
     def fitted(self) -> bool:
@@ -93,6 +101,18 @@ def _mean(turns: Array) -> Array:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
         return np.asarray(np.nanmean(turns, axis=0)) if len(turns) else np.full(turns.shape[1], np.nan)
+
+
+def finite(measurement: Measurement) -> Measurement:
+    """The measurement with NaN for readings that are infinite."""
+    found = []
+    for one in measurement.conditions:
+        courses = {
+            name: replace(course, turns=np.where(np.isinf(course.turns), np.nan, course.turns))
+            for name, course in one.courses.items()
+        }
+        found.append(replace(one, courses=courses))
+    return replace(measurement, conditions=tuple(found))
 
 
 def channels_of(measurement: Measurement, wanted: Sequence[str] | None, joints: Mapping[str, str]) -> list[str]:

@@ -26,6 +26,7 @@ MOST_EVALUATIONS = 100
 TOLERANCE = 1e-10  # of cost and step: far below what data of any scatter tell
 PER_GUARD = 90  # positions of a cycle for each that is left out beside a jump, which resampling smears
 ANGLE = "angle of each condition"  # by the sampling of pulses
+LEAST_GAIN = 0.1  # of the model: what a sensor reads at least, 0 would do away with the model
 GUESS = 0.01  # of a course: the scatter of one without repetitions, until its residuals are known
 
 
@@ -186,10 +187,10 @@ class Problem:
     @property
     def bounds(self) -> tuple[Array, Array]:
         """Limits of unknowns and sensors."""
-        free = [inf] * len(self.sensors)
         low = [one.lower for one in self.model.unknowns]
         high = [one.upper for one in self.model.unknowns]
-        return np.array([*low, *(-one for one in free)]), np.array([*high, *free])
+        least = [(LEAST_GAIN - 1) / max(one.sizes) if one.kind == "gain" else -inf for one in self.sensors]
+        return np.array([*low, *least]), np.array([*high, *([inf] * len(self.sensors))])
 
     def courses(self, x: Array) -> Courses:
         """What the model says; of the last few places it is kept."""
@@ -253,7 +254,7 @@ class Problem:
             size = block.turns.shape[1]
             if size == 1 < len(status):  # a figure of the whole cycle
                 good = np.array([bool(np.all(status < Status.NOT_CONVERGED))])
-            elif measure.of_motion:
+            elif measure.of_motion or measure.kind == "rate":  # whatever forces do
                 good = (status < Status.SINGULAR) & (status != Status.NEAR_SINGULAR)
             else:
                 guard = -(-size // PER_GUARD) if self.guard is None else self.guard

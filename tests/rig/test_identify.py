@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from ruamel.yaml import YAML
 
 import trunnion
 from rigged import Sensors, True_, truth
@@ -17,7 +20,7 @@ from trunnion.analysis.measures import named
 from trunnion.analysis.rig.identify import identify, with_estimates
 from trunnion.analysis.rig.identify.courses import Model
 from trunnion.analysis.rig.identify.run import identified
-from trunnion.analysis.rig.identify.unknowns import described, unknowns
+from trunnion.analysis.rig.identify.unknowns import described, limits, unknowns
 from trunnion.errors import MechanismError
 from trunnion.measured.measurement import Accuracy, Condition, Course, Measurement
 from trunnion.model.file import read_mechanism
@@ -98,6 +101,35 @@ def test_more_turns_make_it_narrower_but_not_beyond_the_sensor(cardan: trunnion.
         assert found["standard_uncertainty"].values[0] == pytest.approx(stated, rel=0.02)
     assert "% of its variance is the zero of torque-out: more turns do not help" in said(many)
     assert float(many["share"].sel(source="zero of torque-out")[0]) > 0.99
+
+
+@pytest.mark.parametrize("sensors", ["channel", "condition"])
+def test_the_zero_of_each_file_counts_however_the_sensors_are_grouped(
+    cardan: trunnion.Mechanism, shaft: True_, sensors: Any
+) -> None:
+    data = own_zeros(replace(shaft, conditions=shaft.conditions[:2], courses=shaft.courses[:2]).measured(2), 0.1)
+    found = identify(cardan, data, ["brake.resisting_torque"], channels=["torque-out"], sensors=sensors)
+    assert found["standard_uncertainty"].values[0] == pytest.approx(0.1 / np.sqrt(2), rel=0.05)
+    assert found["share"].sel(source="zero of each file of torque-out").values[0] > 0.9
+
+
+def test_the_zero_of_each_file_is_not_shared_by_the_efficiencies(cardan: trunnion.Mechanism, shaft: True_) -> None:
+    data = own_zeros(shaft.measured(2), 0.1)
+    one, many = (
+        identify(cardan, replace(data, conditions=data.conditions[:k]), [FRICTION], channels=["efficiency"])
+        for k in (2, 6)
+    )
+    assert many["standard_uncertainty"].values[0] < 0.8 * one["standard_uncertainty"].values[0]
+
+
+def own_zeros(data: Measurement, zero: float) -> Measurement:
+    """The measurement with a zero of torque-out that each file has by itself, and no other error of a sensor."""
+    found = []
+    for one in data.conditions:
+        courses = {name: replace(course, accuracy=Accuracy()) for name, course in one.courses.items()}
+        courses["torque-out"] = replace(courses["torque-out"], accuracy=Accuracy(zero=zero, own=zero))
+        found.append(replace(one, courses=courses))
+    return replace(data, conditions=tuple(found))
 
 
 def test_a_coefficient_on_its_limit_has_a_one_sided_interval(four_bar: trunnion.Mechanism) -> None:
@@ -313,6 +345,18 @@ def test_terms_of_a_law_with_speed(four_bar: trunnion.Mechanism) -> None:
     assert -1 < found["correlation"].values[0, 1] < -0.3
 
 
+def test_a_dimension_has_the_limits_of_what_it_is(four_bar: trunnion.Mechanism) -> None:
+    text = YAML(typ="safe").load(Path("examples/durango-fourbar.yaml"))
+    text["dimensions"] |= {"mu": 0.1, "twice": "2*mu", "same": "mu"}
+    text["joints"]["C"]["friction"] = "same"
+    model = trunnion.Mechanism.model_validate(text)
+    assert limits(model, "dimensions.mu") == (0.0, np.inf)
+    assert limits(model, "dimensions.twice") == (-np.inf, np.inf)
+    both = unknowns(model, described(model, {"all": ["mu", "C.friction.coefficient"]}), {})[0]
+    assert both.unit == "1"
+    assert both.lower == 0.0
+
+
 # ---- written back, refused ------------------------------------------------------------------------------------
 
 
@@ -345,6 +389,9 @@ def test_estimates_are_written_with_the_digits_they_have(cardan: trunnion.Mechan
         ({"channels": ["force"]}, "the measurement has torque"),
         ({"hold_out": ["run-9"]}, "there is no condition 'run-9'"),
         ({"hold_out": 1.5}, "cannot be held out"),
+        ({"hold_out": [""]}, "there is no condition ''"),
+        ({"hold_out": ["run"]}, "in the names of 5 conditions"),
+        ({"guard": 100}, "each is beside one where a friction turns round"),
         ({"hold_out": [f"run-{k}" for k in range(1, 6)]}, "all conditions are held out"),
         ({"start": {"mass": 1.0}}, "is none of the parameters"),
         ({"start": {FRICTION: -1.0}}, "least is 0"),
@@ -358,6 +405,34 @@ def test_what_is_wrong_is_said(
         identify(four_bar, torque.measured(1), **options)
 
 
+@pytest.mark.parametrize(
+    ("reading", "message"), [(np.nan, "no channel has a value"), (3.0, "reads 3 at all positions of all turns in 5")]
+)
+def test_data_that_say_nothing_are_refused(
+    four_bar: trunnion.Mechanism, torque: True_, reading: float, message: str
+) -> None:
+    with pytest.raises(MechanismError, match=message):
+        identify(four_bar, changed(torque.measured(1), lambda turns: np.full_like(turns, reading)), [FRICTION])
+
+
+def changed(data: Measurement, change: Callable[[Any], Any]) -> Measurement:
+    """The measurement with other turns."""
+    found = []
+    for one in data.conditions:
+        courses = {name: replace(course, turns=change(course.turns)) for name, course in one.courses.items()}
+        found.append(replace(one, courses=courses))
+    return replace(data, conditions=tuple(found))
+
+
+def test_infinite_readings_are_gaps_and_exact_data_no_misfit(four_bar: trunnion.Mechanism, torque: True_) -> None:
+    exact = torque.measured(1, sensors=Sensors(0.0, 0.0, 0.0))
+    gappy = changed(exact, lambda turns: np.where(np.arange(turns.shape[1]) < 3, np.inf, turns))
+    for data in (exact, gappy):
+        found = identify(four_bar, data, [FRICTION])
+        assert found["estimate"].values[0] == pytest.approx(0.3, abs=1e-8)
+        assert said(found, "warning") == ""
+
+
 def test_a_channel_without_a_course_is_refused(four_bar: trunnion.Mechanism, torque: True_) -> None:
     data = torque.measured(1)
     course = replace(data.conditions[0].courses["torque"], measures="locking_margin:mechanism")
@@ -369,7 +444,7 @@ def test_a_channel_without_a_course_is_refused(four_bar: trunnion.Mechanism, tor
 def test_positions_where_a_friction_turns_round_are_left_out(four_bar: trunnion.Mechanism, torque: True_) -> None:
     found = identified(four_bar, torque.measured(1), [FRICTION])
     out = [np.flatnonzero(~mask) for mask in found.problem.masks]
-    assert all(len(one) == 9 for one in out)
+    assert all(len(one) == 10 for one in out)  # a speed of zero at a position takes both neighbours
     assert not np.isfinite(
         identify(four_bar, torque.measured(1), [FRICTION])["residual_after"].values[0, 0, out[0]]
     ).any()

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -15,12 +15,15 @@ from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.measured.efficiency import efficiency_of, pairs_of
-from trunnion.measured.measurement import Condition, Course, Measurement
+from trunnion.measured.measurement import Accuracy, Condition, Course, Measurement
 
-__all__ = ["EFFICIENCY", "Block", "blocks_of", "channels_of"]
+__all__ = ["EFFICIENCY", "OWN", "Block", "blocks_of", "channels_of", "finite", "shared_zero"]
 
 Array = NDArray[np.float64]
 EFFICIENCY = "efficiency"  # the channel that is computed from torques and speeds, one figure a turn
+OWN = "zero of each file"
+ROUNDING = 1e-9  # of a course, by interpolation and sums
+FAR_ABOVE = 100.0
 
 
 @dataclass(frozen=True)
@@ -42,8 +45,14 @@ class Block:
 
     @property
     def unresolved(self) -> float:
-        """Standard uncertainty by steps between readings that the scatter does not carry it over."""
-        return float(self.course.unresolved)
+        """Standard uncertainty by steps between readings that the scatter does not carry it over, or by rounding."""
+        return max(float(self.course.unresolved), self._rounding)
+
+    @cached_property
+    def _rounding(self) -> float:
+        """What computing rounds off; 0 where the scatter is far above it."""
+        least = ROUNDING * float(np.nanmax(np.abs(self.turns), initial=0.0))
+        return 0.0 if self.repeats and float(self.variance[0]) > (FAR_ABOVE * least) ** 2 else least
 
     @property
     def fitted(self) -> bool:
@@ -94,6 +103,18 @@ def _mean(turns: Array) -> Array:
         return np.asarray(np.nanmean(turns, axis=0)) if len(turns) else np.full(turns.shape[1], np.nan)
 
 
+def finite(measurement: Measurement) -> Measurement:
+    """The measurement with NaN for readings that are infinite."""
+    found = []
+    for one in measurement.conditions:
+        courses = {
+            name: replace(course, turns=np.where(np.isinf(course.turns), np.nan, course.turns))
+            for name, course in one.courses.items()
+        }
+        found.append(replace(one, courses=courses))
+    return replace(measurement, conditions=tuple(found))
+
+
 def channels_of(measurement: Measurement, wanted: Sequence[str] | None, joints: Mapping[str, str]) -> list[str]:
     """Channels to fit, in the order of the data; all if none is named. MechanismError for one that is not there."""
     known = list(dict.fromkeys(name for one in measurement.conditions for name in one.courses))
@@ -113,12 +134,23 @@ def channels_of(measurement: Measurement, wanted: Sequence[str] | None, joints: 
 def _efficiency(condition: Condition, joints: Mapping[str, str]) -> tuple[Course, dict[str, float]]:
     """The efficiency of each turn as a course of one position, and what the errors of its sensors do to it."""
     found = efficiency_of(condition, joints)
-    effects = {
-        f"{one.source} of {one.channel}": one.sensitivity * one.input
-        for one in found.contributions
-        if one.source in ("gain", "zero")
-    }
+    effects: dict[str, float] = {}
+    for one in found.contributions:
+        accuracy = condition.courses[one.channel].accuracy if one.channel in condition.courses else Accuracy()
+        if one.source == "gain":
+            effects[f"gain of {one.channel}"] = one.sensitivity * one.input
+        elif one.source == "zero":
+            shared = shared_zero(accuracy)
+            effects |= {f"zero of {one.channel}": one.sensitivity * shared} if shared else {}
+            effects |= {f"{OWN} of {one.channel}": one.sensitivity * accuracy.own} if accuracy.own else {}
     return Course(EFFICIENCY, "efficiency:cycle", "1", found.per_turn[:, None]), effects
+
+
+def shared_zero(accuracy: Accuracy) -> float:
+    """Standard uncertainty of the zero that all files share: without what each has by itself."""
+    if not np.isfinite(accuracy.zero):
+        return float(accuracy.zero)
+    return float(np.sqrt(max(accuracy.zero**2 - accuracy.own**2, 0.0)))
 
 
 def blocks_of(

@@ -29,6 +29,7 @@ __all__ = ["Courses", "Model", "Said"]
 
 Array = NDArray[np.float64]
 AT_ONCE = 20_000  # numbers in an array
+STILL = 1e-9  # of the largest speed in the cycle: rounding, whose sign says nothing
 STEP = 1e-6  # of a driver's number, for what it does to the duration of the cycle
 
 
@@ -136,7 +137,9 @@ class Model:
         """Positions beside one with a relative speed of the other sign, in a joint that friction or a load resists."""
         found = np.zeros(shape, bool)
         for joint in sticking(self.run.system):
-            sign = np.broadcast_to(np.sign(primal(back.slips[joint].speed)), shape)
+            speed = np.broadcast_to(np.asarray(primal(back.slips[joint].speed), float), shape)
+            most = np.max(np.abs(np.nan_to_num(speed)), axis=-1, keepdims=True)
+            sign = np.where(np.abs(speed) > STILL * most, np.sign(speed), 0.0)
             differs = sign != np.roll(sign, -1, axis=-1)
             if not self.run.cycle.periodic:
                 differs[..., -1] = False

@@ -14,7 +14,7 @@ from math import inf
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.analysis.rig.identify.blocks import Block
+from trunnion.analysis.rig.identify.blocks import OWN, Block, shared_zero
 from trunnion.analysis.rig.identify.courses import Courses, Model
 from trunnion.errors import Status
 
@@ -25,8 +25,8 @@ Mask = NDArray[np.bool_]
 MOST_EVALUATIONS = 100
 TOLERANCE = 1e-10  # of cost and step: far below what data of any scatter tell
 PER_GUARD = 90  # positions of a cycle for each that is left out beside a jump, which resampling smears
-OWN = "zero of each file"
 ANGLE = "angle of each condition"  # by the sampling of pulses
+LEAST_GAIN = 0.1  # of the model: what a sensor reads at least, 0 would do away with the model
 GUESS = 0.01  # of a course: the scatter of one without repetitions, until its residuals are known
 
 
@@ -85,7 +85,7 @@ def sensors_of(
             found.append(Sensor(name, channel, kind, tuple(sizes), not free))
     return [
         *found,
-        *([] if own else _of_files(blocks)),
+        *_of_files(blocks),
         *_late(blocks, delay),
         *_sampled(blocks, lags or {}),
         *_behind(blocks, own),
@@ -133,20 +133,22 @@ def _sampled(blocks: Sequence[Block], lags: Mapping[str, float]) -> list[Sensor]
 
 def _behind(blocks: Sequence[Block], own: Sequence[str] | None) -> list[Sensor]:
     """Errors of the sensors behind courses that are computed."""
-    effects: dict[tuple[str, str], list[float]] = {}
+    effects: dict[tuple[str, str, str], list[float]] = {}
     for k, block in enumerate(blocks):
         for name, size in block.effects.items():
-            name = f"{name} in {own[block.condition]}" if own else name
-            effects.setdefault((name, block.channel), [0.0] * len(blocks))[k] = size
-    return [Sensor(name, channel, "zero", tuple(sizes), True) for (name, channel), sizes in effects.items()]
+            group = name if name.startswith(OWN) else ""
+            if group:
+                name = f"{name}: {' '.join(block.files or (str(block.condition),))}"
+            elif own:
+                name = f"{name} in {own[block.condition]}"
+            effects.setdefault((name, block.channel, group), [0.0] * len(blocks))[k] = size
+    return [Sensor(name, one, "zero", tuple(sizes), True, group) for (name, one, group), sizes in effects.items()]
 
 
 def _stated(block: Block, kind: str) -> float:
     """What is stated of an error that a channel has in all conditions."""
     accuracy = block.course.accuracy
-    if kind == "zero" and np.isfinite(accuracy.zero):
-        return float(np.sqrt(max(accuracy.zero**2 - accuracy.own**2, 0.0)))
-    return float(getattr(accuracy, kind))
+    return shared_zero(accuracy) if kind == "zero" else float(accuracy.gain)
 
 
 @dataclass
@@ -185,10 +187,10 @@ class Problem:
     @property
     def bounds(self) -> tuple[Array, Array]:
         """Limits of unknowns and sensors."""
-        free = [inf] * len(self.sensors)
         low = [one.lower for one in self.model.unknowns]
         high = [one.upper for one in self.model.unknowns]
-        return np.array([*low, *(-one for one in free)]), np.array([*high, *free])
+        least = [(LEAST_GAIN - 1) / max(one.sizes) if one.kind == "gain" else -inf for one in self.sensors]
+        return np.array([*low, *least]), np.array([*high, *([inf] * len(self.sensors))])
 
     def courses(self, x: Array) -> Courses:
         """What the model says; of the last few places it is kept."""
@@ -252,7 +254,7 @@ class Problem:
             size = block.turns.shape[1]
             if size == 1 < len(status):  # a figure of the whole cycle
                 good = np.array([bool(np.all(status < Status.NOT_CONVERGED))])
-            elif measure.of_motion:
+            elif measure.of_motion or measure.kind == "rate":  # whatever forces do
                 good = (status < Status.SINGULAR) & (status != Status.NEAR_SINGULAR)
             else:
                 guard = -(-size // PER_GUARD) if self.guard is None else self.guard

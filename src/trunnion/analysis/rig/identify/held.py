@@ -22,7 +22,8 @@ def held_out(mechanism: Mechanism, measurement: Measurement, wanted: HoldOut) ->
     """Names of the conditions to hold out, and the share of the turns of the others.
 
     A condition is named by its name, the name of its file without extension, a setting such as `misalignment=15 deg`,
-    which may be that of several, or a part of its name. MechanismError for what names none.
+    which may be that of several, or a part of its name
+    that no other has. MechanismError for what names none.
     """
     if wanted is None:
         return frozenset(), 0.0
@@ -35,7 +36,12 @@ def held_out(mechanism: Mechanism, measurement: Measurement, wanted: HoldOut) ->
     for text in [wanted] if isinstance(wanted, str) else wanted:
         named = [one.name for one in measurement.conditions if _is_named(one, text)]
         named = named or _set(mechanism, measurement, text)
-        named = named or [one.name for one in measurement.conditions if text in one.name]
+        part = [one.name for one in measurement.conditions if text.strip() and text in one.name]
+        if not named and len(part) > 1:
+            some = "; ".join(part[:MOST_NAMED]) + ("; …" if len(part) > MOST_NAMED else "")
+            what = f"'{text}' is in the names of {len(part)} conditions"
+            raise MechanismError(Finding(what, "hold_out", f"name one of {some}; or a setting as NAME=VALUE"))
+        named = named or part
         if not named:
             names = [one.name for one in measurement.conditions]
             some = "; ".join(names[:MOST_NAMED]) + ("; …" if len(names) > MOST_NAMED else "")

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from trunnion.analysis.analyse import Run, prepare
 from trunnion.analysis.friction import FrictionMethod
 from trunnion.analysis.measures import Measure, named
-from trunnion.analysis.rig.identify.blocks import Block, blocks_of, channels_of
+from trunnion.analysis.rig.identify.blocks import Block, blocks_of, channels_of, finite
 from trunnion.analysis.rig.identify.courses import Model
 from trunnion.analysis.rig.identify.fit import Problem, fit, sensors_of
 from trunnion.analysis.rig.identify.held import HoldOut, held_out
@@ -104,6 +104,7 @@ def identified(
     """What `identify` makes its Dataset of."""
     _check(sensors, delay, guard, starts)
     check_settings(mechanism, measurement)
+    measurement = finite(measurement)
     paths = described(mechanism, parameters)
     stated = _stated(mechanism, measurement, paths, start or {})
     settings = _settings(stated, measurement, paths)

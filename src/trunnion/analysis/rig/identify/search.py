@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from trunnion.analysis.rig.identify.fit import Fit, Problem, fit
 from trunnion.analysis.rig.identify.separate import sizes_of
 from trunnion.analysis.rig.identify.uncertainty import correlation_factors, lack_of_fit
-from trunnion.errors import Finding, MechanismError
+from trunnion.analysis.rig.identify.usable import refuse_unusable
 
 __all__ = ["Search", "search"]
 
@@ -81,9 +81,7 @@ def _runnable(problem: Problem) -> tuple[Array, float]:
         found = problem.unanswered(less)
         if found < lost:
             lost, shared, best = found, 0.5**k, less
-    if not any(np.any(mask) for block, mask in zip(problem.blocks, problem.allowed(best), strict=True) if block.fitted):
-        remedy = "give a start from which it runs, or look at it with analyse"
-        raise MechanismError(Finding("no position of the data has an answer of the model", "start", remedy))
+    refuse_unusable(problem, best)
     return best, shared
 
 

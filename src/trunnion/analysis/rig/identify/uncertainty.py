@@ -181,10 +181,11 @@ def spread_of(problem: Problem, x: Array) -> Spread:
     return Spread(information, inverse, null, parts, freedom, test, follows, apart[: problem.count])
 
 
-def _steps(problem: Problem, x: Array, inverse: Array) -> Array:
-    """Covariance by readings that stick to steps: of a mean that does not get finer by more turns."""
+def _steps(problem: Problem, x: Array, inverse: Array, blocks: Sequence[int] | None = None) -> Array:
+    """Covariance by readings that stick to steps: of a mean that does not get finer by more turns; of some blocks."""
     total = np.zeros_like(inverse)
-    for k, block in enumerate(problem.blocks):
+    for k in range(len(problem.blocks)) if blocks is None else blocks:
+        block = problem.blocks[k]
         if block.fitted and block.unresolved:
             columns = inverse @ (np.nan_to_num(problem.said(x, k)[1]) * problem.weight(k)) * block.unresolved
             total += columns @ columns.T
@@ -227,9 +228,10 @@ def _between_turns(problem: Problem, x: Array, inverse: Array) -> tuple[Array, A
         if not own:
             continue
         turns = max(len(problem.blocks[k].turns) for k in own)
-        moved, seam = np.zeros((turns, count)), np.zeros((count, count))
+        moved, seam, rounding = np.zeros((turns, count)), np.zeros((count, count)), np.zeros(count)
         for k in own:  # the channels of a turn belong together
             part = _parts(problem, x, k, inverse)
+            rounding += np.diagonal(_steps(problem, x, inverse, [k]))
             moved[: part.shape[1]] += np.sum(part, axis=2).T
             seam += _seam(part, _reach(problem.blocks[k]))
         covariance = moved.T @ moved * (turns / (turns - 1))
@@ -239,11 +241,12 @@ def _between_turns(problem: Problem, x: Array, inverse: Array) -> tuple[Array, A
         total += covariance
         alone[condition] = np.append(np.diagonal(covariance), turns - 1.0)
         fourth += np.diagonal(covariance) ** 2 / (turns - 1)
-        size = np.sqrt(np.maximum(np.sum(moved**2, axis=0), 1e-300))
-        unit = np.where(size > 1e-140, moved / size, 0.0)[:, : problem.count]
+        size = np.sqrt(np.maximum(np.sum(moved**2, axis=0), 1e-300))[: problem.count]
+        telling = size > np.sqrt(rounding[: problem.count]) + 1e-140  # else it is rounding that repeats
+        unit = (moved[:, : problem.count] / size)[:, telling]
         products += float(np.sum(unit[1:] * unit[:-1])) + unit.shape[1] / turns  # its bias is −1/turns
         squares += unit.shape[1]
-        pairs += turns - 1
+        pairs += (turns - 1) * bool(np.any(telling))
     variance = np.diagonal(total)
     with np.errstate(all="ignore"):
         freedom = np.where(fourth > 0, variance**2 / fourth, np.inf)
@@ -266,15 +269,17 @@ def _apart(problem: Problem, x: Array, inverse: Array, alone: dict[int, Array]) 
         return found
     squares = np.zeros(count)
     for condition, variances in alone.items():
-        added = np.zeros(count)
+        added, steps = np.zeros(count), np.zeros(count)
         for k, block in enumerate(problem.blocks):
             if block.condition == condition and block.fitted and block.repeats:
                 gap = np.where(problem.masks[k], problem.misses(x, k, block.mean), 0.0)
-                added += inverse @ (np.nan_to_num(problem.said(x, k)[1]) * problem.weight(k)) @ gap
+                columns = inverse @ (np.nan_to_num(problem.said(x, k)[1]) * problem.weight(k))
+                added += columns @ gap
+                steps += np.sum((columns * block.unresolved) ** 2, axis=1)
         freedom = variances[-1]
         fair = (freedom - 2) / freedom if freedom > 2 else 0.3
-        steps = np.where(variances[:-1] > 0, variances[:-1], np.inf)
-        squares += fair * added**2 / steps
+        expected = variances[:-1] + steps
+        squares += fair * added**2 / np.where(expected > 0, expected, np.inf)
     freedom = len(alone) - 1.0
     turns = float(np.median([one[-1] for one in alone.values()]))
     chance = special.fdtrc(freedom, max(freedom * turns, 4.0), squares / freedom)

@@ -13,13 +13,14 @@ from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.model.check_values import NOT_NEGATIVE
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.merge import DEFAULT_LAW
-from trunnion.model.parameters import measured
+from trunnion.model.parameters import Entry, measured
 
 __all__ = ["Parameters", "Unknown", "described", "limits", "unknowns"]
 
 Parameters = Mapping[str, Sequence[str] | str] | Sequence[str]
 ABOVE_ZERO = frozenset({"pair_factor", "period", "duration", "return_duration"})
 SMALL = 1e-6  # of 1 in SI: the least of numbers that must be above 0
+PLAIN = {"SI": "1"}  # of a dimension without a unit, whose kind its value does not tell
 OF_SPRINGS = ("stiffness", "damping", "free_length")
 
 
@@ -90,7 +91,7 @@ def unknowns(
             what = f"{missing[0]} is no number but changes with the motion"
             findings.append(Finding(what, f"parameter {name}", "identify a dimension in it"))
             continue
-        units = {kinds[path].unit for path in paths}
+        units = {PLAIN.get(kinds[path].unit, kinds[path].unit) for path in paths}
         if len(units) > 1:
             what = f"its numbers are not of one kind: {', '.join(sorted(units))}"
             findings.append(Finding(what, f"parameter {name}", "give each kind a parameter of its own"))
@@ -115,7 +116,30 @@ def _read(mechanism: Mechanism, path: str, text: float | str) -> float:
 
 
 def limits(mechanism: Mechanism, path: str) -> tuple[float, float]:
-    """Where a number may lie by its law or its kind, SI; infinite where nothing is known against it."""
+    """Where a number may lie by its law or its kind, SI; infinite where nothing is known against it.
+
+    A dimension has the limits of all numbers that are it and nothing else.
+    """
+    entries = mechanism.parameter_set.entries.values()
+    ends, same, grown = [_limits(mechanism, path)], {path}, path.startswith("dimensions.")
+    while grown:  # dimensions that are this one, and so on
+        equal = [one.path for one in entries if one.path not in same and _equals(one, same)]
+        ends += [_limits(mechanism, one) for one in equal]
+        same.update(equal)
+        grown = bool(equal)
+    return max(low for low, _ in ends), min(high for _, high in ends)
+
+
+def _equals(entry: Entry, paths: set[str]) -> bool:
+    """Whether a number is written as one of these dimensions alone, or follows a number that is."""
+    if entry.alias:
+        return entry.alias in paths
+    source = entry.quantity.source
+    return isinstance(source, str) and f"dimensions.{source.strip()}" in paths
+
+
+def _limits(mechanism: Mechanism, path: str) -> tuple[float, float]:
+    """Those of a number by itself."""
     section, _, rest = path.partition(".")
     leaf = path.rpartition(".")[2]
     if ".friction." in path:

@@ -63,7 +63,7 @@ def drift(parts: Sequence[tuple[Turns, Array]]) -> Drift | None:
         min(turns.begin[0] for turns, _ in parts if turns.begin.size)
     )
     change = slope * float(np.ptp(t)) if within == 1 else slope * span
-    if abs(slope) < CERTAIN * error or abs(change) < PLAIN * scatter or abs(change) < SHARE * largest:
+    if change == 0 or abs(slope) < CERTAIN * error or abs(change) < PLAIN * scatter or abs(change) < SHARE * largest:
         return None
     return Drift(slope, error, change, scatter, span)
 

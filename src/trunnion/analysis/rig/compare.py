@@ -115,6 +115,9 @@ def _pair(condition: Condition, model: Modelled, channel: str, coverage: float) 
     return replace(pair, cause=cause, others=tuple(others))
 
 
+VAGUE = 0.5  # expanded uncertainty from which an efficiency is none
+
+
 def _efficiency(condition: Condition, model: Modelled, joints: Mapping[str, str], coverage: float) -> Efficient | None:
     """Efficiency as a rig computes it: of the measured courses, and of the model's in their place."""
     try:
@@ -126,6 +129,13 @@ def _efficiency(condition: Condition, model: Modelled, joints: Mapping[str, str]
         once = "there is one turn only: without scatter its uncertainty is not known", "measure more turns"
         return Efficient(measured.value, model=_of_model(condition, model, joints), reason=once)
     wide = measured.factor(coverage) * measured.uncertainty
+    wrong = "a sign, a gain, a unit or a column of its channels is wrong", "hold their means against what they measure"
+    if wide > VAGUE:
+        return Efficient(measured.value, model=_of_model(condition, model, joints),
+                         reason=(f"its U of {wide:.3g} tells nothing: {wrong[0]}", wrong[1]))  # fmt: skip
+    if measured.value > 1 + wide:
+        return Efficient(measured.value, model=_of_model(condition, model, joints),
+                         reason=(f"{measured.value:.4g} is above 1: {wrong[0]}", wrong[1]))  # fmt: skip
     return Efficient(measured.value, wide, _of_model(condition, model, joints))
 
 

@@ -92,8 +92,8 @@ def _fit(judged: Judged) -> Iterator[Finding]:
     single = [block for block in problem.blocks if block.fitted and not block.repeats]
     if single and len(single) == sum(block.fitted for block in problem.blocks):
         what = (
-            "no turn is repeated: the scatter is taken from the residuals, nothing tests the model, and of filtered data "
-            "the intervals are too narrow"
+            "no turn is repeated: the scatter is taken from the residuals, nothing tests the model, and of filtered "
+            "data the intervals are too narrow"
         )
         yield Finding(what, "data", "record several turns", Severity.WARNING)
     freedom = judged.found.spread.freedom[: problem.count][~judged.lost[: problem.count]]

@@ -19,6 +19,7 @@ from trunnion.analysis.friction import FrictionMethod
 from trunnion.analysis.measures import named
 from trunnion.analysis.rig.identify import identify, with_estimates
 from trunnion.analysis.rig.identify.courses import Model
+from trunnion.analysis.rig.identify.held import held_out
 from trunnion.analysis.rig.identify.run import identified
 from trunnion.analysis.rig.identify.said import _formula
 from trunnion.analysis.rig.identify.separate import Combination
@@ -446,6 +447,15 @@ def test_a_driver_at_another_speed_and_sensors_taken_as_exact_are_warned_of(
     assert "no accuracy is stated of torque: zero and gain are taken as exact" in text
     assert "no turn is repeated" in text
     assert "did not turn" not in said(identify(four_bar, data, [FRICTION]))
+
+
+def test_a_value_names_all_conditions_that_have_it(four_bar: trunnion.Mechanism, torque: True_) -> None:
+    data = torque.measured(1)
+    names = ("angle 25 deg, 10 rpm", "angle 5 deg, 10 rpm", "angle 25 deg, 20 rpm")
+    data = replace(data, conditions=tuple(replace(c, name=n) for c, n in zip(data.conditions, names, strict=False)))
+    assert held_out(four_bar, data, "25 deg") == ({names[0], names[2]}, 0.0)
+    assert held_out(four_bar, data, "5 deg") == ({names[1]}, 0.0)
+    assert held_out(four_bar, data, "20") == ({names[2]}, 0.0)
 
 
 def test_a_combination_has_the_units_of_its_factors() -> None:

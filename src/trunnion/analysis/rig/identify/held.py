@@ -22,7 +22,8 @@ def held_out(mechanism: Mechanism, measurement: Measurement, wanted: HoldOut) ->
     """Names of the conditions to hold out, and the share of the turns of the others.
 
     A condition is named by its name, the name of its file without extension, a setting such as `misalignment=15 deg`,
-    or its value as it stands in the names, which may be that of several, or a part of its name that no other has. MechanismError for what names none.
+    or its value as it stands in the names, which may be that of several, or a part of its name that no other has.
+    MechanismError for what names none.
     """
     if wanted is None:
         return frozenset(), 0.0

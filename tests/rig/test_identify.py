@@ -19,7 +19,10 @@ from trunnion.analysis.friction import FrictionMethod
 from trunnion.analysis.measures import named
 from trunnion.analysis.rig.identify import identify, with_estimates
 from trunnion.analysis.rig.identify.courses import Model
+from trunnion.analysis.rig.identify.held import held_out
 from trunnion.analysis.rig.identify.run import identified
+from trunnion.analysis.rig.identify.said import _formula
+from trunnion.analysis.rig.identify.separate import Combination
 from trunnion.analysis.rig.identify.unknowns import described, limits, unknowns
 from trunnion.errors import MechanismError
 from trunnion.measured.measurement import Accuracy, Condition, Course, Measurement
@@ -430,7 +433,35 @@ def test_infinite_readings_are_gaps_and_exact_data_no_misfit(four_bar: trunnion.
     for data in (exact, gappy):
         found = identify(four_bar, data, [FRICTION])
         assert found["estimate"].values[0] == pytest.approx(0.3, abs=1e-8)
-        assert said(found, "warning") == ""
+        assert said(found, "warning").startswith("sensors: no accuracy is stated of torque")
+        assert "\n" not in said(found, "warning")
+
+
+def test_a_driver_at_another_speed_and_sensors_taken_as_exact_are_warned_of(
+    four_bar: trunnion.Mechanism, torque: True_
+) -> None:
+    data = torque.measured(1, 1, Sensors(zero=0.0, gain=0.0))
+    fast = replace(data, conditions=tuple(replace(one, speed=3.0) for one in data.conditions))
+    text = said(identify(four_bar, fast, [FRICTION]), "warning")
+    assert "the driver did not turn at the model's speed in every condition: 3 rad/s measured, 2 rad/s" in text
+    assert "no accuracy is stated of torque: zero and gain are taken as exact" in text
+    assert "no turn is repeated" in text
+    assert "did not turn" not in said(identify(four_bar, data, [FRICTION]))
+
+
+def test_a_value_names_all_conditions_that_have_it(four_bar: trunnion.Mechanism, torque: True_) -> None:
+    data = torque.measured(1)
+    names = ("angle 25 deg, 10 rpm", "angle 5 deg, 10 rpm", "angle 25 deg, 20 rpm")
+    data = replace(data, conditions=tuple(replace(c, name=n) for c, n in zip(data.conditions, names, strict=False)))
+    assert held_out(four_bar, data, "25 deg") == ({names[0], names[2]}, 0.0)
+    assert held_out(four_bar, data, "5 deg") == ({names[1]}, 0.0)
+    assert held_out(four_bar, data, "20") == ({names[2]}, 0.0)
+
+
+def test_a_combination_has_the_units_of_its_factors() -> None:
+    mixed = Combination("sum", (1.0, 17.0, 0.0, -0.5), 0.2, 0.1)
+    text = _formula(mixed, ["mu", "radius", "off", "torque"], ["1", "m", "1", "N m"])
+    assert text == "mu + 17 1/m radius − 0.5 1/(N m) torque"
 
 
 def test_a_channel_without_a_course_is_refused(four_bar: trunnion.Mechanism, torque: True_) -> None:

@@ -153,9 +153,9 @@ def _spread(values: Array) -> list[float]:
     return [float(known.min()), float(known.max())] if known.size else []
 
 
-def files(result: xr.Dataset) -> Table | None:
-    """The files of the data with their size and hash; None if none is known."""
-    held = attribute(result, "files", [])
+def files(result: xr.Dataset, key: str = "files") -> Table | None:
+    """The files of the data with their size and hash; None if none is known. key: of the attribute that has them."""
+    held = attribute(result, key, [])
     rows = [
         [
             row["file"],

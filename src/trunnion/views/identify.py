@@ -8,7 +8,7 @@ import numpy as np
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.views.conditions import shortened
-from trunnion.views.cycle import names
+from trunnion.views.cycle import Array, attribute, names
 from trunnion.views.figures import INK, MUTED, PALETTE, SHADE, dress, legend, new
 from trunnion.views.identified import Estimate, channels, conditions, curve_of, estimates
 from trunnion.views.lettering import plain
@@ -121,12 +121,30 @@ def residuals(result: xr.Dataset) -> Figure:
     if not pairs:
         return _figures(result)
     sheet = new("Residuals, before and after", result, height=1.0 + 1.75 * len(pairs))
-    rows = sheet.subplots(len(pairs), 1, sharex=True, squeeze=False)[:, 0]
-    for axes, (channel, condition) in zip(rows, pairs, strict=True):
-        _residual(axes, result, channel, condition)
-    dress(rows[-1], "share of the cycle", rows[-1].get_ylabel())
-    legend(rows[0], least=1)
+    rows = sheet.subplots(len(pairs), 2, sharex=True, squeeze=False)
+    drive = str(result.attrs.get("drive", ""))
+    angles = [_angles(result, condition) for _, condition in pairs]
+    turned = all(one is not None for one in angles)
+    for (left, right), angle, (channel, condition) in zip(rows, angles, pairs, strict=True):
+        phase = np.asarray(result["phase"].values[condition], float)
+        x = angle if turned and angle is not None else phase
+        _residual(left, result, (channel, condition), x, before=True)
+        _residual(right, result, (channel, condition), x, before=False)
+    for axes in rows[-1]:
+        dress(axes, plain(f"drive angle {drive} [°]") if turned else "share of the cycle", axes.get_ylabel())
+    for axes in rows[0]:
+        legend(axes, least=1)
     return sheet
+
+
+def _angles(result: xr.Dataset, condition: int) -> Array | None:
+    """Angle of the driver at each position, °; None where it names no position."""
+    ends = attribute(result, "drive_range", [])
+    if condition >= len(ends) or ends[condition] is None:
+        return None
+    first, last = ends[condition]
+    phase = np.asarray(result["phase"].values[condition], float)
+    return np.asarray(np.degrees(first + (last - first) * phase))
 
 
 def panels(result: xr.Dataset) -> list[tuple[int, int]]:
@@ -142,25 +160,28 @@ def panels(result: xr.Dataset) -> list[tuple[int, int]]:
     return [found[int(j)] for j in np.rint(np.linspace(0, len(found) - 1, MOST_PANELS))]
 
 
-def _residual(axes: Axes, result: xr.Dataset, channel: int, condition: int) -> None:
+def _residual(axes: Axes, result: xr.Dataset, pair: tuple[int, int], x: Array, before: bool) -> None:
+    """One course: before, with that after behind it, or after with the band, on its own scale."""
+    channel, condition = pair
     _, name, unit = channels(result)[channel]
-    phase = np.asarray(result["phase"].values[condition], float)
-    before, after, spread = (
+    start, end, spread = (
         curve_of(result, key, channel, condition)
         for key in ("residual_before", "residual_after", "residual_uncertainty")
     )
-    peak = float(np.nanmax(np.abs(np.concatenate([before, after])), initial=0.0))
-    factor, shown = prefixed(peak, unit)
+    shown_of = np.concatenate([start, end] if before else [end, COVERED * spread])
+    factor, shown = prefixed(float(np.nanmax(np.abs(shown_of), initial=0.0)), unit)
     dress(axes, "", plain(f"{name} [{shown}]" if shown else name))
     axes.axhline(0, color=MUTED, linewidth=0.8, zorder=1.5)
-    if np.any(np.isfinite(spread)):
-        axes.fill_between(phase, -COVERED * spread * factor, COVERED * spread * factor, color=SHADE, linewidth=0,
-                          label=f"±{COVERED:g} u of the mean, by scatter", zorder=1)  # fmt: skip
     look: dict[str, Any] = {"marker": "o", "markersize": 2.0, "linewidth": 1.1}
-    axes.plot(phase, before * factor, color=BEFORE, label="before", **look)
-    axes.plot(phase, after * factor, color=AFTER, label="after", **look)
-    axes.set_xlim(0, 1)
-    axes.set_title(plain(names(result, "condition")[condition]), loc="right", fontsize=8, color=MUTED, pad=3)
+    if before:
+        axes.plot(x, start * factor, color=BEFORE, label="before", **look)
+    elif np.any(np.isfinite(spread)):
+        axes.fill_between(x, -COVERED * spread * factor, COVERED * spread * factor, color=SHADE, linewidth=0,
+                          label=f"±{COVERED:g} u of the mean, by scatter", zorder=1)  # fmt: skip
+    axes.plot(x, end * factor, color=AFTER, label="after", **look)
+    axes.set_xlim(float(np.nanmin(x)), float(np.nanmax(x)))
+    if before:
+        axes.set_title(plain(names(result, "condition")[condition]), loc="right", fontsize=8, color=MUTED, pad=3)
 
 
 def _figures(result: xr.Dataset) -> Figure:

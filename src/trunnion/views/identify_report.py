@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from trunnion.views.bundle import web_text
+from trunnion.views.compare_tables import files
 from trunnion.views.cycle import attribute
 from trunnion.views.identified import estimates
 from trunnion.views.identify import figure
@@ -68,7 +69,9 @@ def report(result: xr.Dataset) -> str:
         "formula": str(result.attrs["formula"]), "facts": _facts(result), "summary": _summary(result),
         "findings": [row for row in found if row["severity"] != "note"],
         "notes": [row for row in found if row["severity"] == "note"],
-        "sections": _sections(result), "done": attribute(result, "done", []), "definitions": DEFINITIONS,
+        "sections": _sections(result), "done": attribute(result, "done", []),
+        "files": files(result, "data_files"), "data_findings": attribute(result, "data_findings", []),
+        "definitions": DEFINITIONS,
         "references": [line for line in str(result.attrs.get("references", "")).splitlines() if line.strip()],
         "version": result.attrs.get("trunnion_version", ""), "model_hash": result.attrs.get("model_hash", ""),
         "style": Markup(style), "style_hash": hashed(style),

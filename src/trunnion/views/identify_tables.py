@@ -33,7 +33,7 @@ def estimated(result: xr.Dataset) -> Table:
             f"{one.start:.4g}{one.tail}".replace("-", "−"),
             _value(one),
             _interval(one),
-            "" if not one.told or not math.isfinite(one.freedom) else f"{one.freedom:.0f}",
+            _freedom(one),
             one.source,
         ]
         for one in estimates(result)
@@ -42,12 +42,21 @@ def estimated(result: xr.Dataset) -> Table:
     return Table(f"{result.attrs['identified']}: what was found", head, rows)
 
 
+def _freedom(one: Estimate) -> str:
+    if not one.told:
+        return ""
+    return f"{one.freedom:.0f}" if one.freedom < MANY else "∞"
+
+
+MANY = 1e4  # degrees of freedom: Student's t is the normal distribution to four digits
+
+
 def _value(one: Estimate) -> str:
     if not one.told:
         return "not told"
     if one.limit:
         return f"{one.say(one.value)} (limit)"
-    return f"{one.say(one.value, unit=False)} ± {one.say(one.half)}"
+    return f"{one.say(one.value, unit=False)}\u00a0±\u00a0{one.say(one.half)}"
 
 
 def _interval(one: Estimate) -> str:
@@ -55,18 +64,21 @@ def _interval(one: Estimate) -> str:
         return "—"
     if one.limit:
         return f"up to {one.say(one.upper)}" if one.limit < 0 else f"from {one.say(one.lower)}"
-    return f"{one.say(one.lower, unit=False)} to {one.say(one.upper)}"
+    return f"{one.say(one.lower, unit=False)}\u00a0to\u00a0{one.say(one.upper)}"
 
 
 def correlations(result: xr.Dataset) -> Table | None:
-    """Between the estimates, of several."""
+    """Between the estimates, of several; columns are numbered as the rows are, for names would be too wide."""
     told = [p for p, one in enumerate(estimates(result)) if one.told]
     if len(told) < 2:
         return None
     short = [one.short for one in estimates(result)]
     values = result["correlation"].values
-    rows = [[short[p], *(f"{values[p, q]:.2f}".replace("-", "−") if q <= p else "" for q in told)] for p in told]
-    return Table("correlation", ["", *(short[p] for p in told)], rows)
+    rows = [
+        [f"{k} {short[p]}", *(f"{values[p, q]:.2f}".replace("-", "−") if q <= p else "" for q in told)]
+        for k, p in enumerate(told, 1)
+    ]
+    return Table("correlation", ["", *(f"{k}" for k in range(1, len(told) + 1))], rows)
 
 
 def fits(result: xr.Dataset) -> Table | None:

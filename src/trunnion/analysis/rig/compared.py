@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -18,7 +18,7 @@ from trunnion.analysis.rig.judge import Verdict, difference, expanded, probabili
 from trunnion.analysis.rig.pairs import Compared, Pair
 from trunnion.analysis.rig.said import findings_of, gathered, units_set
 from trunnion.errors import Status
-from trunnion.measured.measurement import Measurement
+from trunnion.measured.measurement import Condition, Measurement
 from trunnion.model.mechanism import Mechanism
 
 if TYPE_CHECKING:
@@ -177,7 +177,7 @@ def _attributes(
         "findings": [finding_row(finding) for finding in told],
         "data_findings": [{**finding_row(one), "file": one.file} for one in gathered(measurement.findings)],
         "done": list(measurement.done),
-        "files": _files(found),
+        "files": hashed_files(one.condition for one in found),
         "condition_files": [list(one.condition.files) for one in found],
         "inputs": inputs(mechanism),
     }
@@ -210,10 +210,10 @@ def _all_within(found: Sequence[Compared]) -> bool:
     return courses and all(one.efficiency.within for one in found if one.efficiency is not None)
 
 
-def _files(found: Sequence[Compared]) -> list[dict[str, Any]]:
+def hashed_files(conditions: Iterable[Condition]) -> list[dict[str, Any]]:
     """Name, size and SHA-256 of every file of the data; without the last two where it is not at hand."""
     rows = []
-    for name in dict.fromkeys(name for one in found for name in one.condition.files):
+    for name in dict.fromkeys(name for one in conditions for name in one.files):
         path = Path(name)
         row: dict[str, Any] = {"file": path.name, "bytes": None, "sha256": ""}
         if path.is_file():

@@ -23,7 +23,7 @@ from trunnion.model.units import unit as unit_of
 if TYPE_CHECKING:
     from trunnion.analysis.rig.pairs import Compared, Pair
 
-__all__ = ["findings_of", "gathered", "said", "units_set"]
+__all__ = ["findings_of", "gathered", "other_speed", "said", "units_set"]
 
 FAR = 0.5  # of a gain: told as a factor from here on
 SIGNIFICANT = 3.5  # standard deviations: of a correlation of turns that is none, in 1 of 4000 channels
@@ -322,21 +322,24 @@ def _efficiencies(found: Sequence[Compared]) -> Iterator[Finding]:
 
 def _speeds(found: Sequence[Compared]) -> Iterator[Finding]:
     """A driver that turned at another speed than the model's."""
-    off = []
+    rows = []
     for one in found:
-        run = one.model.run
-        first = next(iter(run.system.mechanism.drivers), "")
-        if not first or not np.isfinite(one.condition.speed) or one.model.unit != "rad":
-            continue
-        theirs = one.model.span / run.cycle.duration
-        if abs(one.condition.speed - theirs) > SLOWER * abs(theirs):
-            off.append((one, first, theirs))
+        first = next(iter(one.model.run.system.mechanism.drivers), "")
+        if first and one.model.unit == "rad":
+            rows.append((one.condition.name, one.condition.speed, one.model.span / one.model.run.cycle.duration))
+            driver = first
+    if rows:
+        yield from other_speed(driver, rows, len(found))
+
+
+def other_speed(driver: str, rows: Sequence[tuple[str, float, float]], of: int) -> Iterator[Finding]:
+    """Of a driver whose speed, by condition as measured and in the model, rad/s, differs; of: conditions in all."""
+    off = [row for row in rows if np.isfinite(row[1]) and abs(row[1] - row[2]) > SLOWER * abs(row[2])]
     if off:
-        one, driver, theirs = off[0]
-        where = _in([case.condition.name for case, _, _ in off], len(found))
+        _, measured, theirs = off[0]
         what = (
-            f"the driver did not turn at the model's speed {where}: {said(one.condition.speed, 'rad/s')} measured, "
-            f"{said(theirs, 'rad/s')} in the model"
+            f"the driver did not turn at the model's speed {_in([row[0] for row in off], of)}: "
+            f"{said(measured, 'rad/s')} measured, {said(theirs, 'rad/s')} in the model"
         )
         remedy = f"state set: {{{driver}.speed: {{mean: …}}}} in the mapping, of a channel that measures rate:{driver}"
         yield Finding(what, f"drivers.{driver}", remedy, Severity.WARNING)

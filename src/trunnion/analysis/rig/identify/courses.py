@@ -19,7 +19,7 @@ from trunnion.analysis.analyse import Run, pose_status, status_of
 from trunnion.analysis.friction import FrictionMethod
 from trunnion.analysis.kinematics import Forward, posed
 from trunnion.analysis.kinetostatics import Backward
-from trunnion.analysis.measures import Measure
+from trunnion.analysis.measures import Measure, coordinate_unit
 from trunnion.analysis.rig.identify.unknowns import Unknown
 from trunnion.analysis.seating import given_offsets
 from trunnion.analysis.system import sticking
@@ -207,14 +207,33 @@ class Model:
 
     def _duration(self, condition: int, at: Array) -> float:
         """Of the cycle, s. Gear pairs that no driver turns are taken to turn as in the nominal cycle."""
-        overrides: dict[str, Number] = dict(self.settings[condition])
-        for value, unknown in zip(at, self.unknowns, strict=True):
-            overrides.update(dict.fromkeys(unknown.paths, float(value)))
+        overrides = self._overrides(condition, at)
         system, cycle = self.run.system, self.run.cycle
         if cycle.duration == 0:
             return 0.0
         nominal = system.cycle(self.run.values).duration
         return float(cycle.duration * system.cycle(system.mechanism.parameters(overrides)).duration / nominal)
+
+    def _overrides(self, condition: int, at: Array) -> dict[str, Number]:
+        """What a condition sets, and the unknowns."""
+        overrides: dict[str, Number] = dict(self.settings[condition])
+        for value, unknown in zip(at, self.unknowns, strict=True):
+            overrides.update(dict.fromkeys(unknown.paths, float(value)))
+        return overrides
+
+    def driven(self, condition: int, at: Array) -> tuple[float, float, float]:
+        """Angles of the first driver where the cycle begins and ends, rad, and its mean speed, rad/s.
+
+        NaN where its turns name no position.
+        """
+        system, duration = self.run.system, self._duration(condition, at)
+        if duration == 0 or coordinate_unit(system, self.run.values) != "rad":
+            return float("nan"), float("nan"), float("nan")
+        values = system.mechanism.parameters(self._overrides(condition, at))
+        ends = np.array([0.0, duration * (1 - 1e-12)])
+        drive = system.drive(values, next(iter(system.mechanism.drivers)), ends)[0]
+        row = np.ravel(np.asarray(primal(drive), float))
+        return float(row[0]), float(row[-1]), float((row[-1] - row[0]) / duration)
 
     def _times(self, part: Sequence[int], at: Array) -> Number:
         """Times of the positions, s, (row, position): shares of a cycle that an unknown may make longer."""

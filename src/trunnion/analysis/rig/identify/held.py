@@ -22,8 +22,8 @@ def held_out(mechanism: Mechanism, measurement: Measurement, wanted: HoldOut) ->
     """Names of the conditions to hold out, and the share of the turns of the others.
 
     A condition is named by its name, the name of its file without extension, a setting such as `misalignment=15 deg`,
-    which may be that of several, or a part of its name
-    that no other has. MechanismError for what names none.
+    or its value as it stands in the names, which may be that of several, or a part of its name that no other has.
+    MechanismError for what names none.
     """
     if wanted is None:
         return frozenset(), 0.0
@@ -36,6 +36,7 @@ def held_out(mechanism: Mechanism, measurement: Measurement, wanted: HoldOut) ->
     for text in [wanted] if isinstance(wanted, str) else wanted:
         named = [one.name for one in measurement.conditions if _is_named(one, text)]
         named = named or _set(mechanism, measurement, text)
+        named = named or [one.name for one in measurement.conditions if _has(one.name, text.strip())]
         part = [one.name for one in measurement.conditions if text.strip() and text in one.name]
         if not named and len(part) > 1:
             some = "; ".join(part[:MOST_NAMED]) + ("; …" if len(part) > MOST_NAMED else "")
@@ -53,6 +54,11 @@ def held_out(mechanism: Mechanism, measurement: Measurement, wanted: HoldOut) ->
 
 def _is_named(condition: Condition, text: str) -> bool:
     return condition.name == text or text in {PurePath(one).stem for one in condition.files}
+
+
+def _has(name: str, text: str) -> bool:
+    """Whether a name, such as `misalignment 25 deg, input.speed 100 rpm`, has a setting of this value."""
+    return bool(text) and any(one == text or one.endswith(f" {text}") for one in name.split(", "))
 
 
 def _set(mechanism: Mechanism, measurement: Measurement, text: str) -> list[str]:

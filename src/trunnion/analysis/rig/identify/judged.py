@@ -65,6 +65,11 @@ class Judged:
             lost[list(group.members)] = True
         return lost
 
+    @property
+    def told(self) -> Array:
+        """Values of the unknowns: estimates, of what the data do not tell the start, (unknown,)."""
+        return np.asarray(np.where(self.lost, self.start, self.found.x)[: self.problem.count])
+
     @cached_property
     def deviation(self) -> Array:
         """Standard uncertainty, (unknown and sensor,)."""

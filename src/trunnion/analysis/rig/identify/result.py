@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 
 from trunnion import __version__
 from trunnion.analysis.account import finding_row, references
+from trunnion.analysis.rig.compared import hashed_files
 from trunnion.analysis.rig.identify.judged import Judged
 from trunnion.analysis.rig.identify.run import Identified
 from trunnion.analysis.rig.identify.said import sentences
 from trunnion.analysis.rig.identify.uncertainty import CONFIDENCE
+from trunnion.analysis.rig.said import gathered
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -62,7 +64,12 @@ def dataset(found: Identified) -> xr.Dataset:
         "channel_units": json.dumps([one.unit(system) for one in problem.model.measures.values()]),
         "channel_measures": json.dumps([one.name for one in problem.model.measures.values()]),
         "drive": _drive(found),
+        "drive_range": json.dumps(_driven(judged)),
         "files": json.dumps([list(one.files) for one in measurement.conditions], ensure_ascii=False),
+        "data_files": json.dumps(hashed_files(measurement.conditions), ensure_ascii=False),
+        "data_findings": json.dumps(
+            [{**finding_row(one), "file": one.file} for one in gathered(measurement.findings)], ensure_ascii=False
+        ),
         "done": json.dumps(list(measurement.done), ensure_ascii=False),
         "evaluations": problem.evaluations,
         "starts": found.search.starts,
@@ -76,6 +83,13 @@ def dataset(found: Identified) -> xr.Dataset:
 def _drive(found: Identified) -> str:
     """The first driver, if its turns name the positions."""
     return next(iter(found.mechanism.drivers), "")
+
+
+def _driven(judged: Judged) -> list[list[float] | None]:
+    """Angles of the first driver where the cycle begins and ends, rad, by condition; None if they name no position."""
+    model = judged.problem.model
+    ends = (model.driven(k, judged.told) for k in range(len(model.phases)))
+    return [[first, last] if np.isfinite([first, last]).all() else None for first, last, _ in ends]
 
 
 @dataclass(frozen=True)

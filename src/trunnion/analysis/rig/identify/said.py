@@ -7,9 +7,11 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from trunnion.analysis.rig.identify.amounts import amount, share
+from trunnion.analysis.rig.identify.blocks import OWN, shared_zero
 from trunnion.analysis.rig.identify.judged import Judged
 from trunnion.analysis.rig.identify.separate import Combination, Group, known_of, sizes_of
 from trunnion.analysis.rig.identify.uncertainty import RANDOM, quantile
+from trunnion.analysis.rig.said import other_speed
 from trunnion.errors import Finding, Severity, Status
 
 __all__ = ["sentences"]
@@ -21,12 +23,13 @@ MOSTLY = 0.5  # of the variance
 POOR = 2.0  # times what is expected, of predictions
 MOST_NAMED = 3
 FEW = 5.0  # degrees of freedom
+FORCES = ("effort", "load", "reaction", "efficiency")
 NUMBERS = ("no", "one", "two", "three", "four", "five", "six")
 
 
 def sentences(judged: Judged) -> list[Finding]:
     """Errors and warnings first."""
-    parts = (_search, _fit, _groups, _near, _limits, _sensors, _data, _held)
+    parts = (_search, _fit, _speeds, _groups, _near, _limits, _sensors, _exact, _data, _held)
     found = [one for part in parts for one in part(judged)]
     order = (Severity.ERROR, Severity.WARNING, Severity.NOTE)
     return sorted(found, key=lambda one: order.index(one.severity))
@@ -88,8 +91,11 @@ def _fit(judged: Judged) -> Iterator[Finding]:
         yield Finding(what, where, remedy, Severity.WARNING if apart[p] > MUCH**2 else Severity.NOTE)
     single = [block for block in problem.blocks if block.fitted and not block.repeats]
     if single and len(single) == sum(block.fitted for block in problem.blocks):
-        what = "no turn is repeated: the scatter is taken from the residuals, and nothing tests the model"
-        yield Finding(what, "data", "record several turns", Severity.NOTE)
+        what = (
+            "no turn is repeated: the scatter is taken from the residuals, nothing tests the model, and of filtered "
+            "data the intervals are too narrow"
+        )
+        yield Finding(what, "data", "record several turns", Severity.WARNING)
     freedom = judged.found.spread.freedom[: problem.count][~judged.lost[: problem.count]]
     if freedom.size and np.min(freedom) < FEW:
         degrees = _count(round(float(np.min(freedom))), "degree")
@@ -100,6 +106,16 @@ def _fit(judged: Judged) -> Iterator[Finding]:
     if follows > 2 / np.sqrt(max(pairs, 1)):
         what = f"each turn resembles the one before it (correlation {follows:.2f}): the intervals are wider for it"
         yield Finding(what, "data", "look for a drift; warm the rig up", Severity.WARNING)
+
+
+def _speeds(judged: Judged) -> Iterator[Finding]:
+    """A driver that ran at another speed than the model's."""
+    model = judged.problem.model
+    driver = next(iter(model.run.system.mechanism.drivers), "")
+    conditions = judged.found.measurement.conditions
+    fitted = dict.fromkeys(block.condition for block in judged.problem.blocks if block.fitted)
+    rows = [(conditions[k].name, conditions[k].speed, model.driven(k, judged.told)[2]) for k in fitted]
+    yield from other_speed(driver, [row for row in rows if np.isfinite(row[2])], len(rows))
 
 
 # ---- what cannot be told apart --------------------------------------------------------------------------------
@@ -151,14 +167,13 @@ def _known(judged: Judged, group: Group, names: Sequence[str], short: bool = Fal
     """What of them is known, and that the rest is not; short: of what is known only."""
     if not group.known:
         return "no combination of them is known"
-    units = {judged.problem.model.unknowns[i].unit for i in group.members if i < judged.problem.count}
-    unit = next(iter(units)) if len(units) == 1 and max(group.members) < judged.problem.count else "1"
+    units = [_unit(judged, i) for i in group.members]
     pair = len(names) == 2
     if pair:
         one = group.known[0]
-        said = amount(one.value, one.uncertainty, unit if one.form == "sum" else "1")
+        said = amount(one.value, one.uncertainty, _leading(one, units) if one.form == "sum" else "1")
         if short:
-            subject = f"their {one.form}" if one.form != "sum" else _formula(one, names)
+            subject = f"their {one.form}" if one.form != "sum" else _formula(one, names, units)
             return f"{subject} = {said} is known best"
         other = {"sum": "difference", "product": "ratio", "ratio": "product"}[one.form]
         if one.form == "sum" and one.factors == (1.0, 1.0):
@@ -167,21 +182,43 @@ def _known(judged: Judged, group: Group, names: Sequence[str], short: bool = Fal
             return f"their difference is known, {said}, their sum is not"
         if one.form != "sum":
             return f"their {one.form} is known, {said}, neither alone"
-        return f"{_formula(one, names)} = {said} is known, neither alone"
-    told = "; ".join(f"{_formula(one, names)} = {amount(one.value, one.uncertainty, unit)}" for one in group.known)
+        return f"{_formula(one, names, units)} = {said} is known, neither alone"
+    told = "; ".join(
+        f"{_formula(one, names, units)} = {amount(one.value, one.uncertainty, _leading(one, units))}"
+        for one in group.known
+    )
     many = f"{_count(len(group.known), 'combination')} of them {'is' if len(group.known) == 1 else 'are'} known"
     return f"{many}, none alone: {told}"
 
 
-def _formula(one: Combination, names: Sequence[str]) -> str:
+def _unit(judged: Judged, i: int) -> str:
+    """SI unit of an unknown; errors of sensors are in their standard uncertainties."""
+    return judged.problem.model.unknowns[i].unit if i < judged.problem.count else "1"
+
+
+def _leading(one: Combination, units: Sequence[str]) -> str:
+    """SI unit of a combination: that of its first number, whose factor is 1."""
+    return next(unit for factor, unit in zip(one.factors, units, strict=True) if factor != 0)
+
+
+def _formula(one: Combination, names: Sequence[str], units: Sequence[str]) -> str:
     parts: list[str] = []
-    for factor, name in zip(one.factors, names, strict=True):
+    lead = _leading(one, units)
+    for factor, name, unit in zip(one.factors, names, units, strict=True):
         if factor == 0:
             continue
-        size = "" if abs(factor) == 1 else f"{abs(factor):.3g} "
+        per = "" if unit == lead else f"{_ratio(lead, unit)} "
+        size = "" if abs(factor) == 1 and not per else f"{abs(factor):.3g} {per}"
         sign = ("− " if factor < 0 else "+ ") if parts else ("−" if factor < 0 else "")
         parts.append(f"{sign}{size}{name}")
     return " ".join(parts)
+
+
+def _ratio(over: str, under: str) -> str:
+    """A unit by another: 1/m, N m/rad."""
+    if under in ("", "1"):
+        return over
+    return f"{over}/({under})" if set(under) & set(" /*") else f"{over}/{under}"
 
 
 # ---- limits, sensors, data ------------------------------------------------------------------------------------
@@ -215,20 +252,33 @@ def _sensors(judged: Judged) -> Iterator[Finding]:
         for source, part in zip(names, shares[p], strict=True):
             if source not in (*RANDOM, "resolution") and part > MOSTLY:
                 what = f"{share(part)} of its variance is the {source}: more turns do not help"
-                yield Finding(what, f"parameter {unknown.name}", "calibrate that sensor better", Severity.NOTE)
+                remedy = "calibrate that sensor better"
+                if source.startswith(OWN):
+                    remedy = "record a longer unloaded stretch in each file, or more files"
+                yield Finding(what, f"parameter {unknown.name}", remedy, Severity.NOTE)
     for s, sensor in enumerate(problem.sensors, problem.count):
         if sensor.stated and abs(judged.found.x[s]) > FAR:
             what = f"comes out {abs(judged.found.x[s]):.1f} standard uncertainties from what is stated of it"
             remedy = "check the sensor, its stated accuracy, and the loads of the model"
             yield Finding(what, sensor.name, remedy, Severity.WARNING)
-    known = (
-        (one.channel, one.effects or one.course.accuracy.zero or one.course.accuracy.gain) for one in problem.blocks
-    )
-    exact = [channel for channel, told in known if not told]
-    if exact:
-        channels = _joined(list(dict.fromkeys(exact)))
-        what = f"no accuracy is stated of {channels}: zero and gain are taken as exact"
-        yield Finding(what, "sensors", "state accuracy: {zero: …, gain: …} in the mapping", Severity.NOTE)
+
+
+def _exact(judged: Judged) -> Iterator[Finding]:
+    """Channels whose zero and gain are taken as exact: of torques and forces that is hardly so."""
+    measures = judged.problem.model.measures
+    known: dict[str, bool] = {}
+    for one in judged.problem.blocks:
+        accuracy = one.course.accuracy
+        if one.fitted:
+            stated = bool(one.effects or shared_zero(accuracy) or accuracy.gain)
+            known[one.channel] = known.get(one.channel, False) or stated
+    bare = [channel for channel, told in known.items() if not told]
+    forces = [channel for channel in bare if measures[channel].kind in FORCES]
+    for channels, severity in ((forces, Severity.WARNING), ([one for one in bare if one not in forces], Severity.NOTE)):
+        if channels:
+            what = f"no accuracy is stated of {_joined(channels)}: zero and gain are taken as exact"
+            what += ", and the intervals are too narrow by that" if severity is Severity.WARNING else ""
+            yield Finding(what, "sensors", "state accuracy: {zero: …, gain: …} in the mapping", severity)
 
 
 def _data(judged: Judged) -> Iterator[Finding]:

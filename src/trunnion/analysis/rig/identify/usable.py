@@ -43,8 +43,7 @@ def _unusable(problem: Problem, start: Array) -> Iterator[Finding]:
         yield Finding(what, "guard", "give a smaller guard, or resample to more positions")
         return
     codes = np.concatenate([np.asarray(one) for one in problem.courses(start).status])
-    usual = int(np.bincount(codes).argmax())
-    worst = next(one for one in Status if one == usual)
+    worst = list(Status)[int(np.bincount(codes).argmax())]
     if worst < Status.NOT_CONVERGED:
         what = "no position of the data has a sound answer of the model: a mechanism stands or is near singular there"
         yield Finding(what, "data", "measure at more positions")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -48,7 +49,7 @@ def show_figures(title: str, rows: list[dict[str, Any]]) -> None:
 def show_rows(title: str, head: list[str], rows: list[list[str]]) -> None:
     """Rows of texts under their heads, broken between words where they are too wide, but not before a unit.
 
-    A table whose words do not fit is wider than the terminal: a number is never broken.
+    Where no terminal sets a width, a table whose words do not fit is as wide as they need: no number is broken.
     """
     from rich.cells import cell_len
     from rich.table import Table
@@ -56,10 +57,10 @@ def show_rows(title: str, head: list[str], rows: list[list[str]]) -> None:
     out = console()
     out.print(title, style="italic", markup=False, highlight=False, soft_wrap=True)
     frame = 3 * len(head) - 1
-    words = (
-        max(cell_len(word) for cell in column for word in cell.split(" ")) for column in zip(head, *rows, strict=True)
-    )
-    out.width = max(out.width, sum(words) + frame)
+    if not out.is_terminal and "COLUMNS" not in os.environ:
+        columns = zip(head, *rows, strict=True)
+        least = (max(cell_len(word) for cell in column for word in cell.split(" ")) for column in columns)
+        out.width = max(out.width, sum(least) + frame)
     cells = _fitted([head, *rows], out.width - frame)
     table = Table(show_edge=False)
     for name in cells[0]:
@@ -70,14 +71,14 @@ def show_rows(title: str, head: list[str], rows: list[list[str]]) -> None:
 
 
 def _fitted(rows: list[list[str]], room: int) -> list[list[str]]:
-    """The cells broken into lines at plain spaces so that all columns take so much room; as they are if they do. rich
-    itself breaks at spaces that are not to be broken, too."""
+    """The cells broken into lines at plain spaces so that all columns take so much room; as they are if they do, or
+    cannot. rich itself breaks at spaces that are not to be broken, too."""
     from rich.cells import cell_len
 
     columns = list(zip(*rows, strict=True))
     widths = [max(cell_len(cell) for cell in column) for column in columns]
     least = [max(cell_len(word) for cell in column for word in cell.split(" ")) for column in columns]
-    if sum(widths) <= room:
+    if sum(widths) <= room or sum(least) > room:
         return rows
     while sum(widths) > room:
         widest = max((k for k in range(len(widths)) if widths[k] > least[k]), key=widths.__getitem__)

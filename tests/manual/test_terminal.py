@@ -32,3 +32,11 @@ def test_a_table_too_wide_for_whole_words_is_folded(
     monkeypatch.setenv("COLUMNS", "40")
     show_rows("title", HEAD, ROWS)
     assert max(cell_len(line) for line in capsys.readouterr().out.splitlines()) <= 40
+
+
+def test_a_file_has_room_for_whole_words(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """Where no terminal sets the width, no number is broken."""
+    monkeypatch.delenv("COLUMNS", raising=False)
+    rows = [["1.23456789", "0.987654321"] * 8]
+    show_rows("title", ["number"] * 16, rows)
+    assert all(text in capsys.readouterr().out.split() for text in ("1.23456789",))

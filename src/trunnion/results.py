@@ -79,6 +79,7 @@ VARIABLES: dict[str, Variable] = {
     "power_residual": Variable((), "W", "drive + loads + inertia − friction power; 0 but for rounding"),
     "friction_iterations": Variable((), "1", "rounds to settle friction and reactions"),
     "friction_change": Variable((), "N", "largest change of a reaction in the last round"),
+    "friction_residual": Variable((), "N", "largest difference between a friction and its law for the load found"),
     "friction_contraction": Variable((), "1", "contraction of the friction iteration; from 1 on it may diverge"),
     "locking_margin": Variable((), "1", "multiple of the friction at which the position locks, ∞ if beyond 10"),
     "status": Variable((), "1", "code of the position's status; see the attribute flag_meanings"),

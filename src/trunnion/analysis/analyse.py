@@ -447,6 +447,7 @@ def _fill_settled(arrays: Arrays, back: Backward, window: slice) -> None:
     for key, field in (
         ("friction_iterations", "iterations"),
         ("friction_change", "change"),
+        ("friction_residual", "residual"),
         ("friction_contraction", "contraction"),
     ):
         worst = functools.reduce(np.maximum, (getattr(one, field) for one in settled), 0.0)

@@ -24,7 +24,7 @@ __all__ = ["scene"]
 
 FORMAT = 1
 SUMS = ("useful_power", "efficiency_instant", "closure_residual", "condition", "power_residual",
-        "friction_iterations", "friction_change", "friction_contraction")  # fmt: skip
+        "friction_iterations", "friction_change", "friction_residual", "friction_contraction")  # fmt: skip
 
 
 def scene(result: xr.Dataset, ideal: xr.Dataset | None = None, max_positions: int = 720) -> dict[str, Any]:

@@ -214,7 +214,8 @@ def slider(count=90):
             "drive_effort": [effort], "drive_effort_lower": [effort - 4], "drive_effort_upper": [effort + 6],
             "drive_power": [effort * 0.05], "useful_power": effort * 0.04, "efficiency": 0.8,
             "efficiency_instant": flat + 0.8, "closure_residual": flat, "condition": flat + 2, "power_residual": flat,
-            "friction_iterations": np.full(count, 3), "friction_change": flat, "friction_residual": flat, "friction_contraction": flat,
+            "friction_iterations": np.full(count, 3), "friction_change": flat, "friction_residual": flat,
+            "friction_contraction": flat,
             "status": np.zeros(count, np.int8),
         },
         {

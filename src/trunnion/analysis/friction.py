@@ -42,8 +42,9 @@ __all__ = [
     "settle",
 ]
 
+OBEYED = 1e-10  # of the largest friction: by how much a friction may miss its law where it is called settled
 SETTLED = 1e-11  # of the largest friction: where the iteration ends
-SLOW = 1e-2  # of the residual: a round of Newton's method that leaves more has another matrix after it
+SLOW = 1e-2  # of the miss: a round of Newton's method that leaves more has another matrix after it
 STUBBORN = 20  # rounds of Newton's method: a lane that takes more goes back and forth between the sides of a kink
 COMPILED_ROUNDS = 3  # of Newton's method where the numbers have no values to tell when to end; one more beyond FEW
 FEW = 3  # contacts of a dyad
@@ -116,7 +117,7 @@ def _newton(problem: Problem, method: FrictionMethod) -> Settled:
     shares: Number = 1.0
     left = ~certain
     if method.limit >= STUBBORN:
-        left = left | ~(found.done | real.obeys(found.gaps, found.forces))
+        left = left | ~(found.done | _obeyed(real, found))
     if np.any(left):
         forces, shares = _follow(real, found.forces, left)
         again = _started(real, forces, ~left)
@@ -132,7 +133,7 @@ def _newton(problem: Problem, method: FrictionMethod) -> Settled:
         state = problem.state(forces)
     # of no lanes at all nothing is known
     contraction = largest([total([np.abs(entry) for entry in row]) for row in rows]) if rows else 0.0
-    converged = found.done if method.criterion is not None else real.obeys(found.gaps, found.forces)
+    converged = found.done if method.criterion is not None else _obeyed(real, found)
     return Settled(
         reactions=problem.reactions(forces, state),
         forces=forces,
@@ -166,6 +167,11 @@ class _Iterate:
     change: Number = np.inf
 
 
+def _obeyed(real: Problem, at: _Iterate) -> Number:
+    """Where every law is obeyed as closely as a solved position promises; NaN is no answer and breaks no promise."""
+    return ~(real.excess(at.gaps, at.forces) > OBEYED)
+
+
 def _started(real: Problem, forces: list[Number], done: Number) -> _Iterate:
     """At these forces, with nothing done in the lanes that are not."""
     state = real.state(forces)
@@ -182,7 +188,7 @@ def _iterated(real: Problem, start: _Iterate, method: FrictionMethod) -> _Iterat
     """
     forces, done, state, gaps = start.forces, start.done, start.state, start.gaps
     rows, inverse, rounds, change = start.rows, start.inverse, start.rounds, start.change
-    residual: Number = largest(gaps)
+    excess: Number = 1.0  # of no friction at all
     slow: Number = ~done
     for _ in range(min(method.limit, STUBBORN)):
         if np.all(done):
@@ -195,13 +201,13 @@ def _iterated(real: Problem, start: _Iterate, method: FrictionMethod) -> _Iterat
         (forces,) = _chosen(~done, [_corrected(forces, gaps, inverse)], [forces])
         before, state = state, real.state(forces)
         gaps = real.gaps(state, forces)
-        previous, residual = residual, largest(gaps)
-        change = np.where(done, change, _changed(state, before))
-        if method.criterion is None:
-            done = done | real.obeys(gaps, forces, SETTLED)
-        else:
-            done = done | ~np.greater(change, method.criterion)  # a lane of NaN has nothing to wait for
-        slow = (residual > SLOW * previous) & ~done
+        previous, excess = excess, real.excess(gaps, forces)
+        here = _changed(state, before)
+        change = np.where(done, change, here) if np.any(done) else here
+        # a lane of NaN has nothing to wait for
+        ends = ~(excess > SETTLED) if method.criterion is None else ~np.greater(here, method.criterion)
+        done = done | ends
+        slow = (excess > SLOW * previous) & ~done
     return _Iterate(forces, done, state, gaps, rows, inverse, rounds, change)
 
 
@@ -246,7 +252,7 @@ def _unrolled(problem: Problem, method: FrictionMethod) -> Settled:
         iterations=COMPILED_ROUNDS,
         change=_changed(state, before),
         contraction=0.0,
-        converged=certain & real.obeys(gaps, plain, SETTLED),
+        converged=certain & ~(real.excess(gaps, plain) > SETTLED),
         residual=real.misfit(gaps),
         share=1.0,
         margin=np.inf,
@@ -293,10 +299,10 @@ def _successive(problem: Problem, method: FrictionMethod) -> Settled:
         before, state = state, problem.state(forces)
         gaps = problem.gaps(state, forces)
         previous, change = change, _changed(state, before)
-        done = problem.obeys(gaps, forces, SETTLED) if method.criterion is None else ~(change > method.criterion)
+        done = ~(problem.excess(gaps, forces) > SETTLED) if method.criterion is None else ~(change > method.criterion)
         if np.all(done):
             break
-    done = problem.obeys(gaps, forces) if method.criterion is None else change <= method.criterion
+    done = ~(problem.excess(gaps, forces) > OBEYED) if method.criterion is None else change <= method.criterion
     measurable = np.isfinite(previous) & (previous > 0)
     ratio = np.where(measurable, change / np.where(measurable, previous, 1.0), 0.0)
     real = _primal(problem)

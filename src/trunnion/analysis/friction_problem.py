@@ -22,9 +22,7 @@ from trunnion.groups.planar import is_zero, less
 from trunnion.joints.friction import FrictionLaw
 from trunnion.joints.pairs import ContactLoad, Reaction
 
-__all__ = ["OBEYED", "Contact", "Problem", "State", "added", "largest", "total"]
-
-OBEYED = 1e-10  # of the largest friction: by how much a friction may miss its law where it is called settled
+__all__ = ["Contact", "Problem", "State", "added", "largest", "total"]
 
 
 class Contact(NamedTuple):
@@ -171,19 +169,18 @@ class Problem:
         """What the laws say less what the forces are: 0 where they are settled."""
         return [less(a, b) for a, b in zip(self.target(state.normals), forces, strict=True)]
 
-    def obeys(self, gaps: Sequence[Number], forces: Sequence[Number], share: float = OBEYED) -> Number:
-        """Where no friction misses its law by more than a share of the largest; where there is none, nothing does.
+    def excess(self, gaps: Sequence[Number], forces: Sequence[Number]) -> Number:
+        """Largest miss of a friction from its law, of the largest friction; NaN where there is none, and no answer.
 
-        What pushes gears apart is held against the largest force of all, as it does not get small with friction. NaN
-        is no answer, so that no law is broken there.
+        What pushes gears apart is held against the largest force of all, as it does not get small with friction.
         """
         rubbing = [k for k, contact in enumerate(self.contacts) if contact.rubs]
-        missed: Number = np.False_
-        if rubbing:
-            missed = largest([gaps[k] for k in rubbing]) > share * largest([forces[k] for k in rubbing])
-        if len(rubbing) < len(gaps):
-            missed = missed | (largest(gaps) > share * largest(forces))
-        return ~missed
+        if len(rubbing) == len(gaps):
+            return largest(gaps) / largest(forces)
+        whole = largest(gaps) / largest(forces)
+        if not rubbing:
+            return whole
+        return np.fmax(whole, largest([gaps[k] for k in rubbing]) / largest([forces[k] for k in rubbing]))
 
     def misfit(self, gaps: Sequence[Number]) -> Number:
         """Largest difference between a friction and what its law says, N."""

@@ -11,7 +11,7 @@ from scipy.signal import butter, sosfiltfilt
 
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.measured.account import Account, counted, runs
-from trunnion.measured.amounts import Amount, alike, dimensions
+from trunnion.measured.amounts import HERTZ, Amount, alike, dimensions
 from trunnion.measured.mapping import Channel, Filter, Zero
 from trunnion.measured.scale import Scale, default_unit, scale
 from trunnion.measured.tables import Column
@@ -77,7 +77,10 @@ def reading(name: str, channel: Channel, column: Column, account: Account) -> Re
         return Reading(found, unit, limit, abs(found.factor) * found.reading(channel.accuracy.zero, "accuracy.zero"),
                        float(channel.accuracy.gain.evaluate()))  # fmt: skip
     except UnitError as error:
-        raise MechanismError(Finding(error.what, where, error.remedy, file=account.file)) from None
+        remedy = error.remedy
+        if not channel.unit and column.unit:  # a file of a logger is not written anew
+            remedy = f"state {where}.unit in the mapping; in the file, {remedy}"
+        raise MechanismError(Finding(error.what, where, remedy, file=account.file)) from None
 
 
 def _compare(where: str, channel: Channel, column: Column, account: Account) -> None:
@@ -88,6 +91,8 @@ def _compare(where: str, channel: Channel, column: Column, account: Account) -> 
         own = dimensions(column.unit)
     except UnitError:
         return
+    if own[1] == HERTZ and stated[1] == dimensions("rad/s")[1] and np.isclose(stated[0] / own[0], (1, 2 * np.pi)).any():
+        return  # 1/min where the mapping says rpm, as it has to
     if not alike(own[1], stated[1]) or own[0] != stated[0]:
         what = f"the file has the unit '{column.unit}' for '{channel.column}', the mapping '{channel.unit}'"
         account.warn(where, f"{what}, which is taken", f"correct {where}.unit, or remove it")

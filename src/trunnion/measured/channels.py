@@ -30,12 +30,15 @@ BRIDGED = 0.1  # of the period of the cut-off: gaps up to this are bridged for t
 
 @dataclass(frozen=True)
 class Zeroed:
-    """Zero of a channel, in readings. uncertainty: of it, in readings; drift: readings a second, from `since`."""
+    """Zero of a channel, in readings. uncertainty: of it, in readings; drift: readings a second, from `since`.
+
+    since: when the zero was that, s; NaN where it is a value that was stated.
+    """
 
     value: float
     uncertainty: float = 0.0
     drift: float = 0.0
-    since: float = 0.0
+    since: float = float("nan")
 
 
 @dataclass(frozen=True)
@@ -115,7 +118,7 @@ def zeroed(
     error = float(1 / np.sqrt(weights.sum())) if np.all(errors > 0) else 0.0
     if means.size < 2 or np.ptp(middles) == 0:
         account.say(f"zero of {name}: mean over the unloaded stretch, ± {{}} {unit}", abs(raw.factor) * error)
-        return Zeroed(mean, error)
+        return Zeroed(mean, error, since=float(np.average(middles, weights=weights)))
     slope = float(np.polyfit(middles, means, 1)[0])
     span = float(np.ptp(middles))
     change = slope * span
@@ -128,18 +131,18 @@ def zeroed(
     if drifts:
         account.warn(where.removesuffix(".zero"), told, "let the sensor warm up, or state drift: remove")
     account.say(f"zero of {name}: mean over {means.size} unloaded stretches, ± {{}} {unit}", abs(raw.factor) * error)
-    return Zeroed(mean, error)
+    return Zeroed(mean, error, since=float(np.average(middles, weights=weights)))
 
 
 def _stretches(where: str, zero: Zero, readings: Array, line: Timeline, account: Account) -> tuple[Array, Array, Array]:
-    """Middle, mean and standard uncertainty of the mean of every unloaded stretch that has values."""
+    """Middle of the readings, their mean and its standard uncertainty, of every unloaded stretch that has values."""
     rows = []
     for begin, end in zero.over:
         low, high = np.searchsorted(line.seconds, (begin.value, end.value))
-        part = readings[low:high]
-        part = part[np.isfinite(part)]
-        if part.size:
-            rows.append((0.5 * (begin.value + end.value), float(np.mean(part)), mean_uncertainty(part)))
+        known = np.isfinite(readings[low:high])
+        part, when = readings[low:high][known], line.seconds[low:high][known]
+        if part.size:  # a stretch may be stated longer than the file has it
+            rows.append((float(np.mean(when)), float(np.mean(part)), mean_uncertainty(part)))
         else:
             what = (
                 f"there are no readings from {begin.value:g} to {end.value:g} s; the file runs from {line.seconds[0]:g}"

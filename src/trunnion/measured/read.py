@@ -297,18 +297,11 @@ class _File:
         if mapping.drift == "report":
             account.warn(where, what, f"{remedy}, or state drift: remove")
             return None
-        since = self._since(name)
+        since = float(line.seconds[0]) if np.isnan(zero.since) else zero.since
         account.warn(where, f"{what}; a straight line is taken off, zero at {since:.4g} s", remedy)
         for part in parts:
             part.courses[name] = resampled(part.turns, values - found.slope * (line.seconds - since))
         return found
-
-    def _since(self, name: str) -> float:
-        """When a zero was right: in its unloaded stretch, else at the start of the recording."""
-        zero = self.mapping.channels[name].zero
-        if isinstance(zero, Zero):
-            return float(np.mean([one.value for span in zero.over for one in span]))
-        return float(self.line.seconds[0])
 
     def _rate(self, turns: Sequence[Turns]) -> float:
         cycle = float(self.mapping.cycle.evaluate())
@@ -322,7 +315,7 @@ class _File:
         for name, channel in self.mapping.channels.items():
             own = self.own[name]
             left = drifts[name]
-            extra = left.error * left.span / 2 if left else 0.0
+            extra = left.error * left.span / 2 if left else 0.0  # of the line that was taken off, at either end
             of_file = float(np.hypot(abs(own.scale.factor) * zeros[name].uncertainty, extra))
             zero = float(np.hypot(own.accuracy_zero, of_file))
             accuracy = Accuracy(zero, own.accuracy_gain, self.steps[name], of_file)

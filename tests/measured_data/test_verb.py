@@ -66,7 +66,9 @@ def test_faults_and_bad_input(program: Run, rig: Path, tmp_path: Path) -> None:
     code, out, err = program("data", "rig.json", "a.csv", "b.csv")
     assert code == 1
     assert "beta 15 deg" in out  # the other condition has its file for a name
-    assert err.startswith(
+    note, fault = err.splitlines()[:2]
+    assert note.startswith("rig.json:1: note: files: b.csv is read without `set`, which the mapping states for other")
+    assert fault.startswith(
         "b.csv: warning: channels.brake: sign: the power that brake takes is below zero in all 19 turns"
     )
     pd.DataFrame(columns).drop(columns=["T1", "n2"]).to_csv(tmp_path / "b.csv", index=False)

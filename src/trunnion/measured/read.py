@@ -44,7 +44,8 @@ def read_measured(
     findings: list[Finding] = []
     accounts: list[Account] = []
     failed = False
-    for path, entry in _files(mapped, files):
+    entries, notes = _files(mapped, files)
+    for path, entry in entries:
         account = Account(str(path))
         try:
             with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # of numbers near the end of the floats
@@ -54,7 +55,7 @@ def read_measured(
             failed = True
         findings += account.findings
         accounts.append(account)
-    findings = mapped.placed(findings)
+    findings = mapped.placed([*findings, *notes])
     if failed or not conditions:
         raise MechanismError([one for one in findings if one.severity is not Severity.NOTE])
     name = mapped.mapping.name or Path(mapped.file).stem
@@ -84,17 +85,53 @@ def _averaged(conditions: Sequence[Condition], recorded: float) -> str:
     return f"{each} whole turns{where}; rows before, between and after them are not used"
 
 
-def _files(mapped: Mapped, files: Iterable[str | os.PathLike[str]] | None) -> list[tuple[Path, File]]:
-    """Data files with what the mapping says of them; files of the command line keep the entry of the same file."""
-    stated = {(mapped.folder / entry.file).resolve(): entry for entry in mapped.mapping.files}
-    if files is not None and (named := [Path(one) for one in files]):
-        return [(path, stated.get(path.resolve()) or File(file=path.name or ".")) for path in named]
-    if not mapped.mapping.files:
+def _files(
+    mapped: Mapped, files: Iterable[str | os.PathLike[str]] | None
+) -> tuple[list[tuple[Path, File]], list[Finding]]:
+    """Data files with what the mapping says of them; notes of what is kept of it, or lost, where it names other files.
+
+    Files of the command line keep the entry of the same file, else of the same name, where one entry alone has it.
+    """
+    entries = mapped.mapping.files
+    named = [Path(one) for one in files or ()]
+    if not named and not entries:
         finding = Finding(
             "no data file is named", "files", "write files: [{file: run-01.csv}], or name them after the mapping"
         )
         raise MechanismError(mapped.placed([finding]))
-    return [(mapped.folder / entry.file, entry) for entry in mapped.mapping.files]
+    if not named:
+        return [(mapped.folder / entry.file, entry) for entry in entries], []
+    stated = {(mapped.folder / one.file).resolve(): one for one in entries}
+    own, other = [one.name for one in named], [Path(one.file).name for one in entries]
+    found: list[tuple[Path, File]] = []
+    kept, lost = [], []
+    for path in named:
+        entry = stated.get(path.resolve())
+        if entry is None and own.count(path.name) == 1 == other.count(path.name):
+            entry = entries[other.index(path.name)]
+            kept += [path] if _says(entry) else []
+        elif entry is None:
+            lost.append(path)
+        found.append((path, entry or File(file=path.name or ".")))
+    notes = []
+    if kept:
+        what = f"{_some(kept)} read with what the mapping says of the file of that name, {_says(*entries)}"
+        notes.append(Finding(what, "files", "rename the file if something else was set", Severity.NOTE))
+    if lost and (says := _says(*entries)):
+        what = f"{_some(lost)} read without {says}, which the mapping states for other files"
+        remedy = f"add {{file: {lost[0].name}, set: …}} to `files`, or state `set` for all files"
+        notes.append(Finding(what, "files", remedy, Severity.NOTE))
+    return found, notes
+
+
+def _says(*entries: File) -> str:
+    """What entries state of their files."""
+    return " and ".join(f"`{key}`" for key in ("set", "over") if any(getattr(one, key) for one in entries))
+
+
+def _some(paths: Sequence[Path]) -> str:
+    told = ", ".join(str(one) for one in paths[:4]) + (f" and {len(paths) - 4} more" if len(paths) > 4 else "")
+    return f"{told} {'is' if len(paths) == 1 else 'are'}"
 
 
 def _distinct(conditions: Sequence[Condition]) -> list[Condition]:

@@ -20,6 +20,7 @@ import numpy as np
 from trunnion.measured.amounts import dimensions
 from trunnion.measured.clock import Clock, is_time
 from trunnion.measured.tables import NOTHING, Column, Table, choose, clock_of, failed, number, numbers
+from trunnion.model.names import unguarded
 from trunnion.model.units import UnitError
 
 __all__ = ["read_csv"]
@@ -191,6 +192,7 @@ def _cells(line: str, separator: str) -> list[str]:
 
 def _named(cell: str) -> tuple[str, str]:
     """Name and unit of a header's cell."""
+    cell = unguarded(cell)
     found = _UNIT.match(cell)
     if not found:
         return cell, ""

@@ -164,7 +164,7 @@ def test_files_of_the_command_line_keep_what_was_set(tmp_path: Path, columns: Co
     assert read_("run.csv") == ([{**gamma, **beta}], [])
     values, (kept,) = read_("elsewhere/run.csv")
     assert values == [{**gamma, **beta}]
-    assert "run.csv is read with what the mapping says of the file of that name, `set`" in kept
+    assert "run.csv is read with the `set` of the file of that name in the mapping" in kept
     assert read_("elsewhere/two.csv") == ([gamma], [])  # nothing was said of it
     values, (lost,) = read_("run.csv", "new.csv")
     assert values == [{**gamma, **beta}, gamma]

@@ -90,7 +90,8 @@ def _files(
 ) -> tuple[list[tuple[Path, File]], list[Finding]]:
     """Data files with what the mapping says of them; notes of what is kept of it, or lost, where it names other files.
 
-    Files of the command line keep the entry of the same file, else of the same name, where one entry alone has it.
+    Files of the command line keep the entry of the same file; what was set also that of the same name, where one entry
+    alone has it. A stretch of time is that of one recording.
     """
     entries = mapped.mapping.files
     named = [Path(one) for one in files or ()]
@@ -104,23 +105,26 @@ def _files(
     stated = {(mapped.folder / one.file).resolve(): one for one in entries}
     own, other = [one.name for one in named], [Path(one.file).name for one in entries]
     found: list[tuple[Path, File]] = []
-    kept, lost = [], []
+    kept: list[Path] = []
+    lost: dict[str, list[Path]] = {}
     for path in named:
         entry = stated.get(path.resolve())
-        if entry is None and own.count(path.name) == 1 == other.count(path.name):
-            entry = entries[other.index(path.name)]
-            kept += [path] if _says(entry) else []
-        elif entry is None:
-            lost.append(path)
-        found.append((path, entry or File(file=path.name or ".")))
+        if entry is None:
+            alike = own.count(path.name) == 1 == other.count(path.name)
+            like = entries[other.index(path.name)] if alike else None
+            entry = File(file=path.name or ".", set=like.set if like else {})
+            kept += [path] if entry.set else []
+            missing = _says(*([like.model_copy(update={"set": {}})] if like else entries))
+            lost.setdefault(missing, []).append(path)
+        found.append((path, entry))
     notes = []
     if kept:
-        what = f"{_some(kept)} read with what the mapping says of the file of that name, {_says(*entries)}"
+        what = f"{_some(kept)} read with the `set` of the file of that name in the mapping"
         notes.append(Finding(what, "files", "rename the file if something else was set", Severity.NOTE))
-    if lost and (says := _says(*entries)):
-        what = f"{_some(lost)} read without {says}, which the mapping states for other files"
-        remedy = f"add {{file: {lost[0].name}, set: …}} to `files`, or state `set` for all files"
-        notes.append(Finding(what, "files", remedy, Severity.NOTE))
+    for missing, paths in lost.items():
+        what = f"{_some(paths)} read without {missing}, which the mapping states for other files"
+        remedy = f"add {{file: {paths[0].name}, {missing.split('`')[1]}: …}} to `files`" if missing else ""
+        notes += [Finding(what, "files", remedy, Severity.NOTE)] if missing else []
     return found, notes
 
 

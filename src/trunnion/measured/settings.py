@@ -107,7 +107,8 @@ def _factor(path: str, unit: str, known_as: dict[str, Dimension], account: Accou
         factor, exponents = dimensions(unit)
         known_as[path] = dimension_of(exponents, unit)
     except UnitError as error:
-        raise MechanismError(Finding(error.what, f"set.{path}", error.remedy, file=account.file)) from None
+        remedy = f"state the unit in the mapping: set: {{{path}: {{column: …, unit: …}}}}; in the file, {error.remedy}"
+        raise MechanismError(Finding(error.what, f"set.{path}", remedy, file=account.file)) from None
     return factor
 
 

@@ -31,6 +31,8 @@ _WORD = r"(?:[^\W\d_]+|%|°[A-Za-z]?)(?!\w|\s*\()(?:(?:\^|\*\*)[-+]?[0-9](?![\w.
 _UNIT = rf"(?:{_WORD})(?:[ /*·⋅](?:{_WORD}))*"
 LITERAL = re.compile(rf"(?P<number>{_NUMBER})(?:\s*(?P<unit>{_UNIT})|\s+(?P<per>1/{_UNIT}))?")
 _TOKEN = re.compile(rf"\s*(?:(?P<literal>{LITERAL.pattern})|(?P<name>[^\W\d]\w*)|(?P<operator>\*\*|[-+*/^(),]))")
+# 1500 min-1, as catalogues write a speed: here it is a difference
+_RECIPROCAL = re.compile(rf"\s*{_NUMBER}\s*(?:{_UNIT}[ /*·])?(?P<power>(?P<unit>min|s)-[12])(?![\w.])")
 # Signs an engineer's keyboard or word processor makes of - * ^2; the minus of a superscript included.
 _SIGNS = str.maketrans({"−": "-", "–": "-", "×": "*", "⋅": "·"})
 _SUPERSCRIPT = re.compile("⁻?[⁰¹²³⁴⁵⁶⁷⁸⁹]")
@@ -149,6 +151,9 @@ def _tokens(text: str) -> tuple[str, dict[str, Literal | str]]:
         found = _TOKEN.match(text, place)
         if not found:
             raise UnitError(f"'{text[place:].strip()[:20]}' is not understood in '{text}'", _hint(text))
+        if power := _RECIPROCAL.match(text, place):
+            what = f"'{power['power']}' is {power['unit']} less {power['power'][-1]} in '{text}'"
+            raise UnitError(what, "write an angular speed in rpm or rad/s, a power of a unit as s^-1")
         operator = found["operator"]
         if operator is None and after_operand:
             raise UnitError(
@@ -222,7 +227,8 @@ def _operand(operand: Literal | str) -> Evaluator:
     if operand == "pi":
         return lambda names: np.float64(np.pi)
     if operand in FUNCTIONS:
-        raise UnitError(f"the function '{operand}' has no argument", f"write {operand}(…)")
+        speed = "; an angular speed is in rpm or rad/s" if operand == "min" else ""
+        raise UnitError(f"the function '{operand}' has no argument", f"write {operand}(…){speed}")
     name = operand
 
     def look_up(names: Mapping[str, Number]) -> Number:

@@ -134,7 +134,9 @@ def identify(
     written = _write(result, out or [], report, kind, units_row)
     _tables(result)
     findings = findings_of(result)
-    found = gathered(one for one in measurement.findings if one.severity is not Severity.NOTE)
+    found = gathered(  # of the notes those that tell what was set
+        one for one in measurement.findings if one.severity is not Severity.NOTE or one.where == "files"
+    )
     if write is not None:
         findings += _write_model(mechanism, result, file, write, force, written)
     for path in written:

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 import trunnion
-from mechanisms import DURANGO
+from mechanisms import DURANGO, eccentric_press
 from trunnion import FrictionMethod, Mechanism, Status
 from trunnion.algebra.dual import derivative, primal, seed
 from trunnion.analysis.friction import Contact, Settled, settle
@@ -148,3 +148,16 @@ def test_the_residual_is_a_result(name: str, method: str) -> None:
     assert np.any(moment[solved] + force[solved] > 0)
     thickest = 10.02e-3  # m, of the pins of these: no friction force is less than its torque over it
     assert np.all(result["friction_residual"].values[solved] <= 1e-10 * np.maximum(moment / thickest, force)[solved])
+
+
+def test_single_positions_of_an_eccentric_press() -> None:
+    """One at a time, as no other position then makes the iteration go on; the law by hand, on both sides of the kink."""
+    run = trunnion.prepare(eccentric_press())
+    sides = set()
+    for time in np.linspace(0.05, 6.2, 400):
+        back = run.solve(np.array([time]))
+        reaction, friction = back.reactions["S"], float(back.friction["S"][0])
+        force, couple = abs(float(reaction.y[0])), abs(float(reaction.m[0])) * 2 / 0.1
+        sides.add(force > couple)
+        assert abs(friction) == pytest.approx(0.49 * max(force, couple), rel=1e-10)
+    assert sides == {True, False}

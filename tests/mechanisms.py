@@ -425,7 +425,7 @@ def eccentric_press() -> Mechanism:
     """A slider-crank with friction in its guide alone, whose load presses beside the middle of the guide.
 
     The load F is 0.2 of the guide's length off its axis, so that its couple presses with 0.4 F at any friction, and the
-    side force of the rod with (F − φ) tan β where the load moves the slider: there the friction takes the load over from
+    side force of the rod with (F − φ) tan β where the load moves the slider: there friction takes the load over from
     the side force, which it changes, to the couple, which it does not.
     """
     guide = {"type": "prismatic", "links": ["frame", "slider"], "guide": {"length": 0.1}, "friction": 0.49}

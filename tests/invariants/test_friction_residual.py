@@ -151,7 +151,7 @@ def test_the_residual_is_a_result(name: str, method: str) -> None:
 
 
 def test_single_positions_of_an_eccentric_press() -> None:
-    """One at a time, as no other position then makes the iteration go on; the law by hand, on both sides of the kink."""
+    """One at a time, as no other one then makes the iteration go on; the law by hand, on both sides of a kink."""
     run = trunnion.prepare(eccentric_press())
     sides = set()
     for time in np.linspace(0.05, 6.2, 400):

@@ -247,6 +247,10 @@ class System:
         """One cycle of a driver."""
         return self.mechanism.drivers[name].motion.span(self._motion(values, name))
 
+    def knots(self, values: Values, name: str) -> list[Number]:
+        """Times, s, within one cycle of a driver at which a derivative of its coordinate jumps."""
+        return self.mechanism.drivers[name].motion.knots(self._motion(values, name))
+
     def _motion(self, values: Values, name: str) -> dict[str, Number]:
         """What the motion law of a driver is given."""
         found: dict[str, Number] = {key: values[path] for key, path in self._driver_paths[name] if path in values}

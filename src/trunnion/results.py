@@ -220,7 +220,7 @@ def dataset(
     time: NDArray[np.float64],
     means: CycleMeans,
     attributes: Mapping[str, str | float],
-    ideal_efficiency: float | None = None,
+    ideal: CycleMeans | None = None,
 ) -> xr.Dataset:
     """The arrays as an xarray Dataset with coordinates, units and long names."""
     import xarray as xr
@@ -236,10 +236,10 @@ def dataset(
     }
     for name, (dims, unit, long_name) in CYCLE.items():
         found[name] = xr.Variable(dims, getattr(means, name), {"units": unit, "long_name": long_name})
-    if ideal_efficiency is not None:
-        found["efficiency_ideal"] = xr.Variable(
-            (), ideal_efficiency, {"units": "1", "long_name": "efficiency of the mechanism without errors"}
-        )
+    for name in ("efficiency", "friction_power_mean") if ideal is not None else ():
+        dims, unit, long_name = CYCLE[name]
+        told = {"units": unit, "long_name": f"{long_name}, of the mechanism without errors"}
+        found[f"{name}_ideal"] = xr.Variable(dims, getattr(ideal, name), told)
     coordinates = {dim: (dim, np.asarray(names, dtype=str)) for dim, names in labels.items()}
     times = xr.Variable("position", time, {"units": "s", "long_name": "time from the start of the cycle"})
     return xr.Dataset(found, {**coordinates, "time": times}, dict(attributes))

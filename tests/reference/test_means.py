@@ -15,6 +15,9 @@ from trunnion.analysis.account import useful_loads
 from trunnion.analysis.analyse import Run, prepare
 from trunnion.analysis.quadrature import Effort, integrals
 from trunnion.analysis.switches import Mechanisms, edges
+from trunnion.errors import Status
+from trunnion.views.built_tables import error_rows
+from trunnion.views.quantities import quantity
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 STEPS = (60, 72, 90, 360, 720)
@@ -76,7 +79,9 @@ def test_a_finer_integral_comes_nearer() -> None:
     mechanism = press("1 kN")
     value = float(trunnion.analyse(mechanism, 60)["efficiency"])
     off = [abs(finely(prepare(mechanism), cells) - value) for cells in (36, 360, 3600, 36_000)]
-    assert off[1] < off[0] / 5 and off[2] < off[1] / 5 and off[3] < 1e-6 * value
+    assert off[1] < off[0] / 5
+    assert off[2] < off[1] / 5
+    assert off[3] < 1e-6 * value
 
 
 def test_a_sweep_has_the_efficiencies_of_the_analysis_at_any_number_of_positions() -> None:
@@ -131,6 +136,40 @@ def test_edges_are_where_the_model_switches() -> None:
     dead = [np.degrees(np.arcsin(-60 / 200)) % 360, 180 + np.degrees(np.arcsin(60 / 120))]
     for place in (340, 343, 90, 270, *dead):
         assert np.min(np.abs(degrees - place)) < 1e-8
+
+
+# ---- positions that are not valid -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("model", ["fourbar-with-play", "rssr-with-play"])
+def test_extremes_are_of_positions_that_are_valid(model: str) -> None:
+    """Where a pin loses contact its forces are no answer: the summary, a sweep and the report leave them out."""
+    mechanism = trunnion.read(EXAMPLES / f"{model}.yaml").with_values({"A.speed": "300 rpm"})
+    result = trunnion.analyse(mechanism, 360)
+    lost = result["status"].values == Status.CONTACT_LOST
+    assert np.any(lost)
+    sizes = np.sqrt((result["reaction_force"].values ** 2).sum(axis=1))
+    rows = {row["label"]: row["value"] for row in json.loads(result.attrs["summary"])}
+    kept = result["status"].values == Status.SOLVED
+    for size, joint in zip(sizes, result["joint"].values, strict=True):
+        (value,) = (value for label, value in rows.items() if label.startswith(f"reaction of {joint}, largest"))
+        assert value == pytest.approx(np.max(size[kept]), rel=1e-12)
+    assert rows["positions not valid, for a pin loses contact"] == np.count_nonzero(lost)
+    assert rows["positions solved, of 360"] == 360 - np.count_nonzero(lost)
+    swept = trunnion.sweep(mechanism, {"A.speed": ["300 rpm"]}, 360)
+    np.testing.assert_allclose(swept["reaction_max"].values[:, 0], np.max(sizes[:, kept], axis=1), rtol=1e-12)
+    assert int(swept["not_valid"][0]) == np.count_nonzero(lost)
+    tables = {row["label"]: row["built"] for row in error_rows(result)}
+    joint = str(result["joint"].values[0])
+    assert tables[f"Reaction of {joint}, largest"] == quantity(float(np.max(sizes[0][~lost])), "N")
+
+
+def test_a_lost_contact_matters_to_the_extremes_of_this_example() -> None:
+    """The test above would pass by itself if the largest force lay elsewhere."""
+    mechanism = trunnion.read(EXAMPLES / "fourbar-with-play.yaml").with_values({"A.speed": "300 rpm"})
+    result = trunnion.analyse(mechanism, 360)
+    sizes = np.sqrt((result["reaction_force"].values ** 2).sum(axis=1))
+    assert np.any(np.max(sizes, axis=1) > np.max(sizes[:, result["status"].values == Status.SOLVED], axis=1))
 
 
 # ---- the rule -------------------------------------------------------------------------------------------------

@@ -109,7 +109,6 @@ def finish(run: Run, found_positions: Positions) -> xr.Dataset:
     """The Dataset with its attributes: formula, findings, summary, input data, drawing data, provenance."""
     mechanism, arrays, time = run.system.mechanism, found_positions.arrays, found_positions.time
     method, causes = found_positions.method, found_positions.causes
-    ideal = found_positions.ideal.efficiency if found_positions.ideal else None
     near = _near_locking(run, arrays, time, method)
     left_open = run.determinacy.findings() if run.determinacy else []
     found = [
@@ -139,7 +138,9 @@ def finish(run: Run, found_positions: Positions) -> xr.Dataset:
         "scene": json.dumps(_scene(run), ensure_ascii=False),
         "periodic": int(run.cycle.periodic),
     }
-    return results.dataset(arrays, found_positions.labels, time, found_positions.means, attributes, ideal)
+    return results.dataset(
+        arrays, found_positions.labels, time, found_positions.means, attributes, found_positions.ideal
+    )
 
 
 def effort_units(system: System) -> list[str]:
@@ -280,7 +281,8 @@ def _summary(run: Run, found: Positions, near: near_locking.Locking | None) -> l
         rows += _reaction_rows(run.system, arrays, dial, sound)
         lost = np.sum(arrays["friction_power"], axis=0)
         if rubbing(run.system):
-            rows.append(_margin(arrays["locking_margin"], dial))
+            valid = arrays["status"] != Status.CONTACT_LOST
+            rows.append(_margin(np.where(valid, arrays["locking_margin"], np.nan), dial))
             rows += near.rows(run, dial) if near else []
             rows.append({"label": "friction power, mean", "value": means.friction_power.net, "unit": "W"})
             if len(sound):
@@ -292,7 +294,7 @@ def _summary(run: Run, found: Positions, near: near_locking.Locking | None) -> l
         if found.ideal is not None:
             ideal = found.ideal.efficiency
             rows.append({"label": "efficiency of the cycle without errors", "value": ideal, "unit": "1"})
-            rows += summary_rows(run, arrays, dial)
+            rows += summary_rows(run, arrays, dial, arrays["status"] != Status.CONTACT_LOST)
         back = near_locking.reverse_row(run, near.back, useful_loads(run.system.mechanism)) if near else None
         rows += [back] if back else []
         solved = int(np.count_nonzero(arrays["status"] < Status.NOT_CONVERGED))
@@ -301,7 +303,10 @@ def _summary(run: Run, found: Positions, near: near_locking.Locking | None) -> l
     rows.append(
         {"label": "friction iterations, most", "value": int(np.max(arrays["friction_iterations"])), "unit": "1"}
     )
-    rows.append({"label": f"positions solved, of {len(time)}", "value": solved, "unit": "1"})
+    lost = int(np.count_nonzero(arrays["status"] == Status.CONTACT_LOST))
+    rows.append({"label": f"positions solved, of {len(time)}", "value": solved - lost, "unit": "1"})
+    if lost:
+        rows.append({"label": "positions not valid, for a pin loses contact", "value": lost, "unit": "1"})
     return [{**row, "value": _finite(row["value"])} for row in rows]
 
 
@@ -312,9 +317,9 @@ def _finite(value: float | None) -> float | None:
 def sound_positions(status: NDArray[Any]) -> NDArray[np.intp]:
     """Positions whose figures can be relied on: solved; those with a zero speed only if there are no others.
 
-    Where a pin loses contact motion and forces are those of its seat there, as elsewhere.
+    Where a pin loses contact it is taken to stay in a seat that would jump: forces there are no answer.
     """
-    best = np.flatnonzero((status == Status.SOLVED) | (status == Status.CONTACT_LOST))
+    best = np.flatnonzero(status == Status.SOLVED)
     return best if len(best) else np.flatnonzero(status == Status.ZERO_SLIP)
 
 
@@ -333,6 +338,7 @@ def _reaction_rows(system: System, arrays: Arrays, dial: Dial, sound: NDArray[np
                     {"label": f"{what} of {name}, largest, at {dial.at(top)}", "value": size[top], "unit": unit}
                 )
         slide = arrays["joint_slide"][i]
+        slide = slide[arrays["status"] != Status.CONTACT_LOST]
         if kind == "prismatic" and np.any(np.isfinite(slide)):
             stroke = np.nanmax(slide) - np.nanmin(slide)
             rows.append({"label": f"stroke of {name}", "value": stroke, "unit": "m"})

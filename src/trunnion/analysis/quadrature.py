@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Effort", "Integrals", "integrals"]
+__all__ = ["Effort", "Integrals", "Nodes", "integrals", "nodes"]
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -44,6 +44,21 @@ NODES = np.array([*(-x for x in _NODES), *_NODES[-2::-1]])
 KRONROD = np.array([*_KRONROD, *_KRONROD[-2::-1]])
 GAUSS = np.zeros(15)
 GAUSS[1::2] = [*_GAUSS, *_GAUSS[-2::-1]]
+
+
+class Nodes(NamedTuple):
+    """Places of a mean over panels, rising, the weight of each, and weights of the rule inside, to tell the error."""
+
+    at: Array
+    weights: Array
+    inside: Array
+
+
+def nodes(edges: Array) -> Nodes:
+    """The nodes of all panels between edges."""
+    half, middle = 0.5 * np.diff(edges)[:, None], 0.5 * (edges[1:] + edges[:-1])[:, None]
+    length = edges[-1] - edges[0]
+    return Nodes(*(part.ravel() for part in (middle + half * NODES, half * KRONROD / length, half * GAUSS / length)))
 
 
 @dataclass(frozen=True)
@@ -83,10 +98,10 @@ def integrals(
     low, high = (np.concatenate([one[part] for one in edges]) for part in (slice(None, -1), slice(1, None)))
     panels = np.bincount(rows, minlength=count)
     shortest = np.array([1e-12 * (one[-1] - one[0]) for one in edges])
-    told, nodes = None, 0
+    told, used = None, 0
     for round_ in range(effort.rounds + 1):
         parts = _panels(functions, rows, low, high)
-        nodes += 15 * len(rows)
+        used += 15 * len(rows)
         if told is None:
             told = np.zeros((3, parts.shape[1], count))
         summed = _by_row(parts, rows, count)
@@ -103,7 +118,7 @@ def integrals(
         panels = panels + (PARTS - 1) * np.bincount(rows[wide], minlength=count)
         rows = np.tile(rows[wide], PARTS)
     assert told is not None
-    return Integrals(told[0], told[1], told[2], nodes)
+    return Integrals(told[0], told[1], told[2], used)
 
 
 def _by_row(parts: Array, rows: Rows, count: int) -> Array:

@@ -49,9 +49,10 @@ FIGURES: dict[str, Figure] = {
         (), "1", "least multiple of the friction at which a position locks, ∞ if beyond 10", "margin"
     ),
     "without_answer": Figure((), "1", "positions without an answer"),
+    "not_valid": Figure((), "1", "positions at which a pin loses contact, left out of the figures", "errors"),
     "status": Figure((), "1", "code of the gravest status of a position; see the attribute flag_meanings"),
 }
-INTEGERS = {"status": np.int8, "without_answer": np.int32}
+INTEGERS = {"status": np.int8, "without_answer": np.int32, "not_valid": np.int32}
 Reduced = dict[str, Any]
 
 
@@ -65,14 +66,18 @@ def reduced(arrays: Arrays, means: Means, ideal: Means | None, system: System) -
     status = arrays["status"]
     missing = int(np.count_nonzero(status >= Status.NOT_CONVERGED))
     told: Reduced = {"status": int(np.max(status)), "without_answer": missing}
+    told["not_valid"] = int(np.count_nonzero(status == Status.CONTACT_LOST))
     if "locking_margin" in arrays:
-        told["locking_margin"] = float(np.min(arrays["locking_margin"]))
+        valid = status != Status.CONTACT_LOST
+        told["locking_margin"] = float(np.min(arrays["locking_margin"][valid], initial=np.inf))
     if ideal:
         told["efficiency_ideal"] = ideal.efficiency
     if missing:
         return told
     sound = sound_positions(status)
-    kept = sound if len(sound) else np.arange(len(status))
+    kept = sound if len(sound) else np.flatnonzero(status < Status.CONTACT_LOST)
+    if not len(kept):  # contact is lost everywhere
+        return told
     effort = arrays["drive_effort"]
     size = np.sqrt(np.sum(arrays["reaction_force"] ** 2, axis=1))
     if ideal:

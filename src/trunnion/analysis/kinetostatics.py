@@ -22,7 +22,7 @@ from trunnion.groups.protocol import Group
 from trunnion.joints.friction import FrictionLaw
 from trunnion.joints.pairs import Load
 
-__all__ = ["Backward", "Given", "Sense", "backward", "sense_of", "solve", "under"]
+__all__ = ["Backward", "Given", "Sense", "backward", "sense_of", "slip_of", "solve", "under"]
 
 ZERO_SLIP = 1e-10  # of the speeds about the joint: below it the sign of a relative speed is rounding noise
 
@@ -131,7 +131,7 @@ def backward(walk: Forward, method: FrictionMethod, given: Given) -> Backward:
     system = walk.system
     back = Backward(walk, dict.fromkeys(system.mechanism.links, ZERO_LOAD), travels=bool(given.travel))
     for name in system.joints:
-        back.slips[name] = _slip(walk, name)
+        back.slips[name] = slip_of(walk, name)
     _add_body_loads(back)
     _add_stated_loads(back, given.zero_slip)
     for number in reversed(range(len(system.plan.modules))):
@@ -220,7 +220,7 @@ def _absent(number: Number) -> bool:
 # ---- one module -----------------------------------------------------------------------------------------------
 
 
-def _slip(walk: Forward, joint: str) -> Slip:
+def slip_of(walk: Forward, joint: str) -> Slip:
     """Relative speed along the freedom of a joint, and whether it is zero but for rounding."""
     kind, (first, second) = walk.system.joints[joint]
     w1, w2 = walk.motions[first].twist.w, walk.motions[second].twist.w

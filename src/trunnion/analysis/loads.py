@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +15,7 @@ from trunnion.analysis.kinematics import Forward, PointMotion
 from trunnion.groups.planar import Wrench, turned
 from trunnion.model.parts import Load
 
-__all__ = ["Action", "Slip", "SpringState", "Stated", "spring_state", "springs", "stated_loads"]
+__all__ = ["Action", "Slip", "SpringState", "Stated", "Switch", "spring_state", "springs", "stated_loads"]
 
 
 class Slip(NamedTuple):
@@ -49,6 +49,17 @@ class SpringState(NamedTuple):
     loss: Number
 
 
+class Switch(NamedTuple):
+    """A number of the motion, and the levels at which something jumps or bends as it passes them.
+
+    period: after which the levels come again; None: they do not.
+    """
+
+    number: Number
+    levels: Sequence[Number] = (0.0,)
+    period: Number | None = None
+
+
 class Stated:
     """Numbers of the model at the times of a walk: those of its values, and expressions of the motion."""
 
@@ -70,6 +81,20 @@ class Stated:
         x, y = self.get(f"{path}.x"), self.get(f"{path}.y")
         return None if x is None or y is None else (x, y)
 
+    def switches(self) -> Iterator[Switch]:
+        """What decides where numbers that vary with the motion jump or bend: ends of `between` …, points of tables."""
+        tables: dict[str, None] = {}
+        for entry in self.entries.values():
+            if entry.varies and entry.quantity.expression is not None:
+                named = {name: self._named(name) for name in entry.quantity.names}
+                yield from (Switch(kink(named)) for kink in entry.quantity.expression.kinks)
+                tables.update(dict.fromkeys(named.keys() & self.walk.system.mechanism.tables.keys()))
+        for name in tables:
+            if self.walk.system.mechanism.tables[name].interpolation == "linear":
+                knots, _, place = self._of_table(name)
+                periodic = self.walk.system.mechanism.tables[name].periodic
+                yield Switch(place, knots, knots[-1] - knots[0] if periodic else None)
+
     def _named(self, name: str) -> Number:
         """What a name in an expression stands for: a dimension, the drive, time, or a table."""
         if name in self.walk.system.mechanism.tables:
@@ -85,12 +110,16 @@ class Stated:
         first = next(iter(self.walk.system.mechanism.drivers))
         return self.walk.system.drive(self.walk.values, first, self.walk.time)
 
-    def _table(self, name: str) -> Number:
+    def _of_table(self, name: str) -> tuple[list[Number], list[Number], Number]:
+        """Knots and values of a table, and the place in it."""
         table, path = self.walk.system.mechanism.tables[name], f"tables.{name}.points"
         knots, values = (
             [self.walk.values[f"{path}.{k}.{key}"] for k in range(len(table.points))] for key in ("at", "value")
         )
-        place = self.walk.time if table.over == "time" else self._drive[0]
+        return knots, values, self.walk.time if table.over == "time" else self._drive[0]
+
+    def _table(self, name: str) -> Number:
+        table, (knots, values, place) = self.walk.system.mechanism.tables[name], self._of_table(name)
         return look_up(knots, values, place, table.interpolation == "spline", table.periodic)
 
 

@@ -10,10 +10,11 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import reduce
+from itertools import combinations
 from typing import Final
 
 import numpy as np
@@ -86,13 +87,15 @@ class Expression:
     """A parsed expression.
 
     names: the dimensions it speaks of; evaluate: values of those (SI floats, arrays, duals) to a value;
-    literal: set if it is nothing but one number with its unit (and perhaps a minus).
+    literal: set if it is nothing but one number with its unit (and perhaps a minus); kinks: functions of the same
+    values, where one of which changes its sign the value jumps or bends: at both ends of a `between`, of an `abs` …
     """
 
     names: tuple[str, ...]
     evaluate: Evaluator
     literal: Literal | None
     bare: bool  # neither a unit nor a name in it: only numbers
+    kinks: tuple[Evaluator, ...]
     _tree: ast.expr = field(repr=False)
     _operands: Mapping[str, Literal | str] = field(repr=False)
 
@@ -138,7 +141,7 @@ def parse(text: str) -> Expression:
     core = tree.operand if isinstance(tree, ast.UnaryOp) else tree
     alone = found[0] if isinstance(core, ast.Name) and found else None
     bare = len(found) == len(operands) and not any(one.unit for one in found)
-    return Expression(names, evaluate, alone, bare, tree, operands)
+    return Expression(names, evaluate, alone, bare, tuple(_kinks(tree, operands)), tree, operands)
 
 
 def _tokens(text: str) -> tuple[str, dict[str, Literal | str]]:
@@ -272,6 +275,24 @@ def _between(value: Number, low: Number, high: Number) -> Number:
     """1 from `low` up to `high`, 0 elsewhere: it switches a load on over part of the motion."""
     xp = namespace(value, low, high)
     return xp.where((value >= low) & (value < high), 1.0, 0.0)
+
+
+def _kinks(tree: ast.expr, operands: Mapping[str, Literal | str]) -> Iterator[Evaluator]:
+    """Functions whose sign decides which side of a switch a tree that `_compile` accepted is on."""
+    for part in ast.walk(tree):
+        if not isinstance(part, ast.Call) or not isinstance(part.func, ast.Name):
+            continue
+        name, values = operands[part.func.id], [_compile(one, operands) for one in part.args]
+        if name == "between":
+            yield from (_less(values[0], end) for end in values[1:])
+        elif name in ("min", "max"):
+            yield from (_less(one, other) for one, other in combinations(values, 2))
+        elif name in ("abs", "atan2"):  # an angle jumps by a turn where its first argument passes 0
+            yield values[0]
+
+
+def _less(one: Evaluator, other: Evaluator) -> Evaluator:
+    return lambda names: one(names) - other(names)
 
 
 def _dimension(tree: ast.expr, operands: Mapping[str, Literal | str], names: Dimensions) -> Dimension | None:

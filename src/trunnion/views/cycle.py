@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
-    "Abscissa", "Interval", "abscissa", "attribute", "intervals", "layout", "numbers", "series", "status_text", "thin",
-    "usual_peak",
+    "Abscissa", "Interval", "abscissa", "attribute", "intervals", "layout", "mean_friction", "numbers", "series",
+    "status_text", "thin", "usual_peak", "valid",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -177,6 +177,27 @@ def intervals(result: xr.Dataset, lowest: int = Status.NOT_CONVERGED) -> list[In
     starts, stops = [0, *edges.tolist()], [*edges.tolist(), status.size]
     runs = (Interval(start, stop, int(status[start])) for start, stop in zip(starts, stops, strict=True))
     return [run for run in runs if run.status >= lowest]
+
+
+def valid(result: xr.Dataset, values: Array) -> Array:
+    """A column, NaN at positions that are not valid, for a pin loses contact there."""
+    status = column(result, "status")
+    return values if status is None else np.where(status == Status.CONTACT_LOST, np.nan, values)
+
+
+def mean_friction(result: xr.Dataset, joint: str, of: str = "") -> float:
+    """Mean friction power of a joint, W; of: "_ideal" of the mechanism without errors. NaN where there is no answer.
+
+    A result that was written before there were such means has that of its positions.
+    """
+    told = column(result, f"friction_power_mean{of}", joint=joint)
+    if told is not None:
+        return float(told)
+    values = column(result, "friction_power", joint=joint)
+    if of and values is not None:
+        change = column(result, "friction_power_change", joint=joint)
+        values = None if change is None else values - change
+    return float("nan") if values is None or not np.isfinite(values).any() else float(np.nanmean(values))
 
 
 def usual_peak(*columns: Array | None) -> float:

@@ -25,6 +25,7 @@ from trunnion.views.cycle import (
     attribute,
     column,
     layout,
+    mean_friction,
     names,
     status_text,
     thin,
@@ -136,18 +137,18 @@ def friction_power(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figur
     shade(axes, result, over)
     picked = thin(total)
     axes.fill_between(over.values[picked], 0, total[picked] * factor, color=SHADE, alpha=0.6, linewidth=0, zorder=1)
-    curve(axes, over, total * factor, f"all joints, {_mean(total)}", color=INK, linewidth=1.8)
+    means = {joint: mean_friction(result, joint) for joint in known}
+    curve(axes, over, total * factor, f"all joints, {_mean(sum(means.values()))}", color=INK, linewidth=1.8)
     for joint, values in known.items():
-        label = f"{joint}, {_mean(values)}"
+        label = f"{joint}, {_mean(means[joint])}"
         curve(axes, over, values * factor, label, **style_of(joints.index(joint)), linewidth=1.4)
     frame_peak(axes, peak(total), scope, factor, "W")
     legend(axes, most=3)
     return figure
 
 
-def _mean(values: Array) -> str:
-    known = values[np.isfinite(values)]
-    return f"mean {quantity(float(known.mean()), 'W')}" if known.size else "no answer"
+def _mean(value: float) -> str:
+    return f"mean {quantity(value, 'W')}" if np.isfinite(value) else "no answer"
 
 
 def _reaction(result: xr.Dataset, joint: str, plane: tuple[str, str] = ("x", "y")) -> Array:

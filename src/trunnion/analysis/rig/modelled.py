@@ -45,8 +45,8 @@ class Modelled:
     @property
     def sound(self) -> NDArray[np.bool_]:
         """Positions whose forces can be relied on; all that are solved if there are no such."""
-        best = (self.status == Status.SOLVED) | (self.status == Status.CONTACT_LOST)
-        return best if np.any(best) else self.status < Status.NOT_CONVERGED
+        best = self.status == Status.SOLVED
+        return best if np.any(best) else self.status < Status.CONTACT_LOST
 
     def comparable(self, channel: str) -> NDArray[np.bool_]:
         """Positions at which the model has one number for a channel.

@@ -2,6 +2,7 @@
 
 import { stated } from "./format.js";
 
+const CONTACT_LOST = 3; // errors.Status
 const FIRST_UNSOLVED = 4; // errors.Status.NOT_CONVERGED: from here on the forces have no value
 
 /** The value of a series at a position; a series of one number holds everywhere. */
@@ -156,9 +157,18 @@ export function cause(scene, index) {
 
 /** Runs [first, last] of positions without an answer. */
 export function gaps(scene) {
+  return runsWhere(scene, (index) => !solved(scene, index));
+}
+
+/** Runs [first, last] of positions that are not valid, for a pin loses contact. */
+export function lost(scene) {
+  return runsWhere(scene, (index) => scene.status[index] === CONTACT_LOST);
+}
+
+function runsWhere(scene, holds) {
   const runs = [];
   for (let index = 0; index < scene.count; index += 1) {
-    if (solved(scene, index)) continue;
+    if (!holds(index)) continue;
     const last = runs[runs.length - 1];
     if (last && last[1] === index - 1) last[1] = index;
     else runs.push([index, index]);

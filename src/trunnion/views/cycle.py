@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Abscissa", "Interval", "abscissa", "attribute", "intervals", "layout", "numbers", "series", "status_text", "thin",
-    "usual_peak",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -177,20 +176,6 @@ def intervals(result: xr.Dataset, lowest: int = Status.NOT_CONVERGED) -> list[In
     starts, stops = [0, *edges.tolist()], [*edges.tolist(), status.size]
     runs = (Interval(start, stop, int(status[start])) for start, stop in zip(starts, stops, strict=True))
     return [run for run in runs if run.status >= lowest]
-
-
-def usual_peak(*columns: Array | None) -> float:
-    """The magnitude a figure should show: the greatest, unless it towers over nearly all the rest.
-
-    Next to a dead centre forces grow without bound and would flatten everything else; then it is four times the
-    magnitude that 90 % of the values stay below, and the figure says what it leaves out.
-    """
-    finite = [np.abs(values[np.isfinite(values)]).ravel() for values in columns if values is not None]
-    sizes = np.concatenate(finite) if finite else np.empty(0)
-    if not sizes.size:
-        return 0.0
-    most, usual = float(sizes.max()), float(np.quantile(sizes, 0.9))
-    return 4.0 * usual if 0.0 < usual < most / 16.0 else most
 
 
 def thin(values: Array, most: int = 4000) -> NDArray[np.intp]:

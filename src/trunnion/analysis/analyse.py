@@ -15,7 +15,7 @@ from trunnion import results
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.nested import flat
-from trunnion.analysis import account, contact_loss, diagnosis
+from trunnion.analysis import account, contact_loss, diagnosis, rest
 from trunnion.analysis.asbuilt import COMPARED, fill_errors, fill_seats
 from trunnion.analysis.blanks import blank
 from trunnion.analysis.branches import Chosen, choose
@@ -265,7 +265,8 @@ def positions(
             _fill(arrays, run.solve(time[window], method=method), time[window], window, causes)
         if progress:
             progress(window.stop)
-    _bracket(arrays, run, time, replace(method, margin_up_to=0.0), causes)  # the margin is known by now
+    known = replace(method, margin_up_to=0.0)  # the margin is, by now
+    rest.bracket(arrays, run, time, known, causes.zero_slip(), causes.seats())
     losses = contact_loss.find(arrays, run, time) if run.seats else []
     run.system.engine.unwrap(arrays, run.system, run.values, time)
     return Positions(arrays, labels, time, method, causes, ideal, losses)
@@ -452,44 +453,3 @@ def _fill_settled(arrays: Arrays, back: Backward, window: slice) -> None:
         worst = functools.reduce(np.maximum, (getattr(one, field) for one in settled), 0.0)
         arrays[key][window] = worst
     arrays["locking_margin"][window] = functools.reduce(np.minimum, (one.margin for one in settled), np.inf)
-
-
-def _bracket(
-    arrays: Arrays, run: Run, time: NDArray[np.float64], method: FrictionMethod, causes: diagnosis.Causes
-) -> None:
-    """Least and largest drive effort: where a relative speed is zero, friction may act either way.
-
-    Exact for one such joint at a position; with several, their separate effects are added (first order).
-    """
-    if not causes.zero_slip():
-        return  # both are the effort itself
-    lower = arrays["drive_effort_lower"] = arrays["drive_effort"].copy()
-    upper = arrays["drive_effort_upper"] = arrays["drive_effort"].copy()
-    seated = causes.seats()
-    for joint, positions in causes.zero_slip().items():
-        for low in range(0, len(positions), CHUNK):
-            part = positions[low : low + CHUNK]
-            _widen(lower, upper, arrays["drive_effort"], run, time[part], part, joint, method, seated)
-
-
-def _widen(
-    lower: NDArray[np.float64],
-    upper: NDArray[np.float64],
-    effort: NDArray[np.float64],
-    run: Run,
-    time: NDArray[np.float64],
-    positions: NDArray[np.intp],
-    joint: str,
-    method: FrictionMethod,
-    seated: Mapping[str, NDArray[np.float64]],
-) -> None:
-    """Widen the interval by what the friction of one joint can do with either sign."""
-    offsets = {path: numbers[positions] for path, numbers in seated.items()}
-    ends = [run.at(time, offsets, method, {joint: sign}).efforts for sign in run.system.senses(joint)]
-    # with pins held in both, so that what their travel adds to the effort is none of the interval
-    middle = run.at(time, offsets, method).efforts if offsets else None
-    for i, name in enumerate(run.system.mechanism.drivers):
-        own = effort[i, positions] if middle is None else middle[name]
-        changes = [np.broadcast_to(end[name] - own, time.shape) for end in ends]
-        lower[i, positions] += np.minimum(0.0, np.min(changes, axis=0))
-        upper[i, positions] += np.maximum(0.0, np.max(changes, axis=0))

@@ -19,7 +19,7 @@ from trunnion.analysis.bristles import histories
 from trunnion.analysis.friction import FrictionMethod, Problem, frictionless, identity_minus, scaled
 from trunnion.analysis.kinetostatics import Backward, Given
 from trunnion.analysis.system import Cycle, Dial, law_of
-from trunnion.errors import Finding, Severity
+from trunnion.errors import Finding, Severity, counted
 
 if TYPE_CHECKING:
     from trunnion.analysis.analyse import Run
@@ -171,7 +171,8 @@ def reverse_row(back: Reverse, cycle: Cycle) -> dict[str, Any] | None:
     if np.all(np.isfinite(back.given)) and not cycle.net(back.given) > 0:
         return None
     if np.any(back.locked):
-        text = f"driven backward by the useful loads it locks, at {np.count_nonzero(back.locked)} positions"
+        places = counted(int(np.count_nonzero(back.locked)), "position")
+        text = f"driven backward by the useful loads it locks, at {places}"
     elif not np.all(np.isfinite(back.given + back.delivered)):
         text += " (not every position has an answer)"
     else:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from trunnion.errors import Finding, MechanismError
+from trunnion.errors import Finding, MechanismError, counted
 from trunnion.options import IMAGES, File, FrictionLaw, Out, Seats, Set, Steps, TableFile, Uncut, UnitsRow, over, points
 from trunnion.output import folder
 from trunnion.terminal import bar, console, findings_of, say, show_rows, wrote
@@ -164,4 +164,4 @@ def _show(result: xr.Dataset, mechanism: Mechanism, file: Path, measures: Sequen
         show_rows(f"{mechanism.name or file}\n{one.title}" if k == 0 else one.title, one.head, one.rows)
     left_out = sum(one.left_out for one in shown) // (len(measures) if len(shown) > 1 else 1)
     if left_out:
-        console().print(f"{left_out:,} points more; --out FILE.csv has all", markup=False, highlight=False)
+        console().print(f"{counted(left_out, 'point')} more; --out FILE.csv has all", markup=False, highlight=False)

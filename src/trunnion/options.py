@@ -91,6 +91,9 @@ Out = Annotated[
     list[Path] | None,
     typer.Option("--out", help="Write it: .csv .json .nc .zarr .parquet, or a figure: .png .svg .pdf. Repeatable."),
 ]
+Uncut = Annotated[
+    bool, typer.Option("--uncut", help="Figures show peaks near dead centres whole; else the frame cuts them there.")
+]
 UnitsRow = Annotated[bool, typer.Option("--units-row", help="Second CSV header row with the units.")]
 Kinds = Annotated[
     list[str] | None, typer.Option("--kind", help=f"{PLOT_KINDS}. Repeatable; all if not given.", show_default=False)

@@ -352,6 +352,8 @@ def _rounding(arrays: Arrays, variable: str) -> float:
 
 def _margin(margin: NDArray[np.float64], dial: Dial) -> dict[str, Any]:
     """The least multiple of the friction at which the mechanism locks."""
+    if np.all(np.isnan(margin)):
+        return {"label": "locking margin (times the friction)", "value": float("nan"), "unit": "1"}
     least = np.nanmin(margin, initial=np.inf)
     if not np.isfinite(least):
         return {"label": "locking margin (times the friction), more than", "value": MARGIN, "unit": "1"}

@@ -15,10 +15,9 @@ from trunnion import results
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.nested import flat
-from trunnion.analysis import account, contact_loss, diagnosis
+from trunnion.analysis import account, contact_loss, diagnosis, rest
 from trunnion.analysis.asbuilt import COMPARED, fill_errors, fill_seats
 from trunnion.analysis.blanks import blank
-from trunnion.analysis.brackets import bracket
 from trunnion.analysis.branches import Chosen, choose
 from trunnion.analysis.bristles import History, histories
 from trunnion.analysis.engine import build
@@ -280,10 +279,11 @@ def positions(
             _fill(arrays, run.solve(time[window], method=method), time[window], window, causes)
         if progress:
             progress(window.stop)
-    bracket(arrays, run, time, replace(method, margin_up_to=0.0), causes)  # the margin is known by now
+    quick = replace(method, margin_up_to=0.0)  # the margin is known by now
+    rest.bracket(arrays, run, time, quick, causes.zero_slip(), causes.seats())
     losses = contact_loss.find(arrays, run, time) if run.seats else []
     run.system.engine.unwrap(arrays, run.system, run.values, time)
-    quick = replace(method, margin_up_to=0.0)
+
     means = _means(run, arrays, quick, losses)
     meant = _means(run, ideal, quick, None) if run.erring else None
     return Positions(arrays, labels, time, method, causes, means, meant, losses)

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
@@ -15,7 +16,10 @@ from trunnion.analysis.kinematics import Forward, PointMotion
 from trunnion.groups.planar import Wrench, turned
 from trunnion.model.parts import Load
 
-__all__ = ["Action", "Slip", "SpringState", "Stated", "Switch", "spring_state", "springs", "stated_loads"]
+__all__ = ["Action", "Share", "Slip", "SpringState", "Stated", "Switch", "spring_state", "springs", "stated_loads"]
+
+
+Share = float | NDArray[np.float64]  # of what resists a joint at rest, with the sign of the slip about to begin
 
 
 class Slip(NamedTuple):
@@ -127,7 +131,7 @@ class Stated:
 
 
 def stated_loads(
-    walk: Forward, slips: Mapping[str, Slip], zero_slip: Mapping[str, float]
+    walk: Forward, slips: Mapping[str, Slip], zero_slip: Mapping[str, Share]
 ) -> Iterator[tuple[str, Action]]:
     """The loads of the model, by name. zero_slip: see `kinetostatics.solve`."""
     stated = Stated(walk)
@@ -160,14 +164,14 @@ def _push(stated: Stated, load: Load, path: str) -> Action:
     return Action(on, power)
 
 
-def _resist(walk: Forward, load: Load, size: Number, slip: Slip, at_rest: float) -> Action:
+def _resist(walk: Forward, load: Load, size: Number, slip: Slip, at_rest: Share) -> Action:
     """A torque or force that opposes the motion of a joint, whichever way it goes or one way only.
 
-    at_rest: the sign of the motion to take where there is none; 0: the load is zero there.
+    at_rest: the share of the load where there is no motion, with the sign of that which is about to begin.
     """
-    sign = np.sign(np.where(slip.zero, at_rest, primal(slip.speed)))
+    sign = np.where(slip.zero, at_rest, np.sign(primal(slip.speed)))
     if load.only is not None:
-        sign = np.where(sign == (1.0 if load.only == "positive" else -1.0), sign, 0.0)
+        sign = np.where(sign * (1.0 if load.only == "positive" else -1.0) > 0.0, sign, 0.0)
     return _in_joint(walk, load.joint or "", -sign * size, slip)
 
 

@@ -21,7 +21,7 @@ from trunnion.analysis.kinetostatics import Backward, Given
 from trunnion.analysis.means import ROUNDING
 from trunnion.analysis.quadrature import integrals
 from trunnion.analysis.system import Dial, law_of
-from trunnion.errors import Finding, Severity
+from trunnion.errors import Finding, Severity, counted
 
 if TYPE_CHECKING:
     from trunnion.analysis.analyse import Run
@@ -174,7 +174,8 @@ def reverse_row(run: Run, back: Reverse, useful: Sequence[str]) -> dict[str, Any
     if np.all(np.isfinite(back.given)) and not given > 0:
         return None
     if np.any(back.locked):
-        text = f"driven backward by the useful loads it locks, at {np.count_nonzero(back.locked)} positions"
+        places = counted(int(np.count_nonzero(back.locked)), "position")
+        text = f"driven backward by the useful loads it locks, at {places}"
     elif not np.isfinite(delivered + given) or not np.all(np.isfinite(back.given + back.delivered)):
         text += " (not every position has an answer)"
     else:

@@ -21,7 +21,7 @@ from trunnion.analysis.friction import FrictionMethod
 from trunnion.analysis.sweep_figures import FIGURES, INTEGERS, Figure
 from trunnion.analysis.sweep_grid import MOST_POINTS, Over, Swept, grid, say
 from trunnion.analysis.sweep_points import Points
-from trunnion.errors import Finding, Severity, Status
+from trunnion.errors import Finding, Severity, Status, agreeing, counted
 from trunnion.model.mechanism import Mechanism
 
 if TYPE_CHECKING:
@@ -78,7 +78,7 @@ def sweep(
 def _shared(points: Points) -> Iterator[Finding]:
     """What the points have to say that were looked at by themselves, each once; notes only if all have them."""
     total, looked = int(np.prod(points.shape)), len(points.looked)
-    whole = f"{total:,} points" if looked == total else f"{looked:,} points looked at"
+    whole = counted(total, "point") if looked == total else f"{counted(looked, 'point')} looked at"
     for found in points.said.values():
         one, count = next(iter(found.values())), len(found)
         if count == looked:
@@ -96,8 +96,8 @@ def _answers(swept: Sequence[Swept], arrays: Mapping[str, NDArray[Any]]) -> Iter
             continue
         first = tuple(int(i) for i in where[0])
         count = int(missing[first])
-        some_positions = f"{count:,} position{'s' * (count != 1)} without an answer"
-        some = f"{len(where):,} of {status.size:,} points have no figures"
+        some_positions = f"{counted(count, 'position')} without an answer"
+        some = f"{len(where):,} of {counted(status.size, 'point')} {agreeing(len(where), 'has', 'have')} no figures"
         what = f"{some}, first at {say(swept, first)} ({some_positions}): {code.text}"
         names = " and ".join(one.name for one in swept)
         yield Finding(what, names, "run analyse with these values: it says where in the cycle, and why")

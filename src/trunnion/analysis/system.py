@@ -128,9 +128,9 @@ class System:
         """Kind and links of every joint, as the file has them."""
         return {name: (joint.type, joint.links) for name, joint in self.mechanism.effective_joints.items()}
 
-    def senses(self, joint: str) -> list[float | tuple[float, ...]]:
-        """Ways in which a joint at rest may be about to slip, for `kinetostatics.Given`."""
-        return [-1.0, 1.0]
+    def resting(self, joint: str) -> int:
+        """How many contacts of a joint rest or slip each by itself, for `kinetostatics.Given`."""
+        return 1
 
     def turns(self, joint: str) -> bool:
         """Whether a joint's coordinate, as drivers and loads see it, is an angle."""

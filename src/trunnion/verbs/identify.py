@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.errors import Finding, MechanismError, Severity, counted
 from trunnion.options import (
     IMAGES,
     DataFiles,
@@ -250,7 +250,7 @@ def _tables(result: xr.Dataset) -> None:
         name = str(result.attrs["name"])
         show_rows(f"{name}\n{table.title}" if i == 0 and name else table.title, table.head, table.rows[:MOST_ROWS])
         if len(table.rows) > MOST_ROWS:
-            told = f"{len(table.rows) - MOST_ROWS:,} rows more; --out FILE.residuals.csv has all"
+            told = f"{counted(len(table.rows) - MOST_ROWS, 'row')} more; --out FILE.residuals.csv has all"
             console().print(told, markup=False, highlight=False)
 
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Abscissa", "Interval", "abscissa", "attribute", "intervals", "layout", "mean_friction", "numbers", "series",
-    "status_text", "thin", "usual_peak", "valid",
+    "status_text", "thin", "valid",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -198,20 +198,6 @@ def mean_friction(result: xr.Dataset, joint: str, of: str = "") -> float:
         change = column(result, "friction_power_change", joint=joint)
         values = None if change is None else values - change
     return float("nan") if values is None or not np.isfinite(values).any() else float(np.nanmean(values))
-
-
-def usual_peak(*columns: Array | None) -> float:
-    """The magnitude a figure should show: the greatest, unless it towers over nearly all the rest.
-
-    Next to a dead centre forces grow without bound and would flatten everything else; then it is four times the
-    magnitude that 90 % of the values stay below, and the figure says what it leaves out.
-    """
-    finite = [np.abs(values[np.isfinite(values)]).ravel() for values in columns if values is not None]
-    sizes = np.concatenate(finite) if finite else np.empty(0)
-    if not sizes.size:
-        return 0.0
-    most, usual = float(sizes.max()), float(np.quantile(sizes, 0.9))
-    return 4.0 * usual if 0.0 < usual < most / 16.0 else most
 
 
 def thin(values: Array, most: int = 4000) -> NDArray[np.intp]:

@@ -142,7 +142,10 @@ def _write_cause(axes: Axes, x: float, text: str) -> None:
 
 
 def frame_peak(axes: Axes, most: float, shown: float, factor: float, unit: str) -> None:
-    """Cut the vertical axis at `shown` where the curves rise far above it to `most`, and say so in the frame."""
+    """Cut the vertical axis at `shown` where the curves rise far above it to `most`, and say so in the frame.
+
+    shown: of `peaks.usual_peak`.
+    """
     if shown >= most:
         return
     low, high, room = axes.dataLim.y0, axes.dataLim.y1, 1.05
@@ -151,7 +154,7 @@ def frame_peak(axes: Axes, most: float, shown: float, factor: float, unit: str) 
 
 
 def outside(axes: Axes, most: float, unit: str) -> None:
-    text = f"peak {quantity(most, unit)} lies outside"
+    text = f"peak {quantity(most, unit)} lies outside,\nnear a dead centre; --uncut shows it"
     box = {"boxstyle": "round,pad=0.2", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
     axes.text(0.99, 0.97, text, transform=axes.transAxes, ha="right", va="top", fontsize=8, color=MUTED, bbox=box)
 

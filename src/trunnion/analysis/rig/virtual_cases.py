@@ -14,7 +14,7 @@ from trunnion.analysis.measures import MEASURES, Measure, named
 from trunnion.analysis.rig.virtual_courses import Sampled, cycle_efficiency, sampled
 from trunnion.analysis.rig.virtual_faults import misfits
 from trunnion.analysis.rig.virtual_sensors import Channel, resolved
-from trunnion.errors import Finding, MechanismError, Severity, Status
+from trunnion.errors import Finding, MechanismError, Severity, Status, counted
 from trunnion.measured.rig_file import Rig, Value
 
 __all__ = ["Case", "case_names", "case_of", "channels_of", "findings_of", "measures_of", "placed_at", "speed_differs"]
@@ -214,7 +214,7 @@ def findings_of(cases: Sequence[Case], channels: Mapping[str, Channel], rig: Rig
             first = 360 * one.true.time[places[0]] / one.run.cycle.duration
             what = (
                 f"{_named(stopped)} left out: {status.text}; in condition {one.number} at {len(places)} of "
-                f"{len(one.true.status)} positions, first at {first:.4g}° of the cycle"
+                f"{counted(len(one.true.status), 'position')}, first at {first:.4g}° of the cycle"
             )
             remedy = "run analyse with these values: it says where in the cycle, and why; or do without"
             yield Finding(what, where, remedy, Severity.WARNING)
@@ -222,8 +222,8 @@ def findings_of(cases: Sequence[Case], channels: Mapping[str, Channel], rig: Rig
     if mended := [case for case in sound if case.true.mended]:
         most = max(case.true.mended for case in mended)
         what = (
-            f"{_named(mended)}: a load has no single value at up to {most} positions, its joint being at rest there; "
-            "sensors are given 0 in a rest, the mean of the neighbours at a single position"
+            f"{_named(mended)}: a load has no single value at up to {counted(most, 'position')}, its joint being at "
+            "rest there; sensors are given 0 in a rest, the mean of the neighbours at a single position"
         )
         yield Finding(what, where, "", Severity.NOTE)
     yield from _lost_pulses(sound, rig)

@@ -1,6 +1,6 @@
 // A line chart over the drive: axes, curves with gaps, shaded positions without an answer, a cursor that follows.
 
-import { domain, extent, gaps, lost, nearest, peak, usualPeak } from "./data.js";
+import { OUTSIDE, domain, extent, gaps, lost, nearest, peak, usualPeak } from "./data.js";
 import { clipped, html, onWidth, set, svg } from "./dom.js";
 import { fixed, prefixed, quantity, tickLabel, ticks } from "./format.js";
 
@@ -13,12 +13,12 @@ const MARGIN = { top: 8, right: 14, bottom: 40, left: 58 };
  * `pick(index, firm)` is called when the reader points.
  */
 export function lineChart(scene, { title, unit, series, band = null, limits = null, note = "", marks = [], pick }) {
-  const columns = series.map((one) => one.values);
-  const scope = limits ? peak(limits) : usualPeak(...columns);
+  const columns = [...series.map((one) => one.values), ...(band ? [band.low, band.high] : [])];
+  const scope = limits ? peak(limits) : usualPeak(scene, ...columns);
   const scale = prefixed(scope, unit);
   const most = scope * scale.factor;
   const cut = !limits && scope < peak(...columns);
-  const remark = cut ? `The peak of ${quantity(peak(...columns), unit)} lies outside.` : note;
+  const remark = cut ? `The peak of ${quantity(peak(...columns), unit)} ${OUTSIDE}` : note;
   const plot = html("div", { class: "plot" });
   const values = series.map(() => html("span", { class: "value" }, "—"));
   const element = html(

@@ -79,7 +79,7 @@ def sweep(
     measures = list(dict.fromkeys(measure or ["efficiency"]))
     _check_figures(grid, x or "", family or "", kind)
     files = _files(out or [], measures, image)
-    mechanism = stated(file, set_, table, friction, seat)
+    mechanism = stated(file, set_, table, friction, seat, {name: values[0] for name, values in grid.items()})
     check_measure(measures, mechanism)
     with lines_of(file), bar("points", points(grid)) as progress:
         result = run(mechanism, grid, steps, progress=progress, margin=margin or "locking_margin" in measures)

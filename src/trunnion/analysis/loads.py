@@ -90,8 +90,17 @@ class Stated:
         knots, values = (
             [self.walk.values[f"{path}.{k}.{key}"] for k in range(len(table.points))] for key in ("at", "value")
         )
+        if table.period is not None and self._open(name):
+            knots, values = [*knots, knots[0] + self.walk.values[f"tables.{name}.period"]], [*values, values[0]]
         place = self.walk.time if table.over == "time" else self._drive[0]
-        return look_up(knots, values, place, table.interpolation == "spline", table.periodic)
+        return look_up(knots, values, place, table.interpolation == "spline", table.repeats)
+
+    def _open(self, name: str) -> bool:
+        """Whether the points of a table end before its period does: the first then comes again as the last."""
+        nominal = self.walk.system.mechanism.parameter_set.nominal
+        last = len(self.walk.system.mechanism.tables[name].points) - 1
+        first, end, period = (nominal[f"tables.{name}.{key}"] for key in ("points.0.at", f"points.{last}.at", "period"))
+        return bool(end - first < period * (1 - 1e-9))
 
 
 # ---- loads ----------------------------------------------------------------------------------------------------

@@ -18,7 +18,7 @@ from trunnion.joints.pairs import PAIRS
 from trunnion.model.check_costs import cost_names, cost_values
 from trunnion.model.check_errors import errors, joint_errors
 from trunnion.model.check_gears import gears
-from trunnion.model.check_loads import motion_dimensions, springs, tables, unknown_name
+from trunnion.model.check_loads import motion_dimensions, springs, tables, unknown_name, unread
 from trunnion.model.check_measures import check_measure, measure_values, point_exists
 from trunnion.model.check_space import contact, coordinates, driven, loop, pitch, resisted, space
 from trunnion.model.check_tolerances import stated_entries, tolerance_names, tolerance_values
@@ -249,10 +249,14 @@ def _drivers(mechanism: Mechanism) -> Iterator[Finding]:
 
 def _motion(driver: Driver, where: str) -> Iterator[Finding]:
     """Whether a driver states what its law needs and nothing else."""
+    if driver.file is not None and driver.law == "table":
+        yield unread(driver.file, where)
+        return
     law, takes = driver.motion, (*driver.motion.needs, *driver.motion.takes)
     stray = [key for key in driver.model_fields_set if key != "law" and key not in takes]
     for key in sorted(stray):
-        others = [name for name, one in MOTION_LAWS.items() if key in (*one.needs, *one.takes)]
+        given = "points" if key == "file" else key
+        others = [name for name, one in MOTION_LAWS.items() if given in (*one.needs, *one.takes)]
         remedy = f"remove it, or state law: {' or '.join(others)}; {driver.law} takes {', '.join(takes)}"
         yield Finding(f"'{key}' means nothing to the motion law {driver.law}", f"{where}.{key}", remedy)
     for key in law.needs:
@@ -276,7 +280,7 @@ MOTION_EXAMPLES = {
     "period": "0.5 s",
     "range": "[0 deg, 90 deg]",
     "duration": "0.2 s",
-    "points": "[[0 s, 0 deg], [0.1 s, 20 deg]], or take them from a file by --table",
+    "points": "[[0 s, 0 deg], [0.1 s, 20 deg]], or file: motion.csv, or give a file by --table",
 }
 
 

@@ -251,7 +251,7 @@ class _Builder:
         assert isinstance(node, ScalarNode)  # there are no other nodes
         return self._scalar(node, path)
 
-    def _uncut(self, node: Node, items: list[tuple[Node, str]]) -> list[tuple[Node, str]]:
+    def _uncut(self, node: MappingNode | SequenceNode, items: list[tuple[Node, str]]) -> list[tuple[Node, str]]:
         """The values of a list or group, by path, without those that YAML cut out of an expression at its commas."""
         kept, until = [], 0
         for item, path in items:

@@ -29,6 +29,7 @@ from trunnion.groups.general import OUTER
 from trunnion.groups.protocol import Elements
 from trunnion.groups.spatial import SpatialGroup
 from trunnion.groups.spins import unspun
+from trunnion.model.names import as_key
 from trunnion.structure.decompose import Module
 
 __all__ = ["Chosen", "Track", "choose"]
@@ -207,12 +208,11 @@ def _unstated(system: System, module: Module, count: int) -> Finding:
     links = ", ".join(module.links)
     what = f"links {links} can be assembled in {count} ways and no hint says which; one was taken"
     joint = module.joints[len(module.joints) // 2]
-    place, hint = "where a point is", f"{{{joint}: [x, y]}}"
+    key = as_key(joint)
+    place, hint = "where a point is", f"{{{key}: [x, y]}}"
     if system.mechanism.space == "spatial":
         met = system.joints[joint][0] in MEETING and not system.mechanism.loop
-        place, hint = (
-            (place, f"{{{joint}: [x, y, z]}}") if met else ("how far a joint has turned", f"{{{joint}: 60 deg}}")
-        )
+        place, hint = (place, f"{{{key}: [x, y, z]}}") if met else ("how far a joint has turned", f"{{{key}: 60 deg}}")
     remedy = f"say roughly {place} at the start, e.g. assembly: {hint}, or name one as `check` does"
     return Finding(what, "assembly", remedy, Severity.WARNING)
 

@@ -25,7 +25,7 @@ from trunnion.model.check_tolerances import stated_entries, tolerance_names, tol
 from trunnion.model.check_values import check_values
 from trunnion.model.contact import motions
 from trunnion.model.expression import MOTION, RESERVED
-from trunnion.model.names import nearest
+from trunnion.model.names import as_key, nearest
 from trunnion.model.parameter_names import ERRORS
 from trunnion.model.parameters import ParameterSet, dimension_errors, evaluation_order
 from trunnion.model.parts import Driver, Friction, Joint, Load, freedoms
@@ -211,13 +211,13 @@ def _ends(mechanism: Mechanism, name: str, joint: Joint) -> Iterator[Finding]:
         points = mechanism.links[link].points
         axis = "[1, 0]" if mechanism.space == "planar" else "[0, 0, 1]"
         if name not in points:
-            remedy = f"add {name}: {coordinates(mechanism)} to the points of '{link}'"
+            remedy = f"add {as_key(name)}: {coordinates(mechanism)} to the points of '{link}'"
             yield Finding(f"the link '{link}' has no point '{name}'", where, f"{remedy} ({nearest(name, points)})")
         elif mechanism.space in PAIRS[joint.type].needs_axis and points[name].axis is None:
             yield Finding(
                 f"the point '{name}' of the link '{link}' has no axis, a {joint.type} joint needs one",
                 f"links.{link}.points.{name}",
-                f"write {name}: {{at: {coordinates(mechanism)}, axis: {axis}}}",
+                f"write {as_key(name)}: {{at: {coordinates(mechanism)}, axis: {axis}}}",
             )
 
 

@@ -12,7 +12,7 @@ from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, Severity
 from trunnion.model.contact import motions
 from trunnion.model.expression import MOTION, RESERVED
-from trunnion.model.names import nearest
+from trunnion.model.names import as_key, nearest
 from trunnion.model.parts import Spring, freedoms
 from trunnion.model.quantity import Quantity
 from trunnion.model.units import ANGLE, ANY, KINDS, Dimension, UnitError, dimension_text, fits
@@ -82,7 +82,9 @@ def tables(mechanism: Mechanism, known: Dimensions) -> Iterator[Finding]:
             yield unread(table.file, where)
             continue
         if not table.points:
-            remedy = f"state points: {_EXAMPLES[table.over]}, or file: {name}.csv, or give a file by --table"
+            remedy = (
+                f"state points: {_EXAMPLES[table.over]}, or file: {as_key(f'{name}.csv')}, or give a file by --table"
+            )
             yield Finding("has no points", where, remedy)
             continue
         if table.repeats and len(table.points) < (3 if table.period is None else 2):

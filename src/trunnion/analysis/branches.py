@@ -29,6 +29,7 @@ from trunnion.groups.general import OUTER
 from trunnion.groups.protocol import Elements
 from trunnion.groups.spatial import SpatialGroup
 from trunnion.groups.spins import unspun
+from trunnion.model.names import as_key
 from trunnion.structure.decompose import Module
 
 __all__ = ["Chosen", "Track", "choose"]
@@ -217,12 +218,11 @@ def _unstated(walk: Forward, module: Module, count: int) -> Finding:
     free = [joint for joint in module.joints if joint not in known] or list(module.joints)
     joint = module.joints[len(module.joints) // 2]
     joint = joint if joint in free else free[0]
-    place, hint = "where a point is", f"{{{joint}: [x, y]}}"
+    key = as_key(joint)
+    place, hint = "where a point is", f"{{{key}: [x, y]}}"
     if system.mechanism.space == "spatial":
         met = system.joints[joint][0] in MEETING and not system.mechanism.loop
-        place, hint = (
-            (place, f"{{{joint}: [x, y, z]}}") if met else ("how far a joint has turned", f"{{{joint}: 60 deg}}")
-        )
+        place, hint = (place, f"{{{key}: [x, y, z]}}") if met else ("how far a joint has turned", f"{{{key}: 60 deg}}")
     remedy = f"say roughly {place} at the start, e.g. assembly: {hint}, or name one as `check` does"
     if given:
         remedy = "give a hint that is nearer to one of them, or name one as `check` does"

@@ -96,8 +96,8 @@ class Stated:
         for name in tables:
             if self.walk.system.mechanism.tables[name].interpolation == "linear":
                 knots, _, place = self._of_table(name)
-                periodic = self.walk.system.mechanism.tables[name].periodic
-                yield Switch(place, knots, knots[-1] - knots[0] if periodic else None)
+                repeats = self.walk.system.mechanism.tables[name].repeats
+                yield Switch(place, knots, knots[-1] - knots[0] if repeats else None)
 
     def _named(self, name: str) -> Number:
         """What a name in an expression stands for: a dimension, the drive, time, or a table."""
@@ -120,11 +120,20 @@ class Stated:
         knots, values = (
             [self.walk.values[f"{path}.{k}.{key}"] for k in range(len(table.points))] for key in ("at", "value")
         )
+        if table.period is not None and self._open(name):
+            knots, values = [*knots, knots[0] + self.walk.values[f"tables.{name}.period"]], [*values, values[0]]
         return knots, values, self.walk.time if table.over == "time" else self._drive[0]
 
     def _table(self, name: str) -> Number:
         table, (knots, values, place) = self.walk.system.mechanism.tables[name], self._of_table(name)
-        return look_up(knots, values, place, table.interpolation == "spline", table.periodic)
+        return look_up(knots, values, place, table.interpolation == "spline", table.repeats)
+
+    def _open(self, name: str) -> bool:
+        """Whether the points of a table end before its period does: the first then comes again as the last."""
+        nominal = self.walk.system.mechanism.parameter_set.nominal
+        last = len(self.walk.system.mechanism.tables[name].points) - 1
+        first, end, period = (nominal[f"tables.{name}.{key}"] for key in ("points.0.at", f"points.{last}.at", "period"))
+        return bool(end - first < period * (1 - 1e-9))
 
 
 # ---- loads ----------------------------------------------------------------------------------------------------

@@ -30,6 +30,7 @@ from trunnion.analysis.kinetostatics import Backward
 from trunnion.analysis.means import AVERAGED, Means, means_of, still
 from trunnion.analysis.sweep_figures import Reduced, reduced
 from trunnion.analysis.sweep_grid import Swept, named
+from trunnion.analysis.sweep_measures import of_point
 from trunnion.analysis.switches import Mechanisms
 from trunnion.analysis.system import Cycle, law_of, rubbing
 from trunnion.errors import Finding, MechanismError, Severity, Status
@@ -112,6 +113,11 @@ class Points:
         with named(self.swept, index):
             found = positions(run, self.steps, self.method, margin=self.margin)
         return self._reduced(found.arrays, found.means, found.ideal)
+
+    def measured(self, index: Index, names: Sequence[str]) -> dict[str, float]:
+        """Figures of measures at a point."""
+        with named(self.swept, index):
+            return of_point(self._prepared(index) if any(index) else self.run, names, self.steps, self.method)
 
     def _reduced(self, arrays: Mapping[str, Array], means: Means, ideal: Means | None) -> Reduced:
         wanted = arrays if self.margin else {key: one for key, one in arrays.items() if key != "locking_margin"}

@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
+import json
+import re
 from collections.abc import Iterable
 from difflib import get_close_matches
 
-__all__ = ["FORMULA", "guarded", "nearest", "unguarded"]
+__all__ = ["FORMULA", "as_key", "guarded", "nearest", "unguarded"]
 
 SHOWN = 8
 FORMULA = frozenset("=+-@\t\r\n＝＋－＠")  # with which a cell begins that a spreadsheet executes; some are full width
+_PLAIN = re.compile(r"[^\W\d](?:[\w. +/-]*\w)?")  # what YAML takes for a text as it stands, in braces too
+_WORDS = ("true", "false", "null", "yes", "no", "on", "off")  # and what it does not
+
+
+def as_key(name: str) -> str:
+    """A name as it is written as a key in a model file: in quotation marks where its signs mean something in YAML."""
+    plain = _PLAIN.fullmatch(name) and name.casefold() not in _WORDS
+    return name if plain else json.dumps(name, ensure_ascii=False)
 
 
 def nearest(name: str, known: Iterable[str]) -> str:

@@ -51,6 +51,7 @@ def rig(
     from trunnion.analysis.rig.virtual import observe
     from trunnion.analysis.rig.virtual_files import check_folder, check_form
     from trunnion.measured.rig_file import Rig
+    from trunnion.model.file import files_named
 
     if format_:
         check_form(format_)
@@ -62,7 +63,7 @@ def rig(
     with lines_of(file), _lines_of_rig(rig_file):
         count = len(stated_rig.schedule.rows())
         if out:
-            check_folder(stated_rig, out, format_ or "", [rig_file, file, *tables_read(table)])
+            check_folder(stated_rig, out, format_ or "", [rig_file, file, *tables_read(table), *files_named(file)])
         with bar("conditions", count, least=FEWEST) as progress:
             observation = observe(mechanism, stated_rig, seed, progress)
     found = list(observation.findings)

@@ -33,7 +33,7 @@ Drawn = Annotated[
     list[str] | None,
     typer.Option(
         "--measure",
-        help="What is shown, by its name in the CSV file: A.effort_max. Repeatable; efficiency if not given.",
+        help="What is shown, by its name in the CSV file: A.effort_max, or a measure of the model. Repeatable.",
         show_default=False,
     ),
 ]
@@ -80,10 +80,11 @@ def sweep(
     measures = list(dict.fromkeys(measure or ["efficiency"]))
     _check_figures(grid, x or "", family or "", kind)
     files = _files(out or [], measures, image)
-    mechanism = stated(file, set_, table, friction, seat)
-    check_measure(measures, mechanism)
+    mechanism = stated(file, set_, table, friction, seat, {name: values[0] for name, values in grid.items()})
+    own = check_measure(measures, mechanism)
     with lines_of(file), bar("points", points(grid)) as progress:
-        result = run(mechanism, grid, steps, progress=progress, margin=margin or "locking_margin" in measures)
+        margin = margin or "locking_margin" in measures
+        result = run(mechanism, grid, steps, progress=progress, margin=margin, measures=own)
     _write(result, out or [], files, (x or "", family or "", kind), units_row, uncut)
     _show(result, mechanism, file, measures, x or "", family or "")
     say(placed(findings_of(result), file, ["assembly"]))

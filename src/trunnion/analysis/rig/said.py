@@ -18,6 +18,7 @@ from trunnion.analysis.rig.judge import Verdict, going_on
 from trunnion.errors import Finding, Severity, Status, counted
 from trunnion.model.expression import LITERAL
 from trunnion.model.mechanism import Mechanism
+from trunnion.model.names import as_key
 from trunnion.model.units import unit as unit_of
 
 if TYPE_CHECKING:
@@ -341,8 +342,9 @@ def other_speed(driver: str, rows: Sequence[tuple[str, float, float]], of: int) 
             f"the driver did not turn at the model's speed {_in([row[0] for row in off], of)}: "
             f"{said(measured, 'rad/s')} measured, {said(theirs, 'rad/s')} in the model"
         )
-        remedy = f"state set: {{{driver}.speed: {{mean: …}}}} in the mapping, of a channel that measures rate:{driver}"
-        yield Finding(what, f"drivers.{driver}", remedy, Severity.WARNING)
+        key, where = as_key(f"{driver}.speed"), f"drivers.{driver}"
+        remedy = f"state set: {{{key}: {{mean: …}}}} in the mapping, of a channel that measures rate:{driver}"
+        yield Finding(what, where, remedy, Severity.WARNING)
 
 
 def _answers(found: Sequence[Compared]) -> Iterator[Finding]:

@@ -11,6 +11,7 @@ import numpy as np
 
 from trunnion.analysis.analyse import Run
 from trunnion.analysis.measures import MEASURES, Measure, named
+from trunnion.analysis.rig.modelled import told_at
 from trunnion.analysis.rig.virtual_courses import Sampled, cycle_efficiency, sampled
 from trunnion.analysis.rig.virtual_faults import misfits
 from trunnion.analysis.rig.virtual_sensors import Channel, resolved
@@ -116,8 +117,8 @@ def measures_of(rig: Rig, run: Run) -> list[Measure]:
         except MechanismError as error:
             findings += [replace(one, where=where) for one in error.findings]
             continue
-        if measure.statistic or measure.kind not in SINGLE or measure.of_attitude(run.system):
-            what = f"'{sensor.measures}' is no number that a sensor shows at every instant"
+        if not measure.everywhere or measure.kind not in SINGLE or measure.of_attitude(run.system):
+            what = f"'{sensor.measures}' is no number that a sensor shows at every instant{told_at(measure)}"
             remedy = "write effort:DRIVER, rate:JOINT, load:LOAD, rotation:JOINT, slide:JOINT or link.point.x"
             findings.append(Finding(what, where, remedy))
         found.append(measure)

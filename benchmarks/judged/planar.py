@@ -64,6 +64,7 @@ class Planar:
         self.moment = {link: np.zeros(self.count) for link in self.links}
         self.largest_force = np.zeros(self.count)
         self.largest_moment = np.zeros(self.count)
+        self.apart: dict[str, tuple[Array, Array]] = {}  # what pushes gears apart, as given and as wanted
         self.power = np.zeros(self.count)
         self.largest_power = np.zeros(self.count)
 
@@ -342,9 +343,7 @@ class Planar:
                 1.0 if spins[1] < 0 else -1.0
             )  # the second gear goes away from the first, or further into its ring
             wanted = outward * np.abs(tangential) * np.tan(angle)
-            self.verdict.note(
-                "law", f"gear {name}", apart - wanted, np.max([size(force), 1e-300 * size(force)], axis=0)
-            )
+            self.apart[f"gear {name}"] = apart, wanted
             about = cross(pitch - centres[1], force) * (1 if second[1] == wheels[1] else -1)
             self.verdict.note("balance", f"gear {name}", about - torque, np.abs(torque) + size(force) * size(along))
 
@@ -357,7 +356,7 @@ class Planar:
 
     def rubs(self) -> None:
         """Friction by its law from load and slip, of the largest friction there is at the position."""
-        found: dict[str, tuple[Array, Array]] = {}
+        found = dict(self.apart)
         for name, joint in self.data["joints"].items():
             law = friction_of(joint, self.data.get("joint_defaults"))
             slides = joint["type"] == "prismatic"

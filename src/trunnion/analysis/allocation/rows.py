@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.analysis.allocation.problem import Criterion, Effects
-from trunnion.analysis.tolerance.effects import Spread
 from trunnion.analysis.tolerance.linear import Of, by_position
 from trunnion.analysis.tolerance.study import Study
+from trunnion.analysis.tolerance.zones import Spread
 from trunnion.model.tolerances import Tolerance
 from trunnion.statistics.population import Marginal
 
@@ -145,16 +145,18 @@ def _taken(block: _Block, known: NDArray[np.bool_]) -> _Block:
 def _parts(study: Study, bought: Mapping[str, float], criterion: Criterion, blocks: Sequence[_Block]) -> Effects:
     """Effects (row, contribution) without their limits."""
     slopes = np.concatenate([block.sensitivity for block in blocks], axis=1)
-    upper, half, deviation = (
+    lower, upper, half, shift, deviation = (
         np.concatenate([getattr(block.spread, key) for block in blocks], axis=1)
-        for key in ("upper", "half", "deviation")
+        for key in ("lower", "upper", "half", "shift", "deviation")
     )
     offset, mean = np.zeros(slopes.shape[1]), np.zeros_like(slopes)
     for i, name in enumerate(study.inputs.names):
         one = study.inputs.tolerances[i] if i < len(study.inputs.tolerances) else None
         if one is None or one.direction or one.distribution == "direction":  # a zone
             size = bought.get(name, 1.0)
-            upper[i], half[i], deviation[i] = upper[i] / size, half[i] / size, deviation[i] / size
+            offset += shift[i]  # of what turns about another place than its nominal one, and is not bought
+            upper[i] = 0.5 * (upper[i] - lower[i]) / size
+            half[i], deviation[i] = half[i] / size, deviation[i] / size
             continue
         scatter, drift, constant = _rates(one)
         size = 1.0 if name in bought else one.half_width

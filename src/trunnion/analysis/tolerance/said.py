@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 __all__ = ["findings_of", "summary"]
 
 OTHERWISE, ENOUGH = 1.5, 100  # ratio of standard deviations that is told, and samples from which it is
+CARRIED = 0.02  # of the standard deviation: what it may change with the link that carries a seat before it is told
 FAR_OFF = 0.2  # between first order and what is found, of which it is said
 
 
@@ -96,6 +97,7 @@ def findings_of(outcome: Outcome, counted: Sampled | None) -> Iterator[Finding]:
     yield from _nominal(outcome)
     for of in study.linear.measures:
         yield from _first_order(outcome, of)
+        yield from _carried(outcome, of)
     if counted is not None:
         yield from _samples(outcome, counted)
     if outcome.indices is not None and outcome.indices.lost:
@@ -165,6 +167,27 @@ def _first_order(outcome: Outcome, of: Of) -> Iterator[Finding]:
     if np.isfinite(found) and abs(found - size) > FAR_OFF * max(size, found) and max(size, found) > 0:
         what = f"the worst case found is {found / size if size else np.inf:.2f} times that of first order"
         yield Finding(what, f"measures.{name}", "rely on the one found, and on samples", Severity.NOTE)
+
+
+def _carried(outcome: Outcome, of: Of) -> Iterator[Finding]:
+    """Plays whose part in the scatter is another if the pin keeps its place on the other link."""
+    study, whole = outcome.study, float(of.total[4])
+    others = []
+    for joint in study.inputs.loose:
+        taken, *more = (float(part) for part in study.effects.scatters(joint, of.slope))
+        ratios = [np.sqrt(max(1 + (other**2 - taken**2) / whole**2, 0.0)) for other in more if whole > 0]
+        others += [(joint, ratio) for ratio in ratios if abs(ratio - 1) > CARRIED]
+    if others:
+        joints = study.run.system.mechanism.effective_joints
+        told = ", ".join(f"'{joints[name].links[0]}' in {name}: {ratio:.3g} times" for name, ratio in others)
+        holes = ", ".join(f"'{joints[name].links[1]}' in {name}" for name, _ in others)
+        what = (
+            f"scatter and yield suppose that pins keep their places on the links of the holes ({holes}); on the other "
+        )
+        what += f"link the deviation is another ({told}); the worst case is of both"
+        name = others[0][0]
+        remedy = f"say joints.{name}.seat_on: {joints[name].links[0]} or {joints[name].links[1]}"
+        yield Finding(what, f"measures.{of.measure.name}", remedy, Severity.NOTE)
 
 
 def _scatter(outcome: Outcome, counted: Sampled) -> Iterator[Finding]:

@@ -60,6 +60,9 @@ def findings_of(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:
     for name, share in found.tight.items():
         what = f"its limits were taken {100 * (1 - share):.2g} % narrower, so that the mechanism itself keeps them"
         yield Finding(what, f"measures.{name}", "", Severity.NOTE)
+    if found.asked.criterion != "yield" and found.study.effects.correlated:
+        what = f"the criterion {found.asked.criterion} leaves the correlations out"
+        yield Finding(what, "correlations", "ask for a yield, which has them", Severity.WARNING)
     if found.asked.criterion == "worst-case":
         yield from _searched(found, known)
     if found.asked.criterion == "yield" and "yield_all" in known and answer.sampled is not None:

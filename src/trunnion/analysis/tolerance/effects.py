@@ -162,9 +162,9 @@ class Effects:
         Of an independent one its own variance; of correlated ones S_i (C S)_i, which may be negative.
         """
         found = np.asarray(spread.deviation**2, float)
-        off = self._covariance
-        if not np.any(off):
+        if not self.correlated:
             return found
+        off = self._covariance
         for parts in self._linear_parts(slope):
             found[: len(off)] += parts * np.einsum("ij,j...->i...", off, parts)
         return found
@@ -183,6 +183,11 @@ class Effects:
                 np.sqrt(0.5) * np.array([own[i][k] if i in own else nothing for i in range(count)]) for k in (0, 1)
             ]
         return found
+
+    @property
+    def correlated(self) -> bool:
+        """Whether any two numbers that vary go with each other."""
+        return bool(np.any(self._covariance))
 
     @cached_property
     def _covariance(self) -> Array:

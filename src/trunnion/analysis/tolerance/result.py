@@ -72,10 +72,12 @@ VARIABLES: dict[str, Variable] = {
     "sensitivity": Variable(MP, "ratio", "derivative of the figure; of a clearance, by its radius in the worst case"),
     "contribution_worst_case": Variable(MP, "", "largest change of the figure by the parameter alone, to first order"),
     "contribution_rss": Variable(MP, "1", "share of the parameter in the square of the RSS half width"),
-    "contribution_variance": Variable(MP, "1", "share of the parameter in the variance, to first order"),
+    "contribution_variance": Variable(
+        MP, "1", "share of the parameter in the variance, to first order: its covariance with the figure, signed"
+    ),
     "worst_case_lower": Variable(M, "", "least deviation of the figure, to first order"),
     "worst_case_upper": Variable(M, "", "largest deviation of the figure, to first order"),
-    "rss": Variable(M, "", "half width by the root of the sum of squares"),
+    "rss": Variable(M, "", "half width by the root of the sum of squares; without correlation"),
     "deviation_linear": Variable(M, "", "standard deviation, to first order"),
     "shift_linear": Variable(M, "", "mean deviation from nominal, to first order"),
     "searched_lower": Variable(M, "", "least deviation found on the mechanism itself"),
@@ -86,7 +88,9 @@ VARIABLES: dict[str, Variable] = {
     "curve_sensitivity": Variable(("measure", "parameter", "position"), "course ratio", "derivative of the course"),
     "curve_worst_case_lower": Variable(MPOS, "course", "least deviation of the course, to first order"),
     "curve_worst_case_upper": Variable(MPOS, "course", "largest deviation of the course, to first order"),
-    "curve_rss": Variable(MPOS, "course", "half width of the course by the root of the sum of squares"),
+    "curve_rss": Variable(
+        MPOS, "course", "half width of the course by the root of the sum of squares; without correlation"
+    ),
     "curve_shift": Variable(MPOS, "course", "mean deviation of the course from nominal, to first order"),
     "curve_deviation": Variable(MPOS, "course", "standard deviation of the course, to first order"),
     "status": Variable(("position",), "1", "code of the position's status; see the attribute flag_meanings"),
@@ -183,6 +187,7 @@ def dataset(outcome: Outcome, told: Sequence[Finding]) -> xr.Dataset:
         "distributions": json.dumps(
             [*(one.distribution for one in found.inputs.tolerances), *("play" for _ in found.inputs.loose)]
         ),
+        "correlated": int(found.effects.correlated),
         "drive": dial.of,
         "drive_unit": dial.unit.strip(),
         "periodic": int(found.run.cycle.periodic),
@@ -226,11 +231,11 @@ def _linear(found: Study) -> dict[str, Any]:
     effects = found.effects
     total = np.array([[float(part) for part in of.total] for of in rows]).reshape(-1, 5).T
     halves = np.array([of.spread.half for of in rows])
-    scatter = np.array([of.spread.deviation for of in rows])
+    scatter = np.array([effects.covariances(of.spread, of.slope) for of in rows])
     worst = np.array([np.maximum(-of.spread.lower, of.spread.upper) for of in rows])
     with np.errstate(all="ignore"):
         shares = halves**2 / np.sum(halves**2, axis=1, keepdims=True)
-        variance = scatter**2 / np.sum(scatter**2, axis=1, keepdims=True)
+        variance = scatter / np.sum(scatter, axis=1, keepdims=True)
     numbers = effects.numbers()
     return {
         "nominal": np.array([of.reference.figure for of in rows]),

@@ -52,7 +52,8 @@ def _of_measure(
     if outcome.worst is not None:
         for key, corner in zip(("least", "largest"), outcome.worst[i], strict=True):
             yield {"label": f"{name}, {key} deviation found", "value": corner.value, "unit": unit}
-    yield {"label": f"{name}, RSS{at}", "value": rss, "unit": unit}
+    alone = ", without correlation" if outcome.study.effects.correlated else ""
+    yield {"label": f"{name}, RSS{alone}{at}", "value": rss, "unit": unit}
     yield {"label": f"{name}, standard deviation, linear{at}", "value": deviation, "unit": unit}
     if counted is not None:
         arrays = counted.arrays
@@ -68,6 +69,11 @@ def _of_measure(
         share = float(halves[top] ** 2 / np.sum(halves**2))
         label = f"{name}, largest contribution, {outcome.study.inputs.names[top]}, share of RSS²"
         yield {"label": label, "value": share, "unit": "1"}
+    if alone and deviation > 0:
+        parts = outcome.study.effects.covariances(of.spread, of.slope) / deviation**2
+        top = int(np.argmax(parts))
+        label = f"{name}, largest contribution, {outcome.study.inputs.names[top]}, share of the variance"
+        yield {"label": label, "value": float(parts[top]), "unit": "1"}
 
 
 def _plain(value: Any) -> float | None:
@@ -92,6 +98,9 @@ def findings_of(outcome: Outcome, counted: Sampled | None) -> Iterator[Finding]:
     if loaded:
         what = f"pins lie anywhere in their holes: seats by loads of {', '.join(loaded)} are not taken"
         yield Finding(what, "joints", "analyse takes them", Severity.NOTE)
+    if study.effects.correlated:
+        what = "RSS and worst case leave the correlations out: deviation, shares of variance and samples have them"
+        yield Finding(what, "correlations", severity=Severity.NOTE)
     yield from _measured(outcome)
     yield from _impossible(outcome)
     yield from _nominal(outcome)

@@ -18,11 +18,12 @@ from numpy.typing import NDArray
 from trunnion.analysis.allocation.problem import Criterion, Effects
 from trunnion.analysis.tolerance.linear import Of, by_position
 from trunnion.analysis.tolerance.study import Study
+from trunnion.analysis.tolerance.targets import against, limits
 from trunnion.analysis.tolerance.zones import Spread
 from trunnion.model.tolerances import Tolerance
 from trunnion.statistics.population import Marginal
 
-__all__ = ["Rows", "joined", "limits", "part_of", "rows_of"]
+__all__ = ["Rows", "joined", "part_of", "rows_of"]
 
 Array = NDArray[np.float64]
 Rates = tuple[float, float, float]
@@ -56,35 +57,10 @@ class _Block:
     moving: bool
 
 
-def limits(of: Of) -> tuple[float, float]:
-    """Least and largest deviation from nominal that a row of the measure may have; infinite where there is no limit."""
-    measure = of.measure
-    lower = -np.inf if measure.lower is None else measure.lower
-    upper = np.inf if measure.upper is None else measure.upper
-    least = -np.inf if measure.at_least is None else measure.at_least
-    most = np.inf if measure.at_most is None else measure.at_most
-    if measure.rule == "deviation":
-        return max(lower, -most), min(upper, most)
-    if not _against(of):
-        return max(lower, least - of.reference.figure), min(upper, most - of.reference.figure)
-    if measure.rule == "maximum" and measure.kind != "path_error":
-        return -np.inf, min(upper, most)
-    if measure.rule == "minimum" and measure.kind != "path_error":
-        return max(lower, least), np.inf
-    if measure.rule == "mean" and measure.kind != "path_error":
-        return max(lower, least), min(upper, most)
-    return -min(upper, most), min(upper, most)  # what has a size and no sign
-
-
-def _against(of: Of) -> bool:
-    """Whether the figure is made of deviations from the nominal mechanism and is 0 there."""
-    return of.measure.kind == "path_error" or (of.reference.against and of.measure.rule != "value")
-
-
 def _block(of: Of) -> _Block:
     measure = of.measure
     # without a derivative, but no further off than the worst position: kept where every position keeps it
-    root = _against(of) and measure.rule == "rms"
+    root = against(of) and measure.rule == "rms"
     root |= measure.kind == "path_error" and measure.rule in ("mean", "minimum", "peak-to-peak")
     lower, upper = limits(of)
     if (by_position(of.reference) and of.place >= 0) or root:

@@ -19,6 +19,7 @@ from trunnion.analysis.tolerance.sampled import QUANTILES, sampled
 from trunnion.analysis.tolerance.sampling import Sampling, Tally
 from trunnion.analysis.tolerance.search import Corner
 from trunnion.analysis.tolerance.study import Study
+from trunnion.analysis.tolerance.targets import MISSED
 from trunnion.analysis.tolerance.words import course_text, text_of
 from trunnion.errors import Finding, Status
 from trunnion.model.parameters import dimension_kinds
@@ -146,6 +147,7 @@ def dataset(outcome: Outcome, told: Sequence[Finding]) -> xr.Dataset:
     found = outcome.study
     system, mechanism = found.run.system, found.run.system.mechanism
     counted = None if outcome.tally is None or outcome.job is None else sampled(outcome.job, outcome.tally, found)
+    stated = [finding_row(finding) for finding in [*findings_of(outcome, counted), *told]]
     arrays = {**_linear(found), **_worst(outcome), **(counted.arrays if counted else {}), **_shares(outcome)}
     units = [measure.figure_unit(system, found.run.values) for measure in found.measures]
     curve_units = [measure.unit(system) for measure in found.measures]
@@ -194,8 +196,9 @@ def dataset(outcome: Outcome, told: Sequence[Finding]) -> xr.Dataset:
         "steps": found.steps,
         "stopped": int(outcome.stopped),
         "summary": json.dumps(summary(outcome, counted, units, dial), ensure_ascii=False),
-        "findings": json.dumps(
-            [finding_row(finding) for finding in [*findings_of(outcome, counted), *told]], ensure_ascii=False
+        "findings": json.dumps(stated, ensure_ascii=False),
+        "missed": json.dumps(
+            [f"{row['where']}: {row['what']}" for row in stated if row["what"].startswith(MISSED)], ensure_ascii=False
         ),
     }
     return xr.Dataset(variables, {**told_of, "time": times, "drive": over}, attributes)

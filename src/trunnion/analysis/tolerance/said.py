@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from trunnion.analysis.account import model_notes
-from trunnion.analysis.measures import Measure
 from trunnion.analysis.tolerance.linear import by_position
 from trunnion.analysis.tolerance.sampling import CAUSES
+from trunnion.analysis.tolerance.targets import limited, missed
 from trunnion.errors import Finding, Severity, Status
 from trunnion.model.check_values import NOT_NEGATIVE
 
@@ -81,15 +81,11 @@ def _plain(value: Any) -> float | None:
     return number if number is not None and np.isfinite(number) else None
 
 
-def limited(measure: Measure) -> bool:
-    """Whether a measure has a limit or a bound."""
-    return any(one is not None for one in (measure.lower, measure.upper, measure.at_least, measure.at_most))
-
-
 def findings_of(outcome: Outcome, counted: Sampled | None) -> Iterator[Finding]:
     """What is doubtful, beside what the model itself has to say."""
     study = outcome.study
     mechanism = study.run.system.mechanism
+    yield from missed(outcome, counted)
     yield from (one for one in model_notes(mechanism, study.run.system) if one.severity is not Severity.NOTE)
     yield from study.run.chosen.findings
     if study.run.determinacy is not None:
@@ -219,8 +215,3 @@ def _samples(outcome: Outcome, counted: Sampled) -> Iterator[Finding]:
             what = f"{int(failed[code]):,} of {done:,} samples ({failed[code] / done:.2%}) have no answer: {text}"
             yield Finding(what, "tolerances", "they count as outside every limit; moments are of the others")
     yield from _scatter(outcome, counted)
-    for i, measure in enumerate(outcome.study.measures):
-        if limited(measure) and counted.arrays["yield"][i] < 1:
-            share, low, high = (float(counted.arrays[key][i]) for key in ("yield", "yield_low", "yield_high"))
-            what = f"{share:.4%} of the samples keep the limits (95 % interval {low:.4%} to {high:.4%})"
-            yield Finding(what, f"measures.{measure.name}", "`allocate` finds tolerances that do", Severity.NOTE)

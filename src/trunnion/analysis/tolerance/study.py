@@ -200,7 +200,8 @@ def tolerance(
         notes += ran.notes
         if stopped:
             what = f"stopped before the end: {done_of(job, tally):,} of {job.samples:,} samples"
-            notes.append(Finding(what, "samples", "go on with --resume", Severity.WARNING))
+            remedy = "go on with --resume" if checkpoint is not None else "with --checkpoint FILE what is done is kept"
+            notes.append(Finding(what, "samples", remedy, Severity.WARNING))
     if "sobol" in methods:
         # Not turned: each number is to have its own coordinates of the points.
         own = replace(found.sampling("quasi-monte-carlo", samples, seed), rotation=None)

@@ -152,3 +152,19 @@ def test_the_report_of_no_limits_has_no_such_line() -> None:
     found = trunnion.tolerance(fourbar(), methods=["linear"])
     assert json.loads(found.attrs["missed"]) == []
     assert "limits not kept" not in report(found)
+
+
+@pytest.mark.parametrize(("asked", "fine"), [(0.9, True), (0.9999, False)])
+def test_a_yield_that_is_asked_for_decides_alone(asked: float, fine: bool) -> None:
+    """The worst case is far outside either way."""
+    mechanism = fourbar(**made(limit="±0.08 deg"))
+    found = trunnion.tolerance(mechanism, samples=4000, target=asked)
+    assert 0.95 < found["yield"].item() < 0.999
+    assert bool(missed(found)) != fine
+    assert missed(trunnion.tolerance(mechanism, samples=4000))
+
+
+@pytest.mark.parametrize(("target", "methods"), [(1.2, ["monte-carlo"]), (0.9, ["linear"])])
+def test_a_yield_that_cannot_be_asked_for(target: float, methods: list[str]) -> None:
+    with pytest.raises(trunnion.MechanismError):
+        trunnion.tolerance(fourbar(), methods=methods, target=target)

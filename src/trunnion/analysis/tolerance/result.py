@@ -50,7 +50,7 @@ class Variable:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What the methods that were asked for found; None of those that were not."""
+    """What the methods that were asked for found; None of those that were not. target: the yield asked for."""
 
     study: Study
     methods: tuple[str, ...]
@@ -59,6 +59,7 @@ class Outcome:
     tally: Tally | None = None
     indices: Indices | None = None
     stopped: bool = False
+    target: float | None = None
 
 
 M, P, MP, MPOS = ("measure",), ("parameter",), ("measure", "parameter"), ("measure", "position")

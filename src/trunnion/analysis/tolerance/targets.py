@@ -63,7 +63,13 @@ def against(of: Of) -> bool:
 
 
 def missed(outcome: Outcome, counted: Sampled | None) -> Iterator[Finding]:
-    """Each measure whose worst case, yield or capability is outside its limits: errors, with what helps."""
+    """Each measure whose worst case, yield or capability is outside its limits: errors, with what helps.
+
+    Where a yield is asked for, that alone decides.
+    """
+    if outcome.target is not None:
+        yield from _below(outcome, counted, outcome.target)
+        return
     for i, of in enumerate(outcome.study.linear.measures):
         if not limited(of.measure):
             continue
@@ -74,6 +80,23 @@ def missed(outcome: Outcome, counted: Sampled | None) -> Iterator[Finding]:
         if parts or short:
             what = f"{MISSED}: {'; '.join([*parts, *short])}; {say.limits()}"
             yield Finding(what, f"measures.{of.measure.name}", _remedy(outcome, of, say))
+
+
+def _below(outcome: Outcome, counted: Sampled | None, target: float) -> Iterator[Finding]:
+    """Measures with a lower yield than is asked for, or else all of them together."""
+    if counted is None or not counted.done:
+        return
+    fine = True
+    for i, of in enumerate(outcome.study.linear.measures):
+        if limited(of.measure) and float(counted.arrays["yield_high"][i]) < target:
+            fine, say = False, _Words(outcome, of)
+            what = f"{MISSED}: {_short(counted, i, sure=True)[0]}, {100 * target:.6g} % asked for; {say.limits()}"
+            yield Finding(what, f"measures.{of.measure.name}", _remedy(outcome, of, say))
+    share, low, high = (float(counted.arrays[f"yield_all{end}"]) for end in ("", "_low", "_high"))
+    if fine and high < target:
+        what = f"{MISSED}: yield of all measures together {100 * share:.6g} % (95 % interval {100 * low:.5g} to "
+        what += f"{100 * high:.5g} %), {100 * target:.6g} % asked for"
+        yield Finding(what, "measures", "narrower tolerances of the measure with the lowest yield first")
 
 
 def _worst(outcome: Outcome, i: int, of: Of) -> tuple[tuple[float, float], bool]:

@@ -135,6 +135,11 @@ class System:
         """Kind and links of every joint, as the file has them."""
         return {name: (joint.type, joint.links) for name, joint in self.mechanism.effective_joints.items()}
 
+    @cached_property
+    def order(self) -> dict[str, int]:
+        """Where the joints stand in the file."""
+        return {name: place for place, name in enumerate(self.joints)}
+
     def senses(self, joint: str) -> list[float | tuple[float, ...]]:
         """Ways in which a joint at rest may be about to slip, for `kinetostatics.Given`."""
         return [-1.0, 1.0]

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.names import nearest
+from trunnion.output import reading
 
 __all__ = ["FORMATS", "Column", "Table", "choose", "failed", "number", "numbers", "read_table"]
 
@@ -69,6 +70,7 @@ def read_table(path: Path, wanted: Iterable[str], optional: Iterable[str] = ()) 
         raise MechanismError(Finding(what, file=str(path), remedy="check the path"))
     if path.stat().st_size == 0:
         raise failed(path, "is empty", "check that the recording was saved")
+    reading(path)
     try:
         table = reader(path, list(dict.fromkeys(wanted)), list(dict.fromkeys(optional)))
     except OSError as error:

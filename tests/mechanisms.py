@@ -419,3 +419,31 @@ def dyad(letters: str) -> General:
     first, inner, last = (KIND[letter] for letter in letters)
     joints = (GroupJoint(first, (OUTER, 0)), GroupJoint(inner, (0, 1)), GroupJoint(last, (OUTER, 1)))
     return General(2, joints)
+
+
+def eccentric_press() -> Mechanism:
+    """A slider-crank with friction in its guide alone, whose load presses beside the middle of the guide.
+
+    The load F is 0.2 of the guide's length off its axis, so that its couple presses with 0.4 F at any friction, and the
+    side force of the rod with (F − φ) tan β where the load moves the slider: there friction takes the load over from
+    the side force, which it changes, to the couple, which it does not.
+    """
+    guide = {"type": "prismatic", "links": ["frame", "slider"], "guide": {"length": 0.1}, "friction": 0.49}
+    pin = {"type": "revolute", "pin": {"radius": 0.005}}
+    return Mechanism(
+        links={
+            "frame": {"points": {"O": [0, 0], "S": {"at": [0, 0], "axis": [1, 0]}}},
+            "crank": {"points": {"O": [0, 0], "P": [0.08, 0]}},
+            "rod": {"points": {"P": [0, 0], "Q": [0.2, 0]}},
+            "slider": {"points": {"Q": [0, 0], "S": {"at": [0, 0], "axis": [1, 0]}, "L": [0, 0.02]}},
+        },
+        joints={
+            "O": pin | {"links": ["frame", "crank"]},
+            "P": pin | {"links": ["crank", "rod"]},
+            "Q": pin | {"links": ["rod", "slider"]},
+            "S": guide,
+        },
+        drivers={"O": {"speed": 1.0}},
+        loads={"work": {"link": "slider", "at": "L", "force": [-100.0, 0.0]}},
+        assembly={"Q": [0.28, 0.0]},
+    )

@@ -31,6 +31,7 @@ from trunnion.options import (
     Set,
     Steps,
     TableFile,
+    Uncut,
     UnitsRow,
 )
 from trunnion.output import folder
@@ -145,6 +146,7 @@ def analyse(
     ] = None,
     report: Report = None,
     units_row: UnitsRow = False,
+    uncut: Uncut = False,
 ) -> None:
     """Motion, reactions with friction, drive effort and power over the cycle."""
     from trunnion.export import check_format, save
@@ -157,7 +159,7 @@ def analyse(
     for path in out or []:
         save(result, path, units_row)
     if report:
-        _write_report(mechanism, result, report)
+        _write_report(mechanism, result, report, uncut)
     _summary(result, file)
     for path in [*(out or []), *([report] if report else [])]:
         wrote(path)
@@ -219,6 +221,7 @@ def play(
     friction: FrictionLaw = None,
     out: Out = None,
     units_row: UnitsRow = False,
+    uncut: Uncut = False,
 ) -> None:
     """What the play of every joint does to measures: worst case, share of each joint, standard deviation."""
     from trunnion.analysis.play import play as run
@@ -228,7 +231,7 @@ def play(
     mechanism = stated(file, set_, table, friction)
     with lines_of(file):
         result = run(mechanism, measure, steps)
-    show(mechanism, result, out or [], units_row)
+    show(mechanism, result, out or [], units_row, uncut)
     say(placed(findings_of(result), file, ["measures", "joints"]))
     raise typer.Exit(exit_status(findings_of(result)))
 
@@ -244,9 +247,11 @@ def plot(
     friction: FrictionLaw = None,
     seat: Seats = None,
     image: Annotated[str, typer.Option("--format", help="png, svg or pdf, for a folder of plots.")] = "png",
+    uncut: Uncut = False,
 ) -> None:
     """Figures: drive torque, friction power, reactions, polar diagram, mechanism with coupler curve."""
     from trunnion.views.error_plot import with_worst_case
+    from trunnion.views.peaks import whole_peaks
     from trunnion.views.plots import PLOTS, drawable, save
 
     unknown = [name for name in kind or [] if name not in PLOTS]
@@ -262,7 +267,7 @@ def plot(
     ideal = _ideal(mechanism, steps, None)
     if not single:
         folder(out)
-    shown = with_worst_case(result, mechanism) if "error" in (kind or PLOTS) else result
+    shown = whole_peaks(with_worst_case(result, mechanism) if "error" in (kind or PLOTS) else result, uncut)
     for name, figure in [(name, PLOTS[name](shown, ideal)) for name in kind or drawable(result)]:
         path = out if single else out / f"{name}.{image.lstrip('.')}"
         save(figure, path)
@@ -284,6 +289,7 @@ def report(
     method: Method = "newton",
     criterion: Criterion = None,
     iterations: Rounds = 200,
+    uncut: Uncut = False,
 ) -> None:
     """One self-contained HTML file: animation, plots, findings, balance, input data."""
     if out.suffix.lower() not in (".html", ".htm"):
@@ -292,7 +298,7 @@ def report(
     mechanism = stated(file, set_, table, friction, seat)
     with lines_of(file):
         result = _run(mechanism, steps, _method(method, criterion, iterations))
-    _write_report(mechanism, result, out)
+    _write_report(mechanism, result, out, uncut)
     wrote(out)
     raise typer.Exit(exit_status(findings_of(result)))
 
@@ -405,12 +411,14 @@ def _ideal(mechanism: Mechanism, steps: int, method: FrictionMethod | None) -> x
     return _run(mechanism.with_friction("off"), steps, method)
 
 
-def _write_report(mechanism: Mechanism, result: xr.Dataset, path: Path) -> None:
+def _write_report(mechanism: Mechanism, result: xr.Dataset, path: Path, uncut: bool) -> None:
     from trunnion.output import whole
     from trunnion.views.error_plot import with_worst_case
+    from trunnion.views.peaks import whole_peaks
     from trunnion.views.report import report as page
 
-    text = page(with_worst_case(result, mechanism), _ideal(mechanism, result.sizes["position"], None))
+    shown = whole_peaks(with_worst_case(result, mechanism), uncut)
+    text = page(shown, _ideal(mechanism, result.sizes["position"], None))
     with whole(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
 

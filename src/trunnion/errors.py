@@ -11,7 +11,17 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from enum import IntEnum, StrEnum
 
-__all__ = ["Finding", "MechanismError", "Severity", "Status"]
+__all__ = ["Finding", "MechanismError", "Severity", "Status", "agreeing", "counted"]
+
+
+def counted(count: int, noun: str, plural: str = "") -> str:
+    """A number with its noun: "1 row", "2,000 rows"."""
+    return f"{count:,} {agreeing(count, noun, plural or noun + 's')}"
+
+
+def agreeing(count: int, one: str, many: str) -> str:
+    """The word that goes with a number: "is" of one, "are" of several or none."""
+    return one if count == 1 else many
 
 
 class Severity(StrEnum):

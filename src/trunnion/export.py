@@ -33,6 +33,7 @@ from numpy.typing import NDArray
 
 from trunnion.columns import tables_of
 from trunnion.errors import Finding, MechanismError, Status
+from trunnion.model.names import guarded
 from trunnion.output import whole
 
 if TYPE_CHECKING:
@@ -287,15 +288,26 @@ def _count(result: xr.Dataset, found: list[Column]) -> int:
     return result.sizes.get("position") or int(np.prod([result.sizes[name] for name in swept]))
 
 
+def _guarded(frame: pd.DataFrame) -> pd.DataFrame:
+    """The frame with no text that a spreadsheet would take for a formula."""
+    frame = frame.rename(columns=guarded)
+    for place, kind in enumerate(frame.dtypes):
+        if kind.kind not in "fiub":
+            name = frame.columns[place]
+            frame[name] = [guarded(cell) if isinstance(cell, str) else cell for cell in frame[name]]
+    return frame
+
+
 def _csv(result: xr.Dataset, path: Path, units_row: bool, table: str) -> None:
     with path.open("w", encoding="utf-8", newline="") as file:
-        for number, frame in enumerate(frames(result, table)):
+        for number, frame in enumerate(map(_guarded, frames(result, table))):
             if number == 0:
                 frame.head(0).to_csv(file, index=False)
                 if units_row:
                     import csv
 
-                    csv.writer(file, lineterminator="\n").writerow([unit for _, unit, _ in columns(result, table)])
+                    units = [guarded(unit) for _, unit, _ in columns(result, table)]
+                    csv.writer(file, lineterminator="\n").writerow(units)
             frame.to_csv(file, index=False, header=False)
 
 

@@ -63,7 +63,9 @@ Method = Annotated[str, typer.Option("--method", help="newton, or successive-app
 Criterion = Annotated[
     float | None,
     typer.Option(
-        "--criterion", help="Largest change of a reaction at which the iteration ends, N.", show_default=False
+        "--criterion",
+        help="Largest change of a load, N, at which the friction iteration ends; by its residual if not given.",
+        show_default=False,
     ),
 ]
 Rounds = Annotated[int, typer.Option("--iterations", help="Most rounds of the friction iteration.")]
@@ -88,6 +90,9 @@ Report = Annotated[
 Out = Annotated[
     list[Path] | None,
     typer.Option("--out", help="Write it: .csv .json .nc .zarr .parquet, or a figure: .png .svg .pdf. Repeatable."),
+]
+Uncut = Annotated[
+    bool, typer.Option("--uncut", help="Figures show peaks near dead centres whole; else the frame cuts them there.")
 ]
 UnitsRow = Annotated[bool, typer.Option("--units-row", help="Second CSV header row with the units.")]
 Kinds = Annotated[

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["VARIABLES", "Variable", "allocate", "dataset", "variables"]
+__all__ = ["CYCLE", "VARIABLES", "Variable", "allocate", "dataset", "variables"]
 
 
 @dataclass(frozen=True)
@@ -79,6 +79,7 @@ VARIABLES: dict[str, Variable] = {
     "power_residual": Variable((), "W", "drive + loads + inertia − friction power; 0 but for rounding"),
     "friction_iterations": Variable((), "1", "rounds to settle friction and reactions"),
     "friction_change": Variable((), "N", "largest change of a reaction in the last round"),
+    "friction_residual": Variable((), "N", "largest difference between a friction and its law for the load found"),
     "friction_contraction": Variable((), "1", "contraction of the friction iteration; from 1 on it may diverge"),
     "locking_margin": Variable((), "1", "multiple of the friction at which the position locks, ∞ if beyond 10"),
     "status": Variable((), "1", "code of the position's status; see the attribute flag_meanings"),
@@ -139,6 +140,34 @@ INTEGERS = {
 # the same array until something sets them apart
 SAME_AS = {"drive_effort_lower": "drive_effort", "drive_effort_upper": "drive_effort"}
 
+# of the cycle as a whole, beside VARIABLES: dimensions, unit, long name
+CYCLE: dict[str, tuple[tuple[str, ...], str, str]] = {
+    "efficiency": ((), "1", "useful work over drive work of the cycle"),
+    "efficiency_error": ((), "1", "how far the errors of the integrals may have moved the efficiency"),
+    "drive_effort_rms": (("driver",), "N m", "root mean square of the drive effort"),
+    "drive_power_mean": ((), "W", "mean power of all drivers"),
+    "useful_power_mean": ((), "W", "mean power taken by the useful loads"),
+    "friction_power_mean": (("joint",), "W", "mean power lost to friction"),
+}
+
+
+class CycleMeans(Protocol):
+    """What CYCLE names, over drivers or joints where it has these dimensions."""
+
+    @property
+    def efficiency(self) -> float: ...
+    @property
+    def efficiency_error(self) -> float: ...
+    @property
+    def drive_effort_rms(self) -> NDArray[np.float64]: ...
+    @property
+    def drive_power_mean(self) -> float: ...
+    @property
+    def useful_power_mean(self) -> float: ...
+    @property
+    def friction_power_mean(self) -> NDArray[np.float64]: ...
+
+
 Labels = Mapping[str, Sequence[str]]
 
 
@@ -190,9 +219,9 @@ def dataset(
     arrays: Mapping[str, NDArray[np.float64]],
     labels: Labels,
     time: NDArray[np.float64],
-    efficiency: float,
+    means: CycleMeans,
     attributes: Mapping[str, str | float],
-    ideal_efficiency: float | None = None,
+    ideal: CycleMeans | None = None,
 ) -> xr.Dataset:
     """The arrays as an xarray Dataset with coordinates, units and long names."""
     import xarray as xr
@@ -206,13 +235,12 @@ def dataset(
         )
         for name, array in arrays.items()
     }
-    found["efficiency"] = xr.Variable(
-        (), efficiency, {"units": "1", "long_name": "useful work over drive work of the cycle"}
-    )
-    if ideal_efficiency is not None:
-        found["efficiency_ideal"] = xr.Variable(
-            (), ideal_efficiency, {"units": "1", "long_name": "efficiency of the mechanism without errors"}
-        )
+    for name, (dims, unit, long_name) in CYCLE.items():
+        found[name] = xr.Variable(dims, getattr(means, name), {"units": unit, "long_name": long_name})
+    for name in ("efficiency", "friction_power_mean") if ideal is not None else ():
+        dims, unit, long_name = CYCLE[name]
+        told = {"units": unit, "long_name": f"{long_name}, of the mechanism without errors"}
+        found[f"{name}_ideal"] = xr.Variable(dims, getattr(ideal, name), told)
     coordinates = {dim: (dim, np.asarray(names, dtype=str)) for dim, names in labels.items()}
     times = xr.Variable("position", time, {"units": "s", "long_name": "time from the start of the cycle"})
     return xr.Dataset(found, {**coordinates, "time": times}, dict(attributes))

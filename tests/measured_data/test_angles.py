@@ -200,6 +200,8 @@ def test_part_of_a_file(clean: Columns, tmp_path: Path, monkeypatch: pytest.Monk
     changes = {"files": [{"file": "run.csv", "over": ["0.5 s", "1.05 s"]}]}
     whole = read(clean, tmp_path, changes)  # a file of that name elsewhere
     assert whole.conditions[0].courses["brake"].turns.shape[0] == 19
+    (told,) = whole.findings
+    assert "run.csv is read without `over`, which the mapping states for other files" in told.what
     monkeypatch.chdir(tmp_path)
     (one,) = read_measured(mapping(changes)).conditions
     assert one.courses["brake"].turns.shape[0] == 4

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -89,7 +90,7 @@ FAULTS: list[tuple[Any, str, tuple[str, ...], str]] = [
     (_spikes, "channels.torque-in", ("spikes: 3 readings", "0.82, 1.05, 1.4002 s"), "shielding"),
     (_stuck, "channels.torque-in", ("stuck", "400 samples", "for 0.0798"), "sensor"),
     (_plateau, "channels.torque-in", ("seems clipped at 2.4",), "range:"),
-    (_drift, "channels.torque-in", ("drift", "N m in 1.9 s"), "drift: remove"),
+    (_drift, "channels.torque-in", ("drift", "N m in 1.8 s"), "drift: remove"),
     (_gap, "time", ("1 gap", "300 samples missing", "0.0602 s at 0.9998 s"), "buffer"),
     (_repeated, "time", ("repeats in 2 rows", "at 1, 1 s"), "logger"),
     (_backward, "time", ("runs backward 1 time", "0.0198 s"), "split the file"),
@@ -177,6 +178,24 @@ def test_drift_is_removed_when_asked(run: Columns, tmp_path: Path) -> None:
     assert "a straight line is taken off" in one.what
     assert off(found.conditions[0]) < 0.06
     assert found.conditions[0].courses["torque-in"].accuracy.zero > 0
+
+
+@pytest.mark.parametrize("conditions", [1, 2])
+def test_drift_is_told_over_the_time_it_took(run: Columns, tmp_path: Path, conditions: int) -> None:
+    """What the mean changes by, over the time it is said to take, is the slope that was put in."""
+    run["T1"] += 0.05 * run["t"]
+    run["m"] = np.where(run["t"] < 1.2, 5.0, 5.0 * conditions)
+    changes = {"set": {"misalignment": {"column": "m", "unit": "deg"}}, "drift": "remove"}
+    (one,) = faults(read(run, tmp_path, changes), "drift: ")
+    change, seconds = re.findall(r"changes by ([-0-9.e]+) N m in ([0-9.]+) s", one.what)[0]
+    assert float(change) / float(seconds) == pytest.approx(0.5, rel=0.01)
+
+
+def test_drift_is_taken_off_from_when_the_zero_was_read(run: Columns, tmp_path: Path) -> None:
+    """The stretch is stated far longer than the file has it before: the zero is that of the readings within."""
+    run["T1"] += 0.05 * (run["t"] - 0.1)
+    early = {"channels/torque-in/zero": {"over": ["-20 s", "0.19 s"]}, "drift": "remove"}
+    assert off(read(run, tmp_path, early).conditions[0]) < 0.06
 
 
 def test_drift_between_unloaded_stretches(run: Columns, tmp_path: Path) -> None:

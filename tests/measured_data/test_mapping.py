@@ -7,11 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from manual.conftest import Run, program
 from measured_data.recording import Columns, mapping, off, read, recorded
-from trunnion.errors import MechanismError
+from trunnion.errors import MechanismError, Severity
 from trunnion.measured.amounts import read_amount
 from trunnion.measured.mapping import read_mapping
 from trunnion.measured.read import read_measured
@@ -144,6 +145,33 @@ def test_files_beside_the_mapping(tmp_path: Path, columns: Columns) -> None:
         assert one.values == {"beta": pytest.approx(np.radians(15))}
     with pytest.raises(MechanismError, match="no data file is named"):
         read_measured(mapping())
+
+
+def test_files_of_the_command_line_keep_what_was_set(tmp_path: Path, columns: Columns) -> None:
+    """By the file, else by its name; and it is told which, and which do not."""
+    (tmp_path / "elsewhere").mkdir()
+    for name in ("run.csv", "new.csv", "elsewhere/run.csv", "elsewhere/two.csv"):
+        pd.DataFrame(columns).to_csv(tmp_path / name, index=False)
+    path, files = tmp_path / "m.json", [{"file": "run.csv", "set": {"beta": "15 deg"}}, {"file": "two.csv"}]
+    path.write_text(json.dumps(mapping({"files": files, "set": {"gamma": "1 deg"}})), encoding="utf-8")
+
+    def read_(*names: str) -> tuple[list[dict[str, float]], list[str]]:
+        found = read_measured(path, [tmp_path / name for name in names])
+        assert {one.severity for one in found.findings} <= {Severity.NOTE}
+        return [dict(one.values) for one in found.conditions], [one.what for one in found.findings]
+
+    beta, gamma = {"beta": pytest.approx(np.radians(15))}, {"gamma": pytest.approx(np.radians(1))}
+    assert read_("run.csv") == ([{**gamma, **beta}], [])
+    values, (kept,) = read_("elsewhere/run.csv")
+    assert values == [{**gamma, **beta}]
+    assert "run.csv is read with the `set` of the file of that name in the mapping" in kept
+    assert read_("elsewhere/two.csv") == ([gamma], [])  # nothing was said of it
+    values, (lost,) = read_("run.csv", "new.csv")
+    assert values == [{**gamma, **beta}, gamma]
+    assert "new.csv is read without `set`, which the mapping states for other files" in lost
+    values, (lost,) = read_("elsewhere/run.csv", "new.csv", "./elsewhere/../elsewhere/run.csv")
+    assert values == [gamma] * 3  # which of two of a name is meant cannot be told
+    assert "elsewhere/run.csv are read without" in lost
 
 
 UNITS: list[dict[str, Any]] = [

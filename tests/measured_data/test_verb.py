@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 from pathlib import Path
 
@@ -13,7 +14,9 @@ import xarray as xr
 import trunnion
 from manual.conftest import Run, program
 from measured_data.recording import mapping, recorded
+from trunnion.errors import MechanismError
 from trunnion.measured.table import dataset
+from trunnion.measured.tables import read_table
 
 __all__ = ["program"]  # a fixture
 
@@ -66,7 +69,9 @@ def test_faults_and_bad_input(program: Run, rig: Path, tmp_path: Path) -> None:
     code, out, err = program("data", "rig.json", "a.csv", "b.csv")
     assert code == 1
     assert "beta 15 deg" in out  # the other condition has its file for a name
-    assert err.startswith(
+    note, fault = err.splitlines()[:2]
+    assert note.startswith("rig.json:1: note: files: b.csv is read without `set`, which the mapping states for other")
+    assert fault.startswith(
         "b.csv: warning: channels.brake: sign: the power that brake takes is below zero in all 19 turns"
     )
     pd.DataFrame(columns).drop(columns=["T1", "n2"]).to_csv(tmp_path / "b.csv", index=False)
@@ -116,3 +121,23 @@ def test_results_are_not_written_over_what_is_read(program: Run, rig: Path, tmp_
     assert ((tmp_path / "a.csv").read_bytes(), rig.read_bytes()) == before
     assert (tmp_path / "b.csv").read_bytes() == before[0]
     assert program("data", "rig.json", "b.csv", "--out", "a.csv").code == 0  # it is not read here
+
+
+def test_no_text_of_a_table_is_a_formula(tmp_path: Path) -> None:
+    """Names of conditions and of what was set come from files; a spreadsheet must not execute them."""
+    pd.DataFrame(recorded(turns=3)).to_csv(tmp_path / "=cmd|calc!A1.csv", index=False)
+    changes = {"set": {"@beta": "-15 deg"}, "files": None}
+    found = trunnion.read_measured(mapping({"set": {}}), [tmp_path / "=cmd|calc!A1.csv"])
+    trunnion.save(dataset(found), tmp_path / "one.csv")
+    table = pd.read_csv(tmp_path / "one.csv")
+    assert set(table["condition"]) == {"'=cmd|calc!A1"}
+    found = trunnion.read_measured(mapping(changes), [tmp_path / "=cmd|calc!A1.csv"])
+    trunnion.save(dataset(found), tmp_path / "two.csv", units_row=True)
+    with (tmp_path / "two.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.reader(file))
+    assert rows[0][1] == "'@beta"
+    assert not [cell for row in rows for cell in row if cell[:1] in tuple("=+@") or cell[:2] == "-c"]
+    own = read_table(tmp_path / "two.csv", ["@beta", "phase"])  # our own reader knows the name
+    assert own.columns["@beta"].values == pytest.approx(np.radians(-15))
+    with pytest.raises(MechanismError, match="begins with '='"):
+        trunnion.read_measured(mapping({"channels": {"=T1": mapping()["channels"]["brake"]}}), [tmp_path / "one.csv"])

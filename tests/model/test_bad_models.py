@@ -39,6 +39,11 @@ CASES = [
     ("space: planar", "space: flat", 2, "space", "none of 'planar' or 'spatial'", ""),
     ("trunnion: 1", "trunnion: 2", 1, "trunnion", "version 2, this program reads 1", "trunnion: 1"),
     ("trunnion: 1\n", "", 1, "trunnion", "version of the file is missing", "trunnion: 1"),
+    # names that a spreadsheet would execute
+    ("B: [AB, 0]", "'=B': [AB, 0]", 10, "links.crank.points.=B", "begins with '=', which makes a formula", "a letter"),
+    ("  A: {type", "  +A: {type", 18, "joints.+A", "begins with '+'", "a letter"),
+    ("  crank:", "  '@crank':", 9, "links.@crank", "begins with '@'", "a letter"),
+    ("AB: 2 m", "-AB: 2 m", 4, "dimensions.-AB", "begins with '-'", "a letter"),
     # quantities
     ("mass: 4.8 kg", "mass: 4.8 m", 11, "links.crank.mass", "a length where a mass", "1.2 kg"),
     ("mass: 4.8 kg", "mass: '4.8'", 11, "links.crank.mass", "'4.8' has no unit where a mass", "1.2 kg"),

@@ -300,12 +300,13 @@ def test_forces_are_those_of_the_analysis() -> None:
         Measure("now", "efficiency", "instant", at=run.cycle.times(steps)[40], timed=True),
     ]
     found = figures(run, measures, steps)
-    assert found["rms"] == pytest.approx(np.sqrt(run.cycle.mean(effort**2)), rel=1e-12)
-    assert found["mean"] == pytest.approx(run.cycle.mean(effort), rel=1e-12)
+    assert found["rms"] == pytest.approx(float(result["drive_effort_rms"][0]), rel=1e-6)
+    assert found["mean"] == pytest.approx(run.cycle.mean(trunnion.analyse(mechanism, 36_000)["drive_effort"].values[0]),
+                                          rel=1e-5)  # fmt: skip
     for name, curve in {"most": effort, "size": size, "across": np.abs(reaction[1])}.items():
         assert 0 <= found[name] - np.max(curve) < 2e-3 * np.ptp(curve)
     rows = {row["label"]: row["value"] for row in json.loads(result.attrs["summary"])}
-    assert found["efficiency"] == pytest.approx(rows["efficiency of the cycle"], rel=1e-12)
+    assert found["efficiency"] == pytest.approx(rows["efficiency of the cycle"], rel=1e-7)
     least = np.nanmin(result["locking_margin"].values)
     assert found["margin"] <= min(least, MARGIN) + 1e-12
     assert found["now"] == pytest.approx(float(result["efficiency_instant"].values[40]), rel=1e-9, nan_ok=True)
@@ -328,7 +329,7 @@ def test_locking_margin() -> None:
 def test_forces_in_space() -> None:
     """Efforts and reactions of an RSSR with friction are those of the analysis."""
     run = prepare(Mechanism(**rssr(friction=0.1).data))
-    result = trunnion.analyse(run.system.mechanism, 36)
+    result = trunnion.analyse(run.system.mechanism, 7200)
     joint = next(iter(run.system.joints))
     measures = [
         Measure("z", "reaction", joint, "z", statistic="mean"),
@@ -336,8 +337,37 @@ def test_forces_in_space() -> None:
     ]
     found = figures(run, measures, 36)
     reaction = result["reaction_force"].sel(joint=joint).values
-    assert found["z"] == pytest.approx(run.cycle.mean(reaction[2]), rel=1e-12)
-    assert found["size"] == pytest.approx(run.cycle.mean(np.linalg.norm(reaction, axis=0)), rel=1e-12)
+    size = np.linalg.norm(reaction, axis=0).mean()
+    assert found["z"] == pytest.approx(run.cycle.mean(reaction[2]), abs=1e-4 * size)
+    assert found["size"] == pytest.approx(size, rel=1e-4)
+
+
+def test_means_over_part_of_a_turn() -> None:
+    """Of smooth courses off by h⁴: a mean, an RMS, the straightness of a path."""
+    run = loaded()
+    over = (0.3, 2.1)
+    measures = [
+        Measure("mean", "slide", "S", over=over, statistic="mean"),
+        Measure("rms", "slide", "S", over=over, statistic="rms"),
+        Measure("straight", "straightness", "rod.Q", over=over),
+        Measure("line", "straightness", "crank.P", over=over),
+    ]
+    exact = figures(run, measures, 5000)
+    off = [{name: abs(value - exact[name]) for name, value in figures(run, measures, steps).items()}
+           for steps in (60, 240)]  # fmt: skip
+    for name in ("mean", "rms", "line"):
+        assert off[0][name] < 1e-5 * abs(exact[name])
+        assert off[1][name] < off[0][name] / 100 or off[1][name] < 1e-12
+
+
+@pytest.mark.parametrize("model", ["offset-slider-crank", "rssr", "klann"])
+def test_efficiency_as_a_measure_is_that_of_the_analysis(model: str) -> None:
+    """However many positions there are, of the cycle as of samples."""
+    mechanism = trunnion.read(EXAMPLES / f"{model}.yaml")
+    run, measure = prepare(mechanism), Measure("efficiency", "efficiency", "cycle")
+    value = float(trunnion.analyse(mechanism, 60)["efficiency"])
+    for steps in (60, 333):
+        assert figures(run, [measure], steps)["efficiency"] == pytest.approx(value, rel=1e-4)
 
 
 @pytest.mark.parametrize("scale", [1.0, 1e-7])

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import functools
 import re
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+import trunnion
 from manual.conftest import Run, program
+from trunnion.analysis.rig import virtual_files
 from trunnion.errors import MechanismError
 from trunnion.measured import rig_file
 from trunnion.measured.rig_file import Rig
@@ -173,3 +177,76 @@ def test_files_that_no_rig_has_written_stay(run: Run, tmp_path: Path) -> None:
         ) in done.err
         assert len(list(own.iterdir())) == (4 if done.code == 0 else 1)
     assert run(FOUR_BAR, "rig.yaml", "--out", "rig", "--seed", 2).code == 0
+
+
+def _files(folder: Path) -> dict[str, bytes]:
+    return {str(one.relative_to(folder)): one.read_bytes() for one in folder.rglob("*") if one.is_file()}
+
+
+@pytest.mark.parametrize("where", ["data", "not/yet/there"])
+@pytest.mark.parametrize("form", ["csv", "parquet", "tdms"])
+@pytest.mark.parametrize("error", [OSError(28, "No space left on device"), KeyboardInterrupt(), MemoryError()])
+def test_a_rig_that_fails_leaves_nothing(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, where: str, form: str, error: BaseException
+) -> None:
+    """Neither files of the one that failed nor, where there was an earlier one, other ones than its own."""
+    (tmp_path / "rig.yaml").write_text(GOOD.replace("rate: 1 kHz", "rate: 500 Hz"), encoding="utf-8")
+    rig, model = Rig.read(tmp_path / "rig.yaml"), trunnion.read(FOUR_BAR)
+    seen = trunnion.observe(model, rig, 1)
+    write = virtual_files.WRITERS[form]
+
+    def fails(*arguments: Any) -> None:
+        write(*arguments)
+        raise error
+
+    if where == "data":
+        seen.write(tmp_path / where, form)
+        (tmp_path / where / "notes.txt").write_text("of the laboratory", encoding="utf-8")
+    before, folders = _files(tmp_path), sorted(tmp_path.iterdir())
+    with monkeypatch.context() as patched:
+        patched.setitem(virtual_files.WRITERS, form, fails)
+        with pytest.raises(MechanismError if isinstance(error, OSError) else type(error)) as failure:
+            trunnion.observe(model, rig, 2).write(tmp_path / where, form)
+    if isinstance(error, OSError):
+        assert "No space left" in str(failure.value)
+    assert _files(tmp_path) == before
+    assert sorted(tmp_path.iterdir()) == folders
+    with monkeypatch.context() as patched:  # and where the last step fails
+        patched.setattr(virtual_files.Path, "rename", _failing_at(3 if where == "data" else 1))
+        with pytest.raises(MechanismError, match="nothing of it is left"):
+            trunnion.observe(model, rig, 2).write(tmp_path / where, form)
+    assert _files(tmp_path) == before
+    assert sorted(tmp_path.iterdir()) == folders
+    trunnion.observe(model, rig, 2).write(tmp_path / where, form)
+    assert set(_files(tmp_path)) >= {f"{where}/{name}" for name in ("mapping.yaml", "truth.yaml", f"run-01.{form}")}
+    assert _files(tmp_path) != before
+
+
+def _failing_at(count: int) -> Callable[[Path, Path], Path]:
+    """A rename that works some times."""
+    done = iter(range(1, count))
+
+    def rename(self: Path, target: Path) -> Path:
+        if next(done, None) is None:
+            raise OSError(28, "No space left on device")
+        self.replace(target)
+        return target
+
+    return rename
+
+
+NAMED = [
+    ("schedule: {turns: 1, idle: AB}", "schedule.idle", "'AB' speaks of AB"),
+    ("schedule: {turns: 1, idle: {before: 0.1 s, after: 2 * l2}}", "schedule.idle.after", "'2 * l2' speaks of l2"),
+    ("schedule: {turns: 1, idle: 1 s ± 0.1 s}", "schedule.idle", "has a tolerance"),
+]
+
+
+@pytest.mark.parametrize(("schedule", "where", "what"), NAMED)
+def test_times_of_a_schedule_are_numbers(run: Run, tmp_path: Path, schedule: str, where: str, what: str) -> None:
+    lines = [schedule if line.startswith("schedule:") else line for line in GOOD.splitlines()]
+    (tmp_path / "rig.yaml").write_text("\n".join(lines), encoding="utf-8")
+    done = run(FOUR_BAR, "rig.yaml")
+    assert done.code == 2
+    assert where in done.err
+    assert what in done.err

@@ -137,8 +137,12 @@ test("keys", () => {
   assert.equal(command("a", false, 5, 359), null);
 });
 
-test("a peak that towers over all else does not set the scale", () => {
-  assert.equal(usualPeak([1, -2, 3, null]), 3);
-  assert.equal(usualPeak([...Array(99).fill(1), 1000]), 4);
-  assert.equal(usualPeak([]), 0);
+test("only a peak next to a dead centre does not set the scale", () => {
+  const beside = { ease: [...Array(99).fill(1), 0.01] };
+  assert.equal(usualPeak({ ease: [1] }, [1, -2, 3, null]), 3);
+  assert.equal(usualPeak({ ease: [1] }, [...Array(99).fill(1), 1000]), 1000);
+  assert.equal(usualPeak(beside, [...Array(99).fill(1), 1000]), 1.25);
+  assert.equal(usualPeak(beside, [...Array(99).fill(1), 3]), 3);
+  assert.equal(usualPeak({ ease: [...Array(99).fill(1), 0.5] }, [...Array(99).fill(1), 1000]), 1000); // a load at work
+  assert.equal(usualPeak({}, []), 0);
 });

@@ -26,7 +26,7 @@ UNITS = {
     "friction_power": "W", "drive_effort": "N m", "drive_effort_lower": "N m", "drive_effort_upper": "N m",
     "drive_power": "W", "useful_power": "W", "efficiency": "1", "efficiency_instant": "1",
     "closure_residual": "m", "condition": "1", "power_residual": "W", "friction_iterations": "1",
-    "friction_change": "N", "friction_contraction": "1", "status": "1",
+    "friction_change": "N", "friction_residual": "N", "friction_contraction": "1", "status": "1",
 }  # fmt: skip
 
 
@@ -136,7 +136,7 @@ def four_bar(count=360, friction=1.0, rename=None, gap=None):
             "drive_power": [10 * effort], "useful_power": useful, "efficiency": 0.87,
             "efficiency_instant": np.clip(useful / (10 * effort), 0, 1), "closure_residual": nan + 3e-16,
             "condition": 3 + 2 * np.cos(theta), "power_residual": 1e-12 * np.sin(theta),
-            "friction_iterations": np.full(count, 4), "friction_change": nan + 1e-11,
+            "friction_iterations": np.full(count, 4), "friction_change": nan + 1e-11, "friction_residual": nan + 1e-13,
             "friction_contraction": nan + 0.004, "status": np.zeros(count, np.int8),
         },
         {
@@ -214,7 +214,8 @@ def slider(count=90):
             "drive_effort": [effort], "drive_effort_lower": [effort - 4], "drive_effort_upper": [effort + 6],
             "drive_power": [effort * 0.05], "useful_power": effort * 0.04, "efficiency": 0.8,
             "efficiency_instant": flat + 0.8, "closure_residual": flat, "condition": flat + 2, "power_residual": flat,
-            "friction_iterations": np.full(count, 3), "friction_change": flat, "friction_contraction": flat,
+            "friction_iterations": np.full(count, 3), "friction_change": flat, "friction_residual": flat,
+            "friction_contraction": flat,
             "status": np.zeros(count, np.int8),
         },
         {

@@ -94,7 +94,8 @@ def made(name, formula, links, joints, free, drivers, time, forces, moments, rot
         "drive_effort_upper": (("driver",), effort), "drive_power": (("driver",), 10 * effort),
         "useful_power": ((), 8 * effort.sum(axis=0)), "efficiency_instant": ((), zero + 0.8),
         "closure_residual": ((), zero + 1e-16), "condition": ((), zero + 3), "power_residual": ((), zero),
-        "friction_iterations": ((), zero + 4), "friction_change": ((), zero), "friction_contraction": ((), zero),
+        "friction_iterations": ((), zero + 4), "friction_change": ((), zero),
+        "friction_residual": ((), zero), "friction_contraction": ((), zero),
         "locking_margin": ((), zero + 5), "status": ((), np.zeros(count, np.int8)),
     }  # fmt: skip
     for stem in ("joint_rotation", "joint_slide"):

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from stand_in import blank, four_bar, slider
 
 from trunnion.errors import Status
-from trunnion.views.cycle import abscissa, intervals, status_text, thin, usual_peak
+from trunnion.views.cycle import abscissa, intervals, status_text, thin
 
 
 def test_a_turning_drive_is_drawn_over_its_angle_and_the_turn_closes(plain):
@@ -83,9 +83,3 @@ def test_thinning_keeps_both_peaks_and_every_long_gap(values, most):
         assert np.nanmax(kept) == np.nanmax(column)
         assert np.nanmin(kept) == np.nanmin(column)
     assert np.isnan(kept).any() == np.isnan(column).any()
-
-
-def test_a_peak_that_towers_over_all_else_does_not_set_the_scale():
-    assert usual_peak(np.array([1.0, -2.0, 3.0, np.nan]), None) == 3.0
-    assert usual_peak(np.append(np.ones(99), 1000.0)) == 4.0
-    assert usual_peak(np.array([])) == 0.0

@@ -17,8 +17,9 @@ from trunnion.analysis.friction import FrictionMethod
 from trunnion.analysis.kinematics import start
 from trunnion.analysis.kinetostatics import Backward
 from trunnion.analysis.loads import Stated
+from trunnion.analysis.means import Means
 from trunnion.analysis.scene import DRAWN
-from trunnion.analysis.system import Cycle, Dial, System, rubbing
+from trunnion.analysis.system import Dial, System, rubbing
 from trunnion.errors import Finding, Severity, Status
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.model.check import check_model
@@ -34,7 +35,6 @@ if TYPE_CHECKING:
 
 __all__ = [
     "MARGIN",
-    "efficiency",
     "effort_units",
     "fill_power",
     "finding_row",
@@ -105,20 +105,10 @@ def _worst(system: System, poses: Sequence[Any], figure: str) -> Number:
     return worst
 
 
-def efficiency(arrays: Arrays, cycle: Cycle) -> float:
-    """Useful work over drive work of the cycle [D 1]; NaN where the loads drive or a position has no answer."""
-    drive = np.sum(arrays["drive_power"], axis=0)
-    work = cycle.net(drive)
-    # what a load gives and takes back over a turn cancels but for rounding
-    return cycle.net(arrays["useful_power"]) / work if work > 0 else float("nan")
-
-
 def finish(run: Run, found_positions: Positions) -> xr.Dataset:
     """The Dataset with its attributes: formula, findings, summary, input data, drawing data, provenance."""
     mechanism, arrays, time = run.system.mechanism, found_positions.arrays, found_positions.time
     method, causes = found_positions.method, found_positions.causes
-    value = efficiency(arrays, run.cycle)
-    ideal = efficiency(found_positions.ideal, run.cycle) if found_positions.ideal else None
     near = _near_locking(run, arrays, time, method)
     left_open = run.determinacy.findings() if run.determinacy else []
     found = [
@@ -143,12 +133,14 @@ def finish(run: Run, found_positions: Positions) -> xr.Dataset:
         "driver_units": json.dumps(effort_units(run.system)),
         "spring_units": json.dumps(spring_units(run.system)),
         "findings": json.dumps([finding_row(finding) for finding in found], ensure_ascii=False),
-        "summary": json.dumps(_summary(run, arrays, value, time, near, ideal), ensure_ascii=False),
+        "summary": json.dumps(_summary(run, found_positions, near), ensure_ascii=False),
         "inputs": json.dumps(inputs(mechanism), ensure_ascii=False),
         "scene": json.dumps(_scene(run), ensure_ascii=False),
         "periodic": int(run.cycle.periodic),
     }
-    return results.dataset(arrays, found_positions.labels, time, value, attributes, ideal)
+    return results.dataset(
+        arrays, found_positions.labels, time, found_positions.means, attributes, found_positions.ideal
+    )
 
 
 def effort_units(system: System) -> list[str]:
@@ -264,16 +256,10 @@ def references(mechanism: Mechanism) -> list[str]:
     return [method, *(f"{law}: {FRICTION_LAWS[law].source}" for law in sorted(laws)), *mechanism.references]
 
 
-def _summary(
-    run: Run,
-    arrays: Arrays,
-    value: float,
-    time: NDArray[np.float64],
-    near: near_locking.Locking | None,
-    ideal: float | None,
-) -> list[dict[str, Any]]:
+def _summary(run: Run, found: Positions, near: near_locking.Locking | None) -> list[dict[str, Any]]:
     """The figures one looks at first."""
     rows: list[dict[str, Any]] = []
+    arrays, time, means = found.arrays, found.time, found.means
     dial = run.system.dial(run.values, time)
     # extremes are of positions that can be relied on: beside a dead centre they depend on the sampling
     sound = sound_positions(arrays["status"])
@@ -291,22 +277,25 @@ def _summary(
                         "unit": unit,
                     },
                 ]
-            rms = np.sqrt(run.cycle.mean(effort**2))
-            rows.append({"label": f"drive {kind} of {name}, RMS", "value": rms, "unit": unit})
+            rows.append({"label": f"drive {kind} of {name}, RMS", "value": means.drive_effort_rms[i], "unit": unit})
         rows += _reaction_rows(run.system, arrays, dial, sound)
         lost = np.sum(arrays["friction_power"], axis=0)
         if rubbing(run.system):
-            rows.append(_margin(arrays["locking_margin"], dial))
+            valid = arrays["status"] != Status.CONTACT_LOST
+            rows.append(_margin(np.where(valid, arrays["locking_margin"], np.nan), dial))
             rows += near.rows(run, dial) if near else []
-            rows.append({"label": "friction power, mean", "value": run.cycle.mean(lost), "unit": "W"})
+            rows.append({"label": "friction power, mean", "value": means.friction_power.net, "unit": "W"})
             if len(sound):
                 top = int(sound[np.argmax(lost[sound])])
                 rows.append({"label": f"friction power, largest, at {dial.at(top)}", "value": lost[top], "unit": "W"})
-        rows.append({"label": f"efficiency of the cycle{_why(value, arrays, run.cycle)}", "value": value, "unit": "1"})
-        if ideal is not None:
+        efficiency = {"label": f"efficiency of the cycle{_why(means, arrays)}", "value": means.efficiency, "unit": "1"}
+        rows.append(efficiency)
+        rows.append({"label": "efficiency, error of its integrals", "value": means.efficiency_error, "unit": "1"})
+        if found.ideal is not None:
+            ideal = found.ideal.efficiency
             rows.append({"label": "efficiency of the cycle without errors", "value": ideal, "unit": "1"})
-            rows += summary_rows(run, arrays, dial)
-        back = near_locking.reverse_row(near.back, run.cycle) if near else None
+            rows += summary_rows(run, arrays, dial, arrays["status"] != Status.CONTACT_LOST)
+        back = near_locking.reverse_row(run, near.back, useful_loads(run.system.mechanism)) if near else None
         rows += [back] if back else []
         solved = int(np.count_nonzero(arrays["status"] < Status.NOT_CONVERGED))
         residual = balance(arrays) if solved else None
@@ -314,7 +303,10 @@ def _summary(
     rows.append(
         {"label": "friction iterations, most", "value": int(np.max(arrays["friction_iterations"])), "unit": "1"}
     )
-    rows.append({"label": f"positions solved, of {len(time)}", "value": solved, "unit": "1"})
+    lost = int(np.count_nonzero(arrays["status"] == Status.CONTACT_LOST))
+    rows.append({"label": f"positions solved, of {len(time)}", "value": solved - lost, "unit": "1"})
+    if lost:
+        rows.append({"label": "positions not valid, for a pin loses contact", "value": lost, "unit": "1"})
     return [{**row, "value": _finite(row["value"])} for row in rows]
 
 
@@ -325,9 +317,9 @@ def _finite(value: float | None) -> float | None:
 def sound_positions(status: NDArray[Any]) -> NDArray[np.intp]:
     """Positions whose figures can be relied on: solved; those with a zero speed only if there are no others.
 
-    Where a pin loses contact motion and forces are those of its seat there, as elsewhere.
+    Where a pin loses contact it is taken to stay in a seat that would jump: forces there are no answer.
     """
-    best = np.flatnonzero((status == Status.SOLVED) | (status == Status.CONTACT_LOST))
+    best = np.flatnonzero(status == Status.SOLVED)
     return best if len(best) else np.flatnonzero(status == Status.ZERO_SLIP)
 
 
@@ -346,6 +338,7 @@ def _reaction_rows(system: System, arrays: Arrays, dial: Dial, sound: NDArray[np
                     {"label": f"{what} of {name}, largest, at {dial.at(top)}", "value": size[top], "unit": unit}
                 )
         slide = arrays["joint_slide"][i]
+        slide = slide[arrays["status"] != Status.CONTACT_LOST]
         if kind == "prismatic" and np.any(np.isfinite(slide)):
             stroke = np.nanmax(slide) - np.nanmin(slide)
             rows.append({"label": f"stroke of {name}", "value": stroke, "unit": "m"})
@@ -359,6 +352,8 @@ def _rounding(arrays: Arrays, variable: str) -> float:
 
 def _margin(margin: NDArray[np.float64], dial: Dial) -> dict[str, Any]:
     """The least multiple of the friction at which the mechanism locks."""
+    if np.all(np.isnan(margin)):
+        return {"label": "locking margin (times the friction)", "value": float("nan"), "unit": "1"}
     least = np.nanmin(margin, initial=np.inf)
     if not np.isfinite(least):
         return {"label": "locking margin (times the friction), more than", "value": MARGIN, "unit": "1"}
@@ -376,15 +371,18 @@ def _near_locking(
         return near_locking.look(run, time, arrays["locking_margin"], method, useful_loads(run.system.mechanism))
 
 
-def _why(value: float, arrays: Arrays, cycle: Cycle) -> str:
+def _why(means: Means, arrays: Arrays) -> str:
     """What an efficiency of 0, or none, means."""
+    value = means.efficiency
     if value == 0:
         return " (the useful loads do no net work)"
     if np.isfinite(value):
         return ""
     if np.any(arrays["status"] >= Status.NOT_CONVERGED):
         return " (not every position has an answer)"
-    if cycle.net(np.sum(arrays["drive_power"], axis=0)) < 0:
+    if not np.isfinite(means.drive_power.value):
+        return " (there is no answer between some positions)"
+    if means.drive_power.net < 0:
         return " (the loads drive: the driver takes work)"
     return " (the driver does no net work)"
 

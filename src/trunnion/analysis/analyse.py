@@ -15,7 +15,7 @@ from trunnion import results
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.nested import flat
-from trunnion.analysis import account, contact_loss, diagnosis
+from trunnion.analysis import account, contact_loss, diagnosis, rest
 from trunnion.analysis.asbuilt import COMPARED, fill_errors, fill_seats
 from trunnion.analysis.blanks import blank
 from trunnion.analysis.branches import Chosen, choose
@@ -24,10 +24,13 @@ from trunnion.analysis.engine import build
 from trunnion.analysis.friction import FrictionMethod
 from trunnion.analysis.kinematics import Forward, Travel, forward
 from trunnion.analysis.kinetostatics import Backward, Given, Sense, solve
+from trunnion.analysis.means import AVERAGED, VALID, Means, means_of, still
+from trunnion.analysis.quadrature import Effort
 from trunnion.analysis.seating import Seat, seats, settle
 from trunnion.analysis.space.determinacy import Determinacy
+from trunnion.analysis.switches import Mechanisms, edges
 from trunnion.analysis.system import COMMON_TURNS, Cycle, System, Values, sticking
-from trunnion.analysis.travel import Lanes, lanes
+from trunnion.analysis.travel import Lanes, around, lanes
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.groups.gear import rotation
 from trunnion.model.mechanism import Mechanism
@@ -53,6 +56,7 @@ MOST_STEPS = 100_000_000
 SINGULAR = 1e6  # condition from which less than about four digits would be left
 TURN_STEPS = 720
 NEAR_SINGULAR = 100.0  # a transmission angle of about a degree
+SEATED = Effort(1e-6, 2)  # for means with pins in seats, which themselves settle to 1e-6 of their clearance
 
 Arrays = dict[str, NDArray[np.float64]]
 
@@ -107,13 +111,22 @@ class Run:
 
     def ideal(self, time: Number, method: FrictionMethod | None = None) -> Backward:
         """Motion and forces at the given times (s) without errors and with every pin in the middle of its hole."""
-        values = self._ideal_values
-        return self._solve(time, self.values if values is None else values, self._ideal_past, method)
+        return self._solve(time, self.ideal_values, self._ideal_past, method)
 
     @functools.cached_property
     def seats(self) -> list[Seat]:
         """Joints whose pins lie in seats that are given or follow the load."""
         return seats(self.system, self.values)
+
+    @functools.cached_property
+    def edges(self) -> NDArray[np.float64]:
+        """Times, s, from the start to the end of the cycle, between which its forces are smooth; see `switches`."""
+        return edges(Mechanisms(self.system, self.chosen.assembly, self.values, [self.cycle]))[0]
+
+    @property
+    def ideal_values(self) -> Values:
+        """The numbers of the mechanism without errors."""
+        return self.values if self._ideal_values is None else self._ideal_values
 
     @functools.cached_property
     def _ideal_values(self) -> Values | None:
@@ -224,7 +237,7 @@ def analyse_run(
 class Positions:
     """What every position of a cycle came to, before the books of the cycle are made of it.
 
-    ideal: powers of the mechanism without errors, if it has any; losses: of contact.
+    means: over the cycle; ideal: those of the mechanism without errors, if it has any; losses: of contact.
     """
 
     arrays: Arrays
@@ -232,7 +245,8 @@ class Positions:
     time: NDArray[np.float64]
     method: FrictionMethod
     causes: diagnosis.Causes
-    ideal: Arrays
+    means: Means
+    ideal: Means | None
     losses: list[contact_loss.Loss]
 
 
@@ -265,10 +279,42 @@ def positions(
             _fill(arrays, run.solve(time[window], method=method), time[window], window, causes)
         if progress:
             progress(window.stop)
-    _bracket(arrays, run, time, replace(method, margin_up_to=0.0), causes)  # the margin is known by now
+    quick = replace(method, margin_up_to=0.0)  # the margin is known by now
+    rest.bracket(arrays, run, time, quick, causes.zero_slip(), causes.seats())
     losses = contact_loss.find(arrays, run, time) if run.seats else []
     run.system.engine.unwrap(arrays, run.system, run.values, time)
-    return Positions(arrays, labels, time, method, causes, ideal, losses)
+
+    means = _means(run, arrays, quick, losses)
+    meant = _means(run, ideal, quick, None) if run.erring else None
+    return Positions(arrays, labels, time, method, causes, means, meant, losses)
+
+
+def _means(run: Run, arrays: Arrays, method: FrictionMethod, losses: Sequence[contact_loss.Loss] | None) -> Means:
+    """Means over the cycle; NaN where a position has no answer. losses: of contact, None of the ideal mechanism."""
+    ideal = losses is None
+    of = Mechanisms(run.system, run.chosen.assembly, run.ideal_values if ideal else run.values, [run.cycle])
+    if run.cycle.duration <= 0 or np.any(arrays["status"] >= Status.NOT_CONVERGED):
+        return still(arrays)
+    if losses is None or not run.seats:
+        look = run.ideal if ideal else run.solve
+        between = None if ideal else [run.edges]
+        return means_of(of, lambda rows, time: _powers(look(time.ravel(), method=method), time), between)[0]
+    gaps = contact_loss.gaps(losses, run, len(arrays["status"]))
+
+    def seated(rows: NDArray[np.intp], time: NDArray[np.float64]) -> Arrays:
+        seen = around(time.ravel(), run.cycle)
+        found = settle(run, seen, method, run.ideal(seen.times, method))
+        valid = contact_loss.valid(found, run, gaps, time.ravel())
+        return {**_powers(found.back, time), VALID: valid.reshape(time.shape).astype(float)}
+
+    between = [np.unique(np.concatenate([run.edges, np.clip(gaps.ravel(), 0.0, run.cycle.duration)]))]
+    return means_of(of, seated, between, SEATED)[0]
+
+
+def _powers(back: Backward, time: NDArray[np.float64]) -> Arrays:
+    """What means are made of, (…, lane, node), from a walk at all these times in a row."""
+    arrays, _ = filled(back, None, time.ravel(), (1, time.size), AVERAGED)
+    return {name: arrays[name].reshape(*arrays[name].shape[:-2], *time.shape) for name in AVERAGED}
 
 
 def _refuse_seats(run: Run) -> None:
@@ -447,49 +493,9 @@ def _fill_settled(arrays: Arrays, back: Backward, window: slice) -> None:
     for key, field in (
         ("friction_iterations", "iterations"),
         ("friction_change", "change"),
+        ("friction_residual", "residual"),
         ("friction_contraction", "contraction"),
     ):
         worst = functools.reduce(np.maximum, (getattr(one, field) for one in settled), 0.0)
         arrays[key][window] = worst
     arrays["locking_margin"][window] = functools.reduce(np.minimum, (one.margin for one in settled), np.inf)
-
-
-def _bracket(
-    arrays: Arrays, run: Run, time: NDArray[np.float64], method: FrictionMethod, causes: diagnosis.Causes
-) -> None:
-    """Least and largest drive effort: where a relative speed is zero, friction may act either way.
-
-    Exact for one such joint at a position; with several, their separate effects are added (first order).
-    """
-    if not causes.zero_slip():
-        return  # both are the effort itself
-    lower = arrays["drive_effort_lower"] = arrays["drive_effort"].copy()
-    upper = arrays["drive_effort_upper"] = arrays["drive_effort"].copy()
-    seated = causes.seats()
-    for joint, positions in causes.zero_slip().items():
-        for low in range(0, len(positions), CHUNK):
-            part = positions[low : low + CHUNK]
-            _widen(lower, upper, arrays["drive_effort"], run, time[part], part, joint, method, seated)
-
-
-def _widen(
-    lower: NDArray[np.float64],
-    upper: NDArray[np.float64],
-    effort: NDArray[np.float64],
-    run: Run,
-    time: NDArray[np.float64],
-    positions: NDArray[np.intp],
-    joint: str,
-    method: FrictionMethod,
-    seated: Mapping[str, NDArray[np.float64]],
-) -> None:
-    """Widen the interval by what the friction of one joint can do with either sign."""
-    offsets = {path: numbers[positions] for path, numbers in seated.items()}
-    ends = [run.at(time, offsets, method, {joint: sign}).efforts for sign in run.system.senses(joint)]
-    # with pins held in both, so that what their travel adds to the effort is none of the interval
-    middle = run.at(time, offsets, method).efforts if offsets else None
-    for i, name in enumerate(run.system.mechanism.drivers):
-        own = effort[i, positions] if middle is None else middle[name]
-        changes = [np.broadcast_to(end[name] - own, time.shape) for end in ends]
-        lower[i, positions] += np.minimum(0.0, np.min(changes, axis=0))
-        upper[i, positions] += np.maximum(0.0, np.max(changes, axis=0))

@@ -147,9 +147,11 @@ def _rotation_vector(built: NDArray[np.float64], meant: NDArray[np.float64]) -> 
     return np.asarray(sign * share * vector)
 
 
-def summary_rows(run: Run, arrays: Mapping[str, NDArray[np.float64]], dial: Dial) -> Iterator[dict[str, Any]]:
-    """What the errors do, in the figures one looks at first."""
-    size = np.sqrt(np.sum(arrays["point_error"] ** 2, axis=1))
+def summary_rows(
+    run: Run, arrays: Mapping[str, NDArray[np.float64]], dial: Dial, valid: NDArray[np.bool_]
+) -> Iterator[dict[str, Any]]:
+    """What the errors do, in the figures one looks at first; of valid positions."""
+    size = np.where(valid, np.sqrt(np.sum(arrays["point_error"] ** 2, axis=1)), np.nan)
     if np.any(np.isfinite(size)):
         top, at = divmod(int(np.nanargmax(size)), size.shape[1])
         label = f"error of place, largest: {'.'.join(run.system.points[top])}, at {dial.at(at)}"
@@ -158,13 +160,13 @@ def summary_rows(run: Run, arrays: Mapping[str, NDArray[np.float64]], dial: Dial
         if run.system.mechanism.fixed_link not in links or joint in run.system.mechanism.drivers:
             continue
         for what, unit in (("rotation", "rad"), ("slide", "m")):
-            error = np.abs(arrays[f"joint_{what}_error"][i])
+            error = np.where(valid, np.abs(arrays[f"joint_{what}_error"][i]), np.nan)
             if (what == "rotation") == (kind != "prismatic") and np.any(np.isfinite(error)):
                 at = int(np.nanargmax(error))
                 label = f"transmission error of {joint}, largest, at {dial.at(at)}"
                 yield {"label": label, "value": float(error[at]), "unit": unit}
     for i, joint in enumerate(run.system.mechanism.drivers):
-        change = arrays["drive_effort_change"][i]
+        change = np.where(valid, arrays["drive_effort_change"][i], np.nan)
         if np.any(np.isfinite(change)):
             at = int(np.nanargmax(np.abs(change)))
             kind, unit = ("torque", "N m") if run.system.turns(joint) else ("force", "N")

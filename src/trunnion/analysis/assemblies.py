@@ -17,6 +17,7 @@ from trunnion.analysis.hints import way_name
 from trunnion.analysis.kinematics import Forward, forward, pose_of
 from trunnion.analysis.system import System
 from trunnion.model.mechanism import Mechanism
+from trunnion.model.names import as_key
 from trunnion.structure.decompose import Module
 
 __all__ = ["Choice", "Way", "choices", "put_together"]
@@ -61,7 +62,7 @@ class Choice:
 
     def line(self, way: Way) -> str:
         """What to write into the model file to take one of its ways."""
-        return f"assembly: {{{self.link}: {way.name}}}"
+        return f"assembly: {{{as_key(self.link)}: {way.name}}}"
 
 
 def choices(run: Run) -> tuple[Choice, ...]:

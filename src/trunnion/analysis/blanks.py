@@ -14,7 +14,8 @@ Arrays = dict[str, NDArray[np.float64]]
 
 FORCES = [
     *("reaction_force", "reaction_moment", "friction_torque", "friction_force", "friction_moment", "friction_power"),
-    *("drive_effort", "drive_power", "power_residual", "friction_change", "friction_contraction"),
+    *("drive_effort", "drive_power", "power_residual", "friction_change"),
+    *("friction_residual", "friction_contraction"),
     *("spring_force", "spring_power", "damping_power", "gear_torque", "gear_force"),
     *("reaction_force_change", "drive_effort_change", "friction_power_change"),
     # where the load is not known, neither is the seat

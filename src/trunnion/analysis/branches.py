@@ -23,12 +23,13 @@ from trunnion.analysis.follow import Follower, assemblies, at, closing, lane_of,
 from trunnion.analysis.hints import MEETING, distance, first, hints, misnamed, named_way, nth, told_twice
 from trunnion.analysis.kinematics import Forward, pose_of, start
 from trunnion.analysis.system import Cycle, Dial, Positions, System, Values, driven_coordinates
-from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.errors import Finding, MechanismError, Severity, agreeing
 from trunnion.groups.gear import NUMBERS, rotation
 from trunnion.groups.general import OUTER
 from trunnion.groups.protocol import Elements
 from trunnion.groups.spatial import SpatialGroup
 from trunnion.groups.spins import unspun
+from trunnion.model.names import as_key
 from trunnion.structure.decompose import Module
 
 __all__ = ["Chosen", "Track", "choose"]
@@ -178,7 +179,7 @@ def choose(system: System, values: Values, cycle: Cycle) -> Chosen:
             assembly, count, decided, said = decision
             findings += said
             if count > 1 and not decided:
-                findings.append(_unstated(system, module, count))
+                findings.append(_unstated(walk, module, count))
             chosen.append(assembly)
             walk.assembly.append(assembly)
             counts.append(count)
@@ -203,17 +204,28 @@ def _misnamed(system: System) -> list[Finding]:
     return found
 
 
-def _unstated(system: System, module: Module, count: int) -> Finding:
-    links = ", ".join(module.links)
-    what = f"links {links} can be assembled in {count} ways and no hint says which; one was taken"
+def _unstated(walk: Forward, module: Module, count: int) -> Finding:
+    """Where neither a name nor a place decides: there is no hint, or one that does not tell the assemblies apart."""
+    system, links = walk.system, ", ".join(module.links)
+    given = list(dict.fromkeys(name for _, name, _ in hints(walk, module)))
+    known = [key for key in system.mechanism.assembly if key in module.joints and key not in given]
+    why, names = "no hint says which", given or known
+    if names:
+        why = f"the {agreeing(len(names), 'hint', 'hints')} of {' and '.join(names)} "
+        why += agreeing(len(names), "does", "do") + " not tell them apart"
+        why += "" if given else f", for {agreeing(len(names), 'its place is', 'their places are')} the same in all"
+    what = f"links {links} can be assembled in {count} ways and {why}; one was taken"
+    free = [joint for joint in module.joints if joint not in known] or list(module.joints)
     joint = module.joints[len(module.joints) // 2]
-    place, hint = "where a point is", f"{{{joint}: [x, y]}}"
+    joint = joint if joint in free else free[0]
+    key = as_key(joint)
+    place, hint = "where a point is", f"{{{key}: [x, y]}}"
     if system.mechanism.space == "spatial":
         met = system.joints[joint][0] in MEETING and not system.mechanism.loop
-        place, hint = (
-            (place, f"{{{joint}: [x, y, z]}}") if met else ("how far a joint has turned", f"{{{joint}: 60 deg}}")
-        )
+        place, hint = (place, f"{{{key}: [x, y, z]}}") if met else ("how far a joint has turned", f"{{{key}: 60 deg}}")
     remedy = f"say roughly {place} at the start, e.g. assembly: {hint}, or name one as `check` does"
+    if given:
+        remedy = "give a hint that is nearer to one of them, or name one as `check` does"
     return Finding(what, "assembly", remedy, Severity.WARNING)
 
 
@@ -259,7 +271,8 @@ def _branch(walk: Forward, number: int, times: Array) -> Decision:
 def _placed(walk: Forward, number: int, times: Array) -> tuple[int, bool]:
     """+1 or −1 by the hints, and whether they decide it.
 
-    It is the nearer at the start; where it does not close there, the side the hint lies on.
+    It is the nearer at the start; where it does not close there, the side the hint lies on; where both assemblies
+    meet there, in a dead centre, the nearer at the first position at which they do not.
     """
     module = walk.system.plan.modules[number]
     branches = walk.system.groups[number].BRANCHES
@@ -267,9 +280,10 @@ def _placed(walk: Forward, number: int, times: Array) -> tuple[int, bool]:
     distances = [distance(walk, module, pose.frames, first, first) for pose in poses]
     if not np.all(np.isfinite(distances)) and module.kind == "RRR":
         return _side(walk, number), True
-    for lane in range(len(times)):  # the start if it closes there, else the first position that does
+    apart = np.broadcast_to(1 / walk.system.groups[number].condition(poses[0]), times.shape) > change_points.TOUCHING
+    for lane in range(len(times)):  # the start if it closes there and the two do not meet, else the first that does
         distances = [distance(walk, module, pose.frames, nth(lane), nth(lane)) for pose in poses]
-        if np.all(np.isfinite(distances)):
+        if np.all(np.isfinite(distances)) and apart[lane]:
             break
     return branches[0] if not distances[1] < distances[0] else branches[1], _differ(distances)
 

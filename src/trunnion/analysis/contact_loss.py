@@ -18,20 +18,23 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.analysis.seating import NO_LOAD, ROUNDS, TOLERANCE, Seat, loads_of
+from trunnion.analysis.seating import NO_LOAD, ROUNDS, TOLERANCE, Seat, Seated, loads_of
 from trunnion.analysis.system import Dial
+from trunnion.analysis.travel import FINE as LANES
 from trunnion.errors import Finding, Severity, Status
 
 if TYPE_CHECKING:
     from trunnion.analysis.analyse import Run
 
-__all__ = ["EARLES_WU", "Loss", "find", "findings"]
+__all__ = ["EARLES_WU", "Loss", "find", "findings", "gaps", "valid"]
 
 EARLES_WU = 1.0  # rad/(N s)
 NEAR = 0.1  # of the largest load: as near to zero as a load passes that turns round between two positions
 CLOSE = 20_000  # positions of a cycle that are near enough to tell a passage through zero from a quick turn
 PARTS = 96  # into which a wider step, and a quarter of it on either side, is parted
 FINE = 1.5 / PARTS  # of a step
+REACH = 3.0  # in lanes of `travel`: how far on either side of a jump the differences of seats reach, and one more
+OFF = 1e-6  # of load and offset: a load that points away from the wall, not along it but for rounding
 MOST_PLACES = 6  # named in one finding
 ENDS = ("", " (end 1)", " (end 2)", " (along its axis)")
 
@@ -94,11 +97,40 @@ def find(arrays: Arrays, run: Run, time: NDArray[np.float64]) -> list[Loss]:
     return found
 
 
+def gaps(losses: Sequence[Loss], run: Run, count: int) -> NDArray[np.float64]:
+    """Times, s, from and to, round every loss, in which the travel of a seat that jumps reaches; (2, loss).
+
+    count: of the positions by which places of losses are numbered.
+    """
+    duration, near = run.cycle.duration, REACH * run.cycle.duration / LANES
+    step = duration / max(1, count if run.cycle.periodic else count - 1)
+    at = np.array([place * step for loss in losses for place, _ in loss.places])
+    again = [at, at - duration, at + duration] if run.cycle.periodic else [at]  # beside the start or the end
+    every = np.concatenate(again)
+    every = every[(every > -near) & (every < duration + near)]
+    return np.array([every - near, every + near])
+
+
+def valid(found: Seated, run: Run, near: NDArray[np.float64], time: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """At which times, s, seats are settled, loaded pins press against their walls, and no loss is near (`gaps`)."""
+    good = found.change <= TOLERANCE
+    for low, high in near.T:
+        good &= ~((time > low) & (time < high))
+    for seat in run.seats:
+        if seat.given is None:
+            offsets = seat.play.model.offsets(found.offsets, f"seats.{seat.joint}") or []
+            for load, offset in zip(found.loads[seat.joint], offsets, strict=True):
+                across, *sizes = (sum(a * b for a, b in zip(*two, strict=True))
+                                  for two in ((load, offset), (load, load), (offset, offset)))  # fmt: skip
+                good &= ~np.less(across, -OFF * np.sqrt(sizes[0] * sizes[1]))
+    return np.asarray(good)
+
+
 def _lifted(forces: NDArray[np.float64], offsets: NDArray[np.float64]) -> NDArray[np.intp]:
     """Positions at which the load of an end points away from the wall that its pin lies at."""
     across = np.sum(forces * offsets, axis=1)
     size = np.sqrt(np.sum(forces**2, axis=1) * np.sum(offsets**2, axis=1))
-    return np.flatnonzero(np.any(across < -1e-6 * size, axis=0))
+    return np.flatnonzero(np.any(across < -OFF * size, axis=0))
 
 
 def _numbers(arrays: Arrays, run: Run, time: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -259,7 +291,8 @@ def _lost(loss: Loss, dial: Dial) -> str:
     shown = [text for _, text in sorted(_told(loss.places, dial))]
     more = len(shown) - MOST_PLACES
     text = ", ".join(shown[:MOST_PLACES]) + (f" and {more} more" if more > 0 else "")
-    head = f"its {loss.part} loses contact {text}: the load comes down to {loss.least:.3g} of {loss.peak:.4g} N, turns"
+    least = loss.least if loss.least > NO_LOAD * loss.peak else 0.0  # less than that is rounding
+    head = f"its {loss.part} loses contact {text}: the load comes down to {least:.3g} of {loss.peak:.4g} N, turns"
     return f"{head} round and the seat would jump"
 
 

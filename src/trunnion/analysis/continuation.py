@@ -25,7 +25,8 @@ FIRST_STEP = 0.05
 LONGEST_STEP = 0.05
 LAST_STEP = 1e-9  # to which the share at which a lane locks is found
 NEWTON_LIMIT = 12
-CONVERGED = 1e-9  # of the largest unknown: Newton is quadratic, what is left is its square
+CONVERGED = 1e-9  # of the largest unknown: last move and residual
+TINY = 1e-300  # where all unknowns are 0
 NEAR_AIM = 0.25  # of Newton's first step by which the corrected point may miss its aim
 TINY_MOVE = 0.02  # of the largest unknown
 
@@ -78,8 +79,8 @@ def _correct(system: System, start: Sequence[Array], share: Array) -> tuple[list
     calm = np.ones(share.shape, bool)
     aim, first = x, np.zeros(share.shape)
     with np.errstate(all="ignore"):
+        residual, jacobian = system(x, share)
         for round_ in range(NEWTON_LIMIT):
-            residual, jacobian = system(x, share)
             move, determinant = linalg.solve_and_determinant(jacobian, residual)
             calm &= determinant > 0
             x = [value - delta for value, delta in zip(x, move, strict=True)]
@@ -87,11 +88,13 @@ def _correct(system: System, start: Sequence[Array], share: Array) -> tuple[list
             error = np.maximum.reduce([np.abs(delta) for delta in move])
             if round_ == 0:
                 aim, first = list(x), error
-            good = error <= CONVERGED * size + 1e-300
+            residual, jacobian = system(x, share)
+            # by the residual: a small move may have crossed a kink, beyond which the Jacobian was another
+            missed = np.maximum.reduce([np.abs(part) for part in residual])
+            good = (error <= CONVERGED * size + TINY) & (missed <= CONVERGED * size + TINY)
             if np.all(good | ~calm | (error > first)):  # a lane that moves farther than at first has left the branch
                 break
-        missed = np.maximum.reduce([np.abs(a - b) for a, b in zip(x, aim, strict=True)])
-        calm &= (missed <= NEAR_AIM * first) | (first + missed <= TINY_MOVE * size)
-        _, jacobian = system(x, share)
+        astray = np.maximum.reduce([np.abs(a - b) for a, b in zip(x, aim, strict=True)])
+        calm &= (astray <= NEAR_AIM * first) | (first + astray <= TINY_MOVE * size)
         good = good & calm & (linalg.determinant(jacobian) > 0)
     return x, good & np.isfinite(size)

@@ -25,6 +25,7 @@ from trunnion.algebra.namespace import Number
 __all__ = ["Extreme", "Grid", "largest", "shape_of"]
 
 POINTS, FEWER = 7, 5
+CUBIC = 4  # positions through which the curve goes that a mean over a range is of
 UNEVEN = 8.0  # times the least bend the largest one may have, for a polynomial to go through
 RISE, SHARE = 2.0, 0.05  # of the rise and of the bend of a parabola: more is no top of a smooth curve
 ROUNDING = 1e-14
@@ -58,17 +59,45 @@ class Stencils(NamedTuple):
 
 @dataclass(frozen=True)
 class Grid:
-    """Positions of a curve: rising places; period: after which the curve repeats, if it does."""
+    """Positions of a curve: rising places; period: after which the curve repeats, if it does.
+
+    given: weights of the positions in a mean and those of a rougher rule, if they are places of a rule of their own.
+    """
 
     at: Array
     period: float | None = None
+    given: tuple[Array, Array] | None = None
 
     @cached_property
     def weights(self) -> Array:
-        """Of the positions in a mean; their sum is 1. All alike over a period, by trapezoids over a range."""
+        """Of the positions in a mean; their sum is 1. All alike over a period; over a range the integral of the cubic
+        through the four positions about each gap, which is off by O(h⁴) where the curve is smooth."""
         count = len(self.at)
+        if self.given is not None:
+            return self.given[0]
         if count == 1 or self.period is not None:
             return np.full(count, 1 / count)
+        points = min(CUBIC, count)
+        first = np.clip(np.arange(count - 1) - points // 2 + 1, 0, count - points)
+        nodes = first[:, None] + np.arange(points)
+        step = np.diff(self.at)[:, None]
+        spots = (self.at[nodes] - self.at[:-1, None]) / step
+        powers = np.vander(np.ones(1), points, increasing=True)[0] / np.arange(1, points + 1)
+        shares = np.linalg.solve(np.swapaxes(spots[..., None] ** np.arange(points), 1, 2), powers[:, None])[..., 0]
+        weights = np.zeros(count)
+        np.add.at(weights, nodes, shares * step / (self.at[-1] - self.at[0]))
+        return weights
+
+    @cached_property
+    def rough(self) -> Array:
+        """Weights of a rougher rule, which tells the error: of every other position of a period, of trapezoids."""
+        count = len(self.at)
+        if self.given is not None:
+            return self.given[1]
+        if count == 1:
+            return self.weights
+        if self.period is not None:
+            return np.where(np.arange(count) % 2 == 0, 1.0, 0.0) / ((count + 1) // 2)
         weights: Array = np.convolve(np.diff(self.at), [0.5, 0.5]) / (self.at[-1] - self.at[0])
         return weights
 

@@ -12,11 +12,8 @@ happens is reported.
 
 from __future__ import annotations
 
-import functools
-import operator
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -24,14 +21,14 @@ from numpy.typing import NDArray
 
 from trunnion.algebra import linalg
 from trunnion.algebra.dual import Dual, primal
-from trunnion.algebra.namespace import Number, compiled
+from trunnion.algebra.namespace import Number
 from trunnion.algebra.nested import replaced
 from trunnion.algebra.traced import looped
 from trunnion.analysis import continuation
 from trunnion.analysis.friction_method import FrictionMethod, method_named, peak
-from trunnion.groups.planar import is_zero, less
-from trunnion.joints.friction import FrictionLaw
-from trunnion.joints.pairs import ContactLoad, Reaction
+from trunnion.analysis.friction_problem import Contact, Problem, State, added, largest, total
+from trunnion.groups.planar import is_zero
+from trunnion.joints.pairs import Reaction
 
 __all__ = [
     "Contact",
@@ -45,10 +42,12 @@ __all__ = [
     "settle",
 ]
 
-DOUBTFUL_ROUNDS = 20  # of Newton's method, where no certificate says that it ends at the solution that is looked for
+OBEYED = 1e-10  # of the largest friction: by how much a friction may miss its law where it is called settled
+SETTLED = 1e-11  # of the largest friction: where the iteration ends
+SLOW = 1e-2  # of the miss: a round of Newton's method that leaves more has another matrix after it
+STUBBORN = 20  # rounds of Newton's method: a lane that takes more goes back and forth between the sides of a kink
 COMPILED_ROUNDS = 3  # of Newton's method where the numbers have no values to tell when to end; one more beyond FEW
 FEW = 3  # contacts of a dyad
-EXTRAPOLATED = 1e-2  # of the tolerance: what the change after the last round may be, as its like is guessed
 
 
 class Reacting(Protocol):
@@ -57,40 +56,15 @@ class Reacting(Protocol):
     def reactions(self, pose: Any, loads: Sequence[Any]) -> Sequence[Reaction]: ...
 
 
-class Contact(NamedTuple):
-    """A contact with friction in a joint, as its module sees it.
-
-    joint: its number in the module; unit_loads: what a friction force of 1 N on the second side does to the
-    links; load: normal load and its gradient from the joint's reaction; law with parameters; slip: m/s.
-    rubs: False for the separating force of a gear pair, which follows the tooth force as friction follows the
-    normal load, but is there in full whatever the friction. own: what the unit load adds to what the joint itself
-    carries, where its load depends on that.
-    """
-
-    joint: int
-    unit_loads: Sequence[Any]
-    load: ContactLoad
-    law: FrictionLaw
-    parameters: dict[str, Number]
-    slip: Number
-    rubs: bool = True
-    own: Reaction | None = None
-
-    def mapped(self, change: Callable[[Number], Number]) -> Contact:
-        """The same with `change` applied to every number that the laws see."""
-        parameters = {name: change(value) for name, value in self.parameters.items()}
-        load: ContactLoad = self.load.mapped(change)
-        return self._replace(load=load, parameters=parameters, slip=change(self.slip))
-
-
 class Settled(NamedTuple):
     """Reactions (friction not included) and friction forces, with the figures of the iteration.
 
     share: largest share of the friction for which a solution that starts frictionless was found, 1 unless the
     module locks; margin: multiple of the friction at which it would lock, ∞ beyond what was asked for;
     contraction: ∞-norm of the derivative of φ → law(N(R(φ))) (Newton), or the ratio of the last two
-    changes (successive approximation). certain: whether it is proved that there is no other solution; problem: the
-    equations themselves.
+    changes (successive approximation). residual: largest difference between a friction and what its law says for the
+    load that is found, N; where converged below OBEYED of the largest friction, unless a criterion is given. certain:
+    whether it is proved that there is no other solution; problem: the equations themselves.
     """
 
     reactions: Sequence[Reaction]
@@ -99,7 +73,8 @@ class Settled(NamedTuple):
     change: Number
     contraction: Number
     converged: Number
-    share: Number
+    residual: Number = 0.0
+    share: Number = 1.0
     margin: Number = np.inf
     certain: Number = True
     problem: Problem | None = None
@@ -111,7 +86,7 @@ def settle(
     """Reactions and friction forces of one module under `loads` (about the link origins, friction not included)."""
     start = group.reactions(pose, loads)
     if not contacts:
-        return Settled(start, [], 0, 0.0, 0.0, True, 1.0)
+        return Settled(start, [], 0, 0.0, 0.0, True)
     influence = [_with_own(contact, list(group.reactions(pose, contact.unit_loads))) for contact in contacts]
     problem = Problem(contacts, start, influence)
     if method.name == "successive-approximation":
@@ -123,195 +98,126 @@ def settle(
 
 def _with_own(contact: Contact, column: list[Reaction]) -> list[Reaction]:
     if contact.own is not None:
-        column[contact.joint] = _added(column[contact.joint], contact.own)
+        column[contact.joint] = added(column[contact.joint], contact.own)
     return column
-
-
-class Felt(NamedTuple):
-    """What one contact feels of the frictionless reactions, and of each friction force of 1 N."""
-
-    start: Reaction
-    columns: list[Reaction]
-
-
-class State(NamedTuple):
-    """What every contact feels of the reactions, and its normal load."""
-
-    reactions: list[Reaction]
-    normals: list[Number]
-
-
-@dataclass(frozen=True)
-class Problem:
-    """φ = law(N(R₀ + G φ)): the friction forces of one module, φ, with its reactions R."""
-
-    contacts: Sequence[Contact]
-    start: Sequence[Reaction]
-    influence: Sequence[Sequence[Reaction]]
-
-    def mapped(self, change: Callable[[Number], Number]) -> Problem:
-        """The same with `change` applied to every number."""
-
-        def each(wrenches: Sequence[Reaction]) -> list[Reaction]:
-            return [tuple(change(n) for n in wrench) for wrench in wrenches]
-
-        contacts = [contact.mapped(change) for contact in self.contacts]
-        return Problem(contacts, each(self.start), [each(column) for column in self.influence])
-
-    def numbers(self) -> list[Number]:
-        """All numbers of the problem."""
-        found: list[Number] = []
-
-        def note(number: Number) -> Number:
-            found.append(number)
-            return number
-
-        self.mapped(note)
-        return found
-
-    def picked(self, lanes: Number) -> tuple[Problem, NDArray[np.bool_]]:
-        """The problem of the chosen lanes alone, each number a flat array, and the choice in full shape."""
-        shape = np.broadcast_shapes(np.shape(lanes), *(np.shape(number) for number in self.numbers()))
-        chosen = np.broadcast_to(lanes, shape)
-        return self.mapped(lambda number: np.broadcast_to(np.asarray(number, float), shape)[chosen]), chosen
-
-    @cached_property
-    def compiled(self) -> bool:
-        """Whether its numbers have no values yet."""
-        return compiled(self.numbers())
-
-    @cached_property
-    def felt(self) -> list[Felt]:
-        """What the load of each contact makes of the reactions of its joint: only that is followed in the iteration."""
-        return [
-            Felt(
-                contact.load.felt(self.start[contact.joint]),
-                [contact.load.felt(column[contact.joint]) for column in self.influence],
-            )
-            for contact in self.contacts
-        ]
-
-    @cached_property
-    def one_way(self) -> bool:
-        """Whether friction changes no load of a pin with friction, as in a driver on a pin: nothing to iterate then."""
-        return not any(
-            contact.load.feels(column)
-            for contact, felt in zip(self.contacts, self.felt, strict=True)
-            for column in felt.columns
-        )
-
-    @cached_property
-    def _alike(self) -> list[int]:
-        """For each contact the first one whose reaction every friction force changes just as much."""
-        found: list[int] = []
-        numbers = [[n for column in one.columns for n in column] for one in self.felt]
-        for k, own in enumerate(numbers):
-            same = (i for i in range(k) if all(a is b for a, b in zip(own, numbers[i], strict=False)))
-            found.append(next(same, k))
-        return found
-
-    def reactions(self, forces: Sequence[Number], known: State) -> list[Reaction]:
-        """Reactions of all joints; where a contact feels the whole of it, it is in the state of the forces."""
-        found = {
-            contact.joint: reaction
-            for contact, felt, reaction in zip(self.contacts, self.felt, known.reactions, strict=True)
-            if felt.start is self.start[contact.joint]
-        }
-        still = all(is_zero(force) for force in forces)
-        for joint, start in enumerate(self.start):
-            if joint not in found:
-                found[joint] = start if still else _added(start, _changes([c[joint] for c in self.influence], forces))
-        return [found[joint] for joint in range(len(self.start))]
-
-    def state(self, forces: Sequence[Number]) -> State:
-        """Reactions and normal loads at the contacts under friction forces."""
-        if all(is_zero(force) for force in forces):
-            at = [one.start for one in self.felt]
-        else:
-            changes = {k: _changes(self.felt[k].columns, forces) for k in set(self._alike)}
-            at = [_added(one.start, changes[k]) for one, k in zip(self.felt, self._alike, strict=True)]
-        return State(at, [c.load.normal(reaction) for c, reaction in zip(self.contacts, at, strict=True)])
-
-    @cached_property
-    def slopes(self) -> list[Number]:
-        """Friction force for each newton of normal load: every law is proportional to it."""
-        return [contact.law.function(1.0, contact.slip, **contact.parameters) for contact in self.contacts]
-
-    def target(self, normals: Sequence[Number]) -> list[Number]:
-        """What the laws say for these normal loads."""
-        return [slope * normal for slope, normal in zip(self.slopes, normals, strict=True)]
-
-    def map_derivative(self, state: State) -> list[list[Number]]:
-        """A with A_kl = ∂ law_k / ∂ φ_l."""
-        rows = []
-        for contact, reaction, normal, slope, felt in zip(self.contacts, *state, self.slopes, self.felt, strict=True):
-            gradient = contact.load.gradient(reaction, normal)
-            scaled = tuple(entry if is_zero(entry) else slope * entry for entry in gradient)
-            rows.append([_along(scaled, column) for column in felt.columns])
-        return rows
-
-    def bound(self, multiples: Sequence[float] | None = None) -> Number:
-        """Largest row sum of |A| over all reactions: below 1 the solution exists, alone, for any share of friction.
-
-        multiples: of the friction of each contact, 1 if not given.
-        """
-        factors = multiples or [1.0] * len(self.contacts)
-        rows = [
-            np.abs(factor * slope) * _total([contact.load.bound(column) for column in felt.columns])
-            for contact, slope, factor, felt in zip(self.contacts, self.slopes, factors, self.felt, strict=True)
-        ]
-        return _largest(rows)
 
 
 def _newton(problem: Problem, method: FrictionMethod) -> Settled:
     """Newton from no friction; lanes without the certificate of `bound` are followed by continuation.
 
-    The rounds counted are Newton's; the continuation that such lanes then go through settles which solution it is.
-    The matrix is kept while a round reduces the change a hundredfold, which in all but the worst cases is always.
+    So are certain lanes that kinks keep from settling: their continuation leads to the same, only solution. The rounds
+    counted are Newton's. A followed lane gets as many as it needs to obey its laws, as the others do.
     """
     real = _primal(problem)
-    forces: list[Number] = [0.0] * len(real.contacts)
-    state = real.state(forces)
+    none: list[Number] = [0.0] * len(real.contacts)
     # a lane whose loads are no numbers, because another module locked or opened, is not this module's affair
-    bound = np.where(np.isfinite(peak(state.normals)), real.bound(), 0.0)
+    bound = np.where(np.isfinite(peak(real.state(none).normals)), real.bound(), 0.0)
     certain = ~(bound >= 1.0)
-    rows: list[list[Number]] = []
-    inverse: list[list[Number]] = []
-    change: Number = np.inf
-    rounds: Number = 0
-    done: Number = np.False_
-    renew = True
-    for _ in range(method.limit):
-        rounds = rounds + ~done
-        if renew:
-            rows = real.map_derivative(state)
-            inverse = linalg.quick_inverse(identity_minus(rows))
-        forces = _corrected(real, state, forces, inverse)
-        before, state = state, real.state(forces)
-        previous, change = change, _changed(state, before)
-        # a lane of NaN has nothing to wait for, nor has one for long that is followed all the same
-        done = ~(change > method.tolerance(state.normals)) | (~certain & (rounds >= DOUBTFUL_ROUNDS))
-        if np.all(done):
-            break
-        renew = bool(np.any((change > 0.01 * previous) & ~done))
+    found = _iterated(real, _started(real, none, ~certain), method)
     shares: Number = 1.0
-    if not np.all(certain):
-        forces, shares = _follow(real, forces, ~certain)
-        state = real.state(forces)
-        done = np.where(certain, done, shares >= 1.0)
-        rows = real.map_derivative(state)
-        inverse = linalg.quick_inverse(identity_minus(rows))
+    left = ~certain
+    if method.limit >= STUBBORN:
+        left = left | ~(found.done | _obeyed(real, found))
+    if np.any(left):
+        forces, shares = _follow(real, found.forces, left)
+        again = _started(real, forces, ~left)
+        found = _iterated(real, replace(again, rows=found.rows, inverse=found.inverse, rounds=found.rounds), method)
+    state, rows, inverse = found.state, found.rows, found.inverse
     depth = _depth(problem)
+    forces = found.forces
     if depth:  # the ε parts need the matrix of the solution, not that of the way there
         rows = real.map_derivative(state)
         inverse = linalg.quick_inverse(identity_minus(rows))
     for _ in range(depth):
-        forces = _corrected(problem, problem.state(forces), forces, inverse)
+        forces = _corrected(forces, problem.gaps(problem.state(forces), forces), inverse)
         state = problem.state(forces)
-    contraction = _largest([_total([np.abs(entry) for entry in row]) for row in rows])
-    margin = _margin(real, bound, method.margin_up_to)
-    reactions = problem.reactions(forces, state)
-    return Settled(reactions, forces, rounds, change, contraction, done, shares, margin, certain, real)
+    # of no lanes at all nothing is known
+    contraction = largest([total([np.abs(entry) for entry in row]) for row in rows]) if rows else 0.0
+    converged = found.done if method.criterion is not None else _obeyed(real, found)
+    return Settled(
+        reactions=problem.reactions(forces, state),
+        forces=forces,
+        iterations=found.rounds,
+        change=found.change,
+        contraction=contraction,
+        converged=converged & (shares >= 1.0),
+        residual=real.misfit(found.gaps),
+        share=shares,
+        margin=_margin(real, bound, method.margin_up_to),
+        certain=certain,
+        problem=real,
+    )
+
+
+@dataclass(frozen=True)
+class _Iterate:
+    """Where Newton's method is: forces and, by lane, whether it is done there.
+
+    state, gaps: reactions and law − force under these forces; rows, inverse: A and (1 − A)⁻¹ as last needed; rounds,
+    change: how many it took and the last change of a normal load, N.
+    """
+
+    forces: list[Number]
+    done: Number
+    state: State
+    gaps: list[Number]
+    rows: Sequence[Sequence[Number]] = ()
+    inverse: Sequence[Sequence[Number]] = ()
+    rounds: Number = 0
+    change: Number = np.inf
+
+
+def _obeyed(real: Problem, at: _Iterate) -> Number:
+    """Where every law is obeyed as closely as a solved position promises; NaN is no answer and breaks no promise."""
+    return ~(real.excess(at.gaps, at.forces) > OBEYED)
+
+
+def _started(real: Problem, forces: list[Number], done: Number) -> _Iterate:
+    """At these forces, with nothing done in the lanes that are not."""
+    state = real.state(forces)
+    return _Iterate(forces, done, state, real.gaps(state, forces))
+
+
+def _iterated(real: Problem, start: _Iterate, method: FrictionMethod) -> _Iterate:
+    """Newton's method from a start, in the lanes that are not done; those that are stay as they are.
+
+    A is that of the side of each kink on which the normal loads are. It is kept while a round leaves less than a
+    hundredth of the residual, which in all but the worst cases is always; a lane that crosses a kink leaves more and
+    gets the A of its new side. So what a lane comes to does not depend on the lanes beside it. It is done when every
+    friction is what its law says for the load, whatever the last round changed.
+    """
+    forces, done, state, gaps = start.forces, start.done, start.state, start.gaps
+    rows, inverse, rounds, change = start.rows, start.inverse, start.rounds, start.change
+    excess: Number = 1.0  # of no friction at all
+    slow: Number = ~done
+    for _ in range(min(method.limit, STUBBORN)):
+        if np.all(done):
+            break
+        rounds = rounds + ~done
+        if np.any(slow):
+            fresh = real.map_derivative(state)
+            rows = _chosen(slow, fresh, rows)
+            inverse = _chosen(slow, linalg.quick_inverse(identity_minus(fresh)), inverse)
+        (forces,) = _chosen(~done, [_corrected(forces, gaps, inverse)], [forces])
+        before, state = state, real.state(forces)
+        gaps = real.gaps(state, forces)
+        previous, excess = excess, real.excess(gaps, forces)
+        here = _changed(state, before)
+        change = np.where(done, change, here) if np.any(done) else here
+        # a lane of NaN has nothing to wait for
+        ends = ~(excess > SETTLED) if method.criterion is None else ~np.greater(here, method.criterion)
+        done = done | ends
+        slow = (excess > SLOW * previous) & ~done
+    return _Iterate(forces, done, state, gaps, rows, inverse, rounds, change)
+
+
+def _chosen(lanes: Number, rows: Sequence[Sequence[Number]], others: Sequence[Sequence[Number]]) -> list[list[Number]]:
+    """The rows in the chosen lanes, the others elsewhere; either whole where that is what it comes to."""
+    if not others or np.all(lanes):
+        return [list(row) for row in rows]
+    if not np.any(lanes):
+        return [list(row) for row in others]
+    return [[np.where(lanes, a, b) for a, b in zip(*pair, strict=True)] for pair in zip(rows, others, strict=True)]
 
 
 def _unrolled(problem: Problem, method: FrictionMethod) -> Settled:
@@ -327,24 +233,32 @@ def _unrolled(problem: Problem, method: FrictionMethod) -> Settled:
 
     def step(now: list[Number]) -> list[Number]:
         at = real.state(now)
-        return _corrected(real, at, now, _matrix(real, at))
+        return _corrected(now, real.gaps(at, now), _matrix(real, at))
 
     if len(forces) <= FEW:  # written out: quicker to run, but not to compile
         for _ in range(COMPILED_ROUNDS - 2):
             forces = step(forces)
     else:
         forces = looped(step, forces, COMPILED_ROUNDS - 1)
-    state = real.state(forces)
     forces = step(forces)
-    before, state = state, real.state(forces)
-    previous = _changed(state, before)
-    forces = _corrected(problem, problem.state(forces), forces, _matrix(real, state))
+    state = real.state(forces)
+    forces = _corrected(forces, problem.gaps(problem.state(forces), forces), _matrix(real, state))
     before, state = state, problem.state(forces)
-    change = _changed(state, before)
-    # of a quadratic method: the next round would change less than change · (change/previous)
-    done = certain & ~(change * change > EXTRAPOLATED * method.tolerance(state.normals) * previous)
-    reactions = problem.reactions(forces, state)
-    return Settled(reactions, forces, COMPILED_ROUNDS, change, 0.0, done, 1.0, np.inf, certain, real)
+    plain = [primal(force) for force in forces]
+    gaps = real.gaps(real.state(plain), plain)
+    return Settled(
+        reactions=problem.reactions(forces, state),
+        forces=forces,
+        iterations=COMPILED_ROUNDS,
+        change=_changed(state, before),
+        contraction=0.0,
+        converged=certain & ~(real.excess(gaps, plain) > SETTLED),
+        residual=real.misfit(gaps),
+        share=1.0,
+        margin=np.inf,
+        certain=certain,
+        problem=real,
+    )
 
 
 def _matrix(problem: Problem, state: State) -> list[list[Number]]:
@@ -357,21 +271,18 @@ def _at_once(problem: Problem) -> Settled:
     """Friction from the frictionless reactions, which it does not change but in what no law looks at."""
     forces = problem.target(problem.state([0.0] * len(problem.contacts)).normals)
     reactions = problem.reactions(forces, problem.state(forces))
-    return Settled(reactions, forces, 1, 0.0, 0.0, True, 1.0, problem=_primal(problem))
+    return Settled(reactions, forces, 1, 0.0, 0.0, True, problem=_primal(problem))
 
 
-def _corrected(
-    problem: Problem, state: State, forces: Sequence[Number], inverse: Sequence[Sequence[Number]]
-) -> list[Number]:
+def _corrected(forces: Sequence[Number], gaps: Sequence[Number], inverse: Sequence[Sequence[Number]]) -> list[Number]:
     """φ + (1 − A)⁻¹ (law − φ)."""
-    residual = [less(a, b) for a, b in zip(problem.target(state.normals), forces, strict=True)]
-    moves = [_total([entry * part for entry, part in zip(row, residual, strict=True)]) for row in inverse]
+    moves = [total([entry * part for entry, part in zip(row, gaps, strict=True)]) for row in inverse]
     return [move if is_zero(force) else force + move for force, move in zip(forces, moves, strict=True)]
 
 
 def _changed(state: State, before: State) -> Number:
     """Largest change of a normal load, N."""
-    return _largest([a - b for a, b in zip(state.normals, before.normals, strict=True)])
+    return largest([a - b for a, b in zip(state.normals, before.normals, strict=True)])
 
 
 def _successive(problem: Problem, method: FrictionMethod) -> Settled:
@@ -386,18 +297,27 @@ def _successive(problem: Problem, method: FrictionMethod) -> Settled:
         rounds = rounds + ~done
         forces = problem.target(state.normals)
         before, state = state, problem.state(forces)
+        gaps = problem.gaps(state, forces)
         previous, change = change, _changed(state, before)
-        done = ~(change > method.tolerance(state.normals))
+        done = ~(problem.excess(gaps, forces) > SETTLED) if method.criterion is None else ~(change > method.criterion)
         if np.all(done):
             break
-    done = change <= method.tolerance(state.normals)  # not so where it ran off to infinity
+    done = ~(problem.excess(gaps, forces) > OBEYED) if method.criterion is None else change <= method.criterion
     measurable = np.isfinite(previous) & (previous > 0)
     ratio = np.where(measurable, change / np.where(measurable, previous, 1.0), 0.0)
     real = _primal(problem)
     bound = np.where(np.isfinite(peak(real.state([0.0] * len(real.contacts)).normals)), real.bound(), 0.0)
-    margin = _margin(real, bound, method.margin_up_to)
-    reactions = problem.reactions(forces, state)
-    return Settled(reactions, forces, rounds, change, ratio, done, 1.0, margin, ~(bound >= 1.0), real)
+    return Settled(
+        reactions=problem.reactions(forces, state),
+        forces=forces,
+        iterations=rounds,
+        change=change,
+        contraction=ratio,
+        converged=done & np.isfinite(change),  # not so where it ran off to infinity
+        residual=problem.misfit(gaps),
+        margin=_margin(real, bound, method.margin_up_to),
+        certain=~(bound >= 1.0),
+    )
 
 
 def _margin(problem: Problem, bound: Number, most: float) -> Number:
@@ -457,37 +377,6 @@ def frictionless(problem: Problem, chosen: NDArray[np.bool_]) -> list[NDArray[np
 
 def identity_minus(rows: Sequence[Sequence[Number]]) -> list[list[Number]]:
     return [[(1.0 if k == j else 0.0) - entry for j, entry in enumerate(row)] for k, row in enumerate(rows)]
-
-
-def _changes(columns: Sequence[Reaction], forces: Sequence[Number]) -> Reaction:
-    """What friction forces change in a reaction. columns: what 1 N of each does."""
-    return tuple(
-        _total([entry * force for entry, force in zip(entries, forces, strict=True) if not is_zero(entry)])
-        for entries in zip(*columns, strict=True)
-    )
-
-
-def _along(gradient: Reaction, column: Reaction) -> Number:
-    """Derivative of a normal load along a change of the reaction."""
-    return _total([g * c for g, c in zip(gradient, column, strict=True) if not (is_zero(g) or is_zero(c))])
-
-
-def _added(a: Reaction, b: Reaction) -> Reaction:
-    """a + b; a literal zero costs nothing."""
-    return tuple(p if is_zero(q) else q if is_zero(p) else p + q for p, q in zip(a, b, strict=True))
-
-
-def _total(parts: Sequence[Number]) -> Number:
-    """Sum; of nothing a literal zero. The built-in sum would add the first part to 0."""
-    return functools.reduce(operator.add, parts) if parts else 0.0
-
-
-def _largest(values: Sequence[Number]) -> Number:
-    """Largest magnitude, elementwise; NaN if one is NaN."""
-    largest = np.abs(primal(values[0]))
-    for value in values[1:]:
-        largest = np.maximum(largest, np.abs(primal(value)))
-    return largest
 
 
 def _depth(problem: Problem) -> int:

@@ -23,8 +23,9 @@ class FrictionMethod:
     """How friction and reactions are settled.
 
     name: "newton" or "successive-approximation" ([D] steps 1-5).
-    criterion: largest change of a joint's reaction between two rounds, N, at which the iteration ends ([D] used
-    1e-3 N); None: 1e-3 N for [D], and for Newton 1e-8 of the largest reaction, which leaves some 1e-10 of it.
+    criterion: largest change of a normal load between two rounds, N, at which the iteration ends ([D]: 1e-3 N). None:
+    it ends when every friction is what its law says for the load found, to 1e-10 of the largest friction. With a
+    criterion how far the laws are missed is told by `friction_residual` alone.
     limit: most rounds; a position that needs more is not converged.
     margin_up_to: how far, in multiples of the friction, to look for the point at which it locks; 0: not at all.
     """
@@ -33,14 +34,6 @@ class FrictionMethod:
     criterion: float | None = None
     limit: int = 200
     margin_up_to: float = 0.0
-
-    def tolerance(self, normals: Sequence[Number]) -> Number:
-        """Allowed change, N."""
-        if self.criterion is not None:
-            return self.criterion
-        if self.name == "successive-approximation":
-            return 1e-3
-        return 1e-8 * peak(normals)
 
 
 def method_named(name: str, criterion: float | None, limit: int) -> FrictionMethod:

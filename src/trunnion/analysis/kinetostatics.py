@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
@@ -12,32 +13,32 @@ from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.analysis.friction import Contact, FrictionMethod, Settled, settle
 from trunnion.analysis.kinematics import Assembly, Forward, Travel, forward
-from trunnion.analysis.loads import Action, Slip, SpringState, springs, stated_loads
+from trunnion.analysis.loads import Action, Share, Slip, SpringState, springs, stated_loads
 from trunnion.analysis.system import Place, System, Values, law_of
 from trunnion.groups.gear import Action as GearAction
 from trunnion.groups.gear import Gear, Mesh, actions, apart, mesh
 from trunnion.groups.general import General
 from trunnion.groups.planar import ZERO_LOAD, Wrench, about, added, moved
 from trunnion.groups.protocol import Group
-from trunnion.joints.friction import FrictionLaw
+from trunnion.joints.friction import FrictionLaw, LawFunction
 from trunnion.joints.pairs import Load
 
-__all__ = ["Backward", "Given", "Sense", "backward", "sense_of", "solve", "under"]
+__all__ = ["Backward", "Given", "Sense", "backward", "held", "sense_of", "slip_of", "solve", "under"]
 
 ZERO_SLIP = 1e-10  # of the speeds about the joint: below it the sign of a relative speed is rounding noise
 
 
-Sense = float | tuple[float, ...]
+Sense = Share | tuple[Share, ...]
 
 
 @dataclass(frozen=True)
 class Given:
     """What the joints bring along beside their motion, by joint.
 
-    zero_slip: sign of the slip to take where the relative speed is zero, one for each contact of the joint or one for
-    all; 0 if not stated. deflections: of the bristles
-    of laws that have them, m, in the sense of the slip; that of steady sliding if not stated. travel: how links also
-    move since the seats among the values (`seats.JOINT.1.x` …) change along the way.
+    zero_slip: share of what resists the joint to take where the relative speed is zero, with the sign of the slip that
+    is about to begin, from −1 to 1; one for each contact of the joint or one for all; 0 if not stated. deflections: of
+    the bristles of laws that have them, m, in the sense of the slip; that of steady sliding if not stated. travel: how
+    links also move since the seats among the values (`seats.JOINT.1.x` …) change along the way.
     """
 
     zero_slip: Mapping[str, Sense] = field(default_factory=dict)
@@ -45,10 +46,29 @@ class Given:
     travel: Mapping[str, Travel] = field(default_factory=dict)
 
 
-def sense_of(zero_slip: Mapping[str, Sense], joint: str, contact: int = 0) -> float:
-    """The sign to take for one contact of a joint."""
+def sense_of(zero_slip: Mapping[str, Sense], joint: str, contact: int = 0) -> Share:
+    """The share to take for one contact of a joint, with its sign."""
     sense = zero_slip.get(joint, 0.0)
     return sense[contact] if isinstance(sense, tuple) else sense
+
+
+def held(
+    law: FrictionLaw, parameters: dict[str, Number], speed: Number, zero: Number, sense: Share
+) -> tuple[FrictionLaw, dict[str, Number], Number]:
+    """Law, parameters and slip speed of a contact, of whose friction a share acts where it rests."""
+    if not np.any(zero):
+        return law, parameters, speed
+    forced = np.sign(sense) * np.maximum(np.abs(primal(speed)), 1e-300)
+    speed = namespace(speed).where(zero, forced, speed)
+    if law.interval_at_rest and np.any(np.abs(sense) < 1.0) and np.any(sense):
+        share = np.where(zero, np.abs(sense), 1.0)
+        return replace(law, function=functools.partial(_shared, law.function)), {**parameters, "share": share}, speed
+    return law, parameters, speed
+
+
+def _shared(function: LawFunction, normal: Number, slip: Number, *, share: Number, **parameters: Number) -> Number:
+    """A share of what the law says."""
+    return share * function(normal, slip, **parameters)
 
 
 class GearLoad(NamedTuple):
@@ -131,7 +151,7 @@ def backward(walk: Forward, method: FrictionMethod, given: Given) -> Backward:
     system = walk.system
     back = Backward(walk, dict.fromkeys(system.mechanism.links, ZERO_LOAD), travels=bool(given.travel))
     for name in system.joints:
-        back.slips[name] = _slip(walk, name)
+        back.slips[name] = slip_of(walk, name)
     _add_body_loads(back)
     _add_stated_loads(back, given.zero_slip)
     for number in reversed(range(len(system.plan.modules))):
@@ -220,7 +240,7 @@ def _absent(number: Number) -> bool:
 # ---- one module -----------------------------------------------------------------------------------------------
 
 
-def _slip(walk: Forward, joint: str) -> Slip:
+def slip_of(walk: Forward, joint: str) -> Slip:
     """Relative speed along the freedom of a joint, and whether it is zero but for rounding."""
     kind, (first, second) = walk.system.joints[joint]
     w1, w2 = walk.motions[first].twist.w, walk.motions[second].twist.w
@@ -283,10 +303,7 @@ def _contact(back: Backward, links: tuple[str, ...], k: int, place: Place, given
             frame = walk.motions[link].frame
             push = about(Wrench(axis.c, axis.s, 0.0), frame.x - at.x, frame.y - at.y)
             units.append(_signed(link, place.links, push))
-    speed = slip.speed
-    if np.any(slip.zero):
-        forced = sense_of(given.zero_slip, place.joint) * np.maximum(np.abs(primal(speed)), 1e-300)
-        speed = namespace(speed).where(slip.zero, forced, speed)
+    law, parameters, speed = held(law, parameters, slip.speed, slip.zero, sense_of(given.zero_slip, place.joint))
     speed = sign * lever * speed
     if place.joint in given.deflections:
         parameters["deflection"] = sign * given.deflections[place.joint]

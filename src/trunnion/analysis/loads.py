@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
@@ -15,7 +16,10 @@ from trunnion.analysis.kinematics import Forward, PointMotion
 from trunnion.groups.planar import Wrench, turned
 from trunnion.model.parts import Load
 
-__all__ = ["Action", "Slip", "SpringState", "Stated", "spring_state", "springs", "stated_loads"]
+__all__ = ["Action", "Share", "Slip", "SpringState", "Stated", "Switch", "spring_state", "springs", "stated_loads"]
+
+
+Share = float | NDArray[np.float64]  # of what resists a joint at rest, with the sign of the slip about to begin
 
 
 class Slip(NamedTuple):
@@ -49,6 +53,17 @@ class SpringState(NamedTuple):
     loss: Number
 
 
+class Switch(NamedTuple):
+    """A number of the motion, and the levels at which something jumps or bends as it passes them.
+
+    period: after which the levels come again; None: they do not.
+    """
+
+    number: Number
+    levels: Sequence[Number] = (0.0,)
+    period: Number | None = None
+
+
 class Stated:
     """Numbers of the model at the times of a walk: those of its values, and expressions of the motion."""
 
@@ -70,6 +85,20 @@ class Stated:
         x, y = self.get(f"{path}.x"), self.get(f"{path}.y")
         return None if x is None or y is None else (x, y)
 
+    def switches(self) -> Iterator[Switch]:
+        """What decides where numbers that vary with the motion jump or bend: ends of `between` …, points of tables."""
+        tables: dict[str, None] = {}
+        for entry in self.entries.values():
+            if entry.varies and entry.quantity.expression is not None:
+                named = {name: self._named(name) for name in entry.quantity.names}
+                yield from (Switch(kink(named)) for kink in entry.quantity.expression.kinks)
+                tables.update(dict.fromkeys(named.keys() & self.walk.system.mechanism.tables.keys()))
+        for name in tables:
+            if self.walk.system.mechanism.tables[name].interpolation == "linear":
+                knots, _, place = self._of_table(name)
+                repeats = self.walk.system.mechanism.tables[name].repeats
+                yield Switch(place, knots, knots[-1] - knots[0] if repeats else None)
+
     def _named(self, name: str) -> Number:
         """What a name in an expression stands for: a dimension, the drive, time, or a table."""
         if name in self.walk.system.mechanism.tables:
@@ -85,20 +114,33 @@ class Stated:
         first = next(iter(self.walk.system.mechanism.drivers))
         return self.walk.system.drive(self.walk.values, first, self.walk.time)
 
-    def _table(self, name: str) -> Number:
+    def _of_table(self, name: str) -> tuple[list[Number], list[Number], Number]:
+        """Knots and values of a table, and the place in it."""
         table, path = self.walk.system.mechanism.tables[name], f"tables.{name}.points"
         knots, values = (
             [self.walk.values[f"{path}.{k}.{key}"] for k in range(len(table.points))] for key in ("at", "value")
         )
-        place = self.walk.time if table.over == "time" else self._drive[0]
-        return look_up(knots, values, place, table.interpolation == "spline", table.periodic)
+        if table.period is not None and self._open(name):
+            knots, values = [*knots, knots[0] + self.walk.values[f"tables.{name}.period"]], [*values, values[0]]
+        return knots, values, self.walk.time if table.over == "time" else self._drive[0]
+
+    def _table(self, name: str) -> Number:
+        table, (knots, values, place) = self.walk.system.mechanism.tables[name], self._of_table(name)
+        return look_up(knots, values, place, table.interpolation == "spline", table.repeats)
+
+    def _open(self, name: str) -> bool:
+        """Whether the points of a table end before its period does: the first then comes again as the last."""
+        nominal = self.walk.system.mechanism.parameter_set.nominal
+        last = len(self.walk.system.mechanism.tables[name].points) - 1
+        first, end, period = (nominal[f"tables.{name}.{key}"] for key in ("points.0.at", f"points.{last}.at", "period"))
+        return bool(end - first < period * (1 - 1e-9))
 
 
 # ---- loads ----------------------------------------------------------------------------------------------------
 
 
 def stated_loads(
-    walk: Forward, slips: Mapping[str, Slip], zero_slip: Mapping[str, float]
+    walk: Forward, slips: Mapping[str, Slip], zero_slip: Mapping[str, Share]
 ) -> Iterator[tuple[str, Action]]:
     """The loads of the model, by name. zero_slip: see `kinetostatics.solve`."""
     stated = Stated(walk)
@@ -131,14 +173,14 @@ def _push(stated: Stated, load: Load, path: str) -> Action:
     return Action(on, power)
 
 
-def _resist(walk: Forward, load: Load, size: Number, slip: Slip, at_rest: float) -> Action:
+def _resist(walk: Forward, load: Load, size: Number, slip: Slip, at_rest: Share) -> Action:
     """A torque or force that opposes the motion of a joint, whichever way it goes or one way only.
 
-    at_rest: the sign of the motion to take where there is none; 0: the load is zero there.
+    at_rest: the share of the load where there is no motion, with the sign of that which is about to begin.
     """
-    sign = np.sign(np.where(slip.zero, at_rest, primal(slip.speed)))
+    sign = np.where(slip.zero, at_rest, np.sign(primal(slip.speed)))
     if load.only is not None:
-        sign = np.where(sign == (1.0 if load.only == "positive" else -1.0), sign, 0.0)
+        sign = np.where(sign * (1.0 if load.only == "positive" else -1.0) > 0.0, sign, 0.0)
     return _in_joint(walk, load.joint or "", -sign * size, slip)
 
 

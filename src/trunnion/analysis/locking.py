@@ -94,7 +94,7 @@ def report_rows(run: Run, found: xr.Dataset) -> list[dict[str, Any]]:
     if np.any(more > 0):
         label = f"other solutions at full friction, {dial.intervals(np.flatnonzero(more > 0))}, most"
         rows.append({"label": label, "value": float(np.nanmax(more)), "unit": "1"})
-    backward = reverse_row(_reverse(found), run.cycle)
+    backward = reverse_row(run, _reverse(found), useful_loads(run.system.mechanism))
     stays = {"label": "the useful loads do not drive it backward over the cycle", "value": None, "unit": "1"}
     return [*rows, backward or stays]
 

@@ -3,9 +3,9 @@
 A course is what `Measure.curve` gives at the positions of a `measure_positions.Plan`; `reference` keeps that of the
 nominal mechanism once, `figure` makes the numbers of many samples. Angles follow those of the nominal mechanism, from
 which they are less than half a turn away. Extremes lie between positions too (`extremes`: value off by O(h⁷), place by
-O(h⁶), h the step, where the course is smooth); means are sums over a period, which a smooth course leaves nearly exact,
-and trapezoids over a range, off by O(h²). A figure is NaN where a position that it needs has no answer, and a dead
-centre that is not within its range is NaN.
+O(h⁶), h the step, where the course is smooth); means over the cycle are integrals between the places where the nominal
+mechanism switches (`quadrature`), those over part of it are off by O(h⁴) where the course is smooth. A figure is NaN
+where a position that it needs has no answer, and a dead centre that is not within its range is NaN.
 
 With dual numbers a figure has its exact derivatives. That of a largest |deviation| or of a distance from the nominal
 place has none at the nominal mechanism itself, where it is 0 whatever way one goes: take those of the course there.
@@ -26,10 +26,11 @@ from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.analysis.extremes import Extreme, Grid, largest, shape_of
 from trunnion.analysis.fill import unwrap_row
+from trunnion.analysis.means import ROUNDING
 from trunnion.analysis.measure_lines import distances, total, turn
 from trunnion.analysis.measure_positions import Window
 from trunnion.analysis.measures import MEASURES, Measure
-from trunnion.analysis.system import FEWEST, System
+from trunnion.analysis.system import System
 from trunnion.errors import Status
 
 __all__ = ["RULES", "Course", "Reference", "figure", "judged", "kept", "known", "moment", "reference", "shown", "span"]
@@ -119,15 +120,15 @@ def _ratio(useful: Number, driven: Number, course: Course) -> Number:
 
 
 def _net(power: Number, course: Course) -> Number:
-    """The mean of a power, 0 where it is no more than rounding or what half the positions would miss: it cancels."""
+    """The mean of a power, 0 where it is no more than rounding or the error of its integral: it cancels.
+
+    The error as QUADPACK tells it from two rules; see `quadrature`.
+    """
     value, real = total(power, course.grid.weights), primal(power)
-    size, halved = total(np.abs(real), course.grid.weights), primal(value)
-    count = len(course.grid.at)
-    if count >= FEWEST:
-        half = Grid(course.grid.at[::2], course.grid.period)
-        halved = total(np.broadcast_to(real, (*np.shape(real)[:-1], count))[..., ::2], half.weights)
-    nothing = np.abs(primal(value)) <= np.maximum(1e-9 * size, 4 * np.abs(primal(value) - halved))
-    return namespace(value).where(nothing, 0.0, value)
+    size = total(np.abs(real), course.grid.weights)
+    off = np.abs(primal(value) - total(real, course.grid.rough)) / np.where(size > 0, size, 1.0)
+    error = size * np.maximum(ROUNDING, np.minimum(off, (200 * off) ** 1.5))
+    return namespace(value).where(np.abs(primal(value)) <= error, 0.0, value)
 
 
 # ---- the nominal mechanism and others -------------------------------------------------------------------------
@@ -166,7 +167,7 @@ class Reference:
         """The positions as the places of a curve."""
         time, period = self.window.time, self.window.period
         if not self.opened or period is None:
-            return Grid(time, period)
+            return Grid(time, period, self.window.weights)
         return Grid(np.append(time, time[0] + period))
 
 

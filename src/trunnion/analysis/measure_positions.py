@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number
 from trunnion.analysis.measures import Measure
+from trunnion.analysis.quadrature import Nodes, nodes
 from trunnion.analysis.system import System, Values
 from trunnion.errors import Finding, MechanismError
 
@@ -34,7 +35,8 @@ class Window:
 
     index: into the times of the plan, in order; time: theirs, s, rising (beyond the end of the cycle where the window
     runs over it); coordinate: of the first driver if it runs one way (else the time), in the same way; period: after
-    which they repeat, s, None for a range; gain: of the coordinate in a period.
+    which they repeat, s, None for a range; gain: of the coordinate in a period; weights: of the positions in a mean,
+    and those of a rougher rule, where they are the places of a rule.
     """
 
     index: NDArray[np.intp]
@@ -42,6 +44,7 @@ class Window:
     coordinate: Array
     period: float | None = None
     gain: float = 0.0
+    weights: tuple[Array, Array] | None = None
 
     @cached_property
     def everything(self) -> bool:
@@ -111,12 +114,23 @@ def plan(run: Run, measures: Sequence[Measure], steps: int) -> Plan:
             findings += error.findings
     if findings:
         raise MechanismError(findings)
-    grid = run.cycle.times(steps) if any(len(found) != 1 for found in ends.values()) else np.zeros(0)
+    averaged = {measure.name for measure in measures if not ends[measure.name] and _averages(run, measure)}
+    rule = nodes(run.edges) if averaged else Nodes(*(np.zeros(0),) * 3)
+    asked = [found for name, found in ends.items() if name not in averaged]
+    grid = run.cycle.times(steps) if any(len(found) != 1 for found in asked) else np.zeros(0)
     extra = [moment % duration if run.cycle.periodic else moment for found in ends.values() for moment in found]
-    times = np.unique(np.concatenate([grid, extra]))
+    times = np.unique(np.concatenate([grid, extra, rule.at]))
     known = _path(run, times), _gain(run)
-    windows = {name: _window(run, found, times, grid, known) for name, found in ends.items()}
-    return Plan(run, times, windows)
+    windows = {name: _window(run, found, times, grid, known) for name, found in ends.items() if name not in averaged}
+    index = np.searchsorted(times, rule.at)
+    period = duration if run.cycle.periodic else None
+    whole = Window(index, rule.at, known[0][index], period, known[1], (rule.weights, rule.inside))
+    return Plan(run, times, windows | dict.fromkeys(averaged, whole))
+
+
+def _averages(run: Run, measure: Measure) -> bool:
+    """Whether a figure is a mean over the cycle; that of an angle which gains turns needs the end of the cycle too."""
+    return measure.rule in ("mean", "rms", "ratio") and not measure.turning(run.system)
 
 
 def _window(run: Run, ends: tuple[float, ...], times: Array, grid: Array, known: tuple[Array, float]) -> Window:

@@ -82,10 +82,14 @@ class Measure:
     @property
     def limit(self) -> float | None:
         """The deviation allowed to either side at every position; None where a limit is of one place or one figure."""
-        of_every_position = self.at is None and self.over is None and not self.statistic
-        if not of_every_position or self.lower is None or self.upper is None:
+        if not self.everywhere or self.lower is None or self.upper is None:
             return None
         return max(0.0, min(-self.lower, self.upper))
+
+    @property
+    def everywhere(self) -> bool:
+        """Whether it is of every position: of none place or window, and no statistic."""
+        return self.at is None and self.over is None and not self.statistic
 
     @property
     def of_motion(self) -> bool:

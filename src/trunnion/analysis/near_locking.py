@@ -18,8 +18,10 @@ from trunnion.analysis import continuation
 from trunnion.analysis.bristles import histories
 from trunnion.analysis.friction import FrictionMethod, Problem, frictionless, identity_minus, scaled
 from trunnion.analysis.kinetostatics import Backward, Given
-from trunnion.analysis.system import Cycle, Dial, law_of
-from trunnion.errors import Finding, Severity
+from trunnion.analysis.means import ROUNDING
+from trunnion.analysis.quadrature import integrals
+from trunnion.analysis.system import Dial, law_of
+from trunnion.errors import Finding, Severity, counted
 
 if TYPE_CHECKING:
     from trunnion.analysis.analyse import Run
@@ -162,25 +164,45 @@ def critical_row(run: Run, joint: str, multiple: float, where: str) -> dict[str,
     return {"label": f"critical friction {parameter} of {joint} alone, {where}", "value": multiple * value, "unit": "1"}
 
 
-def reverse_row(back: Reverse, cycle: Cycle) -> dict[str, Any] | None:
+def reverse_row(run: Run, back: Reverse, useful: Sequence[str]) -> dict[str, Any] | None:
     """Power that reaches the drivers over that which the useful loads give, backward; None if these do not drive.
 
     It locks, or is 0 or less: then it holds itself.
     """
     text, value = "efficiency driven backward by the useful loads", float("nan")
-    if np.all(np.isfinite(back.given)) and not cycle.net(back.given) > 0:
+    delivered, given = _reversed_means(run, back, useful)
+    if np.all(np.isfinite(back.given)) and not given > 0:
         return None
     if np.any(back.locked):
-        text = f"driven backward by the useful loads it locks, at {np.count_nonzero(back.locked)} positions"
-    elif not np.all(np.isfinite(back.given + back.delivered)):
+        places = counted(int(np.count_nonzero(back.locked)), "position")
+        text = f"driven backward by the useful loads it locks, at {places}"
+    elif not np.isfinite(delivered + given) or not np.all(np.isfinite(back.given + back.delivered)):
         text += " (not every position has an answer)"
     else:
-        value = cycle.net(back.delivered) / cycle.net(back.given)
+        value = delivered / given
         text += "" if value > 0 else " (it holds itself)"
         if value > 1:  # over a range what masses and springs have stored comes on top
             text += " (masses and springs give work too)"
             value = float("nan")
     return {"label": text, "value": value if np.isfinite(value) else None, "unit": "1"}
+
+
+def _reversed_means(run: Run, back: Reverse, useful: Sequence[str]) -> tuple[float, float]:
+    """Mean powers, W, delivered and given, backward, 0 where they cancel; that of the loads is known where it locks."""
+    if run.cycle.duration <= 0:
+        return float(back.delivered[0]), float(back.given[0])
+
+    def powers(rows: NDArray[np.intp], time: Array) -> Array:
+        method = FrictionMethod()
+        there = reverse(run, run.solve(time.ravel(), method=method), method, useful)
+        return np.stack([there.delivered, there.given]).reshape(2, *time.shape)
+
+    found = integrals(powers, [run.edges])
+    delivered, given = (
+        0.0 if abs(value) <= max(error, ROUNDING * size) else value / run.cycle.duration
+        for value, error, size in zip(found.value[:, 0], found.error[:, 0], found.size[:, 0], strict=True)
+    )
+    return delivered, given
 
 
 class Reverse(NamedTuple):

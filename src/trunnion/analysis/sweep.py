@@ -20,8 +20,9 @@ from trunnion.analysis.account import effort_units, finding_row, references
 from trunnion.analysis.friction import FrictionMethod
 from trunnion.analysis.sweep_figures import FIGURES, INTEGERS, Figure
 from trunnion.analysis.sweep_grid import MOST_POINTS, Over, Swept, grid, say
+from trunnion.analysis.sweep_measures import left_out, measures_of
 from trunnion.analysis.sweep_points import Points
-from trunnion.errors import Finding, Severity, Status
+from trunnion.errors import Finding, Severity, Status, agreeing, counted
 from trunnion.model.mechanism import Mechanism
 
 if TYPE_CHECKING:
@@ -37,12 +38,14 @@ def sweep(
     method: FrictionMethod | None = None,
     progress: Callable[[int], None] | None = None,
     margin: bool = False,
+    measures: Sequence[str] = (),
 ) -> xr.Dataset:
     """Figures of the cycle over a grid of some numbers of the mechanism.
 
     over: by name, as for `Mechanism.with_values` (a path or an ending that is unique), a list of values, or from, to
     and count: `{"misalignment": ("0 deg", "30 deg", 7), "input.speed": [50, 100]}`; plain numbers are SI.
     margin: whether the locking margin is looked for as well, which takes many times as long as all else.
+    measures: names of the model's, or written as for `play`, each with one figure a cycle: variables of these names.
     Returns a Dataset with a dimension for each name, last, its coordinate in SI, and the variables of `FIGURES`. Where
     any position of the cycle has no answer they are NaN, but for the locking margin of positions that lock: `status`
     and `without_answer` tell. Extremes leave out what `analyse` leaves out of its summary: positions with a relative
@@ -61,15 +64,25 @@ def sweep(
                       INTEGERS.get(name, np.float64))
         for name, one in FIGURES.items() if margin or one.part != "margin"
     }  # fmt: skip
+    watched = {one.name: one for one in measures_of(points.run, measures)} if measures else {}
+    arrays |= {name: np.full(points.shape, np.nan) for name in watched}
     for done, (index, told) in enumerate(points.solved(), 1):
+        if watched:
+            told |= points.measured(index, list(watched))
         for name, value in told.items():
             place: Any = (..., *index)
             arrays[name][place] = value
         if progress:
             progress(done)
-    found = [*_answers(points.swept, arrays), *_shared(points)]
-    arrays = {name: array for name, array in arrays.items() if points.erring or FIGURES[name].part != "errors"}
-    return _dataset(points, labels, arrays, found)
+    found = [*_answers(points.swept, arrays), *_shared(points), *left_out(mechanism, measures)]
+    of_errors = () if points.erring else (name for name, one in FIGURES.items() if one.part == "errors")
+    for name in of_errors:
+        arrays.pop(name, None)
+    figures = FIGURES | {
+        name: Figure((), one.figure_unit(points.run.system, points.run.values), f"measure {name}")
+        for name, one in watched.items()
+    }
+    return _dataset(points, labels, arrays, found, figures)
 
 
 # ---- what there is to say -------------------------------------------------------------------------------------
@@ -78,7 +91,7 @@ def sweep(
 def _shared(points: Points) -> Iterator[Finding]:
     """What the points have to say that were looked at by themselves, each once; notes only if all have them."""
     total, looked = int(np.prod(points.shape)), len(points.looked)
-    whole = f"{total:,} points" if looked == total else f"{looked:,} points looked at"
+    whole = counted(total, "point") if looked == total else f"{counted(looked, 'point')} looked at"
     for found in points.said.values():
         one, count = next(iter(found.values())), len(found)
         if count == looked:
@@ -96,8 +109,8 @@ def _answers(swept: Sequence[Swept], arrays: Mapping[str, NDArray[Any]]) -> Iter
             continue
         first = tuple(int(i) for i in where[0])
         count = int(missing[first])
-        some_positions = f"{count:,} position{'s' * (count != 1)} without an answer"
-        some = f"{len(where):,} of {status.size:,} points have no figures"
+        some_positions = f"{counted(count, 'position')} without an answer"
+        some = f"{len(where):,} of {counted(status.size, 'point')} {agreeing(len(where), 'has', 'have')} no figures"
         what = f"{some}, first at {say(swept, first)} ({some_positions}): {code.text}"
         names = " and ".join(one.name for one in swept)
         yield Finding(what, names, "run analyse with these values: it says where in the cycle, and why")
@@ -111,14 +124,15 @@ def _dataset(
     labels: Mapping[str, Sequence[str]],
     arrays: Mapping[str, NDArray[Any]],
     findings: Sequence[Finding],
+    figures: Mapping[str, Figure],
 ) -> xr.Dataset:
     import xarray as xr
 
     mechanism, run, swept = points.mechanism, points.run, points.swept
     names = tuple(one.name for one in swept)
     variables = {
-        name: xr.Variable((*FIGURES[name].dims, *names), array,
-                          {"units": FIGURES[name].units, "long_name": FIGURES[name].long_name})
+        name: xr.Variable((*figures[name].dims, *names), array,
+                          {"units": figures[name].units, "long_name": figures[name].long_name})
         for name, array in arrays.items()
     }  # fmt: skip
     if "transmission_error_max" in variables:

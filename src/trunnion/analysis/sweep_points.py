@@ -27,8 +27,11 @@ from trunnion.analysis.friction import FrictionMethod
 from trunnion.analysis.hints import distance, hints, named_way
 from trunnion.analysis.kinematics import pose_of, start
 from trunnion.analysis.kinetostatics import Backward
+from trunnion.analysis.means import AVERAGED, Means, means_of, still
 from trunnion.analysis.sweep_figures import Reduced, reduced
 from trunnion.analysis.sweep_grid import Swept, named
+from trunnion.analysis.sweep_measures import of_point
+from trunnion.analysis.switches import Mechanisms
 from trunnion.analysis.system import Cycle, law_of, rubbing
 from trunnion.errors import Finding, MechanismError, Severity, Status
 from trunnion.model.check_values import check_values
@@ -42,10 +45,7 @@ FEWEST = 24  # positions on which a change point between them shows
 PROBES = 24  # values of a name at which a mechanism of its own is looked at
 PROBES_FOLLOWED = 5  # the same with groups that are followed, which takes long
 SAME = 1e-6  # of a figure: what two ways to the same assembly may differ by
-WANTED = (
-    *("drive_effort", "drive_power", "useful_power", "friction_power", "reaction_force", "locking_margin"),
-    *("joint_rotation_error", "joint_slide_error"),
-)
+WANTED = ("drive_effort", "reaction_force", "locking_margin", "joint_rotation_error", "joint_slide_error")
 Array = NDArray[np.float64]
 Index = tuple[int, ...]
 
@@ -112,11 +112,16 @@ class Points:
         run = run or (self._prepared(index) if any(index) else self.run)
         with named(self.swept, index):
             found = positions(run, self.steps, self.method, margin=self.margin)
-        return self._reduced(found.arrays, found.ideal, run.cycle)
+        return self._reduced(found.arrays, found.means, found.ideal)
 
-    def _reduced(self, arrays: Mapping[str, Array], ideal: Mapping[str, Array], cycle: Cycle) -> Reduced:
+    def measured(self, index: Index, names: Sequence[str]) -> dict[str, float]:
+        """Figures of measures at a point."""
+        with named(self.swept, index):
+            return of_point(self._prepared(index) if any(index) else self.run, names, self.steps, self.method)
+
+    def _reduced(self, arrays: Mapping[str, Array], means: Means, ideal: Means | None) -> Reduced:
         wanted = arrays if self.margin else {key: one for key, one in arrays.items() if key != "locking_margin"}
-        return reduced(wanted, ideal, cycle, self.run.system)
+        return reduced(wanted, means, ideal, self.run.system)
 
     # ---- in one pass ------------------------------------------------------------------------------------------
 
@@ -198,12 +203,33 @@ class Points:
             ours &= ~_may_change(back, shape, run.cycle.periodic)
             if self._followed:
                 ours &= np.all(arrays["status"] != Status.NOT_ASSEMBLED, axis=1)
+            means = self._means(values, cycles, ours & _answered(arrays))
+            likes = self._means(ideal_values, cycles, ours & errs & _answered(ideal)) if errs.any() else {}
         found: list[Reduced | None] = []
-        for i, cycle in enumerate(cycles):
+        for i in range(len(points)):
             own = {name: array[..., i, :] for name, array in arrays.items()}
-            like = {name: array[..., i, :] for name, array in ideal.items()} if errs[i] else {}
-            found.append(self._reduced(own, like, cycle) if ours[i] else None)
+            like = (likes.get(i) or still(own)) if errs[i] else None
+            found.append(self._reduced(own, means.get(i) or still(own), like) if ours[i] else None)
         return found
+
+    def _means(
+        self, values: Mapping[str, Number], cycles: Sequence[Cycle], wanted: NDArray[np.bool_]
+    ) -> dict[int, Means]:
+        """Means over the cycles of those mechanisms of a batch that are wanted, by their number."""
+        rows, run = np.flatnonzero(wanted), self.run
+        if not len(rows):
+            return {}
+        everyone = Mechanisms(run.system, run.chosen.assembly, values, cycles)
+        of = Mechanisms(run.system, run.chosen.assembly, everyone.picked(rows), [cycles[int(row)] for row in rows])
+
+        def powers(lanes: NDArray[np.intp], time: Array) -> dict[str, Array]:
+            with np.errstate(all="ignore"):
+                back = run.solve(of.lanes(time), of.picked(lanes), self.method)
+                shape = (1, time.size) if len(rows) == 1 else time.shape
+                arrays, _ = filled(back, None, of.lanes(time), shape, AVERAGED)
+            return {name: arrays[name].reshape(*arrays[name].shape[:-2], *time.shape) for name in AVERAGED}
+
+        return dict(zip(rows.tolist(), means_of(of, powers), strict=True))
 
     def _check(self, points: Sequence[Index], values: Mapping[str, Number]) -> None:
         """MechanismError where the numbers of a point are none that a mechanism can have."""
@@ -226,6 +252,11 @@ class Points:
             with named(self.swept, index):
                 found.append(self.run.system.cycle({path: _nth(value, k) for path, value in drive.items()}))
         return found
+
+
+def _answered(arrays: Mapping[str, Array]) -> NDArray[np.bool_]:
+    """Which mechanisms of a batch have an answer at every position."""
+    return np.asarray(np.all(arrays["status"] < Status.NOT_CONVERGED, axis=1))
 
 
 def _agree(found: Reduced, other: Reduced) -> bool:

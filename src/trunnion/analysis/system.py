@@ -27,7 +27,6 @@ from trunnion.structure.decompose import Module, Plan
 
 __all__ = ["Cycle", "Dial", "Place", "Positions", "System", "Values"]
 
-FEWEST = 64  # positions from which half of them tell how good a mean is
 COMMON_TURNS = 60  # of the slowest driver, within which the others must come back too
 Values = Mapping[str, Number]  # every number of a mechanism by its path, SI
 
@@ -99,12 +98,6 @@ class Cycle:
             return float(np.mean(values))
         return float(np.trapezoid(values) / (len(values) - 1))
 
-    def net(self, values: NDArray[np.float64]) -> float:
-        """The mean, 0 where it is no more than rounding or what half the samples would miss: work that cancels."""
-        value, size = self.mean(values), self.mean(np.abs(values))
-        halved = self.mean(values[::2]) if len(values) >= FEWEST else value
-        return 0.0 if abs(value) <= max(1e-9 * size, 4 * abs(value - halved)) else value
-
 
 @dataclass(frozen=True)
 class System:
@@ -140,9 +133,9 @@ class System:
         """Where the joints stand in the file."""
         return {name: place for place, name in enumerate(self.joints)}
 
-    def senses(self, joint: str) -> list[float | tuple[float, ...]]:
-        """Ways in which a joint at rest may be about to slip, for `kinetostatics.Given`."""
-        return [-1.0, 1.0]
+    def resting(self, joint: str) -> int:
+        """How many contacts of a joint rest or slip each by itself, for `kinetostatics.Given`."""
+        return 1
 
     def turns(self, joint: str) -> bool:
         """Whether a joint's coordinate, as drivers and loads see it, is an angle."""
@@ -251,6 +244,10 @@ class System:
     def span(self, values: Values, name: str) -> Span:
         """One cycle of a driver."""
         return self.mechanism.drivers[name].motion.span(self._motion(values, name))
+
+    def knots(self, values: Values, name: str) -> list[Number]:
+        """Times, s, within one cycle of a driver at which a derivative of its coordinate jumps."""
+        return self.mechanism.drivers[name].motion.knots(self._motion(values, name))
 
     def _motion(self, values: Values, name: str) -> dict[str, Number]:
         """What the motion law of a driver is given."""

@@ -28,7 +28,7 @@ from trunnion.analysis.system import Cycle
 if TYPE_CHECKING:
     from trunnion.analysis.analyse import Run
 
-__all__ = ["Lanes", "lanes", "part_of", "travel"]
+__all__ = ["Lanes", "around", "lanes", "part_of", "travel"]
 
 BEND = 0.005  # rad: change of the angle that a seat turns from one lane to the next; more is no even turning
 QUICK = 0.1  # rad from one lane to the next, likewise
@@ -59,10 +59,17 @@ def lanes(time: NDArray[np.float64], cycle: Cycle) -> Lanes:
     count, near = len(time), cycle.duration / FINE
     apart = (time[-1] - time[0]) / (count - 1) if count > 1 else 0.0
     step = max(1, round(near / apart)) if apart > 0 else 0
-    if 0 < apart <= 1.5 * near and count > step:
-        around = apart * np.arange(1, 2 * step + 1)
-        times = np.concatenate([time[0] - around[::-1], time, time[-1] + around])
+    even = bool(np.all(np.abs(np.diff(time) - apart) <= 1e-6 * apart))
+    if even and 0 < apart <= 1.5 * near and count > step:
+        beyond = apart * np.arange(1, 2 * step + 1)
+        times = np.concatenate([time[0] - beyond[::-1], time, time[-1] + beyond])
         return Lanes(_within(times, cycle), 2 * step + np.arange(count), step)
+    return around(time, cycle)
+
+
+def around(time: NDArray[np.float64], cycle: Cycle) -> Lanes:
+    """Any times, in any order, with neighbours of their own."""
+    count, near = len(time), cycle.duration / FINE
     times = np.concatenate([time + k * near for k in (-2, -1, 0, 1, 2)])
     return Lanes(_within(times, cycle), 2 * count + np.arange(count), count)
 

@@ -67,7 +67,8 @@ class MotionLaw:
     """A motion law with what it is stated by and where it comes from.
 
     function: `(time, parameters) -> Drive`; span: its cycle; needs: keys that must be given; takes: keys that may
-    be; profile: of a rise, with the largest s′ and |s″| as published.
+    be; profile: of a rise, with the largest s′ and |s″| as published; knots: times, s, within one cycle, at which a
+    derivative of the coordinate jumps.
     """
 
     function: Callable[[Number, Parameters], Drive]
@@ -79,6 +80,7 @@ class MotionLaw:
     profile: Profile | None = None
     peak_rate: float = 0.0
     peak_second: float = 0.0
+    knots: Callable[[Parameters], list[Number]] = lambda parameters: []
 
 
 # ---- steady laws ----------------------------------------------------------------------------------------------
@@ -199,6 +201,16 @@ def _profile(profile: Profile, peak_rate: float, peak_second: float, source: str
         one_way = bool(np.all(dwell == 0) and np.all(delay == 0))
         return Span(delay + duration + dwell, False, True, one_way, peak, travel)
 
+    def knots(parameters: Parameters) -> list[Number]:
+        """Ends of the rise and of the return, and where the profile goes from one function to the next."""
+        duration, start = parameters["duration"], parameters["delay"]
+        inner = (0.0, 0.125, 0.875, 1.0) if profile is modified_sine else (0.0, 1.0)
+        found = [start + part * duration for part in inner]
+        if parameters["returns"]:
+            start, back = start + duration + parameters["dwell"], _return_duration(parameters)
+            found += [start + part * back for part in inner]
+        return found
+
     return MotionLaw(
         _between(profile),
         span,
@@ -209,6 +221,7 @@ def _profile(profile: Profile, peak_rate: float, peak_second: float, source: str
         profile=profile,
         peak_rate=peak_rate,
         peak_second=peak_second,
+        knots=knots,
     )
 
 
@@ -313,5 +326,6 @@ MOTION_LAWS: dict[str, MotionLaw] = {
         takes=("periodic", "ends", "delay"),
         source="cubic spline: C. de Boor, A Practical Guide to Splines, Springer 1978, chapter IV",
         validity="the curve may swing between points far apart: state enough of them",
+        knots=lambda parameters: [knot + parameters["delay"] for knot in _curve(parameters).knots],
     ),
 }

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.errors import Finding, Severity
+from trunnion.errors import Finding, Severity, counted
 
 __all__ = ["Account", "counted", "places", "runs", "times", "told"]
 
@@ -55,11 +55,6 @@ def told(accounts: Sequence[Account]) -> list[str]:
         most = ", ".join(names[:FILES]) + (f" and {len(names) - FILES} more" if len(names) > FILES else "")
         found.append(text if len(said) == len(accounts) else f"{most}: {text}")
     return found
-
-
-def counted(count: int, noun: str, plural: str = "") -> str:
-    """A number with its noun."""
-    return f"{count:,} {noun if count == 1 else plural or noun + 's'}"
 
 
 def runs(mask: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

@@ -21,7 +21,18 @@ from trunnion.model.names import nearest
 from trunnion.model.part import problem
 from trunnion.model.units import UnitError, root, si_unit, unit
 
-__all__ = ["Amount", "Dimensions", "Frequency", "Number", "UnitText", "alike", "dimensions", "read_amount", "unit_name"]
+__all__ = [
+    "HERTZ",
+    "Amount",
+    "Dimensions",
+    "Frequency",
+    "Number",
+    "UnitText",
+    "alike",
+    "dimensions",
+    "read_amount",
+    "unit_name",
+]
 
 Dimensions = Mapping[str, Fraction]
 
@@ -75,10 +86,9 @@ def dimensions(text: str) -> tuple[float, Dimensions]:
         factor, exponents, names = root(normalise(text))
     except UnitError as error:
         near = nearest(text, _USUAL)
-        remedy = near if near.startswith("did you mean") else "write a unit such as mV, N m, rpm or deg"
-        raise UnitError(error.what, remedy) from None
-    unknown = set(exponents) - set(_SYMBOLS)
-    if unknown or any(name.endswith("bel") for name in names):
+        near = near if near.startswith("did you mean") else "write a unit such as mV, N m, rpm or deg"
+        raise UnitError(error.what, error.remedy or near) from None
+    if set(exponents) - set(_SYMBOLS):
         raise UnitError(f"the unit '{text}' is none of a sensor", "use units of mechanics, volts, ampere or kelvin")
     pulses = any(name.endswith("hertz") for name in names) and exponents and exponents.keys() <= _COUNTED
     if not {"ampere", "kelvin"} & exponents.keys() and exponents != HERTZ and not pulses:

@@ -15,6 +15,7 @@ from trunnion.measured.pulses import by_index, index_times, pulses_of
 from trunnion.measured.smoothing import seen_edges, smoothed, unresolved
 from trunnion.measured.tables import Table
 from trunnion.measured.timebase import Timeline
+from trunnion.model.units import UnitError
 
 __all__ = ["Coordinate", "coordinate"]
 
@@ -68,7 +69,12 @@ def _of_column(source: AngleSource, table: Table, line: Timeline, account: Accou
     unit = source.unit or column.unit
     if not unit:
         account.note("angle", f"the column '{source.column}' has no unit and is taken for rad", "state angle.unit")
-    factor, found = dimensions(unit or "rad")
+    try:
+        factor, found = dimensions(unit or "rad")
+    except UnitError as error:
+        what, remedy = f"the column '{source.column}': {error.what}", "state angle.unit in the mapping, such as deg"
+        remedy = f"{remedy}; in the file, {error.remedy}"
+        raise MechanismError(Finding(what, "angle", remedy, file=account.file)) from None
     if not alike(found, dimensions("rad")[1]):
         what = f"the column '{source.column}' has the unit '{unit}', which is no angle"
         raise MechanismError(Finding(what, "angle", "name another column", file=account.file))

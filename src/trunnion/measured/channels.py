@@ -11,7 +11,7 @@ from scipy.signal import butter, sosfiltfilt
 
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.measured.account import Account, counted, runs
-from trunnion.measured.amounts import Amount, alike, dimensions
+from trunnion.measured.amounts import HERTZ, Amount, alike, dimensions
 from trunnion.measured.mapping import Channel, Filter, Zero
 from trunnion.measured.scale import Scale, default_unit, scale
 from trunnion.measured.tables import Column
@@ -30,12 +30,15 @@ BRIDGED = 0.1  # of the period of the cut-off: gaps up to this are bridged for t
 
 @dataclass(frozen=True)
 class Zeroed:
-    """Zero of a channel, in readings. uncertainty: of it, in readings; drift: readings a second, from `since`."""
+    """Zero of a channel, in readings. uncertainty: of it, in readings; drift: readings a second, from `since`.
+
+    since: when the zero was that, s; NaN where it is a value that was stated.
+    """
 
     value: float
     uncertainty: float = 0.0
     drift: float = 0.0
-    since: float = 0.0
+    since: float = float("nan")
 
 
 @dataclass(frozen=True)
@@ -77,7 +80,10 @@ def reading(name: str, channel: Channel, column: Column, account: Account) -> Re
         return Reading(found, unit, limit, abs(found.factor) * found.reading(channel.accuracy.zero, "accuracy.zero"),
                        float(channel.accuracy.gain.evaluate()))  # fmt: skip
     except UnitError as error:
-        raise MechanismError(Finding(error.what, where, error.remedy, file=account.file)) from None
+        remedy = error.remedy
+        if not channel.unit and column.unit:  # a file of a logger is not written anew
+            remedy = f"state {where}.unit in the mapping; in the file, {remedy}"
+        raise MechanismError(Finding(error.what, where, remedy, file=account.file)) from None
 
 
 def _compare(where: str, channel: Channel, column: Column, account: Account) -> None:
@@ -88,6 +94,8 @@ def _compare(where: str, channel: Channel, column: Column, account: Account) -> 
         own = dimensions(column.unit)
     except UnitError:
         return
+    if own[1] == HERTZ and stated[1] == dimensions("rad/s")[1] and np.isclose(stated[0] / own[0], (1, 2 * np.pi)).any():
+        return  # 1/min where the mapping says rpm, as it has to
     if not alike(own[1], stated[1]) or own[0] != stated[0]:
         what = f"the file has the unit '{column.unit}' for '{channel.column}', the mapping '{channel.unit}'"
         account.warn(where, f"{what}, which is taken", f"correct {where}.unit, or remove it")
@@ -110,7 +118,7 @@ def zeroed(
     error = float(1 / np.sqrt(weights.sum())) if np.all(errors > 0) else 0.0
     if means.size < 2 or np.ptp(middles) == 0:
         account.say(f"zero of {name}: mean over the unloaded stretch, ± {{}} {unit}", abs(raw.factor) * error)
-        return Zeroed(mean, error)
+        return Zeroed(mean, error, since=float(np.average(middles, weights=weights)))
     slope = float(np.polyfit(middles, means, 1)[0])
     span = float(np.ptp(middles))
     change = slope * span
@@ -123,18 +131,18 @@ def zeroed(
     if drifts:
         account.warn(where.removesuffix(".zero"), told, "let the sensor warm up, or state drift: remove")
     account.say(f"zero of {name}: mean over {means.size} unloaded stretches, ± {{}} {unit}", abs(raw.factor) * error)
-    return Zeroed(mean, error)
+    return Zeroed(mean, error, since=float(np.average(middles, weights=weights)))
 
 
 def _stretches(where: str, zero: Zero, readings: Array, line: Timeline, account: Account) -> tuple[Array, Array, Array]:
-    """Middle, mean and standard uncertainty of the mean of every unloaded stretch that has values."""
+    """Middle of the readings, their mean and its standard uncertainty, of every unloaded stretch that has values."""
     rows = []
     for begin, end in zero.over:
         low, high = np.searchsorted(line.seconds, (begin.value, end.value))
-        part = readings[low:high]
-        part = part[np.isfinite(part)]
-        if part.size:
-            rows.append((0.5 * (begin.value + end.value), float(np.mean(part)), mean_uncertainty(part)))
+        known = np.isfinite(readings[low:high])
+        part, when = readings[low:high][known], line.seconds[low:high][known]
+        if part.size:  # a stretch may be stated longer than the file has it
+            rows.append((float(np.mean(when)), float(np.mean(part)), mean_uncertainty(part)))
         else:
             what = (
                 f"there are no readings from {begin.value:g} to {end.value:g} s; the file runs from {line.seconds[0]:g}"

@@ -25,7 +25,10 @@ SHARE = 0.002  # of the largest value over the turn, that a drift amounts to
 
 @dataclass(frozen=True)
 class Drift:
-    """A zero that creeps: slope and its standard error, SI a second, and what it amounts to over the turns."""
+    """A zero that creeps: slope and its standard error, SI a second, and what it amounts to over the turns.
+
+    span: from the middle of the first turn to that of the last, over which the change is.
+    """
 
     slope: float
     error: float
@@ -38,7 +41,7 @@ def drift(parts: Sequence[tuple[Turns, Array]]) -> Drift | None:
     """The slope that the means of turns have in common in all conditions of a file, where it is plain; else None."""
     times: list[Array] = []
     means: list[Array] = []
-    largest, within = 0.0, 0
+    largest, within, ends = 0.0, 0, []
     for turns, course in parts:
         mean = turn_means(course)
         middle = 0.5 * (turns.begin + turns.end)
@@ -46,6 +49,7 @@ def drift(parts: Sequence[tuple[Turns, Array]]) -> Drift | None:
         if np.count_nonzero(finite) < 3:
             continue
         within += 1
+        ends += [float(middle[finite].min()), float(middle[finite].max())]
         times.append(middle[finite] - middle[finite].mean())
         means.append(mean[finite] - mean[finite].mean())
         largest = max(largest, float(np.nanmax(np.abs(course))))
@@ -59,10 +63,8 @@ def drift(parts: Sequence[tuple[Turns, Array]]) -> Drift | None:
     slope = float(np.sum(t * y)) / square
     scatter = float(np.sqrt(np.sum((y - slope * t) ** 2) / free))
     error = scatter / np.sqrt(square)
-    span = float(max(turns.end[-1] for turns, _ in parts if turns.end.size)) - float(
-        min(turns.begin[0] for turns, _ in parts if turns.begin.size)
-    )
-    change = slope * float(np.ptp(t)) if within == 1 else slope * span
+    span = max(ends) - min(ends)
+    change = slope * span
     if change == 0 or abs(slope) < CERTAIN * error or abs(change) < PLAIN * scatter or abs(change) < SHARE * largest:
         return None
     return Drift(slope, error, change, scatter, span)

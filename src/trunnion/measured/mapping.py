@@ -19,10 +19,23 @@ from trunnion.model.file import Lines, place, read_entries
 from trunnion.model.findings import schema_findings
 from trunnion.model.names import nearest
 from trunnion.model.part import Name, Part, forms, problem
-from trunnion.model.quantity import Angle, AnyQuantity, Dimensionless, Quantity, Rate
+from trunnion.model.quantity import Angle, AnyQuantity, Dimensionless, Quantity, Rate, Time
 from trunnion.model.units import ANGLE, KINDS, UnitError
 
-__all__ = ["AngleSource", "Channel", "DataMapping", "File", "FromData", "Mapped", "TimeBase", "Zero", "read_mapping"]
+__all__ = [
+    "AngleSource",
+    "Channel",
+    "DataMapping",
+    "File",
+    "FixedAngle",
+    "FixedNumber",
+    "FixedTime",
+    "FromData",
+    "Mapped",
+    "TimeBase",
+    "Zero",
+    "read_mapping",
+]
 
 Sign = Literal[1, -1]
 NOUN = "a mapping file"
@@ -45,7 +58,7 @@ class FromData(Part):
         return self
 
 
-def _fixed(quantity: Quantity) -> Quantity:
+def fixed(quantity: Quantity) -> Quantity:
     """A number with its unit; there are no dimensions here that an expression could speak of."""
     if quantity.names:
         what = f"'{quantity.source}' speaks of {', '.join(quantity.names)}"
@@ -55,10 +68,11 @@ def _fixed(quantity: Quantity) -> Quantity:
     return quantity
 
 
-FixedAngle = Annotated[Angle, AfterValidator(_fixed)]
-FixedNumber = Annotated[Dimensionless, AfterValidator(_fixed)]
-FixedRate = Annotated[Rate, AfterValidator(_fixed)]
-FixedQuantity = Annotated[AnyQuantity, AfterValidator(_fixed)]
+FixedAngle = Annotated[Angle, AfterValidator(fixed)]
+FixedNumber = Annotated[Dimensionless, AfterValidator(fixed)]
+FixedRate = Annotated[Rate, AfterValidator(fixed)]
+FixedTime = Annotated[Time, AfterValidator(fixed)]
+FixedQuantity = Annotated[AnyQuantity, AfterValidator(fixed)]
 Setting = Annotated[
     Annotated[FromData, Tag(":group")] | Annotated[FixedQuantity, Tag(":value")],
     forms("a number with its unit, {mean: channel} or {column: name, unit: deg}"),

@@ -44,7 +44,8 @@ def read_measured(
     findings: list[Finding] = []
     accounts: list[Account] = []
     failed = False
-    for path, entry in _files(mapped, files):
+    entries, notes = _files(mapped, files)
+    for path, entry in entries:
         account = Account(str(path))
         try:
             with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # of numbers near the end of the floats
@@ -54,7 +55,7 @@ def read_measured(
             failed = True
         findings += account.findings
         accounts.append(account)
-    findings = mapped.placed(findings)
+    findings = mapped.placed([*findings, *notes])
     if failed or not conditions:
         raise MechanismError([one for one in findings if one.severity is not Severity.NOTE])
     name = mapped.mapping.name or Path(mapped.file).stem
@@ -84,17 +85,57 @@ def _averaged(conditions: Sequence[Condition], recorded: float) -> str:
     return f"{each} whole turns{where}; rows before, between and after them are not used"
 
 
-def _files(mapped: Mapped, files: Iterable[str | os.PathLike[str]] | None) -> list[tuple[Path, File]]:
-    """Data files with what the mapping says of them; files of the command line keep the entry of the same file."""
-    stated = {(mapped.folder / entry.file).resolve(): entry for entry in mapped.mapping.files}
-    if files is not None and (named := [Path(one) for one in files]):
-        return [(path, stated.get(path.resolve()) or File(file=path.name or ".")) for path in named]
-    if not mapped.mapping.files:
+def _files(
+    mapped: Mapped, files: Iterable[str | os.PathLike[str]] | None
+) -> tuple[list[tuple[Path, File]], list[Finding]]:
+    """Data files with what the mapping says of them; notes of what is kept of it, or lost, where it names other files.
+
+    Files of the command line keep the entry of the same file; what was set also that of the same name, where one entry
+    alone has it. A stretch of time is that of one recording.
+    """
+    entries = mapped.mapping.files
+    named = [Path(one) for one in files or ()]
+    if not named and not entries:
         finding = Finding(
             "no data file is named", "files", "write files: [{file: run-01.csv}], or name them after the mapping"
         )
         raise MechanismError(mapped.placed([finding]))
-    return [(mapped.folder / entry.file, entry) for entry in mapped.mapping.files]
+    if not named:
+        return [(mapped.folder / entry.file, entry) for entry in entries], []
+    stated = {(mapped.folder / one.file).resolve(): one for one in entries}
+    own, other = [one.name for one in named], [Path(one.file).name for one in entries]
+    found: list[tuple[Path, File]] = []
+    kept: list[Path] = []
+    lost: dict[str, list[Path]] = {}
+    for path in named:
+        entry = stated.get(path.resolve())
+        if entry is None:
+            alike = own.count(path.name) == 1 == other.count(path.name)
+            like = entries[other.index(path.name)] if alike else None
+            entry = File(file=path.name or ".", set=like.set if like else {})
+            kept += [path] if entry.set else []
+            missing = _says(*([like.model_copy(update={"set": {}})] if like else entries))
+            lost.setdefault(missing, []).append(path)
+        found.append((path, entry))
+    notes = []
+    if kept:
+        what = f"{_some(kept)} read with the `set` of the file of that name in the mapping"
+        notes.append(Finding(what, "files", "rename the file if something else was set", Severity.NOTE))
+    for missing, paths in lost.items():
+        what = f"{_some(paths)} read without {missing}, which the mapping states for other files"
+        remedy = f"add {{file: {paths[0].name}, {missing.split('`')[1]}: …}} to `files`" if missing else ""
+        notes += [Finding(what, "files", remedy, Severity.NOTE)] if missing else []
+    return found, notes
+
+
+def _says(*entries: File) -> str:
+    """What entries state of their files."""
+    return " and ".join(f"`{key}`" for key in ("set", "over") if any(getattr(one, key) for one in entries))
+
+
+def _some(paths: Sequence[Path]) -> str:
+    told = ", ".join(str(one) for one in paths[:4]) + (f" and {len(paths) - 4} more" if len(paths) > 4 else "")
+    return f"{told} {'is' if len(paths) == 1 else 'are'}"
 
 
 def _distinct(conditions: Sequence[Condition]) -> list[Condition]:
@@ -297,18 +338,11 @@ class _File:
         if mapping.drift == "report":
             account.warn(where, what, f"{remedy}, or state drift: remove")
             return None
-        since = self._since(name)
+        since = float(line.seconds[0]) if np.isnan(zero.since) else zero.since
         account.warn(where, f"{what}; a straight line is taken off, zero at {since:.4g} s", remedy)
         for part in parts:
             part.courses[name] = resampled(part.turns, values - found.slope * (line.seconds - since))
         return found
-
-    def _since(self, name: str) -> float:
-        """When a zero was right: in its unloaded stretch, else at the start of the recording."""
-        zero = self.mapping.channels[name].zero
-        if isinstance(zero, Zero):
-            return float(np.mean([one.value for span in zero.over for one in span]))
-        return float(self.line.seconds[0])
 
     def _rate(self, turns: Sequence[Turns]) -> float:
         cycle = float(self.mapping.cycle.evaluate())
@@ -322,7 +356,7 @@ class _File:
         for name, channel in self.mapping.channels.items():
             own = self.own[name]
             left = drifts[name]
-            extra = left.error * left.span / 2 if left else 0.0
+            extra = left.error * left.span / 2 if left else 0.0  # of the line that was taken off, at either end
             of_file = float(np.hypot(abs(own.scale.factor) * zeros[name].uncertainty, extra))
             zero = float(np.hypot(own.accuracy_zero, of_file))
             accuracy = Accuracy(zero, own.accuracy_gain, self.steps[name], of_file)

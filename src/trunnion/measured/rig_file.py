@@ -16,12 +16,12 @@ from pydantic import Field, Tag, ValidationError
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.measured.amounts import Amount, Frequency, Number
+from trunnion.measured.mapping import FixedAngle, FixedNumber, FixedTime
 from trunnion.model.expression import LITERAL, normalise
 from trunnion.model.file import place, read_entries
 from trunnion.model.findings import schema_findings
 from trunnion.model.names import nearest
 from trunnion.model.part import Name, Part, forms
-from trunnion.model.quantity import Angle, Dimensionless, Time
 
 __all__ = ["FAULTS", "FORMATS", "Accuracy", "Encoder", "Fault", "Idle", "Rig", "Schedule", "Sensor", "placed_in_rig"]
 
@@ -36,8 +36,8 @@ Count = Annotated[int, Field(ge=1, le=1_000_000)]
 class Idle(Part):
     """How long the machine stands unloaded before it runs, and after: there sensors of forces read their zero."""
 
-    before: Time = Field(default="0 s", validate_default=True)
-    after: Time = Field(default="0 s", validate_default=True)
+    before: FixedTime = Field(default="0 s", validate_default=True)
+    after: FixedTime = Field(default="0 s", validate_default=True)
 
 
 class Schedule(Part):
@@ -47,7 +47,7 @@ class Schedule(Part):
     conditions: tuple[Mapping[str, Value], ...] = ()
     turns: Count = 10
     idle: Annotated[
-        Annotated[Time, Tag(":value")] | Annotated[Idle, Tag(":group")],
+        Annotated[FixedTime, Tag(":value")] | Annotated[Idle, Tag(":group")],
         forms("a time, or a group {before: 0.5 s, after: 0.5 s}"),
     ] = Field(default="0 s", validate_default=True)
 
@@ -74,7 +74,7 @@ class Encoder(Part):
     per_turn: Annotated[int, Field(ge=1, le=10_000_000)]
     kind: Literal["count", "level"] = "count"
     column: Name = "encoder"
-    zero: Angle = Field(default="0 deg", validate_default=True)
+    zero: FixedAngle = Field(default="0 deg", validate_default=True)
     index: Name | None = None
 
 
@@ -84,7 +84,7 @@ class Accuracy(Part):
     gain: relative; zero: of the running sensor, beyond what it reads at rest.
     """
 
-    gain: Dimensionless = Field(default=0, validate_default=True)
+    gain: FixedNumber = Field(default=0, validate_default=True)
     zero: Number = Field(default=0, validate_default=True)
 
 
@@ -122,10 +122,10 @@ class Fault(Part):
     kind: Literal["dropouts", "gap", "wrong-sign", "drift", "spikes", "stuck", "lost-pulses"]
     sensor: str | tuple[str, ...] = ()
     conditions: tuple[Count, ...] = ()
-    share: Dimensionless | None = None
+    share: FixedNumber | None = None
     length: Count = 1
-    start: Time | None = Field(default=None, alias="from")
-    end: Time | None = Field(default=None, alias="to")
+    start: FixedTime | None = Field(default=None, alias="from")
+    end: FixedTime | None = Field(default=None, alias="to")
     by: Number | None = None
 
     @property

@@ -9,7 +9,7 @@ from typing import Annotated
 
 from pydantic import AfterValidator
 
-from trunnion.measured.amounts import Amount, Dimensions, alike, dimensions, unit_name
+from trunnion.measured.amounts import HERTZ, Amount, Dimensions, alike, dimensions, unit_name
 from trunnion.model.names import nearest
 from trunnion.model.part import problem
 from trunnion.model.units import UnitError
@@ -115,6 +115,9 @@ def scale(measures: str, unit: str, gain: Amount | None) -> Scale:
         if name:
             factor = raw * gain.value**power
             return Scale(factor, name, raw, of_reading, dimensions(name)[1])
+    if gain.plain and alike(of_reading, HERTZ) and kind == "rate":
+        what = f"readings in '{unit}' do not give {measures}, for they may count turns or radians"
+        raise UnitError(what, "write the unit as rpm or rad/s")
     needed = " or ".join(QUANTITIES.get(kind, ("a quantity of mechanics",)))
     told = "" if gain.plain else f" with the gain '{gain.source}'"
     remedy = f"state the gain, such as 100 mV/({needed.split(' or ')[0]})" if gain.plain else "check unit and gain"

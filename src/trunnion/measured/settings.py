@@ -9,7 +9,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.errors import Finding, MechanismError
+from trunnion.errors import Finding, MechanismError, agreeing, counted
 from trunnion.measured.account import Account
 from trunnion.measured.amounts import Dimensions, dimensions
 from trunnion.measured.mapping import DataMapping, File, FromData
@@ -75,7 +75,10 @@ def settings(mapping: DataMapping, entry: File, table: Table, line: Timeline, ac
         raise MechanismError(Finding(what, "set", "check set: {…: {column: …}}", file=account.file))
     if not known.all():
         lost = int(np.count_nonzero(~known))
-        account.warn("set", f"{lost:,} of {known.size:,} rows do not state the condition; left out", "check the column")
+        what = (
+            f"{lost:,} of {counted(known.size, 'row')} {agreeing(lost, 'does', 'do')} not state the condition; left out"
+        )
+        account.warn("set", what, "check the column")
     rounded = _rounded(raw)
     at = np.flatnonzero(known)
     unique, first, which = np.unique(rounded[known], axis=0, return_index=True, return_inverse=True)
@@ -107,7 +110,8 @@ def _factor(path: str, unit: str, known_as: dict[str, Dimension], account: Accou
         factor, exponents = dimensions(unit)
         known_as[path] = dimension_of(exponents, unit)
     except UnitError as error:
-        raise MechanismError(Finding(error.what, f"set.{path}", error.remedy, file=account.file)) from None
+        remedy = f"state the unit in the mapping: set: {{{path}: {{column: …, unit: …}}}}; in the file, {error.remedy}"
+        raise MechanismError(Finding(error.what, f"set.{path}", remedy, file=account.file)) from None
     return factor
 
 

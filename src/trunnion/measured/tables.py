@@ -15,10 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError
+from trunnion.measured.clock import Clock, is_time
 from trunnion.model.names import nearest
 from trunnion.output import reading
 
-__all__ = ["FORMATS", "Column", "Table", "choose", "failed", "number", "numbers", "read_table"]
+__all__ = ["FORMATS", "NOTHING", "Column", "Table", "choose", "clock_of", "failed", "number", "numbers", "read_table"]
 
 Array = NDArray[np.float64]
 SHOWN = 40  # columns named in a message
@@ -26,12 +27,16 @@ SHOWN = 40  # columns named in a message
 
 @dataclass(frozen=True)
 class Column:
-    """Numbers of one column. unit: as the file states it; texts: cells that are text, with the first of them."""
+    """Numbers of one column. unit: as the file states it; texts: cells that are text, with the first of them.
+
+    clock: times of day or time stamps, where the texts are such.
+    """
 
     values: Array
     unit: str = ""
     texts: int = 0
     example: str = ""
+    clock: Clock | None = None
 
 
 @dataclass(frozen=True)
@@ -110,7 +115,7 @@ def number(text: object) -> float:
         return np.nan
 
 
-_NOTHING = frozenset({"", "nan", "n/a", "na", "#n/a", "null", "none", "-nan", "inf", "-inf", "+inf", "infinity"})
+NOTHING = frozenset({"", "nan", "n/a", "na", "#n/a", "null", "none", "-nan", "inf", "-inf", "+inf", "infinity"})
 
 
 def numbers(cells: Any, decimal: str = ".") -> tuple[Array, int, str]:
@@ -130,9 +135,18 @@ def numbers(cells: Any, decimal: str = ".") -> tuple[Array, int, str]:
         if decimal != "." and isinstance(text, str):
             text = text.replace(decimal, ".")
         values[place] = number(text)
-        if np.isnan(values[place]) and isinstance(text, str) and text.casefold() not in _NOTHING:
-            texts, example = texts + 1, example or text[:20]
+        if np.isnan(values[place]) and isinstance(text, str) and text.casefold() not in NOTHING:
+            texts, example = texts + 1, example or str(cell).strip()[:40]
     return values, texts, example
+
+
+def clock_of(cells: Any, texts: int, example: str) -> Clock | None:
+    """The clock of a column whose first cell of text is a time; None if it is no such column."""
+    if not texts or not is_time(example):
+        return None
+    clock = Clock()
+    clock.add(np.asarray(cells).tolist())
+    return clock
 
 
 def _csv(path: Path, wanted: Sequence[str], optional: Sequence[str]) -> Table:

@@ -18,12 +18,16 @@ from typing import Any
 import numpy as np
 
 from trunnion.measured.amounts import dimensions
-from trunnion.measured.tables import Column, Table, choose, failed, number, numbers
+from trunnion.measured.clock import Clock, is_time
+from trunnion.measured.tables import NOTHING, Column, Table, choose, clock_of, failed, number, numbers
+from trunnion.model.names import unguarded
 from trunnion.model.units import UnitError
 
 __all__ = ["read_csv"]
 
-HEAD = 1 << 16  # bytes in which the header and the first rows are looked for
+HEAD = 1 << 16  # bytes in which the header and the first rows are looked for, and more where the lines are long
+LINES = 20  # that are read at least
+LONGEST = 1 << 24  # bytes in which the first lines have to end
 ROWS = 250_000  # read at a time, so that memory does not grow with the columns that are not wanted
 WIDE = 40  # columns from which those that are not wanted are passed over, and too many cells in a row not seen
 _UNIT = re.compile(r"^(.*?)\s*\[([^\[\]]*)\]\s*$", re.DOTALL)
@@ -31,6 +35,7 @@ _COMMA = re.compile(r"[-+]?\d*,\d+(?:[eE][-+]?\d+)?")
 _QUOTED = re.compile(r'"[^"]*"')
 _POINT = re.compile(r"[-+]?\d*\.\d+(?:[eE][-+]?\d+)?")
 _NO_UNIT = ("", "-", "–", "1")
+MOST_ABOVE = 3  # rows of units and remarks between names and numbers
 
 
 @dataclass(frozen=True)
@@ -53,19 +58,24 @@ def read_csv(path: Path, wanted: Sequence[str], optional: Sequence[str]) -> Tabl
     units = {name: layout.units[place] for name, place in places.items()}
     pieces: dict[str, list[Any]] = {name: [] for name in places}
     texts, examples = dict.fromkeys(places, 0), dict.fromkeys(places, "")
+    clocks: dict[str, Clock | None] = {}
     for frame in _frames(path, layout, sorted(set(places.values()))):
         for name, place in places.items():
             cells = frame[place].to_numpy()
             if layout.decimal == ",":
                 _check_signs(path, name, cells)
             values, found, example = numbers(cells, layout.decimal)
+            if name not in clocks:
+                clocks[name] = clock_of(cells, found, example)
+            elif (clock := clocks[name]) is not None:
+                clock.add(cells.tolist())
             pieces[name].append(values)
             texts[name] += found
             examples[name] = examples[name] or example
     columns = {}
     for name in places:
         values = np.concatenate(pieces.pop(name) or [np.empty(0)])
-        columns[name] = Column(values, units[name], texts[name], examples[name])
+        columns[name] = Column(values, units[name], texts[name], examples[name], clocks.get(name))
     notes = [] if layout.encoding.startswith("utf-8") else [f"{path.name}: read as {layout.encoding}"]
     return Table(str(path), columns, notes=notes)
 
@@ -112,6 +122,11 @@ def _decoded(path: Path) -> tuple[list[str], str]:
     """The first lines, whole ones but for the last of a long file, and how they are encoded."""
     with path.open("rb") as file:
         raw = file.read(HEAD)
+        while _ends(raw) < LINES and len(raw) < LONGEST and (more := file.read(len(raw))):
+            raw += more
+        if not _ends(raw) and file.read(1):
+            what = f"has no end of a line in its first {LONGEST >> 20} MiB"
+            raise failed(path, what, "check that it is CSV, with a row of the table in each line", 1)
     encodings = ["utf-16"] if raw.startswith((b"\xff\xfe", b"\xfe\xff")) else ["utf-8-sig", "cp1252", "latin-1"]
     if b"\0" in raw and encodings[0] != "utf-16":
         raise failed(path, "is not a text file", "check that it is CSV; use .tdms or .parquet for binary files")
@@ -123,6 +138,10 @@ def _decoded(path: Path) -> tuple[list[str], str]:
                 continue
             return io.StringIO(text, newline=None).read().split("\n"), encoding
     raise failed(path, "is not a text file", "save it as UTF-8")
+
+
+def _ends(raw: bytes) -> int:
+    return raw.count(b"\n") or raw.count(b"\r")
 
 
 def _layout(path: Path, wanted: set[str]) -> _Layout:
@@ -146,10 +165,10 @@ def _layout(path: Path, wanted: set[str]) -> _Layout:
         raise failed(path, f"has no header: its first line is {first}", remedy, stated[header][0] + 1)
     units = [unit for _, unit in named]
     rows = stated[header + 1 :]
-    skip = header
-    if rows and (row := _unit_row(_cells(rows[0][1], separator))):
-        units = [own or (row[k] if k < len(row) else "") for k, own in enumerate(units)]
-        rows, skip = rows[1:], header + 1
+    above = _above_numbers([_cells(line, separator) for _, line in rows[: MOST_ABOVE + 1]])
+    row = next((one for one in above if any(map(_is_unit, one))), above[0] if above else [])
+    units = [own or (row[k] if k < len(row) else "") for k, own in enumerate(units)]
+    rows, skip = rows[len(above) :], header + len(above)
     read = [k for k, (name, _) in enumerate(named) if name in wanted]
     sample = [cell for _, line in rows[:200] for k, cell in enumerate(_cells(line, separator)) if k in read]
     comma = separator != "," and any(_COMMA.fullmatch(cell) for cell in sample)
@@ -173,19 +192,37 @@ def _cells(line: str, separator: str) -> list[str]:
 
 def _named(cell: str) -> tuple[str, str]:
     """Name and unit of a header's cell."""
+    cell = unguarded(cell)
     found = _UNIT.match(cell)
     if not found:
         return cell, ""
     return found[1], "" if found[2].strip() in _NO_UNIT else found[2].strip()
 
 
-def _unit_row(cells: Sequence[str]) -> list[str]:
-    """The units of a row of units; nothing if it is a row of numbers."""
-    bare = [cell.strip().strip("[]()").strip() for cell in cells]
-    if any(not np.isnan(number(cell.replace(",", "."))) for cell in bare if cell not in ("1",)):
-        return []
-    found = ["" if cell in _NO_UNIT else cell for cell in bare]
-    return found if any(_is_unit(cell) for cell in found) else []
+def _above_numbers(rows: Sequence[Sequence[str]]) -> list[list[str]]:
+    """The rows of words between names and numbers, as units; a first row with a unit is one whatever follows.
+
+    What is no unit is one as well, if it stands where they do: that it is unknown is told of the column that has it.
+    """
+    found: list[list[str]] = []
+    for cells in rows[:MOST_ABOVE]:
+        bare = [cell.strip().strip("[]()").strip() for cell in cells]
+        if not _words(bare):
+            break
+        found.append(["" if cell in _NO_UNIT else cell for cell in bare])
+    sure = next((k + 1 for k, one in enumerate(found) if any(map(_is_unit, one))), 0)
+    return found if len(rows) > len(found) and any(map(_is_number, rows[len(found)])) else found[:sure]
+
+
+def _words(cells: Sequence[str]) -> bool:
+    """Whether there is no number and no time in a row, and at least one word."""
+    if any(_is_number(cell) for cell in cells if cell != "1"):
+        return False
+    return any(re.search(r"[^\W\d_]|[°%‰]", cell) and cell.casefold() not in NOTHING for cell in cells)
+
+
+def _is_number(cell: str) -> bool:
+    return not np.isnan(number(cell.replace(",", "."))) or is_time(cell)
 
 
 def _is_unit(text: str) -> bool:

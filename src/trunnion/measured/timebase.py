@@ -10,8 +10,10 @@ from numpy.typing import NDArray
 from trunnion.errors import Finding, MechanismError
 from trunnion.measured.account import Account, counted, times
 from trunnion.measured.amounts import dimensions
+from trunnion.measured.clock import Clock
 from trunnion.measured.mapping import TimeBase
 from trunnion.measured.tables import Column, Table
+from trunnion.model.units import UnitError
 
 __all__ = ["Timeline", "timeline"]
 
@@ -60,7 +62,24 @@ def timeline(table: Table, base: TimeBase | None, account: Account) -> Timeline:
         account.say(f"time is that of the waveforms: every {step:.6g} s")
         return Timeline(start + _counted(table.rows) * step, None, step, np.empty(0, dtype=np.intp))
     column = table.columns[str(base.column)]
+    if column.clock is not None and not np.isfinite(column.values).any():
+        return _stated(_by_clock(column.clock, account), account)
+    if column.texts == column.values.size:
+        what = f"the column '{base.column}' has texts, such as '{column.example}', where times are needed"
+        remedy = "write them in s, as 11:40:00.0002 or as 2026-11-22 11:40:00.0002, or state time: {rate: …}"
+        raise MechanismError(Finding(what, "time.column", remedy, file=account.file))
     return _stated(column.values * _factor(base, column, account), account)
+
+
+def _by_clock(clock: Clock, account: Account) -> Array:
+    """Seconds since the first of the time stamps of a column."""
+    try:
+        seconds = clock.seconds()
+    except ValueError as error:
+        remedy = "write them as 2026-11-22 11:40:00.0002, or state time: {rate: …}"
+        raise MechanismError(Finding(str(error), "time.column", remedy, file=account.file)) from None
+    account.say(f"time is counted in s from the first time stamp, {clock.first}")
+    return seconds
 
 
 def _counted(rows: int) -> Array:
@@ -74,7 +93,12 @@ def _factor(base: TimeBase, column: Column, account: Account) -> float:
     if not column.unit:
         account.note("time", f"the column '{base.column}' has no unit and is taken for seconds", "state time.unit")
         return 1.0
-    factor, found = dimensions(column.unit)
+    try:
+        factor, found = dimensions(column.unit)
+    except UnitError as error:
+        remedy = f"state time.unit in the mapping, such as s; in the file, {error.remedy}"
+        what = f"the column '{base.column}': {error.what}"
+        raise MechanismError(Finding(what, "time", remedy, file=account.file)) from None
     if found != dimensions("s")[1]:
         what = f"the column '{base.column}' has the unit '{column.unit}', which is no time"
         raise MechanismError(Finding(what, "time", "name another column", file=account.file))

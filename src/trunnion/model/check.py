@@ -18,14 +18,14 @@ from trunnion.joints.pairs import PAIRS
 from trunnion.model.check_costs import cost_names, cost_values
 from trunnion.model.check_errors import errors, joint_errors
 from trunnion.model.check_gears import gears
-from trunnion.model.check_loads import motion_dimensions, springs, tables, unknown_name
+from trunnion.model.check_loads import motion_dimensions, springs, tables, unknown_name, unread
 from trunnion.model.check_measures import check_measure, measure_values, point_exists
 from trunnion.model.check_space import contact, coordinates, driven, loop, pitch, resisted, space
 from trunnion.model.check_tolerances import stated_entries, tolerance_names, tolerance_values
 from trunnion.model.check_values import check_values
 from trunnion.model.contact import motions
 from trunnion.model.expression import MOTION, RESERVED
-from trunnion.model.names import nearest
+from trunnion.model.names import as_key, nearest
 from trunnion.model.parameter_names import ERRORS
 from trunnion.model.parameters import ParameterSet, dimension_errors, evaluation_order
 from trunnion.model.parts import Driver, Friction, Joint, Load, freedoms
@@ -211,13 +211,13 @@ def _ends(mechanism: Mechanism, name: str, joint: Joint) -> Iterator[Finding]:
         points = mechanism.links[link].points
         axis = "[1, 0]" if mechanism.space == "planar" else "[0, 0, 1]"
         if name not in points:
-            remedy = f"add {name}: {coordinates(mechanism)} to the points of '{link}'"
+            remedy = f"add {as_key(name)}: {coordinates(mechanism)} to the points of '{link}'"
             yield Finding(f"the link '{link}' has no point '{name}'", where, f"{remedy} ({nearest(name, points)})")
         elif mechanism.space in PAIRS[joint.type].needs_axis and points[name].axis is None:
             yield Finding(
                 f"the point '{name}' of the link '{link}' has no axis, a {joint.type} joint needs one",
                 f"links.{link}.points.{name}",
-                f"write {name}: {{at: {coordinates(mechanism)}, axis: {axis}}}",
+                f"write {as_key(name)}: {{at: {coordinates(mechanism)}, axis: {axis}}}",
             )
 
 
@@ -249,10 +249,14 @@ def _drivers(mechanism: Mechanism) -> Iterator[Finding]:
 
 def _motion(driver: Driver, where: str) -> Iterator[Finding]:
     """Whether a driver states what its law needs and nothing else."""
+    if driver.file is not None and driver.law == "table":
+        yield unread(driver.file, where)
+        return
     law, takes = driver.motion, (*driver.motion.needs, *driver.motion.takes)
     stray = [key for key in driver.model_fields_set if key != "law" and key not in takes]
     for key in sorted(stray):
-        others = [name for name, one in MOTION_LAWS.items() if key in (*one.needs, *one.takes)]
+        given = "points" if key == "file" else key
+        others = [name for name, one in MOTION_LAWS.items() if given in (*one.needs, *one.takes)]
         remedy = f"remove it, or state law: {' or '.join(others)}; {driver.law} takes {', '.join(takes)}"
         yield Finding(f"'{key}' means nothing to the motion law {driver.law}", f"{where}.{key}", remedy)
     for key in law.needs:
@@ -276,7 +280,7 @@ MOTION_EXAMPLES = {
     "period": "0.5 s",
     "range": "[0 deg, 90 deg]",
     "duration": "0.2 s",
-    "points": "[[0 s, 0 deg], [0.1 s, 20 deg]], or take them from a file by --table",
+    "points": "[[0 s, 0 deg], [0.1 s, 20 deg]], or file: motion.csv, or give a file by --table",
 }
 
 

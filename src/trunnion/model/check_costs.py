@@ -11,7 +11,7 @@ from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.joints.fits import standard_tolerance
 from trunnion.model.contact import has_play
 from trunnion.model.cost_parts import COST_MODELS, Cost
-from trunnion.model.names import nearest
+from trunnion.model.names import as_key, nearest
 from trunnion.model.parameters import ParameterSet, measured
 from trunnion.model.prices import FORMULA, Price, cost_paths, price
 from trunnion.model.tolerances import tolerated
@@ -101,7 +101,7 @@ def _unknown(mechanism: Mechanism, name: str, where: str, numbers: ParameterSet)
 
 
 def _untolerated(path: str, where: str) -> Finding:
-    remedy = f"state one as a start, tolerances: {{{path}: ±0.05 mm}}"
+    remedy = f"state one as a start, tolerances: {{{as_key(path)}: ±0.05 mm}}"
     parts = path.split(".")
     if parts[0] == "joints" and parts[-1] == "clearance":
         remedy += f"; the play itself is {parts[0]}.{parts[1]}.clearance"

@@ -11,8 +11,8 @@ from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.joints.clearance import ellipse_error
 from trunnion.joints.fits import FitLimits, fit
-from trunnion.model.contact import PLAY_PAIRS, has_guide, has_pin, has_play, play
-from trunnion.model.joint_parts import Joint, Pin, Seat
+from trunnion.model.contact import PLAY_PAIRS, clearance, has_guide, has_pin, has_play, play
+from trunnion.model.joint_parts import Friction, Joint, Pin, Seat
 from trunnion.model.merge import stated
 from trunnion.model.parameter_names import ERRORS, ParameterNames
 from trunnion.model.parameters import ParameterSet, nominal_dimensions
@@ -71,6 +71,7 @@ def joint_errors(mechanism: Mechanism) -> Iterator[Finding]:
             yield from _misalignment(own, f"{where}.misalignment", mechanism.space == "spatial")
         if has_pin(joint.type):
             yield from _pin(mechanism, name, own.pin, where)
+        yield from _unused(joint.type, own.pin, own.friction, where, mechanism.space == "spatial")
         if joint.seat not in (None, "free"):
             yield from _seat(mechanism, joint, where if own.seat is not None else "joint_defaults", where)
     yield from _defaults(mechanism)
@@ -159,9 +160,27 @@ def _empty_seat(seat: object, where: str) -> Iterator[Finding]:
         yield Finding("says nowhere to lie", f"{where}.seat", "write {xi: 30 deg}, or of a ball {direction: [0, 0, 1]}")
 
 
+def _unused(kind: str, pin: Pin | None, friction: Friction | None, where: str, spatial: bool) -> Iterator[Finding]:
+    """Sizes of a pin, and a model of friction, that change nothing in a joint of a kind; "" of all in the plane."""
+    if spatial and kind != "spherical":
+        return
+    body = "a ball" if spatial else "a pin in the plane"
+    for key in ("length", "bearing"):
+        if pin and getattr(pin, key) is not None:
+            what = f"{body} has no {key}: it is not used"
+            yield Finding(what, f"{where}.pin.{key}", "keep it as a remark, or remove it", Severity.NOTE)
+    if pin and pin.offset is not None and not spatial:
+        yield Finding("there is no axis in the plane to offset a bearing along", f"{where}.pin.offset", "remove it")
+    if friction and friction.model == "pezzuti":
+        what = f"the model pezzuti is of bearings that carry a moment, and {body} carries none"
+        yield Finding(what, f"{where}.friction.model", "remove it")
+
+
 def _defaults(mechanism: Mechanism) -> Iterator[Finding]:
     """Defaults that mean no joint."""
     pin, seat = mechanism.joint_defaults.pin, mechanism.joint_defaults.seat
+    if mechanism.space == "planar":
+        yield from _unused("", pin, mechanism.joint_defaults.friction, "joint_defaults", spatial=False)
     joints = mechanism.effective_joints.values()
     yield from _empty_seat(seat, "joint_defaults")
     if pin and pin.end_float is not None and mechanism.space == "planar":
@@ -207,6 +226,7 @@ def play_values(mechanism: Mechanism, name: str, numbers: ParameterSet) -> Itera
     stated_direction = isinstance(joint.seat, Seat) and joint.seat.direction is not None
     if stated_direction and all(values.get(f"{where}.seat.direction.{one}", np.nan) == 0 for one in "xyz"):
         yield Finding("has no direction: all its components are 0", f"{where}.seat.direction", "write [0, 0, 1]")
+    yield from _unmodelled(mechanism, name, values)
     if not has_play(joint):
         return
     yield from _play_sign(mechanism, name, joint, numbers)
@@ -214,6 +234,22 @@ def play_values(mechanism: Mechanism, name: str, numbers: ParameterSet) -> Itera
     if isinstance(found, FitLimits):
         yield from _press(joint, found, _fit_place(mechanism, name))
     yield from _play_size(mechanism, name, joint, values)
+
+
+def _unmodelled(mechanism: Mechanism, name: str, values: Mapping[str, Number]) -> Iterator[Finding]:
+    """A play of a pair whose play is not modelled, which would count for nothing."""
+    kind, pin = mechanism.effective_joints[name].type, f"joints.{name}.pin"
+    if kind in PLAY_PAIRS or not has_pin(kind):
+        return
+    own, further = clearance(name, values) or 0.0, values.get(f"{pin}.cylindricity", 0.0)
+    if not (np.abs(own) > 0 or np.abs(further) > 0):
+        return
+    size = f" of {_um(own)}" * bool(own > 0)
+    what = f"the play{size} of a {kind} joint is not modelled and would count for nothing"
+    radius = f"radius: {values[f'{pin}.radius'] * 1e3:.6g} mm, " if f"{pin}.radius" in values else ""
+    remedy = f"state pin: {{{radius}clearance: 0{', cylindricity: 0' * bool(further)}}} here"
+    two = ", or two revolute joints in its place, whose play is modelled"
+    yield Finding(what, pin, remedy + two * (kind == "universal"))
 
 
 def _play_sign(mechanism: Mechanism, name: str, joint: Joint, numbers: ParameterSet) -> Iterator[Finding]:

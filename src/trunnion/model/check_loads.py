@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,7 +12,7 @@ from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, Severity
 from trunnion.model.contact import motions
 from trunnion.model.expression import MOTION, RESERVED
-from trunnion.model.names import nearest
+from trunnion.model.names import as_key, nearest
 from trunnion.model.parts import Spring, freedoms
 from trunnion.model.quantity import Quantity
 from trunnion.model.units import ANGLE, ANY, KINDS, Dimension, UnitError, dimension_text, fits
@@ -19,7 +20,7 @@ from trunnion.model.units import ANGLE, ANY, KINDS, Dimension, UnitError, dimens
 if TYPE_CHECKING:
     from trunnion.model.mechanism import Mechanism
 
-__all__ = ["motion_dimensions", "spring_values", "springs", "table_values", "tables", "unknown_name"]
+__all__ = ["motion_dimensions", "spring_values", "springs", "table_values", "tables", "unknown_name", "unread"]
 
 Values = Mapping[str, Number]
 Dimensions = Mapping[str, Dimension | None]
@@ -77,8 +78,20 @@ def tables(mechanism: Mechanism, known: Dimensions) -> Iterator[Finding]:
             yield Finding(f"'{name}' cannot be used in an expression", where, remedy)
         if table.over == "drive" and not mechanism.drivers:
             yield Finding("is over the coordinate of the first driver, but nothing is driven", where, "state a driver")
-        if table.periodic and len(table.points) < 3:
+        if table.file is not None:
+            yield unread(table.file, where)
+            continue
+        if not table.points:
+            remedy = (
+                f"state points: {_EXAMPLES[table.over]}, or file: {as_key(f'{name}.csv')}, or give a file by --table"
+            )
+            yield Finding("has no points", where, remedy)
+            continue
+        if table.repeats and len(table.points) < (3 if table.period is None else 2):
             yield Finding("a periodic table needs three points", f"{where}.points", "add points")
+        if table.period is not None and table.model_fields_set >= {"periodic"} and not table.periodic:
+            what = "means nothing to a table that does not repeat"
+            yield Finding(what, f"{where}.period", "remove it, or write periodic: true")
         first: Dimension | None = None
         for k, (_, value) in enumerate(table.points):
             measured = _measure(value, known)
@@ -88,19 +101,95 @@ def tables(mechanism: Mechanism, known: Dimensions) -> Iterator[Finding]:
                 yield Finding(what, f"{where}.points.{k}.value", "let a table measure one thing")
 
 
+_EXAMPLES = {"drive": "[[0 deg, 40 bar], [360 deg, 40 bar]]", "time": "[[0 s, 40 bar], [1 s, 40 bar]]"}
+
+
+def unread(file: str, where: str) -> Finding:
+    """Of a table that names a file in a model that was not read from one."""
+    what = f"names the file '{file[:60]}', but this model was not read from a file and has no folder to look in"
+    remedy = "give its points instead, or write the model into a file beside it and read that"
+    return Finding(what, f"{where}.file", remedy)
+
+
 def table_values(mechanism: Mechanism, values: Values) -> Iterator[Finding]:
     """Whether the points of each table come in order and a periodic one ends as it begins."""
     for name, table in mechanism.tables.items():
         where = f"tables.{name}.points"
         rows = range(len(table.points))
+        if not rows:
+            continue
         places, column = ([values[f"{where}.{k}.{key}"] for k in rows] for key in ("at", "value"))
-        for k in rows[1:]:
-            if places[k] <= places[k - 1]:
-                what = f"its place {places[k]:g} does not come after {places[k - 1]:g} of the point before (SI)"
-                yield Finding(what, f"{where}.{k}", "sort the points; make a jump steep, not upright")
-        if table.periodic and abs(column[-1] - column[0]) > 1e-9 * np.max(np.abs(column)):
-            what = f"a periodic table that begins at {column[0]:g} and ends at {column[-1]:g} (SI)"
-            yield Finding(what, where, "end it with the value it begins with, one period later")
+        jumbled = [k for k in rows[1:] if places[k] <= places[k - 1]]
+        for k in jumbled:
+            what = f"its place {places[k]:g} does not come after {places[k - 1]:g} of the point before (SI)"
+            yield Finding(what, f"{where}.{k}", "sort the points; make a jump steep, not upright")
+        if table.repeats and not jumbled:
+            yield from _repeated(mechanism, name, (places, column), values)
+
+
+def _repeated(
+    mechanism: Mechanism, name: str, points: tuple[list[Number], list[Number]], values: Values
+) -> Iterator[Finding]:
+    """Whether a periodic table ends as it begins, or has a period that its points fit."""
+    table, where = mechanism.tables[name], f"tables.{name}.points"
+    places, column = points
+    period = values.get(f"tables.{name}.period", np.nan)
+    extent = places[-1] - places[0]
+    if extent > period * (1 + SAME):
+        what = f"is {period:g}, and the points go over {extent:g} (SI)"
+        yield Finding(what, f"tables.{name}.period", "state the whole period, or leave points out")
+        return
+    closed = not extent < period * (1 - SAME)  # by its last point, not by its period
+    if closed and abs(column[-1] - column[0]) > 1e-9 * np.max(np.abs(column)):
+        what = f"a periodic table that begins at {column[0]:g} and ends at {column[-1]:g} (SI)"
+        cycle, unit = _cycle(mechanism, table.over, values)
+        short = table.period is None and cycle is not None and extent < cycle * (1 - SAME)
+        state = f", or state period: {_told(cycle, unit)}" if short and cycle else ""
+        yield Finding(what, where, f"end it with the value it begins with, one period later{state}")
+    elif table.period is None:
+        yield from _misfit(mechanism, name, extent, values)
+
+
+SAME = 1e-9  # of a period
+FITS = 1e-4  # of a cycle: what a period may be off a part of it, as 6.283 rad is
+
+
+def _misfit(mechanism: Mechanism, name: str, extent: Number, values: Values) -> Iterator[Finding]:
+    """A table that repeats after something that is no turn, no part of one and no whole number of them."""
+    cycle, unit = _cycle(mechanism, mechanism.tables[name].over, values)
+    if cycle is None or not extent > 0:
+        return
+    ratio = max(cycle / extent, extent / cycle)
+    if abs(ratio - np.round(ratio)) <= FITS:
+        return
+    size, whole = (_told(one, unit) for one in (extent, cycle))
+    what = f"it repeats after {size}, which is neither a part nor a multiple of the cycle of {whole}"
+    state = f"state period: {whole}, or period: {size} if that is meant" if extent < cycle else f"state period: {size}"
+    remedy = f"end it one cycle after its first point, with the value of that, or {state}"
+    yield Finding(what, f"tables.{name}.points", remedy)
+
+
+def _told(period: Number, unit: str) -> str:
+    """A period as it is written in a file."""
+    return f"{np.degrees(period) if unit == 'deg' else period:.6g} {unit}"
+
+
+def _cycle(mechanism: Mechanism, over: str, values: Values) -> tuple[float | None, str]:
+    """After what the motion repeats, and in which unit it is told: a turn of the first driver, or a time."""
+    first = next(iter(mechanism.drivers), "")
+    joint = mechanism.effective_joints.get(first)
+    if over == "drive":
+        turns = joint is not None and "rotation" in freedoms(joint.type)
+        return (2 * np.pi if turns else None), "deg"
+    driver, before = mechanism.drivers.get(first), f"drivers.{first}."
+    if driver is None or len(mechanism.drivers) > 1 or driver.law == "table":
+        return None, "s"
+    numbers = {path.removeprefix(before): value for path, value in values.items() if path.startswith(before)}
+    with suppress(KeyError, ZeroDivisionError):  # findings of their own
+        span = driver.motion.span({**numbers, **driver.options})
+        if span.periodic and np.isfinite(span.duration) and span.duration > 0:
+            return float(span.duration), "s"
+    return None, "s"
 
 
 # ---- springs --------------------------------------------------------------------------------------------------

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from trunnion.algebra.namespace import Number
-from trunnion.errors import Finding, Severity
+from trunnion.errors import Finding, Severity, counted
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.contact import contact_lacks, has_guide, has_pin, motions
 from trunnion.model.names import nearest
@@ -125,7 +125,7 @@ def driven(name: str, joint: Joint, where: str) -> Iterator[Finding]:
     """Whether one number can say how far the joint has moved."""
     if not PAIRS[joint.type].drivable:
         count = PAIRS[joint.type].count
-        moves = f"has {count} freedoms" if count else "does not move"
+        moves = f"has {counted(count, 'freedom')}" if count else "does not move"
         what = f"the joint '{name}' is {joint.type}: it {moves} and cannot be driven by one number"
         yield Finding(what, where, f"drive one that is {', '.join(DRIVEN_PAIRS[:-1])} or {DRIVEN_PAIRS[-1]}")
 

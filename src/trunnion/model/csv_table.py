@@ -1,4 +1,6 @@
-"""Points of drivers and tables from CSV files that the user names; a model never reads another file by itself.
+"""Points of drivers and tables from CSV files: those that the user names, and those that a model names.
+
+A model may name a file in its own folder only, see `named_file`.
 
 Two columns, first time or drive coordinate, then value; separated by semicolon, tab or comma, the first of these that
 the first line has. With semicolon or tab a number may have a decimal comma. A first row of texts is a header, whose
@@ -19,17 +21,19 @@ from typing import Any, NamedTuple
 from trunnion.errors import Finding, MechanismError
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.expression import literal
+from trunnion.model.named_file import MOST_FILES, in_folder, stated_files
 from trunnion.model.names import nearest
 from trunnion.model.quantity import Quantity
 from trunnion.model.text import read_text
 from trunnion.model.units import ANY, KINDS, Kind, UnitError, dimension_text, unit
 
-__all__ = ["Points", "TableFiles", "column", "place_findings", "with_points"]
+__all__ = ["Points", "TableFiles", "column", "place_findings", "with_own_points", "with_points"]
 
 TableFiles = Mapping[str, str | os.PathLike[str]]  # file by name of a driver or table
 
 MAX_BYTES = 1_000_000
 MAX_ROWS = 10_000  # points of a spline; an analysis of 360 positions then takes seconds
+MAX_OWN_ROWS = 20_000  # of all files that a model names: reading them takes some seconds
 SHOWN = 8  # findings about one file; the rest is counted
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?", re.ASCII)
 _IN_BRACKETS = re.compile(r"\[([^\[\]]*)\]\s*$")
@@ -63,11 +67,54 @@ def with_points(data: Mapping[str, Any], files: TableFiles) -> tuple[dict[str, A
             findings += error.findings
             continue
         read.append(points)
-        entry = data[section][key]
-        kept = entry if isinstance(entry, Mapping) else {}
-        if section == "drivers":
-            kept = kept if kept.get("law") == "table" else {"law": "table"}
-        changed[section] = {**changed[section], key: {**kept, "points": points.rows}}
+        _put(changed, section, key, points)
+    if findings:
+        raise MechanismError(findings)
+    return changed, read
+
+
+def _put(data: dict[str, Any], section: str, key: str, points: Points) -> None:
+    """Points in place of those that a driver or table states, or of the file that it names."""
+    entry = data[section][key]
+    kept = {one: value for one, value in entry.items() if one != "file"} if isinstance(entry, Mapping) else {}
+    if section == "drivers" and kept.get("law") != "table":
+        kept = {"law": "table"}
+    data[section] = {**data[section], key: {**kept, "points": points.rows}}
+
+
+def with_own_points(data: Mapping[str, Any], model: Path) -> tuple[dict[str, Any], list[Points]]:
+    """Plain data of a model file with the points from the files in its folder that drivers and tables name.
+
+    MechanismError with every finding: about a name where it stands in the model, about the content with file and line.
+    """
+    changed, read = dict(data), []
+    findings: list[Finding] = []
+    size = rows = 0
+    for count, (section, key, name) in enumerate(stated_files(data), start=1):
+        where = f"{section}.{key}"
+        if count > MOST_FILES:
+            what = f"the model names more than {MOST_FILES} files"
+            findings.append(Finding(what, f"{where}.file", "state some of the points in the model"))
+            break
+        if "points" in data[section][key]:
+            findings.append(Finding("states both points and a file", where, "remove one of them"))
+            continue
+        try:
+            path = in_folder(model.resolve().parent, name, f"{where}.file")
+            size += path.stat().st_size
+            if size > MAX_BYTES or rows > MAX_OWN_ROWS:
+                what = (
+                    f"the files that the model names are too long: over {MAX_BYTES / 1e6:g} MB or {MAX_OWN_ROWS} rows"
+                )
+                findings.append(Finding(what, f"{where}.file", "thin them out: what lies between is interpolated"))
+                break
+            points = _points(path, f"{where}.points", _kinds(data, section, key), str(model.parent / name))
+        except MechanismError as error:
+            findings += error.findings
+            continue
+        read.append(points)
+        rows += len(points.rows)
+        _put(changed, section, key, points)
     if findings:
         raise MechanismError(findings)
     return changed, read
@@ -140,8 +187,12 @@ def _coordinate(data: Mapping[str, Any], joint: str) -> Kind:
 # ---- the file -------------------------------------------------------------------------------------------------
 
 
-def _points(path: Path, where: str, kinds: tuple[Kind, Kind]) -> Points:
-    """The points of a file; MechanismError with file and line of every finding, a few of each file."""
+def _points(path: Path, where: str, kinds: tuple[Kind, Kind], shown: str = "") -> Points:
+    """The points of a file; MechanismError with file and line of every finding, a few of each file.
+
+    shown: what the file is called in findings.
+    """
+    shown = shown or str(path)
     try:
         separator, rows = _rows(read_text(path, "a table", MAX_BYTES, "write a row for each point, such as 0; 12.5"))
         units, numbers = ["", ""], rows
@@ -154,10 +205,9 @@ def _points(path: Path, where: str, kinds: tuple[Kind, Kind]) -> Points:
         if findings:
             raise MechanismError(_few(findings))
     except MechanismError as error:
-        found = [finding.at(str(path), finding.line) for finding in error.findings]
-        raise MechanismError(found) from None
+        raise MechanismError([finding.at(shown, finding.line) for finding in error.findings]) from None
     points = [[_value(cell, separator, one) for cell, one in zip(cells, units, strict=True)] for _, cells in numbers]
-    return Points(where, str(path), points, [line for line, _ in numbers])
+    return Points(where, shown, points, [line for line, _ in numbers])
 
 
 def column(path: Path, kind: Kind) -> list[float]:

@@ -10,10 +10,11 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import reduce
+from itertools import combinations
 from typing import Final
 
 import numpy as np
@@ -31,6 +32,8 @@ _WORD = r"(?:[^\W\d_]+|%|°[A-Za-z]?)(?!\w|\s*\()(?:(?:\^|\*\*)[-+]?[0-9](?![\w.
 _UNIT = rf"(?:{_WORD})(?:[ /*·⋅](?:{_WORD}))*"
 LITERAL = re.compile(rf"(?P<number>{_NUMBER})(?:\s*(?P<unit>{_UNIT})|\s+(?P<per>1/{_UNIT}))?")
 _TOKEN = re.compile(rf"\s*(?:(?P<literal>{LITERAL.pattern})|(?P<name>[^\W\d]\w*)|(?P<operator>\*\*|[-+*/^(),]))")
+# 1500 min-1, as catalogues write a speed: here it is a difference
+_RECIPROCAL = re.compile(rf"\s*{_NUMBER}\s*(?:{_UNIT}[ /*·])?(?P<power>(?P<unit>min|s)-[12])(?![\w.])")
 # Signs an engineer's keyboard or word processor makes of - * ^2; the minus of a superscript included.
 _SIGNS = str.maketrans({"−": "-", "–": "-", "×": "*", "⋅": "·"})
 _SUPERSCRIPT = re.compile("⁻?[⁰¹²³⁴⁵⁶⁷⁸⁹]")
@@ -84,13 +87,15 @@ class Expression:
     """A parsed expression.
 
     names: the dimensions it speaks of; evaluate: values of those (SI floats, arrays, duals) to a value;
-    literal: set if it is nothing but one number with its unit (and perhaps a minus).
+    literal: set if it is nothing but one number with its unit (and perhaps a minus); kinks: functions of the same
+    values, where one of which changes its sign the value jumps or bends: at both ends of a `between`, of an `abs` …
     """
 
     names: tuple[str, ...]
     evaluate: Evaluator
     literal: Literal | None
     bare: bool  # neither a unit nor a name in it: only numbers
+    kinks: tuple[Evaluator, ...]
     _tree: ast.expr = field(repr=False)
     _operands: Mapping[str, Literal | str] = field(repr=False)
 
@@ -136,7 +141,7 @@ def parse(text: str) -> Expression:
     core = tree.operand if isinstance(tree, ast.UnaryOp) else tree
     alone = found[0] if isinstance(core, ast.Name) and found else None
     bare = len(found) == len(operands) and not any(one.unit for one in found)
-    return Expression(names, evaluate, alone, bare, tree, operands)
+    return Expression(names, evaluate, alone, bare, tuple(_kinks(tree, operands)), tree, operands)
 
 
 def _tokens(text: str) -> tuple[str, dict[str, Literal | str]]:
@@ -149,6 +154,9 @@ def _tokens(text: str) -> tuple[str, dict[str, Literal | str]]:
         found = _TOKEN.match(text, place)
         if not found:
             raise UnitError(f"'{text[place:].strip()[:20]}' is not understood in '{text}'", _hint(text))
+        if power := _RECIPROCAL.match(text, place):
+            what = f"'{power['power']}' is {power['unit']} less {power['power'][-1]} in '{text}'"
+            raise UnitError(what, "write an angular speed in rpm or rad/s, a power of a unit as s^-1")
         operator = found["operator"]
         if operator is None and after_operand:
             raise UnitError(
@@ -222,7 +230,8 @@ def _operand(operand: Literal | str) -> Evaluator:
     if operand == "pi":
         return lambda names: np.float64(np.pi)
     if operand in FUNCTIONS:
-        raise UnitError(f"the function '{operand}' has no argument", f"write {operand}(…)")
+        speed = "; an angular speed is in rpm or rad/s" if operand == "min" else ""
+        raise UnitError(f"the function '{operand}' has no argument", f"write {operand}(…){speed}")
     name = operand
 
     def look_up(names: Mapping[str, Number]) -> Number:
@@ -266,6 +275,24 @@ def _between(value: Number, low: Number, high: Number) -> Number:
     """1 from `low` up to `high`, 0 elsewhere: it switches a load on over part of the motion."""
     xp = namespace(value, low, high)
     return xp.where((value >= low) & (value < high), 1.0, 0.0)
+
+
+def _kinks(tree: ast.expr, operands: Mapping[str, Literal | str]) -> Iterator[Evaluator]:
+    """Functions whose sign decides which side of a switch a tree that `_compile` accepted is on."""
+    for part in ast.walk(tree):
+        if not isinstance(part, ast.Call) or not isinstance(part.func, ast.Name):
+            continue
+        name, values = operands[part.func.id], [_compile(one, operands) for one in part.args]
+        if name == "between":
+            yield from (_less(values[0], end) for end in values[1:])
+        elif name in ("min", "max"):
+            yield from (_less(one, other) for one, other in combinations(values, 2))
+        elif name in ("abs", "atan2"):  # an angle jumps by a turn where its first argument passes 0
+            yield values[0]
+
+
+def _less(one: Evaluator, other: Evaluator) -> Evaluator:
+    return lambda names: one(names) - other(names)
 
 
 def _dimension(tree: ast.expr, operands: Mapping[str, Literal | str], names: Dimensions) -> Dimension | None:

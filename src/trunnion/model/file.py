@@ -11,6 +11,7 @@ import os
 import re
 import tomllib
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -21,12 +22,13 @@ from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 from ruamel.yaml.parser import Parser
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.model.csv_table import TableFiles, place_findings, with_points
+from trunnion.model.csv_table import TableFiles, place_findings, with_own_points, with_points
 from trunnion.model.mechanism import Mechanism
+from trunnion.model.named_file import in_folder, stated_files
 from trunnion.model.text import read_text
 from trunnion.output import whole
 
-__all__ = ["Lines", "place", "placed", "read_entries", "read_mechanism", "write_mechanism"]
+__all__ = ["Lines", "files_named", "place", "placed", "read_entries", "read_mechanism", "write_mechanism"]
 
 MAX_BYTES = 1_000_000  # some ten thousand links; parsing takes seconds
 MAX_DEPTH = 30
@@ -41,7 +43,8 @@ Lines = dict[str, int]
 def read_mechanism(path: str | os.PathLike[str], tables: TableFiles | None = None) -> Mechanism:
     """The mechanism of a file, by its extension .yaml, .yml, .json or .toml.
 
-    tables: CSV files with the points of drivers and tables, by name, see `Mechanism.with_table`.
+    The points of CSV files in its folder that it names become part of it. tables: CSV files with the points of drivers
+    and tables, by name, see `Mechanism.with_table`; they go before those that the model names.
     MechanismError with every finding of severity error, each with file, line, what and remedy.
     """
     path = Path(path)
@@ -49,12 +52,24 @@ def read_mechanism(path: str | os.PathLike[str], tables: TableFiles | None = Non
     findings = [] if "trunnion" in data else [_unversioned().at(str(path), 1)]
     data, read = with_points(data, tables or {})
     try:
+        data, own = with_own_points(data, path)
+        read += own
         mechanism = Mechanism(**data)
     except MechanismError as error:
         findings += place_findings(error.findings, read)
     if findings:
         raise MechanismError(place(findings, str(path), lines, data)) from None
     return mechanism
+
+
+def files_named(path: str | os.PathLike[str]) -> list[Path]:
+    """The files of points that a model file names, as far as they are there; none of a file that cannot be read."""
+    found = []
+    with suppress(MechanismError):
+        for section, key, name in stated_files(read_entries(Path(path))[0]):
+            with suppress(MechanismError):
+                found.append(in_folder(Path(path).resolve().parent, name, f"{section}.{key}.file"))
+    return found
 
 
 def read_entries(
@@ -141,8 +156,8 @@ def _parse(text: str, kind: str) -> tuple[dict[str, Any], Lines]:
 
 def _parse_toml(text: str) -> tuple[dict[str, Any], Lines]:
     if deep := _DEEP_KEY.search(text):  # tomllib takes a time with the square of the dots
-        line = text.count("\n", 0, deep.start()) + 1
-        raise MechanismError(Finding("is nested too deeply", remedy="check the dots in the key", line=line))
+        at = text.count("\n", 0, deep.start()) + 1
+        raise MechanismError(Finding("is nested too deeply", remedy="check the dots in the key", line=at))
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -204,7 +219,7 @@ def _parse_yaml(text: str, kind: str) -> tuple[dict[str, Any], Lines]:
     if not isinstance(root, MappingNode):
         what = "is not a group of entries (key: value) at its top"
         raise MechanismError(Finding(what, remedy="start from one of the examples", line=1))
-    builder = _Builder()
+    builder = _Builder(text)
     data = builder.build(root, "")
     if builder.findings:
         raise MechanismError(builder.findings)
@@ -238,7 +253,8 @@ class _Parser(Parser):
 class _Builder:
     """Plain data from YAML nodes, with the line of every path, and what is wrong on the way."""
 
-    def __init__(self) -> None:
+    def __init__(self, text: str) -> None:
+        self.text = text
         self.lines: Lines = {}
         self.findings: list[Finding] = []
 
@@ -248,13 +264,38 @@ class _Builder:
         if isinstance(node, MappingNode):
             return self._mapping(node, path)
         if isinstance(node, SequenceNode):
-            return [self.build(item, f"{path}.{index}") for index, item in enumerate(node.value)]
+            items = self._uncut(node, [(item, f"{path}.{index}") for index, item in enumerate(node.value)])
+            return [self.build(item, below) for item, below in items]
         assert isinstance(node, ScalarNode)  # there are no other nodes
         return self._scalar(node, path)
 
+    def _uncut(self, node: MappingNode | SequenceNode, items: list[tuple[Node, str]]) -> list[tuple[Node, str]]:
+        """The values of a list or group, by path, without those that YAML cut out of an expression at its commas."""
+        kept, until = [], 0
+        for item, path in items:
+            start = item.start_mark.index
+            if start < until:
+                continue
+            kept.append((item, path))
+            plain = node.flow_style and isinstance(item, ScalarNode) and not item.style
+            if plain and item.value.count("(") > item.value.count(")"):
+                whole = _balanced(self.text[start : node.end_mark.index - 1])
+                until = start + len(whole)
+                if whole:
+                    shown, kind = " ".join(whole.split()), "braces" if isinstance(node, MappingNode) else "brackets"
+                    what = f"'{shown[:80]}' has a comma, which ends a value in {kind}"
+                    mark = "'" if '"' in shown else '"'
+                    remedy = f"put it in quotation marks: {mark}{shown}{mark}"
+                    self.findings.append(Finding(what, path, remedy, line=item.start_mark.line + 1))
+        return kept
+
     def _mapping(self, node: MappingNode, path: str) -> dict[str, Any]:
         values: dict[str, Any] = {}
+        parts = [(value, f"{path}.{key.value}".lstrip(".")) for key, value in node.value]
+        whole = {id(value) for value, _ in self._uncut(node, parts)}
         for key_node, value_node in node.value:
+            if id(value_node) not in whole:
+                continue
             line = key_node.start_mark.line + 1
             if not isinstance(key_node, ScalarNode):
                 self.findings.append(Finding("a key is not a text", path, "write key: value", line=line))
@@ -295,6 +336,16 @@ class _Builder:
             line = node.start_mark.line + 1
             self.findings.append(Finding(f"'{text[:40]}' is not a number", path, remedy, line=line))
         return text
+
+
+def _balanced(text: str) -> str:
+    """The beginning of a text up to the first comma outside parentheses; empty if some are left open."""
+    depth = 0
+    for place, sign in enumerate(text):
+        depth += (sign == "(") - (sign == ")")
+        if sign == "," and depth == 0:
+            return text[:place].rstrip()
+    return "" if depth else text.rstrip()
 
 
 def place(findings: Iterable[Finding], file: str, lines: Lines, data: Mapping[str, Any]) -> list[Finding]:

@@ -23,8 +23,9 @@ from trunnion.model.contact import has_play, play
 from trunnion.model.cost_parts import Process
 from trunnion.model.findings import repair, schema_findings
 from trunnion.model.limit_texts import DIGITS
-from trunnion.model.merge import FitChoice, merge_joint
+from trunnion.model.merge import DEFAULT_LAW, FitChoice, merge_joint
 from trunnion.model.names import nearest
+from trunnion.model.other_law import with_law
 from trunnion.model.parameters import LIMITS, Entry, Location, ParameterSet, entries, nominal_dimensions
 from trunnion.model.parts import (
     Correlation,
@@ -297,10 +298,14 @@ class Mechanism(Part):
         `tolerances.AB` or one key of it, `tolerances.AB.cp`, need not be stated yet. `measures.NAME.limit` is one text.
         """
         data = self.data()
+        self._replace(values, data)
+        return Mechanism(**data)
+
+    def _replace(self, values: Mapping[str, float | str], data: dict[str, Any]) -> None:
+        """Put values into plain data of this mechanism, or of one whose numbers have the same names."""
         for name, value in values.items():
             _assign(data, self._location(name), value, self.coordinates)
             keep_limits(self, name, value, data)
-        return Mechanism(**data)
 
     def path_of(self, name: str) -> str:
         """The path of the number that a name means in `with_values`, stated or not; MechanismError if it means none."""
@@ -388,7 +393,16 @@ class Mechanism(Part):
             if key == "direction" and below in (["x"], ["y"], ["z"]):
                 return path, (*holder, part, key, "xyz".index(below[0]))
             return None if below or key in ("fit", "direction") else (path, (*holder, part, key))
+        before, found, key = name.rpartition(".friction.")
+        if before == "joint_defaults" and key in FRICTION_LAWS[self._default_law].parameters:
+            return name, (before, "friction", key)
         return None
+
+    @property
+    def _default_law(self) -> str:
+        """The friction law of joints that state none."""
+        friction = self.joint_defaults.friction
+        return (friction and friction.law) or DEFAULT_LAW
 
     def _holder(self, name: str) -> Location | None:
         """Where `joint_defaults`, or a joint by its name or path, stands."""
@@ -415,23 +429,23 @@ class Mechanism(Part):
         except MechanismError as error:
             raise MechanismError(place_findings(error.findings, read)) from None
 
-    def with_friction(self, law: str) -> Mechanism:
+    def with_friction(self, law: str, values: Mapping[str, float | str] | None = None) -> Mechanism:
         """The mechanism without friction ("off"), or with another law wherever there is friction.
 
         Parameters that the laws share are kept; MechanismError names those that the new law lacks.
+        values: what else is replaced at the same time, as by `with_values`: parameters of the new law among it.
         """
         if law != "off" and law not in FRICTION_LAWS:
             raise MechanismError(
                 Finding(f"'{law}' is not a friction law", remedy=nearest(law, [*FRICTION_LAWS, "off"]))
             )
-        data = self.data()
-        holders = [data.get("joint_defaults", {}), *data.get("joints", {}).values(), *data.get("loop", [])]
-        for holder in (one for one in holders if "friction" in one):
-            stated = holder.pop("friction")
-            if law != "off":
-                stated = stated if isinstance(stated, dict) else {"coefficient": stated}
-                keep = {"model", *FRICTION_LAWS[law].parameters}
-                holder["friction"] = {"law": law, **{key: value for key, value in stated.items() if key in keep}}
+        if law == "off":
+            stated = self.with_values(values) if values else self
+            return Mechanism(**kept(stated, with_law(stated.data(), law)))
+        data = with_law(self.data(), law)
+        if values:
+            # names are those of a mechanism that states all parameters of the law, as it does with the values
+            Mechanism(**kept(self, with_law(self.data(), law, complete=True)))._replace(values, data)
         return Mechanism(**kept(self, data))
 
     def with_seats(self, seat: str) -> Mechanism:

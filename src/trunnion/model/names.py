@@ -1,13 +1,24 @@
-"""Names that do exist, for messages about one that does not."""
+"""Names that do exist, for messages about one that does not; texts that a spreadsheet would take for a formula."""
 
 from __future__ import annotations
 
+import json
+import re
 from collections.abc import Iterable
 from difflib import get_close_matches
 
-__all__ = ["nearest"]
+__all__ = ["FORMULA", "as_key", "guarded", "nearest", "unguarded"]
 
 SHOWN = 8
+FORMULA = frozenset("=+-@\t\r\n＝＋－＠")  # with which a cell begins that a spreadsheet executes; some are full width
+_PLAIN = re.compile(r"[^\W\d](?:[\w. +/-]*\w)?")  # what YAML takes for a text as it stands, in braces too
+_WORDS = ("true", "false", "null", "yes", "no", "on", "off")  # and what it does not
+
+
+def as_key(name: str) -> str:
+    """A name as it is written as a key in a model file: in quotation marks where its signs mean something in YAML."""
+    plain = _PLAIN.fullmatch(name) and name.casefold() not in _WORDS
+    return name if plain else json.dumps(name, ensure_ascii=False)
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
@@ -21,3 +32,21 @@ def nearest(name: str, known: Iterable[str]) -> str:
         return "none is defined"
     more = ", …" if len(names) > SHOWN else ""
     return "known: " + ", ".join(f"'{one}'" for one in names[:SHOWN]) + more
+
+
+def guarded(text: str) -> str:
+    """A text for a cell of CSV, with an apostrophe before it if a spreadsheet would take it for a formula."""
+    return f"'{text}" if text[:1] in FORMULA and text and not _is_number(text) else text
+
+
+def unguarded(cell: str) -> str:
+    """The text of a cell that `guarded` has written."""
+    return cell[1:] if cell[:1] == "'" and cell[1:2] in FORMULA and cell[1:] else cell
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

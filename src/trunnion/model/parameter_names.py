@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.model.names import nearest
+from trunnion.model.names import as_key, nearest
 
 __all__ = ["ERRORS", "ParameterNames"]
 
@@ -51,7 +51,7 @@ class ParameterNames:
         path = self.resolve(name.removeprefix(ERRORS))
         if f"{ERRORS}{path}" not in self.all:
             what = f"the model states no error of '{path}'"
-            raise MechanismError(Finding(what, remedy=f"state it in the file: errors: {{{path}: …}}"))
+            raise MechanismError(Finding(what, remedy=f"state it in the file: errors: {{{as_key(path)}: …}}"))
         return f"{ERRORS}{path}"
 
     @property

@@ -224,7 +224,7 @@ def _narrow(mechanism: Mechanism, section: str, name: str, entry: Entry) -> Kind
     if section == "measures":
         return _measure_kind(mechanism, name, entry)
     if section == "tables":
-        return _table_kind(mechanism, name) if entry.location[-1] == 0 else ANY
+        return _table_kind(mechanism, name) if entry.location[-1] in (0, "period") else ANY
     if section == "springs":
         return _spring_kind(mechanism, mechanism.springs[name], entry)
     if joint is None or section == "loads" or entry.kind in KINDS.values():

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
-from trunnion.model.names import nearest
+from trunnion.model.names import FORMULA, nearest
 from trunnion.model.quantity import Dimensionless, Length
 
 __all__ = ["FORMS", "Direction", "Name", "Part", "Position", "forms", "known", "problem", "shape"]
@@ -19,6 +19,9 @@ def _name(name: str) -> str:
     """A name that can stand in a path and in a message."""
     if not name.strip() or name != name.strip():
         raise problem(f"the name {name[:80]!r} is empty or begins or ends with a space", "remove the space")
+    if name[0] in FORMULA:
+        what = f"the name '{name[:80]}' begins with '{name[0]}', which makes a formula of it in a spreadsheet"
+        raise problem(what, "begin it with a letter or a number")
     if "." in name:
         raise problem(f"the name '{name[:80]}' has a dot, which separates the parts of a path", "use - or _")
     if len(name) > 80 or any(unicodedata.category(sign) in ("Cc", "Cf", "Cs", "Zl", "Zp") for sign in name):

@@ -179,6 +179,7 @@ class Driver(Part):
     dwell: Time | None = None
     returns: bool = True
     points: Annotated[tuple[tuple[Time, AngleOrLength], ...], Field(min_length=2)] | None = None
+    file: str | None = None
     periodic: bool = False
     ends: Literal["clamped", "natural"] = "clamped"
     delay: Time | None = None
@@ -235,12 +236,22 @@ class Load(Part):
 
 
 class Table(Part):
-    """A quantity stated by points (coordinate of the first driver or time, value), for the expressions of loads."""
+    """A quantity stated by points (coordinate of the first driver or time, value), for the expressions of loads.
+
+    file: instead of the points; they take its place when a model file is read.
+    """
 
     over: Literal["drive", "time"] = "drive"
-    points: Annotated[tuple[tuple[AnyQuantity, AnyQuantity], ...], Field(min_length=2)]
+    points: Annotated[tuple[tuple[AnyQuantity, AnyQuantity], ...], Field(min_length=2)] = ()
+    file: str | None = None
     interpolation: Literal["linear", "spline"] = "linear"
     periodic: bool = False
+    period: AnyQuantity | None = None
+
+    @property
+    def repeats(self) -> bool:
+        """Whether it goes on beyond its points."""
+        return self.periodic or self.period is not None
 
 
 class Spring(Part):

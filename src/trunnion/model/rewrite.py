@@ -15,8 +15,9 @@ from ruamel.yaml.error import YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.model.file import read_mechanism, write_mechanism
+from trunnion.model.file import read_entries, read_mechanism, write_mechanism
 from trunnion.model.mechanism import Mechanism
+from trunnion.model.named_file import stated_files
 from trunnion.output import whole
 
 __all__ = ["rewrite_mechanism"]
@@ -36,8 +37,9 @@ def rewrite_mechanism(
     if not over and path.exists() and path.samefile(source):
         raise MechanismError(Finding("is the model itself", str(path), "name another file, or add --force"))
     own = {source.suffix.lower(), path.suffix.lower()} <= set(YAMLS)
+    beside = source.resolve().parent == path.resolve().parent
     with whole(path) as temporary:
-        for text in _texts(mechanism, source) if own else ():
+        for text in _texts(mechanism, source, beside) if own else ():
             temporary.write_text(text, encoding="utf-8", newline="\n")
             if _holds(temporary, mechanism):
                 return
@@ -51,10 +53,14 @@ def _holds(path: Path, mechanism: Mechanism) -> bool:
         return False
 
 
-def _texts(mechanism: Mechanism, source: Path) -> Iterator[str]:
-    """Texts of the mechanism that are to be tried, the one that is most like the source first."""
+def _texts(mechanism: Mechanism, source: Path, beside: bool) -> Iterator[str]:
+    """Texts of the mechanism that are to be tried, the one that is most like the source first.
+
+    beside: whether it is to stand in the folder of the source, where the files are that this names.
+    """
     try:
         text, before = source.read_text("utf-8"), read_mechanism(source).data()
+        _name_files(before, mechanism.data(), source, beside)
         found = _edited(text, before, mechanism.data())
     except (MechanismError, YAMLError, OSError, ValueError, TypeError, LookupError):
         return
@@ -63,6 +69,14 @@ def _texts(mechanism: Mechanism, source: Path) -> Iterator[str]:
     again = _rewritten(text, before, mechanism)
     if again is not None:
         yield again
+
+
+def _name_files(before: dict[str, Any], after: Mapping[str, Any], source: Path, beside: bool) -> None:
+    """Let the data of the source name the files again whose points are to be written out: others, or elsewhere."""
+    for section, name, file in stated_files(read_entries(source)[0]):
+        stated = before[section][name]
+        if not beside or after.get(section, {}).get(name, {}).get("points") != stated.get("points"):
+            before[section][name] = {key: value for key, value in stated.items() if key != "points"} | {"file": file}
 
 
 # ---- values alone ---------------------------------------------------------------------------------------------

@@ -19,11 +19,11 @@ def read_text(path: Path, kind: str, limit: int, start_from: str) -> str:
     try:
         if path.exists() and not path.is_file():
             raise MechanismError(Finding("is not a file", remedy=f"name {kind}"))
-        size = path.stat().st_size
-        if size > limit:
-            what = f"has {size / 1e6:.1f} MB, {kind} at most {limit / 1e6:.1f} MB"
+        with path.open("rb") as stream:
+            raw = stream.read(limit + 1)
+        if len(raw) > limit:
+            what = f"has {max(path.stat().st_size, len(raw)) / 1e6:.1f} MB, {kind} at most {limit / 1e6:.1f} MB"
             raise MechanismError(Finding(what, remedy=f"check that it is {kind}, or make it smaller"))
-        raw = path.read_bytes()
     except MechanismError:
         raise
     except (OSError, ValueError) as error:

@@ -7,13 +7,12 @@ number, so that 30 deg is not taken for a length nor 30 mm for an angle; beside 
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cache
 from typing import TYPE_CHECKING
 
-from trunnion.model.names import nearest
+from trunnion.model.unit_spellings import READ, plain, remedy_for, strange_sign, words
 
 if TYPE_CHECKING:
     import pint
@@ -139,39 +138,42 @@ def _registry() -> pint.UnitRegistry[Fraction]:
     return registry
 
 
-_TORQUE = re.compile(r"(?<![\w])([mkM]?)Nm(?!\w)([\^*]?)")
-# Those that a misspelt one is compared with; pint knows many more.
-_USUAL = "mm cm m µm km in ft deg rad mrad kg g mg t lb s ms min N mN kN MN lbf Pa kPa MPa GPa bar psi J kJ W kW rpm"
+_PRODUCT = "write a product of a number and a dimension as 2 * AB"
 
 
-def _meant(text: str) -> str:
-    """Remedy for a unit that is not known."""
-    product = "write a product of a number and a dimension as 2 * AB"
-    for word in re.findall(r"[^\W\d_]+", text):
-        try:
-            _registry().parse_units(word)
-        except Exception:  # see `unit`
-            remedy = nearest(word, _USUAL.split())
-            if remedy.startswith("did you mean"):
-                return f"{remedy} ({product})"
-    return product
+def _known_to_pint(word: str) -> str:
+    """The name that pint has for a word; empty if it has none."""
+    try:
+        return " ".join(str(name).replace("_", " ") for name in _registry().parse_units(word)._units)
+    except Exception:  # see `root`
+        return ""
 
 
-def _torque(found: re.Match[str]) -> str:
-    """`N m` for `Nm`, which pint reads as a measure of yarn; in `mV/Nm` both are below the stroke."""
-    return f"{found[1]}N m{found[2]}" if found[2] else f"({found[1]}N m)"
+def _check_spelling(text: str, spaced: str) -> None:
+    """UnitError for a word that is no unit in common use, whatever pint would make of it."""
+    strange = strange_sign(spaced)
+    word = next((one for one in words(spaced) if one not in READ), None)
+    if word is None and not strange:
+        return
+    meant = remedy_for(text, word or "")
+    if word is None or not (name := _known_to_pint(word)):
+        raise UnitError(f"the unit '{text}' is not known", meant)
+    told = "" if word == text else f", of which '{word}'"
+    same = "is" if name == word else f"would be {name}, which is"
+    raise UnitError(f"the unit '{text}'{told} {same} not in common use", meant)
 
 
 @cache
 def root(text: str) -> tuple[Fraction, dict[str, Fraction], tuple[str, ...]]:
-    """Factor to SI, exponents by base unit of pint, and the units named, of any unit pint knows; UnitError if none."""
+    """Factor to SI, exponents by base unit of pint, and the units named, of any unit in use; UnitError if none."""
     registry = _registry()
+    spaced = plain(text)
+    _check_spelling(text, spaced)
     try:
-        spaced = _TORQUE.sub(_torque, text)
-        parsed = registry.parse_units(spaced.replace("·", "*").replace("⋅", "*"))
+        parsed = registry.parse_units(spaced)
         factor, base = registry.get_root_units(parsed)
     except Exception as error:  # pint raises its own, tokenizer and arithmetic errors on text that is no unit
-        raise UnitError(f"the unit '{text}' is not known", _meant(text)) from error
+        raise UnitError(f"the unit '{text}' is not known", remedy_for(text, "")) from error
     exponents = {str(name): Fraction(str(power)) for name, power in base._units.items()}
     to_si = Fraction(str(factor)) / Fraction(1000) ** int(exponents.get("gram", 0))
     return to_si, exponents, tuple(str(name) for name in parsed._units)
@@ -180,9 +182,13 @@ def root(text: str) -> tuple[Fraction, dict[str, Fraction], tuple[str, ...]]:
 @cache
 def unit(text: str) -> tuple[Fraction, Dimension]:
     """Factor to SI and dimension of a unit such as `N m`, `kg m^2`, `rpm`; UnitError if it is none of mechanics."""
-    factor, exponents, names = root(text)
+    try:
+        factor, exponents, names = root(text)
+    except UnitError as error:  # in a model the word may be a dimension's name
+        near = error.remedy.startswith("did you mean")
+        raise UnitError(error.what, f"{error.remedy} ({_PRODUCT})" if near else error.remedy or _PRODUCT) from None
     order = ("meter", "gram", "second", "radian")
-    if set(exponents) - set(order) or any(name.endswith("bel") for name in names):
+    if set(exponents) - set(order):
         raise UnitError(f"the unit '{text}' is not one of mechanics", "use units of length, mass, time and angle")
     length, mass, time, angle = (exponents.get(name, Fraction(0)) for name in order)
     dimension = (length, mass, time, angle)

@@ -250,14 +250,14 @@ def _undriven(mechanism: Mechanism, mobility: int, spins: int, exactly: bool = F
     drivers = len(mechanism.drivers)
     if mobility <= drivers and not (exactly and mobility < drivers):
         return []
-    has = "no driver" if drivers == 0 else "one driver" if drivers == 1 else f"{drivers} drivers"
+    has = "is no driver" if drivers == 0 else "is one driver" if drivers == 1 else f"are {drivers} drivers"
     remedy = (
         "drive a joint for each freedom left, as A: {speed: 10 rad/s}, or add a link or joint that removes it"
         if mobility > drivers
         else "remove a driver, or a joint or link that constrains twice"
     )
     beside = f" beside {spins} that spin a link alone" if spins else ""
-    what = f"the mobility is {mobility} by Grübler's formula{beside}, but there is {has}"
+    what = f"the mobility is {mobility} by Grübler's formula{beside}, but there {has}"
     return [Finding(what, "drivers", remedy)]
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.errors import Finding, MechanismError, Severity, counted
 from trunnion.options import IMAGES, DataFiles, File, FrictionLaw, MappingFile, Out, Seats, Set, TableFile, UnitsRow
 from trunnion.terminal import bar, console, findings_of, say, show_rows, wrote
 from trunnion.verbs.inputs import spare_data
@@ -126,5 +126,5 @@ def _tables(result: xr.Dataset) -> None:
             console().print()
         show_rows(title or table.title, table.head, table.rows[:MOST_ROWS])
         if len(table.rows) > MOST_ROWS:
-            told = f"{len(table.rows) - MOST_ROWS:,} rows more; --out FILE.figures.csv has all"
+            told = f"{counted(len(table.rows) - MOST_ROWS, 'row')} more; --out FILE.figures.csv has all"
             console().print(told, markup=False, highlight=False)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.errors import Finding, MechanismError, Severity, counted
 from trunnion.options import (
     IMAGES,
     DataFiles,
@@ -134,7 +134,9 @@ def identify(
     written = _write(result, out or [], report, kind, units_row)
     _tables(result)
     findings = findings_of(result)
-    found = gathered(one for one in measurement.findings if one.severity is not Severity.NOTE)
+    found = gathered(  # of the notes those that tell what was set
+        one for one in measurement.findings if one.severity is not Severity.NOTE or one.where == "files"
+    )
     if write is not None:
         findings += _write_model(mechanism, result, file, write, force, written)
     for path in written:
@@ -248,7 +250,7 @@ def _tables(result: xr.Dataset) -> None:
         name = str(result.attrs["name"])
         show_rows(f"{name}\n{table.title}" if i == 0 and name else table.title, table.head, table.rows[:MOST_ROWS])
         if len(table.rows) > MOST_ROWS:
-            told = f"{len(table.rows) - MOST_ROWS:,} rows more; --out FILE.residuals.csv has all"
+            told = f"{counted(len(table.rows) - MOST_ROWS, 'row')} more; --out FILE.residuals.csv has all"
             console().print(told, markup=False, highlight=False)
 
 

@@ -28,9 +28,10 @@ def spare_data(
     write: a copy of the model, which may be the model itself.
     """
     from trunnion.measured.read import files_read
+    from trunnion.model.file import files_named
     from trunnion.output import spare
 
-    read = [*files_read(mapping, data), *tables_read(tables)]
+    read = [*files_read(mapping, data), *tables_read(tables), *(files_named(model) if model else [])]
     results = [("--out", path) for path in out or ()] + ([("--report", report)] if report else [])
     spare([*read, model] if model else read, results)
     if write is not None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -22,16 +22,22 @@ def stated(
     tables: list[str] | None = None,
     friction: str | None = None,
     seat: str | None = None,
+    swept: Mapping[str, float | str] | None = None,
 ) -> Mechanism:
-    """The model with the options `--table`, `--set`, `--friction` and `--seat` applied, in this order."""
+    """The model with the options applied: `--table` and `--seat` first, then `--friction` together with `--set`.
+
+    So a number that is set stands against what is said of all joints, and may be one that only the other law has.
+    swept: a value of each number that the verb replaces, which may be such a one too.
+    """
     from trunnion.model.file import read_mechanism
 
     mechanism = read_mechanism(file, dict(named_file(text) for text in tables or ()))
-    if settings:
-        mechanism = mechanism.with_values(dict(setting(text) for text in settings))
+    values = dict(setting(text) for text in settings or ())
+    if seat is not None:
+        mechanism = mechanism.with_seats(seat)
     if friction:
-        mechanism = mechanism.with_friction(friction)
-    return mechanism if seat is None else mechanism.with_seats(seat)
+        return mechanism.with_friction(friction, {**(swept or {}), **values})
+    return mechanism.with_values(values) if values else mechanism
 
 
 @contextmanager

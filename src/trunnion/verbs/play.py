@@ -27,10 +27,11 @@ def check_files(out: Sequence[Path]) -> None:
             check_format(path, IMAGES)
 
 
-def show(mechanism: Mechanism, result: xr.Dataset, out: Sequence[Path], units_row: bool) -> None:
+def show(mechanism: Mechanism, result: xr.Dataset, out: Sequence[Path], units_row: bool, uncut: bool = False) -> None:
     """Write the files, print a table for each measure."""
     from trunnion.export import save
     from trunnion.views import plots
+    from trunnion.views.peaks import whole_peaks
     from trunnion.views.play import MOST_PANELS, figure, tables
 
     for path in out:
@@ -40,7 +41,7 @@ def show(mechanism: Mechanism, result: xr.Dataset, out: Sequence[Path], units_ro
             what = f"{result.sizes['measure']} measures do not fit one figure"
             raise MechanismError(Finding(what, str(path), f"name at most {MOST_PANELS} by --measure"))
         else:
-            plots.save(figure(result), path)
+            plots.save(figure(whole_peaks(result, uncut)), path)
     for i, table in enumerate(tables(result)):
         show_rows(f"{mechanism.name}\n{table.title}" if i == 0 and mechanism.name else table.title, *table[1:])
     for path in out:

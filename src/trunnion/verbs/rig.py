@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from trunnion.errors import Finding, MechanismError
+from trunnion.errors import Finding, MechanismError, counted
 from trunnion.options import File, FrictionLaw, Seats, Seed, Set, TableFile
 from trunnion.terminal import bar, console, say, show_rows, wrote
 from trunnion.verbs.inputs import tables_read
@@ -51,6 +51,7 @@ def rig(
     from trunnion.analysis.rig.virtual import observe
     from trunnion.analysis.rig.virtual_files import check_folder, check_form
     from trunnion.measured.rig_file import Rig
+    from trunnion.model.file import files_named
 
     if format_:
         check_form(format_)
@@ -62,7 +63,7 @@ def rig(
     with lines_of(file), _lines_of_rig(rig_file):
         count = len(stated_rig.schedule.rows())
         if out:
-            check_folder(stated_rig, out, format_ or "", [rig_file, file, *tables_read(table)])
+            check_folder(stated_rig, out, format_ or "", [rig_file, file, *tables_read(table), *files_named(file)])
         with bar("conditions", count, least=FEWEST) as progress:
             observation = observe(mechanism, stated_rig, seed, progress)
     found = list(observation.findings)
@@ -116,7 +117,7 @@ def _about(observation: Observation) -> None:
         observation.mechanism.name or "no name",
         f"{conditions} condition{'s' * (conditions != 1)} of {turns} cycle{'s' * (turns != 1)}",
         f"{observation.rate:g} samples a second",
-        f"{observation.rows:,} rows" + (f", at most {rows:,} a file" if conditions > 1 else ""),
+        counted(observation.rows, "row") + (f", at most {rows:,} a file" if conditions > 1 else ""),
     )
     out.print("; ".join(texts), markup=False, highlight=False, soft_wrap=True)
 
@@ -138,7 +139,7 @@ def _show_plan(observation: Observation) -> list[Finding]:
             "Efficiency to expect: of the model, with the expanded uncertainty U = 2 u of its measurement", head, rows
         )
         if len(told) > MOST_SHOWN:
-            console().print(f"{len(told) - MOST_SHOWN:,} conditions more", markup=False, highlight=False)
+            console().print(f"{counted(len(told) - MOST_SHOWN, 'condition')} more", markup=False, highlight=False)
     return list(found.findings)
 
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from trunnion.errors import Finding, MechanismError
-from trunnion.options import IMAGES, File, FrictionLaw, Out, Seats, Set, Steps, TableFile, UnitsRow, over, points
+from trunnion.errors import Finding, MechanismError, counted
+from trunnion.options import IMAGES, File, FrictionLaw, Out, Seats, Set, Steps, TableFile, Uncut, UnitsRow, over, points
 from trunnion.output import folder
 from trunnion.terminal import bar, console, findings_of, say, show_rows, wrote
 from trunnion.verbs.model import exit_status, lines_of, placed, stated
@@ -33,7 +33,7 @@ Drawn = Annotated[
     list[str] | None,
     typer.Option(
         "--measure",
-        help="What is shown, by its name in the CSV file: A.effort_max. Repeatable; efficiency if not given.",
+        help="What is shown, by its name in the CSV file: A.effort_max, or a measure of the model. Repeatable.",
         show_default=False,
     ),
 ]
@@ -70,6 +70,7 @@ def sweep(
     out: Out = None,
     image: Picture = "png",
     units_row: UnitsRow = False,
+    uncut: Uncut = False,
 ) -> None:
     """How efficiency, drive effort, reactions, friction and locking margin change with numbers of the model."""
     from trunnion.analysis.sweep import sweep as run
@@ -79,11 +80,12 @@ def sweep(
     measures = list(dict.fromkeys(measure or ["efficiency"]))
     _check_figures(grid, x or "", family or "", kind)
     files = _files(out or [], measures, image)
-    mechanism = stated(file, set_, table, friction, seat)
-    check_measure(measures, mechanism)
+    mechanism = stated(file, set_, table, friction, seat, {name: values[0] for name, values in grid.items()})
+    own = check_measure(measures, mechanism)
     with lines_of(file), bar("points", points(grid)) as progress:
-        result = run(mechanism, grid, steps, progress=progress, margin=margin or "locking_margin" in measures)
-    _write(result, out or [], files, (x or "", family or "", kind), units_row)
+        margin = margin or "locking_margin" in measures
+        result = run(mechanism, grid, steps, progress=progress, margin=margin, measures=own)
+    _write(result, out or [], files, (x or "", family or "", kind), units_row, uncut)
     _show(result, mechanism, file, measures, x or "", family or "")
     say(placed(findings_of(result), file, ["assembly"]))
     for path in files:
@@ -136,8 +138,9 @@ def _plain(name: str) -> str:
 
 
 def _write(
-    result: xr.Dataset, out: Sequence[Path], files: Mapping[Path, str], drawn: tuple[str, str, str], units_row: bool
-) -> None:
+    result: xr.Dataset, out: Sequence[Path], files: Mapping[Path, str], drawn: tuple[str, str, str], units_row: bool,
+    uncut: bool,
+) -> None:  # fmt: skip
     from trunnion.export import save
 
     for path, measure in files.items():
@@ -145,11 +148,12 @@ def _write(
             save(result, path, units_row)
             continue
         from trunnion.views import plots
+        from trunnion.views.peaks import whole_peaks
         from trunnion.views.sweep import figure
 
         if path not in out:  # but in a folder of figures
             folder(path.parent)
-        plots.save(figure(result, measure, *drawn), path)
+        plots.save(figure(whole_peaks(result, uncut), measure, *drawn), path)
 
 
 def _show(result: xr.Dataset, mechanism: Mechanism, file: Path, measures: Sequence[str], x: str, family: str) -> None:
@@ -161,4 +165,4 @@ def _show(result: xr.Dataset, mechanism: Mechanism, file: Path, measures: Sequen
         show_rows(f"{mechanism.name or file}\n{one.title}" if k == 0 else one.title, one.head, one.rows)
     left_out = sum(one.left_out for one in shown) // (len(measures) if len(shown) > 1 else 1)
     if left_out:
-        console().print(f"{left_out:,} points more; --out FILE.csv has all", markup=False, highlight=False)
+        console().print(f"{counted(left_out, 'point')} more; --out FILE.csv has all", markup=False, highlight=False)

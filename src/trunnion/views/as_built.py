@@ -165,7 +165,7 @@ def seated(result: xr.Dataset) -> list[Seats]:
 def continued(beta: Array, xi: Array) -> tuple[Array, Array]:
     """β and ξ without the seam of their description, in which (β, ξ) and (β − 2π, ξ + π) are the same seat.
 
-    β stays as near as it can to the position before; ξ in (−π, π].
+    β stays as near as it can to the position before, within a turn to either side; ξ in (−π, π].
     """
     turns = np.zeros(beta.size)
     known = np.flatnonzero(np.isfinite(beta))
@@ -173,6 +173,8 @@ def continued(beta: Array, xi: Array) -> tuple[Array, Array]:
     usual = float(np.median((beta + 2 * np.pi * turns)[known])) if known.size else 0.0
     middle = np.ceil((usual - 1.5 * np.pi) / (2 * np.pi))  # crossed ends, ±π, are shown at π
     turns = turns - middle
+    whole = (beta + 2 * np.pi * turns) / (2 * np.pi)  # an end that goes round and round starts anew after each turn
+    turns = turns - np.where(np.abs(whole) > 1.0 + 1e-9, np.sign(whole) * np.ceil(np.abs(whole) - 1.0 - 1e-9), 0.0)
     turned = xi - np.pi * turns
     return beta + 2 * np.pi * turns, turned - 2 * np.pi * np.ceil((turned - np.pi) / (2 * np.pi))
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from trunnion.views.as_built import angle_scale, losses, outputs, worst_points
-from trunnion.views.cycle import Abscissa, Array, abscissa, attribute, column, names
+from trunnion.views.cycle import Abscissa, Array, abscissa, attribute, column, mean_friction, names, valid
 from trunnion.views.quantities import number, quantity
 
 if TYPE_CHECKING:
@@ -25,9 +25,13 @@ def error_rows(result: xr.Dataset) -> list[Row]:
         return []
     over = abscissa(result)
     rows = [
-        _error(f"Error of place of {key}, largest", error, "m", over) for key, error in worst_points(result).items()
+        _error(f"Error of place of {key}, largest", valid(result, error), "m", over)
+        for key, error in worst_points(result).items()
     ]
-    rows += [_error(f"Transmission error, {one.label}, largest", one.error, one.unit, over) for one in outputs(result)]
+    rows += [
+        _error(f"Transmission error, {one.label}, largest", valid(result, one.error), one.unit, over)
+        for one in outputs(result)
+    ]
     units = attribute(result, "driver_units", [])
     for index, driver in enumerate(names(result, "driver")):
         unit = units[index] if index < len(units) else "N m"
@@ -60,7 +64,10 @@ def _change(result: xr.Dataset, name: str, dim: str, member: str, label: str, un
     built, change = column(result, name, **{dim: member}), column(result, f"{name}_change", **{dim: member})
     if built is None or change is None or not np.isfinite(built).any():
         return _row(label, "—", "—", "—")
-    sizes = [np.abs(one) if one.ndim == 1 else np.linalg.norm(one, axis=0) for one in (built, built - change)]
+    columns = (built, built - change)
+    sizes = [valid(result, np.abs(one) if one.ndim == 1 else np.linalg.norm(one, axis=0)) for one in columns]
+    if not np.isfinite(sizes[0]).any():
+        return _row(label, "—", "—", "—")
     index = int(np.nanargmax(sizes[0]))
     most = [float(np.nanmax(size)) if np.isfinite(size).any() else float("nan") for size in sizes]
     return _row(
@@ -73,12 +80,10 @@ def _signed(value: float, unit: str) -> str:
 
 
 def _mean_friction(result: xr.Dataset) -> Row:
-    built = np.asarray(result["friction_power"].sum("joint", skipna=False).values, dtype=float)
-    ideal = built - np.asarray(result["friction_power_change"].sum("joint", skipna=False).values, dtype=float)
-    known = np.isfinite(built) & np.isfinite(ideal)
-    if not known.any():
+    joints = names(result, "joint")
+    one, two = (sum(mean_friction(result, joint, of) for joint in joints) for of in ("", "_ideal"))
+    if not np.isfinite([one, two]).all():
         return _row("Friction power, mean", "—", "—", "—")
-    one, two = float(built[known].mean()), float(ideal[known].mean())
     return _row("Friction power, mean", quantity(one, "W"), quantity(two, "W"), _signed(one - two, "W"))
 
 

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
-    "Abscissa", "Interval", "abscissa", "attribute", "intervals", "layout", "numbers", "series", "status_text", "thin",
-    "usual_peak",
+    "Abscissa", "Interval", "abscissa", "attribute", "intervals", "layout", "mean_friction", "numbers", "series",
+    "status_text", "thin", "valid",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -179,18 +179,25 @@ def intervals(result: xr.Dataset, lowest: int = Status.NOT_CONVERGED) -> list[In
     return [run for run in runs if run.status >= lowest]
 
 
-def usual_peak(*columns: Array | None) -> float:
-    """The magnitude a figure should show: the greatest, unless it towers over nearly all the rest.
+def valid(result: xr.Dataset, values: Array) -> Array:
+    """A column, NaN at positions that are not valid, for a pin loses contact there."""
+    status = column(result, "status")
+    return values if status is None else np.where(status == Status.CONTACT_LOST, np.nan, values)
 
-    Next to a dead centre forces grow without bound and would flatten everything else; then it is four times the
-    magnitude that 90 % of the values stay below, and the figure says what it leaves out.
+
+def mean_friction(result: xr.Dataset, joint: str, of: str = "") -> float:
+    """Mean friction power of a joint, W; of: "_ideal" of the mechanism without errors. NaN where there is no answer.
+
+    A result that was written before there were such means has that of its positions.
     """
-    finite = [np.abs(values[np.isfinite(values)]).ravel() for values in columns if values is not None]
-    sizes = np.concatenate(finite) if finite else np.empty(0)
-    if not sizes.size:
-        return 0.0
-    most, usual = float(sizes.max()), float(np.quantile(sizes, 0.9))
-    return 4.0 * usual if 0.0 < usual < most / 16.0 else most
+    told = column(result, f"friction_power_mean{of}", joint=joint)
+    if told is not None:
+        return float(told)
+    values = column(result, "friction_power", joint=joint)
+    if of and values is not None:
+        change = column(result, "friction_power_change", joint=joint)
+        values = None if change is None else values - change
+    return float("nan") if values is None or not np.isfinite(values).any() else float(np.nanmean(values))
 
 
 def thin(values: Array, most: int = 4000) -> NDArray[np.intp]:

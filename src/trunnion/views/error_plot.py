@@ -9,9 +9,10 @@ import numpy as np
 from trunnion.analysis.play import play
 from trunnion.errors import MechanismError
 from trunnion.views.as_built import Output, angle_scale, has, losses, need, outputs, point_errors, worst_points
-from trunnion.views.cycle import Abscissa, Array, abscissa, column, names, usual_peak
+from trunnion.views.cycle import Abscissa, Array, abscissa, column, names
 from trunnion.views.figures import along, curve, frame_peak, legend, new, shade, style_of
 from trunnion.views.lettering import plain
+from trunnion.views.peaks import ease, usual_peak
 from trunnion.views.quantities import prefixed
 
 if TYPE_CHECKING:
@@ -83,7 +84,7 @@ def error(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
 def _places(axes: Axes, result: xr.Dataset, over: Abscissa) -> None:
     """Sizes of the errors of place of the worst points."""
     every, worst = point_errors(result), worst_points(result)
-    scope = usual_peak(*every.values())
+    scope = usual_peak(ease(result), *every.values())
     factor, unit = prefixed(scope, "m")
     along(axes, over, f"error of place [{unit or 'm'}]")
     shade(axes, result, over)
@@ -97,7 +98,7 @@ def _transmission(axes: Axes, result: xr.Dataset, over: Abscissa, found: list[Ou
     """Errors of one unit, each with its worst case if that is known."""
     bands = {one.joint: _band(result, one.joint) for one in found}
     edges = [edge for band in bands.values() for edge in band]
-    scope = usual_peak(*[one.error for one in found], *edges)
+    scope = usual_peak(ease(result), *[one.error for one in found], *edges)
     factor, unit = angle_scale(scope) if found[0].unit == "rad" else prefixed(scope, "m")
     noun = "rotation" if found[0].unit == "rad" else "slide"
     along(axes, over, f"transmission error,\n{noun} [{unit}]")

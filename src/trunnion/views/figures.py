@@ -12,6 +12,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.ticker import AutoMinorLocator, MaxNLocator, MultipleLocator
 
+from trunnion.errors import Status
 from trunnion.views.cycle import Abscissa, Array, intervals, thin
 from trunnion.views.lettering import Sheet, plain
 from trunnion.views.quantities import quantity
@@ -110,12 +111,17 @@ def curve(axes: Axes, over: Abscissa, values: Array, label: str | None, *, close
 
 
 def shade(axes: Axes, result: xr.Dataset, over: Abscissa) -> None:
-    """Grey where positions have no answer, with the cause written once for each cause."""
+    """Grey where positions have no answer, with the cause written once for each cause; hatched where one is not valid,
+    for a pin loses contact."""
     runs = intervals(result)
-    if not runs:
-        return
+    lost = [run for run in intervals(result, Status.CONTACT_LOST) if run.status == Status.CONTACT_LOST]
     x = over.values
     half = abs(float(x[1] - x[0])) / 2 if x.size > 1 else 0.5
+    for run in lost:
+        low, high = sorted((float(x[run.start]), float(x[run.stop - 1])))
+        axes.axvspan(low - half, high + half, facecolor="none", edgecolor=SHADE, hatch="////", linewidth=0, zorder=0.5)
+    if lost:
+        _write_cause(axes, float(x[lost[0].start]), "not valid")
     said: set[str] = set()
     for run in runs:
         low, high = sorted((float(x[run.start]), float(x[run.stop - 1])))
@@ -136,7 +142,10 @@ def _write_cause(axes: Axes, x: float, text: str) -> None:
 
 
 def frame_peak(axes: Axes, most: float, shown: float, factor: float, unit: str) -> None:
-    """Cut the vertical axis at `shown` where the curves rise far above it to `most`, and say so in the frame."""
+    """Cut the vertical axis at `shown` where the curves rise far above it to `most`, and say so in the frame.
+
+    shown: of `peaks.usual_peak`.
+    """
     if shown >= most:
         return
     low, high, room = axes.dataLim.y0, axes.dataLim.y1, 1.05
@@ -145,7 +154,7 @@ def frame_peak(axes: Axes, most: float, shown: float, factor: float, unit: str) 
 
 
 def outside(axes: Axes, most: float, unit: str) -> None:
-    text = f"peak {quantity(most, unit)} lies outside"
+    text = f"peak {quantity(most, unit)} lies outside,\nnear a dead centre; --uncut shows it"
     box = {"boxstyle": "round,pad=0.2", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
     axes.text(0.99, 0.97, text, transform=axes.transAxes, ha="right", va="top", fontsize=8, color=MUTED, bbox=box)
 

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from trunnion.analysis.play_result import relied_on
-from trunnion.views.cycle import Abscissa, Array, thin, usual_peak
+from trunnion.views.cycle import Abscissa, Array, thin
 from trunnion.views.figures import INK, PALETTE, along, frame_peak, legend, new, shade
 from trunnion.views.lettering import plain
+from trunnion.views.peaks import ease, usual_peak
 from trunnion.views.quantities import prefixed, quantity
 
 if TYPE_CHECKING:
@@ -42,7 +43,7 @@ def figure(result: xr.Dataset) -> Figure:
 
 def _panel(axes: Axes, result: xr.Dataset, over: Abscissa, name: str, unit: str, limit: float | None) -> None:
     rows, total, rss = (result[key].values for key in ("worst_case", "worst_case_total", "rss"))
-    most, shown = float(np.nanmax(total, initial=0.0)), usual_peak(total)
+    most, shown = float(np.nanmax(total, initial=0.0)), usual_peak(ease(result), total)
     factor, label = prefixed(shown, unit)
     along(axes, over, plain(f"worst case of {name} [{label}]"))
     picked = thin(total)

@@ -25,10 +25,10 @@ from trunnion.views.cycle import (
     attribute,
     column,
     layout,
+    mean_friction,
     names,
     status_text,
     thin,
-    usual_peak,
 )
 from trunnion.views.drawing import draw, picture
 from trunnion.views.error_plot import error
@@ -48,6 +48,7 @@ from trunnion.views.figures import (
     style_of,
 )  # fmt: skip
 from trunnion.views.lettering import plain
+from trunnion.views.peaks import ease, peak, usual_peak
 from trunnion.views.quantities import prefixed, quantity
 from trunnion.views.seat_curves import beta, described
 from trunnion.views.seat_plot import seat
@@ -68,12 +69,6 @@ NOTE: dict[str, Any] = {"textcoords": "offset points", "fontsize": 7.5, "color":
 FREE: dict[str, Any] = {"color": INK, "linewidth": 0.9, "linestyle": (0, (3, 2))}  # without friction, among many curves
 
 
-def peak(*columns: Array | None) -> float:
-    """The greatest magnitude in all columns; 0 if none is finite."""
-    known = [np.abs(values[np.isfinite(values)]).max(initial=0.0) for values in columns if values is not None]
-    return float(max(known, default=0.0))
-
-
 def torque(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
     """Drive effort over the drive, one panel a driver; without friction dashed, its interval at zero slip as a band."""
     over, drivers = abscissa(result), names(result, "driver")
@@ -88,7 +83,8 @@ def torque(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
         free = None if ideal is None else column(ideal, "drive_effort", driver=driver)
         if effort is None:
             continue
-        scope = usual_peak(effort, free)
+        ends = [column(result, f"drive_effort_{end}", driver=driver) for end in ("lower", "upper")]
+        scope = usual_peak(ease(result), effort, free, *ends)
         factor, shown = prefixed(scope, unit)
         noun = "force" if unit == "N" else "torque"
         along(axes, over, f"{noun} {plain(driver)} [{shown}]")
@@ -98,7 +94,7 @@ def torque(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
         if free is not None:
             curve(axes, over, free * factor, "without friction", **FREE)
         _band(axes, result, over, driver, factor)
-        frame_peak(axes, peak(effort, free), scope, factor, unit)
+        frame_peak(axes, peak(effort, free, *ends), scope, factor, unit)
     _only_last_titled(list(panels))
     legend(panels[0])
     return figure
@@ -110,7 +106,7 @@ def _band(axes: Axes, result: xr.Dataset, over: Abscissa, driver: str, factor: f
     high = column(result, "drive_effort_upper", driver=driver)
     if low is None or high is None:
         return
-    wide = np.flatnonzero(high - low > 0.002 * usual_peak(low, high))  # narrower ones would not be seen
+    wide = np.flatnonzero(high - low > 0.002 * usual_peak(ease(result), low, high))  # narrower ones would not be seen
     if wide.size:
         x = over.values[wide]
         axes.vlines(x, low[wide] * factor, high[wide] * factor, color=PALETTE[0], alpha=0.35, linewidth=4.0,
@@ -128,7 +124,7 @@ def friction_power(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figur
     losses = {joint: column(result, "friction_power", joint=joint) for joint in joints}
     known = {joint: values for joint, values in losses.items() if values is not None and peak(values) > 0}
     total = np.sum(list(known.values()), axis=0) if known else np.zeros(over.values.size)
-    scope = usual_peak(total)
+    scope = usual_peak(ease(result), total)
     factor, unit = prefixed(scope, "W")
     figure = new("Friction power by joint", result)
     axes = figure.subplots()
@@ -136,18 +132,18 @@ def friction_power(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figur
     shade(axes, result, over)
     picked = thin(total)
     axes.fill_between(over.values[picked], 0, total[picked] * factor, color=SHADE, alpha=0.6, linewidth=0, zorder=1)
-    curve(axes, over, total * factor, f"all joints, {_mean(total)}", color=INK, linewidth=1.8)
+    means = {joint: mean_friction(result, joint) for joint in known}
+    curve(axes, over, total * factor, f"all joints, {_mean(sum(means.values()))}", color=INK, linewidth=1.8)
     for joint, values in known.items():
-        label = f"{joint}, {_mean(values)}"
+        label = f"{joint}, {_mean(means[joint])}"
         curve(axes, over, values * factor, label, **style_of(joints.index(joint)), linewidth=1.4)
     frame_peak(axes, peak(total), scope, factor, "W")
     legend(axes, most=3)
     return figure
 
 
-def _mean(values: Array) -> str:
-    known = values[np.isfinite(values)]
-    return f"mean {quantity(float(known.mean()), 'W')}" if known.size else "no answer"
+def _mean(value: float) -> str:
+    return f"mean {quantity(value, 'W')}" if np.isfinite(value) else "no answer"
 
 
 def _reaction(result: xr.Dataset, joint: str, plane: tuple[str, str] = ("x", "y")) -> Array:
@@ -169,7 +165,8 @@ def reactions(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
         return space_plots.reactions(*_sound(result, ideal), FREE)
     over, joints = abscissa(result), names(result, "joint")
     forces = [np.hypot(*_reaction(result, joint)) for joint in joints]
-    scope = usual_peak(*forces)
+    free = [] if ideal is None else [np.hypot(*_reaction(ideal, joint)) for joint in joints]
+    scope = usual_peak(ease(result), *forces, *free)
     factor, unit = prefixed(scope, "N")
     figure = new("Joint reactions", result)
     axes = figure.subplots()
@@ -177,11 +174,9 @@ def reactions(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
     shade(axes, result, over)
     for index, (joint, force) in enumerate(zip(joints, forces, strict=True)):
         curve(axes, over, force * factor, joint, **style_of(index))
-    if ideal is not None:
-        for index, joint in enumerate(joints):
-            free = np.hypot(*_reaction(ideal, joint))
-            curve(axes, over, free * factor, "without friction" if index == 0 else None, **FREE)
-    frame_peak(axes, peak(*forces), scope, factor, "N")
+    for index, force in enumerate(free):
+        curve(axes, over, force * factor, "without friction" if index == 0 else None, **FREE)
+    frame_peak(axes, peak(*forces, *free), scope, factor, "N")
     legend(axes)
     return figure
 
@@ -194,6 +189,7 @@ def polar(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
     over, joints = abscissa(result), names(result, "joint")
     planes = space_plots.PLANES if is_spatial(result) else (("x", "y"),)
     result, ideal = _sound(result, ideal)
+    easy = ease(result)
     panels = [(index, joint, plane) for index, joint in enumerate(joints) for plane in planes]
     columns = min(len(panels), 2 if len(panels) in (2, 4) else 3) or 1
     rows = -(-len(panels) // columns) or 1
@@ -204,9 +200,8 @@ def polar(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
     for axes, (index, joint, plane) in zip(grid, panels, strict=False):
         free = None if ideal is None else _reaction(ideal, joint, plane)
         colour = PALETTE[index % len(PALETTE)]
-        _hodograph(
-            axes, over, joint if plane == planes[0] else "", plane, _reaction(result, joint, plane), free, colour
-        )
+        title, force = joint if plane == planes[0] else "", _reaction(result, joint, plane)
+        _hodograph(axes, over, title, plane, force, free, colour, easy)
     if ideal is not None:
         lines = [Line2D([], [], color=PALETTE[0], linewidth=1.6), Line2D([], [], **FREE)]
         figure.legend(lines, ["with friction", "without friction"], loc="upper right", ncols=2, frameon=False,
@@ -215,10 +210,11 @@ def polar(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
 
 
 def _hodograph(
-    axes: Axes, over: Abscissa, joint: str, plane: tuple[str, str], force: Array, free: Array | None, colour: str
-) -> None:
+    axes: Axes, over: Abscissa, joint: str, plane: tuple[str, str], force: Array, free: Array | None, colour: str,
+    easy: Array,
+) -> None:  # fmt: skip
     sizes = [np.hypot(*vector) for vector in (force, free) if vector is not None]
-    scope = usual_peak(*sizes)
+    scope = usual_peak(easy, *sizes)
     factor, unit = prefixed(scope, "N")
     dress(axes, f"F{plane[0]} [{unit}]", f"F{plane[1]} [{unit}]")
     axes.set_title(plain(joint), fontsize=10, fontweight="bold", color=INK, loc="left")
@@ -316,7 +312,7 @@ def power(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
     lost = np.asarray(result["friction_power"].sum("joint", skipna=False).values, dtype=float)
     useful = np.zeros_like(lost) if useful is None else useful
     rest = drive - useful - lost
-    scope = usual_peak(drive, useful, lost)
+    scope = usual_peak(ease(result), drive, useful, lost, rest)
     factor, unit = prefixed(scope, "W")
     figure = new("Power over the run", result)
     axes = figure.subplots()
@@ -328,7 +324,7 @@ def power(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
     if peak(rest) > 1e-9 * peak(drive, useful, lost):
         label = "masses, springs and other loads" if "spring" in result.dims else "masses and other loads"
         curve(axes, over, rest * factor, label, color=MUTED, linestyle=(0, (2, 1.5)), linewidth=1.2)
-    frame_peak(axes, peak(drive, useful, lost), scope, factor, "W")
+    frame_peak(axes, peak(drive, useful, lost, rest), scope, factor, "W")
     legend(axes)
     return figure
 
@@ -367,7 +363,7 @@ def _rates(
     for order, axes in enumerate(panels):
         name = variable + ("", "_velocity", "_acceleration")[order]
         columns = {member: column(result, name, **{dim: member}) for member in members}
-        scope = usual_peak(*columns.values())
+        scope = usual_peak(ease(result), *columns.values())
         scale, shown = prefixed(scope, unit) if order == 0 or unit == "m" else (1.0, unit)
         title = noun if order == 0 else ("velocity", "acceleration")[order - 1]
         rate = ("", "/s", "/s²")[order]

@@ -41,6 +41,7 @@ BALANCE = (
     ("condition", "Condition number", "1", "how strongly forces and speeds answer to the dimensions"),
     ("friction_iterations", "Friction iterations", "1", "rounds until reactions and friction agree"),
     ("friction_contraction", "Contraction", "1", "share of the error that a round leaves; below 1 it converges"),
+    ("friction_residual", "Friction residual", "N", "largest difference between a friction and its law"),
     ("friction_change", "Last change", "N", "change of the reactions in the last round"),
 )
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from trunnion.views.as_built import losses
 from trunnion.views.built_scene import built
 from trunnion.views.cycle import abscissa, attribute, column, intervals, layout, names, numbers, series
+from trunnion.views.peaks import ease
 from trunnion.views.space import is_spatial, without_noise
 from trunnion.views.space_scene import space_scene
 
@@ -24,7 +25,7 @@ __all__ = ["scene"]
 
 FORMAT = 1
 SUMS = ("useful_power", "efficiency_instant", "closure_residual", "condition", "power_residual",
-        "friction_iterations", "friction_change", "friction_contraction")  # fmt: skip
+        "friction_iterations", "friction_change", "friction_residual", "friction_contraction")  # fmt: skip
 
 
 def scene(result: xr.Dataset, ideal: xr.Dataset | None = None, max_positions: int = 720) -> dict[str, Any]:
@@ -53,6 +54,7 @@ def scene(result: xr.Dataset, ideal: xr.Dataset | None = None, max_positions: in
                      "values": numbers(over.values[picked])},
         "time": series(column(kept, "time")),
         "status": [int(code) for code in kept["status"].values],
+        "ease": series(ease(result)[picked]),
         "states": {str(run.status): run.text for run in intervals(kept, 0)},
         "gaps": [{"from": over.say(int(run.start)), "to": over.say(int(run.stop) - 1), "text": run.text}
                  for run in intervals(result)],

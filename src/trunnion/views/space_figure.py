@@ -10,10 +10,11 @@ from matplotlib.patches import FancyArrowPatch
 from matplotlib.patheffects import Normal, Stroke
 
 from trunnion.errors import Finding, MechanismError, Status
-from trunnion.views.cycle import Array, abscissa, column, status_text, usual_peak
+from trunnion.views.cycle import Array, abscissa, column, status_text
 from trunnion.views.drawing import PALE
 from trunnion.views.figures import INK, MUTED, PALETTE, new
 from trunnion.views.lettering import plain
+from trunnion.views.peaks import ease, usual_peak
 from trunnion.views.quantities import prefixed
 from trunnion.views.space import Space, space, without_noise
 from trunnion.views.space_camera import Camera, best, looking
@@ -130,7 +131,7 @@ def _telling(result: xr.Dataset, shown: Space) -> int:
     forces = column(result, "reaction_force")
     if forces is not None and forces.size:
         sizes = np.linalg.norm(forces, axis=1)
-        most = usual_peak(sizes)
+        most = usual_peak(ease(result), sizes)
         each = np.where(np.isfinite(sizes) & (sizes <= most * (1 + 1e-12)), sizes, -1.0).max(axis=0)[known]
         if most > 0 and each.max() > 0 and np.ptp(each) > 1e-6 * most:
             return int(known[each.argmax()])

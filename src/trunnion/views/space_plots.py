@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from trunnion.views.cycle import Abscissa, Array, abscissa, column, layout, names, usual_peak
+from trunnion.views.cycle import Abscissa, Array, abscissa, column, layout, names
 from trunnion.views.figures import along, curve, frame_peak, legend, new, shade, style_of
 from trunnion.views.lettering import plain
+from trunnion.views.peaks import ease, usual_peak
 from trunnion.views.quantities import prefixed
 from trunnion.views.space import NOISE
 
@@ -46,18 +47,18 @@ def reactions(result: xr.Dataset, ideal: xr.Dataset | None, free: dict[str, Any]
         panels, ("reaction_force", "reaction_moment"), ("N", "N m"), ("force", "moment"), strict=True
     ):
         columns = {joint: _sizes(result, variable, "joint", joint) for joint in joints}
-        scope = usual_peak(*columns.values())
+        others = {} if ideal is None else {joint: _sizes(ideal, variable, "joint", joint) for joint in joints}
+        scope = usual_peak(ease(result), *columns.values(), *others.values())
         factor, shown = prefixed(scope, unit)
         along(axes, over, f"{what} of the reaction [{shown}]")
         shade(axes, result, over)
         for index, (joint, values) in enumerate(columns.items()):
             if values is not None:
                 curve(axes, over, values * factor, joint, **style_of(index))
-        for index, joint in enumerate(joints if ideal is not None else []):
-            values = _sizes(ideal, variable, "joint", joint) if ideal is not None else None
+        for index, values in enumerate(others.values()):
             if values is not None:
                 curve(axes, over, values * factor, "without friction" if index == 0 else None, **free)
-        frame_peak(axes, _peak(columns), scope, factor, unit)
+        frame_peak(axes, max(_peak(columns), _peak(others)), scope, factor, unit)
     panels[0].set_xlabel("")
     legend(panels[0])
     return figure
@@ -157,7 +158,7 @@ def _rates(panels: list[Axes], result: xr.Dataset, over: Abscissa, noun: str, un
     members = _without_noise(members)
     for order, axes in enumerate(panels):
         columns = {name: values[order] for name, values in members.items()}
-        scope = usual_peak(*columns.values())
+        scope = usual_peak(ease(result), *columns.values())
         scale, shown = prefixed(scope, unit) if order == 0 or unit == "m" else (1.0, unit)
         rates = ("angular velocity", "angular acceleration") if link else ("velocity", "acceleration")
         title = noun if order == 0 else rates[order - 1]

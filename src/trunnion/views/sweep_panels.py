@@ -13,10 +13,11 @@ from matplotlib.ticker import NullLocator, ScalarFormatter
 from numpy.typing import NDArray
 
 from trunnion.views.as_built import angle_scale
-from trunnion.views.cycle import Array, usual_peak
+from trunnion.views.cycle import Array
 from trunnion.views.error_plot import LOST
 from trunnion.views.figures import INK, MUTED, dress, legend, new
 from trunnion.views.lettering import plain
+from trunnion.views.peaks import ease_of_status, usual_peak
 from trunnion.views.quantities import prefixed
 from trunnion.views.swept import Arrangement, Scale, arrange, grid, meaning, statuses, thinned, written
 
@@ -121,7 +122,7 @@ def field(result: xr.Dataset, measure: str, x: str = "", family: str = "") -> Fi
 
     values, status = panelled(values), panelled(statuses(result, plan))
     ideal = None if ideal is None else panelled(ideal)
-    scope = usual_peak(values, ideal)
+    scope = usual_peak(ease_of_status(result, status), values, ideal)
     factor, shown = angle_scale(scope) if unit == "rad" else prefixed(scope, unit)
     named = [", ".join(one.told(i) for one, i in zip(plan.facets, place, strict=True)) for place in places]
     columns = len({place[-1] for place in places}) if len(plan.facets) == 2 else 0

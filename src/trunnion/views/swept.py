@@ -173,8 +173,11 @@ def thinned(count: int, most: int) -> list[int]:
 # ---- in words -------------------------------------------------------------------------------------------------
 
 
-def check_measure(names: str | Iterable[str], mechanism: Mechanism) -> None:
-    """MechanismError with the nearest name if a sweep of a mechanism has no such figure."""
+def check_measure(names: str | Iterable[str], mechanism: Mechanism) -> list[str]:
+    """Those of the names that are of measures of the model, or written as one is, and not of figures of every sweep.
+
+    MechanismError with the nearest name, and the measures there are, if a name is neither.
+    """
     members = {"driver": list(mechanism.drivers), "joint": list(mechanism.effective_joints)}
     known = [
         f"{member}.{key.removeprefix('drive_')}" if one.dims else key
@@ -182,9 +185,15 @@ def check_measure(names: str | Iterable[str], mechanism: Mechanism) -> None:
         for member in (members[one.dims[0]] if one.dims else [""])
         if key != "status"
     ]
+    own = []
     for name in [names] if isinstance(names, str) else names:
-        if name not in known:
-            raise MechanismError(Finding(f"there is no figure '{name}'", "--measure", nearest(name, known)))
+        if name in mechanism.measures or (":" in name and name not in known):
+            own.append(name)
+        elif name not in known:
+            remedy = nearest(name, [*known, *mechanism.measures])
+            there = f"; the model's measures are {', '.join(mechanism.measures)}" if mechanism.measures else ""
+            raise MechanismError(Finding(f"there is no figure or measure '{name}'", "--measure", f"{remedy}{there}"))
+    return own
 
 
 def meaning(name: str, unit: str) -> str:

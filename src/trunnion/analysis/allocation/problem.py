@@ -20,7 +20,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.errors import Finding, MechanismError
+from trunnion.errors import Finding, MechanismError, agreeing
 from trunnion.statistics.costs import Cost
 
 __all__ = ["CRITERIA", "Answer", "Contribution", "Criterion", "Effects", "Option", "Problem", "Sampled", "Trial"]
@@ -282,7 +282,8 @@ def shortfalls(problem: Problem, least: Array) -> list[Finding]:
         over = [row for row in rows if used[row] > 1 + ALLOWED]
         if over:
             places, broken = (len({effects.place(row) for row in some}) for some in (rows, over))
-            more = f"; {broken} of {places} positions are beyond their limits" if places > 1 else ""
+            beyond = agreeing(broken, "is beyond its", "are beyond their")
+            more = f"; {broken} of {places} positions {beyond} limits" if places > 1 else ""
             found.append(_shortfall(problem, least, max(over, key=lambda row: used[row]), more))
     return found
 

@@ -20,7 +20,7 @@ from trunnion.errors import Finding, MechanismError, Status
 from trunnion.measured.measurement import Condition
 from trunnion.model.mechanism import Mechanism
 
-__all__ = ["Modelled", "measure_of", "modelled", "prepared"]
+__all__ = ["Modelled", "measure_of", "modelled", "prepared", "told_at"]
 
 Array = NDArray[np.float64]
 SLOWER = 0.01  # of the duration of a cycle: a machine that keeps time runs no farther off
@@ -45,8 +45,8 @@ class Modelled:
     @property
     def sound(self) -> NDArray[np.bool_]:
         """Positions whose forces can be relied on; all that are solved if there are no such."""
-        best = (self.status == Status.SOLVED) | (self.status == Status.CONTACT_LOST)
-        return best if np.any(best) else self.status < Status.NOT_CONVERGED
+        best = self.status == Status.SOLVED
+        return best if np.any(best) else self.status < Status.CONTACT_LOST
 
     def comparable(self, channel: str) -> NDArray[np.bool_]:
         """Positions at which the model has one number for a channel.
@@ -66,11 +66,18 @@ def measure_of(mechanism: Mechanism, run: Run, channel: str, name: str) -> Measu
         raise MechanismError([replace(one, where=where) for one in error.findings]) from None
     kind = MEASURES[measure.kind]
     course = kind.rule == "deviation" or (measure.kind == "efficiency" and measure.subject == "instant")
-    if measure.statistic or kind.against or not course or measure.of_attitude(run.system):
-        what = f"'{name}' is no number of a single position"
+    if not measure.everywhere or kind.against or not course or measure.of_attitude(run.system):
+        what = f"'{name}' is no number of a single position" + told_at(measure)
         remedy = "a channel measures such as effort:DRIVER, rate:JOINT, load:LOAD, rotation:JOINT or link.point.x"
         raise MechanismError(Finding(what, where, remedy))
     return measure
+
+
+def told_at(measure: Measure) -> str:
+    """What a measure of the model states that no sensor follows; empty if it is of every position."""
+    if measure.everywhere:
+        return ""
+    return f": the model takes it {f'as {measure.statistic}' if measure.statistic else 'at a place or over a range'}"
 
 
 def modelled(

@@ -15,9 +15,10 @@ import numpy as np
 from trunnion.analysis.account import inputs, model_notes
 from trunnion.analysis.rig.causes import KINDS, Cause
 from trunnion.analysis.rig.judge import Verdict, going_on
-from trunnion.errors import Finding, Severity, Status
+from trunnion.errors import Finding, Severity, Status, counted
 from trunnion.model.expression import LITERAL
 from trunnion.model.mechanism import Mechanism
+from trunnion.model.names import as_key
 from trunnion.model.units import unit as unit_of
 
 if TYPE_CHECKING:
@@ -109,7 +110,7 @@ def _in(names: Sequence[str], of: int) -> str:
     if len(names) == of:
         return "in every condition" if of > 1 else f"in {names[0]}"
     first = "; ".join(names[:3]) + ("; …" if len(names) > 3 else "")
-    return f"in {len(names)} of {of} conditions ({first})"
+    return f"in {len(names)} of {counted(of, 'condition')} ({first})"
 
 
 def _cases(name: str, found: Sequence[Compared]) -> list[tuple[Compared, Pair]]:
@@ -341,8 +342,9 @@ def other_speed(driver: str, rows: Sequence[tuple[str, float, float]], of: int) 
             f"the driver did not turn at the model's speed {_in([row[0] for row in off], of)}: "
             f"{said(measured, 'rad/s')} measured, {said(theirs, 'rad/s')} in the model"
         )
-        remedy = f"state set: {{{driver}.speed: {{mean: …}}}} in the mapping, of a channel that measures rate:{driver}"
-        yield Finding(what, f"drivers.{driver}", remedy, Severity.WARNING)
+        key, where = as_key(f"{driver}.speed"), f"drivers.{driver}"
+        remedy = f"state set: {{{key}: {{mean: …}}}} in the mapping, of a channel that measures rate:{driver}"
+        yield Finding(what, where, remedy, Severity.WARNING)
 
 
 def _answers(found: Sequence[Compared]) -> Iterator[Finding]:
@@ -356,7 +358,7 @@ def _answers(found: Sequence[Compared]) -> Iterator[Finding]:
             first, count = cases[0]
             where = _in([one.condition.name for one, _ in cases], len(found))
             size = len(first.condition.phase)
-            what = f"the model has no answer {where}, first at {count:,} of {size:,} positions: {code.text}"
+            what = f"the model has no answer {where}, first at {count:,} of {counted(size, 'position')}: {code.text}"
             values = " ".join(f"--set {name}={value:.6g}" for name, value in first.condition.values.items())
             yield Finding(what, "", f"run analyse {values}".rstrip() + ": it says where in the cycle, and why")
 

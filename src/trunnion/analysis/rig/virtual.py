@@ -260,7 +260,11 @@ def observe(
     findings = tuple(findings_of(cases, channels, rig))
     sound = tuple(case for case in cases if case.worst.solved)
     if not sound:
-        what = f"none of the {len(rows)} conditions can be measured"
+        what = (
+            f"none of the {len(rows)} conditions can be measured"
+            if len(rows) > 1
+            else "the condition cannot be measured"
+        )
         remedy = "take conditions in which the model has an answer at every position"
         raise MechanismError([*findings, Finding(what, "schedule", remedy)])
     if any(one.severity is Severity.ERROR for one in findings):

@@ -11,10 +11,11 @@ import numpy as np
 
 from trunnion.analysis.analyse import Run
 from trunnion.analysis.measures import MEASURES, Measure, named
+from trunnion.analysis.rig.modelled import told_at
 from trunnion.analysis.rig.virtual_courses import Sampled, cycle_efficiency, sampled
 from trunnion.analysis.rig.virtual_faults import misfits
 from trunnion.analysis.rig.virtual_sensors import Channel, resolved
-from trunnion.errors import Finding, MechanismError, Severity, Status
+from trunnion.errors import Finding, MechanismError, Severity, Status, counted
 from trunnion.measured.rig_file import Rig, Value
 
 __all__ = ["Case", "case_names", "case_of", "channels_of", "findings_of", "measures_of", "placed_at", "speed_differs"]
@@ -116,8 +117,8 @@ def measures_of(rig: Rig, run: Run) -> list[Measure]:
         except MechanismError as error:
             findings += [replace(one, where=where) for one in error.findings]
             continue
-        if measure.statistic or measure.kind not in SINGLE or measure.of_attitude(run.system):
-            what = f"'{sensor.measures}' is no number that a sensor shows at every instant"
+        if not measure.everywhere or measure.kind not in SINGLE or measure.of_attitude(run.system):
+            what = f"'{sensor.measures}' is no number that a sensor shows at every instant{told_at(measure)}"
             remedy = "write effort:DRIVER, rate:JOINT, load:LOAD, rotation:JOINT, slide:JOINT or link.point.x"
             findings.append(Finding(what, where, remedy))
         found.append(measure)
@@ -214,7 +215,7 @@ def findings_of(cases: Sequence[Case], channels: Mapping[str, Channel], rig: Rig
             first = 360 * one.true.time[places[0]] / one.run.cycle.duration
             what = (
                 f"{_named(stopped)} left out: {status.text}; in condition {one.number} at {len(places)} of "
-                f"{len(one.true.status)} positions, first at {first:.4g}° of the cycle"
+                f"{counted(len(one.true.status), 'position')}, first at {first:.4g}° of the cycle"
             )
             remedy = "run analyse with these values: it says where in the cycle, and why; or do without"
             yield Finding(what, where, remedy, Severity.WARNING)
@@ -222,8 +223,8 @@ def findings_of(cases: Sequence[Case], channels: Mapping[str, Channel], rig: Rig
     if mended := [case for case in sound if case.true.mended]:
         most = max(case.true.mended for case in mended)
         what = (
-            f"{_named(mended)}: a load has no single value at up to {most} positions, its joint being at rest there; "
-            "sensors are given 0 in a rest, the mean of the neighbours at a single position"
+            f"{_named(mended)}: a load has no single value at up to {counted(most, 'position')}, its joint being at "
+            "rest there; sensors are given 0 in a rest, the mean of the neighbours at a single position"
         )
         yield Finding(what, where, "", Severity.NOTE)
     yield from _lost_pulses(sound, rig)

@@ -13,8 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.analysis import measure_courses as courses
-from trunnion.analysis.analyse import Run, status_of
+from trunnion.analysis.analyse import Run, positions, status_of
 from trunnion.analysis.friction import FrictionMethod
 from trunnion.analysis.kinetostatics import Backward
 from trunnion.analysis.measures import Measure
@@ -80,11 +79,7 @@ def _back(run: Run, time: Array, method: FrictionMethod | None) -> Backward:
 
 def cycle_efficiency(run: Run) -> float:
     """Useful work over drive work of the cycle, of the model; NaN where the loads drive it."""
-    time = run.cycle.times(EFFICIENCY_STEPS)
-    back = _back(run, time, None)
-    powers = (np.broadcast_to(one, time.shape) for one in courses.efficiency("cycle", back))
-    useful, driven = (run.cycle.net(one) for one in powers)
-    return useful / driven if driven > 0 else float("nan")
+    return positions(run, EFFICIENCY_STEPS, margin=False).means.efficiency
 
 
 def _rests(gaps: NDArray[np.bool_], periodic: bool) -> NDArray[np.bool_]:

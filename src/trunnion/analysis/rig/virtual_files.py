@@ -6,10 +6,14 @@ says before any is written.
 
 from __future__ import annotations
 
+import errno
 import importlib.util
 import math
 import os
-from collections.abc import Callable, Iterable, Mapping
+import shutil
+import tempfile
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +25,7 @@ from trunnion import __version__
 from trunnion.analysis.rig.virtual_cases import Case, case_names, speed_differs
 from trunnion.errors import Finding, MechanismError
 from trunnion.measured.rig_file import FORMATS, Rig
-from trunnion.output import spare, whole
+from trunnion.output import spare
 
 if TYPE_CHECKING:
     from trunnion.analysis.rig.virtual import Observation, Record
@@ -76,30 +80,88 @@ def _of_a_rig(path: Path) -> bool:
 def write(
     observation: Observation, folder: str | os.PathLike[str], form: str, progress: Callable[[int], None] | None = None
 ) -> list[str]:
-    """Write everything into a folder, which is made if it is not there; the names of the files."""
+    """Write everything into a folder, which is made if it is not there, or nothing; the names of the files."""
     check_form(form)
     check_folder(observation.rig, folder, form)
-    folder = Path(folder)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        what = f"cannot be made a folder: {error.strerror or error}"
-        raise MechanismError(Finding(what, str(folder), "name a folder")) from None
-    _write_yaml(folder / TRUTH, truth_of(observation))  # first: it marks the folder as a rig's if this is broken off
     names = []
     units = units_of(observation)
-    for done, record in enumerate(observation.records(), 1):
-        names.append(f"{record.name}.{form}")
-        with whole(folder / names[-1]) as temporary:
-            WRITERS[form](record, units, temporary, observation)
-        if progress:
-            progress(done)
-    _write_yaml(folder / MAPPING, mapping_of(observation, form))
+    with _together(Path(folder)) as temporary:
+        for done, record in enumerate(observation.records(), 1):
+            names.append(f"{record.name}.{form}")
+            WRITERS[form](record, units, temporary / names[-1], observation)
+            if progress:
+                progress(done)
+        _write_yaml(temporary / MAPPING, mapping_of(observation, form))
+        _write_yaml(temporary / TRUTH, truth_of(observation))
     return [*names, MAPPING, TRUTH]
 
 
+@contextmanager
+def _together(folder: Path) -> Iterator[Path]:
+    """A folder for files that are to be in another one: they go there together when the block ends well, or none does.
+
+    MechanismError if they cannot be written.
+    """
+    home = next(one for one in (folder, *folder.absolute().parents) if one.exists())
+    try:
+        if home == folder and not folder.is_dir():
+            raise NotADirectoryError(errno.ENOTDIR, "it is a file")
+        temporary = Path(tempfile.mkdtemp(prefix=".rig-", dir=home))
+    except OSError as error:
+        what = f"cannot be made a folder: {error.strerror or error}"
+        raise MechanismError(Finding(what, str(folder), "name a folder")) from None
+    try:
+        new = temporary / "new"
+        new.mkdir()
+        yield new
+        if home == folder:
+            _move(new, folder, temporary / "old")
+        else:
+            _make(new, folder, home)
+    except OSError as error:
+        what = f"cannot be written: {error.strerror or error}; nothing of it is left"
+        raise MechanismError(Finding(what, str(folder), "make room there, or name another folder")) from None
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def _make(new: Path, folder: Path, home: Path) -> None:
+    """A folder that is not there yet, of one that is complete; with those above it, which go again if it cannot be."""
+    above = [one for one in folder.absolute().parents if home.absolute() in one.parents]
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        new.rename(folder)
+    except OSError:
+        for one in above:
+            with suppress(OSError):  # one that was not made
+                one.rmdir()
+        raise
+
+
+def _move(new: Path, folder: Path, old: Path) -> None:
+    """Files into a folder; those that they replace come back if one of them cannot be moved."""
+    old.mkdir()
+    moved: list[str] = []
+    try:
+        for one in sorted(new.iterdir()):
+            target = folder / one.name
+            if target.is_dir():
+                raise IsADirectoryError(errno.EISDIR, f"{one.name} is a folder")
+            moved.append(one.name)
+            if target.exists() or target.is_symlink():
+                target.rename(old / one.name)
+            one.rename(target)
+    except BaseException:
+        for name in moved:
+            if (old / name).exists():
+                (old / name).replace(folder / name)
+            elif not (new / name).exists():
+                (folder / name).unlink(missing_ok=True)
+        raise
+
+
 def _write_yaml(path: Path, data: dict[str, Any]) -> None:
-    with whole(path) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as stream:
+    with path.open("w", encoding="utf-8", newline="\n") as stream:
         stream.write(HEADS[path.name])
         _yaml(flowing=path.name == MAPPING).dump(data, stream)
 

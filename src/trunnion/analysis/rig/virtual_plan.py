@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from trunnion.analysis.rig.virtual import Observation
 from trunnion.analysis.rig.virtual_cases import Case
-from trunnion.errors import Finding, Severity
+from trunnion.errors import Finding, Severity, counted
 from trunnion.measured.efficiency import Efficiency, efficiency_of, load_joints, pairs_of
 from trunnion.measured.measurement import Accuracy, Condition, Course
 
@@ -153,9 +153,9 @@ def _said(observation: Observation, sensors: tuple[Expected, ...], forecasts: li
     if off:
         worst = max(off, key=lambda one: abs(one.bias))
         what = (
-            f"in {len(off)} of {len(told)} conditions the efficiency is off by more than its standard uncertainty even "
-            f"without random errors, most in condition {worst.case.number} by {worst.bias:+.2g}: the sensors are too "
-            "slow for the cycle, or clipped"
+            f"in {len(off)} of {counted(len(told), 'condition')} the efficiency is off by more than its standard "
+            f"uncertainty even without random errors, most in condition {worst.case.number} by {worst.bias:+.2g}: the "
+            "sensors are too slow for the cycle, or clipped"
         )
         remedy = "take sensors of a larger bandwidth or range, more pulses, or a lower speed"
         found.append(Finding(what, "sensors", remedy, Severity.WARNING))

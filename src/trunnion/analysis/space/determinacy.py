@@ -25,7 +25,7 @@ from trunnion.analysis.friction import FrictionMethod
 from trunnion.analysis.kinematics import forward
 from trunnion.analysis.kinetostatics import Given
 from trunnion.analysis.system import Cycle, System, Values, driven_coordinates
-from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.errors import Finding, MechanismError, Severity, agreeing, counted
 from trunnion.groups.redundant import RANK, stacked
 from trunnion.groups.spatial import Pose, SpatialGroup
 
@@ -246,7 +246,8 @@ class Determinacy:
     def _overdriven(self) -> Finding:
         spins = len(self.system.plan.passive)
         beside = f", {spins} of it spins of a link alone" if spins else ""
-        what = f"{self._count}{beside}, but there are {len(self.system.mechanism.drivers)} drivers"
+        drivers = len(self.system.mechanism.drivers)
+        what = f"{self._count}{beside}, but there {agreeing(drivers, 'is', 'are')} {counted(drivers, 'driver')}"
         return Finding(what, "drivers", "remove a driver")
 
     def _undetermined(self, one: Part) -> Finding:

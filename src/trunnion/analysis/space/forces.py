@@ -19,8 +19,8 @@ from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.rigid import ZERO, Frame, Screw, about, added, minus, moment_at, power, rotated, times
 from trunnion.algebra.space import Vector3, cross, dot, plus, scaled, transpose
 from trunnion.analysis.friction import Contact, FrictionMethod, settle
-from trunnion.analysis.kinetostatics import Backward, Given, Sense, sense_of
-from trunnion.analysis.loads import Slip
+from trunnion.analysis.kinetostatics import Backward, Given, Sense, held, sense_of
+from trunnion.analysis.loads import Share, Slip
 from trunnion.analysis.space.contacts import Rubbing, at_rest, bearing_middle, contacts, stillness
 from trunnion.analysis.space.loads import springs, stated_loads
 from trunnion.analysis.space.motion import SpatialWalk
@@ -236,16 +236,13 @@ def _contact(
     place: Place,
     one: Rubbing,
     given: Given,
-    sense: float,
+    sense: Share,
 ) -> Contact:
-    """One contact of a joint as `friction` sees it; sense: sign of the slip to take where there is none."""
+    """One contact of a joint as `friction` sees it; sense: share of its friction where it rests, signed."""
     walk = back.space
     law = law_of(walk.system, place.joint)
     parameters = {name: walk.values[f"joints.{place.joint}.friction.{name}"] for name in law.parameters}
-    speed = one.slip
-    if np.any(one.zero):
-        forced = sense * np.maximum(np.abs(primal(speed)), 1e-300)
-        speed = namespace(speed).where(one.zero, forced, speed)
+    law, parameters, speed = held(law, parameters, one.slip, one.zero, sense)
     if place.joint in given.deflections:
         parameters["deflection"] = given.deflections[place.joint]
     first, second = place.links

@@ -12,7 +12,7 @@ from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.rigid import Screw, about, power, rotated, times, vector_minus
 from trunnion.algebra.space import Vector3, dot, scaled
 from trunnion.analysis.kinetostatics import ZERO_SLIP
-from trunnion.analysis.loads import SpringState, Stated, spring_state
+from trunnion.analysis.loads import Share, SpringState, Stated, spring_state
 from trunnion.analysis.space.motion import SpatialPoint, SpatialWalk
 from trunnion.model.parts import Load
 
@@ -37,7 +37,7 @@ class SpatialAction(NamedTuple):
         return ~np.isfinite(size)
 
 
-def stated_loads(walk: SpatialWalk, zero_slip: Mapping[str, float]) -> Iterator[tuple[str, SpatialAction]]:
+def stated_loads(walk: SpatialWalk, zero_slip: Mapping[str, Share]) -> Iterator[tuple[str, SpatialAction]]:
     """The loads of the model, by name. zero_slip: see `kinetostatics.Given`."""
     stated = Stated(walk)
     for name, load in walk.system.mechanism.loads.items():
@@ -67,15 +67,15 @@ def _push(walk: SpatialWalk, stated: Stated, load: Load, path: str) -> SpatialAc
     return SpatialAction([(link, wrench)], power(wrench, twist))
 
 
-def _resist(walk: SpatialWalk, load: Load, size: Number, turns: bool, at_rest: float) -> SpatialAction:
+def _resist(walk: SpatialWalk, load: Load, size: Number, turns: bool, at_rest: Share) -> SpatialAction:
     """A torque or force that opposes the motion of a joint, whichever way it goes or one way only."""
     joint = load.joint or ""
     speed = walk.rates(joint)[0 if turns else 1]
     pace = walk.pace
     scale = ZERO_SLIP * pace * (1.0 if turns else walk.size)
-    sign = np.sign(np.where(np.abs(primal(speed)) <= scale, at_rest, primal(speed)))
+    sign = np.where(np.abs(primal(speed)) <= scale, at_rest, np.sign(primal(speed)))
     if load.only is not None:
-        sign = np.where(sign == (1.0 if load.only == "positive" else -1.0), sign, 0.0)
+        sign = np.where(sign * (1.0 if load.only == "positive" else -1.0) > 0.0, sign, 0.0)
     return _in_joint(walk, joint, -sign * size, turns, speed)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import itertools
 from collections.abc import Mapping
 from functools import cached_property
 from typing import cast
@@ -50,14 +49,11 @@ class SpatialSystem(System):
         kind, links = self.joints[name]
         return Place(name, kind, links, (links[0] not in module.links, links[1] not in module.links), False)
 
-    def senses(self, joint: str) -> list[float | tuple[float, ...]]:
-        """All signs of its contacts: a cross has two pins, by `pezzuti` a cylinder turns and slides."""
+    def resting(self, joint: str) -> int:
+        """A cross has two pins, by `pezzuti` a cylinder turns and slides."""
         kind, friction = self.joints[joint][0], self.mechanism.effective_joints[joint].friction
         summed = friction is not None and friction.model == "pezzuti"
-        count = 2 if kind == "universal" or (kind == "cylindrical" and summed) else 1
-        if count == 1:
-            return [-1.0, 1.0]
-        return [signs for signs in itertools.product((-1.0, 0.0, 1.0), repeat=count) if any(signs)]
+        return 2 if kind == "universal" or (kind == "cylindrical" and summed) else 1
 
     def _parallel(self, module: Module) -> bool:
         """Whether the two axes of a link of a cylindrical dyad are parallel: it has no closed form then."""

@@ -11,7 +11,8 @@ from trunnion.analysis.account import model_notes
 from trunnion.analysis.measures import Measure
 from trunnion.analysis.tolerance.linear import by_position
 from trunnion.analysis.tolerance.sampling import CAUSES
-from trunnion.errors import Finding, Severity, Status
+from trunnion.errors import Finding, Severity, Status, agreeing
+from trunnion.errors import counted as number_of
 from trunnion.model.check_values import NOT_NEGATIVE
 
 if TYPE_CHECKING:
@@ -99,7 +100,9 @@ def findings_of(outcome: Outcome, counted: Sampled | None) -> Iterator[Finding]:
     if counted is not None:
         yield from _samples(outcome, counted)
     if outcome.indices is not None and outcome.indices.lost:
-        what = f"{outcome.indices.lost:,} samples of the variance-based indices have no answer and count as the mean"
+        lost = outcome.indices.lost
+        some = f"{number_of(lost, 'sample')} of the variance-based indices {agreeing(lost, 'has', 'have')} no answer"
+        what = f"{some} and {agreeing(lost, 'counts', 'count')} as the mean"
         yield Finding(what, "", "narrower tolerances, or a place where all go together", Severity.WARNING)
 
 
@@ -184,7 +187,8 @@ def _samples(outcome: Outcome, counted: Sampled) -> Iterator[Finding]:
     for code in range(CAUSES):
         if failed[code]:
             text = list(Status)[code].text if code < CAUSES - 1 else "a figure does not exist"
-            what = f"{int(failed[code]):,} of {done:,} samples ({failed[code] / done:.2%}) have no answer: {text}"
+            some = f"{int(failed[code]):,} of {number_of(done, 'sample')} ({failed[code] / done:.2%})"
+            what = f"{some} {agreeing(int(failed[code]), 'has', 'have')} no answer: {text}"
             yield Finding(what, "tolerances", "they count as outside every limit; moments are of the others")
     yield from _scatter(outcome, counted)
     for i, measure in enumerate(outcome.study.measures):

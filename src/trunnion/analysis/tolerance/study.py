@@ -24,7 +24,7 @@ from trunnion.analysis.tolerance.linear import Linear, linear, searched
 from trunnion.analysis.tolerance.sampling import METHODS as SAMPLINGS
 from trunnion.analysis.tolerance.sampling import Sampler, Sampling, Tally, towards
 from trunnion.analysis.tolerance.search import Corner
-from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.errors import Finding, MechanismError, Severity, counted
 from trunnion.model.measure_kinds import place_kind
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.quantity import Quantity
@@ -199,7 +199,7 @@ def tolerance(
         tally, stopped = ran.tally, ran.stopped
         notes += ran.notes
         if stopped:
-            what = f"stopped before the end: {done_of(job, tally):,} of {job.samples:,} samples"
+            what = f"stopped before the end: {done_of(job, tally):,} of {counted(job.samples, 'sample')}"
             notes.append(Finding(what, "samples", "go on with --resume", Severity.WARNING))
     if "sobol" in methods:
         # Not turned: each number is to have its own coordinates of the points.

@@ -1,6 +1,6 @@
 // A line chart over the drive: axes, curves with gaps, shaded positions without an answer, a cursor that follows.
 
-import { domain, extent, gaps, nearest, peak, usualPeak } from "./data.js";
+import { OUTSIDE, domain, extent, gaps, lost, nearest, peak, usualPeak } from "./data.js";
 import { clipped, html, onWidth, set, svg } from "./dom.js";
 import { fixed, prefixed, quantity, tickLabel, ticks } from "./format.js";
 
@@ -13,12 +13,12 @@ const MARGIN = { top: 8, right: 14, bottom: 40, left: 58 };
  * `pick(index, firm)` is called when the reader points.
  */
 export function lineChart(scene, { title, unit, series, band = null, limits = null, note = "", marks = [], pick }) {
-  const columns = series.map((one) => one.values);
-  const scope = limits ? peak(limits) : usualPeak(...columns);
+  const columns = [...series.map((one) => one.values), ...(band ? [band.low, band.high] : [])];
+  const scope = limits ? peak(limits) : usualPeak(scene, ...columns);
   const scale = prefixed(scope, unit);
   const most = scope * scale.factor;
   const cut = !limits && scope < peak(...columns);
-  const remark = cut ? `The peak of ${quantity(peak(...columns), unit)} lies outside.` : note;
+  const remark = cut ? `The peak of ${quantity(peak(...columns), unit)} ${OUTSIDE}` : note;
   const plot = html("div", { class: "plot" });
   const values = series.map(() => html("span", { class: "value" }, "—"));
   const element = html(
@@ -194,9 +194,12 @@ function axes(abscissa, frame, [x0, x1], [y0, y1]) {
 function shading(chart, frame) {
   const { values } = chart.scene.abscissa;
   const half = values.length > 1 ? Math.abs(values[1] - values[0]) / 2 : 0.5;
-  return gaps(chart.scene).map(([first, last]) => {
-    const low = Math.max(frame.x(Math.min(values[first], values[last]) - half), MARGIN.left);
-    const high = Math.min(frame.x(Math.max(values[first], values[last]) + half), frame.right);
+  const span = ([first, last]) => [
+    Math.max(frame.x(Math.min(values[first], values[last]) - half), MARGIN.left),
+    Math.min(frame.x(Math.max(values[first], values[last]) + half), frame.right),
+  ];
+  const unsolved = gaps(chart.scene).map((run) => {
+    const [low, high] = span(run);
     return svg("rect", {
       class: "unsolved",
       x: low,
@@ -205,6 +208,20 @@ function shading(chart, frame) {
       height: frame.bottom - MARGIN.top,
     });
   });
+  const hatched = lost(chart.scene).map((run) => {
+    const path = svg("path", { class: "not-valid", d: hatch(...span(run), frame.bottom) });
+    path.append(svg("title", {}, "not valid: a pin loses contact"));
+    return path;
+  });
+  return [...unsolved, ...hatched];
+}
+
+/** Slanted strokes over the height of a chart from x = low to high, at least 3 px wide. */
+function hatch(low, high, bottom) {
+  const [left, right] = high - low < 3 ? [(low + high) / 2 - 1.5, (low + high) / 2 + 1.5] : [low, high];
+  let path = "";
+  for (let y = MARGIN.top + (right - left); y <= bottom; y += 5) path += `M${left} ${y}L${right} ${y - right + left}`;
+  return path;
 }
 
 /** The path of a curve, broken where there is no value, led on to the first value over a closed turn. */

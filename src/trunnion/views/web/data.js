@@ -2,6 +2,9 @@
 
 import { stated } from "./format.js";
 
+const CONTACT_LOST = 3; // errors.Status
+export const OUTSIDE = "near a dead centre lies outside; --uncut shows it."; // of a peak that a chart cuts
+
 const FIRST_UNSOLVED = 4; // errors.Status.NOT_CONVERGED: from here on the forces have no value
 
 /** The value of a series at a position; a series of one number holds everywhere. */
@@ -36,15 +39,24 @@ export function peak(...list) {
   return list.flat().reduce((most, value) => (Number.isFinite(value) ? Math.max(most, Math.abs(value)) : most), 0);
 }
 
-/** The magnitude a chart should show: the greatest, unless it towers over nearly all the rest, as near a dead centre. */
-export function usualPeak(...list) {
-  const sizes = list
-    .flat()
-    .filter((value) => Number.isFinite(value))
-    .map(Math.abs);
-  const most = peak(sizes);
-  const usual = quantile(sizes, 0.9);
-  return usual > 0 && usual < most / 16 ? 4 * usual : most;
+/**
+ * The magnitude a view should show: the greatest, unless it is next to a dead centre and towers over all others.
+ * Beside it `ease` of the scene is below 1; what grows otherwise than forces do there is a load at work, and all is
+ * shown. The rule is that of trunnion/views/peaks.py.
+ */
+export function usualPeak({ ease = [] }, ...list) {
+  let [most, rest, works] = [0, 0, 0];
+  for (const series of list) {
+    series.forEach((value, index) => {
+      if (!Number.isFinite(value)) return;
+      const share = at(ease, index) ?? 1;
+      const size = Math.abs(value);
+      most = Math.max(most, size);
+      if (share === 1) rest = Math.max(rest, size);
+      works = Math.max(works, size * share ** 4);
+    });
+  }
+  return works > 2 * rest || most <= 4 * rest || rest === 0 ? most : 1.25 * rest;
 }
 
 /** Least and greatest number in the series, or null. */
@@ -156,9 +168,18 @@ export function cause(scene, index) {
 
 /** Runs [first, last] of positions without an answer. */
 export function gaps(scene) {
+  return runsWhere(scene, (index) => !solved(scene, index));
+}
+
+/** Runs [first, last] of positions that are not valid, for a pin loses contact. */
+export function lost(scene) {
+  return runsWhere(scene, (index) => scene.status[index] === CONTACT_LOST);
+}
+
+function runsWhere(scene, holds) {
   const runs = [];
   for (let index = 0; index < scene.count; index += 1) {
-    if (solved(scene, index)) continue;
+    if (!holds(index)) continue;
     const last = runs[runs.length - 1];
     if (last && last[1] === index - 1) last[1] = index;
     else runs.push([index, index]);

@@ -38,10 +38,10 @@ export function mechanismView(scene, kinds) {
     factor: 1,
     shown: new Set(scene.joints.map((joint) => joint.name)),
   };
-  const forces = scene.joints.flatMap((joint) => magnitude(joint.reaction, scene.count));
-  view.peak = usualPeak(forces);
-  view.towers = view.peak < peak(forces); // a few vectors leave the picture whatever the scale
-  view.usual = Math.max(quantile(forces, 0.9), view.peak / 2); // long vectors stay in sight, common ones legible
+  const forces = scene.joints.map((joint) => magnitude(joint.reaction, scene.count));
+  view.peak = usualPeak(scene, ...forces);
+  view.towers = view.peak < peak(...forces); // next to a dead centre vectors leave the picture whatever the scale
+  view.usual = Math.max(Math.min(quantile(forces.flat(), 0.9), view.peak), view.peak / 2); // long vectors stay in sight, common ones legible
   onWidth(stage, (width) => build(fit(view, width)), 490);
   return {
     element,

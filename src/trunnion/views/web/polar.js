@@ -1,6 +1,6 @@
 // Polar reaction diagram of one joint: the tip of the force vector over the run, in the global frame.
 
-import { at, extent, magnitude, peak, usualPeak } from "./data.js";
+import { OUTSIDE, at, extent, magnitude, peak, usualPeak } from "./data.js";
 import { clipped, html, onWidth, set, svg } from "./dom.js";
 import { fixed, prefixed, quantity, tickLabel, ticks } from "./format.js";
 
@@ -15,7 +15,7 @@ export function polarChart(scene, { name, reaction, ideal }, kind, pick, [across
   const joint = { name, reaction: flat(reaction), ideal: flat(ideal) };
   const sizes = magnitude(joint.reaction, scene.count);
   const free = joint.ideal ? magnitude(joint.ideal, scene.count) : [];
-  const most = usualPeak(sizes, free);
+  const most = usualPeak(scene, sizes, free);
   const highest = peak(sizes, free);
   const cut = most < highest ? most : null; // then the window shows what is usual, around the origin
   const scale = prefixed(most, "N");
@@ -32,7 +32,7 @@ export function polarChart(scene, { name, reaction, ideal }, kind, pick, [across
       value,
     ),
     plot,
-    cut === null ? null : html("p", { class: "remark" }, `The peak of ${quantity(highest, "N")} lies outside.`),
+    cut === null ? null : html("p", { class: "remark" }, `The peak of ${quantity(highest, "N")} ${OUTSIDE}`),
   );
   const chart = { scene, joint, kind, scale, cut, plot, axes: [across, up], frame: null, index: 0 };
   onWidth(plot, (width) => draw(chart, width), 220);

@@ -86,7 +86,7 @@ function effortChart(scene, driver, pick) {
   if (driver.ideal) series.push({ label: "without friction", values: full(driver.ideal, count), kind: "ink fine", quiet: true });
   const low = full(driver.effort_lower, count);
   const high = full(driver.effort_upper, count);
-  const open = low.some((value, index) => value !== null && high[index] - value > 0.002 * usualPeak(low, high));
+  const open = low.some((value, index) => value !== null && high[index] - value > 0.002 * usualPeak(scene, low, high));
   const band = open ? { low, high, kind: "k0", label: "range, friction at rest" } : null;
   return lineChart(scene, { title: `Drive ${noun} ${driver.name}`, unit: driver.unit, series, band, pick });
 }
@@ -141,9 +141,9 @@ function readout(scene) {
     ...(abscissa.label === "time" ? [] : [["time", (index) => quantity(at(scene.time, index), "s", peak(scene.time))]]),
     ...drivers.map(({ name, unit, effort }) => [
       `${unit === "N" ? "force" : "torque"} ${name}`,
-      (index) => quantity(at(effort, index), unit, usualPeak(effort)),
+      (index) => quantity(at(effort, index), unit, usualPeak(scene, effort)),
     ]),
-    ["friction power", (index) => quantity(lost[index], "W", usualPeak(lost))],
+    ["friction power", (index) => quantity(lost[index], "W", usualPeak(scene, lost))],
     ["status", (index) => state(scene, index)],
   ];
   const cells = rows.map(() => html("dd", {}, "—"));

@@ -40,8 +40,8 @@ export function spaceView(scene, kinds) {
     element.classList.add("empty");
     return { element, controls: null, show() {}, reactions() {}, magnify() {} };
   }
-  const forces = scene.joints.flatMap((joint) => magnitude(joint.reaction, scene.count));
-  const moments = scene.joints.flatMap((joint) => magnitude(joint.moment, scene.count));
+  const forces = scene.joints.map((joint) => magnitude(joint.reaction, scene.count));
+  const moments = scene.joints.map((joint) => magnitude(joint.moment, scene.count));
   const view = {
     scene: magnified(scene, 1),
     ideal: magnified(scene, 0),
@@ -53,7 +53,7 @@ export function spaceView(scene, kinds) {
     factor: 1,
     shown: new Set(scene.joints.map((joint) => joint.name)),
     extras: new Set(Object.keys(EXTRAS).filter((name) => EXTRAS[name][1])),
-    usual: { force: usual(forces), moment: usual(moments) },
+    usual: { force: usual(scene, forces), moment: usual(scene, moments) },
     camera: first(scene),
     queued: 0,
   };
@@ -91,8 +91,9 @@ function embody(view) {
 }
 
 /** A magnitude that arrows are scaled by: long ones stay in sight, common ones legible. */
-function usual(values) {
-  return Math.max(quantile(values, 0.9), usualPeak(values) / 2);
+function usual(scene, columns) {
+  const most = usualPeak(scene, ...columns);
+  return Math.max(Math.min(quantile(columns.flat(), 0.9), most), most / 2);
 }
 
 function first({ view: { around, above } }) {

@@ -21,6 +21,7 @@ from trunnion.analysis.rig.identify.seated import SeatedModel
 from trunnion.analysis.rig.identify.separate import Group, inseparable
 from trunnion.analysis.rig.identify.uncertainty import Spread, left_over, spread_of
 from trunnion.analysis.rig.identify.unknowns import Parameters, described, unknowns
+from trunnion.analysis.rig.modelled import told_at
 from trunnion.analysis.rig.settings import check_settings
 from trunnion.errors import Finding, MechanismError
 from trunnion.measured.efficiency import load_joints
@@ -213,8 +214,8 @@ def _measures(mechanism: Mechanism, run: Run, blocks: Sequence[Block]) -> dict[s
             raise MechanismError(Finding(what, f"channel {block.channel}", "give them channels of their own"))
     found = {name: named(mechanism, [text], run.values)[0] for name, text in texts.items()}
     for name, measure in found.items():
-        if measure.kind not in COURSES or (measure.of_attitude(run.system)):
-            what = f"measures {texts[name]}, which is no one number at each position"
+        if not measure.everywhere or measure.kind not in COURSES or measure.of_attitude(run.system):
+            what = f"measures {texts[name]}, which is no one number at each position{told_at(measure)}"
             raise MechanismError(Finding(what, f"channel {name}", f"one of {', '.join(COURSES)} is"))
     return found
 

@@ -12,7 +12,7 @@ from trunnion.analysis.rig.identify.judged import Judged
 from trunnion.analysis.rig.identify.separate import Combination, Group, known_of, sizes_of
 from trunnion.analysis.rig.identify.uncertainty import RANDOM, quantile
 from trunnion.analysis.rig.said import other_speed
-from trunnion.errors import Finding, Severity, Status
+from trunnion.errors import Finding, Severity, Status, agreeing, counted
 
 __all__ = ["sentences"]
 
@@ -288,15 +288,17 @@ def _data(judged: Judged) -> Iterator[Finding]:
     used, out = (sum(getattr(one, key) for one in judged.misses) for key in ("used", "out"))
     if out:
         what = (
-            f"{out:,} of {used + out:,} positions are left out: a friction turns round or the speed is zero there, the "
-            "position is close to singular, or the model has no answer"
+            f"{out:,} of {counted(used + out, 'position')} {agreeing(out, 'is', 'are')} left out: "
+            "a friction turns round or the speed is zero there, the position is close to singular, or the model has no "
+            "answer"
         )
         yield Finding(what, "data", severity=Severity.NOTE)
     locked = sum(int(np.count_nonzero(status == Status.LOCKED)) for status in courses.status)
     lost = sum(int(np.count_nonzero(status >= Status.NOT_CONVERGED)) for status in courses.status) - locked
     for number, why in ((locked, "locked by friction"), (lost, "without an answer")):
         if number:
-            what = f"with the estimates {number:,} positions that were measured are {why} in the model"
+            are = agreeing(number, "that was measured is", "that were measured are")
+            what = f"with the estimates {counted(number, 'position')} {are} {why} in the model"
             yield Finding(
                 what, "fit", "look at it with analyse, and at the setting of the conditions", Severity.WARNING
             )

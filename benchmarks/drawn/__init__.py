@@ -1,0 +1,1 @@
+"""Random mechanisms, drawn from a seed as plain model data."""

@@ -1,0 +1,163 @@
+"""Every friction is what its law says for the load that is found, wherever the status says solved."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+import trunnion
+from mechanisms import DURANGO, eccentric_press
+from trunnion import FrictionMethod, Mechanism, Status
+from trunnion.algebra.dual import derivative, primal, seed
+from trunnion.analysis.friction import Contact, Settled, settle
+from trunnion.joints.friction import FRICTION_LAWS
+from trunnion.joints.pairs import Load, Reaction
+
+Array = NDArray[np.float64]
+NEWTON = FrictionMethod()
+COULOMB = FRICTION_LAWS["coulomb"]
+
+
+@dataclass(frozen=True)
+class Linear:
+    """A module of one joint for each contact: reactions (joint, 3, lane) linear in the loads (load, joint, 3, lane)."""
+
+    columns: Any
+
+    def reactions(self, pose: object, loads: Sequence[Any]) -> list[Reaction]:
+        found = sum(load * column for load, column in zip(loads, self.columns, strict=True))
+        return [tuple(joint) for joint in found]
+
+
+def settled(start: Array, influence: Array, contacts: Sequence[tuple[Load, Any]], method: FrictionMethod) -> Settled:
+    """Of contacts (load, coefficient), one a joint. start: (joint, 3, lane); influence: (contact, joint, 3, lane)."""
+    count = len(contacts)
+    made = [
+        Contact(
+            k,
+            [float(i == k + 1) for i in range(count + 1)],
+            load,
+            COULOMB,
+            {"coefficient": f, "pair_factor": 1.0},
+            -1.0,
+        )
+        for k, (load, f) in enumerate(contacts)
+    ]
+    with np.errstate(all="ignore"):  # as in every walk: what diverges comes out as no number
+        return settle(Linear([start, *influence]), None, [1.0] + [0.0] * count, made, method)
+
+
+def missed(found: Settled, contacts: Sequence[tuple[Load, Any]]) -> Array:
+    """Largest |friction − law| of each lane over its largest friction, from what was found alone."""
+    with np.errstate(all="ignore"):
+        law = [f * load.normal(reaction) for (load, f), reaction in zip(contacts, found.reactions, strict=True)]
+        gaps = np.max([np.abs(a - b) for a, b in zip(found.forces, law, strict=True)], axis=0)
+        return np.asarray(gaps / np.max(np.abs(found.forces), axis=0))
+
+
+def test_a_load_that_changes_ends_while_the_other_end_stays() -> None:
+    """A guide pressed by F = 1 − φ/2 and by a couple of 0.97 that no friction changes: φ = f · 0.97, at once or not."""
+    f = 0.49
+    guide = Load((0.0, 1.0), 2.0)
+    start = np.array([[[0.0], [1.0], [0.97]]])
+    found = settled(start, np.array([[[[0.0], [-0.5], [0.0]]]]), [(guide, f)], NEWTON)
+    assert found.forces[0] == pytest.approx(f * 0.97, rel=1e-14)
+    assert np.all(found.converged)
+    assert np.all(found.residual <= 1e-14)
+
+
+@st.composite
+def modules(draw: st.DrawFn) -> tuple[Array, Array, list[tuple[Load, Any]]]:
+    """Up to four pins and guides, 40 lanes, friction weak to strong: some lanes have a certificate, others lock."""
+    count = draw(st.integers(1, 4))
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    guides = [draw(st.booleans()) for _ in range(count)]
+    strength = draw(st.floats(0.05, 2.0))
+    start = rng.normal(size=(count, 3, 40)) * 10.0 ** rng.uniform(-3, 3)
+    influence = rng.normal(size=(count, count, 3, 40)) / count
+    contacts = [
+        (Load((0.6, 0.8), rng.uniform(0.05, 3.0, 40)) if guide else Load(), strength * rng.uniform(0.05, 1.0, 40))
+        for guide in guides
+    ]
+    return start, influence, contacts
+
+
+@settings(max_examples=60, deadline=None)
+@given(modules())
+def test_converged_lanes_obey_their_laws(case: tuple[Array, Array, list[tuple[Load, Any]]]) -> None:
+    """Of both methods; where successive approximation converges and the solution is unique, both are the same."""
+    start, influence, contacts = case
+    newton = settled(start, influence, contacts, NEWTON)
+    named = settled(start, influence, contacts, FrictionMethod("successive-approximation", limit=2000))
+    for found in (newton, named):
+        good = np.broadcast_to(found.converged, (40,))
+        assert np.all(missed(found, contacts)[good] <= 1.001e-10)
+        largest = np.max(np.abs(found.forces), axis=0)
+        assert np.all(np.broadcast_to(found.residual, (40,))[good] <= 1e-10 * largest[good])
+    certain = np.broadcast_to(newton.certain, (40,))
+    assert np.all(np.broadcast_to(newton.converged, (40,))[certain])
+    both = certain & np.broadcast_to(named.converged, (40,))
+    assert np.allclose(np.array(newton.forces)[:, both], np.array(named.forces)[:, both], rtol=1e-7, atol=0)
+
+
+@settings(max_examples=20, deadline=None)
+@given(modules())
+def test_a_lane_does_not_depend_on_the_lanes_beside_it(case: tuple[Array, Array, list[tuple[Load, Any]]]) -> None:
+    """To the bit where a certificate says that no continuation is needed."""
+    start, influence, contacts = case
+    whole = settled(start, influence, contacts, NEWTON)
+    for lane in np.flatnonzero(np.broadcast_to(whole.certain, (40,)))[:3]:
+        part = slice(lane, lane + 1)
+        own = [(load.mapped(lambda n: n[part] if np.ndim(n) else n), f[part]) for load, f in contacts]  # noqa: B023
+        alone = settled(start[..., part], influence[..., part], own, NEWTON)
+        assert np.array_equal(np.array(alone.forces)[:, 0], np.array(whole.forces)[:, lane], equal_nan=True)
+
+
+def test_derivatives_are_those_of_the_side_of_the_kink() -> None:
+    """A guide beside its kink, friction from its couple alone: no derivative by the force that another end carries."""
+    for force, expected in ((0.5, 0.0), (2.0, 0.49 / (1 + 0.5 * 0.49))):
+        push = seed(np.array([force]))
+        found = settled(
+            np.array([[0.0, push, np.array([1.0])]], dtype=object),
+            np.array([[[0.0, np.array([-0.5]), 0.0]]], dtype=object),
+            [(Load((0.0, 1.0), 2.0), 0.49)],
+            NEWTON,
+        )
+        assert derivative(found.forces[0]) == pytest.approx(expected, rel=1e-12)
+        assert primal(found.forces[0]) == pytest.approx(0.49 * (1.0 if expected == 0 else 2.0 / (1 + 0.5 * 0.49)))
+
+
+NAMES = ("offset-slider-crank", "pezzuti-cardan", "fourbar-with-play", "rssr", "geared-five-bar")
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("method", ["newton", "successive-approximation"])
+def test_the_residual_is_a_result(name: str, method: str) -> None:
+    """In the plane and in space, with seats and gears; of a mechanism with 0.2 N of friction and of one with 10 kN."""
+    result = trunnion.analyse(Mechanism.read(DURANGO.with_name(f"{name}.yaml")), 36, replace(NEWTON, name=method))
+    solved = result["status"].values <= Status.NEAR_SINGULAR
+    assert np.all(np.isfinite(result["friction_residual"].values[solved]))
+    moment, force = (np.abs(result[key]).max("joint").values for key in ("friction_torque", "friction_force"))
+    assert np.any(moment[solved] + force[solved] > 0)
+    thickest = 10.02e-3  # m, of the pins of these: no friction force is less than its torque over it
+    assert np.all(result["friction_residual"].values[solved] <= 1e-10 * np.maximum(moment / thickest, force)[solved])
+
+
+def test_single_positions_of_an_eccentric_press() -> None:
+    """One at a time, as no other one then makes the iteration go on; the law by hand, on both sides of a kink."""
+    run = trunnion.prepare(eccentric_press())
+    sides = set()
+    for time in np.linspace(0.05, 6.2, 400):
+        back = run.solve(np.array([time]))
+        reaction, friction = back.reactions["S"], float(back.friction["S"][0])
+        force, couple = abs(float(reaction.y[0])), abs(float(reaction.m[0])) * 2 / 0.1
+        sides.add(force > couple)
+        assert abs(friction) == pytest.approx(0.49 * max(force, couple), rel=1e-10)
+    assert sides == {True, False}

@@ -1,0 +1,95 @@
+"""Options that speak of the same numbers: what they mean together does not depend on which is applied first."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import trunnion
+from manual.conftest import Run
+from manual.test_cli import EXAMPLES
+from trunnion import MechanismError
+
+FOUR_BAR, CARDAN = EXAMPLES / "durango-fourbar.yaml", EXAMPLES / "pezzuti-cardan.yaml"
+STRIBECK = {"joint_defaults.friction.static": "0.5", "joint_defaults.friction.stribeck_speed": "0.1 m/s"}
+LAW = ("--friction", "stribeck")
+SETTINGS = tuple(part for name, value in STRIBECK.items() for part in ("--set", f"{name}={value}"))
+VERBS = [
+    ("check",),
+    ("analyse", "--steps", 24),
+    ("design", "--steps", 24),
+    ("locking", "--steps", 12),
+    ("plot", "--steps", 24, "--kind", "torque", "--out", "a.png"),
+    ("report", "--steps", 24, "--out", "a.html"),
+    ("sweep", "--steps", 24, "--over", "AB=1.9m:2m:2"),
+]
+
+
+@pytest.mark.parametrize("verb", VERBS, ids=lambda verb: str(verb[0]))
+def test_parameters_of_a_law_that_an_option_names(program: Run, verb: tuple[object, ...]) -> None:
+    """Another law and its parameters by --set, in either order."""
+    done = [program(verb[0], FOUR_BAR, *verb[1:], *options) for options in (LAW + SETTINGS, SETTINGS + LAW)]
+    assert all(one.code in (0, 1) for one in done), done[0].err
+    assert done[0] == done[1]
+
+
+def test_the_same_as_a_file_that_states_it() -> None:
+    data = trunnion.read(FOUR_BAR).data()
+    law = {"law": "stribeck", "coefficient": 0.4, "static": 0.5, "stribeck_speed": "0.1 m/s", "viscous": "0.2 s/m"}
+    meant = trunnion.Mechanism(**{**data, "joint_defaults": {**data["joint_defaults"], "friction": law}})
+    values = {**STRIBECK, "joint_defaults.friction.viscous": "0.2 s/m"}
+    assert trunnion.read(FOUR_BAR).with_friction("stribeck", values).parameters() == meant.parameters()
+
+
+def test_what_the_law_still_lacks_is_named(program: Run) -> None:
+    done = program("check", FOUR_BAR, *LAW, *SETTINGS[:2])
+    assert done.code == 2
+    assert "needs 'stribeck_speed'" in done.err
+    done = program("check", FOUR_BAR, "--friction", "coulomb", "--set", "B.friction.static=0.3")
+    assert done.code == 2
+    assert "B.friction.static" in done.err
+
+
+def test_a_parameter_that_only_the_sweep_states(program: Run) -> None:
+    values = ("--over", "joint_defaults.friction.static=0.4:0.5:2", *SETTINGS[2:])
+    done = program("sweep", FOUR_BAR, "--steps", 24, *values, *LAW, "--out", "a.csv")
+    assert done.code in (0, 1), done.err
+    assert "0.4" in done.out
+
+
+def test_a_number_with_limits_under_another_law() -> None:
+    """Limits that stand with a coefficient stay with it where both its law and its value are others."""
+    data = trunnion.read(FOUR_BAR).data()
+    data["joint_defaults"]["friction"] = "0.4 ± 0.05"
+    changed = trunnion.Mechanism(**data).with_friction("viscous", {
+        "joint_defaults.friction.coefficient": 0.3, "joint_defaults.friction.viscous": "0.1 s/m",
+    })  # fmt: skip
+    limits = {one.path: (one.lower, one.upper) for one in changed.tolerated()}
+    assert limits["joints.B.friction.coefficient"] == pytest.approx((-0.05, 0.05))
+    assert changed.parameters()["joints.B.friction.coefficient"] == 0.3
+
+
+def test_a_seat_that_is_set_stands_against_that_of_all_joints(program: Run, tmp_path: Path) -> None:
+    slider = EXAMPLES / "toleranced-slider-crank.yaml"
+    done = [
+        program("analyse", slider, "--steps", 12, "--out", f"{k}.csv", *options).code
+        for k, options in enumerate([
+            ("--seat", "loaded", "--set", "P.seat=free"),
+            ("--set", "P.seat=free", "--seat", "loaded"),
+        ])
+    ]  # fmt: skip
+    assert done[0] in (0, 1)
+    texts = [(tmp_path / f"{k}.csv").read_text("utf-8") for k in range(2)]
+    assert texts[0] == texts[1]
+    assert "S.seat_1_x" in texts[0]
+    assert "P.seat_1_x" not in texts[0]
+    mechanism = trunnion.read(slider).with_seats("loaded").with_values({"P.seat": "free"})
+    assert mechanism.effective_joints["P"].seat == "free"
+
+
+def test_a_default_parameter_can_be_set_before_it_is_stated() -> None:
+    mechanism = trunnion.read(FOUR_BAR).with_values({"joint_defaults.friction.pair_factor": 1.25})
+    assert mechanism.parameters()["joints.C.friction.pair_factor"] == 1.25
+    with pytest.raises(MechanismError, match=r"joint_defaults\.friction\.static"):
+        trunnion.read(FOUR_BAR).with_values({"joint_defaults.friction.static": 0.5})

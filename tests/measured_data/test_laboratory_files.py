@@ -1,0 +1,225 @@
+"""Files as laboratories write them: time stamps, German signs and units, long headers, tables that unfold."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from nptdms import ChannelObject, RootObject, TdmsWriter
+
+from measured_data.recording import Columns, mapping, off, recorded
+from trunnion.errors import Finding, MechanismError
+from trunnion.measured.measurement import Measurement
+from trunnion.measured.read import read_measured
+from trunnion.measured.tables import read_table
+
+
+@pytest.fixture(scope="module")
+def columns() -> Columns:
+    return recorded(turns=6, noise=0.0)
+
+
+def _read(
+    columns: Columns,
+    folder: Path,
+    changes: dict[str, Any],
+    names: dict[str, str] | None = None,
+    encoding: str = "utf-8",
+) -> Measurement:
+    """As a German logger writes it: semicolons and decimal commas."""
+    text = pd.DataFrame(columns).rename(columns=names or {}).to_csv(index=False, sep=";", decimal=",")
+    (folder / "run.csv").write_bytes(text.encode(encoding))
+    return read_measured(mapping(changes), [folder / "run.csv"])
+
+
+def _refused(read: Callable[[], object]) -> list[Finding]:
+    with pytest.raises(MechanismError) as failure:
+        read()
+    assert all(one.remedy for one in failure.value.findings)
+    return list(failure.value.findings)
+
+
+def _stamps(columns: Columns, form: Callable[[float], str]) -> Columns:
+    return {**columns, "t": [form(t) for t in columns["t"]]}
+
+
+def _part(t: float) -> str:
+    return f"{round(t * 1e4) % 10_000:04d}"
+
+
+FORMS: dict[str, Callable[[float], str]] = {
+    "date, decimal comma": lambda t: f"22.11.2026 11:40:{int(t):02d},{_part(t)}",
+    "world time": lambda t: f"2026-11-22T11:40:{int(t):02d}.{_part(t)}Z",
+    "time of day": lambda t: f"11:40:{int(t):02d},{_part(t)}",
+    "over midnight": lambda t: f"{'23:59:59' if t < 0.3 else '00:00:00'},{_part(t + 0.7)}",
+    "over the end of the year": lambda t: f"{'31.12.26 23:59:59' if t < 0.3 else '1.1.27 0:00:00'},{_part(t + 0.7)}",
+    "one day, whichever order": lambda t: f"03/04/2026 11:40:{int(t):02d}.{_part(t)}",
+    "noon": lambda t: f"03/04/2026 12:40:{int(t):02d}.{_part(t)} PM",
+}
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("unit", ["", " [hh:mm:ss]"])
+def test_time_stamps(columns: Columns, tmp_path: Path, form: str, unit: str) -> None:
+    changes = {"time": {"column": "t"}}
+    found = _read(_stamps(columns, FORMS[form]), tmp_path, changes, {"t": f"t{unit}"})
+    plain = _read(columns, tmp_path, {})
+    assert found.findings == ()
+    assert any("first time stamp" in sentence for sentence in found.done)
+    for name, course in plain.conditions[0].courses.items():
+        np.testing.assert_allclose(found.conditions[0].courses[name].mean, course.mean, rtol=1e-9)
+
+
+def test_time_stamps_keep_their_last_digit(tmp_path: Path) -> None:
+    """Seconds since a year as floats are known to some microseconds only."""
+    (tmp_path / "a.csv").write_text(
+        "t;x\n22.11.2026 11:40:00,000000100;1\n22.11.2026 11:40:00,000000300;2\n;3\n", encoding="utf-8"
+    )
+    clock = read_table(tmp_path / "a.csv", ["t", "x"]).columns["t"].clock
+    assert clock is not None
+    np.testing.assert_array_equal(clock.seconds(), [0.0, 200 * 1e-9, np.nan])
+
+
+def test_time_stamps_of_parquet_and_tdms(columns: Columns, tmp_path: Path) -> None:
+    told = _stamps(columns, FORMS["date, decimal comma"])
+    pd.DataFrame(told).to_parquet(tmp_path / "run.parquet")
+    with TdmsWriter(tmp_path / "run.tdms") as writer:
+        writer.write_segment([RootObject({}), *(ChannelObject("rig", key, one) for key, one in told.items())])
+    for name in ("run.parquet", "run.tdms"):
+        found = read_measured(mapping({"time": {"column": "t"}}), [tmp_path / name])
+        assert off(found.conditions[0]) < 0.02
+
+
+@pytest.mark.parametrize(
+    ("form", "what"),
+    [
+        (lambda t: f"{3 if t < 0.3 else 4}/11/2026 11:40:{int(t):02d}.{_part(t)}", "the day or with the month"),
+        (lambda t: f"{'3.11.2026' if t < 0.3 else '2026-11-04'} 11:40:{int(t):02d}.{_part(t)}", "not all dates of one"),
+        (lambda t: "later", "has texts, such as 'later'"),
+        (lambda t: "40:00,5", "has texts, such as '40:00,5'"),
+    ],
+)
+def test_times_that_cannot_be_told(columns: Columns, tmp_path: Path, form: Callable[[float], str], what: str) -> None:
+    (finding,) = _refused(lambda: _read(_stamps(columns, form), tmp_path, {}))
+    assert what in finding.what
+    assert "time: {rate: …}" in finding.remedy
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "cp1252"])
+def test_units_of_a_german_laboratory(columns: Columns, tmp_path: Path, encoding: str) -> None:
+    lines = pd.DataFrame(columns).to_csv(index=False, sep=";", decimal=",").split("\n", 1)[1]
+    head = "Prüfzeit;T1;T2;n1;n2;Drehgeber;Winkel\nSek.;V;Nm;1/min;U/min;-;°\n"
+    (tmp_path / "run.csv").write_bytes((head + lines).encode(encoding))
+    changes = {
+        "time": {"column": "Prüfzeit"}, "angle/column": "Drehgeber", "channels/torque-in/unit": None,
+        "channels/brake/unit": None, "channels/speed-out/unit": None,
+    }  # fmt: skip
+    found = read_measured(mapping(changes), [tmp_path / "run.csv"])
+    assert found.findings == ()  # 1/min is rpm where the mapping says so
+    assert off(found.conditions[0]) < 0.02
+    assert float(np.mean(found.conditions[0].courses["speed-out"].mean)) == pytest.approx(20 * np.pi, rel=1e-3)
+    (finding,) = _refused(
+        lambda: read_measured(mapping({**changes, "channels/speed-in/unit": None}), [tmp_path / "run.csv"])
+    )
+    assert "may count turns or radians" in finding.what
+    assert "channels.speed-in.unit" in finding.remedy
+
+
+@pytest.mark.parametrize("unit", ["Sekunde", "??s", "Grad", "hh:mm:ss"])
+def test_unit_of_the_time_that_is_unknown(columns: Columns, tmp_path: Path, unit: str) -> None:
+    (finding,) = _refused(lambda: _read(columns, tmp_path, {"time": {"column": "t"}}, {"t": f"t [{unit}]"}))
+    assert f"'{unit}'" in finding.what
+    assert "state time.unit in the mapping" in finding.remedy
+    assert _read(columns, tmp_path, {}, {"t": f"t [{unit}]"}).findings == ()
+
+
+@pytest.mark.parametrize("unit", ["Grad", "Winkelgrad", "mgon"])
+def test_unit_of_the_angle_that_is_unknown(columns: Columns, tmp_path: Path, unit: str) -> None:
+    angle: dict[str, Any] = {"from": "column", "column": "angle"}
+    (finding,) = _refused(lambda: _read(columns, tmp_path, {"angle": angle}, {"angle": f"angle [{unit}]"}))
+    assert f"'{unit}'" in finding.what
+    assert "state angle.unit in the mapping" in finding.remedy
+    told = _read(columns, tmp_path, {"angle": {**angle, "unit": "rad"}}, {"angle": f"angle [{unit}]"})
+    assert told.findings == ()
+
+
+def test_rows_of_words_below_the_names(tmp_path: Path) -> None:
+    """A row of units none of which is known is no row of readings, and what stands in it is told as a unit."""
+    path = tmp_path / "a.csv"
+    path.write_text("t;x\nSekunden;Newtonmeter\nUhr;Welle 1\n0;1,5\n1;2,5\n", encoding="utf-8")
+    found = read_table(path, ["t", "x"]).columns
+    assert found["x"].values.tolist() == [1.5, 2.5]
+    assert (found["t"].unit, found["x"].unit, found["x"].texts) == ("Sekunden", "Newtonmeter", 0)
+    path.write_text("t;x\nUhr;Welle 1\ns;N m\n0;1,5\n1;2,5\n", encoding="utf-8")
+    assert read_table(path, ["t", "x"]).columns["x"].unit == "N m"
+    path.write_text("t;x\n0;ERR\n1;2,5\n", encoding="utf-8")
+    assert read_table(path, ["t", "x"]).columns["x"].texts == 1
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "cp1252", "utf-16"])
+def test_header_of_any_length(columns: Columns, tmp_path: Path, encoding: str) -> None:
+    wide = {key: one[:2500] for key, one in columns.items()}
+    wide = {**{f"Temperatur des Gehäuses, Stelle {k}": np.zeros(2500) for k in range(2500)}, **wide}
+    wide["Übertemperatur"] = np.ones(2500)
+    text = pd.DataFrame(wide).to_csv(index=False, sep=";", decimal=",")
+    assert len(text.split("\n", 1)[0]) > 1 << 16
+    (tmp_path / "run.csv").write_bytes(text.encode(encoding))
+    found = read_table(tmp_path / "run.csv", ["t", "T1", "Übertemperatur"]).columns
+    np.testing.assert_array_equal(found["T1"].values, columns["T1"][:2500])
+    assert found["Übertemperatur"].values.min() == 1.0
+
+
+def test_file_without_an_end_of_line(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_bytes(b"1;" * (1 << 24))
+    (finding,) = _refused(lambda: read_table(tmp_path / "a.csv", ["t"]))
+    assert "no end of a line in its first 16 MiB" in finding.what
+
+
+def test_parquet_that_unfolds(tmp_path: Path) -> None:
+    path, zeros = tmp_path / "a.parquet", pa.array(np.zeros(2_500_000))
+    table = pa.table(dict.fromkeys("abcdef", zeros))
+    with pq.ParquetWriter(path, table.schema) as writer:
+        for _ in range(8):
+            writer.write_table(table)
+    assert path.stat().st_size < 2e6
+    before = pa.total_allocated_bytes()
+    (finding,) = _refused(lambda: read_table(path, list("abcdef")))
+    assert "20,000,000 rows of 6 columns unfold to 0.96 GB" in finding.what
+    assert "at most 100 million numbers (0.8 GB)" in finding.what
+    assert "split it" in finding.remedy
+    assert pa.total_allocated_bytes() <= before
+    assert read_table(path, ["a"]).rows == 20_000_000  # what is not asked for does not count
+
+
+def test_parquet_texts_are_read_once(tmp_path: Path) -> None:
+    """Eight kilobytes of file, three gigabytes of text if each cell had its own."""
+    path = tmp_path / "a.parquet"
+    text = pa.DictionaryArray.from_arrays(pa.array([0, 1, 0, 2, None] * 600), ["x" * 1_000_000, "12.5", "11:40:00"])
+    pq.write_table(pa.table({"a": text, "t": np.arange(3000.0)}), path)
+    limit = pa.default_memory_pool().max_memory() or 0
+    found = read_table(path, ["a", "t"]).columns["a"]
+    assert (pa.default_memory_pool().max_memory() or 0) <= max(limit, 1e8)
+    assert found.texts == 1800
+    np.testing.assert_array_equal(found.values[:5], [np.nan, 12.5, np.nan, np.nan, np.nan])
+    assert found.example == "x" * 40
+
+
+def test_parquet_cells_that_are_lists(tmp_path: Path) -> None:
+    pq.write_table(pa.table({"a": pa.array([[1.0], [2.0, 3.0]]), "t": [0.0, 1.0]}), tmp_path / "a.parquet")
+    (finding,) = _refused(lambda: read_table(tmp_path / "a.parquet", ["a", "t"]))
+    assert "in each cell" in finding.what
+
+
+def test_tdms_that_says_more_than_it_holds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("trunnion.measured.binary_tables.MOST", 100)
+    with TdmsWriter(tmp_path / "a.tdms") as writer:
+        writer.write_segment([RootObject({}), *(ChannelObject("rig", key, np.zeros(60)) for key in "ab")])
+    (finding,) = _refused(lambda: read_table(tmp_path / "a.tdms", ["a", "b"]))
+    assert "60 rows of 2 columns" in finding.what
+    assert read_table(tmp_path / "a.tdms", ["a"]).rows == 60

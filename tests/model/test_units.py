@@ -1,0 +1,63 @@
+"""Which spellings of units are read, and what is said of those that are not."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from trunnion.measured.amounts import dimensions
+from trunnion.model.quantity import Quantity
+from trunnion.model.units import KINDS, UnitError, unit
+
+
+@pytest.mark.parametrize(
+    ("text", "factor"),
+    [
+        ("deg", math.pi / 180), ("°", math.pi / 180), ("gon", math.pi / 200), ("mrad", 1e-3), ("µrad", 1e-6),
+        ("urad", 1e-6), ("arcsec", math.pi / 648000), ("rev", 2 * math.pi), ("mm", 1e-3), ("μm", 1e-6), ("um", 1e-6),
+        ("daN", 10.0), ("kNm", 1e3), ("daNm", 10.0), ("cNm", 0.01), ("Nmm", 1e-3), ("N/mm^2", 1e6), ("MPa", 1e6),
+        ("m/sec", 1.0), ("Sek.", 1.0), ("Sek", 1.0), ("sec.", 1.0),
+        ("U/min", math.pi / 30), ("Umdr./min", math.pi / 30), ("cc/rev", 1e-6 / 2 / math.pi),
+        ("km/h", 1 / 3.6), ("millimetres", 1e-3), ("kgf/cm^2", 98066.5), ("µin", 2.54e-8),
+    ],
+)  # fmt: skip
+def test_spellings_in_use(text: str, factor: float) -> None:
+    assert float(unit(text)[0]) == pytest.approx(factor, rel=1e-12)
+    assert dimensions(text)[0] == pytest.approx(factor, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "remedy"),
+    [
+        ("Grad", "write deg for degrees"), ("grad", "write deg for degrees"), ("krad", ""), ("Mrad", "mrad"),
+        ("mdeg", "deg"), ("mgon", "gon"), ("Grev", "rev"), ("kturn", "turn"), ("krpm", "rpm"), ("Mm", "'mm'"),
+        ("MM", "'mm'"), ("Min", "'min'"), ("KN", "kN"), ("kn", "kN"), ("mPa", "MPa"), ("Mpa", "MPa"), ("Kg", "kg"),
+        ("u/min", "rpm"), ("r/min", "rpm"), ("min-1", "rpm"), ("RPM", "rpm"), ("PS", "kW"), ("mil", "thou"),
+        ("ton", "t for 1000 kg"), ("cd", ""), ("ha", ""), ("pA", "Pa"), ("a", "A for ampere"), ("b", ""), ("P", "Pa"),
+        ("Nms", "N m s"), ("Ns", "N s"), ("N/Mm", "'mm'"), ("Nm/Grad", "deg"), ("m⁄s", ""), ("m\\s", ""),
+        ("hh:mm:ss", "write s"), ("dB", ""), ("g_0", "m/s^2"), ("light_year", ""),
+    ],
+)  # fmt: skip
+def test_others_are_findings(text: str, remedy: str) -> None:
+    for read in (unit, dimensions):
+        with pytest.raises(UnitError) as caught:
+            read(text)
+        assert remedy in caught.value.remedy, caught.value.remedy
+        assert caught.value.remedy
+        assert text in caught.value.what
+
+
+@pytest.mark.parametrize("text", ["1500 min-1", "1500 1/min", "1500 min^-1", "1500 min⁻¹", "1500/min", "1500 u/min"])
+def test_a_speed_in_the_words_of_catalogues(text: str) -> None:
+    with pytest.raises(UnitError) as caught:
+        Quantity.read(text, KINDS["angular speed"])
+    assert "rpm" in caught.value.remedy
+    assert Quantity.read("1500 U/min", KINDS["angular speed"]).evaluate() == pytest.approx(50 * math.pi)
+
+
+def test_degrees_in_german_are_no_giga_radians() -> None:
+    with pytest.raises(UnitError, match="not in common use"):
+        Quantity.read("6 Grad", KINDS["angle"])
+    with pytest.raises(UnitError, match="not in common use"):
+        Quantity.read("6 deg ± 1 Grad", KINDS["angle"])

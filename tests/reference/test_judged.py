@@ -1,0 +1,93 @@
+"""A slice of `python -m benchmarks.random_mechanisms`, and that its judge sees what it is there to see."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from benchmarks.drawn import planar, spatial
+from benchmarks.judged import planar as judged_planar
+from benchmarks.judged import spatial as judged_spatial
+from benchmarks.judged.verdict import CHECKS, Results, slope
+from benchmarks.random_mechanisms import examine, result_of
+
+from trunnion.joints.friction import FRICTION_LAWS
+
+STEPS = 24
+# slider-cranks that rub in their guides alone, whose loads cross from one of its ends to the other
+KINKS = (7446, 7517, 7697, 7771, 8097, 8131, 8144)
+DRAWN = {"planar": planar.drawn, "spatial": spatial.drawn}
+JUDGED = {"planar": judged_planar.judge, "spatial": judged_spatial.judge}
+
+
+@pytest.mark.parametrize(
+    ("space", "seeds"),
+    [("planar", range(20)), ("planar", range(20, 40)), ("planar", KINKS), ("spatial", range(12))],
+    ids=["planar", "planar too", "kinks", "spatial"],
+)
+def test_random_mechanisms(space: str, seeds: Any) -> None:
+    """Every solved position keeps every limit, and most positions are solved."""
+    found = [examine(space, seed, STEPS, whole=False) for seed in seeds]
+    assert not any(one.refused for one in found)
+    over = {one.name: one.worst for one in found if any(one.broken.values())}
+    assert not over
+    assert sum(one.statuses[0] for one in found) > 0.6 * STEPS * len(found)
+
+
+@pytest.mark.parametrize(("space", "seed"), [("planar", 3), ("planar", 8097), ("spatial", 0)])
+def test_the_quick_way_has_the_same_numbers(space: str, seed: int) -> None:
+    """What leaves out the locking margin publishes what `analyse` does, bit by bit."""
+    _, data = DRAWN[space](seed)
+    quick, whole = (result_of(data, STEPS, way) for way in (False, True))
+    for name, array in quick.arrays.items():
+        if name != "locking_margin":
+            np.testing.assert_array_equal(array, whole.arrays[name], err_msg=name)
+
+
+def altered(result: Results, name: str, factor: float) -> Results:
+    """The same with one array times a factor."""
+    arrays = {**result.arrays, name: result.arrays[name] * factor}
+    labels = {dim: list(places) for dim, places in result.places.items()}
+    return Results.of(arrays, result.dims, labels, result.time)
+
+
+@pytest.mark.parametrize("space", DRAWN)
+@pytest.mark.parametrize(
+    ("name", "check"),
+    [
+        ("reaction_force", "balance"),
+        ("reaction_moment", "balance"),
+        ("drive_effort", "balance"),
+        ("friction_power", "power"),
+        ("friction_torque", "law"),
+        ("friction_force", "law"),
+        ("point_position", "motion"),
+        ("point_velocity", "motion"),
+        ("point_acceleration", "motion"),
+        ("joint_rotation_velocity", "motion"),
+        ("joint_slide_velocity", "motion"),
+    ],
+)
+def test_the_judge_sees_a_wrong_number(space: str, name: str, check: str) -> None:
+    """A result that is off by 1e-6 of itself is over the limit in the check that is about it."""
+    if space == "spatial" and name == "friction_torque":
+        name = "friction_moment"  # the torque is what the model has, the moment what acts
+    seeds = {"planar": 5, "spatial": 6}  # with pins, a slide and friction in all of them
+    _, data = DRAWN[space](seeds[space])
+    result = result_of(data, STEPS, whole=False)
+    wrong = JUDGED[space](data, altered(result, name, 1 + 1e-6))
+    assert wrong.worst(check)[0] > 1e-8 > CHECKS[check]
+
+
+def test_the_judge_has_laws_of_its_own() -> None:
+    """They agree with those of Trunnion, sign and all, and are odd."""
+    slip = np.linspace(-0.4, 0.4, 41)
+    stated = {"coefficient": 0.2, "pair_factor": 4 / 3, "viscous": 0.1, "static": 0.3}
+    for name in ("coulomb", "viscous", "stribeck", "brown-mcphee", "rolling-bearing"):
+        law = FRICTION_LAWS[name]
+        given = {"stribeck_speed": 0.05, "transition_speed": 0.02, **stated}
+        given = {key: value for key, value in given.items() if key in law.parameters}
+        mine = slope({"law": name, **given}, slip)
+        np.testing.assert_allclose(mine, law.function(1.0, slip, **given), rtol=1e-14, err_msg=name)
+        np.testing.assert_allclose(mine, -slope({"law": name, **given}, -slip), rtol=1e-14, err_msg=name)

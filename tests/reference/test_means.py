@@ -1,0 +1,194 @@
+"""Means over the cycle: the same however many positions are asked for, and those of an integral taken very finely."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import trunnion
+from trunnion import Mechanism
+from trunnion.analysis.account import useful_loads
+from trunnion.analysis.analyse import Run, prepare
+from trunnion.analysis.quadrature import Effort, integrals
+from trunnion.analysis.switches import Mechanisms, edges
+from trunnion.errors import Status
+from trunnion.views.built_tables import error_rows
+from trunnion.views.quantities import quantity
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+STEPS = (60, 72, 90, 360, 720)
+PRESS: dict[str, Any] = {  # of docs/how-to/model-file.md
+    "space": "planar",
+    "dimensions": {"r": "40 mm", "l": "160 mm", "offset": "60 mm"},
+    "links": {
+        "frame": {"points": {"O": [0, 0], "S": {"at": [0, 0], "axis": [1, 0]}}},
+        "crank": {"points": {"O": [0, 0], "P": ["r", 0]}},
+        "rod": {"points": {"P": [0, 0], "Q": ["l", 0]}},
+        "ram": {"points": {"Q": [0, 0], "S": {"at": [0, "offset"], "axis": [1, 0]}}},
+    },
+    "joints": {
+        "O": {"type": "revolute", "links": ["frame", "crank"]},
+        "P": {"type": "revolute", "links": ["crank", "rod"]},
+        "Q": {"type": "revolute", "links": ["rod", "ram"]},
+        "S": {"type": "prismatic", "links": ["frame", "ram"], "guide": {"length": "30 mm"}},
+    },
+    "joint_defaults": {"pin": {"radius": "12 mm"}, "friction": 0.2},
+    "drivers": {"O": {"speed": "60 rpm"}},
+    "loads": {"work": {"joint": "S", "resisting_force": "1 kN", "useful": True}},
+    "assembly": {"Q": ["200 mm", 0]},
+}
+LOADS = (
+    "1 kN * between(drive, 340 deg, 343 deg)",
+    "1 kN * max(0, cos(drive - 341 deg) - 0.9999)",  # a pulse of 1.6 deg that no function states the edges of
+    "1 kN * between(time, 0.9441 s, 0.9527 s)",
+)
+
+
+def press(force: str = LOADS[0], **changes: Any) -> Mechanism:
+    return Mechanism(**(PRESS | changes)).with_values({"work.resisting_force": force})
+
+
+def finely(run: Run, cells: int) -> float:
+    """Efficiency by the midpoint rule over very many cells, straight from the walk."""
+    time = (np.arange(cells) + 0.5) * run.cycle.duration / cells
+    work = np.zeros(2)
+    for part in np.array_split(time, max(1, cells // 10_000)):
+        back = run.solve(part)
+        useful = -sum(back.load_powers[name] for name in useful_loads(run.system.mechanism))
+        driven = sum(effort * back.walk.rate(name) for name, effort in back.efforts.items())
+        work += np.sum(np.broadcast_to(useful, part.shape)), np.sum(np.broadcast_to(driven, part.shape))
+    return float(work[0] / work[1])
+
+
+@pytest.mark.parametrize("force", LOADS)
+def test_efficiency_does_not_depend_on_the_number_of_positions(force: str) -> None:
+    mechanism = press(force)
+    found = [trunnion.analyse(mechanism, steps) for steps in STEPS]
+    values = [float(one["efficiency"]) for one in found]
+    np.testing.assert_allclose(values, values[0], rtol=1e-9)
+    assert values[0] == pytest.approx(finely(prepare(mechanism), 360_000), rel=2e-4)
+    assert all(0 <= float(one["efficiency_error"]) < 1e-6 * values[0] for one in found)
+
+
+def test_a_finer_integral_comes_nearer() -> None:
+    """The midpoint rule is off by the cell in which friction turns round; the value lies where it goes to."""
+    mechanism = press("1 kN")
+    value = float(trunnion.analyse(mechanism, 60)["efficiency"])
+    off = [abs(finely(prepare(mechanism), cells) - value) for cells in (36, 360, 3600, 36_000)]
+    assert off[1] < off[0] / 5
+    assert off[2] < off[1] / 5
+    assert off[3] < 1e-6 * value
+
+
+def test_a_sweep_has_the_efficiencies_of_the_analysis_at_any_number_of_positions() -> None:
+    lengths = ["110 mm", "130 mm", "160 mm", "200 mm"]
+    few, many = (trunnion.sweep(press(), {"l": lengths}, steps) for steps in (60, 720))
+    one = [float(trunnion.analyse(press().with_values({"l": length}), 72)["efficiency"]) for length in lengths]
+    assert np.all(few["efficiency"] > 0.01)
+    for name in ("efficiency", "friction_power_mean", "drive_power_mean", "drive_effort_rms"):
+        np.testing.assert_allclose(few[name], many[name], rtol=1e-8)
+    np.testing.assert_allclose(few["efficiency"], one, rtol=1e-8)
+
+
+@pytest.mark.parametrize("model", ["rssr", "rccc", "klann", "indexing-press", "offset-slider-crank"])
+def test_examples_in_plane_and_space(model: str) -> None:
+    mechanism = trunnion.read(EXAMPLES / f"{model}.yaml")
+    values = [float(trunnion.analyse(mechanism, steps)["efficiency"]) for steps in (50, 333)]
+    assert values[0] == pytest.approx(values[1], rel=1e-6)
+    assert values[0] == pytest.approx(finely(prepare(mechanism), 60_000), rel=1e-4)
+
+
+def test_a_load_that_gives_back_what_it_takes_does_no_net_work() -> None:
+    result = trunnion.analyse(trunnion.read(EXAMPLES / "toggle-press.yaml"), 100)
+    labels = [row["label"] for row in json.loads(result.attrs["summary"])]
+    assert float(result["efficiency"]) == 0
+    assert "efficiency of the cycle (the useful loads do no net work)" in labels
+
+
+def test_friction_of_nothing_is_no_power() -> None:
+    result = trunnion.analyse(press("1 kN", joint_defaults={"pin": {"radius": "12 mm"}, "friction": 0.0}), 60)
+    rows = {row["label"]: row["value"] for row in json.loads(result.attrs["summary"])}
+    assert rows["friction power, mean"] == 0
+
+
+def test_one_way_springs_and_laws_part_the_integral() -> None:
+    """A bumper that the slide just touches for some degrees; a table; a dwell."""
+    data = json.loads(json.dumps(PRESS))
+    data["links"]["frame"]["points"]["W"] = ["230 mm", "60 mm"]
+    data["springs"] = {
+        "bumper": {"between": ["frame.W", "ram.Q"], "stiffness": "200 N/mm", "free_length": "38 mm", "only": "push",
+                   "damping": "2 N s/mm"}
+    }  # fmt: skip
+    values = [float(trunnion.analyse(Mechanism(**data), steps)["efficiency"]) for steps in STEPS]
+    np.testing.assert_allclose(values, values[0], rtol=1e-7)
+    assert values[0] == pytest.approx(finely(prepare(Mechanism(**data)), 200_000), rel=1e-5)
+
+
+def test_edges_are_where_the_model_switches() -> None:
+    run = prepare(press())
+    (found,) = edges(Mechanisms(run.system, run.chosen.assembly, run.values, [run.cycle]))
+    degrees = found / run.cycle.duration * 360
+    # Q turns round where the crank is upright, S in its dead centres: sin φ = offset/(l ± r)
+    dead = [np.degrees(np.arcsin(-60 / 200)) % 360, 180 + np.degrees(np.arcsin(60 / 120))]
+    for place in (340, 343, 90, 270, *dead):
+        assert np.min(np.abs(degrees - place)) < 1e-8
+
+
+# ---- positions that are not valid -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("model", ["fourbar-with-play", "rssr-with-play"])
+def test_extremes_are_of_positions_that_are_valid(model: str) -> None:
+    """Where a pin loses contact its forces are no answer: the summary, a sweep and the report leave them out."""
+    mechanism = trunnion.read(EXAMPLES / f"{model}.yaml").with_values({"A.speed": "300 rpm"})
+    result = trunnion.analyse(mechanism, 360)
+    lost = result["status"].values == Status.CONTACT_LOST
+    assert np.any(lost)
+    sizes = np.sqrt((result["reaction_force"].values ** 2).sum(axis=1))
+    rows = {row["label"]: row["value"] for row in json.loads(result.attrs["summary"])}
+    kept = result["status"].values == Status.SOLVED
+    for size, joint in zip(sizes, result["joint"].values, strict=True):
+        (value,) = (value for label, value in rows.items() if label.startswith(f"reaction of {joint}, largest"))
+        assert value == pytest.approx(np.max(size[kept]), rel=1e-12)
+    assert rows["positions not valid, for a pin loses contact"] == np.count_nonzero(lost)
+    assert rows["positions solved, of 360"] == 360 - np.count_nonzero(lost)
+    swept = trunnion.sweep(mechanism, {"A.speed": ["300 rpm"]}, 360)
+    np.testing.assert_allclose(swept["reaction_max"].values[:, 0], np.max(sizes[:, kept], axis=1), rtol=1e-12)
+    assert int(swept["not_valid"][0]) == np.count_nonzero(lost)
+    tables = {row["label"]: row["built"] for row in error_rows(result)}
+    joint = str(result["joint"].values[0])
+    assert tables[f"Reaction of {joint}, largest"] == quantity(float(np.max(sizes[0][~lost])), "N")
+
+
+def test_a_lost_contact_matters_to_the_extremes_of_this_example() -> None:
+    """The test above would pass by itself if the largest force lay elsewhere."""
+    mechanism = trunnion.read(EXAMPLES / "fourbar-with-play.yaml").with_values({"A.speed": "300 rpm"})
+    result = trunnion.analyse(mechanism, 360)
+    sizes = np.sqrt((result["reaction_force"].values ** 2).sum(axis=1))
+    assert np.any(np.max(sizes, axis=1) > np.max(sizes[:, result["status"].values == Status.SOLVED], axis=1))
+
+
+# ---- the rule -------------------------------------------------------------------------------------------------
+
+
+def test_the_rule_is_exact_for_polynomials_and_tells_its_error() -> None:
+    def functions(rows: Any, time: Any) -> Any:
+        return np.stack([time**20 + rows[:, None], np.abs(time - 0.3), np.where(time < 0.61, 1.0, 3.0)])
+
+    found = integrals(functions, [np.array([0.0, 0.4, 1.0]), np.array([0.0, 2.0])])
+    exact = np.array([[1 / 21, 2 + 2**21 / 21], [(0.3**2 + 0.7**2) / 2, (0.3**2 + 1.7**2) / 2], [1.78, 4.78]])
+    assert np.all(np.abs(found.value - exact) <= np.maximum(3 * found.error, 1e-14 * exact))
+    np.testing.assert_allclose(found.value[0], exact[0], rtol=1e-14)
+    np.testing.assert_allclose(found.value, exact, rtol=1e-5)
+
+
+def test_what_has_no_answer_has_no_integral_and_leaves_the_others_theirs() -> None:
+    found = integrals(
+        lambda rows, time: np.where(rows[:, None] == 1, np.nan, time)[None], [np.array([0.0, 1.0])] * 3, effort=Effort()
+    )
+    assert np.isnan(found.value[0, 1])
+    np.testing.assert_allclose(found.value[0, [0, 2]], 0.5, rtol=1e-15)

@@ -1,0 +1,151 @@
+"""Which peaks a view cuts: those next to a dead centre or to locking, never that of a load at work."""
+
+import numpy as np
+import pytest
+import xarray as xr
+import yaml
+
+from trunnion import Mechanism, analyse
+from trunnion.errors import Status
+from trunnion.views.peaks import ease, usual_peak, whole_peaks
+from trunnion.views.plots import PLOTS, torque
+from trunnion.views.scene import scene
+
+SLIDER_CRANK = """
+trunnion: 1
+space: planar
+links:
+  frame: {{points: {{O: [0, 0], S: {{at: [0, 0], axis: [1, 0]}}}}}}
+  crank: {{points: {{O: [0, 0], P: [35 mm, 0]}}}}
+  rod: {{points: {{P: [0, 0], Q: [130 mm, 0]}}}}
+  piston: {{points: {{Q: [0, 0], S: {{at: [0, 0], axis: [1, 0]}}}}, mass: {mass}}}
+joints:
+  O: {{type: revolute, links: [frame, crank], pin: {{radius: 17 mm}}, friction: {mu}}}
+  P: {{type: revolute, links: [crank, rod], pin: {{radius: 14 mm}}, friction: {mu}}}
+  Q: {{type: revolute, links: [rod, piston], pin: {{radius: 8 mm}}, friction: {mu}}}
+  S: {{type: prismatic, links: [frame, piston]}}
+drivers: {{{drivers}}}
+loads:
+  work: {load}
+assembly: {{P: [0, 35 mm], Q: [125 mm, 0]}}
+"""
+
+
+def model(text):
+    return Mechanism.model_validate(yaml.safe_load(text))
+
+
+def press(between="330 deg, 340 deg"):
+    load = f'{{joint: S, resisting_force: "100 kN * between(drive, {between})", useful: true}}'
+    return model(SLIDER_CRANK.format(mu=0.02, mass="2 kg", drivers="O: {speed: 60 rpm}", load=load))
+
+
+def engine(to="164.9999 mm", load="{joint: O, resisting_torque: 5 N m, useful: true}", mass="0 kg"):
+    """Driven by its piston up to the dead centre."""
+    drivers = f"S: {{speed: 0.01 m/s, range: [110 mm, {to}]}}"
+    return model(SLIDER_CRANK.format(mu=0.001, mass=mass, drivers=drivers, load=load))
+
+
+def shown(figure):
+    """Least and greatest value of the vertical axis of each panel."""
+    return [axes.get_ylim() for axes in figure.axes]
+
+
+def drawn(figure):
+    """The greatest magnitude that each panel has a curve of."""
+    panels = ([np.asarray(line.get_ydata(), float) for line in axes.lines] for axes in figure.axes)
+    return [max(float(np.nanmax(np.abs(values), initial=0.0)) for values in lines) for lines in panels]
+
+
+@pytest.mark.parametrize("kind", ["torque", "reactions", "power", "friction-power", "motion"])
+def test_a_short_working_stroke_is_shown_whole(kind):
+    """Ten of 360 positions carry all of the load, far above the rest."""
+    result = analyse(press(), 360)
+    assert np.all(ease(result) == 1.0)
+    figure = PLOTS[kind](result, None)
+    for (low, high), most in zip(shown(figure), drawn(figure), strict=True):
+        assert max(-low, high) >= most
+    assert not any("outside" in text.get_text() for axes in figure.axes for text in axes.texts)
+
+
+def test_the_longest_reaction_of_the_working_stroke_lies_within_the_polar_diagram():
+    figure = PLOTS["polar"](analyse(press(), 360), None)
+    for axes in figure.axes:
+        for line in axes.lines:
+            if len(line.get_xdata()) > 2:
+                assert np.nanmax(line.get_xdata()) <= axes.get_xlim()[1]
+                assert np.nanmin(line.get_xdata()) >= axes.get_xlim()[0]
+
+
+def test_what_grows_without_bound_at_a_dead_centre_is_cut_there_and_shown_on_demand():
+    result = analyse(engine(), 400)
+    effort = np.abs(result["drive_effort"].values[0])
+    near = ease(result) < 1.0
+    assert near[-1]
+    assert not near[:300].any()
+    figure = torque(result, None)
+    high, scale = figure.axes[0].get_ylim()[1], drawn(figure)[0] / np.nanmax(effort)
+    assert np.nanmax(effort[~near]) * scale < high < np.nanmax(effort) * scale
+    assert any("--uncut" in text.get_text() for text in figure.axes[0].texts)
+    whole = torque(whole_peaks(result), None)
+    assert whole.axes[0].get_ylim()[1] >= drawn(whole)[0]
+    assert not any("outside" in text.get_text() for text in whole.axes[0].texts)
+
+
+def test_a_mechanism_driven_far_from_the_dead_centre_is_shown_whole():
+    result = analyse(engine("160 mm"), 200)
+    assert np.all(ease(result) == 1.0)
+
+
+def test_a_load_that_works_next_to_a_dead_centre_is_shown():
+    """What rises a hundredfold where the condition has only begun to grow is no dead centre."""
+    share = np.append(np.ones(99), 0.8)
+    assert usual_peak(share, np.append(np.ones(99), 1000.0)) == 1000.0
+    assert usual_peak(np.append(np.ones(99), 0.01), np.append(np.ones(99), 1000.0)) == 1.25
+
+
+def test_the_greatest_of_all_without_a_dead_centre():
+    one = np.ones(100)
+    assert usual_peak(np.ones(4), np.array([1.0, -2.0, 3.0, np.nan]), None) == 3.0
+    assert usual_peak(one, np.append(np.ones(99), 1000.0)) == 1000.0
+    assert usual_peak(np.zeros(3), np.array([1.0, 2.0, 3.0])) == 3.0  # all of it next to one
+    assert usual_peak(np.empty(0), np.array([])) == 0.0
+
+
+def result_of(condition, status=None, margin=None):
+    count = len(condition)
+    status = np.zeros(count) if status is None else status
+    margin = np.full(count, np.inf) if margin is None else margin
+    columns = {"condition": condition, "status": status, "locking_margin": margin}
+    return xr.Dataset({name: ("position", np.asarray(values, float)) for name, values in columns.items()})
+
+
+def test_a_position_is_next_to_a_dead_centre_only_in_one_run_with_it():
+    condition = np.full(40, 2.0)
+    condition[10:15] = [11, 30, 400, 30, 11]
+    condition[30:33] = [11, 30, 11]  # poor, but no dead centre
+    status = np.where(condition > 100, int(Status.NEAR_SINGULAR), 0)
+    assert np.flatnonzero(ease(result_of(condition, status)) < 1.0).tolist() == [10, 11, 12, 13, 14]
+
+
+@pytest.mark.parametrize("code", [Status.LOCKED, Status.SINGULAR, Status.NOT_ASSEMBLED])
+def test_beside_positions_without_an_answer(code):
+    """A run may end abruptly, as where a load locks it, or with what feeds it growing up to there."""
+    condition, status = np.full(20, 2.0), np.zeros(20)
+    condition[10:], status[10:] = np.nan, int(code)
+    assert np.all(ease(result_of(condition, status)) == 1.0)
+    condition[8:10] = [12.0, 30.0]
+    assert np.flatnonzero(ease(result_of(condition, status)) < 1.0).tolist() == [8, 9]
+
+
+def test_next_to_locking():
+    margin, status = np.full(20, np.inf), np.zeros(20)
+    margin[8:10], margin[10:], status[10:] = [1.2, 1.05], 0.9, int(Status.LOCKED)
+    assert np.flatnonzero(ease(result_of(np.full(20, 2.0), status, margin)) < 1.0).tolist() == [8, 9]
+
+
+def test_the_page_is_told_where():
+    told = scene(analyse(engine(), 400))["ease"]
+    assert told[0] == 1.0
+    assert told[-1] < 0.2
+    assert scene(analyse(press(), 36))["ease"] == [1.0]

@@ -5,12 +5,13 @@ Names are loaded when first used, so that importing the package costs nothing.
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+TYPE_CHECKING = False  # as a type checker takes it for True; `typing` itself is not needed to start
 
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
+    from typing import Any
+
     from trunnion import dual
     from trunnion.analysis.allocation.allocate import allocate
     from trunnion.analysis.analyse import analyse, prepare
@@ -87,6 +88,8 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     """Load a public name from where it lives."""
+    from importlib import import_module
+
     if name in _MODULES:
         return import_module(_MODULES[name])
     if name not in _PLACES:

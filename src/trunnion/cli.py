@@ -1,18 +1,20 @@
 """The command line: every verb of the library, with the same words.
 
-Exit status: 0 fine, 1 findings (cannot be assembled somewhere, locks, dead centre), 2 bad input.
+Exit status: 0 fine, 1 findings (cannot be assembled somewhere, locks, dead centre), 2 bad input, 3 a fault of its own.
 """
 
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from trunnion import __version__
+from trunnion.edge import status_of
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.options import (
     IMAGES,
@@ -38,6 +40,7 @@ from trunnion.verbs.allocate import allocate
 from trunnion.verbs.assemble import assemble
 from trunnion.verbs.compare import compare
 from trunnion.verbs.data import data
+from trunnion.verbs.files import guarded
 from trunnion.verbs.identify import identify
 from trunnion.verbs.model import exit_status, lines_of, placed, stated
 from trunnion.verbs.rig import rig
@@ -67,10 +70,13 @@ class FileKind(StrEnum):
     DATA = "data"
 
 
-INTERRUPTED = 130  # exit status after Ctrl-C
+def verb(function: Callable[..., None]) -> Callable[..., None]:
+    """Register a verb; what its options write is said to every reader before it begins."""
+    app.command()(guarded(function))
+    return function
 
 
-@app.command()
+@verb
 def check(
     file: File,
     set_: Set = None,
@@ -124,7 +130,7 @@ def check(
     raise typer.Exit(exit_status(found.findings))
 
 
-@app.command()
+@verb
 def analyse(
     file: File,
     steps: Steps = 360,
@@ -160,7 +166,7 @@ def analyse(
     raise typer.Exit(exit_status(findings_of(result)))
 
 
-@app.command()
+@verb
 def design(
     file: File,
     steps: Steps = 720,
@@ -178,7 +184,7 @@ def design(
     show_figures(mechanism.name or str(file), rows)
 
 
-@app.command()
+@verb
 def locking(
     file: File, steps: Steps = 360, set_: Set = None, table: TableFile = None, friction: FrictionLaw = None
 ) -> None:
@@ -195,17 +201,17 @@ def locking(
     raise typer.Exit(exit_status(findings_of(found)))
 
 
-app.command()(assemble)
-app.command()(tolerance)
-app.command()(allocate)
-app.command()(data)
-app.command()(rig)
-app.command()(compare)
-app.command()(identify)
-app.command()(sweep)
+verb(assemble)
+verb(tolerance)
+verb(allocate)
+verb(data)
+verb(rig)
+verb(compare)
+verb(identify)
+verb(sweep)
 
 
-@app.command()
+@verb
 def play(
     file: File,
     measure: Measures = None,
@@ -230,7 +236,7 @@ def play(
     raise typer.Exit(exit_status(findings_of(result)))
 
 
-@app.command()
+@verb
 def plot(
     file: File,
     out: Annotated[Path, typer.Option("--out", help="Folder, or a .png, .svg or .pdf file of one plot.")],
@@ -271,7 +277,7 @@ def plot(
     raise typer.Exit(exit_status(findings_of(result)))
 
 
-@app.command()
+@verb
 def report(
     file: File,
     out: Annotated[Path, typer.Option("--out", help="The HTML file to write.")],
@@ -297,7 +303,7 @@ def report(
     raise typer.Exit(exit_status(findings_of(result)))
 
 
-@app.command()
+@verb
 def examples(
     name: Annotated[str | None, typer.Argument(help="Example to copy out; all are listed if not given.")] = None,
     to: Annotated[Path, typer.Option("--to", help="Folder to copy it into.")] = Path(),
@@ -326,7 +332,7 @@ def examples(
     wrote(target)
 
 
-@app.command()
+@verb
 def schema(
     of: Annotated[
         FileKind, typer.Option("--of", help="Of which file: a model, or data: the mapping.")
@@ -362,6 +368,9 @@ def _options(
     version: Annotated[
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
     ] = False,
+    debug: Annotated[
+        bool, typer.Option("--debug", help="Show where a fault of the program itself arose. With any verb.")
+    ] = False,
 ) -> None:
     """Options of the program itself."""
 
@@ -371,23 +380,11 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):  # names may be Greek whatever the terminal's code page is
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(encoding="utf-8", errors="replace")
-    code: Any = 0
-    try:
-        app()
-    except SystemExit as stop:  # typer's own end, of a usage error or of Ctrl-C too
-        code = stop.code
-        if code == INTERRUPTED:
-            print("stopped; a file named above as written is whole, no other was begun", file=sys.stderr)
-    except MechanismError as error:
-        say(error.findings)
-        code = 2
-    except MemoryError:
-        print("error: not enough memory — use fewer --steps", file=sys.stderr)
-        code = 2
-    except OSError as error:
-        print(f"error: {error.filename or ''}: {error.strerror or error}", file=sys.stderr)
-        code = 2
-    sys.exit(int(code or 0))
+    words = sys.argv[1:]
+    told = words.index("--") if "--" in words else len(words)
+    debug = "--debug" in words[:told]  # before or behind the verb
+    sys.argv[1:] = [word for place, word in enumerate(words) if word != "--debug" or place > told]
+    sys.exit(status_of(app, debug))
 
 
 # ---- shared by the verbs --------------------------------------------------------------------------------------

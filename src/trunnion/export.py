@@ -327,7 +327,12 @@ def _parquet(result: xr.Dataset, path: Path, units_row: bool, table: str) -> Non
 def _netcdf(result: xr.Dataset, path: Path, units_row: bool, table: str) -> None:
     modern = all(importlib.util.find_spec(package) for package in ("h5netcdf", "h5py"))
     engine: Literal["h5netcdf", "scipy"] = "h5netcdf" if modern else "scipy"
-    result.to_netcdf(path, engine=engine)
+    try:
+        made = result.to_netcdf(engine=engine)
+    except ValueError:  # of an xarray that cannot make it in memory
+        result.to_netcdf(path, engine=engine)
+        return
+    path.write_bytes(made)  # by Python: where the disk is full, the HDF5 library takes the process with it
 
 
 def _zarr(result: xr.Dataset, path: Path, units_row: bool, table: str) -> None:

@@ -1,17 +1,32 @@
-"""Files written whole or not at all, and never over what is read."""
+"""Files written whole or not at all, and never over what is read.
+
+A run of the program says once what it will write (`writing`); every reader says what it reads (`reading`). So no output
+is an input of the run, whatever the two are called and wherever the input was named, and this is known before anything
+is computed. What a run writes beyond what it said, such as the figures of a folder, is looked at when it is written.
+"""
 
 from __future__ import annotations
 
 import os
+import re
 import shutil
+import stat
+import sys
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass, field
+from itertools import combinations
 from pathlib import Path
 
 from trunnion.errors import Finding, MechanismError
 
-__all__ = ["folder", "spare", "whole"]
+__all__ = ["Target", "folder", "reading", "same", "spare", "whole", "writing"]
+
+REMEDY = "name another file"
+MOST_LINKS = 40  # one to the other, as operating systems have it
+_DESCRIPTOR = re.compile(r"/dev/(?:(stdin)|(stdout)|(stderr)|fd/(\d+))|/proc/(?:self|\d+)/fd/(\d+)")
 
 
 def _umask() -> int:
@@ -23,33 +38,89 @@ def _umask() -> int:
 UMASK = _umask()  # read once: reading it means setting it, for the whole process
 
 
-@contextmanager
-def whole(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """A temporary path beside `path`, with its extension; it takes the place of `path` when the block ends well.
+# ---- what is read and what is written -------------------------------------------------------------------------
 
-    Raises MechanismError if the folder is missing or not writable, or `path` is a folder.
-    """
-    target = Path(path)
-    if target.is_dir():
-        raise MechanismError(Finding("cannot be written: it is a folder", str(target), "name a file"))
+
+@dataclass(frozen=True)
+class Target:
+    """A file to be written, the option that names it, and the input that it may be nevertheless."""
+
+    option: str
+    path: Path
+    over: Path | None = None
+
+
+@dataclass
+class _Run:
+    """What a run of the program has said that it writes, and has read so far."""
+
+    written: Sequence[Target]
+    read: list[Path] = field(default_factory=list)
+
+    def findings(self, path: Path, targets: Iterable[Target]) -> list[Finding]:
+        """Which targets an input would be lost to."""
+        lost = (one for one in targets if same(one.path, path) and not (one.over and same(one.over, path)))
+        return [
+            Finding(f"{_called(one.path, path)} is read here, and would be written over", one.option, REMEDY)
+            for one in lost
+        ]
+
+
+def _called(written: Path, read: Path) -> str:
+    """A file by the name it is written under, and the other that it has."""
+    return f"'{written}'" if str(written) == str(read) else f"'{written}', which is '{read}',"
+
+
+_RUN: ContextVar[_Run | None] = ContextVar("run", default=None)
+
+
+@contextmanager
+def writing(targets: Sequence[Target]) -> Iterator[None]:
+    """A run that writes these; MechanismError if two are one file, or, while it lasts, if one is read."""
+    findings = [
+        Finding(f"{_called(two.path, one.path)} is written by {one.option} already", two.option, REMEDY)
+        for one, two in combinations(targets, 2)
+        if same(one.path, two.path)
+    ]
+    if findings:
+        raise MechanismError(findings)
+    before = _RUN.set(_Run(targets))
     try:
-        handle, name = tempfile.mkstemp(suffix=target.suffix, prefix=f".{target.stem[:40]}-", dir=target.parent)
-        os.close(handle)
-    except OSError as error:
-        remedy = "make the folder first, or write elsewhere"
-        raise MechanismError(Finding(f"cannot be written: {error.strerror or error}", str(target), remedy)) from None
-    temporary = Path(name)
-    try:
-        yield temporary
-        mode = 0o777 if temporary.is_dir() else 0o666  # mkstemp makes it private; a result is an ordinary file
-        temporary.chmod(mode & ~UMASK)
-        temporary.replace(target)
-    except OSError as error:
-        raise MechanismError(Finding(f"cannot be written: {error.strerror or error}", str(target))) from None
+        yield
     finally:
-        if temporary.is_dir():
-            shutil.rmtree(temporary, ignore_errors=True)
-        temporary.unlink(missing_ok=True)
+        _RUN.reset(before)
+
+
+def reading(path: str | os.PathLike[str]) -> None:
+    """Say that a file is read; MechanismError if the run is to write it."""
+    run = _RUN.get()
+    if run is None:
+        return
+    path = Path(path)
+    if findings := run.findings(path, run.written):
+        raise MechanismError(findings)
+    if path not in run.read:
+        run.read.append(path)
+
+
+def _guard(path: Path) -> None:
+    """MechanismError if something that the run has read would be written over."""
+    run = _RUN.get()
+    if run is None:
+        return
+    own = [one for one in run.written if same(one.path, path)] or [Target("", path)]
+    findings = [finding for read in run.read for finding in run.findings(read, own)]
+    if findings:
+        raise MechanismError(findings)
+
+
+def same(one: Path, two: Path) -> bool:
+    """Whether two paths are one file, under another name or through links; a device or a pipe is nobody's."""
+    try:
+        kind = one.stat().st_mode
+        return (stat.S_ISREG(kind) or stat.S_ISDIR(kind)) and two.exists() and one.samefile(two)
+    except (OSError, ValueError):
+        return not two.exists() and os.path.realpath(one) == os.path.realpath(two)
 
 
 def spare(read: Iterable[Path], written: Iterable[tuple[str, Path]]) -> None:
@@ -65,6 +136,80 @@ def spare(read: Iterable[Path], written: Iterable[tuple[str, Path]]) -> None:
             findings.append(Finding(what, option, "name another file"))
     if findings:
         raise MechanismError(findings)
+
+
+# ---- writing --------------------------------------------------------------------------------------------------
+
+
+@contextmanager
+def whole(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """A temporary path with the extension of `path`, whose place it takes when the block ends well.
+
+    A link stays a link: what it leads to is written. A device or a pipe is written to and stays what it is. Raises
+    MechanismError if the folder is missing or not writable, `path` is a folder, or it is read in this run.
+    """
+    asked = Path(path)
+    _guard(asked)
+    with _unwritable(asked):
+        target, stream = _destination(asked)
+    remedy = "make the folder first, or write elsewhere"
+    with _unwritable(asked, remedy):
+        beside = target.parent if target else None
+        handle, name = tempfile.mkstemp(suffix=asked.suffix, prefix=f".{asked.stem[:40]}-", dir=beside)
+        os.close(handle)
+    temporary = Path(name)
+    try:
+        with _unwritable(asked):
+            yield temporary
+            if target is None:
+                _poured(temporary, stream, asked)
+                return
+            mode = 0o777 if temporary.is_dir() else 0o666  # mkstemp makes it private; a result is an ordinary file
+            temporary.chmod(mode & ~UMASK)
+            temporary.replace(target)
+    finally:
+        if temporary.is_dir():
+            shutil.rmtree(temporary, ignore_errors=True)
+        temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def _unwritable(path: Path, remedy: str = "") -> Iterator[None]:
+    """What the system refuses is a finding about the file."""
+    try:
+        yield
+    except OSError as error:
+        raise MechanismError(Finding(f"cannot be written: {error.strerror or error}", str(path), remedy)) from None
+
+
+def _destination(path: Path) -> tuple[Path | None, int | None]:
+    """The file to be replaced, behind all links; or None for what is written to, with its descriptor if it is one."""
+    step = path
+    for _ in range(MOST_LINKS):
+        if found := _DESCRIPTOR.fullmatch(os.path.normpath(os.path.abspath(step))):
+            number = next((k for k in range(3) if found[k + 1]), None)
+            return None, int(found[4] or found[5]) if number is None else number
+        if not step.is_symlink():
+            break
+        step = step.parent / os.readlink(step)
+    if step.is_dir():
+        raise MechanismError(Finding("cannot be written: it is a folder", str(path), "name a file"))
+    try:
+        kind = step.stat().st_mode
+    except FileNotFoundError:
+        return step, None
+    return (step if stat.S_ISREG(kind) else None), None
+
+
+def _poured(temporary: Path, descriptor: int | None, path: Path) -> None:
+    """Write what was made into a device, a pipe, or what the process has open under a number."""
+    if temporary.is_dir():
+        what = "cannot be written: a folder of files does not go through a pipe"
+        raise MechanismError(Finding(what, str(path), "name a file"))
+    sys.stdout.flush()
+    target = os.dup(descriptor) if descriptor is not None else os.open(path, os.O_WRONLY)
+    with open(target, "wb") as stream, temporary.open("rb") as made:
+        shutil.copyfileobj(made, stream)
 
 
 def folder(path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import time
 from collections.abc import Sequence
 
 import numpy as np
@@ -326,3 +327,72 @@ def test_same_mechanism_in_any_order_has_the_same_modules() -> None:
     shuffled["links"] = dict(reversed(shuffled["links"].items()))
     one, two = decompose(build(data)), decompose(build(shuffled))
     assert {frozenset(m.links) for m in one.modules} == {frozenset(m.links) for m in two.modules}
+
+
+def ladder(count: int) -> Data:
+    """A crank and rocker after rocker behind it, each on its own dyad: two links more in each four-bar of the row."""
+    data: Data = {"links": {"ground": {"points": {"A": [0, 0]}}, "crank": {"points": {"A": [0, 0], "P0": [0.03, 0]}}}}
+    data["joints"] = {"A": revolute("ground", "crank")}
+    before = "crank"
+    for k in range(1, count + 1):
+        coupler, rocker = f"coupler-{k}", f"rocker-{k}"
+        data["links"]["ground"]["points"][f"O{k}"] = [0.1 * k, 0]
+        data["links"][coupler] = {"points": {f"P{k - 1}": [0, 0], f"C{k}": [0.1, 0]}}
+        data["links"][rocker] = {"points": {f"O{k}": [0, 0], f"C{k}": [0.07, 0], f"P{k}": [0.07, 0]}}
+        data["joints"] |= {f"P{k - 1}": revolute(before, coupler), f"C{k}": revolute(coupler, rocker)}
+        data["joints"][f"O{k}"] = revolute("ground", rocker)
+        before = rocker
+    del data["links"][before]["points"][f"P{count}"]
+    return data | {"drivers": {"A": {"speed": 1.0}}}
+
+
+def row(count: int) -> Data:
+    """An arm of many links, each driven on the one before."""
+    data: Data = {"links": {"ground": {"points": {"J0": [0, 0]}}}, "joints": {}, "drivers": {}}
+    for k in range(count):
+        data["links"][f"L{k}"] = {"points": {f"J{k}": [0, 0], f"J{k + 1}": [0.1, 0]}}
+        data["joints"][f"J{k}"] = revolute(f"L{k - 1}" if k else "ground", f"L{k}")
+        data["drivers"][f"J{k}"] = {"speed": 1.0 + k % 5}
+    del data["links"][f"L{count - 1}"]["points"][f"J{count}"]
+    return data
+
+
+def test_a_thousand_links() -> None:
+    """Long rows come apart into their modules, whatever their rank taken at once drowns in, and are analysed."""
+    plan = decompose(Mechanism(**ladder(500)))
+    assert [module.kind for module in plan.modules] == ["R"] + ["RRR"] * 500
+    arm = Mechanism(**row(1000))
+    assert len(decompose(arm).modules) == 1000
+    assert bool((trunnion.analyse(arm, 2)["status"] == trunnion.Status.SOLVED).all())
+
+
+def test_mobility_by_rank_of_a_long_row() -> None:
+    found = trunnion.check(Mechanism(**ladder(120)), 8)
+    assert found.mobility == found.rank_mobility == 1
+
+
+def test_fault_in_a_long_row() -> None:
+    """What is wrong at the end of a long row is named, and not the whole row."""
+    data = ladder(100)
+    data["links"]["ground"]["points"]["X"] = [1.0, 2.0]  # the last rocker is held once more, and a link hangs loose
+    data["links"]["rocker-100"]["points"] |= {"X": [0.3, 0.2], "Y": [0.1, 0.1]}
+    data["links"]["loose"] = {"points": {"Y": [0, 0], "Z": [0.2, 0]}}
+    data["links"]["hanging"] = {"points": {"Z": [0, 0]}}
+    data["joints"] |= {"X": revolute("ground", "rocker-100"), "Y": revolute("rocker-100", "loose")}
+    data["joints"]["Z"] = revolute("loose", "hanging")
+    text = " ".join(str(one) for one in findings_of(data))
+    assert "the links loose, hanging stay undetermined" in text
+    assert len(text) < 500
+
+
+def test_time_grows_with_the_links() -> None:
+    """Four times the links take about four times as long, and not sixteen."""
+
+    def took(mechanism: Mechanism) -> float:
+        begin = time.process_time()
+        trunnion.check(mechanism, 12)
+        return time.process_time() - begin
+
+    took(Mechanism(**row(5)))  # what is loaded at first
+    few, many = (min(took(Mechanism(**row(count))) for _ in range(2)) for count in (100, 400))
+    assert many < 8 * few

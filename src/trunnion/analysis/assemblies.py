@@ -158,9 +158,10 @@ def _joints(walk: Forward, module: Module, frames: Sequence[Any], lane: int | No
         return known if lane is None else each(known, lambda n: n[lane] if np.ndim(n) else n)
 
     found: dict[str, Array] = {}
-    for name, (kind, links) in walk.system.joints.items():
-        inside = all(link in place for link in links)
-        if name not in module.joints or name in module.driven or not place or not (inside or name in turned):
+    own = set(module.joints).difference(module.driven) if place else ()
+    for name in sorted(own, key=walk.system.order.__getitem__):
+        kind, links = walk.system.joints[name]
+        if not (all(link in place for link in links) or name in turned):
             continue
         if kind == "prismatic" or name in turned:
             found[name] = np.array([primal(walk.coordinate(name, *(element(link, name) for link in links)))])

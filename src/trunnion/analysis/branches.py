@@ -19,7 +19,7 @@ from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.nested import each
 from trunnion.analysis import change_points
-from trunnion.analysis.follow import Follower, assemblies, at, lane_of, limits
+from trunnion.analysis.follow import Follower, assemblies, at, closing, lane_of, limits
 from trunnion.analysis.hints import MEETING, distance, first, hints, misnamed, named_way, nth, told_twice
 from trunnion.analysis.kinematics import Forward, pose_of, start
 from trunnion.analysis.system import Cycle, Dial, Positions, System, Values, driven_coordinates
@@ -325,7 +325,7 @@ def _track(walk: Forward, number: int, group: Any, drive: Sequence[Number], time
     nowhere = np.array([], np.intp)
     if not group.kept:  # joints without a free coordinate: there is nothing to choose or to follow
         return Decision(Track(times, rows, 1.0, periodic, clock, turns, nowhere), 1, True)
-    for begin in _starts(grid):
+    for begin in _starts(group, elements, drive, grid):
         found = assemblies(group, at(elements, begin), [lane_of(q, begin) for q in drive])
         if found.orientation.size:
             break
@@ -363,6 +363,8 @@ def _turns(walk: Forward, module: Module, group: Any, elements: Elements, times:
     return found
 
 
-def _starts(grid: int) -> Iterator[int]:
-    """The start of the cycle, then positions spread over it."""
-    yield from sorted({int(i) for i in np.linspace(0, grid - 1, 25)}) if grid > 1 else (0,)
+def _starts(group: Any, elements: Elements, drive: Sequence[Number], grid: int) -> Iterator[int]:
+    """The start of the cycle, then those of some positions spread over it where the group closes."""
+    yield 0
+    if grid > 1:
+        yield from closing(group, elements, drive, sorted({int(i) for i in np.linspace(0, grid - 1, 25)} - {0}))

@@ -39,6 +39,7 @@ class Followed(Protocol):
 
 
 GUESSES = 512
+TRIED = 64  # guesses at each place where it is tried whether there is an assembly at all
 FEW = 16  # guesses at each place where an assembly is looked for again
 PROBES = 96  # such places in the gaps of a track
 MOST_CONDITION = 1e8  # of an assembly that counts
@@ -94,6 +95,20 @@ def assemblies(group: Followed, elements: Elements, drive: Sequence[Number]) -> 
         q=tuple(np.broadcast_to(q, shape)[kept] for q in pose.q),
         orientation=np.broadcast_to(pose.orientation, shape)[kept],
     )
+
+
+def closing(group: Followed, elements: Elements, drive: Sequence[Number], places: Sequence[int]) -> list[int]:
+    """Those of some grid points at which one of a few guesses closes the group, all tried at once."""
+    rng = np.random.default_rng(SEED)
+    lanes = np.repeat(np.array(places, np.intp), TRIED)
+    there = at(elements, lanes)
+    spread = extent(group, there)
+    guesses = [rng.uniform(-reach, reach, len(lanes)) for reach in guess_reaches(group, spread)]
+    pose = group.position(there, guesses, [lane_of(q, lanes) for q in drive])
+    closed = np.isfinite(np.broadcast_to(pose.orientation, lanes.shape)).reshape(len(places), TRIED)
+    for q in pose.q:
+        closed = closed & np.isfinite(np.broadcast_to(q, lanes.shape)).reshape(len(places), TRIED)
+    return [place for place, some in zip(places, closed.any(axis=1), strict=True) if some]
 
 
 def guess_reaches(group: Followed, spread: float) -> list[float]:

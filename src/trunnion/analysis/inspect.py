@@ -16,7 +16,7 @@ from trunnion.analysis.scene import pitch_circles
 from trunnion.errors import Finding, Severity
 from trunnion.model.mechanism import Mechanism
 from trunnion.structure.decompose import Plan
-from trunnion.structure.mobility import mobility_by_rank
+from trunnion.structure.mobility import Part, mobility_by_rank
 
 __all__ = ["Check", "GearPair", "check"]
 
@@ -114,4 +114,6 @@ def _rank(walk: Forward) -> int | None:
         name: (gear.joints, float(np.ravel(primal(walk.values[f"gears.{name}.ratio"]))[0]))
         for name, gear in system.mechanism.gears.items()
     }
-    return mobility_by_rank(list(system.mechanism.links), system.mechanism.fixed_link, system.joints, at, gears)
+    parts = [Part(one.links, one.joints, one.driven, one.gears) for one in system.plan.modules]
+    links = [link for part in parts for link in part.links]
+    return mobility_by_rank(links, system.mechanism.fixed_link, system.joints, at, gears, parts)

@@ -76,6 +76,16 @@ class Forward:
         return self._elements[key]
 
     @cached_property
+    def pace(self) -> Number:
+        """Angular speed typical of the mechanism, rad/s."""
+        return self.system.pace(self.values)
+
+    @cached_property
+    def extent(self) -> Number:
+        """Length typical of the mechanism, m."""
+        return self.system.size(self.values)
+
+    @cached_property
     def holes(self) -> dict[tuple[str, str], Any]:
         """Local frame of every joint's element where its pin lies in the middle of its hole."""
         return self.system.holes(self.values)

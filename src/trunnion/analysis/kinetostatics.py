@@ -244,15 +244,14 @@ def slip_of(walk: Forward, joint: str) -> Slip:
     """Relative speed along the freedom of a joint, and whether it is zero but for rounding."""
     kind, (first, second) = walk.system.joints[joint]
     w1, w2 = walk.motions[first].twist.w, walk.motions[second].twist.w
-    pace = walk.system.pace(walk.values)
     if kind == "revolute":
         speed = w2 - w1
-        return Slip(speed, np.abs(primal(speed)) <= ZERO_SLIP * (np.abs(primal(w1)) + np.abs(primal(w2)) + pace))
+        return Slip(speed, np.abs(primal(speed)) <= ZERO_SLIP * (np.abs(primal(w1)) + np.abs(primal(w2)) + walk.pace))
     one, two = walk.element(first, joint), walk.element(second, joint)
     v1, v2 = walk.twist(first, joint), walk.twist(second, joint)
     dx, dy = two.x - one.x, two.y - one.y
     speed = one.c * (v2.x - v1.x + w1 * dy) + one.s * (v2.y - v1.y - w1 * dx)
-    scale = pace * walk.system.size(walk.values) + np.hypot(primal(v2.x), primal(v2.y))
+    scale = walk.pace * walk.extent + np.hypot(primal(v2.x), primal(v2.y))
     return Slip(speed, np.abs(primal(speed)) <= ZERO_SLIP * scale)
 
 

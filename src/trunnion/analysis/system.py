@@ -128,6 +128,11 @@ class System:
         """Kind and links of every joint, as the file has them."""
         return {name: (joint.type, joint.links) for name, joint in self.mechanism.effective_joints.items()}
 
+    @cached_property
+    def order(self) -> dict[str, int]:
+        """Where the joints stand in the file."""
+        return {name: place for place, name in enumerate(self.joints)}
+
     def resting(self, joint: str) -> int:
         """How many contacts of a joint rest or slip each by itself, for `kinetostatics.Given`."""
         return 1

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from trunnion.errors import Finding, MechanismError
 from trunnion.measured.clock import Clock, is_time
 from trunnion.model.names import nearest
+from trunnion.output import reading
 
 __all__ = ["FORMATS", "NOTHING", "Column", "Table", "choose", "clock_of", "failed", "number", "numbers", "read_table"]
 
@@ -74,6 +75,7 @@ def read_table(path: Path, wanted: Iterable[str], optional: Iterable[str] = ()) 
         raise MechanismError(Finding(what, file=str(path), remedy="check the path"))
     if path.stat().st_size == 0:
         raise failed(path, "is empty", "check that the recording was saved")
+    reading(path)
     try:
         table = reader(path, list(dict.fromkeys(wanted)), list(dict.fromkeys(optional)))
     except OSError as error:

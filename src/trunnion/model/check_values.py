@@ -183,10 +183,12 @@ def _sides(mechanism: Mechanism, values: Values) -> Iterator[Finding]:
     """A link of two turning joints at one point has no length to transmit motion with."""
     if mechanism.space == "spatial":
         return
-    for name, link in mechanism.links.items():
-        joints = [
-            key for key, joint in mechanism.effective_joints.items() if name in joint.links and key in link.points
-        ]
+    holding: dict[str, list[str]] = {name: [] for name in mechanism.links}
+    for key, joint in mechanism.effective_joints.items():
+        for name in dict.fromkeys(joint.links):
+            if name in holding and key in mechanism.links[name].points:
+                holding[name].append(key)
+    for name, joints in holding.items():
         if len(joints) != 2 or any("rotation" not in freedoms(mechanism.effective_joints[key].type) for key in joints):
             continue
         if any(key in gear.joints for gear in mechanism.gears.values() for key in joints):

@@ -33,6 +33,7 @@ __all__ = ["Lines", "files_named", "place", "placed", "read_entries", "read_mech
 MAX_BYTES = 1_000_000  # some ten thousand links; parsing takes seconds
 MAX_DEPTH = 30
 _TYPES = {".yaml": "YAML", ".yml": "YAML", ".json": "JSON", ".toml": "TOML"}
+_DEEP_KEY = re.compile(rf"(?<![\w.\"'-])(?:[\w\"'-]++\s*+\.\s*+){{{MAX_DEPTH},}}")
 _TAG = "tag:yaml.org,2002:"
 _PLAIN_TAGS = frozenset(_TAG + name for name in ("str", "int", "float", "bool", "null", "map", "seq"))
 
@@ -154,6 +155,9 @@ def _parse(text: str, kind: str) -> tuple[dict[str, Any], Lines]:
 
 
 def _parse_toml(text: str) -> tuple[dict[str, Any], Lines]:
+    if deep := _DEEP_KEY.search(text):  # tomllib takes a time with the square of the dots
+        at = text.count("\n", 0, deep.start()) + 1
+        raise MechanismError(Finding("is nested too deeply", remedy="check the dots in the key", line=at))
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -161,13 +165,27 @@ def _parse_toml(text: str) -> tuple[dict[str, Any], Lines]:
         raise MechanismError(
             Finding(f"is not TOML: {error}", remedy="correct it there", line=int(found[1]) if found else None)
         ) from error
+    except ValueError as error:  # of a whole number that Python does not read
+        raise MechanismError(Finding(f"is not TOML: {error}", remedy="write a number as 1.25e1")) from error
+    if _depth(data) > MAX_DEPTH:
+        raise MechanismError(Finding("is nested too deeply", remedy="check brackets and the dots in keys"))
     # tomllib keeps no lines: a key that stands once in the file is found by searching for it.
     places: dict[str, list[int]] = {}
     for number, line in enumerate(text.splitlines(), start=1):
-        for key in set(re.findall(r"[\w-]+(?=\"?\s*[=.\]])", line)):
+        for key in set(re.findall(r"(?<![\w-])[\w-]++(?=\"?\s*[=.\]])", line)):
             places.setdefault(key, []).append(number)
     unique = {key: numbers[0] for key, numbers in places.items() if len(numbers) == 1}
     return data, {path: unique[key] for path, key in _paths(data) if key in unique}
+
+
+def _depth(data: Any) -> int:
+    """How deeply groups and lists are nested."""
+    depth, layer = 0, [data]
+    while layer:
+        depth += 1
+        groups = (one.values() if isinstance(one, dict) else one for one in layer)
+        layer = [one for group in groups for one in group if isinstance(one, (dict, list))]
+    return depth
 
 
 def _paths(data: Any, prefix: str = "") -> Iterable[tuple[str, str]]:
@@ -282,7 +300,7 @@ class _Builder:
             if not isinstance(key_node, ScalarNode):
                 self.findings.append(Finding("a key is not a text", path, "write key: value", line=line))
                 continue
-            key = str(key_node.value)
+            key = self._text(key_node, path)
             below = f"{path}.{key}" if path else key
             if key in values:
                 what = f"the key '{key}' is given twice, first in line {self.lines[below]}"
@@ -292,8 +310,17 @@ class _Builder:
             values[key] = self.build(value_node, below)
         return values
 
-    def _scalar(self, node: ScalarNode, path: str) -> Any:
+    def _text(self, node: ScalarNode, path: str) -> str:
+        """What a node says; half a sign, which JSON can escape, is in no text that can be written again."""
         text = str(node.value)
+        whole = text.encode("utf-8", "replace").decode()
+        if whole != text:
+            line = node.start_mark.line + 1
+            self.findings.append(Finding(f"'{whole[:40]}' has half a sign (\\ud800 …)", path, "remove it", line=line))
+        return whole
+
+    def _scalar(self, node: ScalarNode, path: str) -> Any:
+        text = self._text(node, path)
         try:
             match str(node.tag).removeprefix(_TAG):
                 case "int":

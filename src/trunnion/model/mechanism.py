@@ -150,7 +150,7 @@ class Mechanism(Part):
         """How many coordinates a point has: 2 or 3."""
         return 2 if self.space == "planar" else 3
 
-    @property
+    @cached_property
     def fixed_link(self) -> str:
         """The link that does not move: `ground`, else the link of that name or named frame; empty if there is none."""
         names = [*self.links, *(row.link for row in self.loop)]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from trunnion.errors import Finding, MechanismError
+from trunnion.output import reading
 
 __all__ = ["read_text"]
 
@@ -14,6 +15,7 @@ def read_text(path: Path, kind: str, limit: int, start_from: str) -> str:
 
     kind: what it should be, with its article; start_from: remedy for an empty one.
     """
+    reading(path)
     try:
         if path.exists() and not path.is_file():
             raise MechanismError(Finding("is not a file", remedy=f"name {kind}"))

@@ -9,22 +9,24 @@ work.  [THEORY of the docs, "Structure"; D 17 for the formula]
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import networkx as nx
 import numpy as np
-from numpy.typing import NDArray
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import maximum_bipartite_matching
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.mechanism import Mechanism
-from trunnion.structure.mobility import RANK_TOLERANCE, constraints, rank
+from trunnion.structure.generic import GEAR, SPIN, Constraint, Generic
 
 __all__ = ["FREEDOMS", "Module", "Plan", "decompose", "mobility_by_formula", "passive"]
 
 FREEDOMS = {"planar": 3, "spatial": 6}  # of a free link
-SEED = 1916  # of the generic dimensions
 # outer, inner, outer joint of the dyads in closed form, in the plane and in space
 CLOSED_FORMS = {"planar": ("RRR", "RRP", "RPR", "PRP", "RPP"), "spatial": ("CCC",)}
 ROMAN = {1: "I", 2: "II", 3: "III", 4: "IV", 5: "V", 6: "VI", 7: "VII", 8: "VIII", 9: "IX", 10: "X"}
@@ -95,8 +97,9 @@ def passive(mechanism: Mechanism) -> dict[str, tuple[str, str]]:
     found: dict[str, tuple[str, str]] = {}
     if mechanism.space == "planar" or mechanism.loop:
         return found
+    table = Table(mechanism)
     for link in mechanism.links:
-        joints = [name for name, joint in mechanism.joints.items() if link in joint.links]
+        joints = table.joints_of.get(link, [])
         balls = [name for name in joints if mechanism.joints[name].type == "spherical"]
         if link == mechanism.fixed_link or len(joints) != 2 or not balls:
             continue
@@ -125,16 +128,17 @@ def decompose(mechanism: Mechanism) -> Plan:
     """
     ground = mechanism.fixed_link
     mobility = mobility_by_formula(mechanism)
+    table = Table(mechanism)
     bodies = [link for link in mechanism.effective_links if link != ground]
     spinning = passive(mechanism)
-    determines = _match(mechanism, bodies, ground, spinning)
+    determines, unmatched = _match(mechanism, bodies, ground, spinning)
     if mechanism.space == "spatial":
         findings = _undriven(mechanism, mobility - len(spinning), len(spinning))
         unheld = FREEDOMS["spatial"] * len(bodies) > len(determines)
         if not findings and (unheld or mobility - len(spinning) < len(mechanism.drivers)):
-            return Plan((_whole(mechanism, bodies, spinning),), mobility, tuple(spinning))
+            return Plan((_whole(table, bodies, spinning),), mobility, tuple(spinning))
     else:
-        findings = _undetermined(mechanism, mobility, bodies)
+        findings = _undriven(mechanism, mobility, 0, exactly=True) if mobility != len(mechanism.drivers) else []
     if findings:
         raise MechanismError(findings)
     dependence = nx.DiGraph()
@@ -144,22 +148,62 @@ def decompose(mechanism: Mechanism) -> Plan:
             if other not in (body, ground):
                 dependence.add_edge(other, body)
     parts = nx.condensation(dependence)
+    if mechanism.space == "planar":
+        findings = Generic(mechanism, bodies, determines).fault(unmatched, parts)
+        if findings:
+            raise MechanismError(findings)
     place = {body: i for i, body in enumerate(bodies)}
-    order = nx.lexicographical_topological_sort(
-        parts, key=lambda part: min(place[b] for b in parts.nodes[part]["members"])
-    )
+    first = {part: min(place[body] for body in parts.nodes[part]["members"]) for part in parts}
+    members = {part: sorted(parts.nodes[part]["members"], key=place.__getitem__) for part in parts}
+    gears: dict[int, list[str]] = {}
+    for (name, number), body in determines.items():
+        if number == GEAR:
+            gears.setdefault(parts.graph["mapping"][body], []).append(name)
     known = {ground}
     modules: list[Module] = []
-    for part in order:
-        members = sorted(parts.nodes[part]["members"], key=place.__getitem__)
-        gears = [name for (name, i), body in determines.items() if i == GEAR and body in members]
-        modules.append(_module(mechanism, members, known, gears, spinning))
-        known |= set(members)
+    for part in nx.lexicographical_topological_sort(parts, key=first.__getitem__):
+        modules.append(_module(table, members[part], known, gears.get(part, []), spinning))
+        known |= set(members[part])
     return Plan(tuple(modules), mobility, tuple(spinning))
 
 
-GEAR, SPIN = -1, -2
-Constraint = tuple[str, int]  # of a joint, the number of a freedom it takes; of a gear pair, GEAR; of a link, SPIN
+class Table:
+    """The links and joints of a mechanism, looked up rather than searched for."""
+
+    def __init__(self, mechanism: Mechanism) -> None:
+        self.mechanism = mechanism
+        self.joints = mechanism.effective_joints
+
+    @cached_property
+    def numbers(self) -> dict[str, int]:
+        """Link numbers of the formula: 0 for the ground, the others in file order."""
+        others = [link for link in self.mechanism.effective_links if link != self.mechanism.fixed_link]
+        return {self.mechanism.fixed_link: 0, **{link: i for i, link in enumerate(others, 1)}}
+
+    @cached_property
+    def joints_of(self) -> dict[str, list[str]]:
+        """The joints of each link, in file order."""
+        found: dict[str, list[str]] = {}
+        for name, joint in self.joints.items():
+            for link in dict.fromkeys(joint.links):
+                found.setdefault(link, []).append(name)
+        return found
+
+    @cached_property
+    def order(self) -> dict[str, int]:
+        """Where the joints stand in the file."""
+        return {name: i for i, name in enumerate(self.joints)}
+
+    def inside(self, links: list[str], known: set[str]) -> list[str]:
+        """Joints among some links, or between them and the known ones, in file order."""
+        own = set(links)
+        touching = {name for link in links for name in self.joints_of.get(link, [])}
+        found = (name for name in touching if all(link in own or link in known for link in self.joints[name].links))
+        return sorted(found, key=self.order.__getitem__)
+
+    def symbol(self, joint: str) -> str:
+        """The letter of a joint in the formula."""
+        return PAIRS[self.joints[joint].type].symbol
 
 
 def _constraints(mechanism: Mechanism) -> list[Constraint]:
@@ -180,36 +224,25 @@ def _links_of(mechanism: Mechanism, constraint: Constraint) -> list[str]:
     return list(dict.fromkeys(link for joint in joints for link in mechanism.effective_joints[joint].links))
 
 
-def _match(mechanism: Mechanism, bodies: list[str], ground: str, spinning: Iterable[str]) -> dict[Constraint, str]:
-    """Each constraint with the link it determines: a maximum matching onto the links' freedoms."""
-    graph = nx.Graph()
+def _match(
+    mechanism: Mechanism, bodies: list[str], ground: str, spinning: Iterable[str]
+) -> tuple[dict[Constraint, str], list[Constraint]]:
+    """Each constraint with the link it determines, by a maximum matching onto the links' freedoms; those left over."""
     constraints = _constraints(mechanism) + [(link, SPIN) for link in spinning]
-    graph.add_nodes_from(constraints)
-    for constraint in constraints:
+    size = FREEDOMS[mechanism.space]
+    number = {body: i for i, body in enumerate(bodies)}
+    rows: list[int] = []
+    columns: list[int] = []
+    for row, constraint in enumerate(constraints):
         for link in _links_of(mechanism, constraint):
             if link != ground:
-                graph.add_edges_from((constraint, ("freedom", link, i)) for i in range(FREEDOMS[mechanism.space]))
-    matching = nx.bipartite.maximum_matching(graph, top_nodes=constraints)
-    return {c: matching[c][1] for c in constraints if c in matching}
-
-
-def _undetermined(mechanism: Mechanism, mobility: int, bodies: list[str]) -> list[Finding]:
-    """What keeps the drivers from determining the motion exactly."""
-    drivers = len(mechanism.drivers)
-    if mobility != drivers:
-        return _undriven(mechanism, mobility, 0, exactly=True)
-    matrix, owners = _generic_constraints(mechanism)
-    if rank(matrix) == matrix.shape[1]:
-        return []
-    left, values, right = np.linalg.svd(matrix)
-    free = values <= RANK_TOLERANCE * max(values, default=0.0)
-    strained = np.abs(left[:, : len(values)][:, free]).max(axis=1) > RANK_TOLERANCE
-    loose = np.abs(right[: len(values)][free]).max(axis=0).reshape(-1, FREEDOMS["planar"]).max(axis=1) > RANK_TOLERANCE
-    twice = list(dict.fromkeys(name for name, bad in zip(owners, strained, strict=True) if bad))
-    links = [body for body, bad in zip(bodies, loose, strict=True) if bad]
-    told = ", ".join(f"{name} (driven)" if name in mechanism.drivers else name for name in twice)
-    what = f"one part is constrained twice, by the joints {told}, while the links {', '.join(links)} stay undetermined"
-    return [Finding(what, "joints", "move a joint or a driver from the part that is held twice to the loose one")]
+                columns += range(size * number[link], size * (number[link] + 1))
+                rows += [row] * size
+    shape = (len(constraints), size * len(bodies))
+    graph = csr_array((np.ones(len(rows), dtype=np.int8), (rows, columns)), shape=shape)
+    matched = maximum_bipartite_matching(graph, perm_type="column").tolist()
+    found = {one: bodies[k // size] for one, k in zip(constraints, matched, strict=True) if k >= 0}
+    return found, [one for one, k in zip(constraints, matched, strict=True) if k < 0]
 
 
 def _undriven(mechanism: Mechanism, mobility: int, spins: int, exactly: bool = False) -> list[Finding]:
@@ -228,43 +261,24 @@ def _undriven(mechanism: Mechanism, mobility: int, spins: int, exactly: bool = F
     return [Finding(what, "drivers", remedy)]
 
 
-def _generic_constraints(mechanism: Mechanism) -> tuple[NDArray[np.float64], list[str]]:
-    """Constraints of joints and drivers for dimensions without any special relation."""
-    rng = np.random.default_rng(SEED)
-    joints = {name: (joint.type, joint.links) for name, joint in mechanism.effective_joints.items()}
-    angles = rng.uniform(0.0, 2 * np.pi, len(joints))
-    places = {
-        name: (*rng.uniform(-1.0, 1.0, 2), float(np.cos(angle)), float(np.sin(angle)))
-        for name, angle in zip(joints, angles, strict=True)
-    }
-    gears = {name: (gear.joints, float(rng.uniform(0.3, 0.9))) for name, gear in mechanism.gears.items()}
-    return constraints(
-        list(mechanism.effective_links), mechanism.fixed_link, joints, places, list(mechanism.drivers), gears
-    )
-
-
-def _whole(mechanism: Mechanism, links: list[str], spinning: Mapping[str, tuple[str, str]]) -> Module:
+def _whole(table: Table, links: list[str], spinning: Mapping[str, tuple[str, str]]) -> Module:
     """All links as one module, whose joints constrain more than its links have freedoms."""
-    module = _module(mechanism, links, {mechanism.fixed_link}, [], spinning)
+    module = _module(table, links, {table.mechanism.fixed_link}, [], spinning)
     return replace(module, kind="general", redundant=True)
 
 
 def _module(
-    mechanism: Mechanism, links: list[str], known: set[str], gears: list[str], spinning: Mapping[str, tuple[str, str]]
+    table: Table, links: list[str], known: set[str], gears: list[str], spinning: Mapping[str, tuple[str, str]]
 ) -> Module:
     """The module that the given links form on the links known so far, and through these gear pairs."""
-    joints = [name for name, joint in mechanism.effective_joints.items() if _belongs(joint.links, links, known)]
+    mechanism, numbers = table.mechanism, table.numbers
+    joints = table.inside(links, known)
     driven = [name for name in joints if name in mechanism.drivers]
-    numbers = _numbers(mechanism)
-    letters = "".join(
-        f"[{PAIRS[mechanism.effective_joints[name].type].symbol}]"
-        if name in driven
-        else PAIRS[mechanism.effective_joints[name].type].symbol
-        for name in joints
-    ) + "G" * len(gears)
+    symbols = (f"[{table.symbol(name)}]" if name in driven else table.symbol(name) for name in joints)
+    letters = "".join(symbols) + "G" * len(gears)
     if len(links) == 1 and driven == joints and not gears:
         base = next(link for link in mechanism.effective_joints[joints[0]].links if link not in links)
-        letter = PAIRS[mechanism.effective_joints[joints[0]].type].symbol
+        letter = table.symbol(joints[0])
         label = f"I({numbers[base]},{numbers[links[0]]}){letter}"
         return _assembled(mechanism, letter, links, joints, driven, 1, label)
     rank = _class(mechanism, links, joints)
@@ -281,17 +295,6 @@ def _module(
     witnesses = tuple(joint for joint in spoken if joint not in joints)
     spins = tuple((link, *spinning[link]) for link in links if link in spinning)
     return replace(module, gears=tuple(gears), witnesses=witnesses, spinning=spins)
-
-
-def _belongs(pair: tuple[str, str], links: list[str], known: set[str]) -> bool:
-    """Whether a joint is inside the module or between it and the known links."""
-    return any(link in links for link in pair) and all(link in links or link in known for link in pair)
-
-
-def _numbers(mechanism: Mechanism) -> dict[str, int]:
-    """Link numbers of the formula: 0 for the ground, the others in file order."""
-    others = [link for link in mechanism.effective_links if link != mechanism.fixed_link]
-    return {mechanism.fixed_link: 0, **{link: i for i, link in enumerate(others, 1)}}
 
 
 def _dyad(mechanism: Mechanism, links: list[str], joints: list[str]) -> tuple[str, list[str], list[str]] | None:
@@ -318,12 +321,11 @@ def _class(mechanism: Mechanism, links: list[str], joints: list[str]) -> int:
     """Class after Assur and Artobolevski: joints of the richest link, or of the longest loop of links, at least 2."""
     inner = nx.Graph()
     inner.add_nodes_from(links)
-    most = 2
-    for link in links:
-        most = max(most, sum(link in mechanism.effective_joints[name].links for name in joints))
+    own, held = set(links), Counter(link for name in joints for link in mechanism.effective_joints[name].links)
+    most = max(2, *(held[link] for link in links))
     for name in joints:
         a, b = mechanism.effective_joints[name].links
-        if a in links and b in links:
+        if a in own and b in own:
             inner.add_edge(a, b)
     loops = nx.minimum_cycle_basis(inner)
     return max([most, *(len(loop) for loop in loops if len(loop) > 3)])
@@ -332,12 +334,14 @@ def _class(mechanism: Mechanism, links: list[str], joints: list[str]) -> int:
 def _assembled(
     mechanism: Mechanism, kind: str, links: list[str], joints: list[str], driven: list[str], rank: int, label: str
 ) -> Module:
+    place = {link: i for i, link in enumerate(links)}
+
     def reversed_(name: str) -> bool:
         """A closed form takes the outer link first, and inside the group the link it lists first."""
         first, second = mechanism.effective_joints[name].links
         if kind == "general":
             return False  # its joints are as the file has them
-        return first in links and (second not in links or links.index(first) > links.index(second))
+        return first in place and (second not in place or place[first] > place[second])
 
     flags = tuple(reversed_(name) for name in joints)
     return Module(kind, tuple(links), tuple(joints), flags, tuple(driven), rank, label)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Gears", "Joints", "Places", "constraints", "mobility_by_rank", "rank"]
+__all__ = ["Gears", "Joints", "Part", "Places", "constraints", "mobility_by_rank", "rank"]
 
 RANK_TOLERANCE = 1e-9  # of the largest singular value
 
@@ -27,7 +28,8 @@ def constraints(
     """Constraints on the twists of the links, one row each, and the joint or gear pair that each row belongs to.
 
     Columns: (v_x, v_y at the mean of the places, ω · length) of every link but the ground, lengths in units of the
-    spread of the places, so that the rows do not depend on where the mechanism stands nor on its size.
+    spread of the places, so that the rows do not depend on where the mechanism stands nor on its size. Links of the
+    joints that are not among `links` are held.
     """
     number = {link: i for i, link in enumerate(link for link in links if link != ground)}
     points = np.array([places[name][:2] for name in joints]).reshape(-1, 2)
@@ -46,7 +48,7 @@ def constraints(
         for constraint in held:
             row = np.zeros(3 * len(number))
             for link, sign in zip(sides, (-1.0, 1.0), strict=True):
-                if link != ground:
+                if link in number:
                     row[3 * number[link] : 3 * number[link] + 3] += sign * constraint
             rows.append(row)
             owners.append(name)
@@ -54,7 +56,7 @@ def constraints(
         row = np.zeros(3 * len(number))
         for joint, factor in zip(pair, (-ratio, 1.0), strict=True):
             for link, sign in zip(joints[joint][1], (-1.0, 1.0), strict=True):
-                if link != ground:
+                if link in number:
                     row[3 * number[link] + 2] += sign * factor
         rows.append(row)
         owners.append(name)
@@ -69,12 +71,47 @@ def rank(matrix: NDArray[np.float64]) -> int:
     return int(np.sum(values > RANK_TOLERANCE * values[0]))
 
 
+class Part(NamedTuple):
+    """Links that are determined together, with what holds them: joints, those of them that are driven, gear pairs."""
+
+    links: tuple[str, ...]
+    joints: tuple[str, ...]
+    driven: tuple[str, ...] = ()
+    gears: tuple[str, ...] = ()
+
+
 def mobility_by_rank(
-    links: Sequence[str], ground: str, joints: Joints, places: Places, gears: Gears | None = None
+    links: Sequence[str],
+    ground: str,
+    joints: Joints,
+    places: Places,
+    gears: Gears | None = None,
+    parts: Sequence[Part] = (),
 ) -> int:
     """Freedoms of the links less the rank of the joints' constraints at one position.
 
-    It exceeds Grübler's count where constraints repeat each other, as in a parallelogram with a third crank.
+    It exceeds Grübler's count where constraints repeat each other, as in a parallelogram with a third crank. parts: all
+    links and joints in the order in which they are determined. One that holds its own links firmly takes from them what
+    it should, unless a later one that does not hangs on it: so few constraints of a long row are looked at together.
     """
+    gears = gears or {}
+    weak: list[Part] = []
+    needed: set[str] = set()
+    firm = 0
+    for part in reversed(parts):
+        spoken = (joint for name in part.gears for joint in gears[name][0])
+        own = {name: joints[name] for name in dict.fromkeys((*part.joints, *spoken))}
+        matrix, _ = constraints(
+            part.links, ground, own, places, part.driven, {name: gears[name] for name in part.gears}
+        )
+        if needed.isdisjoint(part.links) and rank(matrix) == int(matrix.shape[1]):
+            firm += len(part.driven)
+        else:
+            weak.append(part)
+            needed.update(link for _, sides in own.values() for link in sides)
+    if parts:
+        links = [link for part in weak for link in part.links]
+        joints = {name: joints[name] for part in weak for name in part.joints}
+        gears = {name: gears[name] for part in weak for name in part.gears}
     matrix, _ = constraints(links, ground, joints, places, gears=gears)
-    return int(matrix.shape[1]) - rank(matrix)
+    return firm + int(matrix.shape[1]) - rank(matrix)

@@ -52,7 +52,7 @@ def bearing_middle(walk: SpatialWalk, joint: str) -> Vector3:
 def stillness(walk: SpatialWalk, joint: str) -> tuple[Number, Number]:
     """Rates of turn and slide of a joint below which their sign is rounding noise, rad/s and m/s."""
     first, second = walk.system.joints[joint][1]
-    turn = ZERO_SLIP * (walk.spins[first] + walk.spins[second] + walk.system.pace(walk.values))
+    turn = ZERO_SLIP * (walk.spins[first] + walk.spins[second] + walk.pace)
     return turn, turn * walk.size
 
 

@@ -71,7 +71,7 @@ def _resist(walk: SpatialWalk, load: Load, size: Number, turns: bool, at_rest: S
     """A torque or force that opposes the motion of a joint, whichever way it goes or one way only."""
     joint = load.joint or ""
     speed = walk.rates(joint)[0 if turns else 1]
-    pace = walk.system.pace(walk.values)
+    pace = walk.pace
     scale = ZERO_SLIP * pace * (1.0 if turns else walk.size)
     sign = np.where(np.abs(primal(speed)) <= scale, at_rest, np.sign(primal(speed)))
     if load.only is not None:

@@ -28,7 +28,7 @@ JUDGED = {"planar": judged_planar.judge, "spatial": judged_spatial.judge}
         ("planar", range(20, 40)),
         ("planar", KINKS),
         ("spatial", range(12)),
-        ("seated", range(10)),
+        ("seated", [*range(10), 16]),  # 16: seats beside a locked stretch
     ],
     ids=["planar", "planar too", "kinks", "spatial", "seats"],
 )

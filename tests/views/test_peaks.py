@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 import xarray as xr
 import yaml
+from typer.testing import CliRunner
 
 from trunnion import Mechanism, analyse
+from trunnion.cli import app
 from trunnion.errors import Status
 from trunnion.views.peaks import ease, usual_peak, whole_peaks
 from trunnion.views.plots import PLOTS, torque
@@ -149,3 +151,25 @@ def test_the_page_is_told_where():
     assert told[0] == 1.0
     assert told[-1] < 0.2
     assert scene(analyse(press(), 36))["ease"] == [1.0]
+
+
+@pytest.mark.parametrize("verb", ["plot", "report", "analyse", "sweep", "play"])
+def test_every_verb_that_draws_can_show_all(verb, tmp_path):
+    """The page is told that no position may be cut; the others take the switch."""
+    file = tmp_path / "engine.yaml"
+    drivers = "S: {speed: 0.01 m/s, range: [110 mm, 164.9999 mm]}"
+    load = "{joint: O, resisting_torque: 5 N m, useful: true}"
+    file.write_text(SLIDER_CRANK.format(mu=0.001, mass="0 kg", drivers=drivers, load=load), encoding="utf-8")
+    page, picture = tmp_path / "page.html", tmp_path / "picture.svg"
+    more = {
+        "plot": ["--kind", "torque", "--out", picture], "report": ["--out", page], "analyse": ["--report", page],
+        "sweep": ["--over", "work.resisting_torque=1Nm,2Nm", "--measure", "S.effort_max", "--out", picture],
+        "play": ["--set", "P.pin.clearance=0.1mm", "--measure", "rotation:O", "--out", picture],
+    }[verb]  # fmt: skip
+    for switch in ([], ["--uncut"]):
+        CliRunner().invoke(app, [verb, str(file), "--steps", "400", *map(str, more), *switch])
+        text = (page if page.exists() else picture).read_text(encoding="utf-8")
+        if page.exists():
+            assert ('"ease":[1.0]' in text.replace(" ", "")) == bool(switch)
+        elif verb == "plot":
+            assert ("near a dead centre" in text) != bool(switch)

@@ -330,7 +330,7 @@ def _refuse_seats(run: Run) -> None:
             raise MechanismError(Finding(what, f"joints.{names[0]}.seat", remedy))
 
 
-IDEAL = ("drive_power", "useful_power", "status")  # what the efficiency of the ideal mechanism is made of
+IDEAL = (*AVERAGED, "status")  # what the means of the ideal mechanism are made of
 
 
 def _fill_as_built(

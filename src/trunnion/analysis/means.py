@@ -127,8 +127,7 @@ def still(arrays: Mapping[str, Array]) -> Means:
         value = float(number[0]) if alone else float("nan")
         return Mean(value, 0.0, abs(value), ROUNDING * abs(value))
 
-    lost = arrays.get("friction_power", np.zeros((0, 1)))
-    efforts = arrays.get("drive_effort", np.zeros((0, 1)))
+    lost, efforts = arrays["friction_power"], arrays["drive_effort"]
     return Means(
         of(np.sum(arrays["drive_power"], axis=0)), of(arrays["useful_power"]), of(np.sum(lost, axis=0)),
         np.array([of(row).value for row in lost]), np.array([abs(of(row).value) for row in efforts]),

@@ -24,7 +24,7 @@ from trunnion.analysis.engine import build
 from trunnion.analysis.friction import FrictionMethod
 from trunnion.analysis.kinematics import Forward, Travel, forward
 from trunnion.analysis.kinetostatics import Backward, Given, Sense, solve
-from trunnion.analysis.means import AVERAGED, VALID, Means, means_of, still
+from trunnion.analysis.means import AVERAGED, Means, means_of, still
 from trunnion.analysis.quadrature import Effort
 from trunnion.analysis.seating import Seat, seats, settle
 from trunnion.analysis.space.determinacy import Determinacy
@@ -304,8 +304,10 @@ def _means(run: Run, arrays: Arrays, method: FrictionMethod, losses: Sequence[co
     def seated(rows: NDArray[np.intp], time: NDArray[np.float64]) -> Arrays:
         seen = around(time.ravel(), run.cycle)
         found = settle(run, seen, method, run.ideal(seen.times, method))
-        valid = contact_loss.valid(found, run, gaps, time.ravel())
-        return {**_powers(found.back, time), VALID: valid.reshape(time.shape).astype(float)}
+        valid = contact_loss.valid(found, run, gaps, time.ravel()).reshape(time.shape)
+        # a gap left out would weigh the rest of the cycle otherwise: play changes little of what flows there
+        meant = _powers(run.ideal(time.ravel(), method=method), time)
+        return {name: np.where(valid, array, meant[name]) for name, array in _powers(found.back, time).items()}
 
     between = [np.unique(np.concatenate([run.edges, np.clip(gaps.ravel(), 0.0, run.cycle.duration)]))]
     return means_of(of, seated, between, SEATED)[0]
@@ -328,8 +330,7 @@ def _refuse_seats(run: Run) -> None:
             raise MechanismError(Finding(what, f"joints.{names[0]}.seat", remedy))
 
 
-# what the means of the ideal mechanism are made of
-IDEAL = ("drive_power", "useful_power", "drive_effort", "friction_power", "status")
+IDEAL = (*AVERAGED, "status")  # what the means of the ideal mechanism are made of
 
 
 def _fill_as_built(

@@ -18,15 +18,14 @@ from trunnion.analysis.quadrature import Effort, integrals
 from trunnion.analysis.switches import Mechanisms, edges
 from trunnion.errors import Status
 
-__all__ = ["AVERAGED", "ROUNDING", "VALID", "Mean", "Means", "Powers", "means_of", "still"]
+__all__ = ["AVERAGED", "ROUNDING", "Mean", "Means", "Powers", "means_of", "still"]
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
 Powers = Callable[[Rows, Array], Mapping[str, Array]]
 
-# what `Powers` has of each lane and node, NaN where there is no answer; some have VALID too, 1 or 0
+# what `Powers` has of each lane and node, NaN where there is no answer
 AVERAGED = ("drive_power", "useful_power", "friction_power", "drive_effort", "power_residual")
-VALID = "valid"
 ROUNDING = 1e-12  # of a mean of magnitudes
 NEGLIGIBLE = 1e-9  # of the largest power: what is below it need not be known to many digits
 RESIDUALS = 4.0  # of the mean residual of the power balance: what rounding leaves of a power that cancels
@@ -51,8 +50,7 @@ class Means:
     """Means over one cycle, W; NaN where any place of it has no answer.
 
     drive_power: of all drivers; useful_power: that the useful loads take; friction_power: lost in all joints;
-    friction_power_mean: in each joint; drive_effort_rms: root mean square of each driver, N m or N; share: of the cycle
-    that these are means over, the rest of it not being valid.
+    friction_power_mean: in each joint; drive_effort_rms: root mean square of each driver, N m or N.
     """
 
     drive_power: Mean
@@ -60,7 +58,6 @@ class Means:
     friction_power: Mean
     friction_power_mean: Array
     drive_effort_rms: Array
-    share: float = 1.0
 
     @property
     def drive_power_mean(self) -> float:
@@ -99,8 +96,7 @@ def means_of(
         found = powers(rows, time)
         driven, lost = np.sum(found["drive_power"], axis=0), found["friction_power"]
         known = [driven, found["useful_power"], np.sum(lost, axis=0), np.abs(found["power_residual"])]
-        all_ = np.concatenate([np.stack(known), found["drive_effort"] ** 2, lost, np.ones((1, *time.shape))])
-        return np.where(found[VALID] > 0, all_, 0.0) if VALID in found else all_
+        return np.concatenate([np.stack(known), found["drive_effort"] ** 2, lost])
 
     def floor(sizes: Array) -> Array:
         """Powers that are nothing beside the others; how even the residual is does not matter."""
@@ -112,17 +108,14 @@ def means_of(
 
     between = edges(of) if between is None else between
     found = integrals(functions, between, floor, effort)
-    whole = np.array([one[-1] - one[0] for one in between])
     told = []
-    for k in range(len(between)):
-        with np.errstate(all="ignore"):
-            value, error, size = (part[:, k] / found.value[-1, k] for part in (found.value, found.error, found.size))
+    for k, times in enumerate(between):
+        value, error, size = (part[:, k] / (times[-1] - times[0]) for part in (found.value, found.error, found.size))
         rounding = np.maximum(ROUNDING * size, RESIDUALS * value[3])
         rounding[2] = max(rounding[2], ROUNDING * np.max(size[:3]))
         driven, useful, lost = (Mean(*(float(one[i]) for one in (value, error, size, rounding))) for i in range(3))
         efforts = np.sqrt(value[4 : 4 + drivers])
-        share = float(found.value[-1, k] / whole[k])
-        told.append(Means(driven, useful, lost, value[4 + drivers : -1], efforts, share))
+        told.append(Means(driven, useful, lost, value[4 + drivers :], efforts))
     return told
 
 
@@ -134,8 +127,7 @@ def still(arrays: Mapping[str, Array]) -> Means:
         value = float(number[0]) if alone else float("nan")
         return Mean(value, 0.0, abs(value), ROUNDING * abs(value))
 
-    lost = arrays.get("friction_power", np.zeros((0, 1)))
-    efforts = arrays.get("drive_effort", np.zeros((0, 1)))
+    lost, efforts = arrays["friction_power"], arrays["drive_effort"]
     return Means(
         of(np.sum(arrays["drive_power"], axis=0)), of(arrays["useful_power"]), of(np.sum(lost, axis=0)),
         np.array([of(row).value for row in lost]), np.array([abs(of(row).value) for row in efforts]),

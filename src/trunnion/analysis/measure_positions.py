@@ -129,7 +129,11 @@ def plan(run: Run, measures: Sequence[Measure], steps: int) -> Plan:
 
 
 def _averages(run: Run, measure: Measure) -> bool:
-    """Whether a figure is a mean over the cycle; that of an angle which gains turns needs the end of the cycle too."""
+    """Whether a figure is a mean over the cycle; that of an angle which gains turns needs the end of the cycle too.
+
+    Samples are taken at the nodes of the nominal mechanism: where one turns round elsewhere, its mean is off by the
+    jump there times the way from the nominal place, as a share of the cycle.
+    """
     return measure.rule in ("mean", "rms", "ratio") and not measure.turning(run.system)
 
 

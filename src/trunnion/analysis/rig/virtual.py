@@ -158,7 +158,7 @@ class Observation:
             parts.append(channel.noise / math.sqrt(longest.before))
         else:
             parts.append(channel.offset)
-        return float(np.linalg.norm(parts))
+        return math.hypot(*parts)
 
     def accuracy(self, name: str) -> Accuracy:
         """What a laboratory that knows its sensors states of one."""

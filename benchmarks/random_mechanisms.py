@@ -33,7 +33,11 @@ from benchmarks.judged import planar as judged_planar
 from benchmarks.judged import spatial as judged_spatial
 from benchmarks.judged.verdict import CHECKS, Data, Results, Verdict
 
-SPACES = {"planar": (planar.drawn, judged_planar.judge), "spatial": (spatial.drawn, judged_spatial.judge)}
+SPACES = {
+    "planar": (planar.drawn, judged_planar.judge),
+    "spatial": (spatial.drawn, judged_spatial.judge),
+    "seated": (planar.seated, judged_planar.judge),
+}
 SHOWN = 12  # offenders listed for each check
 
 __all__ = ["Found", "examine", "main", "result_of"]
@@ -191,6 +195,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.random_mechanisms", description=__doc__.splitlines()[0])
     parser.add_argument("--planar", type=int, default=10_000, help="planar mechanisms (10000)")
     parser.add_argument("--spatial", type=int, default=1_000, help="spatial mechanisms (1000)")
+    parser.add_argument("--seated", type=int, default=0, help="planar ones with their pins in loaded seats (0)")
     parser.add_argument("--steps", type=int, default=24, help="positions of each (24)")
     parser.add_argument("--seed", type=int, default=0, help="the first seed; each mechanism has the next (0)")
     parser.add_argument("--jobs", type=int, default=1, help="processes (1)")

@@ -9,7 +9,7 @@ import numpy as np
 
 from benchmarks.drawn.plane import Data, Place, Plane, unit
 
-__all__ = ["FAMILIES", "drawn"]
+__all__ = ["FAMILIES", "drawn", "seated"]
 
 # families and how often each is drawn
 FAMILIES = {
@@ -225,3 +225,22 @@ def drawn(seed: int) -> tuple[str, Data]:
     BUILT[family](plane)
     plane.loaded()
     return family, plane.data
+
+
+def seated(seed: int) -> tuple[str, Data]:
+    """The same with play in every pin and some guides, each lying where its load presses it; without gear pairs."""
+    family, data = drawn(seed)
+    if "gears" in data:
+        return seated(seed + 1_000_003)
+    rng = np.random.default_rng([20_28, seed])
+    points = [point for link in data["links"].values() for point in link["points"].values()]
+    size = max(float(np.hypot(*(point["at"] if isinstance(point, dict) else point))) for point in points)
+    for joint in data["joints"].values():
+        clearance = size * float(10 ** rng.uniform(-5, -3.5))
+        if joint["type"] == "revolute":
+            joint["pin"] = {"radius": 0.01 * size, **joint.get("pin", {}), "clearance": clearance}
+            joint["seat"] = "loaded"
+        elif rng.random() < 0.5:
+            joint["guide"]["clearance"] = clearance
+            joint["seat"] = "loaded"
+    return family, data

@@ -318,8 +318,10 @@ class Spatial:
                 forces += [dot(force, axis) for axis in two.axes[:2]]
             if kind == "helical":
                 moments.append(dot(moment, z) + joint["pitch"] / (2 * np.pi) * dot(force, z))
+            # of a shaft under great torques and small forces the rounding is that of the torques
+            scale = np.maximum(self.largest_force, self.largest_moment / self.length)
             for part in forces:
-                self.verdict.note("balance", name, part, self.largest_force)
+                self.verdict.note("balance", name, part, scale)
             for part in moments:
                 self.verdict.note("balance", name, part, self.largest_moment)
 

@@ -15,7 +15,7 @@ from trunnion.errors import Finding, Severity
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["bar", "console", "findings_of", "say", "show_figures", "show_rows", "wrote"]
+__all__ = ["bar", "console", "findings_of", "say", "say_missed", "show_figures", "show_rows", "wrote"]
 
 
 def console() -> Any:
@@ -102,6 +102,12 @@ def findings_of(result: xr.Dataset) -> list[Finding]:
     """The findings that a result carries."""
     rows = json.loads(result.attrs["findings"])
     return [Finding(row["what"], row["where"], row["remedy"], Severity(row["severity"])) for row in rows]
+
+
+def say_missed(result: xr.Dataset) -> None:
+    """What of the limits is not kept, before anything else."""
+    for line in json.loads(result.attrs.get("missed", "[]")):
+        console().print(line, style="bold", markup=False, highlight=False, soft_wrap=True)
 
 
 def say(findings: Any) -> None:

@@ -453,3 +453,28 @@ def test_merging_knows_the_types() -> None:
     assert not has_play(Joint(type="universal", links=("a", "b"), pin={"clearance": 1}))
     assert not has_play(Joint(type="prismatic", links=("a", "b"), pin={"clearance": 1}))
     assert has_play(Joint(type="prismatic", links=("a", "b"), guide={"clearance": 0}))
+
+
+# ---- the link that carries a seat -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("joint", "link", "said"),
+    [
+        ("B", "frame", "no link of this joint"),
+        ("S", "frame", "the seat of a prismatic joint has no link to choose"),
+    ],
+)
+def test_links_that_carry_no_seat(joint: str, link: str, said: str) -> None:
+    data = (PLAYING if joint == "B" else SLIDER).data()
+    data["joints"][joint]["seat_on"] = link
+    with pytest.raises(MechanismError, match=said) as error:
+        Mechanism(**data)
+    assert error.value.findings[0].where == f"joints.{joint}.seat_on"
+
+
+def test_a_given_seat_stays_in_its_hole() -> None:
+    data = PLAYING.data()
+    data["joints"]["B"] |= {"seat": {"xi": "30 deg"}, "seat_on": data["joints"]["B"]["links"][0]}
+    with pytest.raises(MechanismError, match="keep one of seat and seat_on"):
+        Mechanism(**data)

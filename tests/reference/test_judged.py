@@ -23,8 +23,14 @@ JUDGED = {"planar": judged_planar.judge, "spatial": judged_spatial.judge}
 
 @pytest.mark.parametrize(
     ("space", "seeds"),
-    [("planar", range(20)), ("planar", range(20, 40)), ("planar", KINKS), ("spatial", range(12))],
-    ids=["planar", "planar too", "kinks", "spatial"],
+    [
+        ("planar", range(20)),
+        ("planar", range(20, 40)),
+        ("planar", KINKS),
+        ("spatial", range(12)),
+        ("seated", [*range(10), 16]),  # 16: seats beside a locked stretch
+    ],
+    ids=["planar", "planar too", "kinks", "spatial", "seats"],
 )
 def test_random_mechanisms(space: str, seeds: Any) -> None:
     """Every solved position keeps every limit, and most positions are solved."""
@@ -43,6 +49,15 @@ def test_the_quick_way_has_the_same_numbers(space: str, seed: int) -> None:
     for name, array in quick.arrays.items():
         if name != "locking_margin":
             np.testing.assert_array_equal(array, whole.arrays[name], err_msg=name)
+
+
+def test_the_judge_sees_a_joint_beside_its_seat() -> None:
+    """A seat that is off by a thousandth of its clearance puts reactions, and the pin, where they are not."""
+    _, data = planar.seated(2)
+    result = result_of(data, STEPS, whole=False)
+    wrong = judged_planar.judge(data, altered(result, "seat_offset", 1.001))
+    assert wrong.worst("motion")[0] > 1e-4
+    assert wrong.worst("balance")[0] > 1e-9
 
 
 def altered(result: Results, name: str, factor: float) -> Results:

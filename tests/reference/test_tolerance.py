@@ -384,13 +384,20 @@ def seated(xi: str = "0 deg", clearance: str = "0.02 mm", **options: Any) -> Mec
 
 
 def test_seat_at_any_angle() -> None:
-    """The pin lies at the wall of its hole, anywhere around."""
+    """The pin lies at the wall of its hole, anywhere around; nominally at 0°, where the coupler is shortest."""
     mechanism = seated(tolerances={"joints.B.seat.xi": {"distribution": "direction"}})
     found = trunnion.tolerance(mechanism, methods=FAST)
     assert [str(name) for name in found["parameter"].values] == ["joints.B.seat.xi"]
     steep = abs(slopes(fourbar_angle, FOURBAR, 3e-5)[2])
     # a finite circle, whose second harmonic is of second order in its radius
-    assert found["worst_case_upper"].item() == pytest.approx(2e-5 * steep, rel=1e-3)
+    ends = sorted(
+        (0.0, fourbar_angle(**(FOURBAR | {"l3": 0.09 + 2e-5})) - fourbar_angle(**(FOURBAR | {"l3": 0.09 - 2e-5})))
+    )
+    assert found["worst_case_lower"].item() == pytest.approx(ends[0], rel=1e-3, abs=1e-12)
+    assert found["worst_case_upper"].item() == pytest.approx(ends[1], rel=1e-3, abs=1e-12)
+    assert found["shift_linear"].item() == pytest.approx(sum(ends) / 2, rel=1e-3)
+    assert found["searched_lower"].item() == pytest.approx(ends[0], rel=1e-3, abs=1e-12)
+    assert found["searched_upper"].item() == pytest.approx(ends[1], rel=1e-3, abs=1e-12)
     assert found["deviation_linear"].item() == pytest.approx(2e-5 * steep / np.sqrt(2), rel=1e-3)
 
 

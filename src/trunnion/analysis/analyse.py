@@ -330,7 +330,8 @@ def _refuse_seats(run: Run) -> None:
             raise MechanismError(Finding(what, f"joints.{names[0]}.seat", remedy))
 
 
-IDEAL = ("drive_power", "useful_power", "friction_power", "status")  # what the means of the ideal mechanism are made of
+# what the means of the ideal mechanism are made of
+IDEAL = ("drive_power", "useful_power", "drive_effort", "friction_power", "status")
 
 
 def _fill_as_built(

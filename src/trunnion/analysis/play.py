@@ -33,7 +33,7 @@ from trunnion.analysis.friction import FrictionMethod
 from trunnion.analysis.kinematics import Forward, forward
 from trunnion.analysis.measures import MOTIONS, Measure, named, outputs
 from trunnion.analysis.play_result import dataset, relied_on
-from trunnion.analysis.shifts import Play
+from trunnion.analysis.shifts import HOLE, Play
 from trunnion.analysis.space import forces
 from trunnion.analysis.space.motion import SpatialWalk
 from trunnion.analysis.system import System, Values
@@ -73,9 +73,14 @@ def by_virtual_load(walk: Forward, measure: Measure, known: Mapping[str, Play]) 
     return {name: play.model.loads(*back.on_hole(name), play.length) for name, play in known.items()}
 
 
-def by_duals(run: Run, measure: Measure, known: Mapping[str, Play], time: Array, method: FrictionMethod) -> Loads:
-    """The same by derivatives through the whole analysis, of measures of the motion or of an effort."""
-    paths = [f"seats.{name}.{key}" for name, play in known.items() for end in play.model.ends for key in end]
+def by_duals(
+    run: Run, measure: Measure, known: Mapping[str, Play], time: Array, method: FrictionMethod, carrier: str = HOLE
+) -> Loads:
+    """The same by derivatives through the whole analysis, of measures of the motion or of an effort.
+
+    carrier: of `shifts.CARRIERS`, the link on which seats stay: pins that turn with one or the other move otherwise.
+    """
+    paths = [f"{carrier}.{name}.{key}" for name, play in known.items() for end in play.model.ends for key in end]
     rows = np.eye(len(paths))[:, :, None]  # (offset, sample, 1): each sample moves one offset
     offsets = {path: Dual(0.0, row) for path, row in zip(paths, rows, strict=True)}
     with np.errstate(all="ignore"):
@@ -215,20 +220,37 @@ def _fill(effect: Effect, rates: Array, window: slice) -> None:
     for i, measure in enumerate(effect.measures):
         if back is None or measure.of_motion:
             value, known, rates[i, window] = measure.value(walk), posed, measure.rate(walk)
-            loads = by_virtual_load(walk, measure, effect.plays)
+            loads, others = by_virtual_load(walk, measure, effect.plays), None
             placed = status < Status.NOT_ASSEMBLED
         else:
             value, known = back.efforts[measure.subject], acting
-            loads = by_duals(run, measure, effect.plays, time, method)
+            loads, others = _both(run, measure, effect.plays, time, method)
             placed = acting
         effect.value[i, window] = np.where(placed, value, np.nan)
-        _put(effect, i, loads, window, known)
+        _put(effect, i, loads, window, known, others or {})
 
 
-def _put(effect: Effect, i: int, loads: Loads, window: slice, known: NDArray[np.bool_]) -> None:
-    """Worst case and deviation of one measure."""
+def _both(
+    run: Run, measure: Measure, known: Mapping[str, Play], time: Array, method: FrictionMethod
+) -> tuple[Loads, Loads]:
+    """Loads of an effort with every seat on the link that carries it, and on the other where the model does not say."""
+    carriers = {name: shifts.carriers_of(run.system.mechanism, name) for name in known}
+    found = []
+    for place in range(2):
+        loads: Loads = {}
+        for carrier in shifts.CARRIERS:
+            own = {name: one for name, one in known.items() if carriers[name][place : place + 1] == (carrier,)}
+            loads |= by_duals(run, measure, own, time, method, carrier) if own else {}
+        found.append(loads)
+    return found[0], found[1]
+
+
+def _put(effect: Effect, i: int, loads: Loads, window: slice, known: NDArray[np.bool_], others: Loads) -> None:
+    """Worst case and deviation of one measure; others: loads with seats on the other links, for the worst case."""
     for j, (name, one) in enumerate(effect.plays.items()):
-        effect.worst_case[i, j, window] = np.where(known, worst_case(loads[name], one.radii), np.nan)
+        most = worst_case(loads[name], one.radii)
+        most = np.maximum(most, worst_case(others[name], one.radii)) if name in others else most
+        effect.worst_case[i, j, window] = np.where(known, most, np.nan)
         effect.deviation[i, j, window] = np.where(known, np.sqrt(variance(loads[name], one.radii)), np.nan)
         for k, (end, load) in enumerate(zip(one.model.ends, loads[name], strict=True)):
             for key, part in zip(end, load, strict=True):

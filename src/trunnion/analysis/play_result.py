@@ -15,7 +15,7 @@ from trunnion.algebra.dual import primal
 from trunnion.analysis.account import finding_row, references
 from trunnion.analysis.measures import Measure
 from trunnion.analysis.shifts import Play
-from trunnion.errors import Finding, Status
+from trunnion.errors import Finding, Severity, Status
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -122,6 +122,14 @@ def dataset(found: Found, findings: Sequence[Finding]) -> xr.Dataset:
         "periodic": int(found.run.cycle.periodic),
         "summary": json.dumps(_summary(found, units, dial), ensure_ascii=False),
         "findings": json.dumps([finding_row(finding) for finding in findings], ensure_ascii=False),
+        "missed": json.dumps(
+            [
+                f"{one.where}: {one.what}"
+                for one in findings
+                if one.where.endswith(".limit") and one.severity is Severity.ERROR
+            ],
+            ensure_ascii=False,
+        ),
     }
     told = {dim: (dim, np.asarray(names, dtype=str)) for dim, names in coordinates.items()}
     times = xr.Variable("position", found.time, {"units": "s", "long_name": "time from the start of the cycle"})

@@ -2,13 +2,14 @@
 
 The second element of a joint is the hole's frame. An error moves it before the pair does, S → S Â, so modules meet
 only another local element. Where the numbers of a seat are among the values (`seats.JOINT.1.x` …, see `clearance`)
-the pin lies there.
+the pin lies there, as the link of the hole sees it; with `journals.JOINT.1.x` … as that of the pin sees it. Both say
+the same at one position; as the joint turns, the first seat stays on the hole's link, the other on the pin's.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -21,9 +22,17 @@ from trunnion.groups import planar
 from trunnion.joints.clearance import CLEARANCE_MODELS, ClearanceModel, leaning
 from trunnion.model.contact import clearance
 
-__all__ = ["Play", "hole", "misaligned", "misaligned_planar", "play_of", "seated", "seated_planar", "unstated_length"]
+if TYPE_CHECKING:
+    from trunnion.model.mechanism import Mechanism
+
+__all__ = [
+    "CARRIERS", "HOLE", "Play", "carriers_of", "hole", "journaled", "journaled_planar", "misaligned",
+    "misaligned_planar", "play_of", "seated", "seated_planar", "unstated_length",
+]  # fmt: skip
 
 Values = Mapping[str, Number]
+HOLE, PIN = "seats", "journals"
+CARRIERS = (HOLE, PIN)  # under which the numbers of a seat stand: carried by the link of the hole, or of the pin
 
 
 class Play(NamedTuple):
@@ -45,6 +54,18 @@ def play_of(space: str, kind: str, values: Values, joint: str) -> Play | None:
     radius = (own if own is not None else 0.0) + values.get(f"{path}.pin.cylindricity", 0.0)
     radii = tuple(0.5 * floats if i in model.axial else radius for i in range(len(model.ends)))
     return Play(model, radii, length_of(model, values, joint))
+
+
+def carriers_of(mechanism: Mechanism, joint: str) -> tuple[str, ...]:
+    """Which of `CARRIERS` a seat may be on as the joint turns: the one that the model says, or both.
+
+    Where nothing turns in a hole, both are the same; where a joint slides, the length of its hole goes with one link.
+    """
+    one = mechanism.effective_joints[joint]
+    model = CLEARANCE_MODELS[mechanism.space].get(one.type)
+    if one.seat_on is not None:
+        return (CARRIERS[0] if one.seat_on == one.links[1] else CARRIERS[1],)
+    return CARRIERS if model is not None and model.turns else CARRIERS[:1]
 
 
 def length_of(model: ClearanceModel, values: Values, joint: str) -> Number:
@@ -91,7 +112,7 @@ def misaligned_planar(frame: planar.Frame, values: Values, joint: str) -> planar
 def seated(frame: rigid.Frame, kind: str, values: Values, joint: str) -> rigid.Frame:
     """The second element of a joint in space where its pin lies in the hole."""
     model = CLEARANCE_MODELS["spatial"].get(kind)
-    offsets = model.offsets(values, f"seats.{joint}") if model else None
+    offsets = model.offsets(values, f"{HOLE}.{joint}") if model else None
     if model is None or offsets is None:
         return frame
     middle = hole(frame, values, joint)
@@ -103,10 +124,30 @@ def seated(frame: rigid.Frame, kind: str, values: Values, joint: str) -> rigid.F
 def seated_planar(frame: planar.Frame, kind: str, values: Values, joint: str) -> planar.Frame:
     """The second element of a joint in the plane where its pin lies in the hole."""
     model = CLEARANCE_MODELS["planar"].get(kind)
-    offsets = model.offsets(values, f"seats.{joint}") if model else None
+    offsets = model.offsets(values, f"{HOLE}.{joint}") if model else None
     if model is None or offsets is None:
         return frame
     return planar.compose(frame, planar.Frame(*model.shift(offsets, length_of(model, values, joint))))
+
+
+def journaled(frame: rigid.Frame, kind: str, values: Values, joint: str) -> rigid.Frame:
+    """The first element of a joint in space whose pin carries the seat: the hole lies off it the other way."""
+    model = CLEARANCE_MODELS["spatial"].get(kind)
+    offsets = model.offsets(values, f"{PIN}.{joint}") if model else None
+    if model is None or offsets is None:
+        return frame
+    lain = rigid.relative(hole(frame, values, joint), model.shift(offsets, length_of(model, values, joint)))
+    back = values.get(f"joints.{joint}.pin.offset")
+    return lain if back is None else lain._replace(place=plus(lain.place, scaled(-back, lain.z)))
+
+
+def journaled_planar(frame: planar.Frame, kind: str, values: Values, joint: str) -> planar.Frame:
+    """The first element of a joint in the plane whose pin carries the seat."""
+    model = CLEARANCE_MODELS["planar"].get(kind)
+    offsets = model.offsets(values, f"{PIN}.{joint}") if model else None
+    if model is None or offsets is None:
+        return frame
+    return planar.relative(frame, planar.Frame(*model.shift(offsets, length_of(model, values, joint))))
 
 
 def _leans(values: Values, joint: str) -> bool:

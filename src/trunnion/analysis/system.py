@@ -199,9 +199,13 @@ class System:
         return (1 / ratio, -phase / ratio) if name in self.turned_round else (ratio, phase)
 
     def elements(self, values: Values) -> dict[tuple[str, str], Any]:
-        """Local frame of every joint's element, by (link, joint): errors of joints and seats are in the second ones."""
+        """Local frame of every joint's element, by (link, joint): errors of joints are in the second ones.
+
+        Seats are in the elements of the links that carry them.
+        """
         found = self.holes(values)
-        for name, (kind, (_, second)) in self.joints.items():
+        for name, (kind, (first, second)) in self.joints.items():
+            found[first, name] = shifts.journaled_planar(found[first, name], kind, values, name)
             found[second, name] = shifts.seated_planar(found[second, name], kind, values, name)
         return found
 

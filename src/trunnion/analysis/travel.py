@@ -150,17 +150,18 @@ def _rates(
     """How fast the seats travel at the inner lanes, m/s, and at which of them all seats do so evenly.
 
     A seat that jumps, since its load turns round or a friction does, or that turns too quickly for differences,
-    bends by more than BEND from a lane to the next and the one after. There the rate is taken on the side on which
-    all turn least, and is 0 where that is more than QUICK.
+    bends by more than BEND from a lane to the next and the one after; so does one that is known on one side alone.
+    There the rate is taken on the side on which all turn least, and is 0 where that is more than QUICK.
     """
     inner = np.arange(len(seen.times))[seen.inner]
     before, after = inner - seen.step, inner + seen.step
     ends = [[f"seats.{seat.joint}.{key}" for key in end] for seat in run.seats for end in seat.play.model.ends]
     bend = back = ahead = np.zeros(len(inner))
     for paths in ends:
-        size = np.sqrt(sum(offsets[path][inner] ** 2 for path in paths))
-        scale = 1 / np.where(size > 0, size, np.inf)
         was, is_, will = ([offsets[path][side] for path in paths] for side in (before, inner, after))
+        # a pin whose load is not known lies in the middle: from there to its wall is a jump, not a way
+        size = np.sqrt(np.maximum.reduce([sum(part**2 for part in side) for side in (was, is_, will)]))
+        scale = 1 / np.where(size > 0, size, np.inf)
         back = np.maximum(back, scale * _apart(was, is_))
         ahead = np.maximum(ahead, scale * _apart(is_, will))
         middle = [0.5 * (a + b) for a, b in zip(was, will, strict=True)]

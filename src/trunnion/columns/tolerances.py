@@ -25,13 +25,14 @@ __all__ = ["TABLES", "flat", "is_tolerance", "table_of"]
 
 Values = NDArray[Any]
 Flat = list[tuple[str, str, Values]]
-BY_MEASURE = ("sensitivity", "contribution_worst_case", "contribution_rss", "corner_lower", "corner_upper",
-              "first_order", "first_order_low", "first_order_high", "total_order", "total_order_low",
-              "total_order_high")  # fmt: skip
+BY_MEASURE = ("sensitivity", "contribution_worst_case", "contribution_rss", "contribution_variance",
+              "corner_lower", "corner_upper", "first_order", "first_order_low", "first_order_high", "total_order",
+              "total_order_low", "total_order_high")  # fmt: skip
 SHARES = (
     "yield",
     "used",
     "contribution_rss",
+    "contribution_variance",
     "first_order",
     "total_order",
     "convergence_yield",

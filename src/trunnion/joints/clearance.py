@@ -56,7 +56,8 @@ class ClearanceModel:
     end float alone, not by the radial clearance. loads: `(force, moment, length)` → load at each end, from the force
     (N) and the moment (N m) about mid-length of the pin on the hole, in the hole's frame; shift: `(offsets, length)`
     → the pin's frame in the hole's: a `rigid.Frame`, in the plane (x, y, cos, sin); size: the part and its key whose
-    number is the length H.
+    number is the length H; turns: whether the pair does nothing but turn, so that a seat that stays on the link of the
+    pin is another than one that stays on that of the hole.
     """
 
     ends: tuple[tuple[str, ...], ...]
@@ -64,6 +65,7 @@ class ClearanceModel:
     shift: Callable[[Offsets, Number], Any]
     size: tuple[str, tuple[str, ...]] | None = None
     axial: tuple[int, ...] = ()
+    turns: bool = False
 
     def offsets(self, values: Mapping[str, Number], path: str) -> list[Vector] | None:
         """The offsets that stand under a path (`path.1.x` …); None if there are none."""
@@ -297,15 +299,17 @@ PIN_LENGTH = ("pin", ("length", "bearing"))
 GUIDE_LENGTH = ("guide", ("length",))
 CLEARANCE_MODELS: dict[str, dict[str, ClearanceModel]] = {
     "planar": {
-        "revolute": ClearanceModel((("1.x", "1.y"),), _planar_pin_loads, _planar_pin_shift),
+        "revolute": ClearanceModel((("1.x", "1.y"),), _planar_pin_loads, _planar_pin_shift, turns=True),
         "prismatic": ClearanceModel((("1.y",), ("2.y",)), _planar_guide_loads, _planar_guide_shift, GUIDE_LENGTH),
     },
     "spatial": {
-        "revolute": ClearanceModel((*PIN_ENDS, ("3.z",)), _thrust_pin_loads, _pin_shift, PIN_LENGTH, axial=(2,)),
+        "revolute": ClearanceModel(
+            (*PIN_ENDS, ("3.z",)), _thrust_pin_loads, _pin_shift, PIN_LENGTH, axial=(2,), turns=True
+        ),
         "cylindrical": ClearanceModel(PIN_ENDS, _pin_loads, _pin_shift, PIN_LENGTH),
         "prismatic": ClearanceModel(
             (("1.x",), ("1.y",), ("2.x",), ("2.y",)), _rectangular_loads, _rectangular_shift, GUIDE_LENGTH
         ),
-        "spherical": ClearanceModel((("1.x", "1.y", "1.z"),), _ball_loads, _ball_shift),
+        "spherical": ClearanceModel((("1.x", "1.y", "1.z"),), _ball_loads, _ball_shift, turns=True),
     },
 }

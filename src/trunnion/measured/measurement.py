@@ -91,7 +91,7 @@ class Course:
         repeated = self.scatter / np.sqrt(np.maximum(self.count, 1))
         with np.errstate(over="ignore"):  # of numbers near the end of the floats
             known = np.square(self.accuracy.zero) + np.square(self.unresolved)
-            return np.sqrt(repeated**2 + known + (self.accuracy.gain * self.mean) ** 2)
+            return np.asarray(np.sqrt(repeated**2 + known + (self.accuracy.gain * self.mean) ** 2))
 
 
 @dataclass(frozen=True)

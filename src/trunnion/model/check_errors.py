@@ -11,7 +11,7 @@ from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.joints.clearance import ellipse_error
 from trunnion.joints.fits import FitLimits, fit
-from trunnion.model.contact import PLAY_PAIRS, clearance, has_guide, has_pin, has_play, play
+from trunnion.model.contact import PLAY_PAIRS, TURNING_PAIRS, clearance, has_guide, has_pin, has_play, play
 from trunnion.model.joint_parts import Friction, Joint, Pin, Seat
 from trunnion.model.merge import stated
 from trunnion.model.parameter_names import ERRORS, ParameterNames
@@ -72,9 +72,23 @@ def joint_errors(mechanism: Mechanism) -> Iterator[Finding]:
         if has_pin(joint.type):
             yield from _pin(mechanism, name, own.pin, where)
         yield from _unused(joint.type, own.pin, own.friction, where, mechanism.space == "spatial")
+        if own.seat_on is not None:
+            yield from _seat_on(joint, f"{where}.seat_on")
         if joint.seat not in (None, "free"):
             yield from _seat(mechanism, joint, where if own.seat is not None else "joint_defaults", where)
     yield from _defaults(mechanism)
+
+
+def _seat_on(joint: Joint, where: str) -> Iterator[Finding]:
+    """Whether the link that carries the seat of a pin is one of its two, and the pin is free to lie anywhere."""
+    if joint.seat_on not in joint.links:
+        yield Finding(f"'{joint.seat_on}' is no link of this joint", where, f"name {' or '.join(joint.links)}")
+    elif joint.type not in TURNING_PAIRS:
+        what = f"the seat of a {joint.type} joint has no link to choose: its length goes with '{joint.links[1]}'"
+        yield Finding(what, where, f"remove it; {' and '.join(TURNING_PAIRS)} joints have one")
+    elif isinstance(joint.seat, Seat):
+        what = "the seat is given, and seat_on is of a pin that may lie anywhere"
+        yield Finding(what, where, "keep one of seat and seat_on")
 
 
 def _misalignment(joint: Joint, where: str, spatial: bool) -> Iterator[Finding]:

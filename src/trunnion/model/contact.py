@@ -7,9 +7,12 @@ from collections.abc import Mapping
 from trunnion.algebra.namespace import Number
 from trunnion.model.joint_parts import Joint, freedoms
 
-__all__ = ["PLAY_PAIRS", "clearance", "contact_lacks", "has_guide", "has_pin", "has_play", "motions", "play"]
+__all__ = [
+    "PLAY_PAIRS", "TURNING_PAIRS", "clearance", "contact_lacks", "has_guide", "has_pin", "has_play", "motions", "play",
+]  # fmt: skip
 
 PLAY_PAIRS = ("revolute", "prismatic", "cylindrical", "spherical")  # those whose play is modelled
+TURNING_PAIRS = ("revolute", "spherical")  # of these those in which nothing slides
 
 _MOTIONS = {
     "revolute": ("rotation",),

@@ -217,7 +217,8 @@ class JointDefaults(Part):
 class Joint(Part):
     """A kinematic pair between two links, at the point of its own name on both.
 
-    pitch: slide of a helical pair for one turn, positive for a right-hand thread.
+    pitch: slide of a helical pair for one turn, positive for a right-hand thread. seat_on: the link on which the pin
+    keeps its place while the joint turns, where its play is that of an analysis of tolerances; either if not stated.
     """
 
     type: JointType
@@ -228,6 +229,7 @@ class Joint(Part):
     friction: Friction | None = None
     misalignment: Misalignment | None = None
     seat: SeatChoice | None = None
+    seat_on: Name | None = None
 
 
 class LoopJoint(Part):
@@ -246,3 +248,4 @@ class LoopJoint(Part):
     friction: Friction | None = None
     misalignment: Misalignment | None = None
     seat: SeatChoice | None = None
+    seat_on: Name | None = None

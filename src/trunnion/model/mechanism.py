@@ -174,6 +174,7 @@ class Mechanism(Part):
                 guide=row.guide,
                 friction=row.friction,
                 misalignment=row.misalignment,
+                seat_on=row.seat_on,
                 seat=row.seat,
             )
         return stated

@@ -26,7 +26,7 @@ from trunnion.options import (
     TableFile,
     UnitsRow,
 )
-from trunnion.terminal import bar, console, findings_of, say, show_rows, wrote
+from trunnion.terminal import bar, console, findings_of, say, say_missed, show_rows, wrote
 from trunnion.verbs.model import exit_status, lines_of, placed, stated
 
 if TYPE_CHECKING:
@@ -182,6 +182,7 @@ def _show(result: xr.Dataset, out: list[Path], units_row: bool, kind: str | None
         with whole(report) as temporary:
             temporary.write_text(text, encoding="utf-8")
         written.append(report)
+    say_missed(result)
     name = str(result.attrs.get("name", ""))
     shown = allocation.tables(result)
     if not shown:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.options import IMAGES
-from trunnion.terminal import show_rows, wrote
+from trunnion.terminal import say_missed, show_rows, wrote
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -42,6 +42,7 @@ def show(mechanism: Mechanism, result: xr.Dataset, out: Sequence[Path], units_ro
             raise MechanismError(Finding(what, str(path), f"name at most {MOST_PANELS} by --measure"))
         else:
             plots.save(figure(whole_peaks(result, uncut)), path)
+    say_missed(result)
     for i, table in enumerate(tables(result)):
         show_rows(f"{mechanism.name}\n{table.title}" if i == 0 and mechanism.name else table.title, *table[1:])
     for path in out:

@@ -56,6 +56,12 @@ def tolerance(
     measure: Measures = None,
     at: At = None,
     method: Methods = None,
+    target: Annotated[
+        float | None,
+        typer.Option(
+            "--yield", help="Share within limits that is asked for; none: the worst case too.", show_default=False
+        ),
+    ] = None,
     samples: Annotated[int, typer.Option("--samples", help="Random mechanisms.")] = 10_000,
     seed: Seed = 1,
     steps: Steps = 360,
@@ -93,7 +99,7 @@ def tolerance(
     with lines_of(file), bar("samples", counted, least=1000) as progress:
         result = run(
             mechanism, measure, methods, samples, seed, steps, at, jobs=jobs, chunk=chunk, engine=engine,
-            cluster=cluster, checkpoint=checkpoint, resume=resume, progress=progress,
+            cluster=cluster, checkpoint=checkpoint, resume=resume, progress=progress, target=target,
         )  # fmt: skip
     show(mechanism, result, out or [], units_row, kind, report)
     findings = findings_of(result)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.options import IMAGES
-from trunnion.terminal import console, show_figures, show_rows, wrote
+from trunnion.terminal import console, say_missed, show_figures, show_rows, wrote
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -58,6 +58,7 @@ def show(
             save(result, path, units_row)
     if report is not None:
         _write_report(result, report)
+    say_missed(result)
     shown = tables(result)
     if not shown:
         show_figures(mechanism.name, json.loads(result.attrs.get("summary", "[]")))

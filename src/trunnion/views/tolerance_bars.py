@@ -40,7 +40,7 @@ def rows_of_sobol(read: Reading) -> int:
 def _kept(read: Reading) -> tuple[list[Contribution], list[Contribution]]:
     """What has a bar of its own, and the rest: what is small, or too much."""
     found = read.contributions
-    large = [one for one in found if max(_known(one.rss_share), _known(one.worst_share)) >= LEAST]
+    large = [one for one in found if one.largest_share >= LEAST]
     shown = large[:MOST_BARS] or found[:1]
     if len(found) == len(shown) + 1:  # one more takes no more room than its being left out
         shown = found
@@ -55,29 +55,35 @@ def _kept_indices(read: Reading) -> list[int]:
     return large or order[:1]
 
 
-def _known(share: float) -> float:
-    return share if math.isfinite(share) else 0.0
-
-
 def contributions(parent: FigureBase, read: Reading) -> None:
-    """Share of each number in the sum of squares, sorted, with the running total; beside it that in the worst case."""
+    """Share of each number in the sum of squares, sorted, with the running total; beside it those in the worst case,
+    and in the variance where they are others."""
     axes = parent.subplots()
     shown, rest = _kept(read)
     labels = [f"{_short(one.short)}  {one.limits}".rstrip() for one in shown]
-    rss, worst = ([getattr(one, key) for one in shown] for key in ("rss_share", "worst_share"))
+    keys = ("rss_share", "worst_share", "variance_share")
+    rss, worst, variance = ([getattr(one, key) for one in shown] for key in keys)
     if rest:
         labels.append(f"{len(rest)} others")
-        rss.append(float(np.nansum([one.rss_share for one in rest])))
-        worst.append(float(np.nansum([one.worst_share for one in rest])))
+        for row, key in zip((rss, worst, variance), keys, strict=True):
+            row.append(float(np.nansum([getattr(one, key) for one in rest])))
     place = np.arange(len(labels))
     dress(axes, "share [%]", "")
-    axes.barh(place - 0.17, 100 * np.array(rss), 0.4, color=PALETTE[0], label="RSS²", zorder=2)
-    axes.barh(place + 0.23, 100 * np.array(worst), 0.28, color=PALE, label="worst case", zorder=2)
+    alone = "RSS², uncorrelated" if read.correlated else "RSS²"
+    axes.barh(place - 0.17, 100 * np.array(rss), 0.4, color=PALETTE[0], label=alone, zorder=2)
+    if read.shares_apart:
+        axes.barh(place + 0.12, 100 * np.array(variance), 0.18, color=PALETTE[2], label="variance", zorder=2)
+        axes.barh(place + 0.3, 100 * np.array(worst), 0.18, color=PALE, label="worst case", zorder=2)
+    else:
+        axes.barh(place + 0.23, 100 * np.array(worst), 0.28, color=PALE, label="worst case", zorder=2)
     running = 100 * np.nancumsum(rss)
     axes.plot(running, place - 0.17, color=INK, linewidth=1.2, marker="o", markersize=3.5, zorder=3,
               label="RSS², added up")  # fmt: skip
-    most = max(100.0, float(running.max(initial=0.0)))
-    _frame(axes, labels, most)
+    told = [100 * part for part in variance if math.isfinite(part)] if read.shares_apart else []
+    most = max([100.0, float(running.max(initial=0.0)), *told])
+    _frame(axes, labels, most, min([0.0, *told]))
+    if min([0.0, *told]) < 0:
+        axes.axvline(0, color=MUTED, linewidth=0.8)
     for y, part in zip(place, rss, strict=True):
         if math.isfinite(part):
             wide = part > INSIDE
@@ -120,10 +126,10 @@ def _short(name: str) -> str:
     return name if len(name) <= NAME else f"…{name[1 - NAME :]}"
 
 
-def _frame(axes: Axes, labels: list[str], most: float) -> None:
+def _frame(axes: Axes, labels: list[str], most: float, least: float = 0.0) -> None:
     """Names down the side, the largest on top."""
     axes.set_yticks(range(len(labels)), [plain(label) for label in labels])
     axes.tick_params(axis="y", length=0)
     axes.grid(visible=False, axis="y")
     axes.set_ylim(len(labels) - 0.4, -0.6)
-    axes.set_xlim(0, 1.04 * most)
+    axes.set_xlim(1.04 * least, 1.04 * most)

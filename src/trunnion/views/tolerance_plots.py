@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import FigureBase
 
-__all__ = ["convergence", "envelope", "histogram", "outer"]
+__all__ = ["convergence", "envelope", "histogram", "outer", "rss_label"]
 
 WITHIN, BEYOND, LIMIT = PALETTE[0], PALETTE[1], "#a1260d"
 LIMITED: dict[str, Any] = {"color": LIMIT, "linewidth": 1.3, "linestyle": (0, (1, 1.5))}
@@ -187,7 +187,13 @@ def envelope(parent: FigureBase, read: Reading) -> None:
         middle = read.along(read.row("curve_shift")) if read.has("curve_shift") else 0.0
         for k, sign in enumerate((1, -1)):
             curve(
-                axes, over, middle + sign * rss, None if k else "RSS", color=INK, linewidth=1.1, linestyle=(0, (5, 2))
+                axes,
+                over,
+                middle + sign * rss,
+                None if k else rss_label(read),
+                color=INK,
+                linewidth=1.1,
+                linestyle=(0, (5, 2)),
             )
     _corner(axes, over, read)
     limits = [one for one in read.limits if math.isfinite(one)] if read.limits_course else []
@@ -195,6 +201,11 @@ def envelope(parent: FigureBase, read: Reading) -> None:
         axes.axhline(one * read.factor, label=None if k else f"limits {read.told_limits}", **LIMITED)
     axes.margins(y=0.07)
     legend(axes, most=4)
+
+
+def rss_label(read: Reading) -> str:
+    """RSS, with what it leaves out."""
+    return "RSS, uncorrelated" if read.correlated else "RSS"
 
 
 def _closed(over: Abscissa, values: Array, more: float = 0.0) -> Array:

@@ -60,7 +60,7 @@ def report(result: xr.Dataset, first: Sequence[Section] = (), kicker: str = "Wha
     context: dict[str, Any] = {
         "kicker": kicker, "name": str(result.attrs.get("name", "")) or "Mechanism",
         "formula": str(result.attrs.get("formula", "")), "facts": _facts(result, run),
-        "summary": headline(result),
+        "summary": headline(result), "missed": attribute(result, "missed", []),
         "findings": [row for row in found if row["severity"] != "note"],
         "notes": [row for row in found if row["severity"] == "note"],
         "overview": overview(result), "sections": [_drawn(part) for part in parts], "whole": failed(result),

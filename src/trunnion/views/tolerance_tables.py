@@ -10,7 +10,7 @@ import numpy as np
 
 from trunnion.views.cycle import names
 from trunnion.views.quantities import number
-from trunnion.views.tolerance_plots import outer
+from trunnion.views.tolerance_plots import outer, rss_label
 from trunnion.views.toleranced import Contribution, Reading, failures, fixed, readings, scaled, share, share_interval
 from trunnion.views.toleranced import with_unit as limits_of
 
@@ -31,7 +31,6 @@ __all__ = [
     "tables",
 ]
 
-APART = 5e-4  # two shares that differ by more have a column each
 MOST_HEADS = 6
 LEAST, LEAST_INDEX = 1e-3, 5e-3  # shares below which a number has no row of its own in the terminal
 MOST = 20  # rows of contributions there
@@ -66,10 +65,16 @@ def tables(result: xr.Dataset) -> list[Table]:
 
 def figures(read: Reading) -> Table:
     """Nominal, worst case, RSS, deviation, range, yield and capability, a column for each method."""
-    rows = [(label, cells) for label, cells in ((label, tell(read)) for label, tell in FIGURES) if any(cells.values())]
+    told = [(_label(read, label), tell(read)) for label, tell in FIGURES]
+    rows = [(label, cells) for label, cells in told if any(cells.values())]
     shown = [key for key in COLUMNS if any(cells.get(key) for _, cells in rows)]
     head = ["", *(_sampling(read) if key == "sampled" else COLUMNS[key] for key in shown)]
     return Table(heading(read), head, [[label, *(cells.get(key, "") for key in shown)] for label, cells in rows])
+
+
+def _label(read: Reading, label: str) -> str:
+    """The label of a row; RSS says that it leaves correlation out."""
+    return rss_label(read) if label == "RSS" else label
 
 
 def heading(read: Reading) -> str:
@@ -197,9 +202,9 @@ def contributions(read: Reading, short: bool = False) -> Table:
     short: without those that matter little, which are counted; names without their section.
     """
     found = read.contributions
-    kept = [one for one in found if max(_zero(one.rss_share), _zero(one.worst_share)) >= LEAST][:MOST] or found[:1]
+    kept = [one for one in found if one.largest_share >= LEAST][:MOST] or found[:1]
     kept = kept if short and len(kept) < len(found) - 1 else found
-    apart = any(abs(one.variance_share - one.rss_share) > APART for one in kept)
+    apart = read.shares_apart
     shares = {"share": "worst_share", "of RSS²": "rss_share"} | ({"of variance": "variance_share"} if apart else {})
     if apart and short:  # a terminal is 80 characters wide; the share follows from the size beside it
         del shares["share"]
@@ -250,10 +255,6 @@ def _sensitivity(read: Reading, one: Contribution) -> str:
     return f"{number(one.sensitivity * read.factor / factor)}\u00a0{unit}".rstrip("\u00a0")
 
 
-def _zero(value: float) -> float:
-    return value if math.isfinite(value) else 0.0
-
-
 def corners(read: Reading) -> Table | None:
     """The numbers at which the searched worst case stands; None if it was not searched."""
     ends = [end for end in ("lower", "upper") if read.has(f"corner_{end}") and math.isfinite(_searched(read, end))]
@@ -295,6 +296,7 @@ def overview(result: xr.Dataset) -> Table:
         worst = cells["worst case"].get("searched") or cells["worst case"].get("linear", "")
         told = [cells[label].get("sampled") or cells[label].get("linear", "") for label in head[5:]]
         rows.append([read.name, read.told_limits, cells["nominal"]["linear"], worst, cells["RSS"]["linear"], *told])
+    head = [_label(read, label) for label in head for read in readings(result)[:1]]
     kept = [k for k in range(len(head)) if k == 0 or any(row[k] for row in rows)]
     return Table("measures", [head[k] for k in kept], [[row[k] for k in kept] for row in rows])
 

@@ -35,6 +35,7 @@ __all__ = [
     "with_unit",
 ]
 
+APART = 5e-4  # two shares that differ by more are told each
 OUTER = (0.00135, 0.99865)  # quantiles of the 99.73 % range
 SMALL = 1e-5  # m: lengths below are told in µm
 DEGREE = ("°", "deg")
@@ -45,7 +46,8 @@ class Contribution:
     """What one toleranced number has in a measure, in SI; shares from 0 to 1, NaN where they are not known.
 
     name: its path; short: without the section, where that names one number only; limits: as in a drawing;
-    sensitivity: of the measure by the number; rss_share: of the square of RSS, variance_share: of the variance.
+    sensitivity: of the measure by the number; rss_share: of the square of RSS, variance_share: of the variance, below
+    0 where a correlated number takes away from what the others do.
     """
 
     name: str
@@ -57,6 +59,13 @@ class Contribution:
     worst_share: float
     rss_share: float
     variance_share: float
+
+    @property
+    def largest_share(self) -> float:
+        """The largest of its shares, whatever its sign; 0 where none is known."""
+        return max(
+            abs(one) if math.isfinite(one) else 0.0 for one in (self.worst_share, self.rss_share, self.variance_share)
+        )
 
 
 @dataclass(frozen=True)
@@ -238,6 +247,16 @@ class Reading:
         """Yield with the ends of its 95 % interval; NaN if it is not known."""
         return self.value("yield"), self.value("yield_low"), self.value("yield_high")
 
+    @property
+    def correlated(self) -> bool:
+        """Whether numbers go with each other, of which RSS does not know."""
+        return bool(self.result.attrs.get("correlated", 0))
+
+    @property
+    def shares_apart(self) -> bool:
+        """Whether the shares in the variance are others than those in RSS²."""
+        return any(abs(one.variance_share - one.rss_share) > APART for one in self.contributions)
+
     @cached_property
     def contributions(self) -> list[Contribution]:
         """Of every toleranced number, the largest share first."""
@@ -332,12 +351,12 @@ def _known(value: float) -> float:
 
 
 def share(value: float, decimals: int | None = None) -> str:
-    """A share in per cent, near 1 with the digits that tell how near: "99.62 %", "99.998 %"."""
+    """A share in per cent, near 1 with the digits that tell how near: "99.62 %", "99.998 %", "−3.1 %"."""
     if math.isnan(value):
         return "—"
     if decimals is None:
         decimals = _decimals(min(value, 1 - value))
-    return f"{100 * value:.{0 if value in (0.0, 1.0) else decimals}f}\u00a0%"
+    return f"{fixed(100 * value, 0 if value in (0.0, 1.0) else decimals)}\u00a0%"
 
 
 def share_interval(value: float, low: float, high: float) -> str:

@@ -16,11 +16,12 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import Dual, derivative
 from trunnion.analysis.allocation.problem import CRITERIA, SHOWN, Answer, Contribution, Criterion, Option, Problem, none
-from trunnion.analysis.allocation.rows import Rows, joined, limits, part_of, rows_of
+from trunnion.analysis.allocation.rows import Rows, joined, part_of, rows_of
 from trunnion.analysis.allocation.solve import CHOICES, solve, trade_off
 from trunnion.analysis.allocation.solve import Choice as Way
 from trunnion.analysis.friction import FrictionMethod
 from trunnion.analysis.tolerance.study import DEFAULT_SAMPLES, Study, study, tolerance
+from trunnion.analysis.tolerance.targets import limits
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.prices import Price
@@ -353,6 +354,8 @@ class _Search:
                 self.mechanism.with_tolerances(bought), self.measures, ["monte-carlo"], asked.samples, asked.seed,
                 asked.steps, asked.at, friction=asked.friction, jobs=asked.jobs,
             )  # fmt: skip
+            if sampled.attrs["stopped"]:  # a part of the samples decides no tolerances
+                raise KeyboardInterrupt
             share, low, high = (float(sampled[f"yield_all{end}"]) for end in ("", "_low", "_high"))
             return share, low, high
 

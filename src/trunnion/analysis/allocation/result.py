@@ -14,6 +14,8 @@ from trunnion.analysis.account import finding_row
 from trunnion.analysis.allocation.allocate import Allocated
 from trunnion.analysis.allocation.said import findings_of, summary
 from trunnion.analysis.tolerance.result import Variable
+from trunnion.analysis.tolerance.targets import MISSED
+from trunnion.errors import Severity
 from trunnion.model.prices import Price
 from trunnion.statistics.costs import Cost
 
@@ -82,8 +84,9 @@ def dataset(found: Allocated, known: xr.Dataset) -> xr.Dataset:
         for name, values in arrays.items()
     }
     told = json.loads(known.attrs["findings"])
-    kept = [row for row in told if not row["remedy"].startswith("`allocate`")]  # this is what was done
+    kept = [row for row in told if not row["what"].startswith(MISSED)]  # the criterion says what is to be kept
     own = [finding_row(finding) for finding in findings_of(found, known)]
+    errors = [row for row in own if row["severity"] == Severity.ERROR.value]
     attributes: dict[str, Any] = {
         "found": int(found.answer.found),
         "criterion": found.asked.criterion,
@@ -95,6 +98,7 @@ def dataset(found: Allocated, known: xr.Dataset) -> xr.Dataset:
             [*summary(found, known, arrays), *json.loads(known.attrs["summary"])], ensure_ascii=False
         ),
         "findings": json.dumps([*own, *kept], ensure_ascii=False),
+        "missed": json.dumps([f"{row['where']}: {row['what']}".lstrip(": ") for row in errors], ensure_ascii=False),
     }
     return known.assign(variables).assign_attrs(attributes)
 

@@ -16,13 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.analysis.allocation.problem import Criterion, Effects
-from trunnion.analysis.tolerance.effects import Spread
 from trunnion.analysis.tolerance.linear import Of, by_position
 from trunnion.analysis.tolerance.study import Study
+from trunnion.analysis.tolerance.targets import against, limits
+from trunnion.analysis.tolerance.zones import Spread
 from trunnion.model.tolerances import Tolerance
 from trunnion.statistics.population import Marginal
 
-__all__ = ["Rows", "joined", "limits", "part_of", "rows_of"]
+__all__ = ["Rows", "joined", "part_of", "rows_of"]
 
 Array = NDArray[np.float64]
 Rates = tuple[float, float, float]
@@ -56,35 +57,10 @@ class _Block:
     moving: bool
 
 
-def limits(of: Of) -> tuple[float, float]:
-    """Least and largest deviation from nominal that a row of the measure may have; infinite where there is no limit."""
-    measure = of.measure
-    lower = -np.inf if measure.lower is None else measure.lower
-    upper = np.inf if measure.upper is None else measure.upper
-    least = -np.inf if measure.at_least is None else measure.at_least
-    most = np.inf if measure.at_most is None else measure.at_most
-    if measure.rule == "deviation":
-        return max(lower, -most), min(upper, most)
-    if not _against(of):
-        return max(lower, least - of.reference.figure), min(upper, most - of.reference.figure)
-    if measure.rule == "maximum" and measure.kind != "path_error":
-        return -np.inf, min(upper, most)
-    if measure.rule == "minimum" and measure.kind != "path_error":
-        return max(lower, least), np.inf
-    if measure.rule == "mean" and measure.kind != "path_error":
-        return max(lower, least), min(upper, most)
-    return -min(upper, most), min(upper, most)  # what has a size and no sign
-
-
-def _against(of: Of) -> bool:
-    """Whether the figure is made of deviations from the nominal mechanism and is 0 there."""
-    return of.measure.kind == "path_error" or (of.reference.against and of.measure.rule != "value")
-
-
 def _block(of: Of) -> _Block:
     measure = of.measure
     # without a derivative, but no further off than the worst position: kept where every position keeps it
-    root = _against(of) and measure.rule == "rms"
+    root = against(of) and measure.rule == "rms"
     root |= measure.kind == "path_error" and measure.rule in ("mean", "minimum", "peak-to-peak")
     lower, upper = limits(of)
     if (by_position(of.reference) and of.place >= 0) or root:
@@ -145,16 +121,18 @@ def _taken(block: _Block, known: NDArray[np.bool_]) -> _Block:
 def _parts(study: Study, bought: Mapping[str, float], criterion: Criterion, blocks: Sequence[_Block]) -> Effects:
     """Effects (row, contribution) without their limits."""
     slopes = np.concatenate([block.sensitivity for block in blocks], axis=1)
-    upper, half, deviation = (
+    lower, upper, half, shift, deviation = (
         np.concatenate([getattr(block.spread, key) for block in blocks], axis=1)
-        for key in ("upper", "half", "deviation")
+        for key in ("lower", "upper", "half", "shift", "deviation")
     )
     offset, mean = np.zeros(slopes.shape[1]), np.zeros_like(slopes)
     for i, name in enumerate(study.inputs.names):
         one = study.inputs.tolerances[i] if i < len(study.inputs.tolerances) else None
         if one is None or one.direction or one.distribution == "direction":  # a zone
             size = bought.get(name, 1.0)
-            upper[i], half[i], deviation[i] = upper[i] / size, half[i] / size, deviation[i] / size
+            offset += shift[i]  # of what turns about another place than its nominal one, and is not bought
+            upper[i] = 0.5 * (upper[i] - lower[i]) / size
+            half[i], deviation[i] = half[i] / size, deviation[i] / size
             continue
         scatter, drift, constant = _rates(one)
         size = 1.0 if name in bought else one.half_width

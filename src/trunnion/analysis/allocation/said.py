@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from trunnion.analysis.allocation.allocate import CLOSE, share_of
+from trunnion.analysis.allocation.allocate import CLOSE, DEFAULT_YIELD, share_of
 from trunnion.analysis.allocation.problem import SHOWN
-from trunnion.analysis.allocation.rows import limits
+from trunnion.analysis.tolerance.targets import limits
 from trunnion.errors import Finding, Severity
 
 if TYPE_CHECKING:
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 __all__ = ["findings_of", "summary"]
 
+TWICE = 2.0  # so many rejects as an RSS stands for are an error
 ROUGH, SLIGHT = 0.01, 0.001  # of a limit: what first order may leave out before it is an error, and a warning
 
 
@@ -60,8 +61,13 @@ def findings_of(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:
     for name, share in found.tight.items():
         what = f"its limits were taken {100 * (1 - share):.2g} % narrower, so that the mechanism itself keeps them"
         yield Finding(what, f"measures.{name}", "", Severity.NOTE)
+    if found.asked.criterion != "yield" and found.study.effects.correlated:
+        what = f"the criterion {found.asked.criterion} leaves the correlations out"
+        yield Finding(what, "correlations", "ask for a yield, which has them", Severity.WARNING)
     if found.asked.criterion == "worst-case":
         yield from _searched(found, known)
+    if found.asked.criterion == "rss" and "yield" in known:
+        yield from _promised(known)
     if found.asked.criterion == "yield" and "yield_all" in known and answer.sampled is not None:
         yield from _yielded(found, known)
     missing = [factor for factor, one in found.offers if not one.found]
@@ -85,6 +91,23 @@ def _yielded(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:
         what = f"the yield of the samples is {share:.6g}, less than {target:g}, which lies in its interval "
         remedy = "take more samples, or ask for more, to be surer"
         yield Finding(f"{what}{low:.6g} to {high:.6g}", "yield", remedy, Severity.NOTE)
+
+
+def _promised(known: xr.Dataset) -> Iterator[Finding]:
+    """Measures of whose samples fewer keep the limits than three deviations of a normal one would.
+
+    That is what RSS means where the tolerances are three deviations of theirs; other distributions, means off the
+    middle, and correlations make it another.
+    """
+    for name, share, high in zip(
+        *(known[key].values.tolist() for key in ("measure", "yield", "yield_high")), strict=True
+    ):
+        if not high < DEFAULT_YIELD:
+            continue
+        what = f"the yield of the samples is {share:.6g}, an RSS within the limits stands for {DEFAULT_YIELD:g}"
+        remedy = "ask for that yield, which takes distributions, means and correlations as they are"
+        severity = Severity.ERROR if 1 - high > TWICE * (1 - DEFAULT_YIELD) else Severity.WARNING
+        yield Finding(what, f"measures.{name}", remedy, severity)
 
 
 def _searched(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:

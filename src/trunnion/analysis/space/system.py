@@ -75,9 +75,13 @@ class SpatialSystem(System):
     # ---- elements -------------------------------------------------------------------------------------------
 
     def elements(self, values: Values) -> dict[tuple[str, str], Frame]:
-        """Local frame of every joint's element, by (link, joint): errors of joints and seats are in the second ones."""
+        """Local frame of every joint's element, by (link, joint): errors of joints are in the second ones.
+
+        Seats are in the elements of the links that carry them.
+        """
         found = self.holes(values)
-        for name, (kind, (_, second)) in self.joints.items():
+        for name, (kind, (first, second)) in self.joints.items():
+            found[first, name] = shifts.journaled(found[first, name], kind, values, name)
             found[second, name] = shifts.seated(found[second, name], kind, values, name)
         return found
 

@@ -2,7 +2,8 @@
 
 A toleranced number is its value as built plus a random deviation (`statistics.distributions`). A pin in a play that no
 seat decides lies anywhere in its hole: each end uniform over its interval, disc or ball, whose radius is that of the
-sample. A run-out has a random size and a direction that is uniform over a turn.
+sample. It keeps that place on the link of the hole as the joint turns, or on the one that the model names. A run-out
+has a random size and a direction that is uniform over a turn.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.algebra.dual import Dual, derivative
 from trunnion.algebra.namespace import Number
 from trunnion.analysis import shifts
 from trunnion.analysis.analyse import Run
@@ -21,7 +23,7 @@ from trunnion.analysis.seating import given_offsets
 from trunnion.analysis.shifts import Play
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.mechanism import Mechanism
-from trunnion.model.tolerances import Tolerance
+from trunnion.model.tolerances import FULL_TURN, Tolerance
 from trunnion.statistics.population import Marginal, Population
 from trunnion.statistics.streams import correlated
 
@@ -76,6 +78,51 @@ class Inputs:
         assert play is not None  # else it would not be loose
         return play.model.ends
 
+    def carriers(self, joint: str) -> tuple[str, ...]:
+        """Which of `shifts.CARRIERS` may carry the seat of a pin as the joint turns; the first does in samples."""
+        return shifts.carriers_of(self.run.system.mechanism, joint)
+
+    def angle(self, i: int) -> str:
+        """Path of the angle that a toleranced number is, or that goes with it."""
+        return self.tolerances[i].direction or self.tolerances[i].path
+
+    @cached_property
+    def turned(self) -> dict[int, int]:
+        """Of each toleranced number that changes the size of what points anywhere, which of them is the direction."""
+        angles = [i for i, one in enumerate(self.tolerances) if one.direction or one.distribution == FULL_TURN]
+        if not angles:
+            return {}
+        count = len(self.tolerances)
+        seeds = np.eye(2 * count)[:, :, None]
+        deviations = {one.path: Dual(0.0, seeds[i]) for i, one in enumerate(self.tolerances)}
+        for i in angles:  # the angle of a run-out is no toleranced number
+            path, own = self.angle(i), Dual(0.0, seeds[count + i])
+            deviations[path] = deviations[path] + own if path in deviations else own
+        values = self.run.system.mechanism.parameters(deviations=deviations)
+        found: dict[int, int] = {}
+        for sizes, angle in self._directed(values):
+            turning = [i for i in angles if np.any(_by(values[angle], count + i, 2 * count))]
+            numbers = [
+                i for i in range(count) if i not in angles and any(np.any(_by(size, i, 2 * count)) for size in sizes)
+            ]
+            found.update({i: turning[0] for i in numbers if turning})
+        return found
+
+    def _directed(self, values: Mapping[str, Number]) -> Iterator[tuple[tuple[Number, ...], str]]:
+        """Sizes, and the path of the direction they point in: of misaligned axes and of seats that are given."""
+        for joint in self.run.system.joints:
+            path = f"joints.{joint}.misalignment"
+            aside = "offset_towards" if f"{path}.offset_towards" in values else "towards"
+            for size, angle in (("tilt", "towards"), ("offset", aside)):
+                if {f"{path}.{size}", f"{path}.{angle}"} <= values.keys():
+                    yield (values[f"{path}.{size}"],), f"{path}.{angle}"
+        for joint in self.held:
+            play = self.play(joint, values)
+            assert play is not None  # a seat is one of a play
+            for angle in (f"joints.{joint}.seat.{key}" for key in ("xi", "beta")):
+                if angle in values:
+                    yield play.radii, angle
+
     def play(self, joint: str, values: Mapping[str, Number]) -> Play | None:
         """The play of a joint with these numbers."""
         return shifts.play_of(self.run.system.mechanism.space, self.run.system.joints[joint][0], values, joint)
@@ -107,16 +154,22 @@ class Inputs:
         assert play is not None  # a seat is one of a play
         return play.model.paths(f"seats.{joint}", given_offsets(values, joint, play))
 
-    def _anywhere(self, joint: str, values: Mapping[str, Number], rest: object) -> dict[str, Number]:
-        """Offsets of a pin at each end, uniform over the interval, disc or ball."""
+    def _anywhere(self, joint: str, values: Mapping[str, Number], rest: Iterator[Array]) -> dict[str, Number]:
+        """Offsets of a pin at each end, uniform over the interval, disc or ball, on the link that carries its seat."""
         play = self.play(joint, values)
         assert play is not None
         offsets = []
         for end, radius in zip(play.model.ends, play.radii, strict=True):
-            unit = within([next(rest) for _ in end])  # type: ignore[call-overload]
+            unit = within([next(rest) for _ in end])
             room = np.maximum(radius, 0.0)  # a fit that presses leaves none
             offsets.append(tuple(room * part[:, None] for part in unit))
-        return play.model.paths(f"seats.{joint}", offsets)
+        return play.model.paths(f"{self.carriers(joint)[0]}.{joint}", offsets)
+
+
+def _by(number: Number, i: int, count: int) -> Array:
+    """Derivative of a number by the i-th of so many seeds."""
+    found: Array = np.broadcast_to(np.asarray(derivative(number), float), (count, 1))[i]
+    return found
 
 
 def within(u: Sequence[Array]) -> list[Array]:

@@ -19,9 +19,10 @@ from trunnion.algebra.namespace import Number
 from trunnion.analysis.measure_figures import Reference, figure, shown, span
 from trunnion.analysis.measure_positions import Plan
 from trunnion.analysis.measures import Measure
-from trunnion.analysis.tolerance.effects import Effects, Spread
+from trunnion.analysis.tolerance.effects import Effects
 from trunnion.analysis.tolerance.kernel import NumpyKernel
 from trunnion.analysis.tolerance.search import Corner, search
+from trunnion.analysis.tolerance.zones import Spread
 
 __all__ = ["Linear", "Of", "Total", "by_position", "linear", "searched"]
 
@@ -104,7 +105,7 @@ def _of(known: Reference, effects: Effects, course: Course) -> Of:
     parts = [Dual(part.real[:, window.index], part.dual[:, window.index]) for part in course]
     real, slope = _scalar(known, effects, course, parts)
     slope = effects.without_noise(slope)
-    curve_spread = effects.spread(real, slope)
+    curve_spread = effects.spread(slope)
     curve_total = effects.total(curve_spread, slope)
     lead = None
     if by_position(known):
@@ -117,13 +118,13 @@ def _of(known: Reference, effects: Effects, course: Course) -> Of:
         place = 0 if measure.rule == "value" else -1
         steep = np.where(np.isfinite(whole), steep, np.nan)  # of what does not exist
     steep = effects.without_noise(steep)
-    spread = effects.spread(whole, steep)
+    spread = effects.spread(steep)
     total = effects.total(spread, steep)
     if by_position(known):
         total = _ends(measure, curve_total, total)
     return Of(
-        known, whole, steep, effects.sensitivity(whole, steep), spread, total,
-        real[0], effects.sensitivity(real, slope), curve_spread, curve_total, place, steep if lead is None else lead,
+        known, whole, steep, effects.sensitivity(steep), spread, total,
+        real[0], effects.sensitivity(slope), curve_spread, curve_total, place, steep if lead is None else lead,
     )  # fmt: skip
 
 
@@ -135,6 +136,8 @@ def _ends(measure: Measure, course: Total, total: Total) -> Total:
     """
     lower, upper, *rest = total
     if measure.kind == "path_error" or measure.rule in ("peak-to-peak", "largest"):
+        # to either side: a distance has a direction that has no sign, a largest |deviation| none either
+        upper = upper if measure.rule == "peak-to-peak" else np.maximum(-lower, upper)
         lower = np.zeros_like(lower)
     elif measure.rule == "maximum":
         lower, upper = (np.asarray(np.max(np.nan_to_num(end, nan=-np.inf))) for end in course[:2])
@@ -180,7 +183,7 @@ def _worst(measure: Measure, effects: Effects, real: Array, slope: Array, total:
         best, found = -1.0, slope[:, 0] * 0.0
         for i in pick:
             change = slope[:, pick] - slope[:, [i]]
-            upper = np.nan_to_num(effects.total(effects.spread(real[:, pick] * 0.0, change), change)[1])
+            upper = np.nan_to_num(effects.total(effects.spread(change), change)[1])
             top = int(np.argmax(upper))
             if upper[top] > best:
                 best, found = float(upper[top]), change[:, top]
@@ -208,7 +211,7 @@ def searched(kernel: NumpyKernel, found: Linear, of: Of) -> tuple[Corner, Corner
                 return whole, _slope_at(of, effects, course, sign)
             return whole, effects.slopes(figure(course, known), ())[1]
 
-        start = found.effects.corner(of.real, of.lead, sign)
+        start = found.effects.corner(of.lead, sign)
         return search(found.effects, objective, start, sign, bool(np.isfinite(known.figure)))
 
     return ends(-1.0), ends(1.0)

@@ -19,6 +19,7 @@ from trunnion.analysis.tolerance.sampled import QUANTILES, sampled
 from trunnion.analysis.tolerance.sampling import Sampling, Tally
 from trunnion.analysis.tolerance.search import Corner
 from trunnion.analysis.tolerance.study import Study
+from trunnion.analysis.tolerance.targets import MISSED
 from trunnion.analysis.tolerance.words import course_text, text_of
 from trunnion.errors import Finding, Status
 from trunnion.model.parameters import dimension_kinds
@@ -49,7 +50,7 @@ class Variable:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What the methods that were asked for found; None of those that were not."""
+    """What the methods that were asked for found; None of those that were not. target: the yield asked for."""
 
     study: Study
     methods: tuple[str, ...]
@@ -58,6 +59,7 @@ class Outcome:
     tally: Tally | None = None
     indices: Indices | None = None
     stopped: bool = False
+    target: float | None = None
 
 
 M, P, MP, MPOS = ("measure",), ("parameter",), ("measure", "parameter"), ("measure", "position")
@@ -72,10 +74,12 @@ VARIABLES: dict[str, Variable] = {
     "sensitivity": Variable(MP, "ratio", "derivative of the figure; of a clearance, by its radius in the worst case"),
     "contribution_worst_case": Variable(MP, "", "largest change of the figure by the parameter alone, to first order"),
     "contribution_rss": Variable(MP, "1", "share of the parameter in the square of the RSS half width"),
-    "contribution_variance": Variable(MP, "1", "share of the parameter in the variance, to first order"),
+    "contribution_variance": Variable(
+        MP, "1", "share of the parameter in the variance, to first order: its covariance with the figure, signed"
+    ),
     "worst_case_lower": Variable(M, "", "least deviation of the figure, to first order"),
     "worst_case_upper": Variable(M, "", "largest deviation of the figure, to first order"),
-    "rss": Variable(M, "", "half width by the root of the sum of squares"),
+    "rss": Variable(M, "", "half width by the root of the sum of squares; without correlation"),
     "deviation_linear": Variable(M, "", "standard deviation, to first order"),
     "shift_linear": Variable(M, "", "mean deviation from nominal, to first order"),
     "searched_lower": Variable(M, "", "least deviation found on the mechanism itself"),
@@ -86,7 +90,9 @@ VARIABLES: dict[str, Variable] = {
     "curve_sensitivity": Variable(("measure", "parameter", "position"), "course ratio", "derivative of the course"),
     "curve_worst_case_lower": Variable(MPOS, "course", "least deviation of the course, to first order"),
     "curve_worst_case_upper": Variable(MPOS, "course", "largest deviation of the course, to first order"),
-    "curve_rss": Variable(MPOS, "course", "half width of the course by the root of the sum of squares"),
+    "curve_rss": Variable(
+        MPOS, "course", "half width of the course by the root of the sum of squares; without correlation"
+    ),
     "curve_shift": Variable(MPOS, "course", "mean deviation of the course from nominal, to first order"),
     "curve_deviation": Variable(MPOS, "course", "standard deviation of the course, to first order"),
     "status": Variable(("position",), "1", "code of the position's status; see the attribute flag_meanings"),
@@ -142,6 +148,7 @@ def dataset(outcome: Outcome, told: Sequence[Finding]) -> xr.Dataset:
     found = outcome.study
     system, mechanism = found.run.system, found.run.system.mechanism
     counted = None if outcome.tally is None or outcome.job is None else sampled(outcome.job, outcome.tally, found)
+    stated = [finding_row(finding) for finding in [*findings_of(outcome, counted), *told]]
     arrays = {**_linear(found), **_worst(outcome), **(counted.arrays if counted else {}), **_shares(outcome)}
     units = [measure.figure_unit(system, found.run.values) for measure in found.measures]
     curve_units = [measure.unit(system) for measure in found.measures]
@@ -183,14 +190,16 @@ def dataset(outcome: Outcome, told: Sequence[Finding]) -> xr.Dataset:
         "distributions": json.dumps(
             [*(one.distribution for one in found.inputs.tolerances), *("play" for _ in found.inputs.loose)]
         ),
+        "correlated": int(found.effects.correlated),
         "drive": dial.of,
         "drive_unit": dial.unit.strip(),
         "periodic": int(found.run.cycle.periodic),
         "steps": found.steps,
         "stopped": int(outcome.stopped),
         "summary": json.dumps(summary(outcome, counted, units, dial), ensure_ascii=False),
-        "findings": json.dumps(
-            [finding_row(finding) for finding in [*findings_of(outcome, counted), *told]], ensure_ascii=False
+        "findings": json.dumps(stated, ensure_ascii=False),
+        "missed": json.dumps(
+            [f"{row['where']}: {row['what']}" for row in stated if row["what"].startswith(MISSED)], ensure_ascii=False
         ),
     }
     return xr.Dataset(variables, {**told_of, "time": times, "drive": over}, attributes)
@@ -226,11 +235,11 @@ def _linear(found: Study) -> dict[str, Any]:
     effects = found.effects
     total = np.array([[float(part) for part in of.total] for of in rows]).reshape(-1, 5).T
     halves = np.array([of.spread.half for of in rows])
-    scatter = np.array([of.spread.deviation for of in rows])
+    scatter = np.array([effects.covariances(of.spread, of.slope) for of in rows])
     worst = np.array([np.maximum(-of.spread.lower, of.spread.upper) for of in rows])
     with np.errstate(all="ignore"):
         shares = halves**2 / np.sum(halves**2, axis=1, keepdims=True)
-        variance = scatter**2 / np.sum(scatter**2, axis=1, keepdims=True)
+        variance = scatter / np.sum(scatter, axis=1, keepdims=True)
     numbers = effects.numbers()
     return {
         "nominal": np.array([of.reference.figure for of in rows]),

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from trunnion.analysis.account import model_notes
-from trunnion.analysis.measures import Measure
 from trunnion.analysis.tolerance.linear import by_position
 from trunnion.analysis.tolerance.sampling import CAUSES
+from trunnion.analysis.tolerance.targets import limited, missed
 from trunnion.errors import Finding, Severity, Status, agreeing
 from trunnion.errors import counted as number_of
 from trunnion.model.check_values import NOT_NEGATIVE
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 __all__ = ["findings_of", "summary"]
 
 OTHERWISE, ENOUGH = 1.5, 100  # ratio of standard deviations that is told, and samples from which it is
+CARRIED = 0.02  # of the standard deviation: what it may change with the link that carries a seat before it is told
 FAR_OFF = 0.2  # between first order and what is found, of which it is said
 
 
@@ -52,7 +53,8 @@ def _of_measure(
     if outcome.worst is not None:
         for key, corner in zip(("least", "largest"), outcome.worst[i], strict=True):
             yield {"label": f"{name}, {key} deviation found", "value": corner.value, "unit": unit}
-    yield {"label": f"{name}, RSS{at}", "value": rss, "unit": unit}
+    alone = ", without correlation" if outcome.study.effects.correlated else ""
+    yield {"label": f"{name}, RSS{alone}{at}", "value": rss, "unit": unit}
     yield {"label": f"{name}, standard deviation, linear{at}", "value": deviation, "unit": unit}
     if counted is not None:
         arrays = counted.arrays
@@ -68,6 +70,11 @@ def _of_measure(
         share = float(halves[top] ** 2 / np.sum(halves**2))
         label = f"{name}, largest contribution, {outcome.study.inputs.names[top]}, share of RSS²"
         yield {"label": label, "value": share, "unit": "1"}
+    if alone and deviation > 0:
+        parts = outcome.study.effects.covariances(of.spread, of.slope) / deviation**2
+        top = int(np.argmax(parts))
+        label = f"{name}, largest contribution, {outcome.study.inputs.names[top]}, share of the variance"
+        yield {"label": label, "value": float(parts[top]), "unit": "1"}
 
 
 def _plain(value: Any) -> float | None:
@@ -75,15 +82,11 @@ def _plain(value: Any) -> float | None:
     return number if number is not None and np.isfinite(number) else None
 
 
-def limited(measure: Measure) -> bool:
-    """Whether a measure has a limit or a bound."""
-    return any(one is not None for one in (measure.lower, measure.upper, measure.at_least, measure.at_most))
-
-
 def findings_of(outcome: Outcome, counted: Sampled | None) -> Iterator[Finding]:
     """What is doubtful, beside what the model itself has to say."""
     study = outcome.study
     mechanism = study.run.system.mechanism
+    yield from missed(outcome, counted)
     yield from (one for one in model_notes(mechanism, study.run.system) if one.severity is not Severity.NOTE)
     yield from study.run.chosen.findings
     if study.run.determinacy is not None:
@@ -92,11 +95,15 @@ def findings_of(outcome: Outcome, counted: Sampled | None) -> Iterator[Finding]:
     if loaded:
         what = f"pins lie anywhere in their holes: seats by loads of {', '.join(loaded)} are not taken"
         yield Finding(what, "joints", "analyse takes them", Severity.NOTE)
+    if study.effects.correlated:
+        what = "RSS and worst case leave the correlations out: deviation, shares of variance and samples have them"
+        yield Finding(what, "correlations", severity=Severity.NOTE)
     yield from _measured(outcome)
     yield from _impossible(outcome)
     yield from _nominal(outcome)
     for of in study.linear.measures:
         yield from _first_order(outcome, of)
+        yield from _carried(outcome, of)
     if counted is not None:
         yield from _samples(outcome, counted)
     if outcome.indices is not None and outcome.indices.lost:
@@ -170,6 +177,27 @@ def _first_order(outcome: Outcome, of: Of) -> Iterator[Finding]:
         yield Finding(what, f"measures.{name}", "rely on the one found, and on samples", Severity.NOTE)
 
 
+def _carried(outcome: Outcome, of: Of) -> Iterator[Finding]:
+    """Plays whose part in the scatter is another if the pin keeps its place on the other link."""
+    study, whole = outcome.study, float(of.total[4])
+    others = []
+    for joint in study.inputs.loose:
+        taken, *more = (float(part) for part in study.effects.scatters(joint, of.slope))
+        ratios = [np.sqrt(max(1 + (other**2 - taken**2) / whole**2, 0.0)) for other in more if whole > 0]
+        others += [(joint, ratio) for ratio in ratios if abs(ratio - 1) > CARRIED]
+    if others:
+        joints = study.run.system.mechanism.effective_joints
+        told = ", ".join(f"'{joints[name].links[0]}' in {name}: {ratio:.3g} times" for name, ratio in others)
+        holes = ", ".join(f"'{joints[name].links[1]}' in {name}" for name, _ in others)
+        what = (
+            f"scatter and yield suppose that pins keep their places on the links of the holes ({holes}); on the other "
+        )
+        what += f"link the deviation is another ({told}); the worst case is of both"
+        name = others[0][0]
+        remedy = f"say joints.{name}.seat_on: {joints[name].links[0]} or {joints[name].links[1]}"
+        yield Finding(what, f"measures.{of.measure.name}", remedy, Severity.NOTE)
+
+
 def _scatter(outcome: Outcome, counted: Sampled) -> Iterator[Finding]:
     """Measures whose samples scatter quite otherwise than first order says."""
     for i, of in enumerate(outcome.study.linear.measures):
@@ -191,8 +219,3 @@ def _samples(outcome: Outcome, counted: Sampled) -> Iterator[Finding]:
             what = f"{some} {agreeing(int(failed[code]), 'has', 'have')} no answer: {text}"
             yield Finding(what, "tolerances", "they count as outside every limit; moments are of the others")
     yield from _scatter(outcome, counted)
-    for i, measure in enumerate(outcome.study.measures):
-        if limited(measure) and counted.arrays["yield"][i] < 1:
-            share, low, high = (float(counted.arrays[key][i]) for key in ("yield", "yield_low", "yield_high"))
-            what = f"{share:.4%} of the samples keep the limits (95 % interval {low:.4%} to {high:.4%})"
-            yield Finding(what, f"measures.{measure.name}", "`allocate` finds tolerances that do", Severity.NOTE)

@@ -35,10 +35,12 @@ class Sampled:
     passed: int
 
 
-def sampled(job: Sampling, tally: Tally, study: Study) -> Sampled:
-    """All figures of a tally."""
+def sampled(job: Sampling, tally: Tally, study: Study) -> Sampled | None:
+    """All figures of a tally; None of one that was stopped before its first block."""
     count = len(job.measures)
     totals = [total for tree in tally.trees if (total := tree.total()) is not None]
+    if not totals:
+        return None
     whole = totals[0]
     for one in totals[1:]:
         whole = whole.merged(one)

@@ -52,7 +52,7 @@ def search(effects: Effects, objective: Objective, start: Mapping[str, float], s
         assembles = assembles and (rounds > 1 or bool(np.isfinite(real[0])))
         if not np.all(np.isfinite(slope)):
             break
-        turned = effects.corner(real, slope, sign)
+        turned = effects.corner(slope, sign, at)
         if _same(turned, at):
             break
         at = turned
@@ -73,13 +73,14 @@ def search(effects: Effects, objective: Objective, start: Mapping[str, float], s
 
 
 def _flips(effects: Effects, at: Mapping[str, float]) -> list[dict[str, float]]:
-    """Each toleranced number alone at its other limit, or at its nominal value."""
+    """Each toleranced number alone at its other limit, or at its nominal value if its limits let it."""
     found = []
     for i, one in enumerate(effects.inputs.tolerances):
         if one.direction or one.distribution == "direction":
             continue
         nominal = effects.nominal(i)
-        places = {nominal, nominal + one.lower, nominal + one.upper} - {at.get(one.path, nominal)}
+        within = {nominal} if one.lower <= 0.0 <= one.upper else set()
+        places = {*within, nominal + one.lower, nominal + one.upper} - {at.get(one.path, nominal)}
         found += [{one.path: place} for place in sorted(places)]
     return found
 

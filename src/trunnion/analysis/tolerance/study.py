@@ -163,6 +163,7 @@ def tolerance(
     checkpoint: str | os.PathLike[str] | None = None,
     resume: bool = False,
     progress: Callable[[int], None] | None = None,
+    target: float | None = None,
 ) -> xr.Dataset:
     """What the tolerances and plays of a mechanism do to measures: limits, scatter, yield, and what each contributes.
 
@@ -171,7 +172,8 @@ def tolerance(
     samples: of the sampling method, and of the variance-based indices; seed: of its random numbers. steps: positions of
     a whole cycle; at: the place (driver coordinate or time) of measures that state neither a place nor a figure.
     jobs: processes, one a core if not given and worth it; chunk, cluster, checkpoint, resume, progress: `runner.run`.
-    engine: numpy, or jax (an extra).
+    engine: numpy, or jax (an extra). target: the yield that is asked for; limits are missed below it, and if none is
+    given where a worst case, a yield below 1 or a C_pk below 1 breaks them: errors among the findings.
     Returns a Dataset over (measure, parameter, position, …) of `result.VARIABLES`; SI, each measure in its own unit.
     Method: exact first derivatives by dual numbers; the worst corner of the tolerances found on the mechanism itself;
     Monte Carlo or scrambled Sobol points through the whole analysis; Sobol' indices. Samples that have no answer are
@@ -181,6 +183,7 @@ def tolerance(
     from trunnion.analysis.tolerance.result import Outcome, dataset
 
     _check(methods, samples, seed, engine)
+    _check_target(target, methods)
     found = study(mechanism, measures, steps, at, friction)
     worst = found.worst() if "worst-case" in methods else None
     method = next((one for one in methods if one in SAMPLINGS), None)
@@ -200,12 +203,13 @@ def tolerance(
         notes += ran.notes
         if stopped:
             what = f"stopped before the end: {done_of(job, tally):,} of {counted(job.samples, 'sample')}"
-            notes.append(Finding(what, "samples", "go on with --resume", Severity.WARNING))
+            remedy = "go on with --resume" if checkpoint is not None else "with --checkpoint FILE what is done is kept"
+            notes.append(Finding(what, "samples", remedy, Severity.WARNING))
     if "sobol" in methods:
         # Not turned: each number is to have its own coordinates of the points.
         own = replace(found.sampling("quasi-monte-carlo", samples, seed), rotation=None)
         shares = indices(found.sampler(own), samples, seed)
-    return dataset(Outcome(found, tuple(methods), worst, job, tally, shares, stopped), [*found.told, *notes])
+    return dataset(Outcome(found, tuple(methods), worst, job, tally, shares, stopped, target), [*found.told, *notes])
 
 
 def done_of(job: Sampling, tally: Tally) -> int:
@@ -231,6 +235,17 @@ def _check(methods: Sequence[str], samples: int, seed: int, engine: str) -> None
         findings.append(Finding(f"a seed of {seed}", "seed", "give a whole number from 0"))
     if findings:
         raise MechanismError(findings)
+
+
+def _check_target(target: float | None, methods: Sequence[str]) -> None:
+    """MechanismError for a yield that cannot be asked for."""
+    if target is None:
+        return
+    if not 0 < target < 1:
+        what = f"a yield of {target:g} cannot be asked for"
+        raise MechanismError(Finding(what, "yield", "give a share above 0 and below 1, such as 0.9973"))
+    if not any(method in SAMPLINGS for method in methods):
+        raise MechanismError(Finding("a yield is one of samples", "yield", f"add the method {' or '.join(SAMPLINGS)}"))
 
 
 def placed(mechanism: Mechanism, measure: Measure, at: float | str) -> Measure:

@@ -1,0 +1,124 @@
+"""Shares of the variance: of the deviation that is told, correlated or not, in numbers, tables, chart and columns."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import trunnion
+from toleranced import FOURBAR, fourbar, fourbar_angle, slider_crank
+from trunnion import Mechanism
+from trunnion.views.tolerance import figure
+from trunnion.views.tolerance_tables import tables
+from trunnion.views.toleranced import readings
+
+WIDE = 0.05e-3 / 3  # σ of each length
+
+
+def study(rho: float, methods: tuple[str, ...] = ("linear",), **options: Any) -> xr.Dataset:
+    rows = [{"of": ["l2", "l3"], "coefficient": rho}, {"of": ["l3", "l4"], "coefficient": -rho / 2}]
+    return trunnion.tolerance(fourbar(correlations=rows, **options), methods=methods, samples=4000)
+
+
+def drawn(rho: float, samples: int = 400_000) -> tuple[np.ndarray, np.ndarray]:
+    """Deviations of the four lengths, and the angle of each four-bar by its closed form."""
+    matrix = np.eye(4)
+    matrix[1, 2] = matrix[2, 1] = rho
+    matrix[2, 3] = matrix[3, 2] = -rho / 2
+    off = WIDE * np.linalg.cholesky(matrix) @ np.random.default_rng(3).standard_normal((4, samples))
+    return off, fourbar_angle(*(value + row for value, row in zip(FOURBAR.values(), off, strict=True)))
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.6, -0.7, 0.85])
+def test_shares_are_covariances_with_the_measure(rho: float) -> None:
+    """Of samples: a number's part is its slope times its covariance with the angle; together the variance."""
+    found = study(rho)
+    off, angle = drawn(rho)
+    slopes = found["sensitivity"].values[0]
+    wanted = slopes * np.array([np.cov(row, angle)[0, 1] for row in off]) / np.var(angle)
+    np.testing.assert_allclose(found["contribution_variance"].values[0], wanted, atol=5e-3)
+    assert found["contribution_variance"].sum().item() == pytest.approx(1, abs=1e-12)
+    assert found["deviation_linear"].item() == pytest.approx(np.std(angle), rel=5e-3)
+
+
+def test_shares_with_plays_and_directions_add_up() -> None:
+    """Zones are independent of the lengths, and their share is that of the deviation with all correlations."""
+    joints = fourbar().data()["joints"]
+    joints["C"] |= {"pin": {"clearance": "0.03 mm"}}
+    joints["B"] |= {"misalignment": {"offset": "0.02 mm", "offset_towards": "40 deg"}}
+    tolerances = dict.fromkeys(FOURBAR, "±0.05 mm")
+    tolerances |= {"joints.B.misalignment.offset": "±0.01 mm"}
+    tolerances |= {"joints.B.misalignment.offset_towards": {"distribution": "direction"}}
+    found = study(0.8, ("linear", "monte-carlo"), joints=joints, tolerances=tolerances)
+    shares = found["contribution_variance"].isel(measure=0)
+    assert shares.sum().item() == pytest.approx(1, abs=1e-12)
+    plays = shares.sel(parameter="joints.C.clearance").item() * found["deviation_linear"].item() ** 2
+    alone = found["sensitivity"].sel(parameter="joints.C.clearance").item() * 0.03e-3 / 2
+    assert plays == pytest.approx(alone**2, rel=1e-9)
+    assert found["deviation"].item() == pytest.approx(found["deviation_linear"].item(), rel=0.04)
+
+
+def test_sizes_of_one_direction_go_with_each_other() -> None:
+    """Two numbers make the offset that points anywhere: correlated they widen it, by samples as by first order."""
+    data = slider_crank().data()
+    data["dimensions"] |= {"e1": "0.2 mm", "e2": "0.1 mm"}
+    data["joints"]["B"]["misalignment"] = {"offset": "e1 + e2", "offset_towards": "90 deg"}
+    data["tolerances"] = {"e1": "±0.2 mm", "e2": "±0.1 mm"}
+    data["tolerances"] |= {"joints.B.misalignment.offset_towards": {"distribution": "direction"}}
+    data["correlations"] = [{"of": ["e1", "e2"], "coefficient": 0.95}]
+    found = trunnion.tolerance(Mechanism(**data), methods=["linear", "monte-carlo"], samples=20_000)
+    assert found["deviation_linear"].item() == pytest.approx(found["deviation"].item(), rel=0.02)
+    assert found["contribution_variance"].sum().item() == pytest.approx(1, abs=1e-12)
+
+
+def test_rss_says_that_it_leaves_correlation_out() -> None:
+    found = study(0.85)
+    table = tables(found)[0]
+    assert any(row[0] == "RSS, uncorrelated" for row in table.rows)
+    assert any("RSS, without correlation" in row["label"] for row in json.loads(found.attrs["summary"]))
+    assert any("leave the correlations out" in row["what"] for row in json.loads(found.attrs["findings"]))
+    plain = study(0.0)
+    assert not any("uncorrelated" in row[0] for row in tables(plain)[0].rows)
+    assert not any("correlations" in row["what"] for row in json.loads(plain.attrs["findings"]))
+
+
+def test_table_and_chart_show_the_same_shares() -> None:
+    found = study(-0.85)
+    table = next(one for one in tables(found) if one.title.startswith("what contributes"))
+    told = [float(row[table.head.index("of variance")].split("\u00a0")[0].replace("−", "-")) for row in table.rows]
+    assert sum(told) == pytest.approx(100, abs=0.2)
+    assert min(told) < 0  # one of two that work against each other
+    axes = figure(found, "contributions").findobj(lambda one: hasattr(one, "containers") and one.containers)[0]
+    bars = {one.get_label(): [bar.get_width() for bar in one] for one in axes.containers}
+    np.testing.assert_allclose(bars["variance"], told, atol=0.051)
+    np.testing.assert_allclose(
+        bars["RSS², uncorrelated"], [100 * one.rss_share for one in readings(found)[0].contributions]
+    )
+    assert axes.get_xlim()[0] < min(bars["variance"])
+
+
+def test_columns_have_the_shares_of_the_variance(tmp_path: Path) -> None:
+    from trunnion.export import save
+
+    found = study(0.5)
+    save(found, tmp_path / "x.parameters.csv")
+    head, *rows = (tmp_path / "x.parameters.csv").read_text("utf-8").splitlines()
+    place = next(k for k, name in enumerate(head.split(",")) if name.startswith("angle.contribution_variance"))
+    shares = [float(row.split(",")[place]) for row in rows]
+    np.testing.assert_allclose(shares, found["contribution_variance"].values[0], rtol=1e-12)
+
+
+@pytest.mark.parametrize("criterion", ["worst-case", "rss", "yield"])
+def test_an_allocation_says_when_it_leaves_correlation_out(criterion: str) -> None:
+    costs = {name: {"model": "power", "B": 1, "k": 1, "unit": "mm"} for name in FOURBAR}
+    measures = {"angle": {"angle": "rocker", "at": "60 deg", "limit": "±0.1 deg"}}
+    rows = [{"of": ["l2", "l3"], "coefficient": 0.5}]
+    mechanism = fourbar(correlations=rows, costs=costs, measures=measures)
+    found = trunnion.allocate(mechanism, criterion=criterion, samples=0)  # type: ignore[arg-type]
+    said = any("leaves the correlations out" in row["what"] for row in json.loads(found.attrs["findings"]))
+    assert said == (criterion != "yield")

@@ -161,3 +161,12 @@ def test_dimensions_off_nominal() -> None:
     change = (built.drive_effort - meant.drive_effort).values
     np.testing.assert_allclose(result.drive_effort_change.values, change, rtol=0, atol=1e-9)
     assert float(result.efficiency_ideal) == pytest.approx(float(meant.efficiency), nan_ok=True)
+
+
+def test_errors_of_what_cannot_be_assembled() -> None:
+    """The means of the ideal mechanism have their joints also where there is nothing to take a mean of."""
+    data = linkage(misalignment={"tilt": 1e-3})
+    data["links"]["rod"]["points"]["C"] = [1e3, 0, 0]
+    result = trunnion.analyse(trunnion.Mechanism(**data), 4)
+    assert bool((result["status"] == trunnion.Status.NOT_ASSEMBLED).all())
+    assert result["friction_power_mean_ideal"].sizes == {"joint": result.sizes["joint"]}

@@ -160,6 +160,7 @@ class Run:
         return self._histories(self.values)
 
 
+@np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
 def prepare(mechanism: Mechanism) -> Run:
     """Decompose a mechanism and choose its assembly. Raises MechanismError if its structure is not determined."""
     system = build(mechanism)
@@ -222,6 +223,7 @@ def check_steps(steps: int) -> None:
         raise MechanismError(Finding(f"cannot analyse {steps} positions", "steps", remedy))
 
 
+@np.errstate(all="ignore")
 def analyse_run(
     run: Run,
     steps: int = 360,

@@ -56,6 +56,7 @@ class Check:
         return self.plan.mobility
 
 
+@np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
 def check(mechanism: Mechanism, steps: int = 360) -> Check:
     """Structure and findings of a mechanism, looked at over `steps` positions of its cycle.
 

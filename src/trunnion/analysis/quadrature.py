@@ -109,7 +109,8 @@ def integrals(
         share = (tolerance / np.maximum(panels, 1))[:, rows]
         with np.errstate(invalid="ignore"):
             wide = np.any(parts[1] > share, axis=0) & (high - low > shortest[rows])
-        wide &= (panels[rows] < MOST_PANELS) & (round_ < effort.rounds)
+        more = (PARTS - 1) * np.bincount(rows[wide], minlength=count)
+        wide &= (panels + more <= MOST_PANELS)[rows] & (round_ < effort.rounds)
         told += _by_row(parts[:, :, ~wide], rows[~wide], count)
         if not np.any(wide):
             break

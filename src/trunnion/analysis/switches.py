@@ -41,6 +41,7 @@ STATED_SCANNED = 1440
 MOST_SCANNED = 20_000
 MOST_LEVELS = 720  # of one table: points closer together than that are as good as a smooth course
 PANELS = 6  # of a turn: the widest that is integrated in one go
+MOST_EDGES = 2000  # of a cycle of very many turns: the error of its means is told
 ROUNDS = 60
 SETTLED = 1e-11  # of the cycle
 CLOSE = 1e-10  # of the cycle: edges that are one
@@ -112,7 +113,7 @@ def _parted(times: Array, cycle: Cycle) -> Array:
     times = np.sort(times[(times >= 0) & (times <= cycle.duration)])
     kept = times[np.append(np.diff(times) > CLOSE * cycle.duration, True)]
     kept[0] = 0.0
-    widest = cycle.duration / (PANELS * max(1.0, np.ceil(cycle.turns - 1e-9)))
+    widest = cycle.duration / min(PANELS * max(1.0, np.ceil(cycle.turns - 1e-9)), MOST_EDGES)
     counts = np.ceil(np.diff(kept) / widest * (1 - 1e-9)).astype(int)
     parts = [np.linspace(a, b, n + 1)[:-1] for a, b, n in zip(kept[:-1], kept[1:], counts, strict=True)]
     return np.concatenate([*parts, kept[-1:]])
@@ -126,7 +127,8 @@ def _knots(of: Mechanisms) -> Iterator[tuple[int, float]]:
             continue
         each, periods = np.array([of.row(knot) for knot in knots]).T, of.row(span.duration)
         for row, (times, period, cycle) in enumerate(zip(each, periods, of.cycles, strict=True)):
-            laps = np.arange(np.ceil(cycle.duration / period)) if span.periodic else np.zeros(1)
+            most = max(1.0, MOST_EDGES / len(times))
+            laps = np.arange(min(np.ceil(cycle.duration / period), most)) if span.periodic else np.zeros(1)
             again = np.mod(times, period) if span.periodic else times
             yield from ((row, float(moment)) for moment in (again[:, None] + laps * period).ravel())
 

@@ -89,8 +89,9 @@ class Course:
         GUM (JCGM 100:2008), 4.2 and 5.1. NaN with fewer than two turns.
         """
         repeated = self.scatter / np.sqrt(np.maximum(self.count, 1))
-        known = self.accuracy.zero**2 + self.unresolved**2
-        return np.sqrt(repeated**2 + known + (self.accuracy.gain * self.mean) ** 2)
+        with np.errstate(over="ignore"):  # of numbers near the end of the floats
+            known = np.square(self.accuracy.zero) + np.square(self.unresolved)
+            return np.asarray(np.sqrt(repeated**2 + known + (self.accuracy.gain * self.mean) ** 2))
 
 
 @dataclass(frozen=True)

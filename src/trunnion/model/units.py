@@ -7,6 +7,7 @@ number, so that 30 deg is not taken for a length nor 30 mm for an angle; beside 
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cache
@@ -138,6 +139,10 @@ def _registry() -> pint.UnitRegistry[Fraction]:
     return registry
 
 
+MOST_POWER = 1000  # of all powers in a unit, one on the other
+# one power, not itself raised to another
+_POWER = re.compile(r"(?:\*\*|\^)\s*\(?\s*[+-]?\s*(\d{1,2})(?:[./]\d{1,2})?\s*\)?(?!\s*(?:\*\*|\^)|[\d.])")
+_LONG = re.compile(r"\d{20}|[⁰¹²³⁴⁵⁶⁷⁸⁹]{3}|.{200}")
 _PRODUCT = "write a product of a number and a dimension as 2 * AB"
 
 
@@ -163,12 +168,22 @@ def _check_spelling(text: str, spaced: str) -> None:
     raise UnitError(f"the unit '{text}'{told} {same} not in common use", meant)
 
 
+def _check_powers(text: str, spaced: str) -> None:
+    """UnitError for powers and numbers that no unit has: pint works them out to the last digit."""
+    product = 1
+    for power in _POWER.findall(spaced):
+        product *= max(1, int(power))
+    if re.search(r"\*\*|\^", _POWER.sub("", spaced)) or product > MOST_POWER or _LONG.search(spaced):
+        raise UnitError(f"the unit '{text[:60]}' is not known", "write powers as m^2 or s^-1")
+
+
 @cache
 def root(text: str) -> tuple[Fraction, dict[str, Fraction], tuple[str, ...]]:
     """Factor to SI, exponents by base unit of pint, and the units named, of any unit in use; UnitError if none."""
     registry = _registry()
     spaced = plain(text)
     _check_spelling(text, spaced)
+    _check_powers(text, spaced)
     try:
         parsed = registry.parse_units(spaced)
         factor, base = registry.get_root_units(parsed)

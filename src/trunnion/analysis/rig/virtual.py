@@ -158,14 +158,14 @@ class Observation:
             parts.append(channel.noise / math.sqrt(longest.before))
         else:
             parts.append(channel.offset)
-        return float(np.linalg.norm(parts))
+        return math.hypot(*parts)
 
     def accuracy(self, name: str) -> Accuracy:
         """What a laboratory that knows its sensors states of one."""
         channel = self.channels[name]
         zero = self.zero_uncertainty(name)
         rests = channel.at_rest and all(case.before for case in self.cases)  # else all files have one offset
-        own = math.sqrt(max(zero**2 - channel.zero**2, 0.0)) if rests else 0.0
+        own = math.sqrt(max(zero - channel.zero, 0.0) * (zero + channel.zero)) if rests else 0.0
         return Accuracy(zero, channel.gain, channel.step, own)
 
     def measurement(self, positions: int = 360) -> Measurement:

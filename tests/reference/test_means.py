@@ -128,6 +128,19 @@ def test_one_way_springs_and_laws_part_the_integral() -> None:
     assert values[0] == pytest.approx(finely(prepare(Mechanism(**data)), 200_000), rel=1e-5)
 
 
+@pytest.mark.parametrize(("points", "interpolation"), [(500, "linear"), (500, "spline"), (5000, "linear")])
+def test_a_peak_of_one_point_of_a_long_table_counts(points: int, interpolation: str) -> None:
+    """Points close together are a smooth course only where they are: a peak of one of them is not passed over."""
+    values = [f"{50 if k == round(0.29 * points) else 1} N" for k in range(points + 1)]
+    rows = [[f"{360 * k / points:.9g} deg", value] for k, value in enumerate(values)]
+    table = {"over": "drive", "points": rows, "periodic": True, "interpolation": interpolation}
+    mechanism = press("200 * p", tables={"p": table})
+    found = trunnion.analyse(mechanism, 60)
+    value = finely(prepare(mechanism), 200_000)
+    assert float(found["efficiency"]) == pytest.approx(value, rel=1e-4)
+    assert float(found["efficiency_error"]) < 1e-4
+
+
 def test_edges_are_where_the_model_switches() -> None:
     run = prepare(press())
     (found,) = edges(Mechanisms(run.system, run.chosen.assembly, run.values, [run.cycle]))

@@ -102,8 +102,8 @@ def find(arrays: Arrays, run: Run, time: NDArray[np.float64]) -> list[Loss]:
 def gaps(run: Run) -> NDArray[np.float64]:
     """Times, s, from and to, round every loss, in which the travel of a seat that jumps reaches; (2, loss).
 
-    Of the loads without play, all along the cycle and on either side of every place at which the model switches: they do
-    not depend on which positions were asked for.
+    Of the loads without play, all along the cycle and on either side of every place at which the model switches: they
+    do not depend on which positions were asked for.
     """
     duration, near = run.cycle.duration, REACH * run.cycle.duration / LANES
     scan = np.linspace(0.0, duration, LANES + 1)
@@ -127,6 +127,9 @@ def _turned(run: Run, seat: Seat, time: NDArray[np.float64]) -> Iterator[float]:
                 continue
             for place, _ in _passages(load, peak, periodic=False, near=np.inf):
                 k = min(int(place), len(time) - 2)
+                if k == place:  # there is no load here, with nothing to look at more closely
+                    yield float(time[k])
+                    continue
                 fine = np.linspace(time[k], time[k + 1], PARTS + 1)
                 for one, _ in _passages(_loads_at(run.ideal(fine), seat, fine)[number], peak, periodic=False):
                     yield float(np.interp(one, np.arange(len(fine)), fine))

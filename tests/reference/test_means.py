@@ -47,6 +47,26 @@ LOADS = (
     "1 kN * between(time, 0.9441 s, 0.9527 s)",
 )
 
+SHAFT: dict[str, Any] = {
+    "space": "spatial",
+    "dimensions": {"delta": "20 deg", "error": "0.1 mm"},
+    "loop": [
+        {"joint": "input", "type": "revolute", "link": "first", "twist": "90 deg"},
+        {"joint": "pin-1", "type": "cylindrical", "link": "cross", "twist": "90 deg", "distance": "error"},
+        {"joint": "pin-2", "type": "cylindrical", "link": "second", "twist": "90 deg"},
+        {"joint": "output", "type": "cylindrical", "link": "ground", "twist": "180 deg - delta"},
+    ],
+    "links": {"cross": {"frame": "pin-2", "mass": "0.2 kg", "centre": [0, 0, 0],
+                        "inertia": {"xx": 5e-5, "yy": 5e-5, "zz": 8e-5}}},
+    "joint_defaults": {"pin": {"radius": "8 mm", "bearing": "60 mm", "clearance": "0.01 mm"}, "friction": 0.05,
+                       "seat": "loaded"},
+    "drivers": {"input": {"speed": "500 rpm"}},
+    "loads": {"brake": {"joint": "output", "resisting_torque": "30 N m * between(drive, 100 deg, 102 deg)",
+                        "useful": True}},
+    "gravity": [0, 0, -9.81],
+    "assembly": {"output": "90 deg"},
+}  # fmt: skip
+
 
 def press(force: str = LOADS[0], **changes: Any) -> Mechanism:
     return Mechanism(**(PRESS | changes)).with_values({"work.resisting_force": force})
@@ -128,6 +148,19 @@ def test_one_way_springs_and_laws_part_the_integral() -> None:
     assert values[0] == pytest.approx(finely(prepare(Mechanism(**data)), 200_000), rel=1e-5)
 
 
+@pytest.mark.parametrize(("points", "interpolation"), [(500, "linear"), (500, "spline"), (5000, "linear")])
+def test_a_peak_of_one_point_of_a_long_table_counts(points: int, interpolation: str) -> None:
+    """Points close together are a smooth course only where they are: a peak of one of them is not passed over."""
+    values = [f"{50 if k == round(0.29 * points) else 1} N" for k in range(points + 1)]
+    rows = [[f"{360 * k / points:.9g} deg", value] for k, value in enumerate(values)]
+    table = {"over": "drive", "points": rows, "periodic": True, "interpolation": interpolation}
+    mechanism = press("200 * p", tables={"p": table})
+    found = trunnion.analyse(mechanism, 60)
+    value = finely(prepare(mechanism), 200_000)
+    assert float(found["efficiency"]) == pytest.approx(value, rel=1e-4)
+    assert float(found["efficiency_error"]) < 1e-4
+
+
 def test_edges_are_where_the_model_switches() -> None:
     run = prepare(press())
     (found,) = edges(Mechanisms(run.system, run.chosen.assembly, run.values, [run.cycle]))
@@ -162,6 +195,17 @@ def test_extremes_are_of_positions_that_are_valid(model: str) -> None:
     tables = {row["label"]: row["built"] for row in error_rows(result)}
     joint = str(result["joint"].values[0])
     assert tables[f"Reaction of {joint}, largest"] == quantity(float(np.max(sizes[0][~lost])), "N")
+
+
+def test_means_with_seats_do_not_depend_on_which_losses_of_contact_the_positions_show() -> None:
+    """A load of two degrees turns the seats round twice, between two of 60 positions and at some of 180."""
+    mechanism = Mechanism(**SHAFT)
+    found = [trunnion.analyse(mechanism, steps) for steps in (60, 90, 180)]
+    for name in ("efficiency", "drive_power_mean"):
+        values = [float(one[name]) for one in found]
+        np.testing.assert_allclose(values, values[0], rtol=1e-9)
+    rows = {row["label"]: row["value"] for row in json.loads(found[0].attrs["summary"])}
+    assert 0 < rows["part of the cycle that means leave out, not valid"] < 0.1
 
 
 def test_a_lost_contact_matters_to_the_extremes_of_this_example() -> None:

@@ -286,22 +286,21 @@ def positions(
     losses = contact_loss.find(arrays, run, time) if run.seats else []
     run.system.engine.unwrap(arrays, run.system, run.values, time)
 
-    means = _means(run, arrays, quick, losses)
-    meant = _means(run, ideal, quick, None) if run.erring else None
+    means = _means(run, arrays, quick)
+    meant = _means(run, ideal, quick, ideal=True) if run.erring else None
     return Positions(arrays, labels, time, method, causes, means, meant, losses)
 
 
-def _means(run: Run, arrays: Arrays, method: FrictionMethod, losses: Sequence[contact_loss.Loss] | None) -> Means:
-    """Means over the cycle; NaN where a position has no answer. losses: of contact, None of the ideal mechanism."""
-    ideal = losses is None
+def _means(run: Run, arrays: Arrays, method: FrictionMethod, ideal: bool = False) -> Means:
+    """Means over the cycle; NaN where a position has no answer. ideal: of the mechanism without errors."""
     of = Mechanisms(run.system, run.chosen.assembly, run.ideal_values if ideal else run.values, [run.cycle])
     if run.cycle.duration <= 0 or np.any(arrays["status"] >= Status.NOT_CONVERGED):
         return still(arrays)
-    if losses is None or not run.seats:
+    if ideal or not run.seats:
         look = run.ideal if ideal else run.solve
         between = None if ideal else [run.edges]
         return means_of(of, lambda rows, time: _powers(look(time.ravel(), method=method), time), between)[0]
-    gaps = contact_loss.gaps(losses, run, len(arrays["status"]))
+    gaps = contact_loss.gaps(run)
 
     def seated(rows: NDArray[np.intp], time: NDArray[np.float64]) -> Arrays:
         seen = around(time.ravel(), run.cycle)

@@ -25,6 +25,7 @@ from trunnion.errors import Finding, Severity, Status
 
 if TYPE_CHECKING:
     from trunnion.analysis.analyse import Run
+    from trunnion.analysis.kinetostatics import Backward
 
 __all__ = ["EARLES_WU", "Loss", "find", "findings", "gaps", "valid"]
 
@@ -35,6 +36,7 @@ PARTS = 96  # into which a wider step, and a quarter of it on either side, is pa
 FINE = 1.5 / PARTS  # of a step
 REACH = 3.0  # in lanes of `travel`: how far on either side of a jump the differences of seats reach, and one more
 OFF = 1e-6  # of load and offset: a load that points away from the wall, not along it but for rounding
+BESIDE = 1e-9  # of a cycle: on the sides of a place at which the model switches
 MOST_PLACES = 6  # named in one finding
 ENDS = ("", " (end 1)", " (end 2)", " (along its axis)")
 
@@ -97,18 +99,50 @@ def find(arrays: Arrays, run: Run, time: NDArray[np.float64]) -> list[Loss]:
     return found
 
 
-def gaps(losses: Sequence[Loss], run: Run, count: int) -> NDArray[np.float64]:
+def gaps(run: Run) -> NDArray[np.float64]:
     """Times, s, from and to, round every loss, in which the travel of a seat that jumps reaches; (2, loss).
 
-    count: of the positions by which places of losses are numbered.
+    Of the loads without play, all along the cycle and on either side of every place at which the model switches: they
+    do not depend on which positions were asked for.
     """
     duration, near = run.cycle.duration, REACH * run.cycle.duration / LANES
-    step = duration / max(1, count if run.cycle.periodic else count - 1)
-    at = np.array([place * step for loss in losses for place, _ in loss.places])
+    scan = np.linspace(0.0, duration, LANES + 1)
+    time = np.unique(np.clip(np.concatenate([scan, run.edges - BESIDE * duration, run.edges + BESIDE * duration]),
+                             0.0, duration))  # fmt: skip
+    at = np.array([moment for seat in run.seats if seat.given is None for moment in _turned(run, seat, time)])
     again = [at, at - duration, at + duration] if run.cycle.periodic else [at]  # beside the start or the end
     every = np.concatenate(again)
     every = every[(every > -near) & (every < duration + near)]
     return np.array([every - near, every + near])
+
+
+def _turned(run: Run, seat: Seat, time: NDArray[np.float64]) -> Iterator[float]:
+    """Times at which the load of an end passes near zero, seen closely wherever it turns round between two of these."""
+    with np.errstate(all="ignore"):
+        back = run.ideal(time)
+        largest = max((float(np.nanmax(np.abs(row), initial=0.0)) for row in _all_loads(run, back)), default=0.0)
+        for number, load in enumerate(_loads_at(back, seat, time)):
+            peak = float(np.nanmax(_size(load), initial=0.0))
+            if peak <= NO_LOAD * largest:
+                continue
+            for place, _ in _passages(load, peak, periodic=False, near=np.inf):
+                k = min(int(place), len(time) - 2)
+                if k == place:  # there is no load here, with nothing to look at more closely
+                    yield float(time[k])
+                    continue
+                fine = np.linspace(time[k], time[k + 1], PARTS + 1)
+                for one, _ in _passages(_loads_at(run.ideal(fine), seat, fine)[number], peak, periodic=False):
+                    yield float(np.interp(one, np.arange(len(fine)), fine))
+
+
+def _loads_at(back: Backward, seat: Seat, time: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    """Loads of the ends of a joint, (component, time) each."""
+    return [np.array([np.broadcast_to(part, time.shape) for part in load]) for load in loads_of(back, seat)]
+
+
+def _all_loads(run: Run, back: Backward) -> Iterator[NDArray[np.float64]]:
+    """Every component of the load of every end."""
+    yield from (np.asarray(part) for seat in run.seats for load in loads_of(back, seat) for part in load)
 
 
 def valid(found: Seated, run: Run, near: NDArray[np.float64], time: NDArray[np.float64]) -> NDArray[np.bool_]:

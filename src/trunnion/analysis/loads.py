@@ -19,6 +19,8 @@ from trunnion.model.parts import Load
 __all__ = ["Action", "Share", "Slip", "SpringState", "Stated", "Switch", "spring_state", "springs", "stated_loads"]
 
 
+SPLINED = 3  # of a spline every so many points: it bends at none, but may be anything between two that are far apart
+
 Share = float | NDArray[np.float64]  # of what resists a joint at rest, with the sign of the slip about to begin
 
 
@@ -94,10 +96,9 @@ class Stated:
                 yield from (Switch(kink(named)) for kink in entry.quantity.expression.kinks)
                 tables.update(dict.fromkeys(named.keys() & self.walk.system.mechanism.tables.keys()))
         for name in tables:
-            if self.walk.system.mechanism.tables[name].interpolation == "linear":
-                knots, _, place = self._of_table(name)
-                repeats = self.walk.system.mechanism.tables[name].repeats
-                yield Switch(place, knots, knots[-1] - knots[0] if repeats else None)
+            table, (knots, _, place) = self.walk.system.mechanism.tables[name], self._of_table(name)
+            known = knots if table.interpolation == "linear" else [*knots[:-1:SPLINED], knots[-1]]
+            yield Switch(place, known, knots[-1] - knots[0] if table.repeats else None)
 
     def _named(self, name: str) -> Number:
         """What a name in an expression stands for: a dimension, the drive, time, or a table."""

@@ -39,7 +39,7 @@ Rows = NDArray[np.intp]
 SCANNED = 180  # places of a turn at which the motion is looked at; what the model states of it takes less
 STATED_SCANNED = 1440
 MOST_SCANNED = 20_000
-MOST_LEVELS = 720  # of one table: points closer together than that are as good as a smooth course
+MOST_LEVELS = 720  # of one table in a turn: of more points every n-th, so that no node of a panel is far from any
 PANELS = 6  # of a turn: the widest that is integrated in one go
 MOST_EDGES = 2000  # of a cycle of very many turns: the error of its means is told
 ROUNDS = 60
@@ -264,7 +264,10 @@ def _levels(of: Mechanisms, switch: Switch, row: int, course: Array) -> Array:
         period = of.row(switch.period)[row]
         first, last = np.floor((np.min(known) - levels[0]) / period), np.ceil((np.max(known) - levels[0]) / period)
         levels = np.unique((levels[:-1] + period * np.arange(first, last + 1)[:, None]).ravel())
-    return levels if len(levels) <= MOST_LEVELS else levels[:0]
+    if len(known):
+        levels = levels[(levels >= np.min(known)) & (levels <= np.max(known))]
+    most = min(MOST_LEVELS * max(1.0, np.ceil(of.cycles[row].turns - 1e-9)), MOST_SCANNED)
+    return levels[:: max(1, int(np.ceil(len(levels) / most)))]
 
 
 def _passed(course: Array, levels: Array, time: Array) -> Iterator[tuple[float, ...]]:

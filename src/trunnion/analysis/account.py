@@ -45,7 +45,6 @@ __all__ = [
     "sound_positions",
 ]
 
-LEFT_OUT = 1e-9  # of the cycle: less than that is rounding
 MARGIN = 10.0  # multiple of the friction up to which the locking margin is looked for
 
 Arrays = Mapping[str, NDArray[np.float64]]
@@ -292,9 +291,6 @@ def _summary(run: Run, found: Positions, near: near_locking.Locking | None) -> l
         efficiency = {"label": f"efficiency of the cycle{_why(means, arrays)}", "value": means.efficiency, "unit": "1"}
         rows.append(efficiency)
         rows.append({"label": "efficiency, error of its integrals", "value": means.efficiency_error, "unit": "1"})
-        if means.share < 1 - LEFT_OUT:
-            label = "part of the cycle that means leave out, not valid"
-            rows.append({"label": label, "value": 1 - means.share, "unit": "1"})
         if found.ideal is not None:
             ideal = found.ideal.efficiency
             rows.append({"label": "efficiency of the cycle without errors", "value": ideal, "unit": "1"})

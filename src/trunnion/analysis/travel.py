@@ -160,7 +160,7 @@ def _rates(
     for paths in ends:
         was, is_, will = ([offsets[path][side] for path in paths] for side in (before, inner, after))
         # a pin whose load is not known lies in the middle: from there to its wall is a jump, not a way
-        size = np.sqrt(np.maximum.reduce([sum(part**2 for part in side) for side in (was, is_, will)]))
+        size = np.max([np.sqrt(np.sum(np.square(side), axis=0)) for side in (was, is_, will)], axis=0)
         scale = 1 / np.where(size > 0, size, np.inf)
         back = np.maximum(back, scale * _apart(was, is_))
         ahead = np.maximum(ahead, scale * _apart(is_, will))

@@ -39,8 +39,11 @@ def test_each_point_is_an_analysis_of_its_own(space: str) -> None:
     for k, value in enumerate(over[swept]):
         one = trunnion.analyse(mechanism.with_values({**start, swept: value}), STEPS)
         effort, turned = one["drive_effort"].sel(driver="A"), one["joint_rotation"].sel(joint=out).values
-        assert float(result["torque"][k]) == pytest.approx(float(np.sqrt((effort**2).mean())), rel=1e-9)
-        assert float(result["mean:effort:A"][k]) == pytest.approx(float(effort.mean()), rel=1e-9)
+        speed = float(one["joint_rotation_velocity"].sel(joint="A").mean())
+        rms = float(one["drive_effort_rms"].item())
+        assert float(result["torque"][k]) == pytest.approx(rms, rel=1e-5)
+        mean = float(one["drive_power_mean"]) / speed
+        assert float(result["mean:effort:A"][k]) == pytest.approx(mean, abs=1e-5 * rms)
         assert float(result["least"][k]) <= float(effort.min())
         assert float(result["least"][k]) == pytest.approx(float(effort.min()), rel=2e-2)
         apart = float(result["there"][k]) - turned[STEPS // 6]
@@ -58,8 +61,8 @@ def test_a_pin_that_lies_in_its_seat() -> None:
                             {next(iter(mechanism.dimensions)): [0.05, 0.051]}, STEPS, measures=["top"])  # fmt: skip
     (name,) = json.loads(result.attrs["swept"])
     for k, value in enumerate(result[name].values):
-        one = trunnion.analyse(mechanism.with_values({name: float(value)}), STEPS)
-        assert float(result["top"][k]) == pytest.approx(float(one["drive_effort"].mean()), rel=1e-9)
+        one = trunnion.analyse(mechanism.with_values({name: float(value)}), 20 * STEPS)
+        assert float(result["top"][k]) == pytest.approx(float(one["drive_effort"].mean()), rel=3e-3)
 
 
 def test_a_point_without_an_answer_has_no_figure() -> None:

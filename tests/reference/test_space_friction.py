@@ -172,7 +172,11 @@ def test_pin_at_rest(model: str) -> None:
         ends.append(oracle.rub(motions)[0].effort["input"])
     lower, upper = (float(result[f"drive_effort_{end}"].values[0, 0]) for end in ("lower", "upper"))
     assert upper - lower > 0.1
-    np.testing.assert_allclose([lower, upper], [min(ends), max(ends)], rtol=1e-8)
+    if model == "two-contact":
+        np.testing.assert_allclose([lower, upper], [min(ends), max(ends)], rtol=1e-8)
+    else:  # the least effort lies inside the interval of the friction, where `test_rest` scans it
+        assert upper == pytest.approx(max(ends), rel=1e-8)
+        assert min(ends) - 0.03 * (upper - lower) < lower < min(ends)
     assert lower <= float(result.drive_effort.values[0, 0]) <= upper
 
 

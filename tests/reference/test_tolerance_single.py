@@ -19,7 +19,6 @@ from trunnion.analysis.account import MARGIN
 from trunnion.analysis.analyse import Run, prepare
 from trunnion.analysis.friction import FrictionMethod
 from trunnion.analysis.measure_figures import figure
-from trunnion.analysis.measure_positions import plan
 from trunnion.analysis.measures import coordinate_unit
 from trunnion.analysis.tolerance.study import study
 from trunnion.statistics.streams import uniforms
@@ -96,11 +95,12 @@ def test_batches_against_mechanisms_of_their_own(name: str) -> None:
     figures, _, _, status = batch.figures(u)
     values = batch.inputs.values(u)
     measures = found.measures
-    _, nominal = references(found.run, measures, STEPS)
+    positions, nominal = references(found.run, measures, STEPS)
+    times = np.broadcast_to(positions.moved(values), (2, len(positions.times)))
     seen = 0
     for i in (1,) if mechanism.space == "spatial" else (0, 1):
         run = prepare(alone(mechanism, values, i))
-        back = run.solve(plan(run, measures, STEPS).times, None, FrictionMethod(margin_up_to=MARGIN))
+        back = run.solve(times[i], None, FrictionMethod(margin_up_to=MARGIN))
         for k, measure in enumerate(measures):
             own = float(np.ravel(figure(measure.curve(back), nominal[measure.name]))[0])
             known = nominal[measure.name]

@@ -185,8 +185,11 @@ def test_few_positions(steps: int) -> None:
         "rms": {"effort": "A", "as": "rms"},
     }  # fmt: skip
     result = trunnion.tolerance(fourbar(loaded=True, measures=measures), methods=ALL, samples=40, steps=steps)
-    assert result.sizes["position"] == steps
+    assert result.sizes["position"] >= steps  # the places of the mean square come on top
     assert np.all(np.isfinite(result["mean"].values))
+    del measures["rms"]
+    result = trunnion.tolerance(fourbar(loaded=True, measures=measures), methods=ALL, samples=40, steps=steps)
+    assert result.sizes["position"] == steps
 
 
 def test_many_samples_at_one_place() -> None:

@@ -2,8 +2,8 @@
 
 Models, their tables, mappings, rig files and measured data of every format are damaged at random, as a crash, an editor
 or a stranger would, and read, checked and used as the verbs do. What may come of it is a result or findings: any other
-exception, a process that dies, and a file that takes more than 5 s of CPU are counted, told with the number of the case
-and make the exit status 1. A case depends on the seed and its number alone: `--case 1234` runs one again.
+exception, a process that dies, and a command that takes more than 5 s of CPU are counted, told with the number of the
+case, and make the exit status 1. A case depends on the seed and its number alone: `--case 1234` runs one again.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from typing import Any
 
 __all__ = ["LIMIT", "Outcome", "run_case"]
 
-LIMIT = 5.0  # s of CPU a file may take
+LIMIT = 5.0  # s of CPU that a command may take
 MEMORY = 6 << 30  # bytes of address space; a file that asks for more is a crash
 # Shares of the kinds of files, in percent.
 SHARES = {"model": 55, "mapping": 16, "data": 14, "rig": 7, "points": 5, "samples": 3}
@@ -42,7 +42,10 @@ class TooLong(BaseException):
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of one file: result, findings, warning, too long, died, or the name of an exception."""
+    """What came of one file: result, findings, warning, too long, died, or the name of an exception.
+
+    seconds: of CPU, of the command that took longest.
+    """
 
     case: int
     kind: str
@@ -68,11 +71,12 @@ def run_case(seed: int, case: int, folder: Path, limit: float = LIMIT, keep: Pat
     path.write_bytes(damaged(original, rng))
     if keep:
         keep.write_bytes(path.read_bytes())
-    outcome, told, begin = "result", "", time.process_time()
+    outcome, told, clock = "result", "", _Limited(limit)
     try:
-        with _limited(limit), warnings.catch_warnings():
+        with clock, warnings.catch_warnings():
             warnings.simplefilter("error")
-            KINDS[kind](path, rng)
+            for _ in KINDS[kind](path, rng):
+                clock.again()
     except MechanismError as error:
         outcome = "findings" if error.findings and all(one.what for one in error.findings) else "no finding"
     except TooLong:
@@ -81,25 +85,33 @@ def run_case(seed: int, case: int, folder: Path, limit: float = LIMIT, keep: Pat
         outcome, told = f"warning {type(error).__name__}", traceback.format_exc(limit=-6)
     except Exception as error:
         outcome, told = type(error).__name__, traceback.format_exc(limit=-6)
-    return Outcome(case, kind, original.name, outcome, time.process_time() - begin, told)
+    return Outcome(case, kind, original.name, outcome, clock.longest, told)
 
 
-class _limited:  # noqa: N801  # as contextlib names its own
-    """TooLong is raised inside after so many seconds of CPU."""
+class _Limited:
+    """TooLong is raised inside after so many seconds of CPU, counted from when it was last set `again`."""
 
     def __init__(self, seconds: float) -> None:
-        self.seconds = seconds
+        self.seconds, self.longest = seconds, 0.0
 
     def __enter__(self) -> None:
         def stop(*_: Any) -> None:
             raise TooLong
 
         self.before = signal.signal(signal.SIGPROF, stop)
+        self.begin = time.process_time()
+        self.again()
+
+    def again(self) -> None:
+        """The next command begins."""
         signal.setitimer(signal.ITIMER_PROF, self.seconds)
+        now = time.process_time()
+        self.longest, self.begin = max(self.longest, now - self.begin), now
 
     def __exit__(self, *_: Any) -> None:
         signal.setitimer(signal.ITIMER_PROF, 0)
         signal.signal(signal.SIGPROF, self.before)
+        self.longest = max(self.longest, time.process_time() - self.begin)
 
 
 # ---- processes ------------------------------------------------------------------------------------------------

@@ -45,19 +45,23 @@ class Original:
 # ---- what is done with them -----------------------------------------------------------------------------------
 
 
-def model(path: Path, rng: Random) -> None:
-    """Read, check, analyse at a few positions; now and then another verb, and writing it again."""
+def model(path: Path, rng: Random) -> Iterator[None]:
+    """Check, then analyse at a few positions; now and then another verb, and writing it again."""
     import trunnion
     from trunnion.model.file import write_mechanism
 
     mechanism = trunnion.read(path)
     trunnion.check(mechanism, CHECKED)
-    # `check` has analysed it
+    yield
+    trunnion.analyse(mechanism, STEPS)
+    yield
     if rng.randrange(ONE_IN) == 0:
         rng.choice(VERBS)(mechanism)
+        yield
     if rng.randrange(ONE_IN) == 0:
         write_mechanism(mechanism, path.with_name("again.yaml"))
         trunnion.read(path.with_name("again.yaml"))
+        yield
 
 
 def _design(mechanism: Any) -> None:
@@ -110,7 +114,7 @@ def _saved(mechanism: Any) -> None:
 VERBS: tuple[Callable[[Any], None], ...] = (_design, _locking, _assemble, _play, _tolerance, _report, _saved)
 
 
-def points(path: Path, rng: Random) -> None:
+def points(path: Path, rng: Random) -> Iterator[None]:
     """A driver or a table of a model by a CSV file: the model that stands beside it is the one that it is for."""
     import trunnion
     from trunnion.model.file import read_mechanism
@@ -119,33 +123,37 @@ def points(path: Path, rng: Random) -> None:
         ("A", "fourbar.yaml") if b"angle" in path.with_name("made.csv").read_bytes() else ("pressure", "press.yaml")
     )
     trunnion.analyse(read_mechanism(path.with_name(of), {name: str(path)}), STEPS)
+    yield
 
 
-def samples(path: Path, rng: Random) -> None:
+def samples(path: Path, rng: Random) -> Iterator[None]:
     """A number that varies as a CSV file has it."""
     import trunnion
 
     mechanism = trunnion.read(path.with_name("fourbar.yaml")).with_samples("l3", path)
     trunnion.tolerance(mechanism, methods=("linear", "monte-carlo"), samples=20, steps=STEPS)
+    yield
 
 
-def mapping(path: Path, rng: Random) -> None:
+def mapping(path: Path, rng: Random) -> Iterator[None]:
     """A mapping, and the data that it names."""
     from trunnion import read_measured
     from trunnion.measured.table import dataset
 
     dataset(read_measured(path))
+    yield
 
 
-def data(path: Path, rng: Random) -> None:
+def data(path: Path, rng: Random) -> Iterator[None]:
     """Measured data, by a mapping that is sound."""
     from trunnion import read_measured
     from trunnion.measured.table import dataset
 
     dataset(read_measured(path.with_name("mapping.yaml"), [path]))
+    yield
 
 
-def rig(path: Path, rng: Random) -> None:
+def rig(path: Path, rng: Random) -> Iterator[None]:
     """A rig put to the model that it is for."""
     import trunnion
     from trunnion.analysis.rig.virtual_plan import plan
@@ -154,9 +162,11 @@ def rig(path: Path, rng: Random) -> None:
     stated = Rig.read(path)
     if len(stated.schedule.rows()) <= FEW:
         plan(trunnion.observe(trunnion.read(path.with_name("fourbar.yaml")), stated))
+    yield
 
 
-KINDS: dict[str, Callable[[Path, Random], None]] = {
+# Each yields behind what one command of the program would do.
+KINDS: dict[str, Callable[[Path, Random], Iterator[None]]] = {
     "model": model,
     "points": points,
     "samples": samples,

@@ -108,18 +108,8 @@ def _worst(system: System, poses: Sequence[Any], figure: str) -> Number:
 def finish(run: Run, found_positions: Positions) -> xr.Dataset:
     """The Dataset with its attributes: formula, findings, summary, input data, drawing data, provenance."""
     mechanism, arrays, time = run.system.mechanism, found_positions.arrays, found_positions.time
-    method, causes = found_positions.method, found_positions.causes
-    near = _near_locking(run, arrays, time, method)
-    left_open = run.determinacy.findings() if run.determinacy else []
-    found = [
-        *model_notes(mechanism, run.system),
-        *run.chosen.findings,
-        *left_open,
-        *_over_the_cycle(run, arrays, causes, time, near),
-        *contact_loss.findings(
-            found_positions.losses, arrays, list(run.system.joints), run.system.dial(run.values, time)
-        ),
-    ]
+    method = found_positions.method
+    found, near = findings(run, found_positions)
     attributes: dict[str, str | float] = {
         "name": mechanism.name,
         "formula": run.system.plan.formula,
@@ -141,6 +131,18 @@ def finish(run: Run, found_positions: Positions) -> xr.Dataset:
     return results.dataset(
         arrays, found_positions.labels, time, found_positions.means, attributes, found_positions.ideal
     )
+
+
+def findings(run: Run, at: Positions) -> tuple[list[Finding], near_locking.Locking | None]:
+    """What is to be known of a mechanism at some positions of its cycle, and how near to locking it is."""
+    near = _near_locking(run, at.arrays, at.time, at.method)
+    return [
+        *model_notes(run.system.mechanism, run.system),
+        *run.chosen.findings,
+        *(run.determinacy.findings() if run.determinacy else []),
+        *_over_the_cycle(run, at.arrays, at.causes, at.time, near),
+        *contact_loss.findings(at.losses, at.arrays, list(run.system.joints), run.system.dial(run.values, at.time)),
+    ], near
 
 
 def effort_units(system: System) -> list[str]:

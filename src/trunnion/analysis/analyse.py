@@ -258,10 +258,12 @@ def positions(
     method: FrictionMethod | None = None,
     progress: Callable[[int], None] | None = None,
     margin: bool = True,
+    averaged: bool = True,
 ) -> Positions:
     """The numbers of every variable of `results` at equally spaced positions, their statuses and causes.
 
-    margin: whether the locking margin is looked for; it is infinite if not.
+    margin: whether the locking margin is looked for; it is infinite if not. averaged: whether the means over the cycle
+    are, which ask for many positions more; they are NaN if not.
     """
     check_steps(steps)
     _refuse_seats(run)
@@ -286,8 +288,8 @@ def positions(
     losses = contact_loss.find(arrays, run, time) if run.seats else []
     run.system.engine.unwrap(arrays, run.system, run.values, time)
 
-    means = _means(run, arrays, quick)
-    meant = _means(run, ideal, quick, ideal=True) if run.erring else None
+    means = _means(run, arrays, quick) if averaged else still(arrays)
+    meant = (_means(run, ideal, quick, ideal=True) if averaged else still(ideal)) if run.erring else None
     return Positions(arrays, labels, time, method, causes, means, meant, losses)
 
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from trunnion.algebra.dual import primal
-from trunnion.analysis.analyse import Run, analyse_run, prepare
+from trunnion.analysis import account
+from trunnion.analysis.analyse import Run, positions, prepare
 from trunnion.analysis.assemblies import Choice, choices
 from trunnion.analysis.kinematics import Forward, forward
 from trunnion.analysis.scene import pitch_circles
@@ -63,11 +63,7 @@ def check(mechanism: Mechanism, steps: int = 360) -> Check:
     Raises MechanismError if the structure does not determine the motion.
     """
     run = prepare(mechanism)
-    result = analyse_run(run, steps)
-    found = [
-        Finding(row["what"], row["where"], row["remedy"], Severity(row["severity"]))
-        for row in json.loads(result.attrs["findings"])
-    ]
+    found, _ = account.findings(run, positions(run, steps, averaged=False))
     walk = forward(run.system, run.values, run.chosen.assembly, run.cycle.times(steps))
     rank = run.determinacy.mobility if run.determinacy else _rank(walk)
     if run.determinacy is None and rank is not None and rank != run.system.plan.mobility:

@@ -196,6 +196,7 @@ def _unknown_turns(run: Run) -> dict[str, float]:
     return found
 
 
+@np.errstate(all="ignore")
 def analyse(
     mechanism: Mechanism,
     steps: int = 360,

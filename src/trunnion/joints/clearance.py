@@ -169,7 +169,7 @@ def describing(first: Vector, second: Vector) -> tuple[Number, Number]:
 def ellipse_error(clearance: Number, radius: Number, length: Number, beta: Number = np.pi) -> Number:
     """How far taking the ends' projected circles for circles errs, as a share of the clearance: (2rρ/H²) sin⁴(β/2)."""
     sine = np.sin(0.5 * beta)
-    return 2 * radius * clearance / (length * length) * sine**4
+    return 2 * (radius / length) * (clearance / length) * sine**4  # the square of a tiny length would be 0
 
 
 # ---- loads ----------------------------------------------------------------------------------------------------

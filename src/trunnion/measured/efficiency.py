@@ -74,8 +74,10 @@ class Efficiency:
     @property
     def freedom(self) -> float:
         """Effective degrees of freedom: those of the scatter between turns by its share of u². GUM, G.4.1."""
-        scatter = sum(one.effect**2 for one in self.contributions if one.source == "repeatability" and not one.channel)
-        return (self.turns - 1) * (self.uncertainty**2 / scatter) ** 2 if scatter > 0 else float("inf")
+        own = [one.effect for one in self.contributions if one.source == "repeatability" and not one.channel]
+        scatter = sum(effect * effect for effect in own)  # not a power: near the end of the floats that is an error
+        share = self.uncertainty * self.uncertainty / scatter if scatter > 0 else float("inf")
+        return (self.turns - 1) * share * share if scatter > 0 else float("inf")
 
     def factor(self, coverage: float = COVERAGE) -> float:
         """k of U = k u: Student's for the freedom, with the probability that `coverage` has of a normal one."""
@@ -175,7 +177,7 @@ def efficiency_of(
             for name, (_, weight) in weights.items()
         ]
     contributions = (*(one for one in repeated if one.input != 0), *_type_b(weights))
-    uncertainty = float(np.sqrt(sum(one.effect**2 for one in contributions)))
+    uncertainty = float(np.sqrt(sum(one.effect * one.effect for one in contributions)))
     return Efficiency(value, uncertainty, power_in, power_out, per_turn, contributions, left_out)
 
 

@@ -64,7 +64,8 @@ class Forecast:
         if self.measured is None or not self.measured.uncertainty > 0:
             return ""
         largest = max(self.measured.contributions, key=lambda one: one.effect)
-        share = (largest.effect / self.measured.uncertainty) ** 2
+        part = largest.effect / self.measured.uncertainty
+        share = part * part
         source = {"repeatability": "noise"}.get(largest.source, largest.source)
         return f"{largest.channel} {source} {100 * share:.0f}\N{NO-BREAK SPACE}%"
 
@@ -114,7 +115,7 @@ def _forecast(observation: Observation, case: Case, steady: dict[str, Array]) ->
         step = Accuracy(accuracy.zero, accuracy.gain, 0.0 if carried else channel.step)
         values = steady[name] / channel.per
         courses[name] = Course(name, channel.measures, channel.unit, values[None, :], step)
-        variance = channel.noise**2 + (channel.step**2 / 12 if carried else 0.0)
+        variance = channel.noise * channel.noise + (channel.step * channel.step / 12 if carried else 0.0)
         readings = max(turns * case.run.cycle.duration * observation.rate, 1.0)
         noise[name] = math.sqrt(variance / readings)
     count = len(next(iter(steady.values())))

@@ -15,7 +15,7 @@ from trunnion.model.file import read_mechanism
 from trunnion.model.names import as_key
 
 ROOT = Path(__file__).resolve().parents[2]
-NAMES = ["A", "pin 1", "left: pin", "a, b", "#1", "[x]", "{x}", "no", "12", "it's", 'the "big" one', "γ", "-", "& more"]
+NAMES = ["A", "pin 1", "left: pin", "a, b", "#1", "[x]", "{x}", "no", "12", "it's", 'the "big" one', "γ", "& more"]
 FOUR_BAR = (ROOT / "examples" / "durango-fourbar.yaml").read_text("utf-8")
 
 

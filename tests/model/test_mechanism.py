@@ -42,7 +42,7 @@ def test_numbers_of_the_slider_crank() -> None:
     expected = {
         "links.frame.points.S.axis.x": 1.0, "links.frame.points.S.y": 0.0, "joints.O.pin.radius": 0.00999325,
         "joints.O.pin.hole_radius": 0.01000525, "joints.P.pin.radius": 0.0079875,
-        "joints.P.pin.bearing": 0.02, "joints.Q.pin.clearance": 2e-5,
+        "joints.Q.pin.clearance": 2e-5,
         "joints.S.guide.length": 0.04, "joints.S.friction.coefficient": 0.12, "gravity.y": -9.81,
         "drivers.O.speed": 1500 * 2 * math.pi / 60, "links.piston.inertia": 0.0, "links.piston.centre.x": 0.0,
     }  # fmt: skip
@@ -104,7 +104,11 @@ def test_defaults_are_followed_until_a_joint_has_its_own_value() -> None:
     values = DURANGO.parameters({"joint_defaults.friction.coefficient": 0.2, "B.friction.coefficient": 0.3})
     found = [values[f"joints.{name}.friction.coefficient"] for name in "ABCD"]
     assert found == [0.2, 0.3, 0.2, 0.2]
-    assert SLIDER.parameters({"P.pin.length": 0.03})["joints.P.pin.bearing"] == 0.03
+    data = SLIDER.data()
+    pin = {**data["joints"]["P"]["pin"], "length": "20 mm"}
+    long = Mechanism(**{**data, "joints": {**data["joints"], "P": {**data["joints"]["P"], "pin": pin}}})
+    assert long.parameters()["joints.P.pin.bearing"] == 0.02
+    assert long.parameters({"P.pin.length": 0.03})["joints.P.pin.bearing"] == 0.03
 
 
 @pytest.mark.parametrize(

@@ -85,6 +85,10 @@ class Run:
         past = self._past if values is self.values else self._histories(values)
         return self._solve(time, values, past, method, zero_slip)
 
+    def walk(self, time: Number) -> Forward:
+        """Motion alone at the given times (s)."""
+        return forward(self.system, self.values, self.chosen.assembly, time)
+
     def _solve(
         self,
         time: Number,

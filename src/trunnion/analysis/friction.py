@@ -143,7 +143,7 @@ def _newton(problem: Problem, method: FrictionMethod) -> Settled:
         converged=converged & (shares >= 1.0),
         residual=real.misfit(found.gaps),
         share=shares,
-        margin=_margin(real, bound, method.margin_up_to),
+        margin=_margin(real, bound, method.margin_up_to, shares),
         certain=certain,
         problem=real,
     )
@@ -320,14 +320,21 @@ def _successive(problem: Problem, method: FrictionMethod) -> Settled:
     )
 
 
-def _margin(problem: Problem, bound: Number, most: float) -> Number:
-    """Multiple of the friction at which the module locks; ∞ where it does not up to `most`."""
-    doubtful = bound * most >= 1.0
-    if most <= 0 or not np.any(doubtful):
+def _margin(problem: Problem, bound: Number, most: float, shares: Number = 1.0) -> Number:
+    """Multiple of the friction at which the module locks; ∞ where it does not up to `most`.
+
+    shares: those at which lanes are known to lock, 1 of the others.
+    """
+    if most <= 0:
         return np.inf
+    known = np.asarray(shares) < 1.0
+    margin = np.where(known, shares, np.inf)
+    doubtful = (bound * most >= 1.0) & ~known
+    if not np.any(doubtful):
+        return margin
     part, chosen = problem.picked(doubtful)
     _, reached = continuation.follow(scaled(part), frictionless(part, chosen), most)
-    margin = np.full(chosen.shape, np.inf)
+    margin = np.broadcast_to(margin, chosen.shape).copy()
     margin[chosen] = np.where(reached >= most, np.inf, reached)
     return margin
 

@@ -57,7 +57,7 @@ def look(run: Run, steps: int = 360) -> xr.Dataset:
     with np.errstate(all="ignore"):
         multiples = critical_multiples(back, MARGIN)
         more = np.where(status <= Status.LOCKED, others(back), np.nan)
-        other = reverse(run, back, FrictionMethod(), useful_loads(mechanism))
+        other = reverse(run, back.walk, FrictionMethod(), useful_loads(mechanism))
     known = (status < Status.NOT_CONVERGED) | (status == Status.LOCKED)
     nothing = np.full(len(time), np.nan)
     arrays: dict[str, tuple[tuple[str, ...], Any]] = {

@@ -17,6 +17,7 @@ from trunnion.algebra.dual import primal
 from trunnion.analysis import continuation
 from trunnion.analysis.bristles import histories
 from trunnion.analysis.friction import FrictionMethod, Problem, frictionless, identity_minus, scaled
+from trunnion.analysis.kinematics import Forward
 from trunnion.analysis.kinetostatics import Backward, Given
 from trunnion.analysis.means import ROUNDING
 from trunnion.analysis.quadrature import integrals
@@ -191,10 +192,11 @@ def _reversed_means(run: Run, back: Reverse, useful: Sequence[str]) -> tuple[flo
     """Mean powers, W, delivered and given, backward, 0 where they cancel; that of the loads is known where it locks."""
     if run.cycle.duration <= 0:
         return float(back.delivered[0]), float(back.given[0])
+    if np.any(back.locked):  # then there is no mean to be delivered, and of the other one the sign is asked for
+        return float("nan"), float(np.mean(back.given))
 
     def powers(rows: NDArray[np.intp], time: Array) -> Array:
-        method = FrictionMethod()
-        there = reverse(run, run.solve(time.ravel(), method=method), method, useful)
+        there = reverse(run, run.walk(time.ravel()), FrictionMethod(), useful)
         return np.stack([there.delivered, there.given]).reshape(2, *time.shape)
 
     found = integrals(powers, [run.edges])
@@ -217,10 +219,10 @@ class Reverse(NamedTuple):
     given: Array
 
 
-def reverse(run: Run, back: Backward, method: FrictionMethod, useful: Sequence[str]) -> Reverse:
+def reverse(run: Run, ahead: Forward, method: FrictionMethod, useful: Sequence[str]) -> Reverse:
     """Drive the mechanism backward through the positions of a walk: speeds turned round, friction and all that resists
     with them; inertia stays, for accelerations do."""
-    walk = back.walk.backward()
+    walk = ahead.backward()
     time = np.asarray(walk.time, float)
     past = histories(run.system, run.values, run.chosen.assembly, run.cycle, reverse=True)
     deflections = {joint: history.at(run.cycle.duration - time) for joint, history in past.items()}
@@ -277,13 +279,17 @@ def look(run: Run, time: Array, margin: Array, method: FrictionMethod, useful: S
     """Look at no more than LOOKED times of a cycle. margin: of every position analysed, NaN where unknown."""
     times = run.cycle.times(min(len(time), LOOKED))
     plain = replace(method, name="newton", margin_up_to=0.0)
-    walk = run.solve(times, method=plain)
+    if len(times) == len(time) and np.all(margin < 1.0):  # at each of them: there is nothing left to be solved
+        walk, locked, more = run.walk(times), np.ones(len(times), bool), np.zeros(len(times))
+    else:
+        back = run.solve(times, method=plain)
+        walk, locked, more = back.walk, _locks(back), others(back)
     first = int(np.nanargmin(margin)) if np.any(np.isfinite(margin)) else None
     critical: dict[str, float] = {}
     if first is not None:
         at = critical_multiples(run.solve(time[[first]], method=plain), method.margin_up_to)
         critical = {joint: float(multiple[0]) for joint, multiple in at.items()}
-    return Locking(times, _locks(walk), first, critical, others(walk), reverse(run, walk, plain, useful))
+    return Locking(times, locked, first, critical, more, reverse(run, walk, plain, useful))
 
 
 def findings(near: Locking, dial: Dial) -> Iterator[Finding]:

@@ -20,9 +20,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from trunnion import Mechanism, prepare
-from trunnion.analysis.analyse import CHUNK, pose_status, status_of
-from trunnion.analysis.measures import named
-from trunnion.analysis.tolerance.compiled import CompiledKernel
+from trunnion.cycle.positions import CHUNK
+from trunnion.measures.measures import named
+from trunnion.solve.status import pose_status, status_of
+from trunnion.studies.tolerance.compiled import CompiledKernel
 
 MODEL = Path(__file__).parents[1] / "examples" / "durango-fourbar.yaml"
 SIZES = (10**4, 10**5, 10**6, 4 * 10**6)

@@ -48,7 +48,6 @@ class Original:
 def model(path: Path, rng: Random) -> Iterator[None]:
     """Check, then analyse at a few positions; now and then another verb, and writing it again."""
     import trunnion
-    from trunnion.model.file import write_mechanism
 
     mechanism = trunnion.read(path)
     trunnion.check(mechanism, CHECKED)
@@ -59,20 +58,20 @@ def model(path: Path, rng: Random) -> Iterator[None]:
         rng.choice(VERBS)(mechanism)
         yield
     if rng.randrange(ONE_IN) == 0:
-        write_mechanism(mechanism, path.with_name("again.yaml"))
+        mechanism.write(path.with_name("again.yaml"))
         trunnion.read(path.with_name("again.yaml"))
         yield
 
 
 def _design(mechanism: Any) -> None:
-    from trunnion.analysis.design import report_rows
+    from trunnion.studies.design import report_rows
 
     report_rows(mechanism, 8, 0.05)
 
 
 def _locking(mechanism: Any) -> None:
-    from trunnion.analysis.analyse import prepare
-    from trunnion.analysis.locking import look
+    from trunnion.cycle.locking import look
+    from trunnion.solve.run import prepare
 
     look(prepare(mechanism), STEPS)
 
@@ -117,7 +116,7 @@ VERBS: tuple[Callable[[Any], None], ...] = (_design, _locking, _assemble, _play,
 def points(path: Path, rng: Random) -> Iterator[None]:
     """A driver or a table of a model by a CSV file: the model that stands beside it is the one that it is for."""
     import trunnion
-    from trunnion.model.file import read_mechanism
+    from trunnion.model.mechanism import read_mechanism
 
     name, of = (
         ("A", "fourbar.yaml") if b"angle" in path.with_name("made.csv").read_bytes() else ("pressure", "press.yaml")
@@ -138,7 +137,7 @@ def samples(path: Path, rng: Random) -> Iterator[None]:
 def mapping(path: Path, rng: Random) -> Iterator[None]:
     """A mapping, and the data that it names."""
     from trunnion import read_measured
-    from trunnion.measured.table import dataset
+    from trunnion.rig.reading.table import dataset
 
     dataset(read_measured(path))
     yield
@@ -147,7 +146,7 @@ def mapping(path: Path, rng: Random) -> Iterator[None]:
 def data(path: Path, rng: Random) -> Iterator[None]:
     """Measured data, by a mapping that is sound."""
     from trunnion import read_measured
-    from trunnion.measured.table import dataset
+    from trunnion.rig.reading.table import dataset
 
     dataset(read_measured(path.with_name("mapping.yaml"), [path]))
     yield
@@ -156,8 +155,8 @@ def data(path: Path, rng: Random) -> Iterator[None]:
 def rig(path: Path, rng: Random) -> Iterator[None]:
     """A rig put to the model that it is for."""
     import trunnion
-    from trunnion.analysis.rig.virtual_plan import plan
-    from trunnion.measured.rig_file import Rig
+    from trunnion.rig.reading.rig_file import Rig
+    from trunnion.rig.virtual.plan import plan
 
     stated = Rig.read(path)
     if len(stated.schedule.rows()) <= FEW:

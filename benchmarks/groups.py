@@ -18,8 +18,9 @@ from benchmarks import stacked
 from benchmarks.linkages import LINKAGES, Linkage
 from benchmarks.side import Side, take_turns
 from trunnion import prepare
-from trunnion.analysis.analyse import CHUNK, Run
-from trunnion.analysis.kinematics import Forward, forward
+from trunnion.cycle.positions import CHUNK
+from trunnion.solve.forward import Forward, forward
+from trunnion.solve.run import Run
 
 Array = NDArray[np.float64]
 LIMITS = {2: 0.6, 3: 15.0}  # µs per group and configuration, by class: motion, forces and friction

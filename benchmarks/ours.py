@@ -13,7 +13,7 @@ from benchmarks.side import MOTION_COLUMNS, OUTPUTS, Job, Side, version
 
 if version("trunnion"):
     from trunnion import Mechanism, analyse, prepare
-    from trunnion.analysis.kinematics import forward
+    from trunnion.solve.forward import forward
 
 Array = NDArray[np.floating[Any]]
 MODEL = Path(__file__).parents[1] / "examples" / "durango-fourbar.yaml"

@@ -65,8 +65,8 @@ def result_of(data: Data, steps: int, whole: bool) -> Results:
     mechanism = trunnion.Mechanism(**data)
     if whole:
         return Results(trunnion.analyse(mechanism, steps))
-    from trunnion.analysis.analyse import positions
-    from trunnion.results import variables
+    from trunnion.cycle.positions import positions
+    from trunnion.results.variables import variables
 
     found = positions(trunnion.prepare(mechanism), steps, margin=False)
     known = variables(mechanism.space)

@@ -19,9 +19,9 @@ from rich.table import Table
 
 from benchmarks.side import Side, take_turns
 from trunnion import Mechanism, prepare
-from trunnion.analysis.analyse import Run
-from trunnion.analysis.branches import choose
-from trunnion.analysis.space.system import SpatialSystem
+from trunnion.solve.branches import choose
+from trunnion.solve.run import Run
+from trunnion.solve.space.system import SpatialSystem
 
 Array = NDArray[np.float64]
 EXAMPLE = Path(__file__).parents[1] / "examples" / "pezzuti-cardan.yaml"
@@ -45,7 +45,7 @@ def _general(run: Run) -> Run:
     """The same mechanism with its dyad solved by the general group."""
     modules = tuple(replace(module, kind="general") for module in run.system.plan.modules)
     plan = replace(run.system.plan, modules=modules)
-    system = SpatialSystem(run.system.mechanism, plan, run.system.engine)
+    system = SpatialSystem(run.system.mechanism, plan, run.system.geometry)
     found = [choose(_hinted(run, system, way), run.values, run.cycle) for way in (1, 2)]
     efforts = run.solve(np.zeros(1)).efforts["input"]
     runs = [replace(run, system=system, chosen=chosen) for chosen in found]
@@ -54,7 +54,7 @@ def _general(run: Run) -> Run:
 
 def _hinted(run: Run, system: SpatialSystem, way: int) -> SpatialSystem:
     mechanism = Mechanism(**{**run.system.mechanism.data(), "assembly": {"cross": f"way-{way}"}})
-    return SpatialSystem(mechanism, system.plan, system.engine)
+    return SpatialSystem(mechanism, system.plan, system.geometry)
 
 
 def _solve(run: Run) -> Callable[[int], Array]:

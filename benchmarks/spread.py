@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
-from trunnion.analysis.tolerance.checkpoint import Checkpoint
-from trunnion.analysis.tolerance.ranges import union
-from trunnion.analysis.tolerance.runner import run
+from trunnion.studies.tolerance.checkpoint import Checkpoint
+from trunnion.studies.tolerance.ranges import union
+from trunnion.studies.tolerance.runner import run
 
 FIGURES = 5120  # bins of a figure
 BAND = 256  # bins of a position

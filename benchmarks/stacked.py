@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.analysis.analyse import Run
+from trunnion.solve.run import Run
 
 Array = NDArray[np.float64]
 TOLERANCE = 1e-8  # of the largest reaction, as Trunnion's

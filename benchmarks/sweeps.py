@@ -17,9 +17,9 @@ from rich.console import Console
 from rich.table import Table
 
 import trunnion
-from trunnion.analysis.friction import FrictionMethod
-from trunnion.analysis.sweep_grid import grid
-from trunnion.analysis.sweep_points import AT_ONCE, Points
+from trunnion.solve.friction_method import FrictionMethod
+from trunnion.studies.sweep.grid import grid
+from trunnion.studies.sweep.points import AT_ONCE, Points
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 STEPS = 360

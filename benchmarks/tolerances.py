@@ -24,10 +24,10 @@ from rich.table import Table
 import trunnion
 from benchmarks import durango as d
 from benchmarks.run import peak_memory
-from trunnion.analysis.tolerance import runner
-from trunnion.analysis.tolerance.sampling import Method, Sampling
-from trunnion.analysis.tolerance.study import Study, study
 from trunnion.model.mechanism import Mechanism
+from trunnion.studies.tolerance import runner
+from trunnion.studies.tolerance.first_order import Study, study
+from trunnion.studies.tolerance.sampling import Method, Sampling
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 LIMITS = {"AB": "±1 mm", "BC": "±1 mm", "CD": "±1 mm", "AD": "±1 mm"}

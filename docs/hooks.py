@@ -119,11 +119,12 @@ def models_of(pages: Any) -> dict[str, str]:
 
 def _drawn(model: str, models: dict[str, str], kinds: list[str], steps: int, report: bool) -> dict[str, bytes]:
     """The figures of a model, and its report, by file name."""
+    from trunnion.views.assemblies import ways
+    from trunnion.views.plots import PLOTS, save
+
     from trunnion import analyse, assemble, read
     from trunnion import report as page
     from trunnion.views import fit
-    from trunnion.views.assemblies import ways
-    from trunnion.views.plots import PLOTS, save
 
     base, values = VARIANTS.get(model, (model, {}))
     if base not in models:

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from trunnion.analysis.account import MARGIN
-from trunnion.analysis.analyse import Run
-from trunnion.analysis.friction import FrictionMethod
-from trunnion.analysis.measure_figures import Reference, figure, reference
-from trunnion.analysis.measure_positions import Plan, plan
-from trunnion.analysis.measures import Measure
+from trunnion.measures.figures import Reference, figure, reference
+from trunnion.measures.measures import Measure
+from trunnion.measures.positions import Plan, plan
+from trunnion.solve.friction_method import MARGIN, FrictionMethod
+from trunnion.solve.run import Run
 
 __all__ = ["courses", "figures", "references"]
 

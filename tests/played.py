@@ -10,11 +10,11 @@ import numpy as np
 from mechanisms import Array
 from mechanisms_parts import Data
 from trunnion import Mechanism
-from trunnion.analysis.analyse import Run
-from trunnion.analysis.kinematics import forward
-from trunnion.analysis.measures import Measure
-from trunnion.analysis.shifts import Play
 from trunnion.joints.clearance import CLEARANCE_MODELS, Vector
+from trunnion.measures.measures import Measure
+from trunnion.solve.forward import forward
+from trunnion.solve.run import Run
+from trunnion.solve.shifts import Play
 
 __all__ = ["changes", "four_bar", "measures_of", "offsets_of", "pressed_to", "rssr", "with_play"]
 

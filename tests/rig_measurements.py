@@ -10,8 +10,8 @@ import numpy as np
 
 from mechanisms import four_bar, model
 from trunnion import FrictionMethod, Mechanism
-from trunnion.analysis.rig.modelled import modelled
-from trunnion.measured.measurement import Accuracy, Condition, Course, Measurement
+from trunnion.rig.modelled import modelled
+from trunnion.rig.reading.measurement import Accuracy, Condition, Course, Measurement
 
 CHANNELS = {"torque": "effort:A", "speed": "rate:A", "brake": "load:brake", "out": "rate:D", "angle": "rotation:D"}
 SURE = Accuracy()

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from mechanisms_parts import Data, prismatic, revolute, slide
 from trunnion import Mechanism
-from trunnion.analysis.tolerance.inputs import inputs_of
-from trunnion.analysis.tolerance.sampling import Sampler, Sampling
-from trunnion.analysis.tolerance.study import Study, study
+from trunnion.studies.tolerance.first_order import Study, study
+from trunnion.studies.tolerance.inputs import inputs_of
+from trunnion.studies.tolerance.sampling import Sampler, Sampling
 
 __all__ = [
     "CLUTCH", "FOURBAR", "RSSR", "SLIDER", "clutch", "clutch_angle", "drawn", "fourbar", "fourbar_angle", "link",
@@ -215,7 +215,7 @@ def sampler(found: Study, samples: int = 512, method: Any = "monte-carlo", seed:
 
 def drawn(mechanism: Mechanism, u: Array) -> dict[str, Array]:
     """The toleranced numbers of samples, by path: each its value plus its deviation, worked out by its distribution."""
-    from trunnion.analysis.analyse import prepare
+    from trunnion.solve.run import prepare
 
     inputs = inputs_of(prepare(mechanism))
     deviations = inputs.population.draw(u[: len(inputs.tolerances)])

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.analysis.tolerance.ranges import union
 from trunnion.errors import Finding, MechanismError
+from trunnion.studies.tolerance.ranges import union
 
 Nodes = dict[tuple[int, int], float]
 

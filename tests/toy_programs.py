@@ -18,7 +18,7 @@ POSIX = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 SCRIPT = """
 import sys
 from toy_job import ToyJob
-from trunnion.analysis.tolerance.runner import run
+from trunnion.studies.tolerance.runner import run
 
 if __name__ == "__main__":
     job = ToyJob(blocks=400, pause=0.02)

@@ -5,56 +5,58 @@ Names are loaded when first used, so that importing the package costs nothing.
 
 from __future__ import annotations
 
+from trunnion.version import __version__ as __version__
+
 TYPE_CHECKING = False  # as a type checker takes it for True; `typing` itself is not needed to start
 
-__version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from typing import Any
 
     from trunnion import dual
-    from trunnion.analysis.allocation.allocate import allocate
-    from trunnion.analysis.analyse import analyse, prepare
-    from trunnion.analysis.assemblability import assemble
-    from trunnion.analysis.friction import FrictionMethod
-    from trunnion.analysis.inspect import Check, check
-    from trunnion.analysis.locking import locking
-    from trunnion.analysis.play import play
-    from trunnion.analysis.rig.compare import compare
-    from trunnion.analysis.rig.identify import identify
-    from trunnion.analysis.rig.virtual import observe
-    from trunnion.analysis.sweep import sweep
-    from trunnion.analysis.tolerance.study import tolerance
+    from trunnion.cycle.analyse import analyse
+    from trunnion.cycle.inspect import Check, check
+    from trunnion.cycle.locking import locking
     from trunnion.errors import Finding, MechanismError, Status
-    from trunnion.export import save
-    from trunnion.measured.read import read_measured
-    from trunnion.model.file import read_mechanism as read
     from trunnion.model.mechanism import Mechanism
-    from trunnion.views.report import report
+    from trunnion.model.mechanism import read_mechanism as read
+    from trunnion.results.export import save
+    from trunnion.rig.compare.study import compare
+    from trunnion.rig.identify import identify
+    from trunnion.rig.reading.read import read_measured
+    from trunnion.rig.virtual.observe import observe
+    from trunnion.solve.friction_method import FrictionMethod
+    from trunnion.solve.run import prepare
+    from trunnion.studies.allocation.allocate import allocate
+    from trunnion.studies.assembly.study import assemble
+    from trunnion.studies.play.study import play
+    from trunnion.studies.sweep.study import sweep
+    from trunnion.studies.tolerance.study import tolerance
+    from trunnion.views.cycle.report import report
 
 _PLACES = {
-    "FrictionMethod": "trunnion.analysis.friction",
+    "FrictionMethod": "trunnion.solve.friction_method",
     "Finding": "trunnion.errors",
     "Mechanism": "trunnion.model.mechanism",
     "MechanismError": "trunnion.errors",
     "Status": "trunnion.errors",
-    "Check": "trunnion.analysis.inspect",
-    "allocate": "trunnion.analysis.allocation.allocate",
-    "analyse": "trunnion.analysis.analyse",
-    "assemble": "trunnion.analysis.assemblability",
-    "check": "trunnion.analysis.inspect",
-    "compare": "trunnion.analysis.rig.compare",
-    "identify": "trunnion.analysis.rig.identify",
-    "locking": "trunnion.analysis.locking",
-    "observe": "trunnion.analysis.rig.virtual",
-    "play": "trunnion.analysis.play",
-    "prepare": "trunnion.analysis.analyse",
-    "read": "trunnion.model.file",
-    "read_measured": "trunnion.measured.read",
-    "report": "trunnion.views.report",
-    "save": "trunnion.export",
-    "sweep": "trunnion.analysis.sweep",
-    "tolerance": "trunnion.analysis.tolerance.study",
+    "Check": "trunnion.cycle.inspect",
+    "allocate": "trunnion.studies.allocation.allocate",
+    "analyse": "trunnion.cycle.analyse",
+    "assemble": "trunnion.studies.assembly.study",
+    "check": "trunnion.cycle.inspect",
+    "compare": "trunnion.rig.compare.study",
+    "identify": "trunnion.rig.identify",
+    "locking": "trunnion.cycle.locking",
+    "observe": "trunnion.rig.virtual.observe",
+    "play": "trunnion.studies.play.study",
+    "prepare": "trunnion.solve.run",
+    "read": "trunnion.model.mechanism",
+    "read_measured": "trunnion.rig.reading.read",
+    "report": "trunnion.views.cycle.report",
+    "save": "trunnion.results.export",
+    "sweep": "trunnion.studies.sweep.study",
+    "tolerance": "trunnion.studies.tolerance.study",
 }
 _ELSEWHERE = {"read": "read_mechanism"}
 _MODULES = {"dual": "trunnion.dual"}

@@ -17,7 +17,7 @@ def main() -> None:
     """Run the command line."""
     if _signal.getsignal(_signal.SIGINT) is _signal.default_int_handler:  # else it is not for us
         _signal.signal(_signal.SIGINT, _leave)
-    from trunnion.cli import main as run
+    from trunnion.cli.app import main as run
 
     run()
 

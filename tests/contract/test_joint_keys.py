@@ -12,7 +12,7 @@ import trunnion
 from mechanisms_space import chain
 from trunnion import MechanismError
 from trunnion.joints.pairs import PAIRS
-from trunnion.model.check import check_model
+from trunnion.model.checks.check import check_model
 from trunnion.model.joint_parts import Guide, Misalignment, Pin
 
 STEPS = 3

@@ -9,7 +9,7 @@ import yaml
 
 from trunnion import Mechanism, MechanismError, analyse, check, sweep
 from trunnion.errors import agreeing, counted
-from trunnion.views.as_built import continued
+from trunnion.views.cycle.as_built import continued
 
 ENGINE = """
 trunnion: 1

@@ -10,7 +10,7 @@ from scipy.optimize import brentq, minimize_scalar
 import trunnion
 from gallery.entry import Entry, Outcome
 from gallery.plane import corner
-from trunnion.analysis import design
+from trunnion.studies import design
 
 # ---- toggle-press: where it begins to hold by itself ----------------------------------------------------------------
 

@@ -9,7 +9,7 @@ import numpy as np
 import trunnion
 from gallery.entry import STEPS, Entry, Outcome
 from trunnion.algebra.dual import Dual, derivative
-from trunnion.analysis.design import design
+from trunnion.studies.design import design
 
 # ---- toleranced-slider-crank: ∂x/∂r of the piston at 60° ----------------------------------------------------------
 

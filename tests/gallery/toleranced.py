@@ -12,7 +12,7 @@ from gallery.entry import Entry, Outcome
 from gallery.plane import corner, slope
 from gallery.spatial import rocker_of_rssr
 from trunnion.algebra.dual import Dual, derivative
-from trunnion.analysis.measures import named
+from trunnion.measures.measures import named
 
 __all__ = ["ENTRIES"]
 

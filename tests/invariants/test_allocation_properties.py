@@ -10,9 +10,9 @@ from allocations import bought, random_costs, rows
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from trunnion.analysis.allocation.problem import Criterion, Problem
-from trunnion.analysis.allocation.solve import solve
 from trunnion.statistics.costs import Cost
+from trunnion.studies.allocation.problem import Criterion, Problem
+from trunnion.studies.allocation.solve import solve
 
 SEEDS = st.integers(0, 10**6)
 CRITERIA = st.sampled_from(["worst-case", "rss", "yield"])

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from trunnion.algebra.dual import Dual, derivative, primal
-from trunnion.analysis.extremes import Grid, largest
+from trunnion.measures.extremes import Grid, largest
 
 TURN = 2 * np.pi
 

@@ -16,9 +16,9 @@ import trunnion
 from mechanisms import DURANGO, eccentric_press
 from trunnion import FrictionMethod, Mechanism, Status
 from trunnion.algebra.dual import derivative, primal, seed
-from trunnion.analysis.friction import Contact, Settled, settle
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.joints.pairs import Load, Reaction
+from trunnion.solve.friction import Contact, Settled, settle
 
 Array = NDArray[np.float64]
 NEWTON = FrictionMethod()

@@ -395,7 +395,7 @@ def test_a_balanced_lamp_needs_no_torque() -> None:
 def test_results_of_springs_are_written(tmp_path: Path) -> None:
     import csv
 
-    from trunnion.export import save
+    from trunnion.results.export import save
 
     data = spring_four_bar(stiffness=900.0, free_length=0.3)
     data["springs"]["T"] = {"joint": "C", "stiffness": 3.0, "free_angle": 1.0}
@@ -467,7 +467,7 @@ def test_bad_torsional_springs_are_refused() -> None:
 
 
 def test_zero_stiffness_is_doubted() -> None:
-    from trunnion.model.check import check_model
+    from trunnion.model.checks.check import check_model
 
     found = check_model(Mechanism(**spring_four_bar(stiffness=0.0, free_length=0.1)))
     assert [finding.severity for finding in found if finding.where == "springs.S.stiffness"] == ["warning"]
@@ -551,8 +551,8 @@ def test_example_of_the_lamp() -> None:
 
 
 def test_drawings_show_springs_and_following_loads(tmp_path: Path) -> None:
-    from trunnion.views.plots import PLOTS
-    from trunnion.views.scene import scene
+    from trunnion.views.cycle.plots import PLOTS
+    from trunnion.views.cycle.scene import scene
 
     data = spring_four_bar(stiffness=900.0, free_length=0.3)
     data["loads"] = {"push": {"link": "coupler", "at": "E", "force": ["30 N * cos(drive)", 0], "frame": "link"}}

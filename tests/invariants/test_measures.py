@@ -14,8 +14,8 @@ import mechanisms
 import mechanisms_space
 from measured import figures, references
 from mechanisms import build, four_bar, slider_crank
-from trunnion.analysis.analyse import Run, prepare
-from trunnion.analysis.measures import Measure
+from trunnion.measures.measures import Measure
+from trunnion.solve.run import Run, prepare
 
 STATISTICS = ("maximum", "minimum", "peak-to-peak", "mean", "rms", "largest")
 

@@ -15,10 +15,10 @@ import trunnion
 from mechanisms_parts import Data
 from played import four_bar, rssr, with_play
 from trunnion import Mechanism
-from trunnion.analysis.analyse import prepare
-from trunnion.analysis.friction import FrictionMethod
-from trunnion.analysis.measures import named
-from trunnion.analysis.play import by_duals, plays
+from trunnion.measures.measures import named
+from trunnion.solve.friction_method import FrictionMethod
+from trunnion.solve.run import prepare
+from trunnion.studies.play.study import by_duals, plays
 
 STEPS = 8
 clearances = st.floats(1e-7, 1e-4)

@@ -15,7 +15,7 @@ from mechanisms import MODELS, build, five_bar, four_bar, slider_crank, watt_six
 from trunnion import Status
 from trunnion.algebra import linalg
 from trunnion.algebra.dual import Dual, derivative, primal
-from trunnion.analysis import continuation
+from trunnion.solve import continuation
 
 
 def findings(result) -> list[dict[str, str]]:

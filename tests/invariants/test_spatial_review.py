@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from mechanisms_space import chain, random_rotation, rssr
 from trunnion import Mechanism, MechanismError, Status, analyse, prepare
-from trunnion.analysis.branches import Track
-from trunnion.analysis.follow import Follower
+from trunnion.solve.branch_tracking import Follower
+from trunnion.solve.branches import Track
 
 Array = NDArray[np.float64]
 Data = dict[str, Any]

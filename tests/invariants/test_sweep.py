@@ -15,11 +15,11 @@ import xarray as xr
 
 import trunnion
 from trunnion import Mechanism, MechanismError, Status
-from trunnion.analysis.friction import FrictionMethod
-from trunnion.analysis.sweep import FIGURES, MOST_POINTS
-from trunnion.analysis.sweep_grid import grid as grid_of
-from trunnion.analysis.sweep_points import Points
-from trunnion.export import figures as figures_of
+from trunnion.results.export import figures as figures_of
+from trunnion.solve.friction_method import FrictionMethod
+from trunnion.studies.sweep.grid import grid as grid_of
+from trunnion.studies.sweep.points import Points
+from trunnion.studies.sweep.study import FIGURES, MOST_POINTS
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 CARDAN = EXAMPLES / "pezzuti-cardan.yaml"

@@ -16,9 +16,9 @@ import xarray as xr
 import trunnion
 from mechanisms import DURANGO, MODELS, analyse, four_bar
 from trunnion import MechanismError, Status
-from trunnion.export import FORMATS
+from trunnion.results.export import FORMATS
 
-export = sys.modules["trunnion.export"]
+export = sys.modules["trunnion.results.export"]
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import pytest
 
-from trunnion import cli
+from trunnion.cli import app as cli
 
 
 class Outcome(NamedTuple):

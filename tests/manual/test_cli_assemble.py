@@ -15,7 +15,7 @@ import xarray as xr
 
 import trunnion
 from manual.conftest import Run
-from trunnion.views.fit import figure
+from trunnion.views.assembly.figure import figure
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / "examples"

@@ -14,7 +14,7 @@ import pytest
 
 from manual.conftest import Run
 from manual.test_cli import EXAMPLES
-from trunnion.analysis import analyse as analysing
+from trunnion.cycle import analyse as analysing
 
 FOUR_BAR = EXAMPLES / "durango-fourbar.yaml"
 
@@ -40,7 +40,7 @@ def test_an_unforeseen_exception_is_one_line(
 def test_debug_shows_where(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], words: list[str]
 ) -> None:
-    from trunnion import cli
+    from trunnion.cli import app as cli
 
     def broken(*_: object) -> None:
         raise KeyError("x")

@@ -13,8 +13,9 @@ import typer
 
 from manual.conftest import Run
 from manual.test_cli import EXAMPLES
-from trunnion import cli, read
-from trunnion.verbs.files import outputs
+from trunnion import read
+from trunnion.cli import app as cli
+from trunnion.cli.files import outputs
 
 FOUR_BAR = EXAMPLES / "toleranced-fourbar.yaml"
 

@@ -14,8 +14,7 @@ import xarray as xr
 import trunnion
 from manual.conftest import Outcome, Run
 from played import four_bar
-from trunnion.model.file import write_mechanism
-from trunnion.views.play import figure, tables
+from trunnion.views.play.figure import figure, tables
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 SLIDER = EXAMPLES / "toleranced-slider-crank.yaml"
@@ -61,7 +60,7 @@ def test_measures_of_the_command_line(run: Run) -> None:
 
 
 def test_outputs_where_no_measure_is_stated(run: Run, tmp_path: Path) -> None:
-    write_mechanism(four_bar("C"), tmp_path / "bar.yaml")
+    four_bar("C").write(tmp_path / "bar.yaml")
     code, out, err = run("bar.yaml", "--steps", 12, "--set", "C.pin.clearance=0.04mm")
     assert code == 0
     assert "rotation:D" in out
@@ -71,7 +70,7 @@ def test_outputs_where_no_measure_is_stated(run: Run, tmp_path: Path) -> None:
 
 def test_a_limit_is_a_finding_with_the_line_of_the_file(run: Run, tmp_path: Path) -> None:
     data = four_bar("C").data() | {"measures": {"swing": {"rotation": "D", "limit": "0.01 deg"}}}
-    write_mechanism(trunnion.Mechanism(**data), tmp_path / "bar.yaml")
+    trunnion.Mechanism(**data).write(tmp_path / "bar.yaml")
     code, _, err = run("bar.yaml", "--steps", 12, "--out", "bar.svg")
     assert code == 1
     assert "measures.swing.limit: the worst case is" in err

@@ -22,7 +22,7 @@ from typing import Any
 
 import pytest
 
-from trunnion.cli import main
+from trunnion.cli.app import main
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = sorted([ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").rglob("*.md")])
@@ -224,7 +224,7 @@ def test_theory_tells_every_friction_law() -> None:
 
 def test_changelog_names_the_verbs() -> None:
     """The verbs that the changelog lists are those of the command line."""
-    from trunnion.cli import app
+    from trunnion.cli.app import app
 
     found = re.search(r"Command line: (.+?)\.\n", (ROOT / "CHANGELOG.md").read_text("utf-8"), re.DOTALL)
     assert found

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from rich.cells import cell_len
 
-from trunnion.terminal import show_rows
+from trunnion.cli.terminal import show_rows
 
 HEAD = ["", "linear", "searched", "Monte Carlo", "of variance"]
 ROWS = [

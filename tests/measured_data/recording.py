@@ -12,8 +12,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from trunnion.errors import Finding
-from trunnion.measured.measurement import Condition, Measurement
-from trunnion.measured.read import read_measured
+from trunnion.rig.reading.measurement import Condition, Measurement
+from trunnion.rig.reading.read import read_measured
 
 Array = NDArray[np.float64]
 Columns = dict[str, Any]

@@ -10,9 +10,9 @@ import pytest
 
 from measured_data.recording import IDLE, RPM, ZERO, Columns, faults, mapping, off, read, recorded
 from trunnion.errors import MechanismError
-from trunnion.measured.channels import resolution
-from trunnion.measured.read import read_measured
 from trunnion.model.units import KINDS
+from trunnion.rig.reading.channels import resolution
+from trunnion.rig.reading.read import read_measured
 
 OMEGA = RPM * np.pi / 30
 

@@ -15,9 +15,9 @@ from nptdms import ChannelObject, RootObject, TdmsWriter
 
 from measured_data.recording import Columns, mapping, off, recorded
 from trunnion.errors import Finding, MechanismError
-from trunnion.measured.measurement import Measurement
-from trunnion.measured.read import read_measured
-from trunnion.measured.tables import read_table
+from trunnion.rig.reading.measurement import Measurement
+from trunnion.rig.reading.read import read_measured
+from trunnion.rig.reading.tables import read_table
 
 
 @pytest.fixture(scope="module")
@@ -217,7 +217,7 @@ def test_parquet_cells_that_are_lists(tmp_path: Path) -> None:
 
 
 def test_tdms_that_says_more_than_it_holds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("trunnion.measured.binary_tables.MOST", 100)
+    monkeypatch.setattr("trunnion.rig.reading.binary_tables.MOST", 100)
     with TdmsWriter(tmp_path / "a.tdms") as writer:
         writer.write_segment([RootObject({}), *(ChannelObject("rig", key, np.zeros(60)) for key in "ab")])
     (finding,) = _refused(lambda: read_table(tmp_path / "a.tdms", ["a", "b"]))

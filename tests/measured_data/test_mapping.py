@@ -13,10 +13,10 @@ import pytest
 from manual.conftest import Run, program
 from measured_data.recording import Columns, mapping, off, read, recorded
 from trunnion.errors import MechanismError, Severity
-from trunnion.measured.amounts import read_amount
-from trunnion.measured.mapping import read_mapping
-from trunnion.measured.read import read_measured
 from trunnion.model.units import UnitError
+from trunnion.rig.reading.amounts import read_amount
+from trunnion.rig.reading.mapping import read_mapping
+from trunnion.rig.reading.read import read_measured
 
 __all__ = ["program"]  # a fixture
 

@@ -16,9 +16,9 @@ from nptdms import ChannelObject, RootObject, TdmsWriter
 
 from measured_data.recording import mapping, read, recorded
 from trunnion.errors import MechanismError
-from trunnion.measured.measurement import Measurement
-from trunnion.measured.read import read_measured
-from trunnion.measured.tables import read_table
+from trunnion.rig.reading.measurement import Measurement
+from trunnion.rig.reading.read import read_measured
+from trunnion.rig.reading.tables import read_table
 
 
 def _tdms(

@@ -15,8 +15,8 @@ import trunnion
 from manual.conftest import Run, program
 from measured_data.recording import mapping, recorded
 from trunnion.errors import MechanismError
-from trunnion.measured.table import dataset
-from trunnion.measured.tables import read_table
+from trunnion.rig.reading.table import dataset
+from trunnion.rig.reading.tables import read_table
 
 __all__ = ["program"]  # a fixture
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.model.file import read_mechanism
+from trunnion.model.mechanism import read_mechanism
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ import pytest
 from ruamel.yaml import YAML
 
 from trunnion import Mechanism, MechanismError
-from trunnion.model.file import read_mechanism
+from trunnion.model.mechanism import read_mechanism
 from trunnion.model.names import as_key
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -9,7 +9,7 @@ from model_samples import FOURBAR
 from ruamel.yaml import YAML
 
 from trunnion.errors import Finding, MechanismError, Severity
-from trunnion.model.check import check_model
+from trunnion.model.checks.check import check_model
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.parts import Joint
 

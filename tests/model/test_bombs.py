@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from trunnion import MechanismError, read
-from trunnion.measured.mapping import read_mapping
-from trunnion.measured.rig_file import Rig
 from trunnion.model.units import UnitError, root
+from trunnion.rig.reading.mapping import read_mapping
+from trunnion.rig.reading.rig_file import Rig
 
 DEEP = 20_000
 BOMBS = {

@@ -11,7 +11,7 @@ from varied import VARIED
 
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.joints.fits import GRADES, limits, standard_tolerance
-from trunnion.model.check import check_model
+from trunnion.model.checks.check import check_model
 from trunnion.model.cost_parts import COST_MODELS
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.prices import FORMULA, Price

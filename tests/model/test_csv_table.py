@@ -11,7 +11,7 @@ import pytest
 import trunnion
 from trunnion import Mechanism, MechanismError
 from trunnion.model.csv_table import MAX_ROWS
-from trunnion.model.file import read_mechanism
+from trunnion.model.mechanism import read_mechanism
 
 SLIDER_CRANK = Path(__file__).resolve().parents[2] / "examples" / "slider-crank.yaml"  # driver O, table pressure
 MODEL = read_mechanism(SLIDER_CRANK)

@@ -17,9 +17,8 @@ from hypothesis import strategies as st
 from model_samples import DURANGO, EXAMPLES, FOURBAR
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.model.check import check_model
-from trunnion.model.file import read_mechanism, write_mechanism
-from trunnion.model.mechanism import Mechanism
+from trunnion.model.checks.check import check_model
+from trunnion.model.mechanism import Mechanism, read_mechanism
 
 FindingsOf = Callable[..., tuple[Finding, ...]]
 
@@ -66,7 +65,7 @@ speed = "10 rad/s"
     found = findings_of(text.replace("speed =", "sped ="), "model.toml")
     assert {(one.where, one.line) for one in found} >= {("drivers.A.sped", 14)}
     with pytest.raises(MechanismError, match=r"TOML is read but not written — write \.yaml or \.json"):
-        write_mechanism(read_mechanism(path), tmp_path / "other.toml")
+        read_mechanism(path).write(tmp_path / "other.toml")
 
 
 def test_json_with_tabs_and_lines(tmp_path: Path, findings_of: FindingsOf) -> None:

@@ -11,9 +11,8 @@ import pytest
 from varied import VARIED
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.model.file import read_mechanism
 from trunnion.model.measure_parts import STATISTICS, SUBJECTS, Measure
-from trunnion.model.mechanism import Mechanism
+from trunnion.model.mechanism import Mechanism, read_mechanism
 
 FindingsOf = Callable[..., tuple[Finding, ...]]
 DEG = np.pi / 180

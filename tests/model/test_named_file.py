@@ -12,7 +12,8 @@ import pytest
 import trunnion
 from trunnion import Mechanism, MechanismError
 from trunnion.model.csv_table import MAX_BYTES, MAX_OWN_ROWS, MAX_ROWS
-from trunnion.model.file import files_named, read_mechanism, write_mechanism
+from trunnion.model.file import files_named
+from trunnion.model.mechanism import read_mechanism
 from trunnion.model.named_file import MOST_FILES
 from trunnion.model.rewrite import rewrite_mechanism
 from trunnion.model.schema import json_schema
@@ -128,7 +129,7 @@ def test_what_is_made_of_the_model_needs_the_file_no_more(tmp_path: Path) -> Non
     options = {"methods": ("monte-carlo",), "samples": 40, "steps": 12, "chunk": 20}
     one, two = (trunnion.tolerance(varied, ["maximum:effort:O"], jobs=jobs, **options) for jobs in (1, 2))
     np.testing.assert_array_equal(one["mean"], two["mean"])
-    write_mechanism(mechanism, tmp_path / "copy.yaml")
+    mechanism.write(tmp_path / "copy.yaml")
     assert read_mechanism(tmp_path / "copy.yaml") == mechanism
 
 

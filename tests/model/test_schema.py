@@ -9,7 +9,7 @@ from model_samples import EXAMPLES
 
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.joints.pairs import PAIRS
-from trunnion.model.file import read_mechanism
+from trunnion.model.mechanism import read_mechanism
 from trunnion.model.schema import SCHEMA_FILE, json_schema, schema_text
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from trunnion.errors import Finding, MechanismError, Severity
-from trunnion.model.check import check_model
+from trunnion.model.checks.check import check_model
 from trunnion.model.contact import contact_lacks, has_guide, has_pin, motions
 from trunnion.model.file import placed
 from trunnion.model.mechanism import Mechanism

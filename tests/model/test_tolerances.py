@@ -17,7 +17,7 @@ from varied import VARIED
 import trunnion
 from trunnion.algebra.dual import Dual, derivative
 from trunnion.errors import Finding, MechanismError, Severity
-from trunnion.model.check import check_model
+from trunnion.model.checks.check import check_model
 from trunnion.model.limit_texts import number_with
 from trunnion.model.limits import Limits
 from trunnion.model.mechanism import Mechanism

@@ -6,9 +6,9 @@ import math
 
 import pytest
 
-from trunnion.measured.amounts import dimensions
 from trunnion.model.quantity import Quantity
 from trunnion.model.units import KINDS, UnitError, unit
+from trunnion.rig.reading.amounts import dimensions
 
 
 @pytest.mark.parametrize(

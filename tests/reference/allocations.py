@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.analysis.allocation.problem import Contribution, Criterion, Effects, Option, Problem
 from trunnion.statistics.costs import Cost
+from trunnion.studies.allocation.problem import Contribution, Criterion, Effects, Option, Problem
 
 Array = NDArray[np.float64]
 FOUR_BAR = (100.0, 30.0, 90.0, 70.0)  # ground, crank, coupler, rocker, mm

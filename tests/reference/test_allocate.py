@@ -12,8 +12,8 @@ import pytest
 
 import trunnion
 from trunnion import Mechanism, MechanismError
-from trunnion.analysis.allocation.allocate import half_widths
 from trunnion.joints.fits import standard_tolerance
+from trunnion.studies.allocation.allocate import half_widths
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 LENGTHS = np.array([0.1, 0.03, 0.09, 0.07])

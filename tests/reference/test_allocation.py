@@ -11,10 +11,10 @@ from allocations import FOUR_BAR, bought, four_bar, random_costs, rocker_sensiti
 from numpy.typing import NDArray
 from scipy.optimize import NonlinearConstraint, minimize
 
-from trunnion.analysis.allocation.problem import Answer, Contribution, Criterion, Effects, Problem
-from trunnion.analysis.allocation.solve import solve, trade_off
 from trunnion.errors import MechanismError
 from trunnion.statistics.costs import Cost
+from trunnion.studies.allocation.problem import Answer, Contribution, Criterion, Effects, Problem
+from trunnion.studies.allocation.solve import solve, trade_off
 
 Array = NDArray[np.float64]
 

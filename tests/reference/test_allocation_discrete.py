@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from allocations import random_costs, random_options, rows
 
-from trunnion.analysis.allocation.problem import Contribution, Criterion, Option, Problem
-from trunnion.analysis.allocation.solve import solve
+from trunnion.studies.allocation.problem import Contribution, Criterion, Option, Problem
+from trunnion.studies.allocation.solve import solve
 
 
 def exhaustive(problem: Problem) -> float:

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 from scipy.stats import multivariate_normal
 
-from trunnion.analysis.allocation.problem import Contribution, Problem
-from trunnion.analysis.allocation.solve import solve, trade_off
-from trunnion.analysis.allocation.yields import normal_yield
 from trunnion.statistics.costs import Cost
+from trunnion.studies.allocation.problem import Contribution, Problem
+from trunnion.studies.allocation.solve import solve, trade_off
+from trunnion.studies.allocation.yields import normal_yield
 
 Array = NDArray[np.float64]
 PLAIN = Cost("power", {"B": 1.0, "k": 1.0, "unit": 1.0})

@@ -14,9 +14,9 @@ from scipy.spatial.transform import Rotation
 
 import trunnion
 from mechanisms import Data
-from trunnion.analysis.assemblability import Fit, Study
-from trunnion.analysis.engine import build
-from trunnion.analysis.space.loops import Loops
+from trunnion.solve.geometry import build
+from trunnion.solve.space.loops import Loops
+from trunnion.studies.assembly.study import Fit, Study
 
 Array = NDArray[np.float64]
 LENGTHS = (0.100, 0.030, 0.090, 0.070)  # ground, crank, coupler, rocker

@@ -18,8 +18,8 @@ from geared import geared_loop
 from mechanisms import MODELS, analyse, build, class_three, excavator, findings, four_bar, stephenson_six_bar
 from mechanisms_parts import Data
 from trunnion import Mechanism, MechanismError
-from trunnion.analysis.assemblies import Choice, put_together
 from trunnion.errors import Severity
+from trunnion.solve.assemblies import Choice, put_together
 
 Array = NDArray[np.float64]
 START = np.array([0.0])

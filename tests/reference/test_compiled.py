@@ -15,12 +15,13 @@ import trunnion
 from mechanisms import DURANGO, eccentric_press
 from trunnion import Mechanism, MechanismError
 from trunnion.algebra.dual import derivative, seed
-from trunnion.analysis.analyse import Run, pose_status, prepare, status_of
-from trunnion.analysis.measures import named, outputs
 from trunnion.errors import Status
+from trunnion.measures.measures import named, outputs
+from trunnion.solve.run import Run, prepare
+from trunnion.solve.status import pose_status, status_of
 
 jax = pytest.importorskip("jax")
-compiled = pytest.importorskip("trunnion.analysis.tolerance.compiled")
+compiled = pytest.importorskip("trunnion.studies.tolerance.compiled")
 
 EXAMPLES = DURANGO.parent
 SAMPLES = 5
@@ -202,7 +203,7 @@ def test_what_only_numpy_does_is_said() -> None:
 
 
 def test_jax_is_imported_only_where_asked_for() -> None:
-    code = "import sys, trunnion, trunnion.analysis.tolerance.compiled; sys.exit('jax' in sys.modules)"
+    code = "import sys, trunnion, trunnion.studies.tolerance.compiled; sys.exit('jax' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False, cwd=Path(__file__).parent).returncode == 0
 
 

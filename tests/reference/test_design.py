@@ -8,8 +8,8 @@ import pytest
 import trunnion
 from mechanisms import MODELS, build, five_bar, four_bar, model, slider_crank
 from trunnion import Mechanism
-from trunnion.analysis import design as figures
-from trunnion.analysis.kinematics import forward
+from trunnion.solve.forward import forward
+from trunnion.studies import design as figures
 
 
 def test_dead_centres_of_the_case_study() -> None:

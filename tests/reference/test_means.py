@@ -11,13 +11,13 @@ import pytest
 
 import trunnion
 from trunnion import Mechanism
-from trunnion.analysis.account import useful_loads
-from trunnion.analysis.analyse import Run, prepare
-from trunnion.analysis.quadrature import Effort, integrals
-from trunnion.analysis.switches import Mechanisms, edges
+from trunnion.algebra.quadrature import Effort, integrals
 from trunnion.errors import Status
-from trunnion.views.built_tables import error_rows
-from trunnion.views.quantities import quantity
+from trunnion.solve.loads import useful_loads
+from trunnion.solve.run import Run, prepare
+from trunnion.solve.switches import Mechanisms, edges
+from trunnion.views.common.quantities import quantity
+from trunnion.views.cycle.built_tables import error_rows
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 STEPS = (60, 72, 90, 360, 720)

@@ -17,11 +17,11 @@ from mechanisms import DURANGO, build, four_bar, slider_crank
 from mechanisms_space import rssr
 from trunnion import Mechanism, MechanismError
 from trunnion.algebra.dual import Dual, derivative, primal
-from trunnion.analysis.account import MARGIN
-from trunnion.analysis.analyse import Run, prepare
-from trunnion.analysis.measure_figures import figure, kept, known, shown, span
-from trunnion.analysis.measure_positions import plan
-from trunnion.analysis.measures import MEASURES, STATISTICS, Measure, coordinate_unit, named
+from trunnion.measures.figures import figure, kept, known, shown, span
+from trunnion.measures.measures import MEASURES, STATISTICS, Measure, coordinate_unit, named
+from trunnion.measures.positions import plan
+from trunnion.solve.friction_method import MARGIN
+from trunnion.solve.run import Run, prepare
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 R, L, E = 0.3, 1.0, 0.1  # crank, rod, offset of the guide

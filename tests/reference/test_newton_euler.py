@@ -14,7 +14,7 @@ import pytest
 import trunnion
 from mechanisms import MODELS, Array, Data, build, model
 from reference import newton_euler
-from trunnion.analysis.analyse import Run
+from trunnion.solve.run import Run
 
 STEPS = 24
 STEP = 2e-3  # rad-like share of the cycle for the sixth-order differences below

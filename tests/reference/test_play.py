@@ -17,12 +17,12 @@ import mechanisms_space
 import trunnion
 from played import changes, four_bar, measures_of, offsets_of, pressed_to, rssr, with_play
 from trunnion import MechanismError, Status
-from trunnion.analysis.analyse import Run, prepare
-from trunnion.analysis.friction import FrictionMethod
-from trunnion.analysis.kinematics import forward
-from trunnion.analysis.measures import named, outputs
-from trunnion.analysis.play import by_duals, by_virtual_load, plays, variance
 from trunnion.joints.clearance import worst_case
+from trunnion.measures.measures import named, outputs
+from trunnion.solve.forward import forward
+from trunnion.solve.friction_method import FrictionMethod
+from trunnion.solve.run import Run, prepare
+from trunnion.studies.play.study import by_duals, by_virtual_load, plays, variance
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 NOW = np.zeros(1)
@@ -63,7 +63,7 @@ def test_rssr(hole_on: str) -> None:
     assert np.degrees(np.mean(best)) == pytest.approx(0.044402, abs=5e-7)
 
 
-def _largest_change(run: Run, measure: trunnion.analysis.measures.Measure, sign: int, towards: np.ndarray) -> float:
+def _largest_change(run: Run, measure: trunnion.measures.measures.Measure, sign: int, towards: np.ndarray) -> float:
     """Over the directions of both offsets, each at the wall, by an optimiser."""
 
     def lost(angles: np.ndarray) -> float:

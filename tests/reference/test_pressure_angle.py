@@ -11,8 +11,8 @@ import pytest
 import trunnion
 from mechanisms import MODELS, Array, Data, build, four_bar, slider_crank
 from trunnion import Mechanism
-from trunnion.analysis import design as figures
-from trunnion.analysis.kinematics import forward
+from trunnion.solve.forward import forward
+from trunnion.studies import design as figures
 
 DYADS = ["four-bar", "four-bar, other branch", "slider-crank", "inverted slider-crank", "Scotch yoke", "elliptic bar",
          "tangent drive"]  # fmt: skip

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from trunnion import analyse, read
-from trunnion.analysis.analyse import prepare
-from trunnion.analysis.friction import FrictionMethod
+from trunnion.solve.friction_method import FrictionMethod
+from trunnion.solve.run import prepare
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 PEZZUTI = {"joint_defaults.friction.model": "pezzuti"}

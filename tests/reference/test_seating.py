@@ -21,9 +21,9 @@ from reference import newton_euler
 from reference.maximal_space import Array, Data, Drive, Frame
 from reference.seat_oracle import FourBar, Link, Linkage, SliderCrank
 from reference.seat_oracle_space import settle
-from trunnion.analysis.analyse import Run
-from trunnion.analysis.seating import loads_of
 from trunnion.errors import Status
+from trunnion.solve.run import Run
+from trunnion.solve.seating import loads_of
 
 LINKAGES: dict[str, tuple[Any, type[Linkage]]] = {
     "four-bar": (four_bar, FourBar),

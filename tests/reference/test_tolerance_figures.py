@@ -9,7 +9,7 @@ import pytest
 
 from toleranced import FOURBAR, fourbar, fourbar_angle, rssr
 from trunnion import tolerance
-from trunnion.analysis.extremes import Grid, largest
+from trunnion.measures.extremes import Grid, largest
 
 ERROR = {"transmission_error": "D"}
 PATH = {"path_error": "coupler.C"}

@@ -32,8 +32,8 @@ from toleranced import (
     varied,
 )  # fmt: skip
 from trunnion import Mechanism
-from trunnion.analysis.tolerance.study import study
 from trunnion.statistics.streams import SobolStream, uniforms
+from trunnion.studies.tolerance.first_order import study
 
 Law = Callable[[Array], Array]
 MM = 1e-3

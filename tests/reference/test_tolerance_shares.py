@@ -13,9 +13,9 @@ import xarray as xr
 import trunnion
 from toleranced import FOURBAR, fourbar, fourbar_angle, slider_crank
 from trunnion import Mechanism
-from trunnion.views.tolerance import figure
-from trunnion.views.tolerance_tables import tables
-from trunnion.views.toleranced import readings
+from trunnion.views.tolerance.figure import figure
+from trunnion.views.tolerance.tables import tables
+from trunnion.views.tolerance.toleranced import readings
 
 WIDE = 0.05e-3 / 3  # σ of each length
 
@@ -103,7 +103,7 @@ def test_table_and_chart_show_the_same_shares() -> None:
 
 
 def test_columns_have_the_shares_of_the_variance(tmp_path: Path) -> None:
-    from trunnion.export import save
+    from trunnion.results.export import save
 
     found = study(0.5)
     save(found, tmp_path / "x.parameters.csv")

@@ -15,13 +15,12 @@ import trunnion
 from measured import references
 from mechanisms_parts import Data
 from toleranced import alone, sampler, varied
-from trunnion.analysis.account import MARGIN
-from trunnion.analysis.analyse import Run, prepare
-from trunnion.analysis.friction import FrictionMethod
-from trunnion.analysis.measure_figures import figure
-from trunnion.analysis.measures import coordinate_unit
-from trunnion.analysis.tolerance.study import study
+from trunnion.measures.figures import figure
+from trunnion.measures.measures import coordinate_unit
+from trunnion.solve.friction_method import MARGIN, FrictionMethod
+from trunnion.solve.run import Run, prepare
 from trunnion.statistics.streams import uniforms
+from trunnion.studies.tolerance.first_order import study
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 STEPS = 25

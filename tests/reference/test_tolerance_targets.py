@@ -15,9 +15,9 @@ from typer.testing import CliRunner
 import trunnion
 from toleranced import FOURBAR, fourbar, fourbar_angle
 from trunnion import Mechanism
-from trunnion.analysis.allocation.allocate import half_widths
-from trunnion.cli import app
-from trunnion.views.tolerance_report import report
+from trunnion.cli.app import app
+from trunnion.studies.allocation.allocate import half_widths
+from trunnion.views.tolerance.report import report
 
 NOMINAL = float(fourbar_angle(**FOURBAR))
 COSTS = {name: {"model": "power", "B": 1, "k": 1, "unit": "mm"} for name in FOURBAR}

@@ -14,8 +14,8 @@ from mechanisms import Array
 from mechanisms_parts import prismatic
 from toleranced import FOURBAR, fourbar, fourbar_angle
 from trunnion import Mechanism
-from trunnion.analysis.tolerance.sampled import QUANTILES, sampled
-from trunnion.analysis.tolerance.study import Study, study
+from trunnion.studies.tolerance.first_order import Study, study
+from trunnion.studies.tolerance.sampled import QUANTILES, sampled
 
 MM, SEEDS = 1e-3, 200
 T = 0.05 * MM

@@ -12,13 +12,13 @@ import pytest
 import trunnion
 from rig_measurements import course, exact, measured, rocker
 from trunnion import MechanismError, Status
-from trunnion.analysis.rig.causes import best, causes
-from trunnion.analysis.rig.compared import VARIABLES
-from trunnion.analysis.rig.judge import Verdict, expanded, independent, judge, uncertainty_of
-from trunnion.analysis.rig.said import gathered
 from trunnion.errors import Finding, Severity
-from trunnion.measured.measurement import Accuracy, Condition, Course, Measurement
 from trunnion.model.units import KINDS
+from trunnion.rig.compare.causes import best, causes
+from trunnion.rig.compare.judge import Verdict, expanded, independent, judge, uncertainty_of
+from trunnion.rig.compare.result import VARIABLES
+from trunnion.rig.compare.said import gathered
+from trunnion.rig.reading.measurement import Accuracy, Condition, Course, Measurement
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 POWERS = ("torque", "speed", "brake", "out")

@@ -9,8 +9,8 @@ import pytest
 from numpy.typing import NDArray
 
 from trunnion.errors import MechanismError
-from trunnion.measured.efficiency import efficiency_of
-from trunnion.measured.measurement import Accuracy, Condition, Course
+from trunnion.rig.reading.efficiency import efficiency_of
+from trunnion.rig.reading.measurement import Accuracy, Condition, Course
 
 TURNS, POSITIONS = 12, 24
 PHASE = np.arange(POSITIONS) / POSITIONS

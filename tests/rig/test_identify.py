@@ -14,20 +14,20 @@ from ruamel.yaml import YAML
 
 import trunnion
 from rigged import Sensors, True_, truth
-from trunnion.analysis.analyse import prepare
-from trunnion.analysis.friction import FrictionMethod
-from trunnion.analysis.measures import named
-from trunnion.analysis.rig.identify import identify, with_estimates
-from trunnion.analysis.rig.identify.courses import Model
-from trunnion.analysis.rig.identify.held import held_out
-from trunnion.analysis.rig.identify.run import identified
-from trunnion.analysis.rig.identify.said import _formula
-from trunnion.analysis.rig.identify.separate import Combination
-from trunnion.analysis.rig.identify.unknowns import described, limits, unknowns
 from trunnion.errors import MechanismError
-from trunnion.measured.measurement import Accuracy, Condition, Course, Measurement
-from trunnion.model.file import read_mechanism
-from trunnion.views.identify import KINDS, figure
+from trunnion.measures.measures import named
+from trunnion.model.mechanism import read_mechanism
+from trunnion.rig.identify import identify, with_estimates
+from trunnion.rig.identify.courses import Model
+from trunnion.rig.identify.held import held_out
+from trunnion.rig.identify.run import identified
+from trunnion.rig.identify.said import _formula
+from trunnion.rig.identify.separate import Combination
+from trunnion.rig.identify.unknowns import described, limits, unknowns
+from trunnion.rig.reading.measurement import Accuracy, Condition, Course, Measurement
+from trunnion.solve.friction_method import FrictionMethod
+from trunnion.solve.run import prepare
+from trunnion.views.identify.figure import KINDS, figure
 
 FRICTION = "joint_defaults.friction.coefficient"
 SPEEDS = [{"A.speed": speed} for speed in (2.0, 4.0, 6.0, 8.0, 10.0)]

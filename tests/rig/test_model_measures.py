@@ -11,8 +11,8 @@ import pytest
 import trunnion
 from rig_measurements import measured, rocker
 from trunnion import Mechanism, MechanismError
-from trunnion.measured.measurement import Measurement
-from trunnion.measured.rig_file import Rig
+from trunnion.rig.reading.measurement import Measurement
+from trunnion.rig.reading.rig_file import Rig
 
 RIG = Path(__file__).resolve().parents[2] / "examples" / "rig" / "fourbar-rig.yaml"
 STATED = {

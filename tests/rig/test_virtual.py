@@ -10,15 +10,15 @@ import pytest
 import yaml
 
 import trunnion
-from trunnion.analysis.analyse import prepare
-from trunnion.analysis.rig import virtual_courses
-from trunnion.analysis.rig.virtual import Observation
-from trunnion.analysis.rig.virtual_files import units_of
-from trunnion.analysis.rig.virtual_plan import plan
 from trunnion.errors import MechanismError, Severity
-from trunnion.measured.efficiency import efficiency_of
-from trunnion.measured.rig_file import Rig
 from trunnion.model.mechanism import Mechanism
+from trunnion.rig.reading.efficiency import efficiency_of
+from trunnion.rig.reading.rig_file import Rig
+from trunnion.rig.virtual import courses as virtual_courses
+from trunnion.rig.virtual.files import units_of
+from trunnion.rig.virtual.observe import Observation
+from trunnion.rig.virtual.plan import plan
+from trunnion.solve.run import prepare
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 FOUR_BAR = EXAMPLES / "toleranced-fourbar.yaml"
@@ -141,8 +141,8 @@ def test_efficiency_covers_the_true_one(seen: Observation) -> None:
 def test_files_are_read_as_they_were_meant(seen: Observation, form: str, tmp_path: Path) -> None:
     """The mapping reads the files; courses are those that the rig hands on itself, the same in all formats."""
     pytest.importorskip({"csv": "pandas", "parquet": "pyarrow", "tdms": "nptdms"}[form])
-    from trunnion.measured.read import read_measured
-    from trunnion.measured.tables import read_table
+    from trunnion.rig.reading.read import read_measured
+    from trunnion.rig.reading.tables import read_table
 
     names = seen.write(tmp_path, form)
     assert names == [f"run-01.{form}", "mapping.yaml", "truth.yaml"]

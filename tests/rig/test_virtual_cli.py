@@ -12,10 +12,10 @@ import pytest
 
 import trunnion
 from manual.conftest import Run, program
-from trunnion.analysis.rig import virtual_files
 from trunnion.errors import MechanismError
-from trunnion.measured import rig_file
-from trunnion.measured.rig_file import Rig
+from trunnion.rig.reading import rig_file
+from trunnion.rig.reading.rig_file import Rig
+from trunnion.rig.virtual import files as virtual_files
 
 __all__ = ["program"]
 

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from trunnion.analysis.rig import virtual_sensors
-from trunnion.analysis.rig.virtual_courses import phases
-from trunnion.analysis.rig.virtual_sensors import Drawn, converted, draw, pulsed, readings, resolved, smoothed, stream
 from trunnion.errors import MechanismError
-from trunnion.measured.amounts import read_amount
-from trunnion.measured.rig_file import Sensor
-from trunnion.measured.scale import scale
+from trunnion.rig.reading.amounts import read_amount
+from trunnion.rig.reading.rig_file import Sensor
+from trunnion.rig.reading.scale import scale
+from trunnion.rig.virtual import sensors as virtual_sensors
+from trunnion.rig.virtual.courses import phases
+from trunnion.rig.virtual.sensors import Drawn, converted, draw, pulsed, readings, resolved, smoothed, stream
 
 NONE = Drawn(0.0, 0.0, 0.0)
 

@@ -9,14 +9,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from trunnion.statistics.capability import normal_yield, two_sided
-from trunnion.statistics.intervals import (
-    by_replicates,
-    of_deviation,
-    of_mean,
-    of_quantile,
-    share,
-    share_by_replicates,
-)
+from trunnion.statistics.intervals import by_replicates, of_deviation, of_mean, of_quantile, share, share_by_replicates
 
 RUNS = 4000
 GENERATOR = np.random.default_rng(8)

@@ -8,14 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from trunnion.statistics.streams import (
-    MOST_POINTS,
-    SobolStream,
-    correlated,
-    direction_numbers,
-    factor,
-    uniforms,
-)
+from trunnion.statistics.streams import MOST_POINTS, SobolStream, correlated, direction_numbers, factor, uniforms
 
 MASK = (1 << 64) - 1
 

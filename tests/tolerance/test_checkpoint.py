@@ -11,9 +11,9 @@ import pytest
 
 from toy_job import ToyJob, ToyTally
 from trunnion import MechanismError
-from trunnion.analysis.tolerance import checkpoint as module
-from trunnion.analysis.tolerance.checkpoint import Checkpoint, job_hash
-from trunnion.analysis.tolerance.runner import run
+from trunnion.studies.tolerance import checkpoint as module
+from trunnion.studies.tolerance.checkpoint import Checkpoint, job_hash
+from trunnion.studies.tolerance.runner import run
 
 
 @pytest.fixture

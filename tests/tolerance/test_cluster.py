@@ -16,7 +16,7 @@ import pytest
 from toy_job import ToyJob
 from toy_programs import ENVIRONMENT, POSIX, interrupted
 from trunnion import MechanismError
-from trunnion.analysis.tolerance.runner import run
+from trunnion.studies.tolerance.runner import run
 
 pytest.importorskip("distributed")
 
@@ -121,7 +121,7 @@ def test_a_scheduler_that_goes_away_is_an_error_and_nothing_is_lost(
 
 
 def test_no_scheduler_is_one_finding(monkeypatch: pytest.MonkeyPatch) -> None:
-    from trunnion.analysis.tolerance import cluster as module
+    from trunnion.studies.tolerance import cluster as module
 
     monkeypatch.setattr(module, "CONNECT", 0.5)
     with pytest.raises(MechanismError, match=r"no Dask scheduler answers at tcp://127\.0\.0\.1:9") as caught:
@@ -132,7 +132,7 @@ def test_no_scheduler_is_one_finding(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_without_dask_the_remedy_is_told() -> None:
     script = (
         "import sys; sys.modules['distributed'] = None\n"
-        "from toy_job import ToyJob\nfrom trunnion.analysis.tolerance.runner import run\n"
+        "from toy_job import ToyJob\nfrom trunnion.studies.tolerance.runner import run\n"
         "run(ToyJob(), cluster='local')"
     )
     ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env=ENVIRONMENT, check=False)
@@ -142,6 +142,6 @@ def test_without_dask_the_remedy_is_told() -> None:
 
 
 def test_dask_is_not_imported_unasked() -> None:
-    script = "import sys, trunnion.analysis.tolerance.runner; print('distributed' in sys.modules)"
+    script = "import sys, trunnion.studies.tolerance.runner; print('distributed' in sys.modules)"
     ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env=ENVIRONMENT, check=True)
     assert ended.stdout == "False\n"

@@ -17,8 +17,8 @@ import trunnion
 from mechanisms import Array
 from toleranced import FOURBAR, alone, fourbar, fourbar_angle, many, sampler
 from trunnion import MechanismError, Status
-from trunnion.analysis.tolerance.study import study
 from trunnion.statistics.streams import uniforms
+from trunnion.studies.tolerance.first_order import study
 
 LIMIT = {"angle": {"angle": "rocker", "at": "60 deg", "limit": "±0.1 deg"}}
 ALL = ("linear", "worst-case", "monte-carlo")

@@ -13,9 +13,9 @@ import xarray as xr
 import trunnion
 from toleranced import fourbar
 from trunnion import Mechanism, MechanismError
-from trunnion.analysis.tolerance.runner import run
-from trunnion.analysis.tolerance.sampling import Sampling, Tally
-from trunnion.analysis.tolerance.study import study
+from trunnion.studies.tolerance.first_order import study
+from trunnion.studies.tolerance.runner import run
+from trunnion.studies.tolerance.sampling import Sampling, Tally
 
 SAMPLES, STEPS = 3000, 120
 METHODS = ("monte-carlo", "quasi-monte-carlo")

@@ -14,10 +14,10 @@ import pytest
 from toy_job import ToyJob
 from toy_programs import ENVIRONMENT, POSIX, interrupted
 from trunnion import Finding, MechanismError
-from trunnion.analysis.tolerance.checkpoint import Checkpoint
-from trunnion.analysis.tolerance.ranges import Pace, Plan, count, gaps, union
-from trunnion.analysis.tolerance.runner import run
 from trunnion.errors import Severity
+from trunnion.studies.tolerance.checkpoint import Checkpoint
+from trunnion.studies.tolerance.ranges import Pace, Plan, count, gaps, union
+from trunnion.studies.tolerance.runner import run
 
 
 def test_one_process_gives_the_blocks_in_order() -> None:
@@ -143,7 +143,7 @@ def test_ctrl_c_from_the_terminal_is_quiet(jobs: int, tmp_path: Path) -> None:
 def test_a_script_without_a_guard_is_told_so(tmp_path: Path) -> None:
     script = tmp_path / "bare.py"
     script.write_text(
-        "from toy_job import ToyJob\nfrom trunnion.analysis.tolerance.runner import run\nrun(ToyJob(), jobs=2)\n"
+        "from toy_job import ToyJob\nfrom trunnion.studies.tolerance.runner import run\nrun(ToyJob(), jobs=2)\n"
     )
     ended = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, env=ENVIRONMENT, check=False)
     assert ended.returncode == 1

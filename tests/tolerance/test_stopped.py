@@ -12,9 +12,9 @@ import pytest
 
 import trunnion
 from toleranced import fourbar
-from trunnion.export import save
-from trunnion.views.tolerance_report import report
-from trunnion.views.tolerance_tables import tables
+from trunnion.results.export import save
+from trunnion.views.tolerance.report import report
+from trunnion.views.tolerance.tables import tables
 
 LIMITED = {"angle": {"angle": "rocker", "at": "60 deg", "limit": "±1 deg"}}
 
@@ -41,7 +41,7 @@ def test_stopped_before_the_first_portion(method: str, jobs: int, tmp_path: Path
 
 
 def test_an_allocation_whose_samples_are_stopped_decides_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    from trunnion.analysis.allocation import allocate
+    from trunnion.studies.allocation import allocate
 
     monkeypatch.setattr(allocate, "tolerance", partial(allocate.tolerance, progress=interrupt))
     costs = {"l2": {"model": "power", "B": 1, "k": 1, "unit": "mm"}}

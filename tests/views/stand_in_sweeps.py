@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 import xarray as xr
 
-from trunnion.analysis.sweep import FIGURES
+from trunnion.studies.sweep.study import FIGURES
 
 RPM, DEG = np.pi / 30, np.pi / 180
 

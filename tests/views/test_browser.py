@@ -17,7 +17,7 @@ from mechanisms import MODELS, analyse, slider_crank
 from trunnion import analyse as analysed
 from trunnion import read
 from trunnion.errors import Status
-from trunnion.views.scene import scene
+from trunnion.views.cycle.scene import scene
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 NODE = shutil.which("node")

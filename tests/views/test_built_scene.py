@@ -11,9 +11,9 @@ from as_built_models import EXAMPLES, four_bar, loaded
 from test_report import Page
 
 import trunnion
-from trunnion.views.built_tables import error_rows, loss_rows
-from trunnion.views.report import report
-from trunnion.views.scene import scene
+from trunnion.views.cycle.built_tables import error_rows, loss_rows
+from trunnion.views.cycle.report import report
+from trunnion.views.cycle.scene import scene
 
 
 @pytest.fixture(scope="module")

@@ -20,13 +20,13 @@ from test_report import Page
 import trunnion
 from rig_measurements import measured, rocker
 from trunnion import MechanismError
-from trunnion.cli import main
-from trunnion.measured.measurement import Measurement
-from trunnion.views.bundle import web_text
-from trunnion.views.compare import MOST_PANELS, figure, overlay, panels
-from trunnion.views.compare_report import MOST_DRAWN, report
-from trunnion.views.compare_tables import conditions, efficiencies, files, headline, results, sensors, verdicts
-from trunnion.views.compared import drive, label, levels, varied
+from trunnion.cli.app import main
+from trunnion.rig.reading.measurement import Measurement
+from trunnion.views.common.bundle import web_text
+from trunnion.views.compare.compared import drive, label, levels, varied
+from trunnion.views.compare.figure import MOST_PANELS, figure, overlay, panels
+from trunnion.views.compare.report import MOST_DRAWN, report
+from trunnion.views.compare.tables import conditions, efficiencies, files, headline, results, sensors, verdicts
 
 POWERS = ("torque", "speed", "brake", "out")
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from stand_in import blank, four_bar, slider
 
 from trunnion.errors import Status
-from trunnion.views.cycle import abscissa, intervals, status_text, thin
+from trunnion.views.common.cycle import abscissa, intervals, status_text, thin
 
 
 def test_a_turning_drive_is_drawn_over_its_angle_and_the_turn_closes(plain):

@@ -7,11 +7,11 @@ import yaml
 from typer.testing import CliRunner
 
 from trunnion import Mechanism, analyse
-from trunnion.cli import app
+from trunnion.cli.app import app
 from trunnion.errors import Status
-from trunnion.views.peaks import ease, usual_peak, whole_peaks
-from trunnion.views.plots import PLOTS, torque
-from trunnion.views.scene import scene
+from trunnion.views.common.peaks import ease, usual_peak, whole_peaks
+from trunnion.views.cycle.plots import PLOTS, torque
+from trunnion.views.cycle.scene import scene
 
 SLIDER_CRANK = """
 trunnion: 1

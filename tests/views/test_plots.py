@@ -10,10 +10,10 @@ from matplotlib.figure import Figure
 from stand_in import four_bar, slider
 
 from trunnion.errors import MechanismError, Status
-from trunnion.views import plots
-from trunnion.views.drawing import hull
-from trunnion.views.lettering import OTHERS, _signs, families, plain
-from trunnion.views.plots import PLOTS, READY, mechanism, save
+from trunnion.views.common.drawing import hull
+from trunnion.views.common.lettering import OTHERS, _signs, families, plain
+from trunnion.views.cycle import plots
+from trunnion.views.cycle.plots import PLOTS, READY, mechanism, save
 
 PLAIN = [name for name in PLOTS if name not in READY]  # of results without errors
 SIGNATURES = {".png": b"\x89PNG", ".pdf": b"%PDF", ".svg": b"<?xml"}
@@ -84,7 +84,7 @@ def fonts(monkeypatch):
     """Choose the fonts beside the first one; the machine's own come back afterwards."""
 
     def choose(*others):
-        monkeypatch.setattr("trunnion.views.lettering.OTHERS", others)
+        monkeypatch.setattr("trunnion.views.common.lettering.OTHERS", others)
         families.cache_clear()
         _signs.cache_clear()
 

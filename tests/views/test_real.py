@@ -10,9 +10,9 @@ import pytest
 from test_report import Page
 
 from trunnion import Mechanism, analyse
-from trunnion.views.plots import PLOTS, READY, save
-from trunnion.views.report import report
-from trunnion.views.scene import scene
+from trunnion.views.cycle.plots import PLOTS, READY, save
+from trunnion.views.cycle.report import report
+from trunnion.views.cycle.scene import scene
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 

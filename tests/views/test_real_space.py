@@ -13,14 +13,14 @@ from test_report import Page
 
 import trunnion
 from trunnion import Mechanism, analyse
-from trunnion.analysis.assemblies import Choice, Way
 from trunnion.errors import Status
-from trunnion.export import save as write
-from trunnion.views.assemblies import ways
-from trunnion.views.plots import PLOTS, save
-from trunnion.views.report import report
-from trunnion.views.scene import scene
-from trunnion.views.space import space
+from trunnion.results.export import save as write
+from trunnion.solve.assemblies import Choice, Way
+from trunnion.views.assembly.drawings import ways
+from trunnion.views.cycle.plots import PLOTS, save
+from trunnion.views.cycle.report import report
+from trunnion.views.cycle.scene import scene
+from trunnion.views.space.bodies import space
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SPATIAL = sorted(path.stem for path in EXAMPLES.glob("*.yaml") if "space: spatial" in path.read_text(encoding="utf-8"))

@@ -12,8 +12,8 @@ import pytest
 from stand_in import NASTY, four_bar
 
 from trunnion.errors import Status
-from trunnion.views.bundle import bundle, web_text
-from trunnion.views.report import _summary, embedded, report
+from trunnion.views.common.bundle import bundle, web_text
+from trunnion.views.cycle.report import _summary, embedded, report
 
 VOID = {"meta", "link", "br", "img", "input", "hr"}
 

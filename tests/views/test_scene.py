@@ -9,7 +9,7 @@ import pytest
 from stand_in import four_bar
 
 from trunnion.errors import Status
-from trunnion.views.scene import scene
+from trunnion.views.cycle.scene import scene
 
 
 def test_every_kind_of_result_becomes_plain_json(case):

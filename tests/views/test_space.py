@@ -13,17 +13,17 @@ from stand_in_space import SPATIAL, Z, cardan, every_kind, rssr
 from test_report import Page
 
 from trunnion.errors import MechanismError, Status
-from trunnion.export import columns
-from trunnion.views.plots import PLOTS, READY, mechanism, save
-from trunnion.views.report import report
-from trunnion.views.scene import scene
-from trunnion.views.space import space
-from trunnion.views.space_camera import best, looking
-from trunnion.views.space_figure import scenery
-from trunnion.views.space_paint import facets
-from trunnion.views.space_plots import turned_from_start
-from trunnion.views.space_scene import screw_axis
-from trunnion.views.space_solids import SYMBOLS, solids
+from trunnion.results.export import columns
+from trunnion.views.cycle.plots import PLOTS, READY, mechanism, save
+from trunnion.views.cycle.report import report
+from trunnion.views.cycle.scene import scene
+from trunnion.views.space.bodies import space
+from trunnion.views.space.camera import best, looking
+from trunnion.views.space.figure import scenery
+from trunnion.views.space.paint import facets
+from trunnion.views.space.plots import turned_from_start
+from trunnion.views.space.scene import screw_axis
+from trunnion.views.space.solids import SYMBOLS, solids
 
 BLANK = ("nowhere", "locked")  # no position can be drawn
 

@@ -9,10 +9,10 @@ import pytest
 from stand_in_sweeps import ANGLE, DEG, RPM, SPEED, cardan, scale, swept
 
 from trunnion import MechanismError, Status, save
-from trunnion.views.sweep import figure
-from trunnion.views.sweep_panels import on_scale
-from trunnion.views.sweep_tables import tables
-from trunnion.views.swept import Scale, arrange, written
+from trunnion.views.sweep.figure import figure
+from trunnion.views.sweep.panels import on_scale
+from trunnion.views.sweep.swept import Scale, arrange, written
+from trunnion.views.sweep.tables import tables
 
 GRID = {"misalignment": ANGLE, "input.speed": SPEED}
 FEW = scale([50, 500, 1000, 1500], "rad/s", "rpm", RPM)

@@ -14,15 +14,15 @@ from matplotlib.colors import to_hex
 from matplotlib.text import Text
 from stand_in_tolerances import CASES, LIMIT, QUANTILES, at_one_position, gap, odd_names, toleranced
 
+from trunnion.cli.tolerance import check_files, show
 from trunnion.errors import MechanismError
-from trunnion.export import save as export
-from trunnion.verbs.tolerance import check_files, show
-from trunnion.views.figures import PALETTE
-from trunnion.views.plots import save
-from trunnion.views.tolerance import KINDS, MOST_PANELS, drawable, figure, sheet
-from trunnion.views.tolerance_cost import Offer, Price, tolerance_cost, trade_off
-from trunnion.views.tolerance_tables import corners, figures, indices, inputs, overview, tables
-from trunnion.views.toleranced import fixed, limits_text, readings, scaled, share, share_interval
+from trunnion.results.export import save as export
+from trunnion.views.allocation.cost import Offer, Price, tolerance_cost, trade_off
+from trunnion.views.common.figures import PALETTE
+from trunnion.views.cycle.plots import save
+from trunnion.views.tolerance.figure import KINDS, MOST_PANELS, drawable, figure, sheet
+from trunnion.views.tolerance.tables import corners, figures, indices, inputs, overview, tables
+from trunnion.views.tolerance.toleranced import fixed, limits_text, readings, scaled, share, share_interval
 
 
 @pytest.fixture(scope="module", params=CASES)

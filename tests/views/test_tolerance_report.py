@@ -12,12 +12,12 @@ import pytest
 from stand_in_tolerances import CASES, odd_names, toleranced
 from test_report import Page
 
-from trunnion.views.bundle import web_text
-from trunnion.views.tolerance import drawable, figure
-from trunnion.views.tolerance_notes import NOTES
-from trunnion.views.tolerance_report import Section, report
-from trunnion.views.tolerance_tables import Table
-from trunnion.views.toleranced import readings
+from trunnion.views.common.bundle import web_text
+from trunnion.views.tolerance.figure import drawable, figure
+from trunnion.views.tolerance.notes import NOTES
+from trunnion.views.tolerance.report import Section, report
+from trunnion.views.tolerance.tables import Table
+from trunnion.views.tolerance.toleranced import readings
 
 SOURCE = "data:image/svg+xml;base64,"
 

@@ -10,15 +10,15 @@ from matplotlib.colors import to_hex
 
 import trunnion
 from mechanisms import MODELS, build, class_three, four_bar, scotch_yoke, stephenson_six_bar, watt_six_bar
-from trunnion.analysis.analyse import prepare
-from trunnion.analysis.assemblies import choices
 from trunnion.errors import MechanismError
-from trunnion.views.assemblies import _drawn, ways
-from trunnion.views.cycle import layout
-from trunnion.views.drawing import PALE
-from trunnion.views.figures import INK, RULE
-from trunnion.views.plots import save
-from trunnion.views.ways import lines, places
+from trunnion.solve.assemblies import choices
+from trunnion.solve.run import prepare
+from trunnion.views.assembly.drawings import _drawn, ways
+from trunnion.views.assembly.ways import lines, places
+from trunnion.views.common.cycle import layout
+from trunnion.views.common.drawing import PALE
+from trunnion.views.common.figures import INK, RULE
+from trunnion.views.cycle.plots import save
 
 SIGNATURES = {".png": b"\x89PNG", ".pdf": b"%PDF", ".svg": b"<?xml"}
 

@@ -9,18 +9,14 @@ takes such a linkage apart, so there is no derivative, and dual parts come out a
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, cast
+from collections.abc import Callable, Sequence
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number
-from trunnion.algebra.rigid import ZERO, Screw, moment_at
-
-if TYPE_CHECKING:
-    from trunnion.groups.spatial import Pose, SpatialGroup
 
 __all__ = ["RANK", "condition", "least", "least_squares", "pseudo_inverse"]
 
@@ -72,18 +68,24 @@ def least_squares(matrix: Sequence[Sequence[Number]], side: Sequence[Number]) ->
     return [Dual(value, np.nan) for value in values] if dual else values
 
 
-def least(group: SpatialGroup, pose: Pose, loads: Sequence[Screw], multipliers: Sequence[Number]) -> list[Number]:
-    """The multipliers of the smallest reactions: λ + N y, with N the null space of Jᵀ and y by least squares."""
-    start = _weighed(group, pose, group.link_by_link(pose, loads, multipliers))
+def least(
+    jacobian: Sequence[Sequence[Number]],
+    reactions: Callable[[Sequence[Number], bool], Array],
+    multipliers: Sequence[Number],
+) -> list[Number]:
+    """The multipliers of the smallest reactions: λ + N y, with N the null space of Jᵀ and y by least squares.
+
+    reactions(multipliers, loaded): (lane, entry), of all joints, with the loads of the links or without.
+    """
+    start = reactions(multipliers, True)
     count = len(multipliers)
-    none = [ZERO] * len(loads)
     columns = []
     for j in range(count):
         unit = [1.0 if i == j else 0.0 for i in range(count)]
-        columns.append(_weighed(group, pose, group.link_by_link(pose, none, unit)))
+        columns.append(reactions(unit, False))
     shape = np.broadcast_shapes(start.shape, *(column.shape for column in columns))
     effect = np.stack([np.broadcast_to(column, shape) for column in columns], axis=-1)
-    table = stacked(pose.jacobian)
+    table = stacked(jacobian)
     bad = np.asarray(~(np.isfinite(table).all(axis=(-2, -1)) & np.isfinite(start).all(axis=-1)))
     safe = np.where(bad[..., None, None], 0.0, table)
     project = np.eye(count) - safe @ np.linalg.pinv(safe, rcond=RANK)  # onto the null space of Jᵀ
@@ -92,13 +94,3 @@ def least(group: SpatialGroup, pose: Pose, loads: Sequence[Screw], multipliers: 
     change = (project @ np.linalg.pinv(moves, rcond=RANK) @ wanted[..., None])[..., 0]
     change = np.where(bad[..., None], np.nan, change)
     return [primal(value) - change[..., j] for j, value in enumerate(multipliers)]
-
-
-def _weighed(group: SpatialGroup, pose: Pose, wrenches: Sequence[Screw]) -> Array:
-    """(lane, entry): forces and moments at the joints over the size, of all joints."""
-    rows: list[Number] = []
-    for wrench, one in zip(wrenches, pose.elements, strict=True):
-        moment = moment_at(wrench, one.second.place)
-        rows += [*wrench.u, *(part / pose.size for part in moment)]
-    flat = np.broadcast_arrays(*(np.asarray(primal(row), float) for row in rows), np.zeros(1))[:-1]
-    return cast(Array, np.stack(flat, axis=-1))

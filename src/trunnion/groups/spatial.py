@@ -22,21 +22,13 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from trunnion.algebra import linalg
 from trunnion.algebra.dual import depth, primal
 from trunnion.algebra.namespace import Number, apart, compiled, namespace
 from trunnion.algebra.nested import each, flat, replaced
-from trunnion.algebra.rigid import (
-    ZERO,
-    Frame,
-    Screw,
-    added,
-    bracket,
-    minus,
-    power,
-    times,
-)
+from trunnion.algebra.rigid import ZERO, Frame, Screw, added, bracket, minus, moment_at, power, times
 from trunnion.algebra.space import cross, dot, plus, scaled
 from trunnion.algebra.traced import looped
 from trunnion.groups import redundant
@@ -332,7 +324,11 @@ class SpatialGroup(SpatialTree):
         """
         multipliers = self._multipliers(pose, loads)
         if self.redundant and multipliers:
-            multipliers = redundant.least(self, pose, loads, multipliers)
+
+            def reactions(under: Sequence[Number], loaded: bool) -> NDArray[np.float64]:
+                return _weighed(pose, self.link_by_link(pose, loads if loaded else [ZERO] * len(loads), under))
+
+            multipliers = redundant.least(pose.jacobian, reactions, multipliers)
         return self.link_by_link(pose, loads, multipliers)
 
     def link_by_link(self, pose: Pose, loads: Sequence[Screw], multipliers: Sequence[Number]) -> list[Screw]:
@@ -436,3 +432,13 @@ def _condition(jacobian: Sequence[Sequence[Number]], inverse: Sequence[Sequence[
                     total = total + real * real
         direct, reverse = (total, reverse) if matrix is jacobian else (direct, total)
     return 2 * np.sqrt(direct * reverse) / len(inverse)
+
+
+def _weighed(pose: Pose, wrenches: Sequence[Screw]) -> NDArray[np.float64]:
+    """(lane, entry): forces and moments at the joints over the size, of all joints."""
+    rows: list[Number] = []
+    for wrench, one in zip(wrenches, pose.elements, strict=True):
+        moment = moment_at(wrench, one.second.place)
+        rows += [*wrench.u, *(part / pose.size for part in moment)]
+    flat = np.broadcast_arrays(*(np.asarray(primal(row), float) for row in rows), np.zeros(1))[:-1]
+    return np.stack(flat, axis=-1)

@@ -10,10 +10,10 @@ import json
 import os
 import re
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
@@ -22,13 +22,12 @@ from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 from ruamel.yaml.parser import Parser
 
 from trunnion.errors import Finding, MechanismError
+from trunnion.files import whole
 from trunnion.model.csv_table import TableFiles, place_findings, with_own_points, with_points
-from trunnion.model.mechanism import Mechanism
 from trunnion.model.named_file import in_folder, stated_files
 from trunnion.model.text import read_text
-from trunnion.output import whole
 
-__all__ = ["Lines", "files_named", "place", "placed", "read_entries", "read_mechanism", "write_mechanism"]
+__all__ = ["Lines", "files_named", "place", "placed", "read_entries", "read_model", "write_model"]
 
 MAX_BYTES = 1_000_000  # some ten thousand links; parsing takes seconds
 MAX_DEPTH = 30
@@ -38,10 +37,13 @@ _TAG = "tag:yaml.org,2002:"
 _PLAIN_TAGS = frozenset(_TAG + name for name in ("str", "int", "float", "bool", "null", "map", "seq"))
 
 Lines = dict[str, int]
+Model = TypeVar("Model")
 
 
-def read_mechanism(path: str | os.PathLike[str], tables: TableFiles | None = None) -> Mechanism:
-    """The mechanism of a file, by its extension .yaml, .yml, .json or .toml.
+def read_model(
+    path: str | os.PathLike[str], build: Callable[[dict[str, Any]], Model], tables: TableFiles | None = None
+) -> Model:
+    """What is built of the entries of a file, by its extension .yaml, .yml, .json or .toml.
 
     The points of CSV files in its folder that it names become part of it. tables: CSV files with the points of drivers
     and tables, by name, see `Mechanism.with_table`; they go before those that the model names.
@@ -54,12 +56,12 @@ def read_mechanism(path: str | os.PathLike[str], tables: TableFiles | None = Non
     try:
         data, own = with_own_points(data, path)
         read += own
-        mechanism = Mechanism(**data)
+        model = build(data)
     except MechanismError as error:
         findings += place_findings(error.findings, read)
     if findings:
         raise MechanismError(place(findings, str(path), lines, data)) from None
-    return mechanism
+    return model
 
 
 def files_named(path: str | os.PathLike[str]) -> list[Path]:
@@ -108,18 +110,18 @@ def placed(findings: Iterable[Finding], path: str | os.PathLike[str], sections: 
     return found
 
 
-def write_mechanism(mechanism: Mechanism, path: str | os.PathLike[str]) -> None:
-    """Write a mechanism as YAML or JSON, whole or not at all; MechanismError if it cannot be written."""
+def write_model(data: Mapping[str, Any], path: str | os.PathLike[str]) -> None:
+    """Write the plain data of a model as YAML or JSON, whole or not at all; MechanismError if it cannot be written."""
     path = Path(path)
     kind = _file_type(path)
     if kind == "TOML":
         raise MechanismError(Finding("TOML is read but not written", file=str(path), remedy="write .yaml or .json"))
     with whole(path) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as stream:
         if kind == "JSON":
-            json.dump(mechanism.data(), stream, indent=2, ensure_ascii=False)
+            json.dump(data, stream, indent=2, ensure_ascii=False)
             stream.write("\n")
         else:
-            _yaml().dump(mechanism.data(), stream)
+            _yaml().dump(data, stream)
 
 
 def _yaml() -> YAML:

@@ -13,7 +13,7 @@ from trunnion.model.quantity import Quantity
 from trunnion.model.units import KINDS, Dimension, Kind, UnitError
 
 if TYPE_CHECKING:
-    from trunnion.model.mechanism import Mechanism
+    from trunnion.model.fields import Fields
 
 __all__ = ["drive_kind", "figure_kind", "is_place", "place_kind"]
 
@@ -30,7 +30,7 @@ _OF_SUBJECT = {
 }
 
 
-def drive_kind(mechanism: Mechanism) -> Kind:
+def drive_kind(mechanism: Fields) -> Kind:
     """What the coordinate of the first driver measures."""
     joint = mechanism.effective_joints.get(next(iter(mechanism.drivers), ""))
     return KINDS["length" if joint and "rotation" not in freedoms(joint.type) else "angle"]
@@ -41,7 +41,7 @@ def is_place(measure: Measure) -> bool:
     return (measure.statistic or "").startswith("place-of-") or measure.subject == "dead_centre"
 
 
-def figure_kind(mechanism: Mechanism, measure: Measure) -> Kind:
+def figure_kind(mechanism: Fields, measure: Measure) -> Kind:
     """What a measure gives: of a joint with two motions the rotation, of a place the drive coordinate.
 
     A driver that does not run one way passes a coordinate twice: its places are times, which `place_kind` tells.
@@ -63,7 +63,7 @@ def figure_kind(mechanism: Mechanism, measure: Measure) -> Kind:
     return KINDS["length" if joint and motions(joint.type)[:1] == ("slide",) else "angle"]
 
 
-def place_kind(mechanism: Mechanism, quantity: Quantity, dimensions: Mapping[str, Dimension | None]) -> Kind:
+def place_kind(mechanism: Fields, quantity: Quantity, dimensions: Mapping[str, Dimension | None]) -> Kind:
     """A time if it is stated as one, else the coordinate of the first driver. dimensions: of the names in it."""
     with suppress(UnitError, KeyError):  # findings of their own
         if quantity.check(dimensions) in KINDS["time"].dimensions:

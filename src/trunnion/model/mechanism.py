@@ -8,50 +8,37 @@ import os
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property
-from itertools import pairwise
-from typing import Annotated, Any, Literal, Self
+from typing import Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, ValidationError
+from pydantic import ValidationError
 
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.joints.friction import FRICTION_LAWS
-from trunnion.model.check import check_model
+from trunnion.model.assign import assign
+from trunnion.model.checks.check import check_model
 from trunnion.model.contact import has_play, play
-from trunnion.model.cost_parts import Process
+from trunnion.model.csv_table import TableFiles, place_findings, with_points
+from trunnion.model.file import read_model, write_model
 from trunnion.model.findings import repair, schema_findings
 from trunnion.model.limit_texts import DIGITS
-from trunnion.model.merge import DEFAULT_LAW, FitChoice, merge_joint
+from trunnion.model.merge import DEFAULT_LAW
 from trunnion.model.names import nearest
+from trunnion.model.numbers import Numbers
 from trunnion.model.other_law import with_law
-from trunnion.model.parameters import LIMITS, Entry, Location, ParameterSet, entries, nominal_dimensions
+from trunnion.model.parameters import LIMITS, Location
 from trunnion.model.parts import (
-    Correlation,
-    Cost,
-    Driver,
-    Gear,
     Guide,
-    Hint,
     Joint,
-    JointDefaults,
-    Link,
-    Load,
-    LoopJoint,
-    Measure,
     Misalignment,
-    Name,
     Part,
     Pin,
     Seat,
-    Spring,
-    Table,
     Variation,
-    VariationDefaults,
 )
 from trunnion.model.prices import FORMULA, Price, cost_paths, prices
-from trunnion.model.quantity import Acceleration, AnyQuantity, Quantity
 from trunnion.model.samples import with_samples
 from trunnion.model.tolerances import (
     Tolerance,
@@ -64,47 +51,18 @@ from trunnion.model.tolerances import (
 )
 from trunnion.model.units import Kind
 
-__all__ = ["Mechanism"]
+__all__ = ["Mechanism", "read_mechanism"]
 
-FIXED_NAMES = ("ground", "frame")
 # Parts of a joint whose numbers can be set before the file states them.
 _JOINT_PARTS: Mapping[str, type[Part]] = {"pin": Pin, "guide": Guide, "misalignment": Misalignment, "seat": Seat}
 
 
-class Mechanism(Part):
+class Mechanism(Numbers):
     """A linkage: dimensions, links, joints, drivers, loads. See the sections' classes in `model.parts`.
 
     Built from plain mappings, numbers (SI) and texts with units, or from the classes. A mechanism that exists is
     sound: whatever is wrong with it is raised as one MechanismError when it is built.
     """
-
-    trunnion: Literal[1] = 1
-    name: str = ""
-    space: Literal["planar", "spatial"] = "planar"
-    over_constraint: Literal["refuse", "minimum-norm"] = "refuse"
-    fits: FitChoice = "mean"
-    gravity: Annotated[tuple[Acceleration, ...], Field(min_length=2, max_length=3)] | None = None
-    ground: str | None = None
-    dimensions: Mapping[Name, AnyQuantity] = {}
-    errors: Mapping[str, AnyQuantity] = {}
-    links: Mapping[Name, Link] = {}
-    joints: Mapping[Name, Joint] = {}
-    joint_defaults: JointDefaults = JointDefaults()
-    gears: Mapping[Name, Gear] = {}
-    loop: tuple[LoopJoint, ...] = ()
-    drivers: Mapping[Name, Driver] = {}
-    tables: Mapping[Name, Table] = {}
-    loads: Mapping[Name, Load] = {}
-    springs: Mapping[Name, Spring] = {}
-    assembly: Mapping[str, Hint] = {}
-    measures: Mapping[Name, Measure] = {}
-    variations: Annotated[Mapping[str, Variation], Field(alias="tolerances")] = {}
-    tolerance_defaults: VariationDefaults = VariationDefaults()
-    correlations: tuple[Correlation, ...] = ()
-    costs: Mapping[str, Cost] = {}
-    processes: Mapping[Name, Process] = {}
-    references: tuple[str, ...] = ()
-    notes: str = ""
 
     def __init__(self, **data: Any) -> None:
         """Validate and check; MechanismError with every finding of severity error."""
@@ -133,86 +91,17 @@ class Mechanism(Part):
         return obj if isinstance(obj, cls) else cls(**obj)
 
     @classmethod
-    def read(cls, path: str | os.PathLike[str]) -> Mechanism:
-        """The mechanism of a YAML, JSON or TOML file; MechanismError with file, line and remedy of every finding."""
-        from trunnion.model.file import read_mechanism
+    def read(cls, path: str | os.PathLike[str], tables: TableFiles | None = None) -> Mechanism:
+        """The mechanism of a YAML, JSON or TOML file; MechanismError with file, line and remedy of every finding.
 
-        return read_mechanism(path)
+        tables: CSV files with the points of drivers and tables, by name, see `with_table`; they go before those that
+        the model names.
+        """
+        return read_model(path, lambda data: cls(**data), tables)
 
     def write(self, path: str | os.PathLike[str]) -> None:
         """Write the model as YAML or JSON, by extension; reading it again gives an equal mechanism."""
-        from trunnion.model.file import write_mechanism
-
-        write_mechanism(self, path)
-
-    @property
-    def coordinates(self) -> int:
-        """How many coordinates a point has: 2 or 3."""
-        return 2 if self.space == "planar" else 3
-
-    @cached_property
-    def fixed_link(self) -> str:
-        """The link that does not move: `ground`, else the link of that name or named frame; empty if there is none."""
-        names = [*self.links, *(row.link for row in self.loop)]
-        return self.ground or next((name for name in FIXED_NAMES if name in names), "")
-
-    @cached_property
-    def effective_links(self) -> Mapping[str, Link]:
-        """Every link; one that only the loop names is massless."""
-        return {**self.links, **{row.link: Link() for row in self.loop if row.link not in self.links}}
-
-    @cached_property
-    def stated_joints(self) -> Mapping[str, Joint]:
-        """Every joint as it was stated; a row of the loop joins the link before it to its own."""
-        stated = dict(self.joints)
-        for before, row in zip((*self.loop[-1:], *self.loop[:-1]), self.loop, strict=True):
-            stated[row.joint] = Joint(
-                type=row.type,
-                links=(before.link, row.link),
-                pitch=row.pitch,
-                pin=row.pin,
-                guide=row.guide,
-                friction=row.friction,
-                misalignment=row.misalignment,
-                seat_on=row.seat_on,
-                seat=row.seat,
-            )
-        return stated
-
-    @cached_property
-    def effective_joints(self) -> Mapping[str, Joint]:
-        """Every joint with the defaults merged in and its friction complete: law, model and all parameters."""
-        spatial = self.space == "spatial"
-        pins = [self.joint_defaults.pin, *(joint.pin for joint in self.stated_joints.values())]
-        named = any(pin and pin.fit and pin.fit.size.names for pin in pins)
-        sizes = nominal_dimensions(self) if named else {}
-        return {
-            name: merge_joint(joint, self.joint_defaults, spatial, self.fits, sizes)
-            for name, joint in self.stated_joints.items()
-        }
-
-    @cached_property
-    def points(self) -> Mapping[str, tuple[str, ...]]:
-        """Names of the points of every link; a joint of the loop is a point of both its links."""
-        rows = [row.joint for row in self.loop]
-        ends = {name: [row for row in rows if name in self.stated_joints[row].links] for name in self.effective_links}
-        return {name: tuple(dict.fromkeys([*link.points, *ends[name]])) for name, link in self.effective_links.items()}
-
-    def carriers(self, gear: str) -> tuple[int, int] | None:
-        """On which side (0, 1) of each of its joints a gear pair has the link common to both; None without one."""
-        one, two = (self.effective_joints[joint].links for joint in self.gears[gear].joints)
-        shared = next((link for link in one if link in two), None)
-        return None if shared is None else (one.index(shared), two.index(shared))
-
-    @cached_property
-    def entries(self) -> tuple[Entry, ...]:
-        """Every number of the mechanism and where it stands, defaults filled in; see `model.parameters.entries`."""
-        return tuple(entries(self))
-
-    @cached_property
-    def parameter_set(self) -> ParameterSet:
-        """The numbers of the mechanism, compiled once."""
-        return ParameterSet(self)
+        write_model(self.data(), path)
 
     def parameters(
         self, overrides: Mapping[str, Number] | None = None, deviations: Mapping[str, Number] | None = None
@@ -305,7 +194,7 @@ class Mechanism(Part):
     def _replace(self, values: Mapping[str, float | str], data: dict[str, Any]) -> None:
         """Put values into plain data of this mechanism, or of one whose numbers have the same names."""
         for name, value in values.items():
-            _assign(data, self._location(name), value, self.coordinates)
+            assign(data, self._location(name), value, self.coordinates)
             keep_limits(self, name, value, data)
 
     def path_of(self, name: str) -> str:
@@ -422,8 +311,6 @@ class Mechanism(Part):
         Time and coordinate of a driver, which gets the motion law `table` if it has another; place and value of a
         table. MechanismError with file and line of what cannot be read or makes no table.
         """
-        from trunnion.model.csv_table import place_findings, with_points
-
         data, read = with_points(self.data(), {name: path})
         try:
             return Mechanism(**kept(self, data))
@@ -459,10 +346,6 @@ class Mechanism(Part):
             holder.pop("seat", None)
         return Mechanism(**kept(self, {**data, "joint_defaults": {**data.get("joint_defaults", {}), "seat": seat}}))
 
-    def data(self) -> dict[str, Any]:
-        """The model as plain mappings, lists, numbers and texts: what was stated, as it was written."""
-        return {"trunnion": self.trunnion, **self.model_dump(mode="json", exclude_unset=True, by_alias=True)}
-
     @property
     def digest(self) -> str:
         """Hash of the content, 16 hexadecimal digits: equal mechanisms have equal digests."""
@@ -479,16 +362,6 @@ def _canonical(value: Any) -> Any:
     return float(value) if isinstance(value, int) and not isinstance(value, bool) else value
 
 
-def _assign(data: dict[str, Any], location: Location, value: float | str | Quantity, coordinates: int) -> None:
-    """Put a value at its place in plain data, making the groups on the way and writing short forms out."""
-    holder: Any = data
-    for key, following in pairwise(location):
-        if isinstance(holder, dict) and holder.get(key) is None:
-            holder[key] = [0] * coordinates if isinstance(following, int) else {}
-        if following == "at" and isinstance(holder[key], list):
-            holder[key] = {"at": holder[key]}
-        elif isinstance(following, str) and not isinstance(holder[key], dict):
-            short = {"limits": holder[key]} if location[0] == "tolerances" else {"coefficient": holder[key]}
-            holder[key] = {} if key == "seat" else short  # the short form, of tolerances and of friction
-        holder = holder[key]
-    holder[location[-1]] = value
+def read_mechanism(path: str | os.PathLike[str], tables: TableFiles | None = None) -> Mechanism:
+    """The mechanism of a YAML, JSON or TOML file; see `Mechanism.read`."""
+    return Mechanism.read(path, tables)

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from graphlib import CycleError, TopologicalSorter
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,25 +18,18 @@ from pydantic import BaseModel
 from trunnion.algebra.namespace import Number
 from trunnion.errors import MechanismError
 from trunnion.joints.friction import FRICTION_LAWS
+from trunnion.model.dimensions import evaluation_order
 from trunnion.model.expression import MOTION
 from trunnion.model.limits import Limits
 from trunnion.model.measure_kinds import drive_kind, figure_kind, is_place, place_kind
 from trunnion.model.merge import DEFAULT_LAW
 from trunnion.model.parameter_names import ERRORS, ParameterNames
-from trunnion.model.parts import (
-    Driver,
-    Friction,
-    Gear,
-    Joint,
-    Point,
-    Spring,
-    freedoms,
-)
+from trunnion.model.parts import Driver, Friction, Gear, Joint, Point, Spring, freedoms
 from trunnion.model.quantity import Quantity
 from trunnion.model.units import ANY, KINDS, Dimension, Kind, UnitError, si_unit, unit
 
 if TYPE_CHECKING:
-    from trunnion.model.mechanism import Mechanism
+    from trunnion.model.fields import Fields
 
 __all__ = [
     "LIMITS",
@@ -46,9 +38,7 @@ __all__ = [
     "dimension_errors",
     "dimension_kinds",
     "entries",
-    "evaluation_order",
     "measured",
-    "nominal_dimensions",
 ]
 
 Location = tuple[str | int, ...]
@@ -87,7 +77,7 @@ class Entry:
         return self.path.rpartition(".")[0] if self.location[-1] in LIMITS else self.path
 
 
-def entries(mechanism: Mechanism) -> list[Entry]:
+def entries(mechanism: Fields) -> list[Entry]:
     """Every number of a mechanism, defaults filled in; what an entry follows comes before it, dimensions apart.
 
     Last come the deviations that the model states of them; those whose name means no number are left out.
@@ -108,7 +98,7 @@ def entries(mechanism: Mechanism) -> list[Entry]:
     return [*shifted, *errors.values()]
 
 
-def _numbers(mechanism: Mechanism) -> Iterator[Entry]:
+def _numbers(mechanism: Fields) -> Iterator[Entry]:
     """Every number of a mechanism but its errors."""
     yield from _walk(mechanism.dimensions, "dimensions", ("dimensions",))
     for entry in _walk(mechanism.joint_defaults, "joint_defaults", ("joint_defaults",)):
@@ -178,7 +168,7 @@ def item_name(location: Location, index: int) -> str:
     return names[index] if index < len(names) else str(index)
 
 
-def _joint_entries(mechanism: Mechanism, name: str, joint: Joint) -> Iterator[Entry]:
+def _joint_entries(mechanism: Fields, name: str, joint: Joint) -> Iterator[Entry]:
     """Numbers of a joint with its defaults: what is not its own follows `joint_defaults`."""
     rows = [row.joint for row in mechanism.loop]
     location: Location = ("loop", rows.index(name)) if name in rows else ("joints", name)
@@ -218,7 +208,7 @@ def _law_kind(friction: Friction, parameter: str) -> Kind:
     return known or Kind(parameter, wanted, f"1 {wanted}", (unit(wanted)[1],))
 
 
-def _narrow(mechanism: Mechanism, section: str, name: str, entry: Entry) -> Kind:
+def _narrow(mechanism: Fields, section: str, name: str, entry: Entry) -> Kind:
     """The kind that the place of an entry leaves of several: a slide is driven at a speed, a rotation at rad/s."""
     joint = mechanism.effective_joints.get(name)
     if section == "measures":
@@ -235,12 +225,12 @@ def _narrow(mechanism: Mechanism, section: str, name: str, entry: Entry) -> Kind
     return KINDS["length" if slides else "angle"]
 
 
-def _table_kind(mechanism: Mechanism, name: str) -> Kind:
+def _table_kind(mechanism: Fields, name: str) -> Kind:
     """What the first column of a table measures: a time, or the coordinate of the first driver."""
     return KINDS["time"] if mechanism.tables[name].over == "time" else drive_kind(mechanism)
 
 
-def _spring_kind(mechanism: Mechanism, spring: Spring, entry: Entry) -> Kind:
+def _spring_kind(mechanism: Fields, spring: Spring, entry: Entry) -> Kind:
     """A spring in a joint that turns has a torsional stiffness; every other acts along a line."""
     joint = mechanism.effective_joints.get(spring.joint or "")
     turns = joint is not None and "rotation" in freedoms(joint.type)
@@ -252,7 +242,7 @@ def _spring_kind(mechanism: Mechanism, spring: Spring, entry: Entry) -> Kind:
     return entry.kind
 
 
-def _measure_kind(mechanism: Mechanism, name: str, entry: Entry) -> Kind:
+def _measure_kind(mechanism: Fields, name: str, entry: Entry) -> Kind:
     """Of a position that of the drive or a time, else what the measure gives."""
     measure = mechanism.measures[name]
     if entry.location[2] not in ("at", "over") and not is_place(measure):
@@ -261,33 +251,13 @@ def _measure_kind(mechanism: Mechanism, name: str, entry: Entry) -> Kind:
     return place_kind(mechanism, entry.quantity, {name: one.dimensions[0] for name, one in kinds.items()})
 
 
-def evaluation_order(
-    dimensions: Mapping[str, Quantity], errors: Mapping[str, Quantity] | None = None
-) -> tuple[list[str], list[list[str]]]:
-    """Dimensions in an order in which each follows those it speaks of, and the circles that have none.
-
-    errors: deviations of some of them, which may speak of dimensions too.
-    """
-    graph = {name: {one for one in quantity.names if one in dimensions} for name, quantity in dimensions.items()}
-    for name, quantity in (errors or {}).items():
-        graph[name] |= {one for one in quantity.names if one in dimensions}
-    circles: list[list[str]] = []
-    while True:
-        try:
-            return list(TopologicalSorter(graph).static_order()), circles
-        except CycleError as error:
-            circle = list(reversed(error.args[1]))[:-1]
-            circles.append(circle)
-            graph = {name: set() if name in circle else needs for name, needs in graph.items()}
-
-
 def dimension_errors(found: Iterable[Entry]) -> dict[str, Quantity]:
     """Deviations of dimensions by the name of the dimension."""
     before = f"{ERRORS}dimensions."
     return {one.path.removeprefix(before): one.quantity for one in found if one.path.startswith(before)}
 
 
-def dimension_kinds(mechanism: Mechanism) -> dict[str, Kind]:
+def dimension_kinds(mechanism: Fields) -> dict[str, Kind]:
     """What each dimension measures, as far as its value tells."""
     known: dict[str, Dimension | None] = {}
     for name in evaluation_order(mechanism.dimensions)[0]:
@@ -301,7 +271,7 @@ def dimension_kinds(mechanism: Mechanism) -> dict[str, Kind]:
     }
 
 
-def measured(mechanism: Mechanism, found: Iterable[Entry]) -> dict[str, Kind]:
+def measured(mechanism: Fields, found: Iterable[Entry]) -> dict[str, Kind]:
     """What each number measures, by path: of a dimension, as far as its value tells."""
     of_dimensions = {f"dimensions.{name}": kind for name, kind in dimension_kinds(mechanism).items()}
     kinds = {entry.path: of_dimensions.get(entry.path, entry.kind) for entry in found}
@@ -309,24 +279,14 @@ def measured(mechanism: Mechanism, found: Iterable[Entry]) -> dict[str, Kind]:
     return {**kinds, **{path: kind for path, kind in deviations.items() if kind}}
 
 
-def nominal_dimensions(mechanism: Mechanism) -> dict[str, Number]:
-    """The dimensions without errors; nan where one has no value."""
-    order, circles = evaluation_order(mechanism.dimensions)
-    lost = {name for circle in circles for name in circle}
-    names: dict[str, Number] = {}
-    for name in order:
-        quantity = mechanism.dimensions[name]
-        sound = name not in lost and set(quantity.names) <= names.keys()
-        names[name] = quantity.evaluate(names) if sound else np.nan
-    return names
-
-
 class ParameterSet:
     """The numbers of one mechanism, compiled; `unreadable` paths are nan and so is what depends on them."""
 
-    def __init__(self, mechanism: Mechanism, unreadable: Iterable[str] = ()) -> None:
-        found = list(mechanism.entries)
-        order, _ = evaluation_order(mechanism.dimensions, dimension_errors(found))
+    def __init__(
+        self, entries: Iterable[Entry], dimensions: Mapping[str, Quantity], unreadable: Iterable[str] = ()
+    ) -> None:
+        found = list(entries)
+        order, _ = evaluation_order(dimensions, dimension_errors(found))
         place = {f"dimensions.{name}": rank for rank, name in enumerate(order)}
         last = len(place)
 

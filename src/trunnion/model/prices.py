@@ -19,7 +19,7 @@ from trunnion.model.tolerances import clearance_of, named_paths, tolerated
 from trunnion.model.units import KINDS, Kind, UnitError, unit
 
 if TYPE_CHECKING:
-    from trunnion.model.mechanism import Mechanism
+    from trunnion.model.numbers import Numbers
 
 __all__ = ["Choice", "Price", "cost_entries", "cost_paths", "prices"]
 
@@ -54,7 +54,7 @@ class Price:
     choices: tuple[Choice, ...] = ()
 
 
-def prices(mechanism: Mechanism) -> list[Price]:
+def prices(mechanism: Numbers) -> list[Price]:
     """Every cost with its numbers, in the order of the file; what `joint_defaults` states is a price of each joint.
 
     What varies as measured or over a full turn has no tolerance to choose, and no price.
@@ -66,7 +66,7 @@ def prices(mechanism: Mechanism) -> list[Price]:
     return [price(mechanism, path, cost) for path, cost in paths if path not in fixed]
 
 
-def cost_paths(mechanism: Mechanism, name: str, numbers: ParameterSet | None = None) -> list[str]:
+def cost_paths(mechanism: Numbers, name: str, numbers: ParameterSet | None = None) -> list[str]:
     """The paths that a name in `costs` means: those of numbers, or `joints.B.clearance`; none if it means nothing.
 
     numbers: those of the mechanism, where some of it could not be read.
@@ -78,7 +78,7 @@ def cost_paths(mechanism: Mechanism, name: str, numbers: ParameterSet | None = N
     return named_paths(numbers, [name])
 
 
-def price(mechanism: Mechanism, path: str, cost: Cost, numbers: ParameterSet | None = None) -> Price:
+def price(mechanism: Numbers, path: str, cost: Cost, numbers: ParameterSet | None = None) -> Price:
     """The numbers of a cost; nan where one cannot be known, which is a finding of its own."""
     numbers = numbers or mechanism.parameter_set
     names = numbers.dimension_values
@@ -97,7 +97,7 @@ def price(mechanism: Mechanism, path: str, cost: Cost, numbers: ParameterSet | N
     )
 
 
-def _choices(mechanism: Mechanism, path: str, cost: Cost, numbers: ParameterSet) -> list[Choice]:
+def _choices(mechanism: Numbers, path: str, cost: Cost, numbers: ParameterSet) -> list[Choice]:
     names = numbers.dimension_values
     if cost.options is not None:
         return [
@@ -127,7 +127,7 @@ def _number(quantity: Quantity, names: Mapping[str, Number]) -> float:
     return float(quantity.evaluate(names)) if set(quantity.names) <= names.keys() else np.nan
 
 
-def cost_entries(mechanism: Mechanism, names: ParameterNames, kinds: Mapping[str, Kind]) -> list[Entry]:
+def cost_entries(mechanism: Numbers, names: ParameterNames, kinds: Mapping[str, Kind]) -> list[Entry]:
     """Every quantity of costs and processes, with where it stands and what it has to measure."""
     listed: list[Entry] = []
 

@@ -15,10 +15,10 @@ from ruamel.yaml.error import YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.model.file import read_entries, read_mechanism, write_mechanism
-from trunnion.model.mechanism import Mechanism
+from trunnion.files import whole
+from trunnion.model.file import read_entries
+from trunnion.model.mechanism import Mechanism, read_mechanism
 from trunnion.model.named_file import stated_files
-from trunnion.output import whole
 
 __all__ = ["rewrite_mechanism"]
 
@@ -43,7 +43,7 @@ def rewrite_mechanism(
             temporary.write_text(text, encoding="utf-8", newline="\n")
             if _holds(temporary, mechanism):
                 return
-        write_mechanism(mechanism, temporary)  # a way of writing that was not foreseen: without the comments then
+        mechanism.write(temporary)  # a way of writing that was not foreseen: without the comments then
 
 
 def _holds(path: Path, mechanism: Mechanism) -> bool:

@@ -12,15 +12,15 @@ from trunnion.model.parameters import measured
 from trunnion.model.tolerances import variations
 
 if TYPE_CHECKING:
-    from trunnion.model.mechanism import Mechanism
+    from trunnion.model.numbers import Numbers
 
 __all__ = ["with_samples"]
 
 
-def with_samples(mechanism: Mechanism, name: str, path: str | os.PathLike[str]) -> dict[str, Any]:
+def with_samples(mechanism: Numbers, name: str, path: str | os.PathLike[str]) -> dict[str, Any]:
     """Plain data of the mechanism with a number that varies as the deviations in a file; limits stated are kept."""
     numbers = mechanism.parameter_set
-    target = mechanism.path_of(name)
+    target = numbers.resolve(name)
     if target not in numbers.entries:
         raise MechanismError(Finding(f"the model states no '{target}'", "--sample", "state it, then its deviations"))
     deviations = column(Path(path), measured(mechanism, numbers.entries.values())[target])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.output import reading
+from trunnion.files import reading
 
 __all__ = ["read_text"]
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, MechanismError
+from trunnion.model.assign import assign
 from trunnion.model.limit_texts import DIGITS, half_width, limits_text, number_with, written
 from trunnion.model.limits import Limits
 from trunnion.model.parameters import Entry, Location, ParameterSet, measured
@@ -24,7 +25,7 @@ from trunnion.model.tolerance_parts import DISTRIBUTIONS, Variation
 from trunnion.model.units import KINDS, Kind, UnitError
 
 if TYPE_CHECKING:
-    from trunnion.model.mechanism import Mechanism
+    from trunnion.model.numbers import Numbers
 
 __all__ = [
     "Tolerance",
@@ -73,7 +74,7 @@ class Tolerance:
         return "values" not in self.options and self.distribution != FULL_TURN
 
 
-def tolerated(mechanism: Mechanism, numbers: ParameterSet | None = None) -> list[Tolerance]:
+def tolerated(mechanism: Numbers, numbers: ParameterSet | None = None) -> list[Tolerance]:
     """Every number that varies, in the order of the parameters.
 
     numbers: those of the mechanism, where some of it could not be read.
@@ -106,7 +107,7 @@ def may_vary(entry: Entry) -> bool:
     return not entry.varies and entry.path.partition(".")[0] not in ("measures", "assembly")
 
 
-def variations(mechanism: Mechanism, numbers: ParameterSet) -> dict[str, tuple[str, Variation]]:
+def variations(mechanism: Numbers, numbers: ParameterSet) -> dict[str, tuple[str, Variation]]:
     """Name and entry of `tolerances` by path; names that mean nothing are left out, as findings of their own."""
     found: dict[str, tuple[str, Variation]] = {}
     shared: dict[str, tuple[str, Variation]] = {}
@@ -137,7 +138,7 @@ def towards(path: str, numbers: ParameterSet) -> str:
 
 
 def _tolerance(
-    mechanism: Mechanism,
+    mechanism: Numbers,
     numbers: ParameterSet,
     entry: Entry,
     stated: Variation,
@@ -160,7 +161,7 @@ def _tolerance(
     return Tolerance(entry.path, nominal, lower, upper, distribution, values, direction)
 
 
-def _distribution(mechanism: Mechanism, stated: Variation) -> tuple[str, dict[str, Quantity | tuple[Quantity, ...]]]:
+def _distribution(mechanism: Numbers, stated: Variation) -> tuple[str, dict[str, Quantity | tuple[Quantity, ...]]]:
     """Its name and what it is told; defaults are for what the distribution takes and the entry does not say."""
     defaults = mechanism.tolerance_defaults
     name = stated.distribution or defaults.distribution
@@ -189,7 +190,7 @@ def _number(quantity: Quantity, dimensions: Mapping[str, Number]) -> float:
 # ---- correlation ----------------------------------------------------------------------------------------------
 
 
-def correlation(mechanism: Mechanism, numbers: ParameterSet | None = None) -> NDArray[np.float64]:
+def correlation(mechanism: Numbers, numbers: ParameterSet | None = None) -> NDArray[np.float64]:
     """The matrix of the correlations of all tolerated numbers, in the order of `tolerated`."""
     numbers = numbers or mechanism.parameter_set
     place = {one.path: index for index, one in enumerate(tolerated(mechanism, numbers))}
@@ -217,7 +218,7 @@ def named_paths(numbers: ParameterSet, names: Iterable[str]) -> list[str]:
 # ---- other tolerances -----------------------------------------------------------------------------------------
 
 
-def clearance_of(mechanism: Mechanism, name: str, numbers: ParameterSet | None = None) -> str:
+def clearance_of(mechanism: Numbers, name: str, numbers: ParameterSet | None = None) -> str:
     """The path of the clearance that `joints.B.clearance` or `B.clearance` means, of pin or guide; empty if none.
 
     The play of a joint is meant, and not a tolerance of the number that states it, which is `joints.B.pin.clearance`.
@@ -230,15 +231,13 @@ def clearance_of(mechanism: Mechanism, name: str, numbers: ParameterSet | None =
     return next((path for path in paths if path in known), "")
 
 
-def with_tolerances(
-    mechanism: Mechanism, half_widths: Mapping[str, float | str], digits: int = DIGITS
-) -> dict[str, Any]:
+def with_tolerances(mechanism: Numbers, half_widths: Mapping[str, float | str], digits: int = DIGITS) -> dict[str, Any]:
     """Plain data of the mechanism with other half widths of tolerances, and other clearances, SI or text, by name."""
     numbers = mechanism.parameter_set
     kinds = measured(mechanism, numbers.entries.values())
     known = {one.path: one for one in tolerated(mechanism)}
     stated = variations(mechanism, numbers)
-    clearances: dict[str, float | str] = {}
+    clearances: dict[str, str] = {}
     texts: list[tuple[Location, str]] = []
     entries: dict[str, Any] = {}
     findings: list[Finding] = []
@@ -247,7 +246,7 @@ def with_tolerances(
             half = _half(told, KINDS["length"], name, findings)
             clearances[play] = written(half, KINDS["length"], digits)
             continue
-        path = mechanism.path_of(name)
+        path = numbers.resolve(name)
         tolerance = known.get(path)
         if tolerance is None or not tolerance.can_be_chosen:
             what = "has no tolerance" if tolerance is None else "varies as measured or over a full turn"
@@ -264,7 +263,10 @@ def with_tolerances(
         entries[own_key] = Variation(**{one: getattr(group, one) for one in {*variation.model_fields_set, "limits"}})
     if findings:
         raise MechanismError(findings)
-    data = (mechanism.with_values(clearances) if clearances else mechanism).data()
+    data = mechanism.data()
+    for play, text in clearances.items():
+        assign(data, numbers.entries[play].location, text, mechanism.coordinates)
+        keep_limits(mechanism, play, text, data)
     for location, text in texts:
         holder, last = _holder(data, location)
         holder[last] = text
@@ -274,7 +276,7 @@ def with_tolerances(
     return data
 
 
-def keep_limits(mechanism: Mechanism, name: str, value: Any, data: dict[str, Any]) -> None:
+def keep_limits(mechanism: Numbers, name: str, value: Any, data: dict[str, Any]) -> None:
     """Write the limits that stood with a number, as in `40 mm ± 0.02 mm`, into `tolerances` where it is replaced by one
     without: another nominal value is no other tolerance.
     """
@@ -316,7 +318,7 @@ def _half(told: float | str, kind: Kind, name: str, findings: list[Finding]) -> 
         return 0.0
 
 
-def _in_place(mechanism: Mechanism, entry: Entry, half: float, digits: int) -> tuple[Location, str] | None:
+def _in_place(mechanism: Numbers, entry: Entry, half: float, digits: int) -> tuple[Location, str] | None:
     """Where the text of a number that carries its own limits stands, and the text with others; None if it has none."""
     if entry.alias or not entry.quantity.tolerance:
         return None
@@ -344,7 +346,7 @@ def _holder(data: dict[str, Any], location: Location) -> tuple[Any, Any]:
 # ---- numbers that are no more ---------------------------------------------------------------------------------
 
 
-def kept(mechanism: Mechanism, data: Mapping[str, Any]) -> dict[str, Any]:
+def kept(mechanism: Numbers, data: Mapping[str, Any]) -> dict[str, Any]:
     """Plain data made of that of a mechanism, without errors, tolerances and costs of numbers that it no longer has.
 
     So a mechanism without friction has no tolerance of a coefficient. MechanismError if the data make no mechanism.

@@ -1,1 +1,0 @@
-"""One question each about a mechanism."""

@@ -1,0 +1,205 @@
+"""`trunnion allocate`: the tolerances and plays of least cost that keep the limits of measures."""
+
+from __future__ import annotations
+
+import os
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from trunnion.cli.model import exit_status, lines_of, placed, stated
+from trunnion.cli.options import (
+    IMAGES,
+    At,
+    File,
+    Force,
+    FrictionLaw,
+    Jobs,
+    Measures,
+    Out,
+    Report,
+    Seed,
+    Set,
+    Steps,
+    TableFile,
+    UnitsRow,
+)
+from trunnion.cli.terminal import bar, console, findings_of, say, say_missed, show_rows, wrote
+from trunnion.errors import Finding, MechanismError, Severity
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from trunnion.model.mechanism import Mechanism
+
+__all__ = ["allocate"]
+
+FEW = 2_000_000  # configurations up to which further processes cost more than they save
+STOPPED = 130
+WRITTEN = 5  # significant digits of a tolerance in the model that is written
+
+
+class Criterion(StrEnum):
+    """What is to keep the limits."""
+
+    WORST_CASE = "worst-case"
+    RSS = "rss"
+    YIELD = "yield"
+
+
+class Choice(StrEnum):
+    """What may be chosen."""
+
+    AUTO = "auto"
+    CONTINUOUS = "continuous"
+    DISCRETE = "discrete"
+
+
+def allocate(
+    file: File,
+    measure: Measures = None,
+    criterion: Annotated[
+        Criterion, typer.Option("--criterion", help="What keeps the limits: worst-case, rss or yield.")
+    ] = Criterion.WORST_CASE,
+    target: Annotated[
+        float | None, typer.Option("--yield", help="Share within all limits; sets the criterion.", show_default=False)
+    ] = None,
+    choice: Annotated[
+        Choice, typer.Option("--choice", help="continuous, discrete, or auto: as the costs are stated.")
+    ] = Choice.AUTO,
+    exact: Annotated[
+        bool, typer.Option("--exact", help="Worst case of the mechanism itself, not of first order.")
+    ] = False,
+    curve: Annotated[int, typer.Option("--curve", help="Points of cost over accuracy; none if 0.")] = 0,
+    at: At = None,
+    steps: Steps = 360,
+    samples: Annotated[int, typer.Option("--samples", help="Random mechanisms that verify it; none if 0.")] = 10_000,
+    seed: Seed = 1,
+    jobs: Jobs = None,
+    set_: Set = None,
+    table: TableFile = None,
+    friction: FrictionLaw = None,
+    write: Annotated[
+        Path | None,
+        typer.Option("--write", help="Write the model with the tolerances found: .yaml or .json.", show_default=False),
+    ] = None,
+    force: Force = False,
+    kind: Annotated[
+        str | None, typer.Option("--kind", help="Which figure: cost, trade-off, or one of `tolerance`.")
+    ] = None,
+    out: Out = None,
+    report: Report = None,
+    units_row: UnitsRow = False,
+) -> None:
+    """Tolerances and plays of least cost that keep the limits of measures, verified; what accuracy costs."""
+    from trunnion.studies.allocation.allocate import allocate as run
+    from trunnion.studies.allocation.allocated import DEFAULT_YIELD
+
+    _check(file, write, force, out or [], report, kind)
+    mechanism = stated(file, set_, table, friction)
+    by = Criterion.YIELD if target is not None else criterion
+    if jobs is None:
+        jobs = 1 if samples * steps < FEW else os.cpu_count() or 1
+    with lines_of(file), bar("samples", samples, least=1000) as progress:
+        result = run(
+            mechanism, measure, by.value, DEFAULT_YIELD if target is None else target, choice.value, steps, at, samples,
+            seed, curve, exact=exact, jobs=jobs, progress=progress,
+        )  # fmt: skip
+    written = _show(result, out or [], units_row, kind, report)
+    findings = findings_of(result)
+    if write is not None:
+        lost = _write_model(mechanism, result, file, write, force, bool(exit_status(findings)))
+        findings += lost
+        written += [] if lost else [write]
+    for path in written:
+        wrote(path)
+    say(placed(_named(findings, mechanism), file, ["measures", "joints", "tolerances", "costs"]))
+    raise typer.Exit(STOPPED if result.attrs["stopped"] else exit_status(findings))
+
+
+def _write_model(
+    mechanism: Mechanism, result: xr.Dataset, file: Path, write: Path, force: bool, failed: bool
+) -> list[Finding]:
+    """Write the model with what was found, or say why it is not written."""
+    from trunnion.model.rewrite import rewrite_mechanism
+
+    if result.attrs["found"] and not result.attrs["stopped"] and not failed:
+        rewrite_mechanism(_bought(mechanism, result), file, write, force)
+        return []
+    why = "the limits are not kept with the tolerances found" if result.attrs["found"] else "there is no allocation"
+    why = "stopped before the tolerances were verified" if result.attrs["stopped"] else why
+    return [Finding(f"'{write}' is not written: {why}", "--write", "", Severity.ERROR)]
+
+
+def _bought(mechanism: Mechanism, result: xr.Dataset) -> Mechanism:
+    """The mechanism with what was found: options as they are, all others rounded down, so that the limits hold."""
+    from trunnion.studies.allocation.allocate import half_widths
+
+    found = half_widths(result)
+    made = dict(zip(result["parameter"].values.tolist(), result["choice"].values.tolist(), strict=True))
+    options = {path: t for path, t in found.items() if made[path]}
+    others = {path: t for path, t in found.items() if not made[path]}
+    return mechanism.with_tolerances(options).with_tolerances(others, WRITTEN)
+
+
+def _check(file: Path, write: Path | None, force: bool, out: list[Path], report: Path | None, kind: str | None) -> None:
+    """MechanismError for what cannot be written, before anything is computed."""
+    from trunnion.cli.tolerance import check_files
+
+    check_files(out, report)
+    if kind is not None:
+        from trunnion.views.allocation.allocation import check_kind
+
+        check_kind(kind)
+    if write is None:
+        return
+    if write.suffix.lower() not in (".yaml", ".yml", ".json"):
+        raise MechanismError(Finding(f"a model is not written as '{write.suffix}'", "--write", "write .yaml or .json"))
+    if not force and write.exists() and file.exists() and write.samefile(file):
+        raise MechanismError(Finding(f"'{write}' is the model itself", "--write", "name another file, or add --force"))
+
+
+def _show(result: xr.Dataset, out: list[Path], units_row: bool, kind: str | None, report: Path | None) -> list[Path]:
+    """Write the files, print the tables; the files that were written."""
+    from trunnion.results.export import save
+    from trunnion.views.allocation import allocation
+    from trunnion.views.cycle import plots
+
+    written = []
+    for path in out:
+        if path.suffix.lower() not in IMAGES:
+            save(result, path, units_row)
+        elif result.attrs["found"]:
+            plots.save(allocation.figure(result, kind), path)
+        else:
+            continue
+        written.append(path)
+    if report is not None:
+        from trunnion.files import whole
+
+        text = allocation.report(result)
+        with whole(report) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+        written.append(report)
+    say_missed(result)
+    name = str(result.attrs.get("name", ""))
+    shown = allocation.tables(result)
+    if not shown:
+        console().print(f"{name}\nno allocation keeps the limits".lstrip(), markup=False, highlight=False)
+    for i, one in enumerate(shown):
+        if i:
+            console().print()
+        show_rows(f"{name}\n{one.title}" if i == 0 and name else one.title, *one[1:])
+    return written
+
+
+def _named(findings: list[Finding], mechanism: Mechanism) -> list[Finding]:
+    """Findings about costs by the names that the file has for them."""
+    from dataclasses import replace
+
+    from trunnion.model.prices import cost_paths
+
+    known = {f"costs.{path}": f"costs.{name}" for name in mechanism.costs for path in cost_paths(mechanism, name)}
+    return [replace(one, where=known.get(one.where, one.where)) for one in findings]

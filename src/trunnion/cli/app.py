@@ -1,0 +1,442 @@
+"""The command line: every verb of the library, with the same words.
+
+Exit status: 0 fine, 1 findings (cannot be assembled somewhere, locks, dead centre), 2 bad input, 3 a fault of its own.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from trunnion.cli.allocate import allocate
+from trunnion.cli.assemble import assemble
+from trunnion.cli.compare import compare
+from trunnion.cli.data import data
+from trunnion.cli.edge import status_of
+from trunnion.cli.files import guarded
+from trunnion.cli.identify import identify
+from trunnion.cli.model import exit_status, lines_of, placed, stated
+from trunnion.cli.options import (
+    IMAGES,
+    Criterion,
+    File,
+    FrictionLaw,
+    Kinds,
+    Measures,
+    Method,
+    Out,
+    Report,
+    Rounds,
+    Seats,
+    Set,
+    Steps,
+    TableFile,
+    Uncut,
+    UnitsRow,
+)
+from trunnion.cli.rig import rig
+from trunnion.cli.study import tolerance
+from trunnion.cli.sweep import sweep
+from trunnion.cli.terminal import bar, console, findings_of, say, show_figures, wrote
+from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.files import folder
+from trunnion.version import __version__
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from trunnion.model.mechanism import Mechanism
+    from trunnion.solve.friction_method import FrictionMethod
+
+app = typer.Typer(
+    name="trunnion",
+    help="The analysis of linkages as built: motion, reactions with friction, drive torque, power.",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+)
+
+
+class FileKind(StrEnum):
+    """Files that have a JSON Schema."""
+
+    MODEL = "model"
+    DATA = "data"
+
+
+def verb(function: Callable[..., None]) -> Callable[..., None]:
+    """Register a verb; what its options write is said to every reader before it begins."""
+    app.command()(guarded(function))
+    return function
+
+
+@verb
+def check(
+    file: File,
+    set_: Set = None,
+    table: TableFile = None,
+    friction: FrictionLaw = None,
+    assemblies: Annotated[
+        Path | None,
+        typer.Option(
+            "--assemblies",
+            help="Also draw the ways in which each group can be assembled: a .png, .svg or .pdf file.",
+            show_default=False,
+        ),
+    ] = None,
+) -> None:
+    """Findings, mobility, structural formula and plan of a mechanism, and the ways it can be assembled in."""
+    from trunnion.cycle.inspect import check as inspect
+    from trunnion.views.assembly.ways import gear_line, lines
+
+    if assemblies:
+        from trunnion.views.cycle.plots import check_figure
+
+        check_figure(assemblies)
+    mechanism = stated(file, set_, table, friction)
+    with lines_of(file):
+        found = inspect(mechanism)
+    rank = "not known: no position can be assembled" if found.rank_mobility is None else str(found.rank_mobility)
+    out = console()
+    out.print(mechanism.name or file.name, style="bold", markup=False)
+    out.print(f"mobility {found.mobility} by formula, {rank} by rank; drivers: {len(mechanism.drivers)}", markup=False)
+    out.print(f"formula  {found.formula or '(no moving link)'}", markup=False)
+    for number, (module, count) in enumerate(zip(found.plan.modules, found.assemblies, strict=True)):
+        ways = "" if module.rank == 1 else f", {count} {'assembly' if count == 1 else 'assemblies'}"
+        solver = "general group" if module.kind == "general" else "closed form"
+        joints = ", ".join(module.joints)
+        out.print(
+            f"  {module.label:<24} links {', '.join(module.links)}; joints {joints}; {solver}{ways}",
+            markup=False, soft_wrap=True,
+        )  # fmt: skip
+        for choice in (one for one in found.choices if one.module == number):
+            for line in lines(choice):
+                out.print(f"    {line}", markup=False, highlight=False, soft_wrap=True)
+    for pair in found.gears:
+        out.print(f"gears    {gear_line(pair)}", markup=False, highlight=False, soft_wrap=True)
+    say(placed(found.findings, file, ["assembly"]))
+    if assemblies:
+        from trunnion.views.assembly.drawings import ways as drawings
+        from trunnion.views.cycle.plots import save
+
+        save(drawings(mechanism, found.choices), assemblies)
+        wrote(assemblies)
+    raise typer.Exit(exit_status(found.findings))
+
+
+@verb
+def analyse(
+    file: File,
+    steps: Steps = 360,
+    set_: Set = None,
+    table: TableFile = None,
+    friction: FrictionLaw = None,
+    seat: Seats = None,
+    method: Method = "newton",
+    criterion: Criterion = None,
+    iterations: Rounds = 200,
+    out: Annotated[
+        list[Path] | None, typer.Option("--out", help="Write the result: .csv .json .nc .zarr .parquet. Repeatable.")
+    ] = None,
+    report: Report = None,
+    units_row: UnitsRow = False,
+    uncut: Uncut = False,
+) -> None:
+    """Motion, reactions with friction, drive effort and power over the cycle."""
+    from trunnion.results.export import check_format, save
+
+    for path in out or []:
+        check_format(path)
+    mechanism = stated(file, set_, table, friction, seat)
+    with lines_of(file):
+        result = _run(mechanism, steps, _method(method, criterion, iterations))
+    for path in out or []:
+        save(result, path, units_row)
+    if report:
+        _write_report(mechanism, result, report, uncut)
+    _summary(result, file)
+    for path in [*(out or []), *([report] if report else [])]:
+        wrote(path)
+    raise typer.Exit(exit_status(findings_of(result)))
+
+
+@verb
+def design(
+    file: File,
+    steps: Steps = 720,
+    set_: Set = None,
+    table: TableFile = None,
+    friction: FrictionLaw = None,
+    fluctuation: Annotated[float, typer.Option("--fluctuation", help="Of the drive speed, for the flywheel.")] = 0.05,
+) -> None:
+    """Transmission angles, dead centres, range, Grashof type, shaking force, balance, flywheel, motor."""
+    from trunnion.studies.design import report_rows
+
+    mechanism = stated(file, set_, table, friction)
+    with lines_of(file):
+        rows = report_rows(mechanism, steps, fluctuation)
+    show_figures(mechanism.name or str(file), rows)
+
+
+@verb
+def locking(
+    file: File, steps: Steps = 360, set_: Set = None, table: TableFile = None, friction: FrictionLaw = None
+) -> None:
+    """How close to locking, by all friction and by each joint's; other solutions; whether it can be driven backward."""
+    from trunnion.cycle.locking import look, report_rows
+    from trunnion.solve.run import prepare
+
+    mechanism = stated(file, set_, table, friction)
+    with lines_of(file):
+        run = prepare(mechanism)
+        found = look(run, steps)
+    show_figures(mechanism.name or str(file), report_rows(run, found))
+    say(placed(findings_of(found), file, ["assembly"]))
+    raise typer.Exit(exit_status(findings_of(found)))
+
+
+verb(assemble)
+verb(tolerance)
+verb(allocate)
+verb(data)
+verb(rig)
+verb(compare)
+verb(identify)
+verb(sweep)
+
+
+@verb
+def play(
+    file: File,
+    measure: Measures = None,
+    steps: Steps = 360,
+    set_: Set = None,
+    table: TableFile = None,
+    friction: FrictionLaw = None,
+    out: Out = None,
+    units_row: UnitsRow = False,
+    uncut: Uncut = False,
+) -> None:
+    """What the play of every joint does to measures: worst case, share of each joint, standard deviation."""
+    from trunnion.cli.play import check_files, show
+    from trunnion.studies.play.study import play as run
+
+    check_files(out or [])
+    mechanism = stated(file, set_, table, friction)
+    with lines_of(file):
+        result = run(mechanism, measure, steps)
+    show(mechanism, result, out or [], units_row, uncut)
+    say(placed(findings_of(result), file, ["measures", "joints"]))
+    raise typer.Exit(exit_status(findings_of(result)))
+
+
+@verb
+def plot(
+    file: File,
+    out: Annotated[Path, typer.Option("--out", help="Folder, or a .png, .svg or .pdf file of one plot.")],
+    kind: Kinds = None,
+    steps: Steps = 360,
+    set_: Set = None,
+    table: TableFile = None,
+    friction: FrictionLaw = None,
+    seat: Seats = None,
+    image: Annotated[str, typer.Option("--format", help="png, svg or pdf, for a folder of plots.")] = "png",
+    uncut: Uncut = False,
+) -> None:
+    """Figures: drive torque, friction power, reactions, polar diagram, mechanism with coupler curve."""
+    from trunnion.views.common.peaks import whole_peaks
+    from trunnion.views.cycle.error_plot import with_worst_case
+    from trunnion.views.cycle.plots import PLOTS, drawable, save
+
+    unknown = [name for name in kind or [] if name not in PLOTS]
+    if unknown:
+        raise MechanismError(Finding(f"there is no plot '{unknown[0]}'", "--kind", f"use one of {', '.join(PLOTS)}"))
+    single = out.suffix.lower() in IMAGES
+    if single and len(kind or PLOTS) > 1:
+        what = f"{len(kind or PLOTS)} plots do not fit one file"
+        raise MechanismError(Finding(what, str(out), "name a folder, or one --kind"))
+    mechanism = stated(file, set_, table, friction, seat)
+    with lines_of(file):
+        result = _run(mechanism, steps, None)
+    ideal = _ideal(mechanism, steps, None)
+    if not single:
+        folder(out)
+    shown = whole_peaks(with_worst_case(result, mechanism) if "error" in (kind or PLOTS) else result, uncut)
+    for name, figure in [(name, PLOTS[name](shown, ideal)) for name in kind or drawable(result)]:
+        path = out if single else out / f"{name}.{image.lstrip('.')}"
+        save(figure, path)
+        wrote(path)
+    said = [finding for finding in findings_of(result) if finding.severity is not Severity.NOTE]
+    say(placed(said, file, ["assembly"]))
+    raise typer.Exit(exit_status(findings_of(result)))
+
+
+@verb
+def report(
+    file: File,
+    out: Annotated[Path, typer.Option("--out", help="The HTML file to write.")],
+    steps: Steps = 360,
+    set_: Set = None,
+    table: TableFile = None,
+    friction: FrictionLaw = None,
+    seat: Seats = None,
+    method: Method = "newton",
+    criterion: Criterion = None,
+    iterations: Rounds = 200,
+    uncut: Uncut = False,
+) -> None:
+    """One self-contained HTML file: animation, plots, findings, balance, input data."""
+    if out.suffix.lower() not in (".html", ".htm"):
+        what = f"a report is HTML, '{out.name}' is not"
+        raise MechanismError(Finding(what, "--out", "write a .html file and print it"))
+    mechanism = stated(file, set_, table, friction, seat)
+    with lines_of(file):
+        result = _run(mechanism, steps, _method(method, criterion, iterations))
+    _write_report(mechanism, result, out, uncut)
+    wrote(out)
+    raise typer.Exit(exit_status(findings_of(result)))
+
+
+@verb
+def examples(
+    name: Annotated[str | None, typer.Argument(help="Example to copy out; all are listed if not given.")] = None,
+    to: Annotated[Path, typer.Option("--to", help="Folder to copy it into.")] = Path(),
+    force: Annotated[bool, typer.Option("--force", help="Overwrite a file of that name.")] = False,
+) -> None:
+    """List the example models and rig files, or copy one out."""
+    found = _examples()
+    if name is None:
+        for path in found.values():
+            title = next(
+                (line[5:].strip() for line in path.read_text("utf-8").splitlines() if line.startswith("name:")), ""
+            )
+            console().print(f"{path.stem:<28} {title}", markup=False, highlight=False, soft_wrap=True)
+        return
+    source = found.get(name.removesuffix(".yaml"))
+    if source is None:
+        raise MechanismError(Finding(f"there is no example '{name}'", remedy=f"use one of {', '.join(found)}"))
+    from trunnion.files import whole
+
+    folder(to)
+    target = to / source.name
+    if target.exists() and not force:
+        raise MechanismError(Finding("exists already", str(target), "use --force to overwrite it"))
+    with whole(target) as temporary:
+        temporary.write_bytes(source.read_bytes())
+    wrote(target)
+
+
+@verb
+def schema(
+    of: Annotated[
+        FileKind, typer.Option("--of", help="Of which file: a model, or data: the mapping.")
+    ] = FileKind.MODEL,
+    out: Annotated[Path | None, typer.Option("--out", help="Write it to a file.", show_default=False)] = None,
+) -> None:
+    """The JSON Schema of the model file or the mapping file, for editors that complete and check as you type."""
+    if of is FileKind.DATA:
+        from trunnion.rig.reading.schema import schema_text
+
+        text = schema_text()
+    else:
+        from trunnion.model.schema import SCHEMA_FILE
+
+        text = SCHEMA_FILE.read_text("utf-8")
+    if out is None:
+        print(text, end="")
+        return
+    from trunnion.files import whole
+
+    with whole(out) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def _version(show: bool) -> None:
+    if show:
+        print(f"trunnion {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
+    ] = False,
+    debug: Annotated[
+        bool, typer.Option("--debug", help="Show where a fault of the program itself arose. With any verb.")
+    ] = False,
+) -> None:
+    """Options of the program itself."""
+
+
+def main() -> None:
+    """Run the command line; every failure is a message and an exit status, never a traceback."""
+    for stream in (sys.stdout, sys.stderr):  # names may be Greek whatever the terminal's code page is
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(encoding="utf-8", errors="replace")
+    words = sys.argv[1:]
+    told = words.index("--") if "--" in words else len(words)
+    debug = "--debug" in words[:told]  # before or behind the verb
+    sys.argv[1:] = [word for place, word in enumerate(words) if word != "--debug" or place > told]
+    sys.exit(status_of(app, debug))
+
+
+# ---- shared by the verbs --------------------------------------------------------------------------------------
+
+
+def _method(name: str, criterion: float | None, iterations: int) -> FrictionMethod:
+    from trunnion.solve.friction import method_named
+
+    return method_named(name, criterion, iterations)
+
+
+def _run(mechanism: Mechanism, steps: int, method: FrictionMethod | None) -> xr.Dataset:
+    """Analyse, with a progress bar when it takes long enough to need one."""
+    from trunnion.cycle.analyse import analyse as run
+
+    with bar("positions", steps, least=200_000) as progress:
+        return run(mechanism, steps, method, progress)
+
+
+def _ideal(mechanism: Mechanism, steps: int, method: FrictionMethod | None) -> xr.Dataset | None:
+    """The same without friction, to compare with; None if there is none."""
+    if all(joint.friction is None for joint in mechanism.effective_joints.values()):
+        return None
+    return _run(mechanism.with_friction("off"), steps, method)
+
+
+def _write_report(mechanism: Mechanism, result: xr.Dataset, path: Path, uncut: bool) -> None:
+    from trunnion.files import whole
+    from trunnion.views.common.peaks import whole_peaks
+    from trunnion.views.cycle.error_plot import with_worst_case
+    from trunnion.views.cycle.report import report as page
+
+    shown = whole_peaks(with_worst_case(result, mechanism), uncut)
+    text = page(shown, _ideal(mechanism, result.sizes["position"], None))
+    with whole(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def _summary(result: xr.Dataset, file: Path) -> None:
+    """The short table of an analysis, and its findings."""
+    import json
+
+    show_figures(f"{result.attrs['name']}\n{result.attrs['formula']}", json.loads(result.attrs["summary"]))
+    say(placed(findings_of(result), file, ["assembly"]))
+
+
+def _examples() -> dict[str, Path]:
+    """Example models and rigs by name: beside the installed package, or in the source tree."""
+    here = Path(__file__).resolve().parent.parent
+    folder = here / "examples" if (here / "examples").is_dir() else here.parents[1] / "examples"
+    return {path.stem: path for path in (*sorted(folder.glob("*.yaml")), *sorted(folder.glob("rig/*-rig.yaml")))}
+
+
+if __name__ == "__main__":
+    main()

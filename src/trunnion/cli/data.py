@@ -1,0 +1,53 @@
+"""`trunnion data`: what a mapping makes of measured files, and what is wrong with them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from trunnion.cli.inputs import spare_data
+from trunnion.cli.options import UnitsRow
+from trunnion.cli.terminal import console, say, show_rows, wrote
+from trunnion.errors import Severity
+
+__all__ = ["data"]
+
+
+def data(
+    mapping: Annotated[Path, typer.Argument(help="Mapping file: YAML, JSON or TOML.", show_default=False)],
+    files: Annotated[
+        list[Path] | None,
+        typer.Argument(help="Data files instead of those it names: .csv .parquet .tdms.", show_default=False),
+    ] = None,
+    out: Annotated[
+        list[Path] | None,
+        typer.Option("--out", help="Write the mean courses: .csv .json .nc .zarr .parquet. Repeatable."),
+    ] = None,
+    units_row: UnitsRow = False,
+) -> None:
+    """Measured files, read by a mapping: conditions, channels, scatter and uncertainty, and faults by name."""
+    from trunnion.results.export import check_format, save
+    from trunnion.rig.reading.read import read_measured
+    from trunnion.rig.reading.table import dataset
+    from trunnion.views.rig.measured import tables
+
+    for path in out or []:
+        check_format(path)
+    spare_data(mapping, files, out)
+    measurement = read_measured(mapping, files)
+    for i, one in enumerate(tables(measurement)):
+        if i:
+            console().print()
+        show_rows(*one)
+    if measurement.done:
+        console().print()
+    for sentence in measurement.done:
+        console().print(sentence, markup=False, highlight=False, soft_wrap=True)
+    for path in out or []:
+        save(dataset(measurement), path, units_row)
+        wrote(path)
+    say(measurement.findings)
+    faulty = any(finding.severity is not Severity.NOTE for finding in measurement.findings)
+    raise typer.Exit(1 if faulty else 0)

@@ -1,0 +1,50 @@
+"""What every verb writes: the files that its options name, said before it begins, so that none is one that it reads."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, get_args, get_type_hints
+
+from typer.models import OptionInfo
+
+from trunnion.files import Target, writing
+
+__all__ = ["guarded", "outputs"]
+
+IN_PLACE = "write"  # the one option that may name the model itself; the verb asks for --force then
+MODEL = "file"
+
+
+def guarded(verb: Callable[..., None]) -> Callable[..., None]:
+    """The verb, run so that nothing it writes is something it reads, and no two outputs are one file."""
+    names = outputs(verb)
+
+    @functools.wraps(verb)
+    def run(*arguments: Any, **options: Any) -> None:
+        with writing(list(_targets(names, options))):
+            verb(*arguments, **options)
+
+    return run
+
+
+def outputs(verb: Callable[..., None]) -> list[str]:
+    """The parameters that name files to be written: every option that takes a path. Inputs are arguments or texts."""
+    hints = get_type_hints(verb, include_extras=True)
+    return [name for name, hint in hints.items() if _is_option(hint) and _takes_path(hint)]
+
+
+def _is_option(hint: Any) -> bool:
+    return any(isinstance(one, OptionInfo) for one in getattr(hint, "__metadata__", ()))
+
+
+def _takes_path(hint: Any) -> bool:
+    return hint is Path or any(_takes_path(one) for one in get_args(hint))
+
+
+def _targets(names: list[str], options: dict[str, Any]) -> Iterator[Target]:
+    for name in names:
+        given = options.get(name)
+        for path in given if isinstance(given, list) else [given] if given is not None else []:
+            yield Target(f"--{name.strip('_')}", path, options.get(MODEL) if name == IN_PLACE else None)

@@ -1,0 +1,272 @@
+"""`trunnion identify`: numbers of the model from measured data, with what they are worth."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from trunnion.cli.inputs import spare_data
+from trunnion.cli.model import exit_status, lines_of, placed, stated
+from trunnion.cli.options import (
+    IMAGES,
+    DataFiles,
+    File,
+    Force,
+    FrictionLaw,
+    MappingFile,
+    Out,
+    Report,
+    Seats,
+    Set,
+    TableFile,
+    UnitsRow,
+    setting,
+)
+from trunnion.cli.terminal import console, findings_of, say, show_rows, wrote
+from trunnion.cli.tolerance import PAGES
+from trunnion.errors import Finding, MechanismError, Severity, counted
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from trunnion.model.mechanism import Mechanism
+
+__all__ = ["identify"]
+
+MOST_ROWS = 24
+
+Parameters = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--parameter",
+        help="A number of the model, as in --set; NAME=PATH,PATH,… for several that are one unknown. Repeatable.",
+        show_default=False,
+    ),
+]
+Channels = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--channel",
+        help="A channel by its name in the mapping, or efficiency. Repeatable; if not given, all that tell.",
+        show_default=False,
+    ),
+]
+Starting = Annotated[
+    list[str] | None,
+    typer.Option("--start", help="NAME=VALUE: where the search begins; the model's value if not given."),
+]
+HeldOut = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--hold-out",
+        help="A condition by its name, or a share of the turns such as 0.2, to predict instead of fit. Repeatable.",
+        show_default=False,
+    ),
+]
+Sensors = Annotated[
+    str,
+    typer.Option("--sensors", help="Zero and gain of a channel are off alike in a whole channel, or condition."),
+]
+Delay = Annotated[
+    str | None,
+    typer.Option(
+        "--delay",
+        help="By which channels may lag behind the angle: 0.2ms, a standard uncertainty.",
+        show_default=False,
+    ),
+]
+Guard = Annotated[
+    int | None,
+    typer.Option("--guard", help="Positions left out on each side where a friction turns round.", show_default=False),
+]
+Starts = Annotated[
+    int | None,
+    typer.Option("--starts", help="Places to begin at; more than one if the model does not fit.", show_default=False),
+]
+Write = Annotated[
+    Path | None,
+    typer.Option("--write", help="Write the model with the estimates: .yaml or .json.", show_default=False),
+]
+Kind = Annotated[
+    str | None,
+    typer.Option("--kind", help="Which figure: intervals, correlation or residuals.", show_default=False),
+]
+
+
+def identify(
+    file: File,
+    mapping: MappingFile,
+    data: DataFiles = None,
+    parameter: Parameters = None,
+    channel: Channels = None,
+    start: Starting = None,
+    hold_out: HeldOut = None,
+    sensors: Sensors = "channel",
+    delay: Delay = None,
+    guard: Guard = None,
+    starts: Starts = None,
+    set_: Set = None,
+    table: TableFile = None,
+    friction: FrictionLaw = None,
+    seat: Seats = None,
+    write: Write = None,
+    force: Force = False,
+    kind: Kind = None,
+    out: Out = None,
+    report: Report = None,
+    units_row: UnitsRow = False,
+) -> None:
+    """Numbers of the model from measured data: estimates, 95 % intervals, what the data cannot tell apart."""
+    from trunnion.rig.compare.said import gathered
+    from trunnion.rig.identify import identify as run
+    from trunnion.rig.reading.read import read_measured
+
+    _check(file, write, force, out or [], report, kind)
+    spare_data(mapping, data, out, report, file, table, write)
+    mechanism = stated(file, set_, table, friction, seat)
+    with lines_of(file):
+        wanted, begin = parameters(parameter or []), dict(setting(text) for text in start or ())
+        held, late = held_out(hold_out or []), seconds(delay)
+        measurement = read_measured(mapping, [str(path) for path in data] if data else None)
+        result = run(mechanism, measurement, wanted, channel, begin, held, sensors, late, guard, starts)  # type: ignore[arg-type]
+    written = _write(result, out or [], report, kind, units_row)
+    _tables(result)
+    findings = findings_of(result)
+    found = gathered(  # of the notes those that tell what was set
+        one for one in measurement.findings if one.severity is not Severity.NOTE or one.where == "files"
+    )
+    if write is not None:
+        findings += _write_model(mechanism, result, file, write, force, written)
+    for path in written:
+        wrote(path)
+    say(found)
+    say(placed(findings, file, ["assembly", "measures"]))
+    raise typer.Exit(exit_status([*found, *findings]))
+
+
+def parameters(texts: list[str]) -> dict[str, list[str]]:
+    """Paths by the name of the unknown, from NAME or NAME=PATH,PATH."""
+    found: dict[str, list[str]] = {}
+    for text in texts:
+        name, equals, paths = (part.strip() for part in text.partition("="))
+        own = [one.strip() for one in paths.split(",")] if equals else [name]
+        if not name or not all(own):
+            remedy = "write NAME, or NAME=PATH,PATH, e.g. pins=pin-1.friction.coefficient,pin-2.friction.coefficient"
+            raise MechanismError(Finding(f"'{text}' names no number", "--parameter", remedy))
+        if name in found:
+            raise MechanismError(Finding(f"'{name}' is given twice", "--parameter", "give all its numbers at once"))
+        found[name] = own
+    if not found:
+        remedy = "add --parameter joint_defaults.friction.coefficient, or another number of the model"
+        raise MechanismError(Finding("there is nothing to identify", "--parameter", remedy))
+    return found
+
+
+def seconds(text: str | None) -> float | None:
+    """A time above 0 in s, from a number or a text with its unit."""
+    from trunnion.model.quantity import Quantity
+    from trunnion.model.units import KINDS, UnitError
+
+    if text is None:
+        return None
+    try:
+        found = float(Quantity.read(_plain(text), KINDS["time"]).evaluate())
+    except UnitError as error:
+        raise MechanismError(Finding(error.what, "--delay", error.remedy)) from None
+    if not found > 0:
+        raise MechanismError(Finding(f"a delay of {text} is not above 0", "--delay", "write one such as 0.2ms"))
+    return found
+
+
+def _plain(text: str) -> float | str:
+    try:
+        return float(text)
+    except ValueError:
+        return text
+
+
+def held_out(texts: list[str]) -> float | list[str] | None:
+    """A share of the turns, or names of conditions."""
+    if len(texts) == 1:
+        try:
+            return float(texts[0])
+        except ValueError:
+            return texts
+    return texts or None
+
+
+def _check(file: Path, write: Path | None, force: bool, out: list[Path], report: Path | None, kind: str | None) -> None:
+    """MechanismError for what cannot be written, before anything is read."""
+    from trunnion.results.export import check_format
+    from trunnion.views.identify.figure import check_kind
+
+    for path in out:
+        if path.suffix.lower() not in IMAGES:
+            check_format(path, IMAGES)
+    if kind is not None:
+        check_kind(kind)
+    if report is not None and report.suffix.lower() not in PAGES:
+        what = f"a report is HTML, '{report.name}' is not"
+        raise MechanismError(Finding(what, "--report", "write a .html file and print it"))
+    if write is None:
+        return
+    if write.suffix.lower() not in (".yaml", ".yml", ".json"):
+        raise MechanismError(Finding(f"a model is not written as '{write.suffix}'", "--write", "write .yaml or .json"))
+    if not force and write.exists() and file.exists() and write.samefile(file):
+        raise MechanismError(Finding(f"'{write}' is the model itself", "--write", "name another file, or add --force"))
+
+
+def _write(result: xr.Dataset, out: list[Path], report: Path | None, kind: str | None, units_row: bool) -> list[Path]:
+    """Write the files; which were written."""
+    from trunnion.files import whole
+    from trunnion.results.export import save
+    from trunnion.views.cycle import plots
+    from trunnion.views.identify.figure import figure
+
+    for path in out:
+        if path.suffix.lower() in IMAGES:
+            plots.save(figure(result, kind), path)
+        else:
+            save(result, path, units_row)
+    if report is None:
+        return list(out)
+    from trunnion.views.identify.report import report as page
+
+    text = page(result)
+    with whole(report) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    return [*out, report]
+
+
+def _tables(result: xr.Dataset) -> None:
+    """What was found; of long tables the first rows."""
+    from trunnion.views.identify.tables import tables
+
+    for i, table in enumerate(tables(result)):
+        if i:
+            console().print()
+        name = str(result.attrs["name"])
+        show_rows(f"{name}\n{table.title}" if i == 0 and name else table.title, table.head, table.rows[:MOST_ROWS])
+        if len(table.rows) > MOST_ROWS:
+            told = f"{counted(len(table.rows) - MOST_ROWS, 'row')} more; --out FILE.residuals.csv has all"
+            console().print(told, markup=False, highlight=False)
+
+
+def _write_model(
+    mechanism: Mechanism, result: xr.Dataset, file: Path, write: Path, force: bool, written: list[Path]
+) -> list[Finding]:
+    """The model with the estimates; findings about what is not in it."""
+    from trunnion.model.rewrite import rewrite_mechanism
+    from trunnion.rig.identify import with_estimates
+
+    lost = [str(name) for name, told in zip(result["parameter"].values, result["told"].values, strict=True) if not told]
+    if len(lost) == result.sizes["parameter"] or not result.attrs["converged"]:
+        why = "the data tell none of the parameters" if result.attrs["converged"] else "the search did not end"
+        return [Finding(f"'{write}' is not written: {why}", "--write", "", Severity.ERROR)]
+    rewrite_mechanism(with_estimates(mechanism, result), file, write, force)
+    written.append(write)
+    if not lost:
+        return []
+    return [Finding(f"{', '.join(lost)} stay as they are: the data do not tell them", "--write", "", Severity.NOTE)]

@@ -1,0 +1,107 @@
+"""`trunnion tolerance`: what tolerances and plays do to measures, and which of them does it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from trunnion.cli.model import exit_status, lines_of, placed, stated
+from trunnion.cli.options import (
+    At,
+    File,
+    FrictionLaw,
+    Jobs,
+    Measures,
+    Out,
+    Report,
+    Seed,
+    Set,
+    Steps,
+    TableFile,
+    UnitsRow,
+    named_file,
+)
+from trunnion.cli.terminal import bar, findings_of, say
+
+__all__ = ["tolerance"]
+
+STOPPED = 130
+
+Methods = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--method",
+        help="linear, worst-case, monte-carlo, quasi-monte-carlo, sobol. Repeatable; the first three if not given.",
+        show_default=False,
+    ),
+]
+Samples = Annotated[
+    list[str] | None,
+    typer.Option("--sample", help="NAME=FILE.csv: measured deviations of a number, one column. Repeatable."),
+]
+Cluster = Annotated[
+    str | None,
+    typer.Option("--cluster", help="Address of a Dask scheduler, or local.", show_default=False),
+]
+Kind = Annotated[
+    str | None,
+    typer.Option("--kind", help="One figure alone: histogram, contributions, envelope, convergence or sobol."),
+]
+
+
+def tolerance(
+    file: File,
+    measure: Measures = None,
+    at: At = None,
+    method: Methods = None,
+    target: Annotated[
+        float | None,
+        typer.Option(
+            "--yield", help="Share within limits that is asked for; none: the worst case too.", show_default=False
+        ),
+    ] = None,
+    samples: Annotated[int, typer.Option("--samples", help="Random mechanisms.")] = 10_000,
+    seed: Seed = 1,
+    steps: Steps = 360,
+    jobs: Jobs = None,
+    chunk: Annotated[
+        int | None, typer.Option("--chunk", help="Samples handed out at a time; about a second's.", show_default=False)
+    ] = None,
+    engine: Annotated[str, typer.Option("--engine", help="numpy, or jax: compiled, for large batches.")] = "numpy",
+    cluster: Cluster = None,
+    checkpoint: Annotated[
+        Path | None, typer.Option("--checkpoint", help="File that keeps what is done.", show_default=False)
+    ] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on from the checkpoint.")] = False,
+    set_: Set = None,
+    table: TableFile = None,
+    friction: FrictionLaw = None,
+    sample: Samples = None,
+    kind: Kind = None,
+    out: Out = None,
+    report: Report = None,
+    units_row: UnitsRow = False,
+) -> None:
+    """What tolerances and plays do to measures: worst case, RSS, scatter, yield, contributions."""
+    from trunnion.cli.tolerance import check_files, show
+    from trunnion.studies.tolerance.sampling import METHODS as SAMPLINGS
+    from trunnion.studies.tolerance.study import DEFAULT_METHODS
+    from trunnion.studies.tolerance.study import tolerance as run
+
+    check_files(out or [], report, kind)
+    mechanism = stated(file, set_, table, friction)
+    for text in sample or []:
+        mechanism = mechanism.with_samples(*named_file(text, "--sample"))
+    methods = tuple(method or DEFAULT_METHODS)
+    counted = samples if any(one in SAMPLINGS for one in methods) else 0
+    with lines_of(file), bar("samples", counted, least=1000) as progress:
+        result = run(
+            mechanism, measure, methods, samples, seed, steps, at, jobs=jobs, chunk=chunk, engine=engine,
+            cluster=cluster, checkpoint=checkpoint, resume=resume, progress=progress, target=target,
+        )  # fmt: skip
+    show(mechanism, result, out or [], units_row, kind, report)
+    findings = findings_of(result)
+    say(placed(findings, file, ["measures", "joints", "tolerances"]))
+    raise typer.Exit(STOPPED if result.attrs["stopped"] else exit_status(findings))

@@ -1,0 +1,181 @@
+"""`trunnion sweep`: figures of the cycle over a grid of numbers of the model, as tables, files, curves and maps."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from trunnion.cli.model import exit_status, lines_of, placed, stated
+from trunnion.cli.options import (
+    IMAGES,
+    File,
+    FrictionLaw,
+    Out,
+    Seats,
+    Set,
+    Steps,
+    TableFile,
+    Uncut,
+    UnitsRow,
+    over,
+    points,
+)
+from trunnion.cli.terminal import bar, console, findings_of, say, show_rows, wrote
+from trunnion.errors import Finding, MechanismError, counted
+from trunnion.files import folder
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from trunnion.model.mechanism import Mechanism
+
+__all__ = ["sweep"]
+
+Over = Annotated[
+    list[str],
+    typer.Option(
+        "--over",
+        help="NAME=FROM:TO:COUNT or NAME=VALUE,VALUE,…: misalignment=0deg:30deg:16. Repeatable.",
+        show_default=False,
+    ),
+]
+Drawn = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--measure",
+        help="What is shown, by its name in the CSV file: A.effort_max, or a measure of the model. Repeatable.",
+        show_default=False,
+    ),
+]
+Along = Annotated[
+    str | None,
+    typer.Option("--x", help="The swept name along the axis and down the table; the first if not given."),
+]
+Family = Annotated[
+    str | None,
+    typer.Option(
+        "--family", help="The swept name that tells the curves, or upwards in a map; the second if not given."
+    ),
+]
+Kind = Annotated[str, typer.Option("--kind", help="curves, or map: contours over two of the names.")]
+Margin = Annotated[
+    bool, typer.Option("--margin", help="Look for the locking margin too; takes many times as long as all else.")
+]
+Picture = Annotated[str, typer.Option("--format", help="png, svg or pdf, for a folder of figures.")]
+
+
+def sweep(
+    file: File,
+    over_: Over,
+    measure: Drawn = None,
+    x: Along = None,
+    family: Family = None,
+    kind: Kind = "curves",
+    margin: Margin = False,
+    steps: Steps = 360,
+    set_: Set = None,
+    table: TableFile = None,
+    friction: FrictionLaw = None,
+    seat: Seats = None,
+    out: Out = None,
+    image: Picture = "png",
+    units_row: UnitsRow = False,
+    uncut: Uncut = False,
+) -> None:
+    """How efficiency, drive effort, reactions, friction and locking margin change with numbers of the model."""
+    from trunnion.studies.sweep.study import sweep as run
+    from trunnion.views.sweep.swept import check_measure
+
+    grid = over(over_)
+    measures = list(dict.fromkeys(measure or ["efficiency"]))
+    _check_figures(grid, x or "", family or "", kind)
+    files = _files(out or [], measures, image)
+    mechanism = stated(file, set_, table, friction, seat, {name: values[0] for name, values in grid.items()})
+    own = check_measure(measures, mechanism)
+    with lines_of(file), bar("points", points(grid)) as progress:
+        margin = margin or "locking_margin" in measures
+        result = run(mechanism, grid, steps, progress=progress, margin=margin, measures=own)
+    _write(result, out or [], files, (x or "", family or "", kind), units_row, uncut)
+    _show(result, mechanism, file, measures, x or "", family or "")
+    say(placed(findings_of(result), file, ["assembly"]))
+    for path in files:
+        wrote(path)
+    raise typer.Exit(exit_status(findings_of(result)))
+
+
+def _check_figures(grid: Mapping[str, Any], x: str, family: str, kind: str) -> None:
+    """MechanismError for figures that cannot be drawn of a grid, before anything is computed."""
+    from trunnion.views.sweep.figure import check_kind
+    from trunnion.views.sweep.swept import check_axes
+
+    check_kind(kind)
+    counts = {name: points({name: values}) for name, values in grid.items()}
+    check_axes(counts, x, family)
+    if kind == "map" and sum(count > 1 for count in counts.values()) < 2:
+        what = "a map needs two names that vary"
+        raise MechanismError(Finding(what, "--kind", "give --over twice, with several values each, or draw curves"))
+
+
+def _files(out: Sequence[Path], measures: Sequence[str], image: str) -> dict[Path, str]:
+    """Every file to write, with the measure that it draws, "" for the numbers; a path without extension is a folder.
+
+    MechanismError for what cannot be written.
+    """
+    from trunnion.results.export import FORMATS, check_format
+    from trunnion.views.cycle.plots import check_figure
+
+    found: dict[Path, str] = {}
+    for path in out:
+        kind = path.suffix.lower()
+        if kind in IMAGES and len(measures) > 1:
+            what = f"{len(measures)} figures do not fit one file"
+            raise MechanismError(Finding(what, str(path), "name a folder, or one --measure"))
+        if kind in IMAGES:
+            found[path] = measures[0]
+        elif kind in FORMATS or (kind and not path.is_dir()):
+            check_format(path, IMAGES)
+            found[path] = ""
+        else:
+            names = [f"{_plain(name)}.{image.lower().lstrip('.')}" for name in measures]
+            check_figure(path / names[0])
+            found |= {path / name: one for name, one in zip(names, measures, strict=True)}
+    return found
+
+
+def _plain(name: str) -> str:
+    """A measure as the name of a file: signs that some file systems refuse are replaced."""
+    return "".join("_" if sign in '/\\:*?"<>| ' else sign for sign in name)
+
+
+def _write(
+    result: xr.Dataset, out: Sequence[Path], files: Mapping[Path, str], drawn: tuple[str, str, str], units_row: bool,
+    uncut: bool,
+) -> None:  # fmt: skip
+    from trunnion.results.export import save
+
+    for path, measure in files.items():
+        if not measure:
+            save(result, path, units_row)
+            continue
+        from trunnion.views.common.peaks import whole_peaks
+        from trunnion.views.cycle import plots
+        from trunnion.views.sweep.figure import figure
+
+        if path not in out:  # but in a folder of figures
+            folder(path.parent)
+        plots.save(figure(whole_peaks(result, uncut), measure, *drawn), path)
+
+
+def _show(result: xr.Dataset, mechanism: Mechanism, file: Path, measures: Sequence[str], x: str, family: str) -> None:
+    """The tables, and how many points they leave out."""
+    from trunnion.views.sweep.tables import tables
+
+    shown = tables(result, measures, x, family, console().width)
+    for k, one in enumerate(shown):
+        show_rows(f"{mechanism.name or file}\n{one.title}" if k == 0 else one.title, one.head, one.rows)
+    left_out = sum(one.left_out for one in shown) // (len(measures) if len(shown) > 1 else 1)
+    if left_out:
+        console().print(f"{counted(left_out, 'point')} more; --out FILE.csv has all", markup=False, highlight=False)

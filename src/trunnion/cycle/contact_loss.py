@@ -1,0 +1,359 @@
+"""Where a pin loses contact: the load of an end passes through zero, and its seat would have to jump across the hole.
+
+The massless-link model of play keeps the pin at the wall of its hole. That ends where the load vanishes or turns
+round: seen here by a load that turns by more than a right angle from one position to the next while it passes near
+zero, or by a seat that does not settle, since there the load changes more by the seat than it presses. Beside it the
+figure of a zero-clearance analysis that S. W. E. Earles and C. L. S. Wu (Predicting the occurrence of contact loss
+and impact at a bearing from a zero-clearance analysis, Proc. 4th World Congress on the Theory of Machines and
+Mechanisms, 1975, 1013-1018) found to tell impact: rate of turn of the reaction over its size, from about 1 rad/(N s)
+on. It is empirical, and has a unit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.errors import Finding, Severity, Status
+from trunnion.solve.seating import NO_LOAD, ROUNDS, TOLERANCE, Seated, loads_of
+from trunnion.solve.seats import Seat
+from trunnion.solve.system import Dial
+from trunnion.solve.travel import FINE as LANES
+
+if TYPE_CHECKING:
+    from trunnion.solve.backward import Backward
+    from trunnion.solve.run import Run
+
+__all__ = ["EARLES_WU", "Loss", "find", "findings", "gaps", "valid"]
+
+EARLES_WU = 1.0  # rad/(N s)
+NEAR = 0.1  # of the largest load: as near to zero as a load passes that turns round between two positions
+CLOSE = 20_000  # positions of a cycle that are near enough to tell a passage through zero from a quick turn
+PARTS = 96  # into which a wider step, and a quarter of it on either side, is parted
+FINE = 1.5 / PARTS  # of a step
+REACH = 3.0  # in lanes of `travel`: how far on either side of a jump the differences of seats reach, and one more
+OFF = 1e-6  # of load and offset: a load that points away from the wall, not along it but for rounding
+BESIDE = 1e-9  # of a cycle: on the sides of a place at which the model switches
+MOST_PLACES = 6  # named in one finding
+ENDS = ("", " (end 1)", " (end 2)", " (along its axis)")
+
+NOWHERE = np.zeros(0, np.intp)
+Arrays = dict[str, NDArray[np.float64]]
+
+
+@dataclass(frozen=True)
+class Loss:
+    """Loss of contact of one joint: where (position, whole and fraction), at which end (1, 2, 3 along the axis, 0 of a
+    play that has one end), least load there, N, largest load of that end, N.
+
+    unsettled: positions whose seats did not settle; lifted: where the inertia of the pin's own way outdoes its load;
+    loaded: whether anything presses it at all; turns: whether its load has a direction that can turn, as that of a
+    guide has not.
+    """
+
+    joint: str
+    places: list[tuple[float, int]]
+    least: float
+    peak: float
+    unsettled: NDArray[np.intp]
+    lifted: NDArray[np.intp]
+    loaded: bool = True
+    turns: bool = True
+
+    @property
+    def part(self) -> str:
+        """What lies in the hole."""
+        return "pin" if self.turns else "slider"
+
+
+def find(arrays: Arrays, run: Run, time: NDArray[np.float64]) -> list[Loss]:
+    """Losses of contact of every joint that its load seats; written into `contact_lost` and the status."""
+    found: list[Loss] = []
+    joints = list(run.system.joints)
+    arrays["contact_loss_number"][:] = _numbers(arrays, run, time)
+    arrays["contact_loss_number"][:, arrays["status"] == Status.ZERO_SLIP] = np.nan  # friction jumps there
+    largest = float(np.nanmax(np.abs(arrays["reaction_force"]), initial=0.0))
+    # where a joint turns round, the sense of its friction is what does not settle; where forces have no answer, nothing
+    status = arrays["status"]
+    open_ = (status < Status.NOT_CONVERGED) & (status != Status.ZERO_SLIP)
+    late = np.flatnonzero((arrays["seat_change"] > TOLERANCE) & open_)
+    loaded = [seat for seat in run.seats if seat.given is None]
+    least = _least_loaded(arrays["end_force"][..., late], [joints.index(one.joint) for one in loaded])
+    for seat in loaded:
+        i = joints.index(seat.joint)
+        loss = _of_joint(run, seat, arrays["end_force"][i], time, largest)
+        turns = any(len(end) > 1 for end in seat.play.model.ends)
+        lifted = _lifted(arrays["end_force"][i], arrays["seat_offset"][i]) if loss.loaded else NOWHERE
+        loss = replace(loss, unsettled=late[least == i], lifted=lifted, turns=turns)
+        if loss.places or len(loss.unsettled) or len(lifted) or not loss.loaded:
+            found.append(loss)
+        lost = np.array([round(place) for place, _ in loss.places], np.intp)
+        lost = lost % len(time) if run.cycle.periodic else np.clip(lost, 0, len(time) - 1)
+        for where in (lost, loss.unsettled, lifted):
+            arrays["contact_lost"][i, where] = 1
+    anywhere = np.any(arrays["contact_lost"] > 0, axis=0)
+    np.maximum(status, np.where(anywhere, status.dtype.type(Status.CONTACT_LOST), status.dtype.type(0)), out=status)
+    return found
+
+
+def gaps(run: Run) -> NDArray[np.float64]:
+    """Times, s, from and to, round every loss, in which the travel of a seat that jumps reaches; (2, loss).
+
+    Of the loads without play, all along the cycle and on either side of every place at which the model switches: they
+    do not depend on which positions were asked for.
+    """
+    duration, near = run.cycle.duration, REACH * run.cycle.duration / LANES
+    scan = np.linspace(0.0, duration, LANES + 1)
+    time = np.unique(np.clip(np.concatenate([scan, run.edges - BESIDE * duration, run.edges + BESIDE * duration]),
+                             0.0, duration))  # fmt: skip
+    at = np.array([moment for seat in run.seats if seat.given is None for moment in _turned(run, seat, time)])
+    again = [at, at - duration, at + duration] if run.cycle.periodic else [at]  # beside the start or the end
+    every = np.concatenate(again)
+    every = every[(every > -near) & (every < duration + near)]
+    return np.array([every - near, every + near])
+
+
+def _turned(run: Run, seat: Seat, time: NDArray[np.float64]) -> Iterator[float]:
+    """Times at which the load of an end passes near zero, seen closely wherever it turns round between two of these."""
+    with np.errstate(all="ignore"):
+        back = run.ideal(time)
+        largest = max((float(np.nanmax(np.abs(row), initial=0.0)) for row in _all_loads(run, back)), default=0.0)
+        for number, load in enumerate(_loads_at(back, seat, time)):
+            peak = float(np.nanmax(_size(load), initial=0.0))
+            if peak <= NO_LOAD * largest:
+                continue
+            for place, _ in _passages(load, peak, periodic=False, near=np.inf):
+                k = min(int(place), len(time) - 2)
+                if k == place:  # there is no load here, with nothing to look at more closely
+                    yield float(time[k])
+                    continue
+                fine = np.linspace(time[k], time[k + 1], PARTS + 1)
+                for one, _ in _passages(_loads_at(run.ideal(fine), seat, fine)[number], peak, periodic=False):
+                    yield float(np.interp(one, np.arange(len(fine)), fine))
+
+
+def _loads_at(back: Backward, seat: Seat, time: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    """Loads of the ends of a joint, (component, time) each."""
+    return [np.array([np.broadcast_to(part, time.shape) for part in load]) for load in loads_of(back, seat)]
+
+
+def _all_loads(run: Run, back: Backward) -> Iterator[NDArray[np.float64]]:
+    """Every component of the load of every end."""
+    yield from (np.asarray(part) for seat in run.seats for load in loads_of(back, seat) for part in load)
+
+
+def valid(found: Seated, run: Run, near: NDArray[np.float64], time: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """At which times, s, seats are settled, loaded pins press against their walls, and no loss is near (`gaps`)."""
+    good = found.change <= TOLERANCE
+    for low, high in near.T:
+        good &= ~((time > low) & (time < high))
+    for seat in run.seats:
+        if seat.given is None:
+            offsets = seat.play.model.offsets(found.offsets, f"seats.{seat.joint}") or []
+            for load, offset in zip(found.loads[seat.joint], offsets, strict=True):
+                across, *sizes = (sum(a * b for a, b in zip(*two, strict=True))
+                                  for two in ((load, offset), (load, load), (offset, offset)))  # fmt: skip
+                good &= ~np.less(across, -OFF * np.sqrt(sizes[0] * sizes[1]))
+    return np.asarray(good)
+
+
+def _lifted(forces: NDArray[np.float64], offsets: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Positions at which the load of an end points away from the wall that its pin lies at."""
+    across = np.sum(forces * offsets, axis=1)
+    size = np.sqrt(np.sum(forces**2, axis=1) * np.sum(offsets**2, axis=1))
+    return np.flatnonzero(np.any(across < -OFF * size, axis=0))
+
+
+def _numbers(arrays: Arrays, run: Run, time: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The figure of Earles and Wu of every joint: of its reaction without play, in space of the force on an end."""
+    if run.system.mechanism.space == "planar":
+        return _earles_wu(arrays["reaction_force"] - arrays["reaction_force_change"], time, run.cycle.periodic)
+    ends = [_earles_wu(arrays["end_force"][:, end], time, run.cycle.periodic) for end in (0, 1)]
+    return np.fmax(*ends)
+
+
+def _earles_wu(force: NDArray[np.float64], time: NDArray[np.float64], periodic: bool) -> NDArray[np.float64]:
+    """|F × Ḟ|/|F|³, rad/(N s), of every joint, by central differences over the positions; NaN of a single one."""
+    if len(time) < 3:
+        return np.full((len(force), len(time)), np.nan)
+    before, after = np.roll(force, 1, axis=-1), np.roll(force, -1, axis=-1)
+    if not periodic:  # the ends have no rate
+        before[..., 0] = after[..., -1] = np.nan
+    rate = (after - before) / (2 * (time[1] - time[0]))
+    size = np.sum(force * force, axis=1)
+    along = np.sum(force * rate, axis=1)
+    with np.errstate(all="ignore"):
+        across = np.sqrt(np.maximum(np.sum(rate * rate, axis=1) - along**2 / size, 0.0))
+        # no rate tells a jump, of the load or of a friction: there the second difference is no smaller than the first
+        bends = np.sum((after - 2 * force + before) ** 2, axis=1) > 0.25 * np.sum((after - before) ** 2, axis=1)
+        jumps = (np.sum(after * before, axis=1) < 0) | bends
+        return np.where((size > 0) & ~jumps, across / size, np.nan)
+
+
+def _least_loaded(forces: NDArray[np.float64], rows: Sequence[int]) -> NDArray[np.intp]:
+    """Of the joints with loaded seats that whose end bears least, at each of some positions."""
+    if not len(rows) or not forces.shape[-1]:
+        return NOWHERE
+    sizes = np.sqrt(np.sum(forces[rows] ** 2, axis=2))
+    least = np.argmin(np.nan_to_num(np.min(np.where(np.isfinite(sizes), sizes, np.inf), axis=1)), axis=0)
+    return np.array([rows[k] for k in least], np.intp)
+
+
+def _of_joint(run: Run, seat: Seat, forces: NDArray[np.float64], time: NDArray[np.float64], largest: float) -> Loss:
+    """Where the load of an end of one joint passes through zero."""
+    places: list[tuple[float, int]] = []
+    least, peak = np.inf, 1.0
+    loads = list(_end_loads(seat, forces))
+    known = any(np.any(np.isfinite(load)) for _, load in loads)
+    top = max((float(np.nanmax(_size(load), initial=0.0)) for _, load in loads), default=0.0)
+    if known and top <= NO_LOAD * largest:
+        return Loss(seat.joint, [], 0.0, top, NOWHERE, NOWHERE, loaded=False)
+    for number, load in loads:
+        own = float(np.nanmax(_size(load), initial=0.0))
+        if own <= NO_LOAD * largest:
+            continue  # nothing ever presses this end
+        end = int(seat.play.model.ends[number][0][0]) if len(seat.play.model.ends) > 1 else 0
+        seen = _seen(run, seat, number, load, time, own)
+        for place, size in _once(seen, len(time), run.cycle.periodic):
+            places.append((place, end))
+            if size / own < least / peak:
+                least, peak = size, own
+    return Loss(seat.joint, sorted(places), least, peak, NOWHERE, NOWHERE)
+
+
+def _seen(
+    run: Run, seat: Seat, number: int, load: NDArray[np.float64], time: NDArray[np.float64], peak: float
+) -> Iterator[tuple[float, float]]:
+    """Passages of a load near zero; between wide steps those that are there when looked at closely, without play.
+
+    How near a load comes to zero from one position to the next is not known of wide steps, only that it turns round.
+    """
+    step = time[1] - time[0] if len(time) > 1 else 0.0
+    if step <= run.cycle.duration / CLOSE:
+        yield from _passages(load, peak, run.cycle.periodic)
+        return
+    for place, _ in _passages(load, peak, run.cycle.periodic, near=np.inf):
+        from_ = np.floor(place) - 0.25
+        times = time[0] + step * (from_ + np.arange(PARTS + 1) * FINE)
+        times = times if run.cycle.periodic else np.clip(times, 0.0, run.cycle.duration)
+        close = np.array([np.broadcast_to(part, times.shape) for part in loads_of(run.ideal(times), seat)[number]])
+        for fine, size in _passages(close, peak, periodic=False):
+            yield from_ + fine * FINE, size
+
+
+def _once(found: Iterable[tuple[float, float]], count: int, periodic: bool) -> Iterator[tuple[float, float]]:
+    """Each passage once: one near a position is seen from both sides of it, over a turn also from its other end."""
+    places = sorted((place % count if periodic else place, size) for place, size in found)
+    for k, (place, size) in enumerate(places):
+        before = places[k - 1][0] if k else places[-1][0] - count if periodic and len(places) > 1 else -np.inf
+        if place - before > 0.5 * FINE:
+            yield place, size
+
+
+def _end_loads(seat: Seat, forces: NDArray[np.float64]) -> Iterator[tuple[int, NDArray[np.float64]]]:
+    """(number, load (component, position)) of every end that can move at all."""
+    for number, (end, radius) in enumerate(zip(seat.play.model.ends, seat.play.radii, strict=True)):
+        if np.any(np.asarray(radius) > 0):
+            place = int(end[0][0])
+            rows = ["xyz".index(key.split(".")[1]) for key in end]
+            # what is along the axis stands by halves with either end
+            yield number, forces[place - 1][rows] if place < 3 else forces[0][rows] + forces[1][rows]
+
+
+def _size(load: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.asarray(np.sqrt(np.sum(load * load, axis=0)))
+
+
+def _passages(
+    load: NDArray[np.float64], peak: float, periodic: bool, near: float = NEAR
+) -> Iterator[tuple[float, float]]:
+    """(position with its fraction, least load) wherever a load turns round near zero, or is zero.
+
+    near: how near, of the peak.
+    """
+    after = np.roll(load, -1, axis=1)
+    step = after - load
+    square = np.sum(step * step, axis=0)
+    with np.errstate(all="ignore"):
+        share = np.clip(-np.sum(load * step, axis=0) / square, 0.0, 1.0)
+    nearest = _size(load + share * step)
+    turns = (np.sum(load * after, axis=0) < 0) & (nearest <= near * peak)
+    if not periodic and len(turns):
+        turns[-1] = False
+    nothing = _size(load) <= NO_LOAD * peak
+    for k in np.flatnonzero(turns | nothing):
+        yield (float(k), float(_size(load)[k])) if nothing[k] else (float(k + share[k]), float(nearest[k]))
+
+
+def findings(found: Sequence[Loss], arrays: Arrays, joints: Sequence[str], dial: Dial) -> list[Finding]:
+    """One finding for each joint that loses contact, and for each that nothing presses."""
+    told: list[Finding] = []
+    if "seat_change" not in arrays:
+        return told
+    held = np.flatnonzero((arrays["seat_travel"] == 0) & (arrays["status"] < Status.CONTACT_LOST))
+    if len(held):
+        what = f"the seats turn too fast to tell how they travel {dial.intervals(held)}: velocities and accelerations "
+        what += "there are those of pins held in their seats"
+        told.append(Finding(what, "joints", severity=Severity.NOTE))
+    for loss in found:
+        where = f"joints.{loss.joint}"
+        if not loss.loaded:
+            what = f"no load presses its {loss.part}: it is taken to lie in the middle of its hole"
+            told.append(Finding(what, where, "give the seat, or leave it free", Severity.NOTE))
+            continue
+        if loss.places:
+            remedy = _number(arrays, joints.index(loss.joint), dial) if loss.turns else "expect impact there"
+            told.append(Finding(_lost(loss, dial), where, remedy, Severity.WARNING))
+        if len(loss.lifted):
+            what = (
+                f"its {loss.part} lifts off the wall {dial.intervals(loss.lifted)}: the inertia of its travel across "
+            )
+            what += "the hole outweighs the load"
+            told.append(Finding(what, where, "forces there are those of one that stays", Severity.WARNING))
+        if len(loss.unsettled):
+            worst = float(np.nanmax(arrays["seat_change"][loss.unsettled]))
+            what = f"its seat did not settle in {ROUNDS} rounds {dial.intervals(loss.unsettled)}: it still changes by "
+            what += f"{worst:.2g} of its clearance, as the load there changes more with the seat than it presses"
+            told.append(Finding(what, where, "there the pin floats: contact is lost", Severity.WARNING))
+    return told
+
+
+def _lost(loss: Loss, dial: Dial) -> str:
+    shown = [text for _, text in sorted(_told(loss.places, dial))]
+    more = len(shown) - MOST_PLACES
+    text = ", ".join(shown[:MOST_PLACES]) + (f" and {more} more" if more > 0 else "")
+    least = loss.least if loss.least > NO_LOAD * loss.peak else 0.0  # less than that is rounding
+    head = f"its {loss.part} loses contact {text}: the load comes down to {least:.3g} of {loss.peak:.4g} N, turns"
+    return f"{head} round and the seat would jump"
+
+
+def _told(places: Sequence[tuple[float, int]], dial: Dial) -> Iterator[tuple[float, str]]:
+    """Where, and in words, of every passage; those of an end without a load for a while are one."""
+    for end, name in enumerate(ENDS):
+        own = np.array(sorted(place for place, one in places if one == end))
+        for run in np.split(own, np.flatnonzero(np.diff(own) > 1.5) + 1):
+            if len(run) > MOST_PLACES:
+                yield run[0], f"between {_at(dial, run[0])} and {_at(dial, run[-1])}{name}"
+            else:
+                yield from ((place, f"at {_at(dial, place)}{name}") for place in run)
+
+
+def _number(arrays: Arrays, i: int, dial: Dial) -> str:
+    numbers = arrays["contact_loss_number"][i]
+    if not np.any(np.isfinite(numbers)):
+        return "expect impact there"
+    top = int(np.nanargmax(numbers))
+    rest = f"elsewhere its reaction turns at up to {numbers[top]:.3g} rad/(N s), at {dial.at(top)}"
+    return f"expect impact there; {rest} (impact is likely from {EARLES_WU:g}: Earles and Wu)"
+
+
+def _at(dial: Dial, place: float) -> str:
+    """A place between two positions."""
+    k = int(place)
+    values = dial.values
+    step = values[1] - values[0] if len(values) > 1 else 0.0
+    return f"{values[k % len(values)] + (place - k) * step:.4g}{dial.unit}"

@@ -1,0 +1,117 @@
+"""What a mechanism is before any question is asked of it: findings, mobility, structural formula, plan."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from trunnion.algebra.dual import primal
+from trunnion.cycle import account
+from trunnion.cycle.positions import positions
+from trunnion.cycle.scene import pitch_circles
+from trunnion.errors import Finding, Severity
+from trunnion.model.mechanism import Mechanism
+from trunnion.solve.assemblies import Choice, choices
+from trunnion.solve.forward import Forward, forward
+from trunnion.solve.run import Run, prepare
+from trunnion.structure.decompose import Plan
+from trunnion.structure.mobility import Part, mobility_by_rank
+
+__all__ = ["Check", "GearPair", "check"]
+
+
+class GearPair(NamedTuple):
+    """A gear pair with teeth: whether one gear turns inside the other, and the pitch radii by link, m."""
+
+    name: str
+    internal: bool
+    radii: tuple[tuple[str, float], ...]
+
+
+@dataclass(frozen=True)
+class Check:
+    """The outcome of `check`.
+
+    rank_mobility: by the rank of the joints' constraints, None where no position can be assembled.
+    assemblies: number found for each module; choices: the groups that have several, with their ways; findings:
+    everything to know, worst first; gears: the gear pairs with teeth.
+    """
+
+    plan: Plan
+    rank_mobility: int | None
+    assemblies: tuple[int, ...]
+    choices: tuple[Choice, ...]
+    findings: tuple[Finding, ...]
+    gears: tuple[GearPair, ...] = ()
+
+    @property
+    def formula(self) -> str:
+        """Structural formula, e.g. I(0,1)R → II(2,3)RRR."""
+        return self.plan.formula
+
+    @property
+    def mobility(self) -> int:
+        """Mobility by Grübler's formula."""
+        return self.plan.mobility
+
+
+@np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
+def check(mechanism: Mechanism, steps: int = 360) -> Check:
+    """Structure and findings of a mechanism, looked at over `steps` positions of its cycle.
+
+    Raises MechanismError if the structure does not determine the motion.
+    """
+    run = prepare(mechanism)
+    found, _ = account.findings(run, positions(run, steps, averaged=False))
+    walk = forward(run.system, run.values, run.chosen.assembly, run.cycle.times(steps))
+    rank = run.determinacy.mobility if run.determinacy else _rank(walk)
+    if run.determinacy is None and rank is not None and rank != run.system.plan.mobility:
+        what = (
+            f"the mobility is {run.system.plan.mobility} by Grübler's formula and {rank} by the rank of the constraints"
+        )
+        found.append(
+            Finding(what, "joints", "a special geometry: reactions or motion are not determined", Severity.WARNING)
+        )
+    order = list(Severity)
+    found.sort(key=lambda finding: order.index(finding.severity))
+    return Check(run.system.plan, rank, run.chosen.found, choices(run), tuple(found), _gears(run))
+
+
+def _gears(run: Run) -> tuple[GearPair, ...]:
+    found = []
+    for name, gear in run.system.mechanism.gears.items():
+        if not gear.teeth:
+            continue
+        circles = pitch_circles(run.system, run.values, name)
+        carriers = run.system.mechanism.carriers(name) or (0, 0)
+        sign = 1.0 if carriers[0] == carriers[1] else -1.0
+        radii = tuple((str(circle["at"]).rpartition(".")[0], float(circle["radius"])) for circle in circles)
+        found.append(GearPair(name, sign * float(run.values[f"gears.{name}.ratio"]) > 0, radii))
+    return tuple(found)
+
+
+def _rank(walk: Forward) -> int | None:
+    """Mobility by rank at the first assembled position."""
+    system = walk.system
+    places = {}
+    for name, (_, (_, second)) in system.joints.items():
+        places[name] = np.broadcast_arrays(*(np.atleast_1d(primal(n)) for n in walk.element(second, name)))
+    length = max((len(place[0]) for place in places.values()), default=1)
+    table = {name: np.array([np.broadcast_to(n, length) for n in place]) for name, place in places.items()}
+    solved = np.all([np.isfinite(place).all(axis=0) for place in table.values()], axis=0)
+    if not np.any(solved):
+        return None
+    first = int(np.argmax(solved))
+    at = {
+        name: (float(p[0, first]), float(p[1, first]), float(p[2, first]), float(p[3, first]))
+        for name, p in table.items()
+    }
+    gears = {
+        name: (gear.joints, float(np.ravel(primal(walk.values[f"gears.{name}.ratio"]))[0]))
+        for name, gear in system.mechanism.gears.items()
+    }
+    parts = [Part(one.links, one.joints, one.driven, one.gears) for one in system.plan.modules]
+    links = [link for part in parts for link in part.links]
+    return mobility_by_rank(links, system.mechanism.fixed_link, system.joints, at, gears, parts)

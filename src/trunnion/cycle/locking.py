@@ -1,0 +1,124 @@
+"""How close is it to locking, which joint decides, can it be driven backward, is the answer the only one?"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.cycle.analyse import analyse_run
+from trunnion.cycle.near_locking import Reverse, critical_multiples, critical_row, others, reverse, reverse_row
+from trunnion.errors import Finding, MechanismError, Status
+from trunnion.model.mechanism import Mechanism
+from trunnion.solve.friction_method import MARGIN, FrictionMethod
+from trunnion.solve.loads import useful_loads
+from trunnion.solve.run import Run, prepare
+from trunnion.solve.system import Dial, rubbing
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["MOST_STEPS", "locking", "look", "report_rows"]
+
+MOST_STEPS = 8192
+
+_NAMES = {
+    "critical_multiple": ("1", "multiple of the joint's own friction at which the position locks"),
+    "other_solutions": ("1", "solutions found at full friction beside the one given"),
+    "drive_effort_reverse": ("N m", "drive effort with the motion run backward; NaN where that locks"),
+    "power_delivered_reverse": ("W", "power that the drivers take out with the motion run backward"),
+    "power_given_reverse": ("W", "power that the useful loads put in with the motion run backward"),
+}
+
+
+def locking(mechanism: Mechanism, steps: int = 360) -> xr.Dataset:
+    """The result of `analyse` with what is to know of locking at every position, by dims joint, driver and position.
+
+    critical_multiple: by continuation from no friction, ∞ beyond 10; 0 for a joint without whose friction its group
+    still locks; NaN for joints without friction and positions without forces for another cause. The names, units and
+    meanings are in the Dataset. Raises MechanismError if the structure does not determine the motion, or for no steps
+    or more than MOST_STEPS.
+    """
+    return look(prepare(mechanism), steps)
+
+
+def look(run: Run, steps: int = 360) -> xr.Dataset:
+    """What `locking` does, for a mechanism that is prepared."""
+    import xarray as xr
+
+    mechanism = run.system.mechanism
+    if run.determinacy is not None:
+        run.determinacy.refuse()
+    if not 1 <= steps <= MOST_STEPS:
+        raise MechanismError(Finding(f"cannot look at {steps} positions", "steps", f"give 1 to {MOST_STEPS:,}"))
+    result = analyse_run(run, steps)
+    time, status = result["time"].values, result["status"].values
+    back = run.solve(time, method=FrictionMethod())
+    with np.errstate(all="ignore"):
+        multiples = critical_multiples(back, MARGIN)
+        more = np.where(status <= Status.LOCKED, others(back), np.nan)
+        other = reverse(run, back.walk, FrictionMethod(), useful_loads(mechanism))
+    known = (status < Status.NOT_CONVERGED) | (status == Status.LOCKED)
+    nothing = np.full(len(time), np.nan)
+    arrays: dict[str, tuple[tuple[str, ...], Any]] = {
+        "critical_multiple": (
+            ("joint",),
+            [np.where(known, multiples.get(str(name), nothing), np.nan) for name in result["joint"].values],
+        ),
+        "other_solutions": ((), more),
+        "drive_effort_reverse": (
+            ("driver",),
+            np.array([np.where(other.locked, np.nan, other.efforts[name]) for name in mechanism.drivers]).reshape(
+                len(mechanism.drivers), len(time)
+            ),
+        ),
+        "power_delivered_reverse": ((), np.where(other.locked, np.nan, other.delivered)),
+        "power_given_reverse": ((), other.given),
+    }
+    added = {
+        name: xr.Variable((*dims, "position"), values, dict(zip(("units", "long_name"), _NAMES[name], strict=True)))
+        for name, (dims, values) in arrays.items()
+    }
+    return result.assign(added)
+
+
+def report_rows(run: Run, found: xr.Dataset) -> list[dict[str, Any]]:
+    """The figures of a result of `look` that one looks at first, as label, value and unit."""
+    dial = run.system.dial(run.values, found["time"].values)
+    if not rubbing(run.system):
+        return [{"label": "there is no friction: nothing locks", "value": None, "unit": "1"}]
+    rows = [_least("locking margin, all friction together", found["locking_margin"].values, dial)]
+    for joint in rubbing(run.system):
+        rows += _joint(run, joint, found["critical_multiple"].sel(joint=joint).values, dial)
+    more = found["other_solutions"].values
+    if np.any(more > 0):
+        label = f"other solutions at full friction, {dial.intervals(np.flatnonzero(more > 0))}, most"
+        rows.append({"label": label, "value": float(np.nanmax(more)), "unit": "1"})
+    backward = reverse_row(run, _reverse(found), useful_loads(run.system.mechanism))
+    stays = {"label": "the useful loads do not drive it backward over the cycle", "value": None, "unit": "1"}
+    return [*rows, backward or stays]
+
+
+def _least(label: str, values: NDArray[np.float64], dial: Dial) -> dict[str, Any]:
+    if not np.any(np.isfinite(values)):
+        nowhere = np.all(np.isnan(values))
+        return {"label": label if nowhere else f"{label}, more than", "value": None if nowhere else MARGIN, "unit": "1"}
+    at = int(np.nanargmin(values))
+    return {"label": f"{label}, least, at {dial.at(at)}", "value": float(values[at]), "unit": "1"}
+
+
+def _joint(run: Run, joint: str, multiple: NDArray[np.float64], dial: Dial) -> list[dict[str, Any]]:
+    """The least critical multiple of a joint, and its friction there."""
+    rows = [_least(f"critical multiple of {joint} alone", multiple, dial)]
+    if np.any(np.isfinite(multiple)):
+        at = int(np.nanargmin(multiple))
+        row = critical_row(run, joint, float(multiple[at]), f"at {dial.at(at)}")
+        rows = rows if "multiple" in row["label"] else [row] if multiple[at] == 0 else [*rows, row]
+    return rows
+
+
+def _reverse(found: xr.Dataset) -> Reverse:
+    """The way back as the Dataset has it."""
+    delivered, given = found["power_delivered_reverse"].values, found["power_given_reverse"].values
+    return Reverse({}, np.isnan(delivered) & np.isfinite(given), delivered, given)

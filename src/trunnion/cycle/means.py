@@ -1,0 +1,134 @@
+"""Means over a cycle: of powers, of friction, of the squares of efforts, and the efficiency that follows from them.
+
+They are integrals between the places where the model switches (`switches`), so that they do not depend on how many
+positions were asked for, and each has the error of its integral. A mean that this error, or rounding, may have made is
+0: power that a load gives and takes back.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.algebra.quadrature import Effort, integrals
+from trunnion.errors import Status
+from trunnion.solve.switches import Mechanisms, edges
+
+__all__ = ["AVERAGED", "ROUNDING", "Mean", "Means", "Powers", "means_of", "still"]
+
+Array = NDArray[np.float64]
+Rows = NDArray[np.intp]
+Powers = Callable[[Rows, Array], Mapping[str, Array]]
+
+# what `Powers` has of each lane and node, NaN where there is no answer
+AVERAGED = ("drive_power", "useful_power", "friction_power", "drive_effort", "power_residual")
+ROUNDING = 1e-12  # of a mean of magnitudes
+NEGLIGIBLE = 1e-9  # of the largest power: what is below it need not be known to many digits
+RESIDUALS = 4.0  # of the mean residual of the power balance: what rounding leaves of a power that cancels
+
+
+class Mean(NamedTuple):
+    """A mean, the error of its integral, the mean of the magnitude, and what may be no more than rounding."""
+
+    value: float
+    error: float
+    size: float
+    rounding: float
+
+    @property
+    def net(self) -> float:
+        """The value; 0 where it is no more than its error or rounding."""
+        return 0.0 if abs(self.value) <= max(self.error, self.rounding) else self.value
+
+
+@dataclass(frozen=True)
+class Means:
+    """Means over one cycle, W; NaN where any place of it has no answer.
+
+    drive_power: of all drivers; useful_power: that the useful loads take; friction_power: lost in all joints;
+    friction_power_mean: in each joint; drive_effort_rms: root mean square of each driver, N m or N.
+    """
+
+    drive_power: Mean
+    useful_power: Mean
+    friction_power: Mean
+    friction_power_mean: Array
+    drive_effort_rms: Array
+
+    @property
+    def drive_power_mean(self) -> float:
+        """Of all drivers, W."""
+        return self.drive_power.net
+
+    @property
+    def useful_power_mean(self) -> float:
+        """Taken by the useful loads, W."""
+        return self.useful_power.net
+
+    @property
+    def efficiency(self) -> float:
+        """Useful work over drive work of the cycle [D 1]; NaN where the loads drive or a place has no answer."""
+        work = self.drive_power.net
+        return self.useful_power.net / work if work > 0 else float("nan")
+
+    @property
+    def efficiency_error(self) -> float:
+        """How far the errors of both integrals may have moved the efficiency."""
+        work, value = self.drive_power.net, self.efficiency
+        return (self.useful_power.error + abs(value) * self.drive_power.error) / work if work > 0 else float("nan")
+
+
+def means_of(
+    of: Mechanisms, powers: Powers, between: Sequence[Array] | None = None, effort: Effort | None = None
+) -> list[Means]:
+    """The means of every mechanism over its cycle.
+
+    powers: what `AVERAGED` names, (…, lane, node), at the times (lane, node), s, of one mechanism a lane. between:
+    times in rising order that the integrals are parted at, those of `switches` if not given.
+    """
+    drivers = len(of.system.mechanism.drivers)
+
+    def functions(rows: Rows, time: Array) -> Array:
+        found = powers(rows, time)
+        driven, lost = np.sum(found["drive_power"], axis=0), found["friction_power"]
+        known = [driven, found["useful_power"], np.sum(lost, axis=0), np.abs(found["power_residual"])]
+        return np.concatenate([np.stack(known), found["drive_effort"] ** 2, lost])
+
+    def floor(sizes: Array) -> Array:
+        """Powers that are nothing beside the others; how even the residual is does not matter."""
+        least = np.empty_like(sizes)
+        least[:] = NEGLIGIBLE * np.max(sizes[:3], axis=0)
+        least[3] = np.inf
+        least[4 : 4 + drivers] = NEGLIGIBLE * np.max(sizes[4 : 4 + drivers], axis=0, initial=0.0)
+        return least
+
+    between = edges(of) if between is None else between
+    found = integrals(functions, between, floor, effort)
+    told = []
+    for k, times in enumerate(between):
+        value, error, size = (part[:, k] / (times[-1] - times[0]) for part in (found.value, found.error, found.size))
+        rounding = np.maximum(ROUNDING * size, RESIDUALS * value[3])
+        rounding[2] = max(rounding[2], ROUNDING * np.max(size[:3]))
+        driven, useful, lost = (Mean(*(float(one[i]) for one in (value, error, size, rounding))) for i in range(3))
+        efforts = np.sqrt(value[4 : 4 + drivers])
+        told.append(Means(driven, useful, lost, value[4 + drivers :], efforts))
+    return told
+
+
+def still(arrays: Mapping[str, Array]) -> Means:
+    """The means of a mechanism that stands, in its one position; NaN where positions have no answer."""
+    alone = len(arrays["status"]) == 1 and arrays["status"][0] < Status.NOT_CONVERGED
+
+    def of(number: Array) -> Mean:
+        value = float(number[0]) if alone else float("nan")
+        return Mean(value, 0.0, abs(value), ROUNDING * abs(value))
+
+    lost, efforts = arrays["friction_power"], arrays["drive_effort"]
+    return Means(
+        of(np.sum(arrays["drive_power"], axis=0)), of(arrays["useful_power"]), of(np.sum(lost, axis=0)),
+        np.array([of(row).value for row in lost]), np.array([abs(of(row).value) for row in efforts]),
+    )  # fmt: skip

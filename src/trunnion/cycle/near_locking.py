@@ -1,0 +1,312 @@
+"""What is to know of locking beside the margin: which joint does it, other solutions, and the way back.
+
+All of it is read from the equations φ = law(N(R₀ + G φ)) that `friction.settle` has solved, one set for each module.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.algebra import linalg
+from trunnion.algebra.dual import primal
+from trunnion.algebra.quadrature import integrals
+from trunnion.cycle.means import ROUNDING
+from trunnion.errors import Finding, Severity, counted
+from trunnion.solve import continuation
+from trunnion.solve.backward import Backward, Given
+from trunnion.solve.bristles import histories
+from trunnion.solve.forward import Forward
+from trunnion.solve.friction import Problem, frictionless, identity_minus, scaled
+from trunnion.solve.friction_method import FrictionMethod
+from trunnion.solve.system import Dial, law_of
+
+if TYPE_CHECKING:
+    from trunnion.solve.run import Run
+
+__all__ = [
+    "Locking",
+    "Reverse",
+    "critical_multiples",
+    "critical_row",
+    "findings",
+    "look",
+    "others",
+    "reverse",
+    "reverse_row",
+]
+
+Array = NDArray[np.float64]
+STARTS = 48
+ROUNDS = 40
+SEED = 1785  # of the starts
+LOOKED = 360  # positions
+SAME = 1e-6  # of the largest force: two solutions nearer than this are one
+
+
+def critical_multiples(back: Backward, most: float) -> dict[str, Array]:
+    """For each joint the multiple of its own friction at which it locks its module, the others' being as they are.
+
+    ∞ where it does not up to `most`, 0 where the module locks even without friction in this joint.
+    """
+    system, positions = back.walk.system, np.shape(back.walk.time)
+    found: dict[str, Array] = {}
+    for number, settled in zip(reversed(range(len(system.plan.modules))), back.settled, strict=True):
+        if settled.problem is None:
+            continue
+        contacts = settled.problem.contacts
+        places = list(dict.fromkeys(contact.joint for contact in contacts if contact.rubs))
+        own = np.array([[contact.joint == place for contact in contacts] for place in places], bool)
+        for place, multiple in zip(places, _alone(settled.problem, own, most), strict=True):
+            found[system.places[number][place].joint] = np.broadcast_to(multiple, positions)
+    return {joint: found[joint] for joint in system.joints if joint in found}
+
+
+def _alone(problem: Problem, own: NDArray[np.bool_], most: float) -> list[Array]:
+    """The multiples for the contacts of each joint: the others' friction is raised to full first, then theirs.
+
+    own: (joint, contact). The joints are followed side by side, each in lanes of its own.
+    """
+    every, all_ = problem.picked(True)
+    bounds = [np.asarray(problem.bound([most if mine else 1.0 for mine in row])) for row in own]
+    doubtful = np.array([np.broadcast_to(np.isfinite(bound) & (bound >= 1.0), all_.shape) for bound in bounds])
+    result = np.full(doubtful.shape, np.inf)
+    joint, lane = np.nonzero(doubtful.reshape(len(own), -1))
+    if len(lane):
+        part, mine = every.mapped(lambda number: number[lane]), own[joint].T
+
+        def weights(share: Array, lanes: NDArray[np.intp]) -> Sequence[Array]:
+            others_, theirs = np.minimum(share, 1.0), np.maximum(share - 1.0, 0.0)
+            return list(np.where(mine[:, lanes], theirs, others_))
+
+        start = frictionless(part, np.ones(len(lane), bool))
+        _, reached = continuation.follow(scaled(part, weights), start, 1.0 + most)
+        result[doubtful] = np.where(reached >= 1.0 + most, np.inf, np.maximum(reached - 1.0, 0.0))
+    return list(result)
+
+
+# ---- other solutions ------------------------------------------------------------------------------------------
+
+
+def others(back: Backward) -> Array:
+    """How many solutions at full friction were found beside the one that grows from no friction, by position.
+
+    Only where the certificate of uniqueness fails is there anything to look for: there by Newton's method from many
+    starts, so it is a count of those found, not a proof that there are no more.
+    """
+    total: Array = np.zeros(np.shape(back.walk.time))
+    for settled in back.settled:
+        if settled.problem is None or np.all(settled.certain):
+            continue
+        part, chosen = settled.problem.picked(~np.asarray(settled.certain))
+        known = [np.broadcast_to(np.asarray(force, float), chosen.shape)[chosen] for force in settled.forces]
+        count = np.zeros(chosen.shape)
+        count[chosen] = _count(part, np.array(known))
+        total = total + count
+    return total
+
+
+def _count(problem: Problem, known: Array) -> Array:
+    """Solutions other than the known ones (contact, lane), NaN where there is none, lane by lane."""
+    contacts, lanes = known.shape
+    many = problem.mapped(lambda number: np.repeat(number, STARTS))
+    scale = np.repeat(_size(problem, lanes), STARTS)
+    rng = np.random.default_rng(SEED)
+    factors = rng.choice([-1.0, 1.0], (contacts, lanes * STARTS)) * 10 ** rng.uniform(-1.5, 2.0, lanes * STARTS)
+    forces = list(factors * scale)
+    with np.errstate(all="ignore"):
+        for _ in range(ROUNDS):
+            state = many.state(forces)
+            residual = [f - t for f, t in zip(forces, many.target(state.normals), strict=True)]
+            (move,) = linalg.solve(identity_minus(many.map_derivative(state)), residual)
+            forces = [f - m for f, m in zip(forces, move, strict=True)]
+        target = many.target(many.state(forces).normals)
+        error = np.max(np.abs(np.array(forces) - np.array(target)), axis=0)
+        found = np.array(forces).reshape(contacts, lanes, STARTS)
+        closed = (error <= 1e-9 * np.maximum(scale, np.max(np.abs(forces), axis=0))).reshape(lanes, STARTS)
+    counted = np.zeros(lanes)
+    for i in range(lanes):
+        counted[i] = _distinct(found[:, i, closed[i]], known[:, i], scale[i * STARTS])
+    return counted
+
+
+def _size(problem: Problem, lanes: int) -> Array:
+    """The largest load without friction, N."""
+    normals = problem.state([np.zeros(lanes) for _ in problem.contacts]).normals
+    largest: Array = np.max([np.abs(np.broadcast_to(normal, lanes)) for normal in normals], axis=0)
+    return largest + 1e-300
+
+
+def _distinct(found: Array, known: Array, scale: float) -> float:
+    """How many of the columns are neither alike nor the known one."""
+    kept = [known] if np.all(np.isfinite(known)) else []
+    before = len(kept)
+    for column in found.T:
+        near = SAME * max(scale, float(np.max(np.abs(column))))
+        if all(np.max(np.abs(column - other)) > near for other in kept):
+            kept.append(column)
+    return float(len(kept) - before)
+
+
+# ---- the way back ---------------------------------------------------------------------------------------------
+
+
+def critical_row(run: Run, joint: str, multiple: float, where: str) -> dict[str, Any]:
+    """The critical friction of a joint alone: its coefficient if its law is proportional to one, else the multiple."""
+    parameter = law_of(run.system, joint).scale
+    if not multiple > 0:
+        return {"label": f"it locks even without friction in {joint}, {where}", "value": 0.0, "unit": "1"}
+    if not parameter:
+        return {"label": f"critical multiple of the friction of {joint} alone, {where}", "value": multiple, "unit": "1"}
+    value = float(np.ravel(primal(run.values[f"joints.{joint}.friction.{parameter}"]))[0])
+    return {"label": f"critical friction {parameter} of {joint} alone, {where}", "value": multiple * value, "unit": "1"}
+
+
+def reverse_row(run: Run, back: Reverse, useful: Sequence[str]) -> dict[str, Any] | None:
+    """Power that reaches the drivers over that which the useful loads give, backward; None if these do not drive.
+
+    It locks, or is 0 or less: then it holds itself.
+    """
+    text, value = "efficiency driven backward by the useful loads", float("nan")
+    delivered, given = _reversed_means(run, back, useful)
+    if np.all(np.isfinite(back.given)) and not given > 0:
+        return None
+    if np.any(back.locked):
+        places = counted(int(np.count_nonzero(back.locked)), "position")
+        text = f"driven backward by the useful loads it locks, at {places}"
+    elif not np.isfinite(delivered + given) or not np.all(np.isfinite(back.given + back.delivered)):
+        text += " (not every position has an answer)"
+    else:
+        value = delivered / given
+        text += "" if value > 0 else " (it holds itself)"
+        if value > 1:  # over a range what masses and springs have stored comes on top
+            text += " (masses and springs give work too)"
+            value = float("nan")
+    return {"label": text, "value": value if np.isfinite(value) else None, "unit": "1"}
+
+
+def _reversed_means(run: Run, back: Reverse, useful: Sequence[str]) -> tuple[float, float]:
+    """Mean powers, W, delivered and given, backward, 0 where they cancel; that of the loads is known where it locks."""
+    if run.cycle.duration <= 0:
+        return float(back.delivered[0]), float(back.given[0])
+    if np.any(back.locked):  # then there is no mean to be delivered, and of the other one the sign is asked for
+        return float("nan"), float(np.mean(back.given))
+
+    def powers(rows: NDArray[np.intp], time: Array) -> Array:
+        there = reverse(run, run.walk(time.ravel()), FrictionMethod(), useful)
+        return np.stack([there.delivered, there.given]).reshape(2, *time.shape)
+
+    found = integrals(powers, [run.edges])
+    delivered, given = (
+        0.0 if abs(value) <= max(error, ROUNDING * size) else value / run.cycle.duration
+        for value, error, size in zip(found.value[:, 0], found.error[:, 0], found.size[:, 0], strict=True)
+    )
+    return delivered, given
+
+
+class Reverse(NamedTuple):
+    """The same positions passed backward: effort of every driver, where it locks, and what flows where.
+
+    delivered: power that the drivers take out, W; given: power that the useful loads put in, W.
+    """
+
+    efforts: dict[str, Array]
+    locked: NDArray[np.bool_]
+    delivered: Array
+    given: Array
+
+
+def reverse(run: Run, ahead: Forward, method: FrictionMethod, useful: Sequence[str]) -> Reverse:
+    """Drive the mechanism backward through the positions of a walk: speeds turned round, friction and all that resists
+    with them; inertia stays, for accelerations do."""
+    walk = ahead.backward()
+    time = np.asarray(walk.time, float)
+    past = histories(run.system, run.values, run.chosen.assembly, run.cycle, reverse=True)
+    deflections = {joint: history.at(run.cycle.duration - time) for joint, history in past.items()}
+    with np.errstate(all="ignore"):
+        other = walk.system.geometry.backward(walk, method, Given({}, deflections))
+    shape = time.shape
+    efforts = {name: np.broadcast_to(effort, shape) for name, effort in other.efforts.items()}
+    delivered = -sum((effort * walk.rate(name) for name, effort in efforts.items()), np.zeros(shape))
+    given = sum((np.broadcast_to(other.load_powers[name], shape) for name in useful), np.zeros(shape))
+    return Reverse(efforts, _locks(other), delivered, given)
+
+
+# ---- over a cycle ---------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Locking:
+    """What one cycle shows, looked at some times (s).
+
+    locked: whether it is; first: number of the analysed position with the least margin, None if all are beyond what was
+    looked for; critical: for each joint, the multiple of its own friction at which it locks there; others: solutions
+    at full friction beside the one that grows from none; back: the same positions run backward.
+    """
+
+    times: Array
+    locked: NDArray[np.bool_]
+    first: int | None
+    critical: dict[str, float]
+    others: Array
+    back: Reverse
+
+    def responsible(self) -> tuple[str, float] | None:
+        """The joint whose friction, changed alone, decides, and the multiple of it at which it does.
+
+        Of a mechanism that runs, the first to lock it; of one that is locked, the one that need be lowered the least.
+        """
+        sound = {joint: multiple for joint, multiple in self.critical.items() if np.isfinite(multiple)}
+        locked = [joint for joint, multiple in sound.items() if multiple < 1.0]
+        if locked:
+            joint = max(locked, key=sound.__getitem__)
+            return (joint, sound[joint]) if sound[joint] > 0 else None
+        joint = min(sound, key=sound.__getitem__, default="")
+        return (joint, sound[joint]) if joint else None
+
+    def rows(self, run: Run, dial: Dial) -> list[dict[str, Any]]:
+        """The joint that decides, as a row of a summary. dial: names the position of `first`."""
+        decides = self.responsible()
+        if decides is None or self.first is None:
+            return []
+        return [critical_row(run, *decides, f"at {dial.at(self.first)}")]
+
+
+def look(run: Run, time: Array, margin: Array, method: FrictionMethod, useful: Sequence[str]) -> Locking:
+    """Look at no more than LOOKED times of a cycle. margin: of every position analysed, NaN where unknown."""
+    times = run.cycle.times(min(len(time), LOOKED))
+    plain = replace(method, name="newton", margin_up_to=0.0)
+    if len(times) == len(time) and np.all(margin < 1.0):  # at each of them: there is nothing left to be solved
+        walk, locked, more = run.walk(times), np.ones(len(times), bool), np.zeros(len(times))
+    else:
+        back = run.solve(times, method=plain)
+        walk, locked, more = back.walk, _locks(back), others(back)
+    first = int(np.nanargmin(margin)) if np.any(np.isfinite(margin)) else None
+    critical: dict[str, float] = {}
+    if first is not None:
+        at = critical_multiples(run.solve(time[[first]], method=plain), method.margin_up_to)
+        critical = {joint: float(multiple[0]) for joint, multiple in at.items()}
+    return Locking(times, locked, first, critical, more, reverse(run, walk, plain, useful))
+
+
+def findings(near: Locking, dial: Dial) -> Iterator[Finding]:
+    """What to say of other solutions."""
+    more = np.flatnonzero((near.others > 0) & ~near.locked)
+    if len(more):
+        count = int(np.max(near.others[more]))
+        what = f"friction allows up to {count} other solution{'s' if count > 1 else ''} {dial.intervals(more)}"
+        remedy = "the one that grows from no friction is given; started otherwise it may wedge"
+        yield Finding(what, "joints", remedy, Severity.NOTE)
+
+
+def _locks(back: Backward) -> NDArray[np.bool_]:
+    """Where a module locks."""
+    shape = np.shape(back.walk.time)
+    locked = np.zeros(shape, bool)
+    for settled in back.settled:
+        locked |= np.broadcast_to(np.asarray(settled.share) < 1.0, shape)
+    return locked

@@ -1,0 +1,255 @@
+"""The positions of a cycle: every variable of the results, statuses and means, before the books are made."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.algebra.quadrature import Effort
+from trunnion.cycle import contact_loss, diagnosis, rest
+from trunnion.cycle.asbuilt import COMPARED, fill_errors, fill_seats
+from trunnion.cycle.blanks import blank
+from trunnion.cycle.fill import fill_power
+from trunnion.cycle.means import AVERAGED, Means, means_of, still
+from trunnion.errors import Finding, MechanismError, Status
+from trunnion.results import variables as results
+from trunnion.solve.backward import Backward
+from trunnion.solve.friction_method import MARGIN, FrictionMethod
+from trunnion.solve.seating import settle
+from trunnion.solve.switches import Mechanisms
+from trunnion.solve.system import System
+from trunnion.solve.travel import Lanes, around, lanes
+
+if TYPE_CHECKING:
+    pass
+from trunnion.cycle.variables import fill_of
+from trunnion.solve.run import Run
+from trunnion.solve.status import status_of
+
+__all__ = ["Arrays", "Positions", "filled", "positions"]
+
+
+MOST_STEPS = 100_000_000
+CHUNK = 8192  # positions at a time: the arrays of a walk stay in cache
+SEATED = Effort(1e-6, 2)  # for means with pins in seats, which themselves settle to 1e-6 of their clearance
+Arrays = dict[str, NDArray[np.float64]]
+
+
+def check_steps(steps: int) -> None:
+    if not isinstance(steps, (int, np.integer)) or not 1 <= steps <= MOST_STEPS:
+        remedy = f"give a whole number from 1 to {MOST_STEPS:,}"
+        raise MechanismError(Finding(f"cannot analyse {steps} positions", "steps", remedy))
+
+
+@dataclass(frozen=True)
+class Positions:
+    """What every position of a cycle came to, before the books of the cycle are made of it.
+
+    means: over the cycle; ideal: those of the mechanism without errors, if it has any; losses: of contact.
+    """
+
+    arrays: Arrays
+    labels: dict[str, list[str]]
+    time: NDArray[np.float64]
+    method: FrictionMethod
+    causes: diagnosis.Causes
+    means: Means
+    ideal: Means | None
+    losses: list[contact_loss.Loss]
+
+
+def positions(
+    run: Run,
+    steps: int = 360,
+    method: FrictionMethod | None = None,
+    progress: Callable[[int], None] | None = None,
+    margin: bool = True,
+    averaged: bool = True,
+) -> Positions:
+    """The numbers of every variable of `results` at equally spaced positions, their statuses and causes.
+
+    margin: whether the locking margin is looked for; it is infinite if not. averaged: whether the means over the cycle
+    are, which ask for many positions more; they are NaN if not.
+    """
+    check_steps(steps)
+    _refuse_seats(run)
+    method = replace(method or FrictionMethod(), margin_up_to=MARGIN if margin else 0.0)
+    steps = steps if run.cycle.duration > 0 else 1
+    time = run.cycle.times(steps)
+    labels = fill_of(run.system).labels(run.system) | ({"end": ["1", "2"]} if run.seats else {})
+    parts = [part for part, there in (("seats", run.seats), ("errors", run.erring)) if there]
+    arrays = results.allocate(labels, steps, fill_of(run.system).absent(run.system), parts)
+    causes = diagnosis.Causes(run.system)
+    ideal = {name: np.zeros(arrays[name].shape, arrays[name].dtype) for name in IDEAL} if run.erring else {}
+    for low in range(0, steps, CHUNK):
+        window = slice(low, min(low + CHUNK, steps))
+        if run.erring:
+            _fill_as_built(arrays, ideal, run, time, window, method, causes)
+        else:
+            _fill(arrays, run.solve(time[window], method=method), time[window], window, causes)
+        if progress:
+            progress(window.stop)
+    quick = replace(method, margin_up_to=0.0)  # the margin is known by now
+    rest.bracket(arrays, run, time, quick, causes.zero_slip(), causes.seats())
+    losses = contact_loss.find(arrays, run, time) if run.seats else []
+    fill_of(run.system).unwrap(arrays, run.system, run.values, time)
+
+    means = _means(run, arrays, quick) if averaged else still(arrays)
+    meant = (_means(run, ideal, quick, ideal=True) if averaged else still(ideal)) if run.erring else None
+    return Positions(arrays, labels, time, method, causes, means, meant, losses)
+
+
+def _means(run: Run, arrays: Arrays, method: FrictionMethod, ideal: bool = False) -> Means:
+    """Means over the cycle; NaN where a position has no answer. ideal: of the mechanism without errors."""
+    of = Mechanisms(run.system, run.chosen.assembly, run.ideal_values if ideal else run.values, [run.cycle])
+    if run.cycle.duration <= 0 or np.any(arrays["status"] >= Status.NOT_CONVERGED):
+        return still(arrays)
+    if ideal or not run.seats:
+        look = run.ideal if ideal else run.solve
+        between = None if ideal else [run.edges]
+        return means_of(of, lambda rows, time: _powers(look(time.ravel(), method=method), time), between)[0]
+    gaps = contact_loss.gaps(run)
+
+    def seated(rows: NDArray[np.intp], time: NDArray[np.float64]) -> Arrays:
+        seen = around(time.ravel(), run.cycle)
+        found = settle(run, seen, method, run.ideal(seen.times, method))
+        valid = contact_loss.valid(found, run, gaps, time.ravel()).reshape(time.shape)
+        # a gap left out would weigh the rest of the cycle otherwise: play changes little of what flows there
+        meant = _powers(run.ideal(time.ravel(), method=method), time)
+        return {name: np.where(valid, array, meant[name]) for name, array in _powers(found.back, time).items()}
+
+    between = [np.unique(np.concatenate([run.edges, np.clip(gaps.ravel(), 0.0, run.cycle.duration)]))]
+    return means_of(of, seated, between, SEATED)[0]
+
+
+def _powers(back: Backward, time: NDArray[np.float64]) -> Arrays:
+    """What means are made of, (…, lane, node), from a walk at all these times in a row."""
+    arrays, _ = filled(back, None, time.ravel(), (1, time.size), AVERAGED)
+    return {name: arrays[name].reshape(*arrays[name].shape[:-2], *time.shape) for name in AVERAGED}
+
+
+def _refuse_seats(run: Run) -> None:
+    """MechanismError where pins lie in seats of a module that closes with special dimensions only."""
+    seated = {seat.joint for seat in run.seats}
+    for module in run.system.plan.modules:
+        names = [name for name in module.joints if name in seated]
+        if module.redundant and names:
+            what = f"the links {', '.join(module.links)} are over-constrained: seats by loads do not close them"
+            remedy = "analyse it with --seat free; `trunnion assemble` tells what its play takes up"
+            raise MechanismError(Finding(what, f"joints.{names[0]}.seat", remedy))
+
+
+IDEAL = (*AVERAGED, "status")  # what the means of the ideal mechanism are made of
+
+
+def _fill_as_built(
+    arrays: Arrays,
+    ideal: Arrays,
+    run: Run,
+    time: NDArray[np.float64],
+    window: slice,
+    method: FrictionMethod,
+    causes: diagnosis.Causes,
+) -> None:
+    """One chunk of a mechanism with errors beside the ideal one."""
+    part, quick = time[window], replace(method, margin_up_to=0.0)
+    labels = fill_of(run.system).labels(run.system)
+    seen = lanes(part, run.cycle) if run.seats else Lanes(part, np.arange(len(part)), 0)
+    scratch = results.allocate(
+        labels, len(seen.times), fill_of(run.system).absent(run.system), wanted={*IDEAL, *COMPARED}
+    )
+    meant = run.ideal(seen.times, quick)
+    _fill(scratch, meant, seen.times, slice(0, len(seen.times)))
+    own = slice(int(seen.own[0]), int(seen.own[-1]) + 1)
+    scratch = {name: array[..., own] for name, array in scratch.items()}
+    for name, array in ideal.items():
+        array[..., window] = scratch[name]
+    if run.seats:
+        seated = settle(run, seen, method, meant)
+        causes.note_seats(seated.offsets, seated.sticks, window.start)
+        _fill(arrays, seated.back, part, window, causes)
+        fill_seats(arrays, run.seats, seated, window)
+        status = arrays["status"][window]
+        np.maximum(status, np.where(seated.sticks, status.dtype.type(Status.ZERO_SLIP), 0), out=status)
+    else:
+        _fill(arrays, run.solve(part, method=method), part, window, causes)
+    fill_errors(arrays, scratch, _link_numbers(run.system), window)
+    blank(arrays, arrays["status"][window].astype(np.int8), window)
+
+
+def filled(
+    back: Backward,
+    meant: Backward | None,
+    time: NDArray[np.float64],
+    shape: tuple[int, int],
+    wanted: Collection[str],
+) -> tuple[Arrays, Arrays]:
+    """Variables of `results` by name, (…, mechanism, position), of one walk over many mechanisms; the same of `meant`.
+
+    meant: the walk of the mechanisms without errors, if any has some; the first arrays then hold the differences too.
+    time: (mechanism, position) or (position,), s; wanted: what will be read, of the rest there is nothing.
+    """
+    system, everything = back.walk.system, slice(None)
+    if meant is None:
+        arrays = _of_many(system, shape, {*wanted, "status"}, [])
+        _fill(arrays, back, time, everything)
+        return arrays, {}
+    arrays, ideal = (_of_many(system, shape, {*wanted, *IDEAL, *COMPARED}, ["errors"]) for _ in range(2))
+    _fill(arrays, back, time, everything)
+    _fill(ideal, meant, time, everything)
+    fill_errors(arrays, ideal, _link_numbers(system), everything)
+    blank(arrays, arrays["status"].astype(np.int8), everything)
+    return arrays, ideal
+
+
+def _of_many(system: System, shape: tuple[int, int], wanted: Collection[str], parts: Sequence[str]) -> Arrays:
+    """Arrays to be filled, (…, mechanism, position)."""
+    labels, absent = fill_of(system).labels(system), fill_of(system).absent(system)
+    flat = results.allocate(labels, shape[0] * shape[1], absent, parts, wanted)
+    return {name: array.reshape(*array.shape[:-1], *shape) for name, array in flat.items()}
+
+
+def _link_numbers(system: System) -> list[tuple[int, int]]:
+    """Numbers of the links of every joint."""
+    links = fill_of(system).labels(system)["link"]
+    return [(links.index(first), links.index(second)) for _, (first, second) in system.joints.values()]
+
+
+def _fill(
+    arrays: Arrays,
+    back: Backward,
+    time: NDArray[np.float64],
+    window: slice,
+    causes: diagnosis.Causes | None = None,
+) -> None:
+    """Write one chunk into the result; what a status rules out becomes NaN."""
+    status = status_of(back, arrays["status"][window].shape)
+    arrays["status"][window] = status
+    if causes:
+        causes.note(back, status, window.start)
+    with np.errstate(all="ignore"):
+        fill = fill_of(back.walk.system)
+        fill.motion(arrays, back, window)
+        fill.forces(arrays, back, window)
+        _fill_settled(arrays, back, window)
+        fill_power(arrays, back, time, window)
+    blank(arrays, status, window)
+
+
+def _fill_settled(arrays: Arrays, back: Backward, window: slice) -> None:
+    """Figures of the friction iteration."""
+    settled = back.settled
+    for key, field in (
+        ("friction_iterations", "iterations"),
+        ("friction_change", "change"),
+        ("friction_residual", "residual"),
+        ("friction_contraction", "contraction"),
+    ):
+        worst = functools.reduce(np.maximum, (getattr(one, field) for one in settled), 0.0)
+        arrays[key][window] = worst
+    arrays["locking_margin"][window] = functools.reduce(np.minimum, (one.margin for one in settled), np.inf)

@@ -1,0 +1,290 @@
+"""At which positions measures have to be known: the grid of a cycle, single places, ends of windows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.algebra.dual import Dual, primal
+from trunnion.algebra.namespace import Number
+from trunnion.algebra.quadrature import Nodes, nodes
+from trunnion.errors import Finding, MechanismError
+from trunnion.measures.measures import Measure
+from trunnion.solve.system import System, Values
+
+if TYPE_CHECKING:
+    from trunnion.solve.run import Run
+
+__all__ = ["Plan", "Window", "plan"]
+
+Array = NDArray[np.float64]
+
+CLOSE = 0.25  # of a step: a position of the grid that is closer to the end of a window gives way to it
+NEWTONS = 4  # steps to a time, one of which is exact at a constant speed, before it is looked for by bisection
+BISECTIONS = 60
+
+
+@dataclass(frozen=True)
+class Window:
+    """The positions of one measure.
+
+    index: into the times of the plan, in order; time: theirs, s, rising (beyond the end of the cycle where the window
+    runs over it); coordinate: of the first driver if it runs one way (else the time), in the same way; period: after
+    which they repeat, s, None for a range; gain: of the coordinate in a period; weights: of the positions in a mean,
+    and those of a rougher rule, where they are the places of a rule.
+    """
+
+    index: NDArray[np.intp]
+    time: Array
+    coordinate: Array
+    period: float | None = None
+    gain: float = 0.0
+    weights: tuple[Array, Array] | None = None
+
+    @cached_property
+    def everything(self) -> bool:
+        """Whether it takes all positions as they are."""
+        return bool(np.array_equal(self.index, np.arange(len(self.index))))
+
+    def of(self, number: Number, positions: int) -> Number:
+        """The part of a number over all positions of the plan, (…, position), that the measure is of."""
+        if isinstance(number, Dual):
+            return Dual(self.of(number.real, positions), self.of(number.dual, positions))
+        if np.ndim(number) == 0 or np.shape(number)[-1] == 1 < positions:
+            whole = np.broadcast_to(number, (*np.shape(number)[:-1], len(self.index)))
+            return whole
+        return number if self.everything and len(self.index) == positions else number[..., self.index]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Times to evaluate, s, rising, (position,), and the window of each measure, by name."""
+
+    run: Run
+    times: Array
+    windows: Mapping[str, Window]
+
+    def moved(self, values: Values) -> Number:
+        """The times with other numbers of the drivers, (position,) or (sample, position): of the same positions.
+
+        The first driver has the same coordinates if it runs one way; else times are the same parts of its cycle.
+        Dual numbers give derivatives of the times, of a law that runs one way.
+        """
+        system, before = self.run.system, self.run.values
+        paths = [path for path in before if path.startswith("drivers.")]
+        if all(values[path] is before[path] or _same(values[path], before[path]) for path in paths):
+            return self.times
+        name = next(iter(system.mechanism.drivers))
+        before_span, span = system.span(before, name), system.span(values, name)
+        scaled = self.times * (span.duration / before_span.duration)
+        if not span.one_way:
+            return scaled
+        return _reached(system, values, name, system.drive(before, name, self.times)[0], scaled, span.duration)
+
+
+def plan(run: Run, measures: Sequence[Measure], steps: int) -> Plan:
+    """The positions that measures need: the grid of `steps` positions only if one is of all positions or of a window.
+
+    Raises MechanismError for places and windows that are not in the cycle.
+    """
+    duration = run.cycle.duration
+    findings: list[Finding] = []
+    if duration <= 0:
+        for measure in measures:
+            if measure.of_place or measure.at is not None or measure.over is not None:
+                what = "nothing moves: there are no places in a cycle"
+                findings.append(
+                    Finding(what, f"measures.{measure.name}", "measure it as it stands, without at or over")
+                )
+        if findings:
+            raise MechanismError(findings)
+        nothing = np.zeros(1)
+        one = Window(np.zeros(1, np.intp), nothing, nothing)
+        return Plan(run, nothing, {measure.name: one for measure in measures})
+    ends: dict[str, tuple[float, ...]] = {}
+    for measure in measures:
+        try:
+            ends[measure.name] = _ends(run, measure)
+        except MechanismError as error:
+            findings += error.findings
+    if findings:
+        raise MechanismError(findings)
+    averaged = {measure.name for measure in measures if not ends[measure.name] and _averages(run, measure)}
+    rule = nodes(run.edges) if averaged else Nodes(*(np.zeros(0),) * 3)
+    asked = [found for name, found in ends.items() if name not in averaged]
+    grid = run.cycle.times(steps) if any(len(found) != 1 for found in asked) else np.zeros(0)
+    extra = [moment % duration if run.cycle.periodic else moment for found in ends.values() for moment in found]
+    times = np.unique(np.concatenate([grid, extra, rule.at]))
+    known = _path(run, times), _gain(run)
+    windows = {name: _window(run, found, times, grid, known) for name, found in ends.items() if name not in averaged}
+    index = np.searchsorted(times, rule.at)
+    period = duration if run.cycle.periodic else None
+    whole = Window(index, rule.at, known[0][index], period, known[1], (rule.weights, rule.inside))
+    return Plan(run, times, windows | dict.fromkeys(averaged, whole))
+
+
+def _averages(run: Run, measure: Measure) -> bool:
+    """Whether a figure is a mean over the cycle; that of an angle which gains turns needs the end of the cycle too.
+
+    Samples are taken at the nodes of the nominal mechanism: where one turns round elsewhere, its mean is off by the
+    jump there times the way from the nominal place, as a share of the cycle.
+    """
+    return measure.rule in ("mean", "rms", "ratio") and not measure.turning(run.system)
+
+
+def _window(run: Run, ends: tuple[float, ...], times: Array, grid: Array, known: tuple[Array, float]) -> Window:
+    """The positions of one measure: a place, a window between two times, or all of the grid."""
+    duration, (coordinates, gain) = run.cycle.duration, known
+    if not ends:
+        index = np.searchsorted(times, grid)
+        return Window(index, grid, coordinates[index], duration if run.cycle.periodic else None, gain)
+    laps = [np.floor(moment / duration) if run.cycle.periodic else 0.0 for moment in ends]
+    found = [np.searchsorted(times, moment - lap * duration) for moment, lap in zip(ends, laps, strict=True)]
+    between, between_laps = np.zeros(0, np.intp), np.zeros(0)
+    if len(ends) == 2:
+        step = duration / max(1, len(grid) - (0 if run.cycle.periodic else 1))
+        reach = np.arange(laps[0], laps[1] + 1)
+        inner = (grid[None, :] + reach[:, None] * duration).ravel()
+        inside = (inner > ends[0] + CLOSE * step) & (inner < ends[1] - CLOSE * step)
+        between = np.tile(np.searchsorted(times, grid), len(reach))[inside]
+        between_laps = np.repeat(reach, len(grid))[inside]
+    index = np.concatenate([found[:1], between, found[1:]]).astype(np.intp)
+    lap = np.concatenate([laps[:1], between_laps, laps[1:]])
+    return Window(index, times[index] + lap * duration, coordinates[index] + lap * gain)
+
+
+# ---- places and windows as they are stated --------------------------------------------------------------------
+
+
+def _ends(run: Run, measure: Measure) -> tuple[float, ...]:
+    """Times, s, of the place or of both ends of the window of a measure; none if it is of the whole cycle."""
+    where = f"measures.{measure.name}"
+    name = next(iter(run.system.mechanism.drivers))
+    if measure.of_place and not run.system.span(run.values, name).one_way:
+        what = f"the figure is a coordinate of '{name}', which names no one position: it goes there and back"
+        raise MechanismError(Finding(what, where, "let it run one way, or measure something else"))
+    if measure.at is not None:
+        return (_time(run, measure, measure.at, f"{where}.at"),)
+    if measure.over is None:
+        return ()
+    first, last = (_time(run, measure, place, f"{where}.over") for place in measure.over)
+    duration = run.cycle.duration
+    if run.cycle.periodic:
+        first, last = (first, last) if _forward(run, measure) else (last, first)
+        stated = abs(measure.over[1] - measure.over[0])
+        whole = duration if measure.timed else abs(_gain(run))
+        if abs(stated - whole) <= 1e-9 * whole:
+            return ()
+        if stated > whole:
+            what = f"the window is {stated:g} wide, the cycle {whole:g} (SI)"
+            raise MechanismError(Finding(what, f"{where}.over", "state a window within one cycle"))
+        first %= duration
+        last = first + (last - first) % duration
+    elif last < first:
+        first, last = last, first
+    if not last > first:
+        raise MechanismError(Finding("the window is empty", f"{where}.over", "state two places apart, or at: one"))
+    return first, last
+
+
+def _forward(run: Run, measure: Measure) -> bool:
+    """Whether a window is stated in the sense in which the cycle runs; one that goes down is told from its upper end.
+
+    [300, 60] and [-60, 60] deg are the same of a driver that turns on: from the first place to the second.
+    """
+    if measure.timed or measure.over is None:
+        return True
+    return bool(_gain(run) > 0) or measure.over[1] < measure.over[0]
+
+
+def _time(run: Run, measure: Measure, place: float, where: str) -> float:
+    """The time of a place, s."""
+    duration = run.cycle.duration
+    if measure.timed:
+        if not run.cycle.periodic and not -1e-12 * duration <= place <= duration * (1 + 1e-12):
+            what = f"{place:g} s is not in the cycle, which takes {duration:g} s"
+            raise MechanismError(Finding(what, where, "state a time within it"))
+        return place % duration if run.cycle.periodic else min(max(place, 0.0), duration)
+    system = run.system
+    name = next(iter(system.mechanism.drivers), "")
+    span = system.span(run.values, name) if name else None
+    if span is None or not span.one_way:
+        what = f"the coordinate of '{name}' names no one position: it goes there and back" if name else "no driver"
+        raise MechanismError(Finding(what, where, "state a time, such as 0.2 s"))
+    return _moment(run, name, place, where)
+
+
+def _moment(run: Run, name: str, place: float, where: str) -> float:
+    """The time, s, at which a driver that runs one way has a coordinate."""
+    duration, values, system = run.cycle.duration, run.values, run.system
+    ends = [float(np.ravel(primal(system.drive(values, name, time)[0]))[0]) for time in (0.0, duration)]
+    low, high = min(ends), max(ends)
+    slack = 1e-9 * (high - low)
+    if run.cycle.periodic:
+        turn = 2 * np.pi if system.turns(name) else high - low
+        place += turn * np.ceil((low - slack - place) / turn)
+        place -= turn * max(0.0, np.ceil((place - high - slack) / turn))
+    if not low - slack <= place <= high + slack:
+        factor, unit = (180 / np.pi, "deg") if system.turns(name) else (1e3, "mm")
+        what = f"{factor * place:.6g} {unit} is outside the range of '{name}', "
+        what += f"{factor * low:.6g} to {factor * high:.6g} {unit}"
+        raise MechanismError(Finding(what, where, "state a place within the range"))
+    target = np.array(min(max(place, low), high))
+    guess = np.array(duration * (float(target) - ends[0]) / (ends[1] - ends[0]))
+    return float(_reached(system, values, name, target, guess, duration))
+
+
+def _reached(system: System, values: Values, name: str, target: Number, guess: Number, duration: Number) -> Number:
+    """Times, s, at which a driver that runs one way has the target coordinates; by bisection where the guess has not.
+
+    With the derivatives that the numbers carry: t = t₀ − (q(t₀) − target)/q̇.
+    """
+    wanted = primal(target)
+
+    def error(time: Number) -> tuple[Number, Number]:
+        value, rate, _ = system.drive(values, name, time)
+        return np.asarray(primal(value)) - wanted, np.asarray(primal(rate))
+
+    first, last = error(0.0 * guess)[0], error(0.0 * guess + duration)[0]
+    exact = 4e-15 * (np.max(np.abs(last - first)) + np.max(np.abs(wanted)))
+    time = guess
+    for _ in range(NEWTONS):
+        off, rate = error(time)
+        if np.all(np.abs(off) <= exact):
+            break
+        time = time - off / np.where(rate == 0, np.inf, rate)
+    if not np.all(np.abs(error(time)[0]) <= exact):
+        way, shape = np.sign(last - first), np.shape(first + guess)
+        low, high = np.zeros(shape), np.zeros(shape) + duration
+        for _ in range(BISECTIONS):
+            time = (low + high) / 2
+            late = way * error(time)[0] > 0
+            low, high = np.where(late, low, time), np.where(late, time, high)
+    value, rate, _ = system.drive(values, name, time)
+    if isinstance(value, Dual):
+        return time - Dual(np.zeros(value.shape), (value - target).dual) / primal(rate)
+    return np.asarray(time)
+
+
+def _gain(run: Run) -> float:
+    """What `_path` gains over the cycle."""
+    ends = _path(run, np.array([0.0, run.cycle.duration]))
+    return float(ends[1] - ends[0])
+
+
+def _path(run: Run, times: Array) -> Array:
+    """Coordinate of the first driver if it runs one way, else the time."""
+    name = next(iter(run.system.mechanism.drivers), "")
+    if not name or not run.system.span(run.values, name).one_way:
+        return times
+    found = np.broadcast_to(np.asarray(primal(run.system.drive(run.values, name, times)[0]), float), times.shape)
+    return np.array(found)
+
+
+def _same(number: Number, other: Number) -> bool:
+    return not isinstance(number, Dual) and bool(np.all(np.asarray(number) == np.asarray(other)))

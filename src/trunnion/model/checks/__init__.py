@@ -1,0 +1,1 @@
+"""What is wrong with the plain fields of a model file."""

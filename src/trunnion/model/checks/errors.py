@@ -1,0 +1,365 @@
+"""Checks of what is off nominal: named errors, misaligned axes, plays, seats and fits."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from trunnion.algebra.namespace import Number
+from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.joints.clearance import ellipse_error
+from trunnion.joints.fits import FitLimits, fit
+from trunnion.model.contact import PLAY_PAIRS, TURNING_PAIRS, clearance, has_guide, has_pin, has_play, play
+from trunnion.model.dimensions import nominal_dimensions
+from trunnion.model.joint_parts import Friction, Joint, Pin, Seat
+from trunnion.model.merge import stated
+from trunnion.model.parameter_names import ERRORS, ParameterNames
+from trunnion.model.parameters import ParameterSet
+
+if TYPE_CHECKING:
+    from trunnion.model.numbers import Numbers
+
+__all__ = ["error_sizes", "errors", "joint_errors", "play_values"]
+
+WILD = 0.1  # of a length: an error above it is more likely a slip of the unit
+LEANING = np.radians(2)  # of a tilt, likewise
+STEEPEST = np.pi / 4  # of a tilt: beyond it is another design, and more likely a slip of the unit
+MEASURABLE = 1e-9  # m: half a millionth of a millimetre of interference is rounding
+
+
+# ---- errors of named numbers ----------------------------------------------------------------------------------
+
+
+def errors(mechanism: Numbers) -> Iterator[Finding]:
+    """Whether each error is of one number, once, and measures what that does."""
+    if not mechanism.errors:
+        return
+    found = {entry.path: entry for entry in mechanism.entries}
+    names = ParameterNames(found)
+    first: dict[str, str] = {}
+    for name in mechanism.errors:
+        where = f"{ERRORS}{name}"
+        try:
+            path = names.resolve(name)
+        except MechanismError as error:
+            one = error.findings[0]
+            yield Finding(one.what, where, one.remedy)
+            continue
+        if path.startswith("drivers."):
+            what = "an error of a driver makes the ideal mechanism run at other times, and nothing can be compared"
+            yield Finding(what, where, "change the driver itself")
+        if path in first:
+            what = f"'{name}' and '{first[path]}' are the same number"
+            yield Finding(what, where, "keep one of them")
+        first.setdefault(path, name)
+        if found[path].varies:
+            yield Finding(
+                f"'{path}' varies with the motion and has no one error", where, "state one of a dimension in it"
+            )
+
+
+# ---- what is stated of joints ---------------------------------------------------------------------------------
+
+
+def joint_errors(mechanism: Numbers) -> Iterator[Finding]:
+    """Plays, seats and misalignments that a joint cannot have, or that lack something."""
+    for name, joint in mechanism.effective_joints.items():
+        own, where = mechanism.stated_joints[name], f"joints.{name}"
+        yield from _empty_seat(own.seat, where)
+        if own.misalignment is not None:
+            yield from _misalignment(own, f"{where}.misalignment", mechanism.space == "spatial")
+        if has_pin(joint.type):
+            yield from _pin(mechanism, name, own.pin, where)
+        yield from _unused(joint.type, own.pin, own.friction, where, mechanism.space == "spatial")
+        if own.seat_on is not None:
+            yield from _seat_on(joint, f"{where}.seat_on")
+        if joint.seat not in (None, "free"):
+            yield from _seat(mechanism, joint, where if own.seat is not None else "joint_defaults", where)
+    yield from _defaults(mechanism)
+
+
+def _seat_on(joint: Joint, where: str) -> Iterator[Finding]:
+    """Whether the link that carries the seat of a pin is one of its two, and the pin is free to lie anywhere."""
+    if joint.seat_on not in joint.links:
+        yield Finding(f"'{joint.seat_on}' is no link of this joint", where, f"name {' or '.join(joint.links)}")
+    elif joint.type not in TURNING_PAIRS:
+        what = f"the seat of a {joint.type} joint has no link to choose: its length goes with '{joint.links[1]}'"
+        yield Finding(what, where, f"remove it; {' and '.join(TURNING_PAIRS)} joints have one")
+    elif isinstance(joint.seat, Seat):
+        what = "the seat is given, and seat_on is of a pin that may lie anywhere"
+        yield Finding(what, where, "keep one of seat and seat_on")
+
+
+def _misalignment(joint: Joint, where: str, spatial: bool) -> Iterator[Finding]:
+    if joint.type not in ("revolute", "cylindrical"):
+        what = f"the misalignment of a {joint.type} joint is not modelled"
+        yield Finding(what, where, "state errors: {…} of the numbers of its points, or remove it")
+    elif joint.misalignment and joint.misalignment.tilt is not None and not spatial:
+        yield Finding("nothing tilts in the plane", f"{where}.tilt", "keep the offset, or state space: spatial")
+
+
+def _pin(mechanism: Numbers, name: str, own: Pin | None, where: str) -> Iterator[Finding]:
+    """One way to state a play; an end float where there are ends; the classes of a fit."""
+    merged = mechanism.effective_joints[name].pin
+    defaults = mechanism.joint_defaults.pin
+    for pin, place in ((own, f"{where}.pin"), (defaults, "joint_defaults.pin")):
+        ways = stated(pin).keys() & {"radius", "hole_radius", "clearance", "fit"}
+        if "fit" in ways and len(ways) > 1:
+            yield Finding("a fit states radius and clearance already", place, "keep the fit or the numbers")
+        elif {"hole_radius", "clearance"} <= ways:
+            yield Finding("the hole is stated by its radius and by the clearance", place, "keep one of them")
+    if own and own.hole_radius is not None and merged and merged.radius is None:
+        yield Finding("the hole has a radius, the pin has none", f"{where}.pin", "add radius: …, or state clearance: …")
+    spatial = mechanism.space == "spatial"
+    if own and own.end_float is not None and not (spatial and mechanism.stated_joints[name].type == "revolute"):
+        what = "an end float is the play along the axis of a revolute joint in space"
+        yield Finding(what, f"{where}.pin.end_float", "remove it")
+    if merged and merged.fit and isinstance(found := _fit(mechanism, name), Finding):
+        yield Finding(found.what, _fit_place(mechanism, name), found.remedy)
+
+
+def _fit(mechanism: Numbers, name: str) -> FitLimits | Finding | None:
+    """The play of a joint's fit, or why it has none; None without a fit, or where its size has no value."""
+    pin = mechanism.effective_joints[name].pin
+    if pin is None or pin.fit is None:
+        return None
+    sizes = nominal_dimensions(mechanism.dimensions) if pin.fit.size.names else {}
+    if not set(pin.fit.size.names) <= sizes.keys() or np.isnan(size := float(pin.fit.size.evaluate(sizes))):
+        return None
+    try:
+        return fit(size, pin.fit.hole, pin.fit.shaft)
+    except MechanismError as error:
+        return error.findings[0]
+
+
+def _seat(mechanism: Numbers, joint: Joint, stated_at: str, where: str) -> Iterator[Finding]:
+    """What a seat other than free needs of its joint, and its words."""
+    at, seat, spatial = f"{stated_at}.seat", joint.seat, mechanism.space == "spatial"
+    if joint.type not in PLAY_PAIRS:
+        what = f"the play of a {joint.type} joint is not modelled: its pin has no seat"
+        yield Finding(what, at, f"remove it; {', '.join(PLAY_PAIRS[:-1])} and {PLAY_PAIRS[-1]} joints have one")
+        return
+    guide = has_guide(joint.type)
+    if not has_play(joint):
+        play_keys = "guide: {clearance: …}" if guide else "pin: {clearance: …}, hole_radius or a fit"
+        yield Finding("a seat without a play to lie in", at, f"state {play_keys}, or seat: free")
+        return
+    if joint.type != "spherical" and guide and not (joint.guide and joint.guide.length):
+        yield Finding("a seat without the length of the guide", where, "state guide: {length: …}, or seat: free")
+    if (
+        spatial
+        and not guide
+        and joint.type != "spherical"
+        and not (joint.pin and (joint.pin.length or joint.pin.bearing))
+    ):
+        yield Finding("a seat without the length of the pin", where, "state pin: {length: …}, or seat: free")
+    if not isinstance(seat, Seat):
+        return
+    if joint.type == "spherical":
+        if seat.beta is not None or seat.xi is not None:
+            yield Finding("a ball lies in a direction, not at angles", at, "write seat: {direction: [0, 0, 1]}")
+        elif seat.direction is not None and len(seat.direction) != 3:
+            what = f"has {len(seat.direction)} components, a ball in space needs 3"
+            yield Finding(what, f"{at}.direction", "write [0, 0, 1]")
+    elif seat.direction is not None:
+        body = "slider" if guide else "pin"
+        yield Finding(f"a {body} lies at angles, not in a direction", f"{at}.direction", "write seat: {xi: 30 deg}")
+    elif not spatial and not guide and seat.beta is not None and seat.beta.source != 0:
+        yield Finding("a pin in the plane does not lean: its beta is 0", f"{at}.beta", "keep xi")
+
+
+def _empty_seat(seat: object, where: str) -> Iterator[Finding]:
+    if isinstance(seat, Seat) and not stated(seat):
+        yield Finding("says nowhere to lie", f"{where}.seat", "write {xi: 30 deg}, or of a ball {direction: [0, 0, 1]}")
+
+
+def _unused(kind: str, pin: Pin | None, friction: Friction | None, where: str, spatial: bool) -> Iterator[Finding]:
+    """Sizes of a pin, and a model of friction, that change nothing in a joint of a kind; "" of all in the plane."""
+    if spatial and kind != "spherical":
+        return
+    body = "a ball" if spatial else "a pin in the plane"
+    for key in ("length", "bearing"):
+        if pin and getattr(pin, key) is not None:
+            what = f"{body} has no {key}: it is not used"
+            yield Finding(what, f"{where}.pin.{key}", "keep it as a remark, or remove it", Severity.NOTE)
+    if pin and pin.offset is not None and not spatial:
+        yield Finding("there is no axis in the plane to offset a bearing along", f"{where}.pin.offset", "remove it")
+    if friction and friction.model == "pezzuti":
+        what = f"the model pezzuti is of bearings that carry a moment, and {body} carries none"
+        yield Finding(what, f"{where}.friction.model", "remove it")
+
+
+def _defaults(mechanism: Numbers) -> Iterator[Finding]:
+    """Defaults that mean no joint."""
+    pin, seat = mechanism.joint_defaults.pin, mechanism.joint_defaults.seat
+    if mechanism.space == "planar":
+        yield from _unused("", pin, mechanism.joint_defaults.friction, "joint_defaults", spatial=False)
+    joints = mechanism.effective_joints.values()
+    yield from _empty_seat(seat, "joint_defaults")
+    if pin and pin.end_float is not None and mechanism.space == "planar":
+        yield Finding("there is no end float in the plane", "joint_defaults.pin.end_float", "remove it")
+    if seat not in (None, "free") and not any(has_play(joint) for joint in joints):
+        what = "no joint has a play to lie in"
+        yield Finding(what, "joint_defaults.seat", "state pin: {clearance: …}, hole_radius or a fit", Severity.WARNING)
+    if isinstance(seat, Seat) and seat.direction is not None and (seat.beta is not None or seat.xi is not None):
+        what = "a direction is the seat of a ball, beta and xi are that of a pin"
+        yield Finding(what, "joint_defaults.seat", "state the one here and the other with its joints")
+
+
+# ---- numbers --------------------------------------------------------------------------------------------------
+
+
+def error_sizes(numbers: ParameterSet) -> Iterator[Finding]:
+    """Errors so large that their unit is in doubt."""
+    for path in numbers.entries:
+        target = path.removeprefix(ERRORS)
+        if target == path or target not in numbers.nominal or path not in numbers.nominal:
+            continue
+        error = float(numbers.nominal[path])
+        meant = float(numbers.nominal[target]) - error
+        if np.abs(error) > WILD * np.abs(meant) > 0:
+            what = f"is {error:g} (SI), {100 * np.abs(error / meant):.3g} % of the {meant:g} that are meant"
+            yield Finding(what, path, "check its unit: a plain number is SI", Severity.WARNING)
+
+
+def play_values(mechanism: Numbers, name: str, numbers: ParameterSet) -> Iterator[Finding]:
+    """Signs and sizes of a joint's misalignment, seat and play, and what they make doubtful."""
+    joint, where, values = mechanism.effective_joints[name], f"joints.{name}", numbers.nominal
+    tilt = values.get(f"{where}.misalignment.tilt", 0.0)
+    if np.abs(tilt) > STEEPEST:
+        what = f"is {np.degrees(tilt):.4g} deg, an error of at most 45 deg is meant"
+        yield Finding(what, f"{where}.misalignment.tilt", "check its unit; turn the axis of the point instead")
+    elif np.abs(tilt) > LEANING:
+        what = f"is {np.degrees(tilt):.4g} deg, more than a misalignment usually is"
+        yield Finding(what, f"{where}.misalignment.tilt", "a plain number is in radians", Severity.WARNING)
+    beta = values.get(f"{where}.seat.beta", 0.0)
+    if np.abs(beta) > np.pi * (1 + 1e-12):
+        what = f"is {np.degrees(beta):.4g} deg, the ends of a pin lie at most 180 deg apart"
+        yield Finding(what, f"{where}.seat.beta", "give an angle above -180 deg up to 180 deg")
+    stated_direction = isinstance(joint.seat, Seat) and joint.seat.direction is not None
+    if stated_direction and all(values.get(f"{where}.seat.direction.{one}", np.nan) == 0 for one in "xyz"):
+        yield Finding("has no direction: all its components are 0", f"{where}.seat.direction", "write [0, 0, 1]")
+    yield from _unmodelled(mechanism, name, values)
+    if not has_play(joint):
+        return
+    yield from _play_sign(mechanism, name, joint, numbers)
+    found = _fit(mechanism, name)
+    if isinstance(found, FitLimits):
+        yield from _press(joint, found, _fit_place(mechanism, name))
+    yield from _play_size(mechanism, name, joint, values)
+
+
+def _unmodelled(mechanism: Numbers, name: str, values: Mapping[str, Number]) -> Iterator[Finding]:
+    """A play of a pair whose play is not modelled, which would count for nothing."""
+    kind, pin = mechanism.effective_joints[name].type, f"joints.{name}.pin"
+    if kind in PLAY_PAIRS or not has_pin(kind):
+        return
+    own, further = clearance(name, values) or 0.0, values.get(f"{pin}.cylindricity", 0.0)
+    if not (np.abs(own) > 0 or np.abs(further) > 0):
+        return
+    size = f" of {_um(own)}" * bool(own > 0)
+    what = f"the play{size} of a {kind} joint is not modelled and would count for nothing"
+    radius = f"radius: {values[f'{pin}.radius'] * 1e3:.6g} mm, " if f"{pin}.radius" in values else ""
+    remedy = f"state pin: {{{radius}clearance: 0{', cylindricity: 0' * bool(further)}}} here"
+    two = ", or two revolute joints in its place, whose play is modelled"
+    yield Finding(what, pin, remedy + two * (kind == "universal"))
+
+
+def _play_sign(mechanism: Numbers, name: str, joint: Joint, numbers: ParameterSet) -> Iterator[Finding]:
+    """A nominal play below zero, which no seat can lie in and which radii as stated must not have."""
+    where, values = f"joints.{name}", numbers.nominal
+    pin = joint.pin
+    if pin is None or pin.clearance is not None or has_guide(joint.type) or pin.hole_radius is None:
+        return  # a negative clearance is found with the other lengths
+    if f"{where}.pin.hole_radius" not in values:  # a play along the axis alone
+        return
+    radius, hole = values[f"{where}.pin.radius"], values[f"{where}.pin.hole_radius"]
+    if not hole < radius:
+        return
+    if pin.fit is None:
+        what = f"is {_mm(hole)}, less than the radius {_mm(radius)} of the pin"
+        entry = numbers.entries[f"{where}.pin.hole_radius"]
+        yield Finding(what, entry.alias or entry.path, "check the two; a press fit is a fixed joint")
+    elif joint.seat not in (None, "free"):
+        what = f"the nominal play of the fit {pin.fit.source} is {_um(hole - radius)} on the radius: no pin lies in it"
+        yield Finding(what, _fit_place(mechanism, name), "take another fit, fits: maximum, or seat: free")
+
+
+def _fit_place(mechanism: Numbers, name: str) -> str:
+    """Where the fit of a joint is stated: with the joint or with the defaults."""
+    own = mechanism.stated_joints[name].pin
+    return f"joints.{name}.pin.fit" if own and own.fit else "joint_defaults.pin.fit"
+
+
+def _press(joint: Joint, found: FitLimits, where: str) -> Iterator[Finding]:
+    """A fit that may or must press."""
+    text = joint.pin.fit.source if joint.pin and joint.pin.fit else ""
+    reach = f"its play on the diameter is {_um(found.minimum)} to {_um(found.maximum)}"
+    if found.maximum <= MEASURABLE:
+        what = f"{text} is a press fit, no play: it cannot turn as a bearing; {reach}"
+        yield Finding(what, where, "take a shaft of class e to h, such as g6", Severity.WARNING)
+    elif found.minimum < -MEASURABLE:
+        what = f"{text} may press: {reach}"
+        yield Finding(what, where, "take a shaft of class e to h, such as g6", Severity.WARNING)
+
+
+def _play_size(mechanism: Numbers, name: str, joint: Joint, values: Mapping[str, Number]) -> Iterator[Finding]:
+    """A play so large, or a pin so short, that what is said of small plays no longer holds."""
+    where, rho = f"joints.{name}", float(play(joint, name, values))
+    if not rho > 0 or has_guide(joint.type):
+        return
+    place = f"{where}.pin"
+    side, distance, link = _shortest_side(mechanism, name, joint, values)
+    crossing = distance <= values.get(f"{where}.pin.radius", 0.0)  # axes that all but meet: that is no lever
+    if rho > 0.01 * distance and not crossing:
+        what = f"a play of {_mm(rho)} is {100 * rho / distance:.3g} % of the {_mm(distance)} from '{name}' to '{side}'"
+        remedy = f"above 1 % of a side of the link '{link}' small-play figures are rough: check its unit"
+        yield Finding(what, place, remedy, Severity.WARNING)
+    if mechanism.space == "planar" or joint.type == "spherical":
+        return
+    radius = float(values.get(f"{where}.pin.radius", np.nan))
+    length = float(values.get(f"{where}.pin.length", values.get(f"{where}.pin.bearing", np.nan)))
+    error = ellipse_error(rho, radius, length) if length > 0 else np.nan  # at β = π
+    if error > 0.01:
+        what = f"taking the hole for a circle where a leaning pin cuts an ellipse errs by up to {100 * error:.2g} %"
+        remedy = f"of the play {_mm(rho)}, by 2 r play / length²; a longer pin or a smaller play keeps it below 1 %"
+        yield Finding(what, place, remedy, Severity.WARNING)
+    leans = joint.seat not in (None, "free") or values.get(f"{where}.misalignment.tilt", 0.0) != 0
+    if leans and length < 2 * radius:
+        what = f"the pin is {_mm(length)} long, less than its diameter {_mm(2 * radius)}: its two ends hardly guide it"
+        yield Finding(what, place, "give the length in the hole; a longer pin leans less", Severity.WARNING)
+
+
+def _shortest_side(mechanism: Numbers, name: str, joint: Joint, values: Mapping[str, Number]) -> tuple[str, float, str]:
+    """The nearest other turning joint on a link of the joint, how far it is, m, and which link; infinity without one.
+
+    Joints at one point count for nothing, and a loop places none by points.
+    """
+    best = ("", np.inf, "")
+    for link in joint.links:
+        points = mechanism.links[link].points if link in mechanism.links else {}
+        here = _place(values, link, name)
+        for other, one in mechanism.effective_joints.items():
+            if other == name or link not in one.links or other not in points or name not in points:
+                continue
+            if not has_pin(one.type) or len(there := _place(values, link, other)) != len(here):
+                continue
+            distance = float(np.linalg.norm(here - there))
+            if 0 < distance < best[1]:
+                best = (other, distance, link)
+    return best
+
+
+def _place(values: Mapping[str, Number], link: str, point: str) -> np.ndarray:
+    path = f"links.{link}.points.{point}"
+    return np.array([float(values[f"{path}.{one}"]) for one in "xyz" if f"{path}.{one}" in values])
+
+
+def _mm(length: float) -> str:
+    return f"{1e3 * length:.5g} mm"
+
+
+def _um(length: float) -> str:
+    return f"{1e6 * length:.4g} um"

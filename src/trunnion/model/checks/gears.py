@@ -1,0 +1,84 @@
+"""Checks of gear pairs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from trunnion.algebra.namespace import Number
+from trunnion.errors import Finding
+from trunnion.model.names import nearest
+from trunnion.model.parts import freedoms
+
+if TYPE_CHECKING:
+    from trunnion.model.numbers import Numbers
+
+__all__ = ["gear_values", "gears"]
+
+
+def gears(mechanism: Numbers) -> Iterator[Finding]:
+    """Whether each gear pair speaks of two joints that turn, and has teeth only where its gears can touch."""
+    joints = mechanism.effective_joints
+    for name, gear in mechanism.gears.items():
+        where = f"gears.{name}"
+        if mechanism.space == "spatial":
+            yield Finding("gear pairs are planar", where, "use a planar mechanism")
+            continue
+        if name in joints:
+            yield Finding("a joint has this name too", where, "call the gear pair otherwise")
+        missing = [joint for joint in gear.joints if joint not in joints]
+        for joint in missing:
+            yield Finding(f"there is no joint '{joint}'", f"{where}.joints", nearest(joint, joints))
+        for joint in gear.joints:
+            if joint in joints and "rotation" not in freedoms(joints[joint].type):
+                yield Finding(f"the joint '{joint}' does not turn", f"{where}.joints", "name a revolute joint")
+        if gear.joints[0] == gear.joints[1]:
+            yield Finding(f"couples the joint '{gear.joints[0]}' with itself", f"{where}.joints", "name two joints")
+        elif not missing:
+            yield from _teeth(mechanism, name, where)
+
+
+def _teeth(mechanism: Numbers, name: str, where: str) -> Iterator[Finding]:
+    gear = mechanism.gears[name]
+    one, two = (mechanism.effective_joints[joint].links for joint in gear.joints)
+    shared = set(one) & set(two)
+    if len(shared) == 2:
+        yield Finding("both joints are between the same two links", f"{where}.joints", "name joints of three links")
+    elif gear.teeth and not shared:
+        what = f"'{gear.joints[0]}' and '{gear.joints[1]}' have no link in common that carries both gears"
+        yield Finding(what, where, "state teeth: false for a train, belt or chain that passes torques alone")
+    elif not gear.teeth and gear.pressure_angle is not None:
+        yield Finding("means nothing without teeth", f"{where}.pressure_angle", "remove it, or teeth: false")
+
+
+def gear_values(mechanism: Numbers, values: Mapping[str, Number]) -> Iterator[Finding]:
+    """Ratios and pressure angles that no gear has."""
+    for name, gear in mechanism.gears.items():
+        where = f"gears.{name}"
+        ratio = values.get(f"{where}.ratio", np.nan)
+        if ratio == 0:
+            yield Finding("is 0: the second joint would not turn at all", f"{where}.ratio", "give another ratio")
+        known = len({*gear.joints} & mechanism.effective_joints.keys()) == len(gear.joints)
+        carriers = mechanism.carriers(name) if known else None
+        if gear.teeth and carriers and abs((1 if carriers[0] == carriers[1] else -1) * ratio - 1) < 1e-9:
+            what = "the gears turn alike, seen from the link that carries them: they have no pitch point"
+            yield Finding(what, f"{where}.ratio", "state teeth: false, or another ratio")
+        if gear.teeth and carriers and not _apart(mechanism, name, carriers, values):
+            what = "both joints lie at one point of the link that carries them: there is no room for gears that touch"
+            yield Finding(what, where, "move one, or state teeth: false for gears inside each other or a belt")
+        angle = values.get(f"{where}.pressure_angle", 0.0)
+        if angle < 0 or angle >= np.pi / 2:
+            what = f"is {np.degrees(angle):.4g}°"
+            yield Finding(what, f"{where}.pressure_angle", "give an angle from 0 to below 90°; 20 deg is usual")
+
+
+def _apart(mechanism: Numbers, name: str, carriers: tuple[int, int], values: Mapping[str, Number]) -> bool:
+    """Whether the centres of two gears are apart, by more than rounding of where they lie."""
+    joints = mechanism.gears[name].joints
+    carrier = mechanism.effective_joints[joints[0]].links[carriers[0]]
+    places = [[values.get(f"links.{carrier}.points.{joint}.{axis}", np.nan) for axis in "xy"] for joint in joints]
+    (ax, ay), (dx, dy) = places
+    distance = np.hypot(dx - ax, dy - ay)
+    return not distance <= 1e-12 * max(abs(ax), abs(ay), abs(dx), abs(dy))

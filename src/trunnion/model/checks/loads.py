@@ -1,0 +1,267 @@
+"""Checks of what loads may speak of (the motion, tables) and of springs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from trunnion.algebra.namespace import Number
+from trunnion.errors import Finding, Severity
+from trunnion.model.contact import motions
+from trunnion.model.expression import MOTION, RESERVED
+from trunnion.model.names import as_key, nearest
+from trunnion.model.parts import Spring, freedoms
+from trunnion.model.quantity import Quantity
+from trunnion.model.units import ANGLE, ANY, KINDS, Dimension, UnitError, dimension_text, fits
+
+if TYPE_CHECKING:
+    from trunnion.model.numbers import Numbers
+
+__all__ = ["motion_dimensions", "spring_values", "springs", "table_values", "tables", "unknown_name", "unread"]
+
+Values = Mapping[str, Number]
+Dimensions = Mapping[str, Dimension | None]
+
+
+# ---- names in the expressions of loads ------------------------------------------------------------------------
+
+
+def motion_dimensions(mechanism: Numbers, known: Dimensions) -> dict[str, Dimension | None]:
+    """What an expression in a load may speak of beside the dimensions, and what each measures."""
+    found: dict[str, Dimension | None] = {"time": KINDS["time"].dimensions[0]}
+    joint = mechanism.effective_joints.get(next(iter(mechanism.drivers), ""))
+    if joint is not None:
+        slides = "rotation" not in freedoms(joint.type)
+        found["drive"] = KINDS["length"].dimensions[0] if slides else ANGLE
+        found["speed"] = KINDS["speed" if slides else "angular speed"].dimensions[0]
+    for name, table in mechanism.tables.items():
+        found[name] = next((one for _, value in table.points if (one := _measure(value, known)) is not None), None)
+    return found
+
+
+def _measure(value: Quantity, known: Dimensions) -> Dimension | None:
+    if not set(value.names) <= known.keys():
+        return None
+    try:
+        return value.check(known, ANY)
+    except UnitError:
+        return None
+
+
+def unknown_name(mechanism: Numbers, name: str, path: str, source: object, known: Dimensions) -> Finding:
+    """A name in an expression that means nothing there."""
+    section = path.partition(".")[0]
+    what = f"'{source}' speaks of '{name}', which is not one of the dimensions"
+    if name not in MOTION and name not in mechanism.tables:
+        remedy = nearest(name, [*known, *(motion_dimensions(mechanism, known) if section == "loads" else ())])
+        return Finding(what, path, remedy)
+    if section == "loads":
+        return Finding(f"'{source}' speaks of '{name}', but nothing is driven", path, "state a driver")
+    return Finding(what, path, "drive, speed, time and tables are for loads; give a number or a dimension")
+
+
+# ---- tables ---------------------------------------------------------------------------------------------------
+
+
+def tables(mechanism: Numbers, known: Dimensions) -> Iterator[Finding]:
+    """Names of the tables, and whether the values of each measure one thing."""
+    for name, table in mechanism.tables.items():
+        where = f"tables.{name}"
+        if name in RESERVED or name in MOTION or name in mechanism.dimensions:
+            other = "a dimension" if name in mechanism.dimensions else "a name of the expressions themselves"
+            yield Finding(f"'{name}' is {other}", where, "call the table otherwise")
+        elif not name.isidentifier() or name.startswith("_"):
+            remedy = "name it with letters, digits and _, a letter first"
+            yield Finding(f"'{name}' cannot be used in an expression", where, remedy)
+        if table.over == "drive" and not mechanism.drivers:
+            yield Finding("is over the coordinate of the first driver, but nothing is driven", where, "state a driver")
+        if table.file is not None:
+            yield unread(table.file, where)
+            continue
+        if not table.points:
+            remedy = (
+                f"state points: {_EXAMPLES[table.over]}, or file: {as_key(f'{name}.csv')}, or give a file by --table"
+            )
+            yield Finding("has no points", where, remedy)
+            continue
+        if table.repeats and len(table.points) < (3 if table.period is None else 2):
+            yield Finding("a periodic table needs three points", f"{where}.points", "add points")
+        if table.period is not None and table.model_fields_set >= {"periodic"} and not table.periodic:
+            what = "means nothing to a table that does not repeat"
+            yield Finding(what, f"{where}.period", "remove it, or write periodic: true")
+        first: Dimension | None = None
+        for k, (_, value) in enumerate(table.points):
+            measured = _measure(value, known)
+            first = first if first is not None else measured
+            if measured is not None and first is not None and not (fits(measured, first) and fits(first, measured)):
+                what = f"is {dimension_text(measured)}, the values before are {dimension_text(first)}"
+                yield Finding(what, f"{where}.points.{k}.value", "let a table measure one thing")
+
+
+_EXAMPLES = {"drive": "[[0 deg, 40 bar], [360 deg, 40 bar]]", "time": "[[0 s, 40 bar], [1 s, 40 bar]]"}
+
+
+def unread(file: str, where: str) -> Finding:
+    """Of a table that names a file in a model that was not read from one."""
+    what = f"names the file '{file[:60]}', but this model was not read from a file and has no folder to look in"
+    remedy = "give its points instead, or write the model into a file beside it and read that"
+    return Finding(what, f"{where}.file", remedy)
+
+
+def table_values(mechanism: Numbers, values: Values) -> Iterator[Finding]:
+    """Whether the points of each table come in order and a periodic one ends as it begins."""
+    for name, table in mechanism.tables.items():
+        where = f"tables.{name}.points"
+        rows = range(len(table.points))
+        if not rows:
+            continue
+        places, column = ([values[f"{where}.{k}.{key}"] for k in rows] for key in ("at", "value"))
+        jumbled = [k for k in rows[1:] if places[k] <= places[k - 1]]
+        for k in jumbled:
+            what = f"its place {places[k]:g} does not come after {places[k - 1]:g} of the point before (SI)"
+            yield Finding(what, f"{where}.{k}", "sort the points; make a jump steep, not upright")
+        if table.repeats and not jumbled:
+            yield from _repeated(mechanism, name, (places, column), values)
+
+
+def _repeated(
+    mechanism: Numbers, name: str, points: tuple[list[Number], list[Number]], values: Values
+) -> Iterator[Finding]:
+    """Whether a periodic table ends as it begins, or has a period that its points fit."""
+    table, where = mechanism.tables[name], f"tables.{name}.points"
+    places, column = points
+    period = values.get(f"tables.{name}.period", np.nan)
+    extent = places[-1] - places[0]
+    if extent > period * (1 + SAME):
+        what = f"is {period:g}, and the points go over {extent:g} (SI)"
+        yield Finding(what, f"tables.{name}.period", "state the whole period, or leave points out")
+        return
+    closed = not extent < period * (1 - SAME)  # by its last point, not by its period
+    if closed and abs(column[-1] - column[0]) > 1e-9 * np.max(np.abs(column)):
+        what = f"a periodic table that begins at {column[0]:g} and ends at {column[-1]:g} (SI)"
+        cycle, unit = _cycle(mechanism, table.over, values)
+        short = table.period is None and cycle is not None and extent < cycle * (1 - SAME)
+        state = f", or state period: {_told(cycle, unit)}" if short and cycle else ""
+        yield Finding(what, where, f"end it with the value it begins with, one period later{state}")
+    elif table.period is None:
+        yield from _misfit(mechanism, name, extent, values)
+
+
+SAME = 1e-9  # of a period
+FITS = 1e-4  # of a cycle: what a period may be off a part of it, as 6.283 rad is
+
+
+def _misfit(mechanism: Numbers, name: str, extent: Number, values: Values) -> Iterator[Finding]:
+    """A table that repeats after something that is no turn, no part of one and no whole number of them."""
+    cycle, unit = _cycle(mechanism, mechanism.tables[name].over, values)
+    if cycle is None or not extent > 0:
+        return
+    ratio = max(cycle / extent, extent / cycle)
+    if abs(ratio - np.round(ratio)) <= FITS:
+        return
+    size, whole = (_told(one, unit) for one in (extent, cycle))
+    what = f"it repeats after {size}, which is neither a part nor a multiple of the cycle of {whole}"
+    state = f"state period: {whole}, or period: {size} if that is meant" if extent < cycle else f"state period: {size}"
+    remedy = f"end it one cycle after its first point, with the value of that, or {state}"
+    yield Finding(what, f"tables.{name}.points", remedy)
+
+
+def _told(period: Number, unit: str) -> str:
+    """A period as it is written in a file."""
+    return f"{np.degrees(period) if unit == 'deg' else period:.6g} {unit}"
+
+
+def _cycle(mechanism: Numbers, over: str, values: Values) -> tuple[float | None, str]:
+    """After what the motion repeats, and in which unit it is told: a turn of the first driver, or a time."""
+    first = next(iter(mechanism.drivers), "")
+    joint = mechanism.effective_joints.get(first)
+    if over == "drive":
+        turns = joint is not None and "rotation" in freedoms(joint.type)
+        return (2 * np.pi if turns else None), "deg"
+    driver, before = mechanism.drivers.get(first), f"drivers.{first}."
+    if driver is None or len(mechanism.drivers) > 1 or driver.law == "table":
+        return None, "s"
+    numbers = {path.removeprefix(before): value for path, value in values.items() if path.startswith(before)}
+    with suppress(KeyError, ZeroDivisionError):  # findings of their own
+        span = driver.motion.span({**numbers, **driver.options})
+        if span.periodic and np.isfinite(span.duration) and span.duration > 0:
+            return float(span.duration), "s"
+    return None, "s"
+
+
+# ---- springs --------------------------------------------------------------------------------------------------
+
+
+def springs(mechanism: Numbers) -> Iterator[Finding]:
+    """Whether each spring stands somewhere and states what it needs."""
+    for name, spring in mechanism.springs.items():
+        where = f"springs.{name}"
+        if (spring.between is None) == (spring.joint is None):
+            remedy = "state between: [link.point, link.point] or joint: …"
+            yield Finding("stands neither or both between two points and in a joint", where, remedy)
+            continue
+        joints, joint = mechanism.effective_joints, spring.joint or ""
+        if spring.between is not None:
+            yield from _ends(mechanism, spring.between, f"{where}.between")
+        elif joint not in joints:
+            yield Finding(f"there is no joint '{joint}'", f"{where}.joint", nearest(joint, joints))
+            continue
+        elif not motions(joints[joint].type):
+            what = f"a {joints[joint].type} joint has no one axis for a spring to act about or along"
+            remedy = "put it in a revolute, prismatic, cylindrical or helical joint, or between two points"
+            yield Finding(what, f"{where}.joint", remedy)
+            continue
+        turns = spring.between is None and "rotation" in freedoms(joints[joint].type)
+        yield from _free(spring, turns, where)
+
+
+def _ends(mechanism: Numbers, ends: tuple[str, str], where: str) -> Iterator[Finding]:
+    known = [f"{link}.{point}" for link, points in mechanism.points.items() for point in points]
+    for end in ends:
+        if end not in known:
+            yield Finding(f"there is no point '{end}'", where, nearest(end, known) + " (write link.point)")
+    if ends[0].partition(".")[0] == ends[1].partition(".")[0]:
+        yield Finding(f"both ends are on the link '{ends[0].partition('.')[0]}'", where, "name points of two links")
+
+
+def _free(spring: Spring, turns: bool, where: str) -> Iterator[Finding]:
+    """What the spring states of itself."""
+    own, other = ("free_angle", "free_length") if turns else ("free_length", "free_angle")
+    if getattr(spring, other) is not None:
+        kind = "turns" if turns else "acts along a line"
+        yield Finding(f"this spring {kind}", f"{where}.{other}", f"state {own} instead")
+    elif spring.stiffness is None and spring.damping is None and spring.preload is None:
+        yield Finding("there is nothing in this spring", where, "state a stiffness, a damping or a preload")
+    elif spring.stiffness is not None and getattr(spring, own) is None:
+        example = "20 deg" if turns else "40 mm"
+        yield Finding(f"a stiffness without a {own}", where, f"add {own}: {example}; its force there is the preload")
+    elif spring.stiffness is None and getattr(spring, own) is not None:
+        yield Finding(f"a {own} means nothing without a stiffness", f"{where}.{own}", "add stiffness: … or remove it")
+    if spring.only is not None and turns:
+        yield Finding(f"a spring in a joint that turns cannot only {spring.only}", f"{where}.only", "remove it")
+    elif spring.only is not None and spring.stiffness is None:
+        remedy = "add stiffness: … and free_length: …, which tells where it begins to act"
+        yield Finding(f"a spring that can only {spring.only} needs a stiffness", where, remedy)
+
+
+def spring_values(mechanism: Numbers, values: Values) -> Iterator[Finding]:
+    """Signs, the sense of a preload, and a free angle that would count whole turns where nothing counts them."""
+    for name, spring in mechanism.springs.items():
+        where = f"springs.{name}"
+        for key in ("stiffness", "damping", *(["free_length"] if spring.between else [])):
+            number = values.get(f"{where}.{key}", np.nan)
+            if number < 0:
+                yield Finding(f"is {number:g}, which is negative", f"{where}.{key}", "give a value of at least 0")
+        if values.get(f"{where}.stiffness", np.nan) == 0:
+            yield Finding("is 0: the spring does not pull", f"{where}.stiffness", "remove it", Severity.WARNING)
+        preload = values.get(f"{where}.preload", np.nan)
+        if spring.only is not None and preload * (1 if spring.only == "pull" else -1) < 0:
+            what = f"is {preload:g} N, which {'pushes' if preload < 0 else 'pulls'}; the spring can only {spring.only}"
+            yield Finding(what, f"{where}.preload", "change its sign, or remove it")
+        turns = np.abs(values.get(f"{where}.free_angle", np.nan)) / (2 * np.pi)
+        if spring.joint not in mechanism.drivers and turns > 1:
+            what = f"is {turns:.3g} turns, but the rotation of '{spring.joint}', which is not driven, counts none"
+            yield Finding(what, f"{where}.free_angle", "state the angle within a turn and the winding as preload: …")

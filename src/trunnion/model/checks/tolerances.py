@@ -1,0 +1,264 @@
+"""Checks of tolerances and correlations: what they name, what their distributions take, whether they agree."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import combinations
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.model.parameter_names import ParameterNames
+from trunnion.model.parameters import Entry, ParameterSet, measured
+from trunnion.model.prices import cost_entries
+from trunnion.model.quantity import Quantity
+from trunnion.model.tolerance_parts import DISTRIBUTIONS, OPTIONS, Variation
+from trunnion.model.tolerances import (
+    DEFAULTS,
+    FULL_TURN,
+    Tolerance,
+    correlation,
+    may_vary,
+    named_paths,
+    tolerated,
+    towards,
+    variations,
+    written_limits,
+)
+from trunnion.model.units import KINDS, Kind
+
+if TYPE_CHECKING:
+    from trunnion.model.numbers import Numbers
+
+__all__ = ["stated_entries", "tolerance_names", "tolerance_values"]
+
+NUMBER = KINDS["number"]
+ROUNDING = 1e-9  # of an eigenvalue, and of limits that touch zero
+
+
+# ---- quantities, for the checks of units ----------------------------------------------------------------------
+
+
+def stated_entries(mechanism: Numbers, found: Sequence[Entry]) -> list[Entry]:
+    """Every quantity of the sections about tolerances and costs, with where it stands and what it has to measure.
+
+    found: the numbers of the mechanism.
+    """
+    if not (mechanism.variations or mechanism.costs or mechanism.correlations or mechanism.processes):
+        return _defaults(mechanism)
+    names, kinds = ParameterNames(entry.path for entry in found), measured(mechanism, found)
+    listed = _defaults(mechanism)
+    for name, variation in mechanism.variations.items():
+        try:
+            kind = kinds[names.resolve(name)]
+        except MechanismError:  # a finding of its own
+            continue
+        listed += _variation(variation, f"tolerances.{name}", ("tolerances", name), kind)
+    for row, one in enumerate(mechanism.correlations):
+        listed += _entries(one.coefficient, f"correlations.{row}.coefficient", ("correlations", row), NUMBER)
+    return [*listed, *cost_entries(mechanism, names, kinds)]
+
+
+def _defaults(mechanism: Numbers) -> list[Entry]:
+    section = "tolerance_defaults"
+    stated = {key: getattr(mechanism.tolerance_defaults, key, None) for key in OPTIONS}
+    return [one for key, value in stated.items() for one in _entries(value, f"{section}.{key}", (section, key), NUMBER)]
+
+
+def _variation(variation: Variation, where: str, location: tuple[str | int, ...], kind: Kind) -> list[Entry]:
+    listed: list[Entry] = []
+    if variation.limits is not None:
+        for limit in (variation.limits.lower, variation.limits.upper):
+            listed += _entries(limit, where, location, kind)
+    for key in OPTIONS:
+        own = key in ("shift", "mode", "values")
+        listed += _entries(getattr(variation, key), f"{where}.{key}", (*location, key), kind if own else NUMBER)
+    return listed
+
+
+def _entries(value: Any, where: str, location: tuple[str | int, ...], kind: Kind) -> list[Entry]:
+    """Entries of a quantity, or of each of several."""
+    if isinstance(value, Quantity):
+        return [Entry(where, location, value, kind)]
+    items = value if isinstance(value, tuple) else ()
+    return [Entry(f"{where}.{place}", (*location, place), one, kind) for place, one in enumerate(items)]
+
+
+# ---- names ----------------------------------------------------------------------------------------------------
+
+
+def tolerance_names(mechanism: Numbers, found: Sequence[Entry]) -> Iterator[Finding]:
+    """Whether each name is of a number that can vary, once, and each distribution gets what it takes."""
+    names = ParameterNames(entry.path for entry in found)
+    known = {entry.path: entry for entry in found}
+    used = {name for entry in found for name in entry.quantity.names}
+    first: dict[str, str] = {}
+    for name, variation in mechanism.variations.items():
+        where = f"tolerances.{name}"
+        yield from _shape(mechanism, variation, where)
+        try:
+            path = names.resolve(name)
+        except MechanismError as error:
+            yield Finding(error.findings[0].what, where, error.findings[0].remedy)
+            continue
+        if path in first:
+            yield Finding(f"'{name}' and '{first[path]}' are the same number", where, "keep one of them")
+        first.setdefault(path, name)
+        yield from _number(known, path, used, where)
+    yield from _default_distribution(mechanism)
+    for row, one in enumerate(mechanism.correlations):
+        for place, name in enumerate(one.of):
+            try:
+                names.resolve(name)
+            except MechanismError as error:
+                at = f"correlations.{row}.of.{place}"
+                yield Finding(error.findings[0].what, at, error.findings[0].remedy)
+
+
+def _number(known: Mapping[str, Entry], path: str, used: set[str], where: str) -> Iterator[Finding]:
+    """Whether a number is one that can vary and that something depends on."""
+    entry = known[path]
+    if entry.varies:
+        what = f"'{path}' varies with the motion and has no one tolerance"
+        yield Finding(what, where, "state one of a dimension in it")
+    elif not may_vary(entry):
+        what = f"'{path}' is no number of the mechanism itself: nothing in it varies"
+        yield Finding(what, where, "state tolerances of dimensions, joints, links, loads, springs or drivers")
+    elif path.startswith(DEFAULTS) and not any(one.alias == path for one in known.values()):
+        yield Finding(f"no joint follows '{path}'", where, "name the number of a joint, as B.pin.clearance")
+    elif path.startswith("dimensions.") and path.partition(".")[2] not in used:
+        yield Finding(f"nothing depends on '{path}'", where, "use it, or remove it", Severity.WARNING)
+
+
+def _shape(mechanism: Numbers, variation: Variation, where: str) -> Iterator[Finding]:
+    """Whether the keys of an entry are those of its distribution."""
+    name = variation.distribution or mechanism.tolerance_defaults.distribution
+    takes = DISTRIBUTIONS[name]
+    for key in OPTIONS:
+        if getattr(variation, key) is not None and key not in takes:
+            others = " or ".join(one for one, keys in DISTRIBUTIONS.items() if key in keys)
+            own = ", ".join(takes) or "nothing but limits"
+            what = f"'{key}' means nothing to the distribution {name}"
+            yield Finding(what, f"{where}.{key}", f"remove it, or state distribution: {others}; {name} takes {own}")
+    if name == "sample" and variation.values is None:
+        yield Finding(
+            "the measured deviations are missing", where, "add values: [0.01 mm, …], or give them by --sample"
+        )
+    if name == FULL_TURN and variation.limits is not None:
+        yield Finding("a direction over the whole turn has no limits", where, "remove them, or say uniform")
+
+
+def _default_distribution(mechanism: Numbers) -> Iterator[Finding]:
+    defaults, where = mechanism.tolerance_defaults, "tolerance_defaults"
+    if defaults.distribution in ("sample", FULL_TURN):
+        what = f"the distribution {defaults.distribution} is of one number, not of all"
+        yield Finding(what, f"{where}.distribution", "state it in tolerances: {…}")
+    for key in OPTIONS:
+        if getattr(defaults, key, None) is not None and key not in DISTRIBUTIONS[defaults.distribution]:
+            what = f"'{key}' means nothing to the distribution {defaults.distribution}"
+            yield Finding(what, f"{where}.{key}", "remove it, or state its distribution")
+
+
+# ---- numbers --------------------------------------------------------------------------------------------------
+
+
+def tolerance_values(mechanism: Numbers, numbers: ParameterSet) -> Iterator[Finding]:
+    """Findings about limits, distributions and correlations as numbers; nan is reported already and passes."""
+    stated, written = variations(mechanism, numbers), written_limits(numbers)
+    for tolerance in tolerated(mechanism, numbers):
+        name, variation = stated.get(tolerance.path, ("", Variation()))
+        where = f"tolerances.{name}" if name else tolerance.path
+        yield from _limits(numbers, tolerance, variation, written.get(tolerance.path), where)
+        told = {key: where if getattr(variation, key) is not None else "tolerance_defaults" for key in OPTIONS}
+        yield from _options(tolerance, {key: f"{place}.{key}" for key, place in told.items()})
+    if mechanism.correlations:
+        yield from _correlations(mechanism, numbers)
+
+
+def _limits(
+    numbers: ParameterSet,
+    tolerance: Tolerance,
+    variation: Variation,
+    written: tuple[float, float] | None,
+    where: str,
+) -> Iterator[Finding]:
+    path, lower, upper = tolerance.path, tolerance.lower, tolerance.upper
+    unstated = variation.limits is None and written is None
+    if unstated and not {"values"} & tolerance.options.keys() and tolerance.distribution != FULL_TURN:
+        remedy = "add limits: ±0.05 mm, or write them where the number stands, as 60 mm ± 0.05 mm"
+        yield Finding(f"the limits of '{path}' are missing", where, remedy)
+    if lower > upper:
+        what = f"the lower limit {lower:g} is above the upper one {upper:g} (SI)"
+        yield Finding(what, where, "write ± before a number that is not negative")
+    if written is not None and variation.limits is not None and not np.allclose(written, (lower, upper), rtol=1e-9):
+        what = f"these limits go before those that stand with '{path}', {written[0]:g} to {written[1]:g} (SI)"
+        yield Finding(what, where, "state them once", Severity.NOTE)
+    if variation.direction:
+        if not towards(path, numbers):
+            what = f"'{path}' has no direction: the tilt and the offset of a misaligned axis have"
+            yield Finding(what, f"{where}.direction", "remove it; of an angle say {distribution: direction}")
+        elif tolerance.nominal + lower < -ROUNDING * tolerance.half_width:
+            what = f"is the size of a run-out, from {tolerance.nominal + lower:g} on (SI): a size is not negative"
+            yield Finding(what, where, "write +0.02/0 mm")
+    kind = numbers.entries[path].kind
+    if tolerance.distribution == FULL_TURN and kind.dimensions and kind is not KINDS["angle"]:
+        yield Finding(f"'{path}' is no angle", where, "only an angle is uniform over all directions")
+
+
+def _options(tolerance: Tolerance, where: Mapping[str, str]) -> Iterator[Finding]:
+    """Whether what a distribution was told makes one. where: each option stands."""
+    options: dict[str, Any] = dict(tolerance.options)
+    cp, cpk, mode = options.get("cp", 1.0), options.get("cpk"), options.get("mode")
+    for key in ("cp", "alpha", "beta"):
+        if options.get(key, 1.0) <= 0:
+            yield Finding(f"{key} is {options[key]:g}", where[key], "give a number above 0")
+    if cpk is not None and cpk > cp * (1 + ROUNDING):
+        what = f"cpk {cpk:g} is above cp {cp:g}: the share of the limits cannot be larger off the middle than in it"
+        yield Finding(what, where["cpk"], "give a cpk of at most cp")
+    if mode is not None and not tolerance.lower <= mode <= tolerance.upper:
+        what = f"the mode {mode:g} is outside the limits {tolerance.lower:g} to {tolerance.upper:g} (SI)"
+        if not np.isnan(tolerance.half_width + mode):
+            yield Finding(what, where["mode"], "give the deviation at which the density peaks")
+    shift = options.get("shift", 0.0)
+    if abs(shift) > tolerance.half_width:
+        what = f"the shift {shift:g} puts the mean outside the limits, {tolerance.half_width:g} from their middle (SI)"
+        yield Finding(what, where["shift"], "check its unit", Severity.WARNING)
+
+
+def _correlations(mechanism: Numbers, numbers: ParameterSet) -> Iterator[Finding]:
+    vary = {one.path for one in tolerated(mechanism, numbers)}
+    first: dict[frozenset[str], int] = {}
+    sound = True
+    for row, one in enumerate(mechanism.correlations):
+        where = f"correlations.{row}"
+        known = set(one.coefficient.names) <= numbers.dimension_values.keys()
+        value = float(one.coefficient.evaluate(numbers.dimension_values)) if known else np.nan
+        paths = named_paths(numbers, one.of)
+        if abs(value) > 1:
+            sound = False
+            yield Finding(f"is {value:g}", f"{where}.coefficient", "give a number from -1 to 1")
+        for name in (name for name in one.of if not vary.issuperset(named_paths(numbers, [name]))):
+            sound = False
+            yield Finding(f"'{name}' has no tolerance", where, "state one in tolerances: {…}, or leave it out")
+        if len(paths) < 2 and len(one.of) < 2:
+            yield Finding("one number is correlated with nothing", where, "name two, as of: [AB, BC]")
+        for pair in map(frozenset, combinations(paths, 2)):
+            if len(pair) < 2:
+                yield Finding(f"'{next(iter(pair))}' is named twice", where, "name two numbers")
+            elif pair in first:
+                what = f"the correlation of {_both(pair)} stands in entry {first[pair] + 1} already"
+                yield Finding(what, where, "keep one of them")
+            first.setdefault(pair, row)
+    if not sound:
+        return
+    matrix = correlation(mechanism, numbers)
+    if matrix.size and not np.isnan(matrix).any() and (least := float(np.linalg.eigvalsh(matrix)[0])) < -ROUNDING:
+        what = (
+            f"these correlations contradict one another: the least eigenvalue of their matrix is {least:.3g}, below 0"
+        )
+        yield Finding(what, "correlations", "numbers that both go with a third go with each other: bring them nearer 0")
+
+
+def _both(pair: frozenset[str]) -> str:
+    return " and ".join(f"'{path}'" for path in sorted(pair))

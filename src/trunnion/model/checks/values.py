@@ -1,0 +1,240 @@
+"""Checks of the numbers of a model: signs, ranges and bodies that cannot exist."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from itertools import combinations
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from trunnion.algebra.namespace import Number
+from trunnion.errors import Finding, Severity
+from trunnion.joints.friction import FRICTION_LAWS, LawParameter
+from trunnion.model.checks.errors import error_sizes, play_values
+from trunnion.model.checks.gears import gear_values
+from trunnion.model.checks.loads import spring_values, table_values
+from trunnion.model.checks.space import direction_values, pitch_values
+from trunnion.model.parameter_names import ERRORS
+from trunnion.model.parameters import ParameterSet
+from trunnion.model.parts import InertiaTensor, Link, freedoms
+from trunnion.model.units import KINDS
+
+if TYPE_CHECKING:
+    from trunnion.model.numbers import Numbers
+
+__all__ = ["NOT_NEGATIVE", "check_values"]
+
+Values = Mapping[str, Number]
+# Rounding in a file of four to six digits may violate the triangle inequality of a flat body by this much.
+INERTIA_SLACK = 1e-3
+
+
+def check_values(mechanism: Numbers, numbers: ParameterSet) -> Iterator[Finding]:
+    """Findings about the nominal values; a nan in them stands for what is reported already and passes every check."""
+    values = numbers.nominal
+    for path, entry in numbers.entries.items():
+        if path not in values:  # an expression of the motion
+            continue
+        broken = any(np.isnan(values[one]) for one in entry.depends if one in values)
+        if entry.quantity.names and not broken and not np.isfinite(values[path]) and not numbers.is_unreadable(path):
+            yield Finding(
+                f"'{entry.quantity.source}' has no finite value ({values[path]})",
+                entry.where,
+                "check divisions and roots",
+            )
+        if entry.kind is KINDS["angle"] and isinstance(entry.quantity.source, int | float) and not entry.alias:
+            yield from _radians(entry.where, float(values[path]))
+        if path.startswith(ERRORS):
+            continue  # a deviation has a sign
+        if entry.path.rpartition(".")[2] in NOT_NEGATIVE and not entry.alias and values[path] < 0:
+            yield Finding(f"is {values[path]:g}, which is negative", path, "give a value of at least 0")
+    for name, link in mechanism.links.items():
+        yield from _inertia(mechanism, link, values, f"links.{name}")
+    for name in mechanism.effective_joints:
+        yield from _joint(mechanism, name, numbers)
+        yield from play_values(mechanism, name, numbers)
+    for name in mechanism.drivers:
+        yield from _driver(mechanism, name, values)
+    yield from error_sizes(numbers)
+    yield from gear_values(mechanism, values)
+    yield from table_values(mechanism, values)
+    yield from spring_values(mechanism, values)
+    yield from pitch_values(mechanism, values)
+    yield from _directions(mechanism, values)
+    yield from direction_values(mechanism, values)
+    yield from _sides(mechanism, values)
+
+
+NOT_NEGATIVE = frozenset(
+    {"mass", "radius", "hole_radius", "length", "bearing", "clearance", "cylindricity", "end_float"}
+    | {"resisting_torque", "resisting_force"}
+)
+
+
+def _radians(path: str, angle: float) -> Iterator[Finding]:
+    """A plain number that is many turns is likely meant in degrees."""
+    if abs(angle) > 2 * np.pi and not path.startswith("drivers."):
+        what = f"is {angle:g} rad, which is {angle / (2 * np.pi):.3g} turns: a plain number is in radians"
+        yield Finding(what, path, f"write {angle:g} deg if it is in degrees", Severity.WARNING)
+
+
+def _joint(mechanism: Numbers, name: str, numbers: ParameterSet) -> Iterator[Finding]:
+    joint, where = mechanism.effective_joints[name], f"joints.{name}"
+
+    def value(path: str) -> Number:
+        return numbers.nominal.get(f"{where}.{path}", np.nan)
+
+    def stated(path: str) -> str:
+        """Where a value stands: with the joint or with the defaults."""
+        entry = numbers.entries[f"{where}.{path}"]
+        return entry.alias or entry.path
+
+    if joint.friction and joint.friction.law:
+        for parameter, declared in FRICTION_LAWS[joint.friction.law].parameters.items():
+            if parameter in joint.friction.parameters:
+                key = f"friction.{parameter}"
+                yield from _law_value(declared, parameter, value(key), stated(key))
+        across = ("pin.bearing", "guide.width") if mechanism.space == "spatial" else ()
+        for size in ("pin.radius", "guide.length", *across):
+            if value(size) == 0:
+                yield Finding("is 0, where friction needs it", stated(size), "give a value above 0")
+    for part, size in (("pin", "radius"), ("guide", "length")):
+        clearance, body = value(f"{part}.clearance"), value(f"{part}.{size}")
+        if clearance >= body > 0:
+            what = f"is {clearance:g} m, not less than the {size} {body:g} m of the {part}"
+            yield Finding(what, stated(f"{part}.clearance"), "check its unit")
+
+
+def _law_value(declared: LawParameter, parameter: str, number: Number, where: str) -> Iterator[Finding]:
+    if number < declared.minimum:
+        yield Finding(
+            f"is {number:g}, the least is {declared.minimum:g}", where, "give a value in the range of the law"
+        )
+    elif number > declared.maximum:
+        yield Finding(f"is {number:g}, the most is {declared.maximum:g}", where, "give a value in the range of the law")
+    elif parameter == "pair_factor" and number == 0:
+        yield Finding("is 0, which removes the friction", where, "give a factor above 0, or friction: 0")
+    elif parameter == "coefficient" and number > 1:
+        yield Finding(f"is {number:g}, above 1", where, "check it: dry metals have 0.1 to 0.6", Severity.WARNING)
+
+
+def _driver(mechanism: Numbers, name: str, values: Values) -> Iterator[Finding]:
+    where, driver = f"drivers.{name}", mechanism.drivers[name]
+    for key in ("period", "duration", "return_duration"):
+        if values.get(f"{where}.{key}", np.nan) <= 0:
+            number = values[f"{where}.{key}"]
+            yield Finding(f"is {number:g} s, which is not above 0", f"{where}.{key}", "give a time above 0")
+    for key in ("dwell", "delay"):
+        if values.get(f"{where}.{key}", np.nan) < 0:
+            number = values[f"{where}.{key}"]
+            yield Finding(f"is {number:g} s, which is negative", f"{where}.{key}", "give a time of at least 0")
+    if values.get(f"{where}.amplitude") == 0:
+        yield Finding("the amplitude is 0: it never moves", f"{where}.amplitude", "give it an extent")
+    if driver.points is not None:
+        yield from _table(mechanism, name, values)
+    if values.get(f"{where}.speed") == 0:
+        yield Finding("the speed is 0", f"{where}.speed", "give a speed, however small, with its sign")
+    start, end = (values.get(f"{where}.range.{end}", np.nan) for end in ("from", "to"))
+    if start == end:
+        yield Finding(f"the range begins and ends at {start:g}", f"{where}.range", "give it an extent")
+
+
+def _table(mechanism: Numbers, name: str, values: Values) -> Iterator[Finding]:
+    """Whether the points of a driver's table make a motion."""
+    driver, where = mechanism.drivers[name], f"drivers.{name}.points"
+    rows = range(len(driver.points or ()))
+    times, coordinates = ([values[f"{where}.{k}.{key}"] for k in rows] for key in ("time", "coordinate"))
+    if times[0] != 0 and not np.isnan(times[0]):
+        what = f"the table begins at {times[0]:g} s"
+        yield Finding(what, f"{where}.0", "begin it at 0 s and shift it by delay: …")
+    for k in rows[1:]:
+        if times[k] <= times[k - 1]:
+            what = f"its time {times[k]:g} s does not come after {times[k - 1]:g} s of the point before"
+            yield Finding(what, f"{where}.{k}", "sort the points by time")
+    if all(coordinate == coordinates[0] for coordinate in coordinates):
+        yield Finding("the table never moves", where, "give it an extent")
+    joint = mechanism.effective_joints.get(name)
+    gap = coordinates[-1] - coordinates[0]
+    if driver.periodic and joint and abs(gap) > 1e-9 * np.max(np.abs(coordinates)):
+        turns = gap / (2 * np.pi)
+        if "rotation" not in freedoms(joint.type) or abs(turns - np.round(turns)) > 1e-9:
+            what = f"a periodic table that begins at {coordinates[0]:g} and ends at {coordinates[-1]:g} (SI)"
+            yield Finding(what, where, "end it where it begins, or whole turns from there, or state periodic: false")
+
+
+def _directions(mechanism: Numbers, values: Values) -> Iterator[Finding]:
+    example = "[1, 0]" if mechanism.space == "planar" else "[1, 0, 0]"
+    for name, link in mechanism.links.items():
+        for point, place in link.points.items():
+            for key in ("axis", "x"):
+                path = f"links.{name}.points.{point}.{key}"
+                if getattr(place, key) is not None and all(
+                    values[f"{path}.{one}"] == 0 for one in _letters(values, path)
+                ):
+                    yield Finding("has no direction: all its components are 0", path, f"write {example} for along x")
+
+
+def _letters(values: Values, path: str) -> list[str]:
+    return [letter for letter in "xyz" if f"{path}.{letter}" in values]
+
+
+def _sides(mechanism: Numbers, values: Values) -> Iterator[Finding]:
+    """A link of two turning joints at one point has no length to transmit motion with."""
+    if mechanism.space == "spatial":
+        return
+    holding: dict[str, list[str]] = {name: [] for name in mechanism.links}
+    for key, joint in mechanism.effective_joints.items():
+        for name in dict.fromkeys(joint.links):
+            if name in holding and key in mechanism.links[name].points:
+                holding[name].append(key)
+    for name, joints in holding.items():
+        if len(joints) != 2 or any("rotation" not in freedoms(mechanism.effective_joints[key].type) for key in joints):
+            continue
+        if any(key in gear.joints for gear in mechanism.gears.values() for key in joints):
+            continue  # a shaft with two gears passes on a torque
+        for first, second in combinations(joints, 2):
+            a, b = ([values[f"links.{name}.points.{key}.{one}"] for one in "xy"] for key in (first, second))
+            if a == b:
+                severity = Severity.WARNING if name == mechanism.fixed_link else Severity.ERROR
+                what = f"the joints '{first}' and '{second}' of the link '{name}' are at one point"
+                yield Finding(what, f"links.{name}.points", "move one of them", severity)
+
+
+def _inertia(mechanism: Numbers, link: Link, values: Values, where: str) -> Iterator[Finding]:
+    """Whether a body can be so: principal moments about its centre, each at most the sum of the others."""
+    mass = values[f"{where}.mass"]
+    centre = np.array([values[f"{where}.centre.{one}"] for one in _letters(values, f"{where}.centre")], dtype=float)
+    if not len(centre):
+        distance, angle = values[f"{where}.centre.distance"], values[f"{where}.centre.angle"]
+        centre = distance * np.array([np.cos(angle), np.sin(angle)])
+    path = f"{where}.inertia"
+    spatial = isinstance(link.inertia, InertiaTensor)
+    if spatial != (mechanism.space == "spatial") and "inertia" in link.model_fields_set:
+        form = "{xx: …, yy: …, zz: …}" if mechanism.space == "spatial" else "one number"
+        yield Finding(f"the inertia of a {mechanism.space} link is {form}", path, f"write {form}")
+        return
+    about_origin = link.inertia_about == "origin"
+    if path not in values and not spatial:
+        return  # a spatial link without a tensor is a point mass
+    if not spatial:
+        least = mass * float(centre @ centre) if about_origin else 0.0
+        if values[path] < least * (1 - INERTIA_SLACK):
+            what = f"is {values[path]:g} kg m², less than m r² = {least:g}" if least else "is negative"
+            yield Finding(what, path, "check unit and inertia_about")
+        return
+    xx, yy, zz, xy, xz, yz = (float(values[f"{path}.{one}"]) for one in ("xx", "yy", "zz", "xy", "xz", "yz"))
+    tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    if about_origin and len(centre) == 3:
+        tensor = tensor - mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
+    if not np.isfinite(tensor).all():
+        return
+    principal = np.linalg.eigvalsh(tensor)
+    slack = INERTIA_SLACK * float(np.abs(tensor).max())
+    if principal[0] < -slack or principal[2] > principal[0] + principal[1] + slack:
+        shown = ", ".join(f"{one:.4g}" for one in principal)
+        yield Finding(
+            f"no body has the principal moments {shown} kg m² about its centre: one exceeds the sum of the others",
+            path,
+            "check inertia_about and the signs of xy, xz, yz (xy = −∫ x y dm)",
+        )

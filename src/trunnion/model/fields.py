@@ -1,0 +1,132 @@
+"""The plain fields of a model file, and what follows from them without looking at a number."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from trunnion.model.cost_parts import Process
+from trunnion.model.dimensions import nominal_dimensions
+from trunnion.model.merge import FitChoice, merge_joint
+from trunnion.model.parts import (
+    Correlation,
+    Cost,
+    Driver,
+    Gear,
+    Hint,
+    Joint,
+    JointDefaults,
+    Link,
+    Load,
+    LoopJoint,
+    Measure,
+    Name,
+    Part,
+    Spring,
+    Table,
+    Variation,
+    VariationDefaults,
+)
+from trunnion.model.quantity import Acceleration, AnyQuantity
+
+__all__ = ["Fields"]
+
+FIXED_NAMES = ("ground", "frame")
+
+
+class Fields(Part):
+    """The sections of a model file, as stated, and its links, joints and points, those of the loop among them."""
+
+    trunnion: Literal[1] = 1
+    name: str = ""
+    space: Literal["planar", "spatial"] = "planar"
+    over_constraint: Literal["refuse", "minimum-norm"] = "refuse"
+    fits: FitChoice = "mean"
+    gravity: Annotated[tuple[Acceleration, ...], Field(min_length=2, max_length=3)] | None = None
+    ground: str | None = None
+    dimensions: Mapping[Name, AnyQuantity] = {}
+    errors: Mapping[str, AnyQuantity] = {}
+    links: Mapping[Name, Link] = {}
+    joints: Mapping[Name, Joint] = {}
+    joint_defaults: JointDefaults = JointDefaults()
+    gears: Mapping[Name, Gear] = {}
+    loop: tuple[LoopJoint, ...] = ()
+    drivers: Mapping[Name, Driver] = {}
+    tables: Mapping[Name, Table] = {}
+    loads: Mapping[Name, Load] = {}
+    springs: Mapping[Name, Spring] = {}
+    assembly: Mapping[str, Hint] = {}
+    measures: Mapping[Name, Measure] = {}
+    variations: Annotated[Mapping[str, Variation], Field(alias="tolerances")] = {}
+    tolerance_defaults: VariationDefaults = VariationDefaults()
+    correlations: tuple[Correlation, ...] = ()
+    costs: Mapping[str, Cost] = {}
+    processes: Mapping[Name, Process] = {}
+    references: tuple[str, ...] = ()
+    notes: str = ""
+
+    @property
+    def coordinates(self) -> int:
+        """How many coordinates a point has: 2 or 3."""
+        return 2 if self.space == "planar" else 3
+
+    @cached_property
+    def fixed_link(self) -> str:
+        """The link that does not move: `ground`, else the link of that name or named frame; empty if there is none."""
+        names = [*self.links, *(row.link for row in self.loop)]
+        return self.ground or next((name for name in FIXED_NAMES if name in names), "")
+
+    @cached_property
+    def effective_links(self) -> Mapping[str, Link]:
+        """Every link; one that only the loop names is massless."""
+        return {**self.links, **{row.link: Link() for row in self.loop if row.link not in self.links}}
+
+    @cached_property
+    def stated_joints(self) -> Mapping[str, Joint]:
+        """Every joint as it was stated; a row of the loop joins the link before it to its own."""
+        stated = dict(self.joints)
+        for before, row in zip((*self.loop[-1:], *self.loop[:-1]), self.loop, strict=True):
+            stated[row.joint] = Joint(
+                type=row.type,
+                links=(before.link, row.link),
+                pitch=row.pitch,
+                pin=row.pin,
+                guide=row.guide,
+                friction=row.friction,
+                misalignment=row.misalignment,
+                seat_on=row.seat_on,
+                seat=row.seat,
+            )
+        return stated
+
+    @cached_property
+    def effective_joints(self) -> Mapping[str, Joint]:
+        """Every joint with the defaults merged in and its friction complete: law, model and all parameters."""
+        spatial = self.space == "spatial"
+        pins = [self.joint_defaults.pin, *(joint.pin for joint in self.stated_joints.values())]
+        named = any(pin and pin.fit and pin.fit.size.names for pin in pins)
+        sizes = nominal_dimensions(self.dimensions) if named else {}
+        return {
+            name: merge_joint(joint, self.joint_defaults, spatial, self.fits, sizes)
+            for name, joint in self.stated_joints.items()
+        }
+
+    @cached_property
+    def points(self) -> Mapping[str, tuple[str, ...]]:
+        """Names of the points of every link; a joint of the loop is a point of both its links."""
+        rows = [row.joint for row in self.loop]
+        ends = {name: [row for row in rows if name in self.stated_joints[row].links] for name in self.effective_links}
+        return {name: tuple(dict.fromkeys([*link.points, *ends[name]])) for name, link in self.effective_links.items()}
+
+    def carriers(self, gear: str) -> tuple[int, int] | None:
+        """On which side (0, 1) of each of its joints a gear pair has the link common to both; None without one."""
+        one, two = (self.effective_joints[joint].links for joint in self.gears[gear].joints)
+        shared = next((link for link in one if link in two), None)
+        return None if shared is None else (one.index(shared), two.index(shared))
+
+    def data(self) -> dict[str, Any]:
+        """The model as plain mappings, lists, numbers and texts: what was stated, as it was written."""
+        return {"trunnion": self.trunnion, **self.model_dump(mode="json", exclude_unset=True, by_alias=True)}

@@ -1,0 +1,1 @@
+"""Results: their variables, declared once, and how they are written to files."""

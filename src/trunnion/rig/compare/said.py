@@ -1,0 +1,421 @@
+"""What there is to say of a comparison: which courses are not within, what would explain it, what has no answer."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from trunnion.cycle.account import inputs, model_notes
+from trunnion.errors import Finding, Severity, Status, counted
+from trunnion.model.expression import LITERAL
+from trunnion.model.mechanism import Mechanism
+from trunnion.model.names import as_key
+from trunnion.model.units import unit as unit_of
+from trunnion.rig.compare.causes import KINDS, Cause
+from trunnion.rig.compare.judge import Verdict, going_on
+
+if TYPE_CHECKING:
+    from trunnion.rig.compare.pairs import Compared, Pair
+
+__all__ = ["findings_of", "gathered", "other_speed", "said", "units_set"]
+
+FAR = 0.5  # of a gain: told as a factor from here on
+SIGNIFICANT = 3.5  # standard deviations: of a correlation of turns that is none, in 1 of 4000 channels
+SLOWER = 0.01  # of a speed: a difference to speak of
+AGREE = np.radians(1.0)  # shifts that differ by less, or by less than a fifth, are one
+
+
+def findings_of(
+    mechanism: Mechanism, channels: Mapping[str, str], found: Sequence[Compared], coverage: float
+) -> list[Finding]:
+    """Everything there is to say, errors of the comparison first."""
+    rows = [
+        *_answers(found),
+        *_shifts(found),
+        *(finding for name in channels for finding in _of_channel(name, channels[name], found)),
+        *_efficiencies(found),
+        *_speeds(found),
+        *_of_the_model(found),
+        *_left_out(found),
+        *_going_on(channels, found),
+        *_accuracies(channels, found),
+        _exact(mechanism),
+    ]
+    order = list(Severity)
+    return sorted(rows, key=lambda one: order.index(one.severity))
+
+
+def units_set(
+    mechanism: Mechanism, names: Iterable[str], conditions: Iterable[str]
+) -> tuple[list[str], list[tuple[str, float]]]:
+    """SI unit of each number that is set, and the unit with its factor that it is read in.
+
+    That of the names of the conditions, such as `input.speed 250 rpm`, else the one that the model states it in.
+    """
+    known = {row["path"]: row for row in inputs(mechanism)}
+    told = dict(part.partition(" ")[::2] for name in conditions for part in name.split(", "))
+    units, written = [], []
+    for name in names:
+        row = known.get(mechanism.path_of(name), {"unit": "", "text": ""})
+        literals = (LITERAL.fullmatch(one.strip().removeprefix("-")) for one in (told.get(name, ""), row["text"]))
+        text = next((one["unit"] or one["per"] or "" for one in literals if one and (one["unit"] or one["per"])), "")
+        text = text or {"rad": "deg"}.get(row["unit"], row["unit"])
+        units.append(row["unit"])
+        written.append((text, float(unit_of(text)[0]) if text and text != "1" else 1.0))
+    return units, written
+
+
+def gathered(findings: Iterable[Finding]) -> list[Finding]:
+    """Findings about data files, those that differ in numbers only told once, with the files they are of."""
+    alike: dict[tuple[str, ...], list[Finding]] = {}
+    for one in findings:
+        what = re.sub(r"[-−+]?\d[\d.,e+-]*", "#", one.what)
+        alike.setdefault((one.severity, one.where.partition(" ")[0], what, one.remedy), []).append(one)
+    told = []
+    for rows in alike.values():
+        first, files = rows[0], list(dict.fromkeys(Path(one.file).name for one in rows if one.file))
+        if len(rows) > 1:
+            where = first.where if len({one.where for one in rows}) == 1 else f"{first.where.partition(' ')[0]}s"
+            some = ", ".join(files[:4]) + (", …" if len(files) > 4 else "")
+            what = f"{first.what} — and so {len(rows)} times in all" + (f": {some}" if files else "")
+            first = replace(first, what=what, where=where, file="", line=None)
+        told.append(first)
+    return told
+
+
+def said(value: float, unit: str, signed: bool = False) -> str:
+    """A number with its unit; angles in degrees."""
+    factor, shown = (180 / math.pi, "deg") if unit == "rad" else (1.0, "" if unit == "1" else unit)
+    return f"{value * factor + 0.0:{'+' if signed else ''}.3g} {shown}".strip()
+
+
+def _range(values: Sequence[float], unit: str, signed: bool = True) -> str:
+    low, high = said(min(values), unit, signed), said(max(values), unit, signed)
+    return low if low == high else f"{low.partition(' ')[0]} to {high}"
+
+
+def _share(value: float) -> str:
+    return f"{100 * value:.0f} %"
+
+
+def _in(names: Sequence[str], of: int) -> str:
+    """In which conditions."""
+    if len(names) == of:
+        return "in every condition" if of > 1 else f"in {names[0]}"
+    first = "; ".join(names[:3]) + ("; …" if len(names) > 3 else "")
+    return f"in {len(names)} of {counted(of, 'condition')} ({first})"
+
+
+def _cases(name: str, found: Sequence[Compared]) -> list[tuple[Compared, Pair]]:
+    return [(one, one.pairs[name]) for one in found if name in one.pairs]
+
+
+# ---- channels -------------------------------------------------------------------------------------------------
+
+
+def _of_channel(name: str, measures: str, found: Sequence[Compared]) -> Iterator[Finding]:
+    """One finding for each explanation, over all conditions."""
+    cases, shifted = _cases(name, found), _agreed(found)
+    by_cause: dict[str, list[tuple[Compared, Pair]]] = {}
+    for one, pair in cases:
+        verdict = pair.judged.verdict
+        if verdict in (Verdict.NOT, Verdict.OFFSET):
+            kind = pair.cause.kind if pair.cause else ""
+            if not (kind == "shift" and shifted):  # it is said once for all channels
+                by_cause.setdefault("zero" if verdict is Verdict.OFFSET and kind != "sign" else kind, []).append(
+                    (one, pair)
+                )
+    for kind, members in by_cause.items():
+        yield _explained(name, measures, kind, members, len(cases))
+    unknown = [len(pair.course.turns) for _, pair in cases if pair.judged.verdict is Verdict.UNKNOWN]
+    once = "was measured in one turn only"
+    if max(unknown, default=1) > 1:
+        once = f"has values of no more than one turn at a position, of up to {max(unknown)} that were measured"
+    for verdict, what, remedy in (
+        (
+            Verdict.UNKNOWN,
+            f"{once}: without scatter its uncertainty is not known",
+            "look at the gaps that `trunnion data` reports" if max(unknown, default=1) > 1 else "measure more turns",
+        ),
+        (Verdict.NOTHING, "has nothing to compare: nothing measured, or no answer of the model", ""),
+    ):
+        names = [one.condition.name for one, pair in cases if pair.judged.verdict is verdict]
+        if names:
+            yield Finding(f"{what}, {_in(names, len(cases))}", f"channels.{name}", remedy, Severity.WARNING)
+
+
+def _explained(name: str, measures: str, kind: str, members: Sequence[tuple[Compared, Pair]], of: int) -> Finding:
+    """A channel that is not within, with what would explain it."""
+    where = _in([one.condition.name for one, _ in members], of)
+    worst = min(pair.judged.within for _, pair in members)
+    rms = max(pair.judged.rms for _, pair in members)
+    unit = members[0][1].course.unit
+    offset = all(pair.judged.verdict is Verdict.OFFSET for _, pair in members)
+    if offset and kind == "zero":
+        story, remedy = _story(name, measures, kind, [_size(pair, kind) for _, pair in members], members)
+        what = f"is within U {where} apart from {story}: {_share(worst)} of the positions are within with it"
+        return Finding(what, f"channels.{name}", remedy)
+    several = len(members) > 1
+    what = (
+        f"is not within U {where}: {'down to ' if several else ''}{_share(worst)} of the positions are within, RMS of "
+        f"the residual {'up to ' if several else ''}{said(rms, unit)}"
+    )
+    if not kind:
+        remedy = "look at the residual along the cycle; `trunnion identify` fits numbers of the model to it"
+        return Finding(what, f"channels.{name}", remedy)
+    sizes = [_size(pair, kind) for _, pair in members]
+    least = min(cause.explains for cause in sizes)
+    story, remedy = _story(name, measures, kind, sizes, members)
+    alike = {other.kind for _, pair in members for other in pair.others} - {kind}
+    also = f"; {' or '.join(KINDS[one] for one in KINDS if one in alike)} would explain as much" if alike else ""
+    return Finding(f"{what}; {story} explains {_share(least)} of its mean square{also}", f"channels.{name}", remedy)
+
+
+def _size(pair: Pair, kind: str) -> Cause:
+    if pair.cause is not None and pair.cause.kind == kind:
+        return pair.cause
+    judged = pair.judged  # an offset that is less than nearly all of the residual
+    return Cause("zero", judged.bias, (judged.bias / judged.rms) ** 2)
+
+
+REMEDIES = {
+    "flat": "look at the sensor and its cable, and at the column in the mapping",
+    "mirror": "state angle: {sign: -1} in the mapping, or take it away, and look at the zero of the angle",
+    "sign": "state sign: -1 of the channel in the mapping, or take it away",
+    "zero": "look at the zero of the channel, or at what loads the model lacks",
+    "gain": "look at the gain of the channel and its unit, or at friction and loads of the model",
+    "shift": "look at the zero of the angle, and at delays of the channel",
+    "zero and gain": "look at zero and gain of the channel",
+}
+MODEL = "it is not the same in all conditions: look at friction and loads of the model, not at the sensor"
+
+
+def _story(
+    name: str, measures: str, kind: str, sizes: Sequence[Cause], members: Sequence[tuple[Compared, Pair]]
+) -> tuple[str, str]:
+    """What would explain it, with its size, and what to do about it."""
+    first, pair = members[0]
+    unit, values = pair.course.unit, [one.size for one in sizes]
+    subject = measures.removeprefix("rate:")
+    driver = first.model.run.system.mechanism.drivers.get(subject)
+    if driver is not None and driver.speed is not None and kind in ("zero", "gain"):  # not one that swings
+        speed = float(np.nanmean(pair.course.mean))
+        told = _range(values, unit) if kind == "zero" else _percent(values)
+        remedy = f"set: {{{subject}.speed: {{mean: {name}}}}} in the mapping takes the speed that was"
+        return f"another speed of the driver, measured {said(speed, unit)} ({KINDS[kind]} of {told})", remedy
+    if kind == "sign":
+        alike = pair.judged.correlation
+        told = "a wrong sign" + (f", correlation {alike:+.3f}," if np.isfinite(alike) else "")
+    elif kind == "zero":
+        told = f"a constant offset of {_range(values, unit)}"
+    elif kind == "gain":
+        told = f"a gain that is {_times(values) or f'off by {_percent(values)}'}"
+    elif kind == "flat":
+        told = f"a reading that stays at {_range(values, unit, False)} whatever the crank angle"
+    elif kind == "shift":
+        told = _ahead(values, [one for one, _ in members])
+    elif kind == "mirror":
+        told = KINDS[kind]
+    else:
+        told = f"an offset of {_range(values, unit)} and a gain off by {_percent([one.gain for one in sizes])}"
+    return told, MODEL if kind in ("zero", "gain") and _differ(kind, sizes, members) else REMEDIES[kind]
+
+
+def _differ(kind: str, sizes: Sequence[Cause], members: Sequence[tuple[Compared, Pair]]) -> bool:
+    """Whether an offset or a gain changes with the condition by more than its uncertainty, as no sensor's does."""
+    values = [one.size for one in sizes]
+    spread = max(values) - min(values)
+    known = [pair.judged.bias_expanded for _, pair in members]
+    typical = [max(abs(float(np.nanmean(pair.course.mean))), 1e-300) for _, pair in members]
+    wide = [one if kind == "zero" else one / size for one, size in zip(known, typical, strict=True)]
+    return bool(spread > 2 * np.nanmax([*wide, 0.0]) and spread > 0.1 * abs(values[0]))
+
+
+def _times(values: Sequence[float]) -> str:
+    """A gain that is far off, as a factor; empty of others."""
+    if max(abs(one) for one in values) < FAR:
+        return ""
+    low, high = f"{1 + min(values):.3g}", f"{1 + max(values):.3g}"
+    return f"{low if low == high else f'{low} to {high}'} times what it should be"
+
+
+def _percent(values: Sequence[float]) -> str:
+    low, high = f"{100 * min(values):+.2g}", f"{100 * max(values):+.2g}"
+    return f"{low} %" if low == high else f"{low} to {high} %"
+
+
+# ---- the crank angle ------------------------------------------------------------------------------------------
+
+
+def _ahead(shares: Sequence[float], found: Sequence[Compared]) -> str:
+    spans = [share * one.model.span for share, one in zip(shares, found, strict=True)]
+    late = [-share * one.model.run.cycle.duration * 1e3 for share, one in zip(shares, found, strict=True)]
+    return (
+        f"the crank angle read off by {_range(spans, found[0].model.unit)}, or a delay of {_range(late, 'ms', False)},"
+    )
+
+
+def _shifted(found: Sequence[Compared]) -> list[tuple[str, Compared, Cause]]:
+    return [
+        (name, one, pair.cause)
+        for one in found
+        for name, pair in one.pairs.items()
+        if pair.cause is not None and pair.cause.kind == "shift" and pair.judged.verdict is Verdict.NOT
+    ]
+
+
+def _agreed(found: Sequence[Compared]) -> bool:
+    """Whether all courses that a shift explains are shifted alike, and there are two of them."""
+    cases = _shifted(found)
+    angles = [cause.size * one.model.span for _, one, cause in cases]
+    if len(angles) < 2:
+        return False
+    return bool(max(angles) - min(angles) <= max(AGREE, 0.2 * max(abs(angle) for angle in angles)))
+
+
+def _shifts(found: Sequence[Compared]) -> Iterator[Finding]:
+    """A shift that the courses have in common is one of the angle."""
+    if not _agreed(found):
+        return
+    cases = _shifted(found)
+    ahead = [cause.size * one.model.span for _, one, cause in cases]
+    unit, mean = cases[0][1].model.unit, float(np.mean(ahead))
+    names = ", ".join(dict.fromkeys(name for name, _, _ in cases))
+    where = _in(list(dict.fromkeys(one.condition.name for _, one, _ in cases)), len(found))
+    what = (
+        f"{names} are not within U {where}; the crank angle read off by {_range(ahead, unit)} explains "
+        f"{_share(min(cause.explains for _, _, cause in cases))} of the mean square of the residuals"
+    )
+    yield Finding(what, "angle.zero", f"add {said(mean, unit, signed=True)} to the zero of the angle in the mapping")
+
+
+# ---- efficiency, the model, the sensors -----------------------------------------------------------------------
+
+
+def _efficiencies(found: Sequence[Compared]) -> Iterator[Finding]:
+    known = [(one, one.efficiency) for one in found if one.efficiency is not None]
+    told = [(one, of) for one, of in known if np.isfinite([of.measured, of.expanded, of.model]).all()]
+    off = [(one, of) for one, of in told if not of.within]
+    if off:
+        one, of = max(off, key=lambda case: abs(case[1].measured - case[1].model))
+        most = f"; the most in {one.condition.name}" if len(off) > 1 else ""
+        what = (
+            f"the model's is not within U {_in([case.condition.name for case, _ in off], len(known))}{most}: "
+            f"measured {of.measured:.4f} ± {of.expanded:.2g}, model {of.model:.4f}"
+        )
+        yield Finding(what, "efficiency", "look at the channels; `trunnion identify` fits friction to them")
+    for missing in dict.fromkeys(one.unmeasured for one in found if one.unmeasured):
+        where = _in([one.condition.name for one in found if one.unmeasured == missing], len(found))
+        what = f"is not compared {where}: the power of {', '.join(missing)} is not measured"
+        remedy = "measure effort: of every driver and load: of every useful load, each with its rate:"
+        yield Finding(what, "efficiency", remedy, Severity.WARNING)
+    for reason in dict.fromkeys(of.reason for _, of in known if of.reason[0]):
+        where = _in([one.condition.name for one, of in known if of.reason == reason], len(known))
+        yield Finding(f"is not known {where}: {reason[0]}", "efficiency", reason[1], Severity.WARNING)
+
+
+def _speeds(found: Sequence[Compared]) -> Iterator[Finding]:
+    """A driver that turned at another speed than the model's."""
+    rows = []
+    for one in found:
+        first = next(iter(one.model.run.system.mechanism.drivers), "")
+        if first and one.model.unit == "rad":
+            rows.append((one.condition.name, one.condition.speed, one.model.span / one.model.run.cycle.duration))
+            driver = first
+    if rows:
+        yield from other_speed(driver, rows, len(found))
+
+
+def other_speed(driver: str, rows: Sequence[tuple[str, float, float]], of: int) -> Iterator[Finding]:
+    """Of a driver whose speed, by condition as measured and in the model, rad/s, differs; of: conditions in all."""
+    off = [row for row in rows if np.isfinite(row[1]) and abs(row[1] - row[2]) > SLOWER * abs(row[2])]
+    if off:
+        _, measured, theirs = off[0]
+        what = (
+            f"the driver did not turn at the model's speed {_in([row[0] for row in off], of)}: "
+            f"{said(measured, 'rad/s')} measured, {said(theirs, 'rad/s')} in the model"
+        )
+        key, where = as_key(f"{driver}.speed"), f"drivers.{driver}"
+        remedy = f"state set: {{{key}: {{mean: …}}}} in the mapping, of a channel that measures rate:{driver}"
+        yield Finding(what, where, remedy, Severity.WARNING)
+
+
+def _answers(found: Sequence[Compared]) -> Iterator[Finding]:
+    """An error for every status that leaves positions of the model without numbers."""
+    for code in Status:
+        if code.solved:
+            continue
+        cases = [(one, int(np.count_nonzero(one.model.status == code))) for one in found]
+        cases = [(one, count) for one, count in cases if count]
+        if cases:
+            first, count = cases[0]
+            where = _in([one.condition.name for one, _ in cases], len(found))
+            size = len(first.condition.phase)
+            what = f"the model has no answer {where}, first at {count:,} of {counted(size, 'position')}: {code.text}"
+            values = " ".join(f"--set {name}={value:.6g}" for name, value in first.condition.values.items())
+            yield Finding(what, "", f"run analyse {values}".rstrip() + ": it says where in the cycle, and why")
+
+
+def _of_the_model(found: Sequence[Compared]) -> Iterator[Finding]:
+    """What every analysis of this model says, and warnings of single conditions."""
+    said_of: dict[tuple[str, str], list[Finding]] = {}
+    for one in found:
+        run = one.model.run
+        left_open = run.determinacy.findings() if run.determinacy is not None else []
+        for finding in (*model_notes(run.system.mechanism, run.system), *run.chosen.findings, *left_open):
+            said_of.setdefault((finding.where, finding.what), []).append(finding)
+    for rows in said_of.values():
+        if len(rows) == len(found) or rows[0].severity is not Severity.NOTE:
+            yield rows[0]
+
+
+def _left_out(found: Sequence[Compared]) -> Iterator[Finding]:
+    counts: Counter[str] = Counter()
+    for one in found:
+        for name, pair in one.pairs.items():
+            counts[name] += int(np.count_nonzero(np.isfinite(pair.model) & ~pair.comparable))
+    left = {name: count for name, count in counts.items() if count}
+    if left:
+        told = ", ".join(f"{name} {count:,}" for name, count in left.items())
+        what = f"positions left out of the figures: {told}; a relative speed is zero there, or a dead centre near"
+        yield Finding(what, "", "the model has an interval there and not one number", Severity.NOTE)
+
+
+def _going_on(channels: Mapping[str, str], found: Sequence[Compared]) -> Iterator[Finding]:
+    """Channels whose errors go on from turn to turn, in all conditions together."""
+    for name in channels:
+        told = [going_on(pair.course) for _, pair in _cases(name, found)]
+        count = sum(turns for _, turns in told)
+        if not count:
+            continue
+        mean = sum(value * turns for value, turns in told if turns) / count
+        if mean * math.sqrt(count) > SIGNIFICANT:
+            what = (
+                f"the errors of neighbouring turns are alike, correlation {mean:+.2f}: U, which takes turns as "
+                "independent, is too small, and so is that of the efficiency"
+            )
+            remedy = "measure many more turns, or apart from each other; state a zero that wanders in accuracy:"
+            yield Finding(what, f"channels.{name}", remedy, Severity.WARNING)
+
+
+def _accuracies(channels: Mapping[str, str], found: Sequence[Compared]) -> Iterator[Finding]:
+    bare = [
+        name for name in channels
+        if all(pair.course.accuracy.zero == pair.course.accuracy.gain == 0 for _, pair in _cases(name, found))
+    ]  # fmt: skip
+    if bare:
+        what = f"no accuracy of zero and gain is stated of {', '.join(bare)}: U has only the scatter between turns"
+        yield Finding(what, "channels", "state accuracy: {gain: …, zero: …} in the mapping", Severity.NOTE)
+
+
+def _exact(mechanism: Mechanism) -> Finding:
+    what = "the model is taken as exact: the verdicts have the uncertainty of the measurement only"
+    remedy = "`trunnion tolerance` tells what the tolerances do to a measure" if mechanism.tolerances() else ""
+    return Finding(what, "", remedy, Severity.NOTE)

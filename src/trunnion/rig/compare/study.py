@@ -1,0 +1,153 @@
+"""A model beside a measurement: residual and verdict of every channel in every working condition, and the efficiency.
+
+The model is run with the values of each condition and taken at the positions of the measurement. It has no uncertainty
+of its own here: what its numbers are uncertain by is not in the verdict.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from trunnion.errors import Finding, MechanismError, Status
+from trunnion.model.mechanism import Mechanism
+from trunnion.model.names import nearest
+from trunnion.rig.compare.causes import best, causes
+from trunnion.rig.compare.judge import Verdict, judge, uncertainty_of
+from trunnion.rig.compare.pairs import Compared, Efficient, Pair, unmeasured
+from trunnion.rig.compare.result import dataset
+from trunnion.rig.modelled import Modelled, modelled
+from trunnion.rig.reading.efficiency import Pairs, efficiency_of, load_joints, pairs_of
+from trunnion.rig.reading.measurement import Condition, Measurement
+from trunnion.rig.settings import check_settings
+from trunnion.solve.friction_method import FrictionMethod
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["compare"]
+
+
+def compare(
+    mechanism: Mechanism,
+    measurement: Measurement,
+    channels: Sequence[str] | None = None,
+    coverage: float = 2.0,
+    *,
+    friction: FrictionMethod | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> xr.Dataset:
+    """The model beside a measurement, condition by condition and channel by channel.
+
+    channels: some of the measurement's by name; all that measure something if not given. coverage: factor k of the
+    expanded uncertainty U = k u where turns are many (`judge.expanded`). progress: called with the conditions done.
+    Returns a Dataset over (channel, condition, position) of `compared.VARIABLES`, SI, residual = measured − model;
+    NaN where the model has no answer or nothing was measured.
+    Method: at each position the model with the condition's values; U by the GUM from the scatter between turns, the
+    zero and the gain of the sensor. Where a course is not within U, what a wrong sign, an offset, a wrong gain or a
+    shift of the crank angle would explain of the residual is fitted and said.
+    Raises MechanismError for values, channels or measures that the model does not have.
+    """
+    if not (np.isfinite(coverage) and 0 < coverage <= 8):
+        raise MechanismError(Finding(f"{coverage:g} is no coverage factor", "coverage", "give such as 2, up to 8"))
+    wanted = _channels(measurement, channels)
+    check_settings(mechanism, measurement)
+    method, joints = friction or FrictionMethod(), load_joints(mechanism)
+    found: list[Compared] = []
+    for done, condition in enumerate(measurement.conditions, 1):
+        there = {name: what for name, what in wanted.items() if name in condition.courses}
+        powers = pairs_of(condition, joints)
+        also = _of_powers(powers) if powers else {}
+        model = modelled(mechanism, condition, there, method, also)
+        pairs = {name: _pair(condition, model, name, coverage) for name in there}
+        missing = unmeasured(mechanism, condition) if powers else ()
+        whole = powers is not None and not missing and also.keys() <= model.courses.keys()
+        efficiency = _efficiency(condition, model, joints, coverage) if whole else None
+        found.append(Compared(condition, model, pairs, efficiency, missing))
+        if progress:
+            progress(done)
+    return dataset(mechanism, measurement, wanted, found, coverage, method)
+
+
+def _of_powers(powers: Pairs) -> dict[str, str]:
+    """What the channels that tell powers measure, by name."""
+    return {one.channel: one.measures for pair in (*powers.driven, *powers.loaded) for one in pair}
+
+
+def _channels(measurement: Measurement, wanted: Sequence[str] | None) -> dict[str, str]:
+    """What each channel measures, by name; MechanismError if there is none, or not one that is wanted."""
+    known: dict[str, str] = {}
+    for condition in measurement.conditions:
+        for name, course in condition.courses.items():
+            if course.measures:
+                known.setdefault(name, course.measures)
+    missing = [name for name in wanted or () if name not in known]
+    if missing:
+        raise MechanismError(
+            [Finding(f"there is no channel '{name}'", "--channel", nearest(name, known)) for name in missing]
+        )
+    if not known:
+        what = "no channel measures anything of the model" if measurement.conditions else "there is no condition in it"
+        raise MechanismError(
+            Finding(what, measurement.name, "state measures: effort:DRIVER of a channel in the mapping")
+        )
+    return known if wanted is None else {name: known[name] for name in dict.fromkeys(wanted)}
+
+
+def _pair(condition: Condition, model: Modelled, channel: str, coverage: float) -> Pair:
+    course, theirs = condition.courses[channel], model.courses[channel]
+    comparable = model.comparable(channel)
+    judged = judge(course, theirs, comparable, coverage)
+    pair = Pair(course, theirs, comparable, judged, None)
+    if judged.verdict not in (Verdict.NOT, Verdict.OFFSET):
+        return pair
+    where = comparable & np.isfinite(course.mean) & np.isfinite(theirs)
+    found = causes(
+        course.mean[where], theirs[where], np.asarray(condition.phase)[where],
+        closed=model.run.cycle.periodic, turning=model.measures[channel].turning(model.run.system),
+    )  # fmt: skip
+    random = uncertainty_of(course).random[where]
+    noise = float(np.nanmean(random**2)) / judged.rms**2 if np.isfinite(random).any() and judged.rms > 0 else 0.0
+    cause, others = best(found, noise)
+    return replace(pair, cause=cause, others=tuple(others))
+
+
+VAGUE = 0.5  # expanded uncertainty from which an efficiency is none
+
+
+def _efficiency(condition: Condition, model: Modelled, joints: Mapping[str, str], coverage: float) -> Efficient | None:
+    """Efficiency as a rig computes it: of the measured courses, and of the model's in their place."""
+    try:
+        measured = efficiency_of(condition, joints)
+    except MechanismError as error:  # no turn is whole, or no power goes in
+        first = error.findings[0]
+        return Efficient(model=_of_model(condition, model, joints), reason=(first.what, first.remedy))
+    if measured.turns < 2:
+        once = "there is one turn only: without scatter its uncertainty is not known", "measure more turns"
+        return Efficient(measured.value, model=_of_model(condition, model, joints), reason=once)
+    wide = measured.factor(coverage) * measured.uncertainty
+    wrong = "a sign, a gain, a unit or a column of its channels is wrong", "hold their means against what they measure"
+    if wide > VAGUE:
+        return Efficient(measured.value, model=_of_model(condition, model, joints),
+                         reason=(f"its U of {wide:.3g} tells nothing: {wrong[0]}", wrong[1]))  # fmt: skip
+    if measured.value > 1 + wide:
+        return Efficient(measured.value, model=_of_model(condition, model, joints),
+                         reason=(f"{measured.value:.4g} is above 1: {wrong[0]}", wrong[1]))  # fmt: skip
+    return Efficient(measured.value, wide, _of_model(condition, model, joints))
+
+
+def _of_model(condition: Condition, model: Modelled, joints: Mapping[str, str]) -> float:
+    """The efficiency of the model's courses; NaN where it has no answer at some position."""
+    solved = model.status < Status.NOT_CONVERGED
+    courses = {  # a load has no torque where its joint rests, and takes no power
+        name: replace(condition.courses[name], turns=np.where(solved, np.nan_to_num(course), course)[np.newaxis])
+        for name, course in model.courses.items()
+    }
+    try:
+        # its positions are equal steps of time, whatever those of the measurement are
+        return efficiency_of(replace(condition, courses=courses, speed=np.nan), joints).value
+    except MechanismError:
+        return float("nan")

@@ -1,0 +1,269 @@
+"""What the model says of every channel in every condition, with exact derivatives by the unknowns.
+
+All conditions and unknowns are one batch: row c·P + p of it is condition c with the derivative by unknown p.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.algebra.dual import Dual, derivative, primal
+from trunnion.algebra.namespace import Number
+from trunnion.errors import Status
+from trunnion.measures.measures import Measure, coordinate_unit
+from trunnion.rig.identify.unknowns import Unknown
+from trunnion.solve import shifts
+from trunnion.solve.backward import Backward
+from trunnion.solve.forward import Forward, posed
+from trunnion.solve.friction_method import FrictionMethod
+from trunnion.solve.run import Run
+from trunnion.solve.seats import given_offsets
+from trunnion.solve.status import pose_status, status_of
+from trunnion.solve.system import sticking
+
+__all__ = ["Courses", "Model", "Said"]
+
+Array = NDArray[np.float64]
+AT_ONCE = 20_000  # numbers in an array
+STILL = 1e-9  # of the largest speed in the cycle: rounding, whose sign says nothing
+STEP = 1e-6  # of a driver's number, for what it does to the duration of the cycle
+
+
+@dataclass(frozen=True)
+class Said:
+    """One channel in one condition: values (position,) and their derivatives (unknown, position)."""
+
+    value: Array
+    slope: Array
+
+
+@dataclass(frozen=True)
+class Courses:
+    """All that the model says at some values of the unknowns.
+
+    said: by condition, by channel; status: of the positions, by condition; turned: where the sense of a friction or
+    of a resisting load changes from one position to the next, by condition.
+    """
+
+    said: tuple[Mapping[str, Said], ...]
+    status: tuple[NDArray[np.int8], ...]
+    turned: tuple[NDArray[np.bool_], ...]
+
+
+@dataclass(frozen=True)
+class Model:
+    """A prepared mechanism with its unknowns and the conditions it is observed in.
+
+    measures: by channel; settings: values by path, SI, of each condition; phases: (position,) of each.
+    """
+
+    run: Run
+    unknowns: tuple[Unknown, ...]
+    measures: Mapping[str, Measure]
+    settings: tuple[Mapping[str, float], ...]
+    phases: tuple[Array, ...]
+    friction: FrictionMethod
+
+    @cached_property
+    def forces(self) -> bool:
+        """Whether any channel asks for more than the motion."""
+        return not all(measure.of_motion for measure in self.measures.values())
+
+    def courses(self, at: Array) -> Courses:
+        """What the model says at these values of the unknowns, SI."""
+        count = len(self.phases)
+        said: list[Mapping[str, Said]] = [{}] * count
+        status: list[NDArray[np.int8]] = [np.zeros(0, np.int8)] * count
+        turned: list[NDArray[np.bool_]] = [np.zeros(0, bool)] * count
+        for part in self._parts():
+            found = self._batch(part, at)
+            for k, condition in enumerate(part):
+                said[condition], status[condition], turned[condition] = found[k]
+        return Courses(tuple(said), tuple(status), tuple(turned))
+
+    def _parts(self) -> Iterator[list[int]]:
+        """Conditions with as many positions as each other, not too many at once."""
+        sizes = [len(phase) for phase in self.phases]
+        for size in dict.fromkeys(sizes):
+            alike = [k for k, one in enumerate(sizes) if one == size]
+            most = max(1, AT_ONCE // (size * len(self.unknowns)))
+            for low in range(0, len(alike), most):
+                yield alike[low : low + most]
+
+    def _batch(
+        self, part: Sequence[int], at: Array
+    ) -> list[tuple[Mapping[str, Said], NDArray[np.int8], NDArray[np.bool_]]]:
+        many, size = len(self.unknowns), len(self.phases[part[0]])
+        values = self._values(part, at)
+        time = self._times(part, at)
+        shape = (len(part) * many, size)
+        with np.errstate(all="ignore"):
+            if self.forces:
+                found: Backward | Forward = self.run.solve(time, values, self.friction)
+            else:
+                found = posed(self.run.system, values, self.run.chosen.assembly, time)
+            status = status_of(found, shape) if isinstance(found, Backward) else pose_status(found, shape)
+            courses = {name: self._course(measure, found) for name, measure in self.measures.items()}
+            turned = self._turned(found, shape) if isinstance(found, Backward) else np.zeros(shape, bool)
+        rows: list[tuple[Mapping[str, Said], NDArray[np.int8], NDArray[np.bool_]]] = []
+        for k in range(len(part)):
+            own = slice(k * many, (k + 1) * many)
+            said = {name: _said(number, shape, own) for name, number in courses.items()}
+            rows.append((said, np.max(status[own], axis=0), np.any(turned[own], axis=0)))
+        return rows
+
+    def _course(self, measure: Measure, found: Backward | Forward) -> Number:
+        parts = measure.curve(found)
+        if len(parts) == 1:
+            return parts[0]
+        useful, driven = (self._summed(number) for number in parts[:2])
+        return useful / driven
+
+    def _summed(self, power: Number) -> Number:
+        """Work over the cycle but for a factor: sums over a period, trapezia over a range."""
+        if isinstance(power, Dual):
+            return Dual(self._summed(power.real), self._summed(power.dual))
+        if np.ndim(power) == 0:
+            return power
+        row = np.asarray(power, float)
+        total = np.mean(row, axis=-1) if self.run.cycle.periodic else np.trapezoid(row, axis=-1) / (row.shape[-1] - 1)
+        return np.asarray(total)[..., None]
+
+    def _turned(self, back: Backward, shape: tuple[int, ...]) -> NDArray[np.bool_]:
+        """Positions beside one with a relative speed of the other sign, in a joint that friction or a load resists."""
+        found = np.zeros(shape, bool)
+        for joint in sticking(self.run.system):
+            speed = np.broadcast_to(np.asarray(primal(back.slips[joint].speed), float), shape)
+            most = np.max(np.abs(np.nan_to_num(speed)), axis=-1, keepdims=True)
+            sign = np.where(np.abs(speed) > STILL * most, np.sign(speed), 0.0)
+            differs = sign != np.roll(sign, -1, axis=-1)
+            if not self.run.cycle.periodic:
+                differs[..., -1] = False
+            found |= differs | np.roll(differs, 1, axis=-1)
+        return found
+
+    def rate(self, condition: int, row: Array) -> Array:
+        """Derivative by time of courses in a condition, (…, position), by differences of neighbours, with units of 1/s.
+
+        Linear in the course, so that what is exact of the course stays so.
+        """
+        phase, duration = self.phases[condition], self._started[condition]
+        if row.shape[-1] < 3 or row.shape[-1] != len(phase) or duration == 0:
+            return np.zeros_like(row)
+        if not self.run.cycle.periodic:
+            return np.asarray(np.gradient(row, phase * duration, axis=-1))
+        gap = (np.roll(phase, -1) - np.roll(phase, 1)) % 1.0
+        return np.asarray((np.roll(row, -1, axis=-1) - np.roll(row, 1, axis=-1)) / (gap * duration))
+
+    # ---- the batch --------------------------------------------------------------------------------------------
+
+    @cached_property
+    def _errors(self) -> Mapping[str, float]:
+        """Deviations that are added to numbers, by the path of the number."""
+        entries, values = self.run.system.mechanism.parameter_set.entries, self.run.values
+        return {path: float(np.ravel(values[one.error])[0]) for path, one in entries.items() if one.error}
+
+    def _values(self, part: Sequence[int], at: Array) -> dict[str, Number]:
+        """Every number: (row, 1) what differs between conditions, duals (row, 1) the unknowns."""
+        many = len(self.unknowns)
+        overrides: dict[str, Number] = {}
+        for path in dict.fromkeys(path for k in part for path in self.settings[k]):
+            nominal = self.run.values[path]
+            column = [self.settings[k].get(path, nominal) + self._errors.get(path, 0.0) for k in part]
+            overrides[path] = np.repeat(np.array(column, float), many)[:, None]
+        seeds = np.eye(many)
+        for p, unknown in enumerate(self.unknowns):
+            seed = np.tile(seeds[p], len(part))[:, None]
+            for path in unknown.paths:
+                overrides[path] = Dual(np.full((len(seed), 1), at[p] + self._errors.get(path, 0.0)), seed)
+        values = self.run.system.mechanism.parameters(overrides)
+        for seat in self.run.seats:  # given ones: those that follow their loads are in `seated`
+            play = shifts.play_of(self.run.system.mechanism.space, self.run.system.joints[seat.joint][0], values,
+                                  seat.joint)  # fmt: skip
+            if play is not None:
+                values.update(play.model.paths(f"seats.{seat.joint}", given_offsets(values, seat.joint, play)))
+        return values
+
+    @cached_property
+    def _driving(self) -> tuple[int, ...]:
+        """Unknowns that a driver's motion may depend on."""
+        entries = self.run.system.mechanism.parameter_set.entries
+        needed = {path for path in entries if path.startswith("drivers.")}
+        grown = True
+        while grown:
+            more = {one for path in needed if path in entries for one in entries[path].depends} - needed
+            needed |= more
+            grown = bool(more)
+        return tuple(p for p, one in enumerate(self.unknowns) if not needed.isdisjoint(one.paths))
+
+    @cached_property
+    def _started(self) -> tuple[float, ...]:
+        """Duration of the cycle in every condition, s, with the unknowns at their start."""
+        return tuple(self._duration(k, np.array([one.start for one in self.unknowns])) for k in range(len(self.phases)))
+
+    def _duration(self, condition: int, at: Array) -> float:
+        """Of the cycle, s. Gear pairs that no driver turns are taken to turn as in the nominal cycle."""
+        overrides = self._overrides(condition, at)
+        system, cycle = self.run.system, self.run.cycle
+        if cycle.duration == 0:
+            return 0.0
+        nominal = system.cycle(self.run.values).duration
+        return float(cycle.duration * system.cycle(system.mechanism.parameters(overrides)).duration / nominal)
+
+    def _overrides(self, condition: int, at: Array) -> dict[str, Number]:
+        """What a condition sets, and the unknowns."""
+        overrides: dict[str, Number] = dict(self.settings[condition])
+        for value, unknown in zip(at, self.unknowns, strict=True):
+            overrides.update(dict.fromkeys(unknown.paths, float(value)))
+        return overrides
+
+    def driven(self, condition: int, at: Array) -> tuple[float, float, float]:
+        """Angles of the first driver where the cycle begins and ends, rad, and its mean speed, rad/s.
+
+        NaN where its turns name no position.
+        """
+        system, duration = self.run.system, self._duration(condition, at)
+        if duration == 0 or coordinate_unit(system, self.run.values) != "rad":
+            return float("nan"), float("nan"), float("nan")
+        values = system.mechanism.parameters(self._overrides(condition, at))
+        ends = np.array([0.0, duration * (1 - 1e-12)])
+        drive = system.drive(values, next(iter(system.mechanism.drivers)), ends)[0]
+        row = np.ravel(np.asarray(primal(drive), float))
+        return float(row[0]), float(row[-1]), float((row[-1] - row[0]) / duration)
+
+    def _times(self, part: Sequence[int], at: Array) -> Number:
+        """Times of the positions, s, (row, position): shares of a cycle that an unknown may make longer."""
+        many = len(self.unknowns)
+        phase = np.repeat(np.stack([self.phases[k] for k in part]), many, axis=0)
+        if not self._driving:
+            return phase * np.repeat([self._started[k] for k in part], many)[:, None]
+        duration = np.repeat([self._duration(k, at) for k in part], many)[:, None]
+        slope = np.zeros_like(duration)
+        for p in self._driving:
+            step = STEP * (abs(at[p]) or 1.0)
+            ends = [at + sign * step * (np.arange(many) == p) for sign in (-1.0, 1.0)]
+            for i, k in enumerate(part):
+                low, high = (self._duration(k, end) for end in ends)
+                slope[i * many + p] = (high - low) / (2 * step)
+        return Dual(phase * duration, phase * slope)
+
+
+def _said(number: Number, shape: tuple[int, ...], own: slice) -> Said:
+    """The rows of one condition: the number itself, and one derivative a row."""
+    width = np.shape(primal(number))[-1:] or (1,)
+    full = (shape[0], width[0] if width != (1,) else shape[1])
+    if width == (1,) and np.ndim(primal(number)) == 2 and shape[1] > 1:
+        full = (shape[0], shape[1])
+    value = np.broadcast_to(np.asarray(primal(number), float), full)[own]
+    slope = np.broadcast_to(np.asarray(derivative(number), float), full)[own]
+    return Said(value[0], slope)
+
+
+def solved(status: NDArray[np.int8]) -> NDArray[np.bool_]:
+    """Positions with a full answer."""
+    return np.asarray(status < Status.NOT_CONVERGED)

@@ -1,0 +1,44 @@
+"""An identification: the model, the data and what was found."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from trunnion.model.mechanism import Mechanism
+from trunnion.rig.identify.fit import Problem
+from trunnion.rig.identify.search import Search
+from trunnion.rig.identify.separate import Group
+from trunnion.rig.identify.uncertainty import Spread
+from trunnion.rig.reading.measurement import Measurement
+from trunnion.solve.run import Run
+
+if TYPE_CHECKING:
+    pass
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Identified"]
+
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Identified:
+    """All that an identification found, before it is written down."""
+
+    mechanism: Mechanism
+    measurement: Measurement
+    run: Run
+    problem: Problem
+    search: Search
+    spread: Spread
+    groups: Sequence[Group]
+
+    @property
+    def x(self) -> Array:
+        """Estimates of the unknowns, then of the sensors' errors."""
+        return self.search.fit.x

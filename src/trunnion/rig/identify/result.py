@@ -1,0 +1,233 @@
+"""An identification as a Dataset."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.cycle.account import finding_row, references
+from trunnion.rig.compare.result import hashed_files
+from trunnion.rig.compare.said import gathered
+from trunnion.rig.identify.identified import Identified
+from trunnion.rig.identify.judged import Judged
+from trunnion.rig.identify.said import sentences
+from trunnion.rig.identify.uncertainty import CONFIDENCE
+from trunnion.version import __version__
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["VARIABLES", "dataset"]
+
+Array = NDArray[Any]
+SOURCES = (
+    "G. A. F. Seber, C. J. Wild, Nonlinear Regression, Wiley, 1989, doi:10.1002/0471725315",
+    "JCGM 100:2008, Evaluation of measurement data: Guide to the expression of uncertainty in measurement",
+)
+
+
+def dataset(found: Identified) -> xr.Dataset:
+    """Estimates with all that is said of them."""
+    import xarray as xr
+
+    judged = Judged(found)
+    problem, measurement = found.problem, found.measurement
+    unknowns = problem.model.unknowns
+    names = [one.name for one in unknowns]
+    rows = _parameters(judged) | _sensors(judged) | _blocks(judged)
+    coordinates: dict[str, Any] = {
+        "parameter": ("parameter", np.array(names, str)),
+        "parameter_2": ("parameter_2", np.array(names, str)),
+        "source": ("source", np.array(judged.budget[0], str)),
+        "sensor": ("sensor", np.array([one.name for one in problem.sensors], str)),
+        "channel": ("channel", np.array(list(problem.model.measures), str)),
+        "condition": ("condition", np.array([one.name for one in measurement.conditions], str)),
+    }
+    variables = {
+        key: xr.Variable(one.dims, rows[key], {"units": one.units, "long_name": one.long_name})
+        for key, one in VARIABLES.items()
+    }
+    system = found.run.system
+    attributes: dict[str, Any] = {
+        "name": found.mechanism.name,
+        "identified": measurement.name,
+        "formula": system.plan.formula,
+        "model_hash": found.mechanism.digest,
+        "trunnion_version": __version__,
+        "confidence": CONFIDENCE,
+        "parameter_paths": json.dumps([one.paths for one in unknowns], ensure_ascii=False),
+        "parameter_units": json.dumps([one.unit for one in unknowns]),
+        "channel_units": json.dumps([one.unit(system) for one in problem.model.measures.values()]),
+        "channel_measures": json.dumps([one.name for one in problem.model.measures.values()]),
+        "drive": _drive(found),
+        "drive_range": json.dumps(_driven(judged)),
+        "files": json.dumps([list(one.files) for one in measurement.conditions], ensure_ascii=False),
+        "data_files": json.dumps(hashed_files(measurement.conditions), ensure_ascii=False),
+        "data_findings": json.dumps(
+            [{**finding_row(one), "file": one.file} for one in gathered(measurement.findings)], ensure_ascii=False
+        ),
+        "done": json.dumps(list(measurement.done), ensure_ascii=False),
+        "evaluations": problem.evaluations,
+        "starts": found.search.starts,
+        "converged": int(found.search.fit.converged),
+        "references": "\n".join([*SOURCES, *references(found.mechanism)]),
+        "findings": json.dumps([finding_row(one) for one in sentences(judged)], ensure_ascii=False),
+    }
+    return xr.Dataset(variables, coordinates, attributes)
+
+
+def _drive(found: Identified) -> str:
+    """The first driver, if its turns name the positions."""
+    return next(iter(found.mechanism.drivers), "")
+
+
+def _driven(judged: Judged) -> list[list[float] | None]:
+    """Angles of the first driver where the cycle begins and ends, rad, by condition; None if they name no position."""
+    model = judged.problem.model
+    ends = (model.driven(k, judged.told) for k in range(len(model.phases)))
+    return [[first, last] if np.isfinite([first, last]).all() else None for first, last, _ in ends]
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A variable of the result: its dimensions, unit, and what it is."""
+
+    dims: tuple[str, ...]
+    units: str
+    long_name: str
+
+
+VARIABLES = {
+    "start": Variable(("parameter",), "of the parameter", "start of the search"),
+    "estimate": Variable(("parameter",), "of the parameter", "estimate; NaN if the data do not tell it"),
+    "standard_uncertainty": Variable(("parameter",), "of the parameter", "standard uncertainty of the estimate"),
+    "lower": Variable(("parameter",), "of the parameter", "lower end of the 95 % interval"),
+    "upper": Variable(("parameter",), "of the parameter", "upper end of the 95 % interval"),
+    "degrees_of_freedom": Variable(("parameter",), "1", "effective degrees of freedom of the standard uncertainty"),
+    "limit": Variable(("parameter",), "1", "−1 on the lower limit, 1 on the upper: the interval is one-sided"),
+    "told": Variable(("parameter",), "1", "1 if the data tell it, 0 if not"),
+    "correlation": Variable(("parameter", "parameter_2"), "1", "correlation of the estimates"),
+    "share": Variable(("parameter", "source"), "1", "share of a source in the variance of an estimate"),
+    "singular_value": Variable(
+        ("parameter",), "1", "singular value of the derivatives with columns scaled to 1, the largest first"
+    ),
+    "sensor_error": Variable(("sensor",), "1", "estimated error of a sensor, in its standard uncertainties"),
+    "sensor_uncertainty": Variable(("sensor",), "1", "standard uncertainty of that, in those stated"),
+    "rms_before": Variable(("channel", "condition"), "of the channel", "root mean square of the residual at the start"),
+    "rms_after": Variable(
+        ("channel", "condition"), "of the channel", "root mean square of the residual with the estimates"
+    ),
+    "rms_expected": Variable(
+        ("channel", "condition"), "of the channel", "what the scatter between turns explains of it"
+    ),
+    "used": Variable(("channel", "condition"), "1", "positions used"),
+    "left_out": Variable(("channel", "condition"), "1", "positions with data that are not used"),
+    "turns": Variable(("channel", "condition"), "1", "turns used"),
+    "held_out_turns": Variable(("channel", "condition"), "1", "turns held out"),
+    "held_out_before": Variable(
+        ("channel", "condition"),
+        "of the channel",
+        "root mean square of the residual of what was held out, at the start",
+    ),
+    "held_out_after": Variable(("channel", "condition"), "of the channel", "the same with the estimates"),
+    "held_out_expected": Variable(
+        ("channel", "condition"),
+        "of the channel",
+        "what its scatter and the uncertainty of the prediction explain of it",
+    ),
+    "reduced_chi_squared": Variable((), "1", "χ² of the residuals over what the scatter between turns explains"),
+    "chi_squared_freedom": Variable((), "1", "degrees of freedom of that χ²"),
+    "chi_squared_chance": Variable((), "1", "chance of a larger one if the model is right"),
+    "turn_correlation": Variable((), "1", "correlation of what each turn adds with the turn before it"),
+    "hold_out_ratio": Variable((), "1", "residuals of what was held out over what is expected of them"),
+    "phase": Variable(("condition", "position"), "1", "share of the cycle"),
+    "measured": Variable(("channel", "condition", "position"), "of the channel", "mean over the turns"),
+    "residual_before": Variable(
+        ("channel", "condition", "position"), "of the channel", "measured less model, at the start"
+    ),
+    "residual_after": Variable(
+        ("channel", "condition", "position"),
+        "of the channel",
+        "measured less what the sensor would read with the estimates",
+    ),
+    "residual_uncertainty": Variable(
+        ("channel", "condition", "position"), "of the channel", "standard uncertainty of the mean over the turns"
+    ),
+}
+
+
+def _parameters(judged: Judged) -> dict[str, Array]:
+    n = judged.problem.count
+    low, high = judged.interval
+    return {
+        "start": judged.start[:n],
+        "estimate": judged.estimate,
+        "standard_uncertainty": judged.deviation[:n],
+        "lower": low,
+        "upper": high,
+        "degrees_of_freedom": judged.found.spread.freedom[:n],
+        "limit": judged.limit,
+        "told": (~judged.lost[:n]).astype(np.int8),
+        "correlation": judged.correlation,
+        "share": judged.budget[1],
+        "singular_value": judged.singular_values,
+        "reduced_chi_squared": np.asarray(judged.found.spread.test.reduced),
+        "chi_squared_freedom": np.asarray(judged.found.spread.test.freedom),
+        "chi_squared_chance": np.asarray(judged.found.spread.test.chance),
+        "turn_correlation": np.asarray(judged.found.spread.follows),
+        "hold_out_ratio": np.asarray(judged.trust),
+    }
+
+
+def _sensors(judged: Judged) -> dict[str, Array]:
+    n = judged.problem.count
+    lost = judged.lost[n:]
+    return {
+        "sensor_error": np.where(lost, np.nan, judged.found.x[n:]),
+        "sensor_uncertainty": judged.deviation[n:],
+    }
+
+
+def _blocks(judged: Judged) -> dict[str, Array]:
+    problem = judged.problem
+    channels = list(problem.model.measures)
+    shape = len(channels), len(judged.found.measurement.conditions)
+    longest = max(len(one.phase) for one in judged.found.measurement.conditions)
+    figures = {key: np.full(shape, np.nan) for key in FIGURES}
+    counts = {key: np.zeros(shape, np.int32) for key in COUNTS}
+    curves = {key: np.full((*shape, longest), np.nan) for key in CURVES}
+    phase = np.full((shape[1], longest), np.nan)
+    for i, condition in enumerate(judged.found.measurement.conditions):
+        phase[i, : len(condition.phase)] = condition.phase
+
+    def place(k: int) -> tuple[int, int]:
+        return channels.index(problem.blocks[k].channel), problem.blocks[k].condition
+
+    for one in judged.misses:
+        at, block = place(one.block), problem.blocks[one.block]
+        for key, value in zip(FIGURES[:3], (one.before, one.after, one.expected), strict=True):
+            figures[key][at] = value
+        for key, number in zip(COUNTS[:3], (one.used, one.out, len(block.turns)), strict=True):
+            counts[key][at] = number
+        for key, row in zip(CURVES, (block.mean, *one.curves), strict=True):
+            curves[key][at][: len(row)] = row
+    for held in judged.held_out:
+        at = place(held.block)
+        counts["held_out_turns"][at] = held.turns
+        for key, value in zip(FIGURES[3:], (held.before, held.after, held.expected), strict=True):
+            figures[key][at] = value
+    return {
+        **figures,
+        **counts,
+        "phase": phase,
+        **curves,
+    }
+
+
+FIGURES = ("rms_before", "rms_after", "rms_expected", "held_out_before", "held_out_after", "held_out_expected")
+COUNTS = ("used", "left_out", "turns", "held_out_turns")
+CURVES = ("measured", "residual_before", "residual_after", "residual_uncertainty")

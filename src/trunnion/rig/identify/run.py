@@ -1,0 +1,217 @@
+"""`identify`: numbers of a model from measurements by least squares, with what they are worth."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.errors import Finding, MechanismError
+from trunnion.measures.measures import Measure, named
+from trunnion.model.mechanism import Mechanism
+from trunnion.rig.identify.blocks import Block, blocks_of, channels_of, finite
+from trunnion.rig.identify.courses import Model
+from trunnion.rig.identify.fit import Problem, fit, sensors_of
+from trunnion.rig.identify.held import HoldOut, held_out
+from trunnion.rig.identify.search import search
+from trunnion.rig.identify.seated import SeatedModel
+from trunnion.rig.identify.separate import inseparable
+from trunnion.rig.identify.uncertainty import left_over, spread_of
+from trunnion.rig.identify.unknowns import Parameters, described, unknowns
+from trunnion.rig.modelled import told_at
+from trunnion.rig.reading.efficiency import load_joints
+from trunnion.rig.reading.measurement import Measurement
+from trunnion.rig.settings import check_settings
+from trunnion.solve.friction_method import FrictionMethod
+from trunnion.solve.run import Run, prepare
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+from trunnion.rig.identify.identified import Identified
+
+__all__ = ["identify", "with_estimates"]
+
+Array = NDArray[np.float64]
+Errors = Literal["channel", "condition"]
+
+
+def identify(
+    mechanism: Mechanism,
+    measurement: Measurement,
+    parameters: Parameters,
+    channels: Sequence[str] | None = None,
+    start: Mapping[str, float | str] | None = None,
+    hold_out: HoldOut = None,
+    sensors: Errors = "channel",
+    delay: float | None = None,
+    guard: int | None = None,
+    starts: int | None = None,
+    method: FrictionMethod | None = None,
+) -> xr.Dataset:
+    """Numbers of a mechanism from what was measured, with 95 % intervals, correlation, and what cannot be told apart.
+
+    parameters: names as for `Mechanism.with_values`, each an unknown; or by a name of your own the numbers that are to
+    be one unknown: `{"pins": ["pin-1.friction.coefficient", "pin-2.friction.coefficient"]}`.
+    channels: of the measurement; all that an unknown acts on if not given; `efficiency` is computed of torques and
+    speeds. start: where the search begins, by name, SI or texts with units; the model's values if not given.
+    hold_out: conditions by name, file or setting, or the share of the turns of each (the last), that are not fitted but
+    predicted. sensors: whether zero and gain of a channel are off by the same in all conditions, or in each by its own.
+    delay: standard uncertainty, s, of the time by which a channel lags behind the angle, as its bandwidth makes it;
+    what it is in fact is estimated too. guard: positions left out on each side where the sense of a friction changes;
+    one for every 90 of a cycle if not given.
+    starts: places to begin at; more than one if the model does not fit and it is not given.
+    Method: weighted least squares with exact derivatives, trust region; covariances by the scatter between turns.
+    Raises MechanismError for names, channels or conditions that are not there, or where the model has no answer.
+    """
+    from trunnion.rig.identify.result import dataset
+
+    return dataset(identified(mechanism, measurement, parameters, channels, start, hold_out, sensors, delay, guard,
+                              starts, method))  # fmt: skip
+
+
+def identified(
+    mechanism: Mechanism,
+    measurement: Measurement,
+    parameters: Parameters,
+    channels: Sequence[str] | None = None,
+    start: Mapping[str, float | str] | None = None,
+    hold_out: HoldOut = None,
+    sensors: Errors = "channel",
+    delay: float | None = None,
+    guard: int | None = None,
+    starts: int | None = None,
+    method: FrictionMethod | None = None,
+) -> Identified:
+    """What `identify` makes its Dataset of."""
+    _check(sensors, delay, guard, starts)
+    check_settings(mechanism, measurement)
+    measurement = finite(measurement)
+    paths = described(mechanism, parameters)
+    stated = _stated(mechanism, measurement, paths, start or {})
+    settings = _settings(stated, measurement, paths)
+    run = prepare(stated)
+    if run.determinacy is not None:
+        run.determinacy.refuse()
+    joints = load_joints(stated)
+    held, share = held_out(stated, measurement, hold_out)
+    blocks = blocks_of(measurement, channels_of(measurement, channels, joints), held, share, joints)
+    measures = _measures(stated, run, blocks)
+    phases = tuple(np.asarray(one.phase, float) for one in measurement.conditions)
+    kind = SeatedModel if any(seat.given is None for seat in run.seats) else Model
+    model = kind(run, tuple(unknowns(stated, paths, start or {})), measures, settings, phases,
+                 method or FrictionMethod())  # fmt: skip
+    if channels is None:
+        model, blocks = _telling(model, blocks)
+    names = [one.name for one in measurement.conditions] if sensors == "condition" else None
+    lags = {one.name: one.lag for one in measurement.conditions}
+    problem = Problem(model, blocks, sensors_of(blocks, names, delay, lags), guard)
+    found = search(problem, starts)
+    spread = spread_of(problem, found.fit.x)
+    problem.left_over = left_over(problem, spread)
+    if problem.left_over > 1 and problem.sensors:
+        found = replace(found, fit=fit(problem, found.fit.x))
+        spread = spread_of(problem, found.fit.x)
+    groups = inseparable(problem, found.fit.x, spread)
+    return Identified(stated, measurement, run, problem, found, spread, groups)
+
+
+def _check(sensors: str, delay: float | None, guard: int | None, starts: int | None) -> None:
+    """MechanismError for options that mean nothing."""
+    if sensors not in ("channel", "condition"):
+        what = f"errors of sensors are not alike by '{sensors}'"
+        raise MechanismError(Finding(what, "sensors", "give channel or condition"))
+    if delay is not None and not delay > 0:
+        raise MechanismError(Finding(f"a delay of {delay:g} s is not above 0", "delay", "give a standard uncertainty"))
+    if guard is not None and guard < 0:
+        raise MechanismError(Finding(f"{guard} positions cannot be left out", "guard", "give 0 or more"))
+    if starts is not None and starts < 1:
+        raise MechanismError(Finding(f"{starts} starts find nothing", "starts", "give 1 or more"))
+
+
+def _telling(model: Model, blocks: list[Block]) -> tuple[Model, list[Block]]:
+    """Only the channels that an unknown acts on, as far as the start tells; all if there are none."""
+    courses = model.courses(np.array([one.start for one in model.unknowns]))
+    sizes = np.array([one.size or 1.0 for one in model.unknowns])
+    moved = dict.fromkeys(model.measures, 0.0)
+    for said in courses.said:
+        for name, one in said.items():
+            most = float(np.nanmax(np.abs(one.value), initial=0.0))
+            change = float(np.nanmax(np.abs(np.nan_to_num(one.slope)) * sizes[:, None], initial=0.0))
+            moved[name] = max(moved[name], change / most if most else change)
+    kept = {name: model.measures[name] for name, share in moved.items() if share > NOTHING} or model.measures
+    return replace(model, measures=kept), [block for block in blocks if block.channel in kept]
+
+
+NOTHING = 1e-9  # of a course: what an unknown does to it
+
+
+def _stated(
+    mechanism: Mechanism,
+    measurement: Measurement,
+    paths: Mapping[str, Sequence[str]],
+    start: Mapping[str, float | str],
+) -> Mechanism:
+    """The mechanism with all numbers stated that the conditions set or that are looked for."""
+    entries = mechanism.parameter_set.entries
+    missing: dict[str, float | str] = {}
+    for condition in measurement.conditions:
+        for name, value in condition.values.items():
+            path = mechanism.path_of(name)
+            if path not in entries:
+                missing[path] = float(value)
+    for name, own in paths.items():
+        missing.update({path: start.get(name, 0.0) for path in own if path not in entries})
+    return mechanism.with_values(missing) if missing else mechanism
+
+
+def _settings(
+    mechanism: Mechanism, measurement: Measurement, paths: Mapping[str, Sequence[str]]
+) -> tuple[dict[str, float], ...]:
+    """What each condition sets, by path; MechanismError where that is looked for."""
+    owners = {path: name for name, own in paths.items() for path in own}
+    found, findings = [], []
+    for condition in measurement.conditions:
+        values = {mechanism.path_of(name): float(value) for name, value in condition.values.items()}
+        for path in values:
+            if path in owners:
+                what = f"the condition {condition.name} sets {path}"
+                findings.append(Finding(what, f"parameter {owners[path]}", "leave it out of the conditions"))
+            elif path not in mechanism.parameters():
+                what = f"the condition {condition.name} sets it, but it is no number: it changes with the motion"
+                findings.append(Finding(what, path, "set a dimension in it"))
+        found.append(values)
+    if findings:
+        raise MechanismError(findings[0])
+    return tuple(found)
+
+
+def _measures(mechanism: Mechanism, run: Run, blocks: Sequence[Block]) -> dict[str, Measure]:
+    """What each channel measures; MechanismError for what has no course."""
+    texts: dict[str, str] = {}
+    for block in blocks:
+        if texts.setdefault(block.channel, block.course.measures) != block.course.measures:
+            what = f"measures {texts[block.channel]} in one condition and {block.course.measures} in another"
+            raise MechanismError(Finding(what, f"channel {block.channel}", "give them channels of their own"))
+    found = {name: named(mechanism, [text], run.values)[0] for name, text in texts.items()}
+    for name, measure in found.items():
+        if not measure.everywhere or measure.kind not in COURSES or measure.of_attitude(run.system):
+            what = f"measures {texts[name]}, which is no one number at each position{told_at(measure)}"
+            raise MechanismError(Finding(what, f"channel {name}", f"one of {', '.join(COURSES)} is"))
+    return found
+
+
+COURSES = ("effort", "load", "rate", "efficiency", "reaction", "rotation", "slide", "angle", "point")
+
+
+def with_estimates(mechanism: Mechanism, result: xr.Dataset) -> Mechanism:
+    """The mechanism with the estimates of a result in place, rounded to two digits of their standard uncertainty.
+
+    Those that were not told apart stay as they are.
+    """
+    from trunnion.rig.identify.written import values
+
+    return mechanism.with_values(values(mechanism, result))

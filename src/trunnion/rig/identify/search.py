@@ -1,0 +1,140 @@
+"""From the start to the estimates: where the model has an answer, several starts, what is used, how much it weighs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.rig.identify.fit import Fit, Problem, fit
+from trunnion.rig.identify.separate import sizes_of
+from trunnion.rig.identify.uncertainty import correlation_factors, lack_of_fit
+from trunnion.rig.identify.usable import refuse_unusable
+
+__all__ = ["Search", "search"]
+
+Array = NDArray[np.float64]
+HALVINGS = 8
+ROUNDS = 4  # of what is used and how much it weighs
+INSIDE = 0.05  # of the size of an unknown: how far from its limit a search begins
+OTHERS = (0.3, 3.0)  # times the start: where else a search begins if the model does not fit
+CLOSE = 1e-3  # of the sizes: two searches ended at one place
+AS_GOOD = 4.0  # sum of squares: another place is told if it is not worse by more
+
+
+@dataclass(frozen=True)
+class Search:
+    """How the search went.
+
+    start: (unknown,), after what was changed of it; shares: of the stated start that friction was lessened to;
+    fit: where it ended; starts: how many; other: another place that fits as well.
+    """
+
+    start: Array
+    shared: float
+    fit: Fit
+    starts: int
+    other: Array | None
+    settled: bool
+
+
+def search(problem: Problem, starts: int | None) -> Search:
+    """The estimates. starts: how many places to begin at; 1, and more if the model does not fit, if not given."""
+    problem.start_scatter()
+    first, shared = _runnable(problem)
+    best, settled = _refined(problem, _inside(problem, first))
+    count, other = 1, None
+    wanted = len(OTHERS) if starts is None else max(0, starts - 1)
+    if starts is None and best.converged and not lack_of_fit(problem, best.x).misfit:
+        wanted = 0
+    kept = problem.masks, problem.variances, problem.factors
+    for place in _others(problem, first, wanted):
+        count += 1
+        problem.masks, problem.variances, problem.factors = kept
+        found = _tried(problem, place)
+        if found is None or not found.converged:
+            continue
+        sizes = sizes_of(problem, best.x)
+        away = float(np.max(np.abs(found.x - best.x)[: problem.count] / sizes[: problem.count]))
+        if found.cost < best.cost * (1 - 1e-6) - 1e-6 and away > CLOSE:
+            worse, (best, settled) = best, _refined(problem, found.x)
+            kept = problem.masks, problem.variances, problem.factors
+            other = worse.x if worse.cost < best.cost + AS_GOOD else None
+        elif away > CLOSE and found.cost < best.cost + AS_GOOD:
+            other = found.x
+    problem.masks, problem.variances, problem.factors = kept
+    return Search(first[: problem.count], shared, best, count, other, settled)
+
+
+def _runnable(problem: Problem) -> tuple[Array, float]:
+    """The start, with less friction where that locks; how much of it is left. MechanismError if nothing runs."""
+    start = np.array([one.start for one in problem.model.unknowns] + [0.0] * len(problem.sensors))
+    rubs = np.array([any(".friction." in path for path in one.paths) for one in problem.model.unknowns], bool)
+    low = np.array([one.lower for one in problem.model.unknowns])
+    lost, shared, best = problem.unanswered(start), 1.0, start
+    for k in range(1, HALVINGS + 1):
+        if not lost or not np.any(rubs):
+            break
+        less = start.copy()
+        less[: problem.count][rubs] = np.maximum(start[: problem.count][rubs] * 0.5**k, low[rubs])
+        found = problem.unanswered(less)
+        if found < lost:
+            lost, shared, best = found, 0.5**k, less
+    refuse_unusable(problem, best)
+    return best, shared
+
+
+def _inside(problem: Problem, start: Array) -> Array:
+    """A start that is not on a limit: there a search would not get off."""
+    problem.masks = problem.allowed(start)
+    sizes = sizes_of(problem, start)
+    low, high = problem.bounds
+    room = np.minimum(INSIDE * sizes, 0.25 * (high - low))
+    return np.asarray(np.clip(start, low + room, high - room))
+
+
+def _refined(problem: Problem, start: Array) -> tuple[Fit, bool]:
+    """A fit whose weights and used positions are those of where it ends; whether they came to rest."""
+    problem.masks, problem.factors = problem.allowed(start), {}
+    found = fit(problem, start)
+    for _ in range(ROUNDS):
+        again = problem.learn_scatter(found.x)
+        factors = correlation_factors(problem, found.x)
+        masks = problem.allowed(found.x)
+        same = all(np.array_equal(a, b) for a, b in zip(masks, problem.masks, strict=True))
+        near = all(abs(factors[name] / problem.factors.get(name, 1.0) - 1) < 0.05 for name in factors)
+        if same and near and not again:
+            return found, True
+        before = found
+        problem.masks, problem.factors = masks, factors
+        found = replace(fit(problem, found.x), evaluations=before.evaluations)
+        if again and same and np.allclose(found.x, before.x, rtol=1e-6, atol=1e-12):
+            return found, True
+    return found, False
+
+
+def _others(problem: Problem, first: Array, wanted: int) -> list[Array]:
+    """Other places to begin at: the start times and divided by 3, then at random between a tenth and ten times."""
+    low, high = problem.bounds
+    found = []
+    random = np.random.default_rng(1)
+    for k in range(wanted):
+        factors = np.full(problem.count, OTHERS[k]) if k < len(OTHERS) else 10 ** random.uniform(-1, 1, problem.count)
+        place = first.copy()
+        place[: problem.count] *= factors
+        found.append(_inside(problem, np.clip(place, low, high)))
+    return found
+
+
+def _tried(problem: Problem, place: Array) -> Fit | None:
+    """A fit from a place; None if the model has no answer there."""
+    kept = problem.masks
+    problem.masks = problem.allowed(place)
+    if not np.all(np.isfinite(problem.residuals(place))) or not any(map(np.any, problem.masks)):
+        problem.masks = kept
+        return None
+    problem.masks = kept
+    if not np.all(np.isfinite(problem.residuals(place))):
+        return None
+    return fit(problem, place)

@@ -1,0 +1,212 @@
+"""The model in one working condition: the course of what each channel measures, at the positions of the measurement."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.errors import Finding, MechanismError, Status
+from trunnion.measures.figures import known
+from trunnion.measures.measures import MEASURES, Measure, coordinate_unit, named
+from trunnion.model.mechanism import Mechanism
+from trunnion.rig.reading.measurement import Condition
+from trunnion.solve.friction_method import FrictionMethod
+from trunnion.solve.run import Run, prepare
+from trunnion.solve.seating import settle
+from trunnion.solve.status import status_of
+from trunnion.solve.travel import lanes
+from trunnion.studies.tolerance.kernel import NumpyKernel
+
+__all__ = ["Modelled", "measure_of", "modelled", "prepared", "told_at"]
+
+Array = NDArray[np.float64]
+SLOWER = 0.01  # of the duration of a cycle: a machine that keeps time runs no farther off
+
+
+@dataclass(frozen=True, eq=False)
+class Modelled:
+    """What the model has at the positions of a condition, SI.
+
+    drive: coordinate of the first driver if it runs one way, else time; unit: rad, m or s; span: what `drive` gains
+    over the cycle; status: (position,); courses, units: by channel, NaN where the status rules a course out.
+    """
+
+    run: Run
+    drive: Array
+    unit: str
+    span: float
+    status: NDArray[np.int8]
+    courses: Mapping[str, Array]
+    measures: Mapping[str, Measure]
+
+    @property
+    def sound(self) -> NDArray[np.bool_]:
+        """Positions whose forces can be relied on; all that are solved if there are no such."""
+        best = self.status == Status.SOLVED
+        return best if np.any(best) else self.status < Status.CONTACT_LOST
+
+    def comparable(self, channel: str) -> NDArray[np.bool_]:
+        """Positions at which the model has one number for a channel.
+
+        A force is an interval where a relative speed is zero, and no number to rely on beside a dead centre.
+        """
+        there = np.isfinite(self.courses[channel])
+        return there if self.measures[channel].of_motion else there & self.sound
+
+
+def measure_of(mechanism: Mechanism, run: Run, channel: str, name: str) -> Measure:
+    """What a channel measures; MechanismError if the model has no such course."""
+    where = f"channels.{channel}.measures"
+    try:
+        measure = named(mechanism, [name], run.values)[0]
+    except MechanismError as error:
+        raise MechanismError([replace(one, where=where) for one in error.findings]) from None
+    kind = MEASURES[measure.kind]
+    course = kind.rule == "deviation" or (measure.kind == "efficiency" and measure.subject == "instant")
+    if not measure.everywhere or kind.against or not course or measure.of_attitude(run.system):
+        what = f"'{name}' is no number of a single position" + told_at(measure)
+        remedy = "a channel measures such as effort:DRIVER, rate:JOINT, load:LOAD, rotation:JOINT or link.point.x"
+        raise MechanismError(Finding(what, where, remedy))
+    return measure
+
+
+def told_at(measure: Measure) -> str:
+    """What a measure of the model states that no sensor follows; empty if it is of every position."""
+    if measure.everywhere:
+        return ""
+    return f": the model takes it {f'as {measure.statistic}' if measure.statistic else 'at a place or over a range'}"
+
+
+def modelled(
+    mechanism: Mechanism,
+    condition: Condition,
+    channels: Mapping[str, str],
+    method: FrictionMethod,
+    also: Mapping[str, str] | None = None,
+) -> Modelled:
+    """The model with the values of a condition. channels: what each measures, by name; also: others, if they can be.
+
+    Raises MechanismError for values or measures that the model does not have, all in one go.
+    """
+    run = prepared(mechanism, condition)
+    findings: list[Finding] = []
+    measures: dict[str, Measure] = {}
+    for channel, name in {**(also or {}), **channels}.items():
+        try:
+            measures[channel] = _checked(run, condition, channel, name)
+        except MechanismError as error:
+            findings += error.findings if channel in channels else ()
+    if findings:
+        raise MechanismError(findings)
+    if run.determinacy is not None and not all(one.of_motion for one in measures.values()):
+        run.determinacy.refuse()
+    time = np.asarray(condition.phase, float) * run.cycle.duration
+    courses, status = _courses(run, {one.name: one for one in measures.values()}, time, method)
+    drive, unit, span = _drive(run, time)
+    _same_cycle(run, condition, unit, span)
+    found = {
+        channel: _beside(measure.turning(run.system), courses[measure.name], condition.courses[channel].mean)
+        for channel, measure in measures.items()
+    }
+    return Modelled(run, drive, unit, span, status, found, measures)
+
+
+def _checked(run: Run, condition: Condition, channel: str, name: str) -> Measure:
+    """What a channel measures; MechanismError if the model has no such course, or has it in another unit."""
+    measure = measure_of(run.system.mechanism, run, channel, name)
+    unit, own = measure.unit(run.system), condition.courses[channel].unit
+    if own != unit:
+        what = f"is in {own}, and {name} is in {unit}"
+        raise MechanismError(Finding(what, f"channels.{channel}", "state its unit and gain, or what else it measures"))
+    return measure
+
+
+def prepared(mechanism: Mechanism, condition: Condition) -> Run:
+    """The mechanism with the values of a condition; what is wrong with it says in which."""
+    with _in(condition):
+        return prepare(mechanism.with_values(dict(condition.values)))
+
+
+@contextmanager
+def _in(condition: Condition) -> Iterator[None]:
+    try:
+        yield
+    except MechanismError as error:
+        told = [replace(one, what=f"{one.what} (in condition {condition.name})") for one in error.findings]
+        raise MechanismError(told) from None
+
+
+def _courses(
+    run: Run, measures: Mapping[str, Measure], time: Array, method: FrictionMethod
+) -> tuple[dict[str, Array], NDArray[np.int8]]:
+    """Each measure at the times, and the statuses; pins with a seat lie in it."""
+    kernel = NumpyKernel(run, tuple(measures.values()), method)
+    if not run.seats:
+        parts, status = kernel.courses(run.values, time)
+        return {name: _row(part[0], time) for name, part in parts.items()}, status
+    seen, quick = lanes(time, run.cycle), replace(method, margin_up_to=0.0)
+    with np.errstate(all="ignore"):
+        seated = settle(run, seen, method, run.ideal(seen.times, quick))
+        status = status_of(seated.back, time.shape)
+        np.maximum(status, np.where(seated.sticks, np.int8(Status.ZERO_SLIP), np.int8(0)), out=status)
+        found = {}
+        for name, measure in measures.items():
+            back = seated.back.walk if measure.of_motion else seated.back
+            course = _row(measure.curve(back)[0], time)
+            found[name] = np.where(known(measure, status), course, np.nan)
+    return found, status
+
+
+def _row(number: object, time: Array) -> Array:
+    return np.array(np.broadcast_to(np.asarray(number, float), time.shape))
+
+
+def _drive(run: Run, time: Array) -> tuple[Array, str, float]:
+    """Coordinate of the first driver, its unit, what it gains in a cycle; time where it names no position."""
+    unit = coordinate_unit(run.system, run.values)
+    if unit == "s":
+        return time, unit, run.cycle.duration
+    first = next(iter(run.system.mechanism.drivers))
+    ends = np.array([0.0, run.cycle.duration * (1 - 1e-12)])
+    drive, low_high = (_row(run.system.drive(run.values, first, at)[0], at) for at in (time, ends))
+    return drive, unit, float(low_high[1] - low_high[0])
+
+
+def _same_cycle(run: Run, condition: Condition, unit: str, span: float) -> None:
+    """MechanismError where the cycle that was cut out of the data is not the model's, or starts elsewhere."""
+    if abs(condition.duration - run.cycle.duration) > SLOWER * run.cycle.duration:
+        what = f"the cycle of the data is {condition.duration:g} s, that of the model {run.cycle.duration:g} s"
+        remedy = f"state cycle: {run.cycle.duration:g} s in the mapping, or set: the number of the model that makes it"
+        raise MechanismError(Finding(what, "cycle", remedy))
+    if unit != "rad" or not np.isfinite([condition.start, condition.cycle]).all():
+        return
+    findings: list[Finding] = []
+    if abs(condition.cycle - abs(span)) > 1e-6 * abs(span):
+        what = f"the cycle of the data is {_degrees(condition.cycle)}, that of the model {_degrees(abs(span))}"
+        findings.append(Finding(what, "cycle", f"state cycle: {_degrees(abs(span))} in the mapping"))
+    begin = float(
+        _row(run.system.drive(run.values, next(iter(run.system.mechanism.drivers)), np.zeros(1))[0], np.zeros(1))[0]
+    )
+    apart = condition.start - begin
+    apart -= 2 * np.pi * np.round(apart / (2 * np.pi)) if run.cycle.periodic else 0.0
+    if abs(apart) > 1e-6:
+        what = f"the cycle of the data starts at {_degrees(condition.start)}, that of the model at {_degrees(begin)}"
+        findings.append(Finding(what, "start", f"state start: {_degrees(begin)} in the mapping"))
+    if findings:
+        raise MechanismError(findings)
+
+
+def _degrees(angle: float) -> str:
+    return f"{np.degrees(angle) + 0.0:.10g} deg"
+
+
+def _beside(turning: bool, course: Array, measured: Array) -> Array:
+    """The course; an angle within half a turn of what was measured, for both count their turns each in its own way."""
+    if not turning:
+        return course
+    turns = np.round((measured - course) / (2 * np.pi))
+    return course + 2 * np.pi * np.nan_to_num(turns)

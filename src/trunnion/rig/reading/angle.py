@@ -1,0 +1,208 @@
+"""Coordinate of the driver at every row: from a column, from time, from a speed, or from the pulses of an encoder."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.errors import Finding, MechanismError
+from trunnion.model.units import UnitError
+from trunnion.rig.reading.account import Account, counted, times
+from trunnion.rig.reading.amounts import alike, dimensions
+from trunnion.rig.reading.columns import Table
+from trunnion.rig.reading.mapping import AngleSource
+from trunnion.rig.reading.pulses import by_index, index_times, pulses_of
+from trunnion.rig.reading.smoothing import seen_edges, smoothed, unresolved
+from trunnion.rig.reading.timebase import Timeline
+
+__all__ = ["Coordinate", "coordinate"]
+
+Array = NDArray[np.float64]
+TURN = 2 * np.pi
+JUMP = 8.0  # times the usual step, by which a cell is off its neighbours
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """Coordinate of the driver by row, rad, NaN where it is not known.
+
+    spoilt: stretches of time, (stretch, 2), in which it is wrong; lag: standard uncertainty, s, of the time at which it
+    passes a value, in the mean over many pulses.
+    """
+
+    values: Array
+    spoilt: Array
+    lag: float = 0.0
+
+
+def coordinate(source: AngleSource, table: Table, line: Timeline, speed: Array | None, account: Account) -> Coordinate:
+    """The coordinate by its source; speed: that of the channel, rad/s, of a source `speed`."""
+    zero = float(source.zero.evaluate())
+    index = np.empty(0)
+    if source.index is not None:
+        index = index_times(table.columns[source.index.column].values, line, source.index.column, account)
+    if source.from_ == "pulses":
+        return _of_pulses(source, table, line, index, zero, account)
+    if source.from_ == "column":
+        values = _of_column(source, table, line, account)
+    elif source.from_ == "time":
+        assert source.speed is not None
+        rate = float(source.speed.evaluate())
+        values = rate * line.seconds
+        account.say(f"the angle is that of a constant speed of {rate:.6g} rad/s")
+    else:
+        assert speed is not None
+        values = _integrated(speed, line, account)
+    values = source.sign * values
+    if index.size > 1 and source.from_ in ("time", "speed"):
+        values, spoilt = _tied(values, index, line, account)
+    else:
+        spoilt = np.empty((0, 2))
+        _check_index(values, index, line, account)
+    return Coordinate(values + zero, spoilt)
+
+
+def _of_column(source: AngleSource, table: Table, line: Timeline, account: Account) -> Array:
+    column = table.columns[str(source.column)]
+    unit = source.unit or column.unit
+    if not unit:
+        account.note("angle", f"the column '{source.column}' has no unit and is taken for rad", "state angle.unit")
+    try:
+        factor, found = dimensions(unit or "rad")
+    except UnitError as error:
+        what, remedy = f"the column '{source.column}': {error.what}", "state angle.unit in the mapping, such as deg"
+        remedy = f"{remedy}; in the file, {error.remedy}"
+        raise MechanismError(Finding(what, "angle", remedy, file=account.file)) from None
+    if not alike(found, dimensions("rad")[1]):
+        what = f"the column '{source.column}' has the unit '{unit}', which is no angle"
+        raise MechanismError(Finding(what, "angle", "name another column", file=account.file))
+    values = _without_jumps(source, line.rows(column.values) * factor, line, account)
+    finite = np.flatnonzero(np.isfinite(values))
+    if finite.size < values.size:
+        what = f"{counted(values.size - finite.size, 'cell')} of '{source.column}' of {values.size:,} are no number"
+        account.warn("angle", f"{what}; these rows are left out", "check the angle sensor and its cable")
+    if finite.size < 3:
+        return np.full(values.size, np.nan)
+    told = np.unwrap(values[finite])
+    steps = np.abs(np.diff(told))
+    moving = steps[steps > 0]
+    if moving.size and np.median(moving) > TURN / 4:
+        what = f"a turn has {TURN / float(np.median(moving)):.3g} samples: which way it turns cannot be told"
+        account.warn("angle", what, "sample at least 8 times a turn")
+    values[finite] = told
+    return values
+
+
+def _without_jumps(source: AngleSource, values: Array, line: Timeline, account: Account) -> Array:
+    """The angle without single cells that are far off both neighbours, which are close to each other."""
+    if values.size < 9:
+        return values
+    steps = np.abs(np.angle(np.exp(1j * np.diff(values))))
+    over = np.abs(np.angle(np.exp(1j * (values[2:] - values[:-2]))))
+    usual = float(np.nanmedian(steps)) if np.isfinite(steps).any() else 0.0
+    far = max(JUMP * usual, np.radians(5.0))
+    out = 1 + np.flatnonzero((steps[:-1] > far) & (steps[1:] > far) & (over < far / 2))
+    if not out.size or out.size > 0.1 * values.size:
+        return values
+    zeros = " zero" if np.all(values[out] == 0) else ""
+    what = (
+        f"{counted(out.size, 'cell')} of '{source.column}' of {values.size:,}{zeros} far off the ones before and after"
+    )
+    account.warn("angle", f"{what}, {times(line.seconds[out])}; left out", "check the angle sensor and its cable")
+    mended = values.copy()
+    mended[out] = np.nan
+    return mended
+
+
+def _integrated(speed: Array, line: Timeline, account: Account) -> Array:
+    """The integral of a speed, from the first row; where it is missing it is interpolated."""
+    finite = np.isfinite(speed)
+    if np.count_nonzero(finite) < 2:
+        return np.full(speed.size, np.nan)
+    bridged = speed if finite.all() else np.interp(line.seconds, line.seconds[finite], speed[finite])
+    steps = 0.5 * (bridged[1:] + bridged[:-1]) * np.diff(line.seconds)
+    account.say("the angle is the integral of the speed from the first row; its zero creeps with the sensor's error")
+    return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+def _tied(values: Array, index: Array, line: Timeline, account: Account) -> tuple[Array, Array]:
+    """An angle stretched between the pulses of an index so that these are a turn apart; not known beyond them."""
+    at = np.interp(index, line.seconds, values)
+    way = np.sign(at[-1] - at[0]) or 1.0
+    turns = np.rint(np.diff(at) / TURN * way)
+    spoilt = np.column_stack([index[:-1], index[1:]])[turns != 1]
+    if spoilt.size:
+        told = counted(len(spoilt), "interval")
+        what = f"{told} of the index, {times(spoilt[:, 0])}, are not one turn of the angle; left out"
+        account.warn("angle.index", what, "check index pulse and speed")
+    exact = way * TURN * np.concatenate([[0.0], np.cumsum(np.maximum(turns, 1))])
+    account.say("the angle is tied to the index pulse once a turn")
+    inside = (line.seconds >= index[0]) & (line.seconds <= index[-1])
+    rising = np.interp(values * way, at * way, exact * way) * way
+    return np.where(inside, rising, np.nan), spoilt
+
+
+def _check_index(values: Array, index: Array, line: Timeline, account: Account) -> None:
+    """Tell where the index of an angle that needs none is out of place."""
+    if index.size < 2:
+        return
+    at = np.interp(index, line.seconds, np.where(np.isfinite(values), values, np.nan))
+    usual = float(np.nanmedian(np.abs(np.diff(at)))) / TURN if np.isfinite(np.diff(at)).any() else 1.0
+    if abs(usual - 1) > 0.5:
+        what = f"from one index pulse to the next the angle goes {usual:.3g} turns"
+        account.warn("angle.index", what, "check the unit of the angle, and whether both turn with the driver")
+    offsets = np.angle(np.exp(1j * (at - at[0])))
+    far = np.flatnonzero(np.abs(offsets) > np.radians(5.0))
+    if far.size:
+        what = f"{counted(far.size, 'index pulse')} of {index.size} more than 5 deg off the first, {times(index[far])}"
+        account.warn("angle.index", what, "check the angle sensor: it slips, or its readings jump")
+
+
+def _of_pulses(
+    source: AngleSource, table: Table, line: Timeline, index: Array, zero: float, account: Account
+) -> Coordinate:
+    """The angle between pulses by interpolation in time, counted anew from every index pulse."""
+    assert source.per_turn is not None
+    readings = line.rows(table.columns[str(source.column)].values)
+    found = pulses_of(source, readings, line, index.size > 1, account)
+    if found.times.size < 2:
+        raise MechanismError(
+            Finding(
+                f"the column '{source.column}' has {counted(found.times.size, 'pulse')}: there are no turns", "angle",
+                "check that angle.column is the encoder's, and angle.kind", file=account.file,
+            )
+        )  # fmt: skip
+    counts, spoilt = found.counts, found.spoilt
+    if index.size > 1:
+        at = np.interp(index[[0, -1]], found.times, counts)
+        index = seen_edges(index, float(np.abs(at[1] - at[0])) / source.per_turn, line.step)
+        counts, lost = by_index(found, index, source.per_turn, line.step, account)
+        spoilt = np.concatenate([spoilt, lost])
+    elif index.size == 1:
+        counts = counts - np.interp(index[0], found.times, counts)
+    turned = source.sign * TURN / source.per_turn * counts
+    pulse = 360.0 / source.per_turn
+    blur = pulse * min(0.5 * found.slack(line.step), 0.5)
+    when, spans, lag = found.times, np.zeros(0), 0.0
+    if not found.crossings and found.slack(line.step) < 1:  # a count for each event: its time is not known
+        when, spans = smoothed(when, 0.5 * line.step, source.per_turn)
+        lag = unresolved((found.times - when)[spans > 0], line.step)
+    elif not found.crossings:  # an event for each sample: its count is not known
+        jump = float(np.median(np.abs(np.diff(counts))))
+        raw = turned
+        turned, spans = smoothed(raw, float(np.radians(blur)), source.per_turn / jump)
+        per_pulse = line.step / found.slack(line.step)
+        lag = unresolved((raw - turned)[spans > 0], float(np.radians(pulse))) / np.radians(pulse) * per_pulse
+    values = np.interp(line.seconds, when, turned, left=np.nan, right=np.nan)
+    if found.until is not None:
+        values[line.seconds > found.until] = np.nan
+    known = "" if found.crossings else ", each known to ± {} deg by the sampling"
+    usual = float(np.median(spans)) if spans.size else 0.0
+    even = f"; it is smoothed over {usual:.3g} turns, with which all pulses agree" if usual > 0 else ""
+    account.say(
+        f"the angle is interpolated between pulses {pulse:.4g} deg apart{known}{even}",
+        None if found.crossings else blur,
+    )
+    return Coordinate(values + zero, spoilt, lag)

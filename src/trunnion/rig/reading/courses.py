@@ -1,0 +1,168 @@
+"""What the turns of a condition say together: drift of a zero, wrong signs, a speed that is not steady."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.rig.reading.account import Account, counted
+from trunnion.rig.reading.mapping import Channel
+from trunnion.rig.reading.turns import Turns, turn_means
+
+__all__ = ["Drift", "drift", "signs", "speeds", "steady"]
+
+Array = NDArray[np.float64]
+STEADY = 0.03  # of the mean speed, between the slowest and the fastest turn
+CERTAIN = 6.0  # standard errors from which a slope is one
+PLAIN = 3.0  # times what turns scatter about the line, that a drift amounts to
+MOST = 0.95  # of the turns, in which a power has the wrong sign if the channel has it
+APART = 0.03  # of a mean speed, between the angle and the channel that reads it
+SHARE = 0.002  # of the largest value over the turn, that a drift amounts to
+
+
+@dataclass(frozen=True)
+class Drift:
+    """A zero that creeps: slope and its standard error, SI a second, and what it amounts to over the turns.
+
+    span: from the middle of the first turn to that of the last, over which the change is.
+    """
+
+    slope: float
+    error: float
+    change: float
+    scatter: float
+    span: float
+
+
+def drift(parts: Sequence[tuple[Turns, Array]]) -> Drift | None:
+    """The slope that the means of turns have in common in all conditions of a file, where it is plain; else None."""
+    times: list[Array] = []
+    means: list[Array] = []
+    largest, within, ends = 0.0, 0, []
+    for turns, course in parts:
+        mean = turn_means(course)
+        middle = 0.5 * (turns.begin + turns.end)
+        finite = np.isfinite(mean)
+        if np.count_nonzero(finite) < 3:
+            continue
+        within += 1
+        ends += [float(middle[finite].min()), float(middle[finite].max())]
+        times.append(middle[finite] - middle[finite].mean())
+        means.append(mean[finite] - mean[finite].mean())
+        largest = max(largest, float(np.nanmax(np.abs(course))))
+    if not times:
+        return None
+    t, y = np.concatenate(times), np.concatenate(means)
+    free = t.size - within - 1
+    square = float(np.sum(t**2))
+    if free < 4 or square == 0:
+        return None
+    slope = float(np.sum(t * y)) / square
+    scatter = float(np.sqrt(np.sum((y - slope * t) ** 2) / free))
+    error = scatter / np.sqrt(square)
+    span = max(ends) - min(ends)
+    change = slope * span
+    if change == 0 or abs(slope) < CERTAIN * error or abs(change) < PLAIN * scatter or abs(change) < SHARE * largest:
+        return None
+    return Drift(slope, error, change, scatter, span)
+
+
+def steady(turns: Turns, step: float, where: str, account: Account) -> None:
+    """Tell where the turns of a condition are not equally fast, by more than the sampling can tell."""
+    lengths = turns.end - turns.begin
+    if lengths.size < 2:
+        return
+    spread = float(np.ptp(1 / lengths)) / float(np.mean(1 / lengths))
+    if spread > STEADY + 2 * step / float(np.mean(lengths)):
+        slow, fast = 60 / float(lengths.max()), 60 / float(lengths.min())
+        what = f"the speed is not steady: {slow:.4g} to {fast:.4g} cycles a minute, {100 * spread:.3g} % between turns"
+        account.warn(where, what, "state files: over: to use the steady part, or mend the speed control")
+
+
+def signs(
+    channels: Mapping[str, Channel], courses: Mapping[str, Array], turning: float | None, account: Account
+) -> list[str]:
+    """Channels that are likely to have the wrong sign: power in, or power out, below zero in all turns of a file.
+
+    courses: turns of all conditions; turning: mean speed of the driver by its angle, rad/s with its sign.
+    """
+    rates = {one.measures.partition(":")[2]: key for key, one in channels.items() if one.measures.startswith("rate:")}
+    drivers = {
+        one.measures.partition(":")[2]: key for key, one in channels.items() if one.measures.startswith("effort:")
+    }
+    suspects, gives = [], False
+    for driver, effort in drivers.items():
+        rate = rates.get(driver)
+        if rate is None and (turning is None or len(drivers) > 1):
+            continue
+        against = courses[rate] if rate else np.full_like(courses[effort], turning or 0.0)
+        power = turn_means(courses[effort] * against)
+        power = power[np.isfinite(power)]
+        if _against(power):
+            opposed = (
+                rate and turning is not None and float(np.nanmean(courses[rate])) * turning < 0 and len(drivers) == 1
+            )
+            likely = str(rate) if opposed else effort
+            other = "the angle turns the other way" if opposed else "or it drives the motor: then nothing is wrong"
+            what = f"sign: the power into {driver} is below zero in {_of(power)}"
+            account.warn(
+                f"channels.{likely}", f"{what} ({power.mean():.4g} W), {other}", f"write sign: {-channels[likely].sign}"
+            )
+            suspects.append(likely)
+        gives = gives or bool(power.size and np.mean(power > 0) > MOST) or effort in suspects
+    loads = {one.measures.partition(":")[2]: key for key, one in channels.items() if one.measures.startswith("load:")}
+    out = [key for joint, key in rates.items() if joint not in drivers]
+    for load, key in loads.items():
+        rate = rates.get(load) or (out[0] if len(out) == 1 else None)
+        if rate is None or not gives:
+            continue
+        power = turn_means(courses[key] * courses[rate])
+        power = power[np.isfinite(power)]
+        if _against(power):
+            what = f"sign: the power that {load} takes is below zero in {_of(power)}"
+            account.warn(f"channels.{key}", f"{what} ({power.mean():.4g} W) while the drive gives power",
+                         f"write sign: {-channels[key].sign} (or turn that of {rate})")  # fmt: skip
+            suspects.append(key)
+    return suspects
+
+
+def speeds(
+    channels: Mapping[str, Channel], courses: Mapping[str, Array], turning: float, told: Sequence[str], account: Account
+) -> None:
+    """Tell where the angle turns at another mean speed than the channel of its driver reads, or the other way.
+
+    turning: mean speed by the angle, rad/s with its sign; told: channels whose sign is said to be wrong.
+    """
+    drivers = [one.measures.partition(":")[2] for one in channels.values() if one.measures.startswith("effort:")]
+    names = [key for key, one in channels.items() if one.measures in {f"rate:{driver}" for driver in drivers}]
+    if len(set(drivers)) != 1 or not names or names[0] in told or not turning:
+        return
+    course = courses[names[0]]
+    known = course[np.isfinite(course)]
+    if not known.size or not known.any():
+        return
+    # over equal angles the mean of a speed in time is the harmonic one
+    one_way = np.all(known > 0) or np.all(known < 0)
+    read = float(1 / np.mean(1 / known)) if one_way else float(np.mean(known))
+    ratio = turning / read if read else np.inf
+    if abs(ratio - 1) <= APART:
+        return
+    where, both = f"channels.{names[0]}", f"the angle turns at {turning:.4g} rad/s, '{names[0]}' reads {read:.4g} rad/s"
+    if abs(ratio + 1) <= APART:
+        account.warn(where, f"sign: {both}", f"write sign: {-channels[names[0]].sign}, or turn angle.sign")
+        return
+    account.warn(
+        where, f"{both}, {ratio:.4g} times", "check unit and gain of the channel, and per_turn or unit of angle"
+    )
+
+
+def _against(power: Array) -> bool:
+    return bool(power.size and np.mean(power < 0) > MOST)
+
+
+def _of(power: Array) -> str:
+    below = int(np.count_nonzero(power < 0))
+    return f"all {counted(below, 'turn')}" if below == power.size else f"{below:,} of {counted(power.size, 'turn')}"

@@ -1,0 +1,234 @@
+"""What is wrong with the readings of a sensor: missing cells, zeros, stuck values, clipping, spikes. Each is named and
+left out, except where nothing tells for certain; what comes back in the same place of most turns is the signal's own.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+from scipy.stats import binom
+
+from trunnion.errors import Severity
+from trunnion.rig.reading.account import Account, counted, places, runs
+from trunnion.rig.reading.columns import Column
+
+__all__ = ["Span", "cells", "signal"]
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+CLIP = 0.9995  # of the range, from which a reading is at it: the top code of 12 bits is 2047/2048
+STUCK = 30  # equal readings in a row at least
+WIDTH = 7  # samples of the median that spikes are told from: up to three in a row are found
+FAR = 12.0  # robust standard deviations from it
+NEAR = 0.01  # of a turn: what recurs that close is in the same place
+CHANCE = 0.025
+FEW = 4  # turns from which what comes back can be told from faults
+SEEN = 0.1  # of the span from the 1st to the 99th percentile, that a spike or a fall to zero exceeds
+
+
+@dataclass(frozen=True)
+class Span:
+    """The rows in which the drive runs, and when its turns begin and end there, s."""
+
+    low: int
+    high: int
+    begin: Array
+    end: Array
+
+    @property
+    def turns(self) -> int:
+        return int(self.begin.size)
+
+    def phase(self, time: Array) -> Array:
+        """Share of its turn that has passed at a time, s."""
+        turn = np.clip(np.searchsorted(self.begin, time, side="right") - 1, 0, self.turns - 1)
+        return np.asarray(((time - self.begin[turn]) / (self.end - self.begin)[turn]) % 1.0)
+
+
+def cells(where: str, column: Column, readings: Array, seconds: Array, account: Account) -> None:
+    """Tell of cells without a finite number, and make the infinite ones NaN."""
+    infinite = np.isinf(readings)
+    readings[infinite] = np.nan
+    missing = np.isnan(readings)
+    count = int(np.count_nonzero(missing))
+    if not count:
+        return
+    kinds = [text for number, text in (
+        (column.texts, f"{counted(column.texts, 'text')} such as '{column.example}'"),
+        (int(np.count_nonzero(infinite)), f"{np.count_nonzero(infinite):,} infinite"),
+    ) if number]  # fmt: skip
+    empty = count - column.texts - int(np.count_nonzero(infinite))
+    kinds += [f"{empty:,} empty or NaN"] * (empty > 0 and bool(kinds))
+    told = f" ({', '.join(kinds)})" if kinds else ""
+    what = f"dropouts: {counted(count, 'cell')} of {readings.size:,} without a number{told}, {places(missing, seconds)}"
+    account.warn(where, f"{what}; left out", "check cable and logger")
+
+
+def signal(
+    where: str,
+    readings: Array,
+    seconds: Array,
+    span: Span,
+    limit: float | None,
+    account: Account,
+    steady: bool = False,
+) -> None:
+    """Look for faults in the rows of a span, and make the readings that they spoil NaN.
+
+    limit: the end of the range, in readings; steady: whether one reading throughout is nothing strange, as of a speed.
+    """
+    part, time = readings[span.low : span.high], seconds[span.low : span.high]
+    finite = np.isfinite(part)
+    if np.count_nonzero(finite) < 10:
+        return
+    known = part[finite]
+    low, high = (float(one) for one in np.percentile(known, (1, 99)))
+    if known.min() == known.max():
+        what = f"reads {known[0]:.6g} in every one of {known.size:,} rows"
+        severity = Severity.NOTE if steady else Severity.WARNING
+        account.warn(where, what, "check that the sensor is connected and the column the right one", severity)
+        return
+    wide = max(high - low, 1e-300)
+    if limit is not None:
+        _clipped(where, part, time, limit, account)
+    _zeros(where, part, time, wide, span, account)
+    _stuck(where, part, time, span, account)
+    if limit is None:
+        _plateaus(where, part, time, account)
+    _spikes(where, part, time, wide, span, account)
+
+
+def _leave_out(part: Array, mask: Mask) -> None:
+    part[mask] = np.nan
+
+
+def _doubtful(part: Array, mask: Mask, span: Span) -> str:
+    """Leave out what may be the signal's own only where there are turns enough to tell; what was done."""
+    if span.turns < FEW:
+        return f"left in: in {counted(span.turns, 'turn')} nothing tells whether it is the signal's own"
+    _leave_out(part, mask)
+    return "left out"
+
+
+def _own(count: int, span: Span) -> bool:
+    """Whether something happens in so many places that it belongs to the signal."""
+    return span.turns >= FEW and count >= 0.5 * span.turns
+
+
+def _recurring(phase: Array) -> Mask:
+    """What comes back in the same place of the turn more often than chance would have it: the signal's own.
+
+    So many others lie within NEAR of it, of turns taken at random, in CHANCE of all cases only (binomial). Once found,
+    they do not count any more when the rest is looked at.
+    """
+    own = np.zeros(phase.size, dtype=np.bool_)
+    while np.count_nonzero(~own) > 1:
+        rest = phase[~own]
+        around = np.sort(np.concatenate([rest - 1, rest, rest + 1]))
+        others = np.searchsorted(around, rest + NEAR, side="right") - np.searchsorted(around, rest - NEAR) - 1
+        found = np.asarray(binom.sf(others - 1, rest.size - 1, 2 * NEAR) < CHANCE)
+        if not found.any():
+            break
+        own[np.flatnonzero(~own)[found]] = True
+    return own
+
+
+def _clipped(where: str, part: Array, time: Array, limit: float, account: Account) -> None:
+    mask = np.abs(part) >= CLIP * limit
+    if count := int(np.count_nonzero(mask)):
+        what = f"clipped: {counted(count, 'reading')} of {part.size:,} at the end of the range, {places(mask, time)}"
+        what = f"{what}; left out, so that means there are too small"
+        account.warn(where, what, "use a larger range or a smaller load")
+        _leave_out(part, mask)
+
+
+def _plateaus(where: str, part: Array, time: Array, account: Account) -> None:
+    """Readings that gather at the largest or least one, as they do at an end of the range that nobody stated."""
+    finite = part[np.isfinite(part)]
+    if not finite.size:
+        return
+    for end in (float(finite.max()), float(finite.min())):
+        at = int(np.count_nonzero(finite == end))
+        if end == 0 or at < max(5, 2e-4 * finite.size):
+            continue
+        mask = part == end
+        _, lengths = runs(mask)
+        others = finite[finite != end]
+        if not others.size:  # the rest was left out as something else
+            continue
+        beside = others.max() if end == finite.max() else others.min()
+        if lengths.max() >= 3 and at > 5 * np.count_nonzero(others == beside) and np.mean(lengths) > 1.5:
+            what = (
+                f"seems clipped at {end:.6g} in the unit of the readings: {at:,} of {part.size:,}, {places(mask, time)}"
+            )
+            account.warn(where, what, "state range: if it is the end of the sensor's, and use a larger one")
+
+
+def _zeros(where: str, part: Array, time: Array, wide: float, span: Span, account: Account) -> None:
+    """Readings of exactly zero between others that are far from it."""
+    mask = part == 0
+    if not mask.any() or np.count_nonzero(mask) > 0.5 * part.size:
+        return
+    starts, lengths = runs(mask)
+    inner = (starts > 0) & (starts + lengths < part.size)
+    starts, lengths = starts[inner], lengths[inner]
+    before, after = part[starts - 1], part[starts + lengths]
+    steps = np.abs(np.diff(part))
+    noise = 1.4826 * float(np.nanmedian(steps)) if np.isfinite(steps).any() else 0.0
+    amplitude = float(np.nanpercentile(np.abs(part), 95))
+    least = max(8 * noise, SEEN * wide, SEEN * amplitude)
+    fallen = (np.abs(before) > least) & (np.abs(after) > least)
+    if not fallen.any() or _own(int(fallen.sum()), span):
+        return
+    bad = np.zeros(part.size, dtype=np.bool_)
+    for begin, length in zip(starts[fallen], lengths[fallen], strict=True):
+        bad[begin : begin + length] = True
+    what = f"dropouts: {counted(int(bad.sum()), 'reading')} of {part.size:,} zero in the middle of the signal"
+    done = _doubtful(part, bad, span)
+    account.warn(where, f"{what}, {places(bad, time)}; {done}", "check cable and connector")
+
+
+def _stuck(where: str, part: Array, time: Array, span: Span, account: Account) -> None:
+    """The same reading in a row much more often than is usual for the channel."""
+    same = np.concatenate([np.diff(part) == 0, [False]])
+    starts, lengths = runs(same)
+    if not starts.size:
+        return
+    single = part.size - int(np.sum(lengths + 1))
+    ranks = np.sort(np.concatenate([lengths + 1, np.ones(min(single, 10 * lengths.size), dtype=np.intp)]))
+    usual = float(ranks[int(0.99 * (ranks.size - 1))])
+    long = lengths + 1 > max(STUCK, 10 * usual if usual < 0.1 * part.size else STUCK)
+    held = int(np.sum(lengths[long] + 1))
+    if not long.any() or _own(int(long.sum()), span) or held > 0.5 * part.size:
+        return
+    bad = np.zeros(part.size, dtype=np.bool_)
+    for begin, length in zip(starts[long], lengths[long], strict=True):
+        bad[begin + 1 : begin + length + 1] = True
+    what = f"stuck: the reading does not change for {counted(held, 'sample')}, {places(bad, time)}"
+    account.warn(where, f"{what}; {_doubtful(part, bad, span)}", "check sensor and logger")
+
+
+def _spikes(where: str, part: Array, time: Array, wide: float, span: Span, account: Account) -> None:
+    """One to three readings far from the median of those around them."""
+    finite = np.isfinite(part)
+    if np.count_nonzero(finite) < 2 * WIDTH:
+        return
+    known = part[finite]
+    off = np.abs(known - median_filter(known, size=WIDTH, mode="nearest"))
+    spread = 1.4826 * float(np.median(off))
+    usual = float(np.percentile(off, 99))
+    far = off > max(FAR * spread, 2.5 * usual, SEEN * wide)
+    if _own(int(runs(far)[0].size), span):
+        return
+    bad = np.zeros(part.size, dtype=np.bool_)
+    bad[np.flatnonzero(finite)[far]] = True
+    bad[np.flatnonzero(bad)[_recurring(span.phase(time[bad]))]] = False
+    far = bad[finite]
+    if not far.any():
+        return
+    what = f"spikes: {counted(int(far.sum()), 'reading')} of {part.size:,} up to {off[far].max() / wide:.2g} times the "
+    what += f"usual span off their neighbours, {places(bad, time)}"
+    account.warn(where, f"{what}; {_doubtful(part, bad, span)}", "check shielding and earth")

@@ -1,0 +1,366 @@
+"""The mapping file: which columns of a data file measure what of the model, in which units, and what to do with them.
+
+Strict, like a model file: an unknown key, a wrong unit or a name that is not there is a finding with file and line.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BeforeValidator, Field, Tag, ValidationError, WithJsonSchema, model_validator
+
+from trunnion.errors import Finding, MechanismError
+from trunnion.model.file import Lines, place, read_entries
+from trunnion.model.findings import schema_findings
+from trunnion.model.names import nearest
+from trunnion.model.part import Name, Part, forms, problem
+from trunnion.model.quantity import Angle, AnyQuantity, Dimensionless, Quantity, Rate, Time
+from trunnion.model.units import ANGLE, KINDS, UnitError
+from trunnion.rig.reading.amounts import Amount, Frequency, Number, UnitText, alike, dimensions
+from trunnion.rig.reading.scale import MeasureText, Scale, scale
+
+__all__ = [
+    "AngleSource",
+    "Channel",
+    "DataMapping",
+    "File",
+    "FixedAngle",
+    "FixedNumber",
+    "FixedTime",
+    "FromData",
+    "Mapped",
+    "TimeBase",
+    "Zero",
+    "read_mapping",
+]
+
+Sign = Literal[1, -1]
+NOUN = "a mapping file"
+START = "write trunnion-data: 1, then files, time, angle and channels"
+
+
+class FromData(Part):
+    """A value that the data tell: the mean of a channel over the turns, or a column that states it."""
+
+    mean: str | None = None
+    column: str | None = None
+    unit: UnitText | None = None
+
+    @model_validator(mode="after")
+    def _one(self) -> FromData:
+        if (self.mean is None) == (self.column is None):
+            raise problem("a value is taken from one of mean and column", "write {mean: channel} or {column: name}")
+        if self.mean is not None and self.unit is not None:
+            raise problem("a mean has the unit of its channel", "remove unit")
+        return self
+
+
+def fixed(quantity: Quantity) -> Quantity:
+    """A number with its unit; there are no dimensions here that an expression could speak of."""
+    if quantity.names:
+        what = f"'{quantity.source}' speaks of {', '.join(quantity.names)}"
+        raise problem(what, "write a number with its unit")
+    if quantity.tolerance is not None:
+        raise problem(f"'{quantity.source}' has a tolerance, which means nothing here", "write the value alone")
+    return quantity
+
+
+FixedAngle = Annotated[Angle, AfterValidator(fixed)]
+FixedNumber = Annotated[Dimensionless, AfterValidator(fixed)]
+FixedRate = Annotated[Rate, AfterValidator(fixed)]
+FixedTime = Annotated[Time, AfterValidator(fixed)]
+FixedQuantity = Annotated[AnyQuantity, AfterValidator(fixed)]
+Setting = Annotated[
+    Annotated[FromData, Tag(":group")] | Annotated[FixedQuantity, Tag(":value")],
+    forms("a number with its unit, {mean: channel} or {column: name, unit: deg}"),
+]
+
+
+def _span(value: object) -> object:
+    """One stretch [from, to] as a list of stretches."""
+    if isinstance(value, (list, tuple)) and value and not isinstance(value[0], (list, tuple)):
+        return [value]
+    return value
+
+
+_PAIR = {"type": "array", "items": {"type": ["number", "string"]}, "minItems": 2, "maxItems": 2}
+
+
+class File(Part):
+    """A data file, what was set while it was recorded, and the stretch of time that is used of it."""
+
+    file: str = Field(min_length=1)
+    set: Mapping[str, Setting] = {}
+    over: tuple[Number, Number] | None = None
+
+    @model_validator(mode="after")
+    def _ordered(self) -> File:
+        _check_spans([self.over] if self.over else [])
+        return self
+
+
+class TimeBase(Part):
+    """Where time comes from: a column with its unit, or a sampling rate."""
+
+    column: str | None = None
+    unit: UnitText | None = None
+    rate: Frequency | None = None
+
+    @model_validator(mode="after")
+    def _one(self) -> TimeBase:
+        if (self.column is None) == (self.rate is None):
+            raise problem("time is either a column or a rate", "write {column: t, unit: s} or {rate: 2 kHz}")
+        if self.unit is not None:
+            _unit_of(self.unit, "s", "a unit of time such as ms")
+        return self
+
+
+class Index(Part):
+    """A pulse once a turn."""
+
+    column: str
+
+
+class AngleSource(Part):
+    """Where the coordinate of the driver comes from."""
+
+    from_: Literal["pulses", "column", "time", "speed"] = Field(alias="from")
+    column: str | None = None
+    unit: UnitText | None = None
+    per_turn: Annotated[int, Field(ge=1, le=10_000_000)] | None = None
+    kind: Literal["count", "level"] | None = None
+    wrap: Annotated[int, Field(ge=2)] | None = None
+    speed: FixedRate | None = None
+    channel: str | None = None
+    zero: FixedAngle = Quantity(0.0, KINDS["angle"])
+    index: Index | None = None
+    sign: Sign = 1
+
+    @model_validator(mode="after")
+    def _of_its_kind(self) -> AngleSource:
+        needed, allowed = _KEYS[self.from_]
+        stated = {key for key in ("column", "unit", "per_turn", "kind", "wrap", "speed", "channel", "index")
+                  if getattr(self, key) is not None}  # fmt: skip
+        if missing := [key for key in needed if key not in stated]:
+            raise problem(f"from: {self.from_} needs {' and '.join(missing)}", "add it")
+        if extra := sorted(stated - {*needed, *allowed}):
+            remedy = f"remove it; from: {self.from_} takes {', '.join((*needed, *allowed))}"
+            raise problem(f"from: {self.from_} does not take {', '.join(extra)}", remedy)
+        if self.wrap is not None and self.kind == "level":
+            raise problem("only a running count wraps", "remove wrap, or write kind: count")
+        if self.unit is not None:
+            _unit_of(self.unit, "rad", "a unit of angle such as deg")
+        if self.speed is not None and self.speed.evaluate() == 0:
+            raise problem("the speed is zero: there are no turns", "write the speed of the driver, such as 1500 rpm")
+        return self
+
+
+# keys each source needs, and those it may have
+_KEYS = {
+    "pulses": (("column", "per_turn"), ("kind", "wrap", "index")),
+    "column": (("column",), ("unit", "index")),
+    "time": (("speed",), ("index",)),
+    "speed": (("channel",), ("index",)),
+}
+
+
+class Zero(Part):
+    """The zero of a channel as the mean over stretches of time in which nothing loads the sensor."""
+
+    over: Annotated[
+        tuple[tuple[Number, Number], ...],
+        BeforeValidator(_span),
+        Field(min_length=1, max_length=20),
+        WithJsonSchema({"anyOf": [_PAIR, {"type": "array", "items": _PAIR, "minItems": 1, "maxItems": 20}]}),
+    ]
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Zero:
+        _check_spans(self.over)
+        return self
+
+
+class Accuracies(Part):
+    """Standard uncertainties of a sensor: of its gain, relative, and of its zero."""
+
+    gain: FixedNumber = Quantity(0.0, KINDS["number"])
+    zero: Number = Amount(0.0, 0.0, "", {})
+
+    @model_validator(mode="after")
+    def _positive(self) -> Accuracies:
+        if self.gain.evaluate() < 0 or self.zero.value < 0:
+            raise problem("a standard uncertainty is below zero", "write it without a sign")
+        return self
+
+
+class Channel(Part):
+    """A column that measures something of the model, and how its readings become that.
+
+    Quantity = sign · (reading − zero) · gain, or / gain, as its unit tells.
+    """
+
+    column: str
+    measures: MeasureText
+    unit: UnitText | None = None
+    gain: Number | None = None
+    sign: Sign = 1
+    zero: Annotated[
+        Annotated[Zero, Tag(":group")] | Annotated[Number, Tag(":value")],
+        forms("a number with its unit, or {over: [0 s, 0.5 s]}"),
+    ] = Amount(0.0, 0.0, "", {})
+    range: Number | None = None
+    accuracy: Accuracies = Accuracies()
+
+    @model_validator(mode="after")
+    def _fitting(self) -> Channel:
+        if self.range is not None and self.range.value <= 0:
+            raise problem("the range is not above zero", "write the full scale, such as 100 N m")
+        if self.unit is not None:
+            self.scale(self.unit)
+        return self
+
+    def scale(self, unit: str) -> Scale:
+        """How readings in a unit become the quantity; an error of pydantic if they cannot."""
+        try:
+            found = scale(self.measures, unit, self.gain)
+            for key, amount in (("zero", self.zero), ("range", self.range), ("accuracy.zero", self.accuracy.zero)):
+                if isinstance(amount, Amount):
+                    found.reading(amount, key)
+        except UnitError as error:
+            raise problem(error.what, error.remedy) from None
+        return found
+
+
+class Filter(Part):
+    """Butterworth low-pass, forward and backward: without delay."""
+
+    cut_off: Frequency
+    order: Annotated[int, Field(ge=1, le=12)] = 4
+
+
+class DataMapping(Part):
+    """A mapping file."""
+
+    version: Literal[1] = Field(alias="trunnion-data")
+    name: str = ""
+    notes: str = ""
+    files: tuple[File, ...] = ()
+    time: TimeBase | None = None
+    angle: AngleSource | None = None
+    channels: Annotated[Mapping[Name, Channel], Field(min_length=1)]
+    set: Mapping[str, Setting] = {}
+    filter: Filter | None = None
+    cycle: FixedQuantity = Quantity.read("1 turn")
+    start: FixedAngle = Quantity(0.0, KINDS["angle"])
+    positions: Annotated[int, Field(ge=2, le=100_000)] = 360
+    drift: Literal["report", "remove"] = "report"
+
+    @property
+    def timed(self) -> bool:
+        """Whether the cycle is a time."""
+        return self.cycle.check({}) == KINDS["time"].dimensions[0]
+
+
+class Mapped:
+    """A mapping with the folder that its files lie below, and the lines of its entries for findings."""
+
+    def __init__(self, mapping: DataMapping, folder: Path, file: str, lines: Lines, data: Mapping[str, Any]) -> None:
+        self.mapping, self.folder, self.file = mapping, folder, file
+        self._lines, self._data = lines, data
+
+    def placed(self, findings: list[Finding]) -> list[Finding]:
+        """Findings about the mapping with its file and line; those of other files as they are."""
+        return place(findings, self.file, self._lines, self._data) if self.file else findings
+
+
+def read_mapping(source: str | os.PathLike[str] | Mapping[str, Any]) -> Mapped:
+    """A mapping from its file, or from plain data, whose files lie below the working folder.
+
+    MechanismError with every finding, each with file and line.
+    """
+    if isinstance(source, Mapping):
+        data, lines, file, folder = dict(source), Lines(), "", Path()
+    else:
+        path = Path(source)
+        data, lines = read_entries(path, NOUN, START)
+        file, folder = str(path), path.parent
+    try:
+        mapping = DataMapping.model_validate(data)
+        findings = [*_check(mapping), *_outside(mapping, folder)]
+    except ValidationError as error:
+        findings = [_explained(one, data) for one in schema_findings(error, DataMapping, data)]
+    if findings:
+        raise MechanismError(place(findings, file, lines, data) if file else findings)
+    return Mapped(mapping, folder, file, lines, data)
+
+
+def _explained(finding: Finding, data: Mapping[str, Any]) -> Finding:
+    """A file of another kind is told as such."""
+    if finding.what == "'trunnion-data' is missing" and "trunnion" in data:
+        return Finding("is a model file, not a mapping file", "trunnion", "name the mapping, then the data files")
+    if finding.what == "'trunnion-data' is missing":
+        return Finding(finding.what, finding.where, "begin the file with trunnion-data: 1")
+    if finding.remedy == "see the examples of model files":
+        return Finding(finding.what, finding.where, "see the examples of mappings in docs/how-to/measured-data.md")
+    return finding
+
+
+def _check(mapping: DataMapping) -> Iterator[Finding]:
+    """What one part alone cannot tell."""
+    channels = mapping.channels
+    settings = {f"set.{key}": value for key, value in mapping.set.items()}
+    for number, file in enumerate(mapping.files):
+        settings |= {f"files.{number}.set.{key}": value for key, value in file.set.items()}
+    for where, value in settings.items():
+        if isinstance(value, FromData) and value.mean is not None and value.mean not in channels:
+            yield Finding(f"there is no channel '{value.mean}'", f"{where}.mean", nearest(value.mean, channels))
+    if mapping.cycle.check({}) not in (ANGLE, KINDS["time"].dimensions[0], None):
+        yield Finding(f"'{mapping.cycle.source}' is no angle and no time", "cycle", "write it as 360 deg or 0.5 s")
+    elif not float(mapping.cycle.evaluate()) > 0:
+        yield Finding("the cycle is not above zero", "cycle", "write it as 360 deg or 0.5 s")
+    elif mapping.angle is None and not mapping.timed:
+        remedy = "add angle: {from: …}, or write cycle: as a time"
+        yield Finding("'angle' is missing: nothing tells the coordinate of the driver", "", remedy)
+    source = mapping.angle.channel if mapping.angle else None
+    if source is not None and source not in channels:
+        yield Finding(f"there is no channel '{source}'", "angle.channel", nearest(source, channels))
+    elif source is not None and not channels[source].measures.startswith("rate:"):
+        what = f"the channel '{source}' measures {channels[source].measures}, not a speed"
+        yield Finding(what, "angle.channel", "name a channel that measures rate:DRIVER")
+    base = mapping.time
+    if mapping.filter and base and base.rate and 2 * mapping.filter.cut_off.value >= base.rate.value:
+        what = f"a cut-off of {mapping.filter.cut_off.value:g} Hz, samples come at {base.rate.value:g} Hz"
+        yield Finding(what, "filter.cut_off", f"write less than half of that, {base.rate.value / 2:g} Hz")
+
+
+def _outside(mapping: DataMapping, folder: Path) -> Iterator[Finding]:
+    """Files that are not below the folder of the mapping: a mapping is data from a stranger."""
+    home = folder.resolve()
+    for number, entry in enumerate(mapping.files):
+        try:
+            inside = not Path(entry.file).is_absolute() and (folder / entry.file).resolve().is_relative_to(home)
+        except (OSError, ValueError, RuntimeError):
+            inside = False
+        if not inside:
+            remedy = "put it there, or name it on the command line"
+            what = f"'{entry.file[:80]}' is not below the folder of the mapping"
+            yield Finding(what, f"files.{number}.file", remedy)
+
+
+def _check_spans(spans: Any) -> None:
+    """Stretches of time that begin before they end."""
+    for begin, end in spans:
+        for one in (begin, end):
+            if not one.plain and not alike(one.dimensions, {"second": 1}):  # type: ignore[dict-item]
+                raise problem(f"'{one.source}' is no time", "write [0 s, 0.5 s]")
+        if not begin.value < end.value:
+            raise problem(f"[{begin.source}, {end.source}] ends before it begins", "write [0 s, 0.5 s]")
+
+
+def _unit_of(text: str, si: str, needed: str) -> None:
+    """An error of pydantic if a unit does not measure the same as that of SI."""
+    if not alike(dimensions(text)[1], dimensions(si)[1]):
+        raise problem(f"the unit '{text}' is not {needed}", f"write {needed}")

@@ -1,0 +1,414 @@
+"""Data files of a test rig as a Measurement: read by a mapping, checked, cut into turns, and brought to positions."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.rig.reading import faults
+from trunnion.rig.reading.account import Account, counted, told
+from trunnion.rig.reading.angle import Coordinate, coordinate
+from trunnion.rig.reading.channels import Reading, Zeroed, filtered, reading, resolution, zeroed
+from trunnion.rig.reading.columns import Table
+from trunnion.rig.reading.courses import Drift, drift, signs, speeds, steady
+from trunnion.rig.reading.mapping import DataMapping, File, FromData, Mapped, Zero, read_mapping
+from trunnion.rig.reading.measurement import Accuracy, Condition, Course, Measurement
+from trunnion.rig.reading.settings import Setting, dimension_of, settings, stated
+from trunnion.rig.reading.tables import read_table
+from trunnion.rig.reading.timebase import Timeline, timeline
+from trunnion.rig.reading.turns import DENSE, Turns, cut, resampled, time_mean
+
+__all__ = ["read_measured"]
+
+Array = NDArray[np.float64]
+FEW_HARMONICS = 5.0
+UNUSED = 0.5  # of the turns recorded, below which it is told how few are used
+
+
+def read_measured(
+    mapping: str | os.PathLike[str] | Mapping[str, Any], files: Iterable[str | os.PathLike[str]] | None = None
+) -> Measurement:
+    """The measurement that a mapping file describes: courses over the cycle, turn by turn, with what is wrong in them.
+
+    mapping: its path, or its entries; files: data files instead of those it names. Faults of the data are findings of
+    the result; MechanismError, with every finding, where mapping or files cannot be read or there is no turn at all.
+    """
+    mapped = read_mapping(mapping)
+    conditions: list[Condition] = []
+    findings: list[Finding] = []
+    accounts: list[Account] = []
+    failed = False
+    entries, notes = _files(mapped, files)
+    for path, entry in entries:
+        account = Account(str(path))
+        try:
+            with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # of numbers near the end of the floats
+                conditions += _File(mapped.mapping, path, entry, account).conditions()
+        except MechanismError as error:
+            account.findings += [one for one in error.findings if one not in account.findings]
+            failed = True
+        findings += account.findings
+        accounts.append(account)
+    findings = mapped.placed([*findings, *notes])
+    if failed or not conditions:
+        raise MechanismError([one for one in findings if one.severity is not Severity.NOTE])
+    name = mapped.mapping.name or Path(mapped.file).stem
+    return Measurement(
+        name,
+        tuple(_distinct(conditions)),
+        tuple(findings),
+        (_averaged(conditions, sum(one.recorded for one in accounts)), *told(accounts)),
+    )
+
+
+def files_read(mapping: Path, files: Iterable[Path] | None = None) -> list[Path]:
+    """What `read_measured` reads: the mapping file, the data files that it names or that are given in their place."""
+    mapped = read_mapping(mapping)
+    named = list(files or ()) or [mapped.folder / entry.file for entry in mapped.mapping.files]
+    return [mapping, *named]
+
+
+def _averaged(conditions: Sequence[Condition], recorded: float) -> str:
+    """How many turns there are, and of how many if some are not used."""
+    counts = [next(iter(one.courses.values())).turns.shape[0] for one in conditions]
+    each = f"{min(counts):,}" if min(counts) == max(counts) else f"{min(counts):,} to {max(counts):,}"
+    where = "" if len(counts) == 1 else f" in each of {len(counts):,} conditions"
+    if sum(counts) < recorded - 2 * len(counts):
+        where += f", {sum(counts):,}" if len(counts) > 1 else ""
+        where += f" of {recorded:,.0f} recorded"
+    return f"{each} whole turns{where}; rows before, between and after them are not used"
+
+
+def _files(
+    mapped: Mapped, files: Iterable[str | os.PathLike[str]] | None
+) -> tuple[list[tuple[Path, File]], list[Finding]]:
+    """Data files with what the mapping says of them; notes of what is kept of it, or lost, where it names other files.
+
+    Files of the command line keep the entry of the same file; what was set also that of the same name, where one entry
+    alone has it. A stretch of time is that of one recording.
+    """
+    entries = mapped.mapping.files
+    named = [Path(one) for one in files or ()]
+    if not named and not entries:
+        finding = Finding(
+            "no data file is named", "files", "write files: [{file: run-01.csv}], or name them after the mapping"
+        )
+        raise MechanismError(mapped.placed([finding]))
+    if not named:
+        return [(mapped.folder / entry.file, entry) for entry in entries], []
+    stated = {(mapped.folder / one.file).resolve(): one for one in entries}
+    own, other = [one.name for one in named], [Path(one.file).name for one in entries]
+    found: list[tuple[Path, File]] = []
+    kept: list[Path] = []
+    lost: dict[str, list[Path]] = {}
+    for path in named:
+        entry = stated.get(path.resolve())
+        if entry is None:
+            alike = own.count(path.name) == 1 == other.count(path.name)
+            like = entries[other.index(path.name)] if alike else None
+            entry = File(file=path.name or ".", set=like.set if like else {})
+            kept += [path] if entry.set else []
+            missing = _says(*([like.model_copy(update={"set": {}})] if like else entries))
+            lost.setdefault(missing, []).append(path)
+        found.append((path, entry))
+    notes = []
+    if kept:
+        what = f"{_some(kept)} read with the `set` of the file of that name in the mapping"
+        notes.append(Finding(what, "files", "rename the file if something else was set", Severity.NOTE))
+    for missing, paths in lost.items():
+        what = f"{_some(paths)} read without {missing}, which the mapping states for other files"
+        remedy = f"add {{file: {paths[0].name}, {missing.split('`')[1]}: …}} to `files`" if missing else ""
+        notes += [Finding(what, "files", remedy, Severity.NOTE)] if missing else []
+    return found, notes
+
+
+def _says(*entries: File) -> str:
+    """What entries state of their files."""
+    return " and ".join(f"`{key}`" for key in ("set", "over") if any(getattr(one, key) for one in entries))
+
+
+def _some(paths: Sequence[Path]) -> str:
+    told = ", ".join(str(one) for one in paths[:4]) + (f" and {len(paths) - 4} more" if len(paths) > 4 else "")
+    return f"{told} {'is' if len(paths) == 1 else 'are'}"
+
+
+def _distinct(conditions: Sequence[Condition]) -> list[Condition]:
+    """Conditions with different names: the file is added where two are alike, then a number."""
+    found: list[Condition] = []
+    names = [one.name for one in conditions]
+    for one in conditions:
+        name = one.name
+        if names.count(name) > 1:
+            name = f"{name} ({', '.join(Path(file).stem for file in one.files)})"
+        plain, number = name, 2
+        while any(name == other.name for other in found):
+            name, number = f"{plain} {number}", number + 1
+        found.append(one if name == one.name else replace(one, name=name))
+    return found
+
+
+@dataclass(frozen=True)
+class _Part:
+    """One condition of a file: its setting, its turns and the courses of the channels, (turn, position)."""
+
+    setting: Setting
+    turns: Turns
+    courses: dict[str, Array]
+
+
+class _File:
+    """One data file on its way to conditions."""
+
+    def __init__(self, mapping: DataMapping, path: Path, entry: File, account: Account) -> None:
+        self.mapping, self.entry, self.account, self.path = mapping, entry, account, path
+        table = _table(path, mapping, entry)
+        for note in table.notes:
+            account.say(note)
+        self.line: Timeline = timeline(table, mapping.time, account)
+        if mapping.filter is not None:
+            self._check_filter(table)
+        self.own: dict[str, Reading] = {}
+        self.lag = 0.0
+        self.readings: dict[str, Array] = {}
+        self.steps: dict[str, float] = {}
+        for name, channel in mapping.channels.items():
+            column = table.columns[channel.column]
+            self.own[name] = reading(name, channel, column, account)
+            self.readings[name] = np.array(self.line.rows(column.values))
+            faults.cells(f"channels.{name}", column, self.readings[name], self.line.seconds, account)
+        self.table = table
+
+    def conditions(self) -> list[Condition]:
+        """The conditions of the file, each with its turns."""
+        mapping, account = self.mapping, self.account
+        zeros = {
+            name: zeroed(
+                name, channel, self.own[name], self.readings[name], self.line, mapping.drift == "remove", account
+            )
+            for name, channel in mapping.channels.items()
+        }
+        share, way, spoilt = self._share(zeros)
+        cuts, used = [], self._used()
+        for setting in settings(mapping, self.entry, self.table, self.line, account):
+            allowed = used[setting.window] & setting.rows
+            name = self._named(setting)
+            turns = cut(share, self.line, setting.window, allowed, mapping.positions, spoilt, account, name)
+            gone = _gone(share[setting.window], allowed)
+            account.recorded += gone
+            if turns.numbers.size:
+                cuts.append((setting, turns))
+                if turns.numbers.size < UNUSED * gone - 2:
+                    what = f"{counted(turns.numbers.size, 'turn')} of {gone:,.0f} recorded can be used"
+                    account.warn(f"condition {name}", what, "mend what the other findings name")
+            else:
+                what = self._no_turn(share[setting.window], allowed)
+                account.error(f"condition {name}", what, "check angle, or record for longer")
+        if not cuts:
+            return []
+        self._check_rows(cuts)
+        parts = [_Part(setting, turns, {}) for setting, turns in cuts]
+        drifts = {name: self._channel(name, zeros[name], parts) for name in mapping.channels}
+        whole = {name: np.concatenate([part.courses[name] for part in parts]) for name in mapping.channels}
+        if not mapping.timed:
+            turning = way * self._rate([part.turns for part in parts])
+            told = signs(mapping.channels, whole, turning, account)
+            speeds(mapping.channels, whole, turning, told, account)
+        return [self._condition(part, zeros, drifts, way) for part in parts]
+
+    def _named(self, setting: Setting) -> str:
+        return setting.name or self.path.stem
+
+    def _used(self) -> NDArray[np.bool_]:
+        if self.entry.over is None:
+            return np.ones(self.line.seconds.size, dtype=np.bool_)
+        begin, end = (one.value for one in self.entry.over)
+        return (self.line.seconds >= begin) & (self.line.seconds <= end)
+
+    def _share(self, zeros: Mapping[str, Zeroed]) -> tuple[Array, float, Array]:
+        """Cycles gone through by row, which way the coordinate runs, and stretches of time in which it is wrong."""
+        mapping = self.mapping
+        cycle = float(mapping.cycle.evaluate())
+        if mapping.timed:
+            return self.line.seconds / cycle, 1.0, np.empty((0, 2))
+        assert mapping.angle is not None
+        source, speed = mapping.angle, None
+        if source.channel is not None:
+            name = source.channel
+            own = self.own[name]
+            if own.scale.unit != "rad/s":
+                what = f"the channel '{name}' is a speed in {own.scale.unit}, not of a turning driver"
+                raise MechanismError(Finding(what, "angle.channel", "name one in rpm or rad/s", file=self.account.file))
+            speed = own.quantity(self.readings[name], zeros[name], mapping.channels[name].sign, self.line.seconds)
+        found: Coordinate = coordinate(source, self.table, self.line, speed, self.account)
+        self.lag = found.lag
+        known = np.flatnonzero(np.isfinite(found.values) & self._used())
+        if known.size < 3:
+            what = "the coordinate of the driver is known in no row that is used"
+            raise MechanismError(Finding(what, "angle", "check angle.column", file=self.account.file))
+        clock = np.repeat(self.line.spoilt[:, None], 2, axis=1)
+        way = 1.0 if found.values[known[-1]] >= found.values[known[0]] else -1.0
+        start = float(mapping.start.evaluate())
+        return way * (found.values - start) / cycle, way, np.concatenate([found.spoilt, clock])
+
+    def _no_turn(self, share: Array, allowed: NDArray[np.bool_]) -> str:
+        known = share[np.isfinite(share) & allowed]
+        gone = float(np.ptp(known)) if known.size else 0.0
+        return f"there is no whole turn: {gone:.3g} cycles in {counted(int(allowed.sum()), 'row')}"
+
+    def _check_filter(self, table: Table) -> None:
+        assert self.mapping.filter is not None
+        rate, cut_off = 1.0 / self.line.step, self.mapping.filter.cut_off.value
+        if 2 * cut_off >= rate:
+            what = f"the sampling is too slow for the filter: {rate:.6g} Hz, a cut-off of {cut_off:g} Hz"
+            remedy = f"state a cut-off below {rate / 2:.4g} Hz, or sample faster"
+            raise MechanismError(Finding(what, "filter.cut_off", remedy, file=str(self.path)))
+        if cut_off * float(np.ptp(self.line.seconds)) < 2:
+            what = f"the cut-off of {cut_off:g} Hz is slower than the recording of {np.ptp(self.line.seconds):.4g} s"
+            raise MechanismError(Finding(what, "filter.cut_off", "state a higher one", file=str(self.path)))
+        if not self.line.even:
+            self.account.warn("filter", "the samples are not evenly spaced in time, as a filter needs them",
+                              "record at a fixed rate, or leave out the filter")  # fmt: skip
+        order = self.mapping.filter.order
+        self.account.say(
+            f"low-pass filter: Butterworth of order {order}, forward and backward, together 3 dB down at {cut_off:g} Hz"
+            f"; gaps up to {100 / cut_off:.3g} ms are bridged for it and stay gaps"
+        )
+
+    def _check_rows(self, cuts: Sequence[tuple[Setting, Turns]]) -> None:
+        """Tell how turns are sampled, whether they are enough and equally fast, and what the filter leaves of them."""
+        account, mapping = self.account, self.mapping
+        for setting, turns in cuts:
+            where = f"condition {self._named(setting)}"
+            if turns.numbers.size < 2:
+                account.warn(where, "has one turn: there is no scatter, so no uncertainty", "record two turns or more")
+            steady(turns, self.line.step, where, account)
+            if turns.density < 1:
+                samples = f"{turns.density * mapping.positions:.4g} samples a turn for {mapping.positions} positions"
+                what = f"the sampling is slow: {samples}; between them it is interpolated"
+                account.warn(where, what, "state fewer positions, or sample faster")
+            length = float(np.mean(turns.end - turns.begin))
+            passed = mapping.filter.cut_off.value * length if mapping.filter else np.inf
+            if passed < FEW_HARMONICS:
+                what = f"the filter leaves the first {passed:.2g} harmonics of a turn"
+                account.note(where, what, "state a higher cut-off")
+        dense = all(turns.density >= DENSE for _, turns in cuts)
+        account.say(
+            "values at a position: mean of the samples within half a position to either side"
+            if dense else "values at a position: interpolated by a cubic between four samples"
+        )  # fmt: skip
+        for name, channel in mapping.channels.items():
+            for low, high in channel.zero.over if isinstance(channel.zero, Zero) else ():
+                inside = sum(int(np.sum((one.begin < high.value) & (one.end > low.value))) for _, one in cuts)
+                if inside:
+                    what = (
+                        f"the unloaded stretch {low.value:g} to {high.value:g} s reaches into {counted(inside, 'turn')}"
+                    )
+                    account.warn(f"channels.{name}.zero", what, "state a stretch in which the sensor is not loaded")
+
+    def _channel(self, name: str, zero: Zeroed, parts: Sequence[_Part]) -> Drift | None:
+        """The courses of a channel, put into the parts; the drift that is left in them."""
+        mapping, account, line = self.mapping, self.account, self.line
+        channel, own, where = mapping.channels[name], self.own[name], f"channels.{name}"
+        begin, end = (np.sort(np.concatenate([getattr(part.turns, one) for part in parts])) for one in ("begin", "end"))
+        low, high = int(np.searchsorted(line.seconds, begin[0])), int(np.searchsorted(line.seconds, end[-1], "right"))
+        span = faults.Span(low, high, begin, end)
+        readings = self.readings.pop(name)
+        self.steps[name] = abs(own.scale.factor) * resolution(readings[low:high])
+        speed = channel.measures.startswith("rate:")
+        faults.signal(where, readings, line.seconds, span, own.limit, account, speed)
+        values = own.quantity(readings, zero, channel.sign, line.seconds)
+        if mapping.filter is not None:
+            values = filtered(values, line, mapping.filter, account, where)
+        for part in parts:
+            part.courses[name] = resampled(part.turns, values)
+        if speed:  # one that creeps is the drive's
+            return None
+        found = drift([(part.turns, part.courses[name]) for part in parts])
+        if found is None:
+            return None
+        by = f"{found.change:.3g} {own.scale.unit} in {found.span:.4g} s"
+        times = f"{abs(found.change) / max(found.scatter, 1e-300):.3g} times what turns scatter about the line"
+        what, remedy = f"drift: the mean of a turn changes by {by}, {times}", "let sensor and bearings warm up"
+        if mapping.drift == "report":
+            account.warn(where, what, f"{remedy}, or state drift: remove")
+            return None
+        since = float(line.seconds[0]) if np.isnan(zero.since) else zero.since
+        account.warn(where, f"{what}; a straight line is taken off, zero at {since:.4g} s", remedy)
+        for part in parts:
+            part.courses[name] = resampled(part.turns, values - found.slope * (line.seconds - since))
+        return found
+
+    def _rate(self, turns: Sequence[Turns]) -> float:
+        cycle = float(self.mapping.cycle.evaluate())
+        return cycle / float(np.mean(np.concatenate([one.end - one.begin for one in turns])))
+
+    def _condition(
+        self, part: _Part, zeros: Mapping[str, Zeroed], drifts: Mapping[str, Drift | None], way: float
+    ) -> Condition:
+        """A condition with its courses, and values that are means of channels."""
+        courses = {}
+        for name, channel in self.mapping.channels.items():
+            own = self.own[name]
+            left = drifts[name]
+            extra = left.error * left.span / 2 if left else 0.0  # of the line that was taken off, at either end
+            of_file = float(np.hypot(abs(own.scale.factor) * zeros[name].uncertainty, extra))
+            zero = float(np.hypot(own.accuracy_zero, of_file))
+            accuracy = Accuracy(zero, own.accuracy_gain, self.steps[name], of_file)
+            courses[name] = Course(name, channel.measures, own.scale.unit, part.courses[name], accuracy)
+        values, known_as = dict(part.setting.values), dict(part.setting.dimensions)
+        for path, channel_name in part.setting.means.items():
+            turns = courses[channel_name].turns
+            if not np.isfinite(turns).any():
+                what = f"the channel '{channel_name}', whose mean it is, has no value in any turn"
+                raise MechanismError(Finding(what, f"set.{path}", "mend the channel, or state it", file=str(self.path)))
+            values[path] = time_mean(part.turns, turns)
+            known_as[path] = dimension_of(self.own[channel_name].scale.of_quantity, courses[channel_name].unit)
+        positions = self.mapping.positions
+        speed = np.nan if self.mapping.timed else way * self._rate([part.turns])
+        name = self._named(part.setting)
+        timed = self.mapping.timed
+        start, cycle = (np.nan if timed else float(one.evaluate()) for one in (self.mapping.start, self.mapping.cycle))
+        phase = np.arange(positions) / positions
+        duration = float(self.mapping.cycle.evaluate()) if timed else np.nan
+        return Condition(
+            name, values, phase, courses, (str(self.path),), speed, start, cycle,
+            lag=self.lag, dimensions=known_as, duration=duration,
+        )  # fmt: skip
+
+
+def _gone(share: Array, allowed: NDArray[np.bool_]) -> float:
+    """Cycles gone through in the rows that are allowed."""
+    steps = np.diff(share)[allowed[1:] & allowed[:-1]]
+    return float(np.sum(np.abs(steps[np.isfinite(steps)])))
+
+
+def _table(path: Path, mapping: DataMapping, entry: File) -> Table:
+    """The columns of a file that the mapping names; a missing one is told with the entry that names it."""
+    named = _columns(mapping, entry)
+    own = "time.column" if path.suffix.lower() == ".tdms" else ""  # which may tell its time by itself
+    wanted = [column for where, column in named.items() if where != own]
+    try:
+        return read_table(path, wanted, [named[own]] if own in named else [])
+    except MechanismError as error:
+        told = error.findings[0].what.partition(";")[0] if "there is no column" in error.findings[0].what else ""
+        where = ", ".join(key for key, column in named.items() if f"'{column}'" in told)
+        raise MechanismError([replace(one, where=where) for one in error.findings]) from None
+
+
+def _columns(mapping: DataMapping, entry: File) -> dict[str, str]:
+    """Columns that are read, by the entries of the mapping that name them."""
+    found: dict[str, str | None] = {"time.column": mapping.time.column if mapping.time else None}
+    if mapping.angle is not None:
+        found["angle.column"] = mapping.angle.column
+        found["angle.index.column"] = mapping.angle.index.column if mapping.angle.index else None
+    found |= {f"channels.{name}.column": channel.column for name, channel in mapping.channels.items()}
+    for name, one in stated(mapping, entry).items():
+        found[f"set.{name}.column"] = one.column if isinstance(one, FromData) else None
+    return {where: column for where, column in found.items() if column is not None}

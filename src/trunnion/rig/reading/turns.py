@@ -1,0 +1,239 @@
+"""Turns: where each begins and ends, which are whole and steady enough, and the values of channels at its positions.
+
+With four samples or more a position, a value is the mean of the samples within half a position to either side, moved
+to the position along the slope there; with fewer it is interpolated by a cubic through the four samples around it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.rig.reading.account import Account, counted
+from trunnion.rig.reading.timebase import GAP, Timeline
+
+__all__ = ["Turns", "cut", "resampled", "time_mean", "turn_means"]
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+DENSE = 4.0  # samples a position from which they are averaged
+STANDING = 0.2  # of the usual speed, below which the drive is taken to stand
+APART = 0.5  # of the usual length of a turn, by which one may differ from it
+
+
+@dataclass(frozen=True)
+class Turns:
+    """Whole turns of one condition in a file, among the rows of a window.
+
+    share: (row of the window,), the cycle counted on, rising, whole at the start of each; numbers: of the turns;
+    begin, end: their times, s; rows: those that belong to them; positions: how many a turn; line: time of the rows.
+    """
+
+    share: Array
+    numbers: NDArray[np.intp]
+    begin: Array
+    end: Array
+    rows: Mask
+    positions: int
+    line: Timeline
+    window: slice
+
+    @property
+    def density(self) -> float:
+        """Samples a position."""
+        return float(np.mean(self.end - self.begin)) / (self.line.step * self.positions) if self.numbers.size else 0.0
+
+
+def cut(
+    shares: Array,
+    times: Timeline,
+    window: slice,
+    allowed: Mask,
+    positions: int,
+    spoilt: Array,
+    account: Account,
+    name: str,
+) -> Turns:
+    """The whole turns among the rows of a window that are allowed; those left out are told.
+
+    shares: cycles gone through, rising with time, NaN where not known; spoilt: stretches of time to leave out.
+    """
+    where, share, line = f"condition {name}", shares[window], times.part(window)
+    known = np.isfinite(share)
+    highest = np.maximum.accumulate(np.where(known, share, -np.inf))
+    begin, end, numbers = _whole(share, highest, line)
+    inside = _covered(begin, end, allowed, line)
+    begin, end, numbers = begin[inside], end[inside], numbers[inside]
+    keep = np.ones(numbers.size, dtype=np.bool_)
+    lengths = end - begin
+    if numbers.size:
+        usual = float(np.median(lengths))
+        odd = np.abs(lengths / usual - 1) > APART
+        if count := int(np.count_nonzero(odd)):
+            low, high = lengths[odd].min(), lengths[odd].max()
+            span = f"{low:.4g} to {high:.4g} s" if count > 1 else f"{low:.4g} s"
+            what = f"{counted(count, 'turn')} of {numbers.size} {'lasts' if count == 1 else 'last'} {span}"
+            what = f"{what} where {usual:.4g} s is usual, and {'is' if count == 1 else 'are'} left out"
+            account.note(where, what, "the drive starts, stops or stands there; files: over: can name what counts")
+        keep &= ~odd
+    if len(spoilt):
+        hit = np.zeros(numbers.size, dtype=np.bool_)
+        for low, high in spoilt:
+            slack = min(line.step, 0.25 * (high - low))  # an index may lie where a turn begins
+            hit |= (begin <= high - slack) & (end >= low + slack)
+        keep &= ~hit
+    numbers, begin, end = numbers[keep], begin[keep], end[keep]
+    rows = _rows_of(share, numbers, begin, end, line, known & allowed, positions)
+    return Turns(share, numbers, begin, end, rows, positions, line, window)
+
+
+def _whole(share: Array, highest: Array, line: Timeline) -> tuple[Array, Array, NDArray[np.intp]]:
+    """Begin, end and number of every turn that is gone through from its start to its end, but for one sample."""
+    finite = np.isfinite(highest)
+    if np.count_nonzero(finite) < 3:
+        return np.empty(0), np.empty(0), np.empty(0, dtype=np.intp)
+    first = int(np.argmax(finite))
+    last = int(np.searchsorted(highest, highest[-1]))  # what follows stands, or is not known
+    rising, seconds = highest[first : last + 1], line.seconds[first : last + 1]
+    if rising.size < 3:
+        return np.empty(0), np.empty(0), np.empty(0, dtype=np.intp)
+    steps = np.diff(rising)
+    usual = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.0
+    low, high = int(np.ceil(rising[0] - 1.01 * usual)), int(np.floor(rising[-1] + 1.01 * usual))
+    if high - low < 1 or usual == 0 or high - low > rising.size:
+        return np.empty(0), np.empty(0), np.empty(0, dtype=np.intp)
+    whole = np.arange(low, high + 1)
+    after = np.clip(np.searchsorted(rising, whole, side="right"), 1, rising.size - 1)
+    before = after - 1
+    step = rising[after] - rising[before]
+    part = np.clip((whole - rising[before]) / np.where(step > 0, step, 1.0), -1.01, 2.01)
+    crossed = seconds[before] + part * (seconds[after] - seconds[before])
+    return crossed[:-1], crossed[1:], whole[:-1]
+
+
+def _covered(begin: Array, end: Array, allowed: Mask, line: Timeline) -> Mask:
+    """Whether all rows of each turn are allowed."""
+    if allowed.all():
+        return np.ones(begin.size, dtype=np.bool_)
+    refused = np.concatenate([[0], np.cumsum(~allowed)])
+    slack = 0.5 * line.step
+    low = np.searchsorted(line.seconds, begin + slack)
+    high = np.searchsorted(line.seconds, end - slack)
+    return np.asarray(refused[np.maximum(high, low)] == refused[low]) & (high > low)
+
+
+def _rows_of(
+    share: Array, numbers: NDArray[np.intp], begin: Array, end: Array, line: Timeline, known: Mask, positions: int
+) -> Mask:
+    """Rows within turns, half a position before and after included, that move."""
+    if not numbers.size:
+        return np.zeros(share.size, dtype=np.bool_)
+    usual = float(np.median(end - begin))
+    margin = 0.5 * usual / positions + line.step
+    level = np.zeros(share.size + 1, dtype=np.int64)
+    np.add.at(level, np.searchsorted(line.seconds, begin - margin), 1)
+    np.add.at(level, np.searchsorted(line.seconds, end + margin, side="right"), -1)
+    rows = (np.cumsum(level[:-1]) > 0) & known
+    wide = max(int(usual / line.step / 100), 1)
+    moved = np.full(share.size, np.inf)
+    moved[wide:-wide] = (share[2 * wide :] - share[: -2 * wide]) / (
+        line.seconds[2 * wide :] - line.seconds[: -2 * wide]
+    )
+    return np.asarray(rows & ~(moved < STANDING / usual))
+
+
+def resampled(turns: Turns, channel: Array) -> Array:
+    """Values of a channel, which has one a row of the file, as (turn, position); NaN where no sample has one."""
+    values = channel[turns.window]
+    if not turns.numbers.size:
+        return np.empty((0, turns.positions))
+    if turns.density >= DENSE:
+        return _averaged(turns, values)
+    return _interpolated(turns, values, turns.line)
+
+
+def _averaged(turns: Turns, values: Array) -> Array:
+    """Means of the samples about each position, moved to it along the slope between its neighbours."""
+    rows = turns.rows & np.isfinite(values)
+    scaled = turns.share[rows] * turns.positions
+    place = np.floor(scaled + 0.5)
+    low = int(turns.numbers[0]) * turns.positions
+    size = (int(turns.numbers[-1]) - int(turns.numbers[0]) + 1) * turns.positions
+    number = place.astype(np.int64) - low
+    inside = (number >= 0) & (number < size)
+    number, off, used = number[inside], (scaled - place)[inside], values[rows][inside]
+    count = np.bincount(number, minlength=size).astype(np.float64)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        mean = np.bincount(number, weights=used, minlength=size) / count
+        centre = np.bincount(number, weights=off, minlength=size) / count
+    rise = np.diff(mean) / np.maximum(1.0 + np.diff(centre), 0.5)
+    sides = np.stack([np.append(rise, np.nan), np.insert(rise, 0, np.nan)])
+    there = np.isfinite(sides)
+    slope = np.where(there, sides, 0.0).sum(axis=0) / np.maximum(there.sum(axis=0), 1)
+    mean = mean - slope * centre
+    return np.asarray(mean.reshape(-1, turns.positions)[turns.numbers - turns.numbers[0]])
+
+
+def _interpolated(turns: Turns, values: Array, line: Timeline) -> Array:
+    """A cubic through the four samples about a position; a straight line between two where one of them is missing."""
+    known = np.isfinite(turns.share)
+    highest = np.maximum.accumulate(np.where(known, turns.share, -np.inf))
+    rows = np.flatnonzero(known & (turns.share > np.concatenate([[-np.inf], highest[:-1]])))
+    x, y, seconds = turns.share[rows], values[rows], line.seconds[rows]
+    wanted = (turns.numbers[:, None] + np.arange(turns.positions) / turns.positions).ravel()
+    if rows.size < 2:
+        return np.full((turns.numbers.size, turns.positions), np.nan)
+    after = np.clip(np.searchsorted(x, wanted, side="right"), 1, x.size - 1)
+    part = (wanted - x[after - 1]) / (x[after] - x[after - 1])
+    found = y[after - 1] + part * (y[after] - y[after - 1])
+    four = np.clip(after[:, None] + np.arange(-2, 2), 0, x.size - 1)
+    apart = np.diff(seconds[four], axis=1)
+    smooth = np.all(np.isfinite(y[four]), axis=1) & np.all(apart > 0, axis=1) & np.all(apart < 3 * line.step, axis=1)
+    found[smooth] = _cubic(x[four[smooth]], y[four[smooth]], wanted[smooth])
+    at_end = np.abs(part - np.clip(part, 0, 1)) > 1.01  # no sample beyond: up to one step is extrapolated
+    gap = seconds[after] - seconds[after - 1] > GAP * line.step * np.maximum(1, np.rint(_usual(seconds) / line.step))
+    found[at_end | gap] = np.nan
+    return np.asarray(found.reshape(-1, turns.positions))
+
+
+def _usual(seconds: Array) -> float:
+    return float(np.median(np.diff(seconds)))
+
+
+def _cubic(x: Array, y: Array, at: Array) -> Array:
+    """The polynomial through four points, each row; Lagrange's form."""
+    total = np.zeros(at.size)
+    for i in range(4):
+        weight = np.ones(at.size)
+        for j in range(4):
+            if j != i:
+                weight *= (at - x[:, j]) / (x[:, i] - x[:, j])
+        total += weight * y[:, i]
+    return total
+
+
+def turn_means(course: Array) -> Array:
+    """Mean of each turn over the positions that most turns have, (turn,); NaN where one lacks many of them."""
+    finite = np.isfinite(course)
+    count = finite.sum(axis=0)
+    usual = np.where(finite, course, 0.0).sum(axis=0) / np.maximum(count, 1)
+    level = float(usual[count > 0].mean()) if np.any(count) else np.nan
+    left = np.where(finite, course - usual, 0.0).sum(axis=1) / np.maximum(finite.sum(axis=1), 1)
+    return np.where(finite.mean(axis=1) > 0.5, level + left, np.nan)
+
+
+def time_mean(turns: Turns, course: Array) -> float:
+    """Mean of a course over the time of the turns, each position by how long it took; NaN if it has no value.
+
+    The mean over the positions is that over the angle: of a speed that varies within the turn it is too high.
+    """
+    known = np.isfinite(turns.share)
+    highest = np.maximum.accumulate(turns.share[known])
+    rising = np.flatnonzero(np.diff(highest, prepend=-np.inf) > 0)
+    edges = turns.numbers[:, None] + (np.arange(turns.positions + 1) - 0.5) / turns.positions
+    dwell = np.diff(np.interp(edges, highest[rising], turns.line.seconds[known][rising]), axis=1)
+    there = np.isfinite(course)
+    total = float(np.sum(dwell, where=there))
+    return float(np.sum(dwell * course, where=there)) / total if total > 0 else float("nan")

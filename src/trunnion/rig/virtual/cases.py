@@ -1,0 +1,297 @@
+"""The working conditions of a virtual rig: whether the model can be in them, and what its sensors are to see there."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from trunnion.errors import Finding, MechanismError, Severity, Status, counted
+from trunnion.measures.measures import MEASURES, Measure, named
+from trunnion.rig.modelled import told_at
+from trunnion.rig.reading.rig_file import Rig, Value
+from trunnion.rig.virtual.courses import Sampled, cycle_efficiency, sampled
+from trunnion.rig.virtual.faults import misfits
+from trunnion.rig.virtual.sensors import Channel, resolved
+from trunnion.solve.run import Run
+
+__all__ = ["Case", "case_names", "case_of", "channels_of", "findings_of", "measures_of", "placed_at", "speed_differs"]
+
+MOST_ROWS = 20_000_000
+BEYOND = 0.1  # of a cycle that is recorded before the first and past the last, so that their ends are there
+MOST_NAMED = 20  # conditions in one finding
+SINGLE = ("point", "angle", "rotation", "slide", "rate", "effort", "reaction", "load")
+
+
+@dataclass(frozen=True)
+class Case:
+    """A working condition that the model can be in: what is set, how it is sampled, what is true.
+
+    before, running, after: samples of the idle stretches and of the run; lead: sampling intervals from the first sample
+    of the run to the start of its first cycle, a whole number and a half; efficiency: of the model, NaN if it has none.
+    """
+
+    number: int
+    name: str
+    settings: Mapping[str, Value]
+    run: Run
+    before: int
+    running: int
+    after: int
+    lead: float
+    true: Sampled
+    efficiency: float
+
+    @property
+    def worst(self) -> Status:
+        """The gravest status of a position."""
+        return max(one for one in Status if np.any(self.true.status == one))
+
+    @property
+    def rows(self) -> int:
+        return self.before + self.running + self.after
+
+    @property
+    def first(self) -> int:
+        """The first sample of the run that lies in its first cycle."""
+        return math.ceil(self.lead)
+
+    def drive(self, rate: float, sample: int = 0) -> tuple[float, float]:
+        """Coordinate and rate of the first driver at a sample of the run, rad or m."""
+        driver = next(iter(self.run.system.mechanism.drivers))
+        found = self.run.system.drive(self.run.values, driver, (sample - self.lead) / rate)
+        return float(np.ravel(found[0])[0]), float(np.ravel(found[1])[0])
+
+    @property
+    def origin(self) -> float:
+        """Sample, counted from the first of the file, at which time is 0: the first, or, where the driver does not name
+        positions by its coordinate, the start of the first cycle."""
+        return 0.0 if self.named else self.before + self.lead
+
+    @property
+    def named(self) -> bool:
+        """Whether the first driver turns one way, so that its coordinate names positions."""
+        driver = next(iter(self.run.system.mechanism.drivers))
+        return self.run.system.turns(driver) and self.run.system.span(self.run.values, driver).one_way
+
+    @property
+    def part(self) -> slice:
+        """Samples at which the machine runs."""
+        return slice(self.before, self.before + self.running)
+
+    def say(self) -> str:
+        """What is set, as text."""
+        return ", ".join(f"{name} = {_shown(value)}" for name, value in self.settings.items()) or "as the model states"
+
+
+def _shown(value: Value) -> str:
+    return value if isinstance(value, str) else f"{value:.6g}"
+
+
+@contextmanager
+def placed_at(where: str, number: int = 0) -> Iterator[None]:
+    """What the model says of values that are set in a rig file: there, and in which condition."""
+    try:
+        yield
+    except MechanismError as error:
+        place = f" (in condition {number})" if number else ""
+        told = [
+            replace(one, what=f"{one.where}: {one.what}{place}" if one.where else f"{one.what}{place}", where=where)
+            for one in error.findings
+        ]
+        raise MechanismError(told) from None
+
+
+def measures_of(rig: Rig, run: Run) -> list[Measure]:
+    """What each sensor measures; MechanismError with all that the model has no course of."""
+    found: list[Measure] = []
+    findings: list[Finding] = []
+    mechanism = run.system.mechanism
+    for name, sensor in rig.sensors.items():
+        where = f"sensors.{name}.measures"
+        try:
+            measure = named(mechanism, [sensor.measures], run.values)[0]
+        except MechanismError as error:
+            findings += [replace(one, where=where) for one in error.findings]
+            continue
+        if not measure.everywhere or measure.kind not in SINGLE or measure.of_attitude(run.system):
+            what = f"'{sensor.measures}' is no number that a sensor shows at every instant{told_at(measure)}"
+            remedy = "write effort:DRIVER, rate:JOINT, load:LOAD, rotation:JOINT, slide:JOINT or link.point.x"
+            findings.append(Finding(what, where, remedy))
+        found.append(measure)
+    if findings:
+        raise MechanismError(findings)
+    if run.determinacy is not None and any(MEASURES[one.kind].of_forces for one in found):
+        run.determinacy.refuse()
+    return found
+
+
+def channels_of(rig: Rig, run: Run, measures: Sequence[Measure]) -> dict[str, Channel]:
+    """The sensors in the units of what they measure; MechanismError with all that does not fit."""
+    found: dict[str, Channel] = {}
+    findings: list[Finding] = []
+    for (name, sensor), measure in zip(rig.sensors.items(), measures, strict=True):
+        try:
+            found[name] = resolved(name, sensor, rig.column(name), measure.unit(run.system))
+        except MechanismError as error:
+            findings += error.findings
+    findings += _of_the_drive(rig, run)
+    findings += misfits(rig, found)
+    if findings:
+        raise MechanismError(findings)
+    return found
+
+
+def _of_the_drive(rig: Rig, run: Run) -> Iterator[Finding]:
+    """What the driver does not let a rig do."""
+    driver = next(iter(run.system.mechanism.drivers), None)
+    if driver is None or run.cycle.duration <= 0:
+        yield Finding("the mechanism has no driver that moves", "schedule", "give the model a driver")
+        return
+    if not run.cycle.periodic and rig.schedule.turns > 1:
+        what = f"the cycle of {driver} ends elsewhere than it starts: it cannot run {rig.schedule.turns} times on end"
+        yield Finding(what, "schedule.turns", "state turns: 1")
+    if rig.encoder and not (run.system.turns(driver) and run.system.span(run.values, driver).one_way):
+        what = f"an encoder counts the turns of a driver that turns one way, {driver} does not"
+        yield Finding(what, "encoder", "remove the encoder: positions then follow from the time")
+
+
+def case_names(count: int) -> list[str]:
+    """Names of conditions, and of their files."""
+    width = max(2, len(str(count)))
+    return [f"run-{number:0{width}d}" for number in range(1, count + 1)]
+
+
+def case_of(
+    number: int,
+    name: str,
+    row: Mapping[str, Value],
+    run: Run,
+    rig: Rig,
+    measures: Sequence[Measure],
+    channels: Mapping[str, Channel],
+) -> Case:
+    """One condition with its true courses. The idle times are taken to a whole number of samples."""
+    rate, cycle = rig.rate.value, run.cycle
+    pauses = rig.schedule.pauses
+    before, after = (math.ceil(float(one.evaluate()) * rate - 1e-9) for one in (pauses.before, pauses.after))
+    # Samples lie half an interval off the start of the cycle, so that edges of pulses that fall on samples otherwise
+    # lie between them: a sampling clock knows nothing of the shaft.
+    lead = math.ceil(BEYOND * cycle.duration * rate) - 0.5 if cycle.periodic else 0.0
+    if cycle.periodic:
+        running = math.ceil(lead) + math.ceil((rig.schedule.turns + BEYOND) * cycle.duration * rate)
+    else:
+        running = math.floor(cycle.duration * rate + 1e-9) + 1
+    if before + running + after > MOST_ROWS:
+        what = f"condition {number} takes {before + running + after:,} rows, a file at most {MOST_ROWS:,}"
+        raise MechanismError(Finding(what, "rate", "sample more slowly, or fewer turns"))
+    if running < 3:
+        what = f"a cycle of condition {number} takes {cycle.duration:.4g} s, no three samples"
+        raise MechanismError(Finding(what, "rate", "sample faster"))
+    tolerances = {i: max(one.step, one.noise) / 10 for i, one in enumerate(channels.values())}
+    true = sampled(run, measures, rate, running, lead, tolerances)
+    case = Case(number, name, row, run, before, running, after, lead, true, float("nan"))
+    if not case.worst.solved:
+        return case
+    for course, (sensor, channel) in zip(true.values, channels.items(), strict=True):
+        if channel.per_turn and np.min(course) < 0 < np.max(course):
+            what = f"in condition {number} ({case.say()}) the speed changes its sign, which pulses do not tell"
+            remedy = "remove per_turn, or measure another joint"
+            raise MechanismError(Finding(what, f"sensors.{sensor}.per_turn", remedy))
+    return replace(case, efficiency=cycle_efficiency(run))
+
+
+def findings_of(cases: Sequence[Case], channels: Mapping[str, Channel], rig: Rig) -> Iterator[Finding]:
+    """What there is to say of conditions: those that cannot be, and what sensors do not tell; each kind once."""
+    where = "schedule.conditions" if rig.schedule.conditions else "schedule.over"
+    for status in reversed(Status):
+        stopped = [case for case in cases if case.worst == status]
+        if stopped and not status.solved:
+            one = stopped[0]
+            places = np.flatnonzero(one.true.status >= Status.NOT_CONVERGED)
+            first = 360 * one.true.time[places[0]] / one.run.cycle.duration
+            what = (
+                f"{_named(stopped)} left out: {status.text}; in condition {one.number} at {len(places)} of "
+                f"{counted(len(one.true.status), 'position')}, first at {first:.4g}° of the cycle"
+            )
+            remedy = "run analyse with these values: it says where in the cycle, and why; or do without"
+            yield Finding(what, where, remedy, Severity.WARNING)
+    sound = [case for case in cases if case.worst.solved]
+    if mended := [case for case in sound if case.true.mended]:
+        most = max(case.true.mended for case in mended)
+        what = (
+            f"{_named(mended)}: a load has no single value at up to {counted(most, 'position')}, its joint being at "
+            "rest there; sensors are given 0 in a rest, the mean of the neighbours at a single position"
+        )
+        yield Finding(what, where, "", Severity.NOTE)
+    yield from _lost_pulses(sound, rig)
+    yield from _both_ways(sound, rig)
+    driver = next(iter(cases[0].run.system.mechanism.drivers))
+    told = rig.encoder or any(one.measures == f"rate:{driver}" for one in channels.values())
+    if sound and not told and speed_differs(sound):
+        what = f"the conditions differ in speed, and nothing measured tells where {driver} is"
+        yield Finding(what, "encoder", f"state an encoder, or a sensor of rate:{driver}")
+    for i, (name, channel) in enumerate(channels.items()):
+        peaks = {case.number: float(np.max(np.abs(case.true.values[i]))) for case in sound}
+        clipped = [case for case in sound if peaks[case.number] > channel.limit]
+        if clipped:
+            what = (
+                f"{_named(clipped)}: {channel.measures} reaches {max(peaks.values()):.4g} {channel.unit}, beyond the "
+                f"range of {channel.limit:.4g} {channel.unit}: readings are clipped"
+            )
+            key = "range" if channel.limit == channel.range else "span"
+            yield Finding(what, f"sensors.{name}.{key}", "take a sensor with a larger range", Severity.WARNING)
+
+
+def _both_ways(cases: Sequence[Case], rig: Rig) -> Iterator[Finding]:
+    """Drivers that turn either way, where there is no count of an encoder: files then begin at other coordinates."""
+    one_way = [case for case in cases if case.named]
+    if len({case.drive(rig.rate.value)[1] > 0 for case in one_way}) < 2:
+        return
+    if rig.encoder is None:
+        what = "the conditions turn both ways, and nothing measured tells where the driver is"
+        yield Finding(what, "encoder", "state an encoder of kind: count, or a rig for each way")
+    elif rig.encoder.kind == "level":
+        what = "the conditions turn both ways, and the level of an encoder does not tell which"
+        yield Finding(what, "encoder.kind", "record kind: count")
+
+
+def speed_differs(cases: Sequence[Case]) -> bool:
+    """Whether the first driver runs one way and not as fast in all conditions."""
+    driver = next(iter(cases[0].run.system.mechanism.drivers))
+    spans = [case.run.system.span(case.run.values, driver) for case in cases]
+    durations = [case.run.cycle.duration for case in cases]
+    return spans[0].one_way and max(durations) - min(durations) > 1e-9 * max(durations)
+
+
+def _named(cases: Sequence[Case]) -> str:
+    """Conditions by number, the first with what is set."""
+    first = f"condition {cases[0].number} ({cases[0].say()})"
+    if len(cases) == 1:
+        return f"{first} is" if cases[0].worst >= Status.NOT_CONVERGED else first
+    shown = ", ".join(str(case.number) for case in cases[1:MOST_NAMED])
+    more = f" and {len(cases) - MOST_NAMED} more" if len(cases) > MOST_NAMED else ""
+    are = " are" if cases[0].worst >= Status.NOT_CONVERGED else ""
+    return f"{first} and condition{'s' * (len(cases) > 2)} {shown}{more}{are}"
+
+
+def _lost_pulses(cases: Sequence[Case], rig: Rig) -> Iterator[Finding]:
+    """An encoder whose level is sampled too slowly to tell every pulse."""
+    if rig.encoder is None or rig.encoder.kind != "level":
+        return
+    peaks = {}
+    for case in cases:
+        driver = next(iter(case.run.system.mechanism.drivers))
+        peaks[case.number] = float(case.run.system.span(case.run.values, driver).peak) / (2 * np.pi)
+    lost = [case for case in cases if 4 * peaks[case.number] * rig.encoder.per_turn > rig.rate.value * (1 + 1e-9)]
+    if lost:
+        most = max(peaks.values()) * rig.encoder.per_turn
+        what = (
+            f"{_named(lost)}: the encoder gives up to {most:.4g} pulses a second; sampled {rig.rate.value:.4g} times a "
+            "second, some are lost"
+        )
+        remedy = "sample four times as fast as there are pulses, or record kind: count"
+        yield Finding(what, "encoder.kind", remedy, Severity.WARNING)

@@ -1,0 +1,430 @@
+"""What a virtual rig leaves behind: data files like those of a real one, the mapping that reads them, and the truth.
+
+CSV, Parquet and TDMS hold the same numbers to the last bit: they are rounded to what the shortest text of a CSV cell
+says before any is written.
+"""
+
+from __future__ import annotations
+
+import errno
+import importlib.util
+import math
+import os
+import shutil
+import tempfile
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from ruamel.yaml import YAML
+
+from trunnion.errors import Finding, MechanismError
+from trunnion.files import spare
+from trunnion.rig.reading.rig_file import FORMATS, Rig
+from trunnion.rig.virtual.cases import Case, case_names, speed_differs
+from trunnion.version import __version__
+
+if TYPE_CHECKING:
+    from trunnion.rig.virtual.observation import Record, Recorded
+    from trunnion.rig.virtual.sensors import Channel
+
+__all__ = ["MAPPING", "TRUTH", "check_folder", "check_form", "mapping_of", "truth_of", "write"]
+
+MAPPING, TRUTH = "mapping.yaml", "truth.yaml"
+PACKAGES = {"parquet": "pyarrow", "tdms": "nptdms"}
+POSITIONS = (360, 180, 120, 90, 72, 60, 36, 24, 12)  # of a cycle: fewer than samples
+FEWER = 0.99
+ROWS = 100_000  # of text written at a time
+AT_REST = 0.9  # share of the idle stretch that the zero is taken from: a filter carries the run into the rest
+
+
+def check_form(form: str) -> None:
+    """MechanismError for a format that is none, or whose package is not there."""
+    if form not in FORMATS:
+        raise MechanismError(Finding(f"'{form}' is no format of data files", "format", f"use {', '.join(FORMATS)}"))
+    package = PACKAGES.get(form)
+    if package and importlib.util.find_spec(package) is None:
+        raise MechanismError(Finding(f"{form} needs {package}", "format", f"pip install 'trunnion[{form}]'"))
+
+
+def check_folder(rig: Rig, folder: str | os.PathLike[str], form: str, read: Iterable[Path] = ()) -> None:
+    """MechanismError if a file of a rig would be written over one that is read, or over one that no rig has written.
+
+    A folder in which mapping and truth, as far as they are there, are those of a rig, and the truth is there, is a
+    rig's: its files are written anew.
+    """
+    folder = Path(folder)
+    files = [f"{name}.{form or rig.format}" for name in case_names(len(rig.schedule.rows()))]
+    spare(read, (("--out", folder / name) for name in (*files, MAPPING, TRUTH)))
+    strange = [name for name in (MAPPING, TRUTH) if (folder / name).exists() and not _of_a_rig(folder / name)]
+    if not (folder / TRUTH).exists():
+        strange += [name for name in files if (folder / name).exists()]
+    if strange:
+        what = f"{', '.join(strange[:3])}{' …' * (len(strange) > 3)} would be written over, and is of no virtual rig"
+        raise MechanismError(Finding(what, str(folder), "name another folder, or move away what is there"))
+
+
+def _of_a_rig(path: Path) -> bool:
+    """Whether a mapping or truth begins as those do that are written here."""
+    head = HEADS[path.name].encode()
+    try:
+        with path.open("rb") as stream:
+            return stream.read(len(head)) == head
+    except OSError:
+        return False
+
+
+def write(
+    observation: Recorded, folder: str | os.PathLike[str], form: str, progress: Callable[[int], None] | None = None
+) -> list[str]:
+    """Write everything into a folder, which is made if it is not there, or nothing; the names of the files."""
+    check_form(form)
+    check_folder(observation.rig, folder, form)
+    names = []
+    units = units_of(observation)
+    with _together(Path(folder)) as temporary:
+        for done, record in enumerate(observation.records(), 1):
+            names.append(f"{record.name}.{form}")
+            WRITERS[form](record, units, temporary / names[-1], observation)
+            if progress:
+                progress(done)
+        _write_yaml(temporary / MAPPING, mapping_of(observation, form))
+        _write_yaml(temporary / TRUTH, truth_of(observation))
+    return [*names, MAPPING, TRUTH]
+
+
+@contextmanager
+def _together(folder: Path) -> Iterator[Path]:
+    """A folder for files that are to be in another one: they go there together when the block ends well, or none does.
+
+    MechanismError if they cannot be written.
+    """
+    home = next(one for one in (folder, *folder.absolute().parents) if one.exists())
+    try:
+        if home == folder and not folder.is_dir():
+            raise NotADirectoryError(errno.ENOTDIR, "it is a file")
+        temporary = Path(tempfile.mkdtemp(prefix=".rig-", dir=home))
+    except OSError as error:
+        what = f"cannot be made a folder: {error.strerror or error}"
+        raise MechanismError(Finding(what, str(folder), "name a folder")) from None
+    try:
+        new = temporary / "new"
+        new.mkdir()
+        yield new
+        if home == folder:
+            _move(new, folder, temporary / "old")
+        else:
+            _make(new, folder, home)
+    except OSError as error:
+        what = f"cannot be written: {error.strerror or error}; nothing of it is left"
+        raise MechanismError(Finding(what, str(folder), "make room there, or name another folder")) from None
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def _make(new: Path, folder: Path, home: Path) -> None:
+    """A folder that is not there yet, of one that is complete; with those above it, which go again if it cannot be."""
+    above = [one for one in folder.absolute().parents if home.absolute() in one.parents]
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        new.rename(folder)
+    except OSError:
+        for one in above:
+            with suppress(OSError):  # one that was not made
+                one.rmdir()
+        raise
+
+
+def _move(new: Path, folder: Path, old: Path) -> None:
+    """Files into a folder; those that they replace come back if one of them cannot be moved."""
+    old.mkdir()
+    moved: list[str] = []
+    try:
+        for one in sorted(new.iterdir()):
+            target = folder / one.name
+            if target.is_dir():
+                raise IsADirectoryError(errno.EISDIR, f"{one.name} is a folder")
+            moved.append(one.name)
+            if target.exists() or target.is_symlink():
+                target.rename(old / one.name)
+            one.rename(target)
+    except BaseException:
+        for name in moved:
+            if (old / name).exists():
+                (old / name).replace(folder / name)
+            elif not (new / name).exists():
+                (folder / name).unlink(missing_ok=True)
+        raise
+
+
+def _write_yaml(path: Path, data: dict[str, Any]) -> None:
+    with path.open("w", encoding="utf-8", newline="\n") as stream:
+        stream.write(HEADS[path.name])
+        _yaml(flowing=path.name == MAPPING).dump(data, stream)
+
+
+def units_of(observation: Recorded) -> dict[str, str]:
+    """Unit of every column that has one."""
+    found = {observation.rig.time.column: observation.rig.time.unit}
+    return found | {channel.column: channel.reading for channel in observation.channels.values()}
+
+
+# ---- tables ---------------------------------------------------------------------------------------------------
+
+
+def _csv(record: Record, units: Mapping[str, str], path: Path, observation: Recorded) -> None:
+    """Text, a column's unit in brackets behind its name, in quotes where it needs them; an empty cell: no reading."""
+    head = [f"{name} [{units[name]}]" if name in units else name for name in record.columns]
+    count = len(next(iter(record.columns.values())))
+    with path.open("w", encoding="utf-8", newline="") as stream:
+        stream.write(",".join(map(_quoted, head)) + "\n")
+        for low in range(0, count, ROWS):
+            cells = [_texts(values[low : low + ROWS]) for values in record.columns.values()]
+            stream.write("\n".join(map(",".join, zip(*cells, strict=True))))
+            stream.write("\n")
+
+
+def _quoted(name: str) -> str:
+    """A cell of the header, in quotes if it has a sign that may separate cells or begin a remark."""
+    return '"{}"'.format(name.replace('"', '""')) if set(name) & set(',;"#') else name
+
+
+def _texts(values: NDArray[Any]) -> list[str]:
+    """The shortest text of every number that gives the same float again; nothing for NaN."""
+    texts = list(map(repr, values.tolist()))
+    for k in np.flatnonzero(~np.isfinite(values)) if values.dtype.kind == "f" else ():
+        texts[k] = ""
+    return texts
+
+
+def _parquet(record: Record, units: Mapping[str, str], path: Path, observation: Recorded) -> None:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    fields, columns = [], []
+    for name, values in record.columns.items():
+        column = pa.array(values, from_pandas=True)  # NaN as null
+        columns.append(column)
+        fields.append(pa.field(name, column.type, metadata={"unit": units[name]} if name in units else None))
+    pq.write_table(pa.table(columns, schema=pa.schema(fields)), path)
+
+
+def _tdms(record: Record, units: Mapping[str, str], path: Path, observation: Recorded) -> None:
+    from nptdms import ChannelObject, RootObject, TdmsWriter
+
+    about = {"name": record.name, "description": observation.rig.name}
+    objects = []
+    for name, values in record.columns.items():
+        properties: dict[str, Any] = {"unit_string": units[name]} if name in units else {}
+        objects.append(ChannelObject("rig", name, values, properties=properties))
+    with TdmsWriter(str(path)) as stream:
+        stream.write_segment([RootObject(properties=about), *objects])
+
+
+WRITERS: Mapping[str, Callable[[Record, Mapping[str, str], Path, Recorded], None]] = {
+    "csv": _csv,
+    "parquet": _parquet,
+    "tdms": _tdms,
+}
+
+
+# ---- the mapping ----------------------------------------------------------------------------------------------
+
+
+def mapping_of(observation: Recorded, form: str) -> dict[str, Any]:
+    """The mapping that reads the files of an observation; what a laboratory knows, and no more than that."""
+    rig = observation.rig
+    found: dict[str, Any] = {"trunnion-data": 1, "name": rig.name or observation.mechanism.name}
+    angle = _angle(observation)
+    timed = angle.get("angle", {}).get("from") == "time" or "angle" not in angle
+    found["files"] = [_file(observation, case, form, timed) for case in observation.cases]
+    if rig.set_:
+        found["set"] = dict(rig.set_)
+    found["time"] = {"column": rig.time.column, "unit": rig.time.unit}
+    found |= angle
+    least = min(case.run.cycle.duration for case in observation.cases) * observation.rate
+    positions = next((one for one in POSITIONS if one < least * FEWER), POSITIONS[-1])
+    if positions != POSITIONS[0]:
+        found["positions"] = positions
+    found["channels"] = {name: _channel(observation, name) for name in observation.channels}
+    return found
+
+
+def _file(observation: Recorded, case: Case, form: str, timed: bool) -> dict[str, Any]:
+    """A file with what was set, and where the time alone tells the position, when it ran."""
+    found: dict[str, Any] = {"file": f"{case.name}.{form}"}
+    if case.settings:
+        found["set"] = dict(case.settings)
+    if timed and case.rows > case.running:
+        ends = (case.before - case.origin, case.before + case.running - 1 - case.origin)
+        found["over"] = [f"{end / observation.rate:.9g} s" for end in ends]
+    return found
+
+
+def _angle(observation: Recorded) -> dict[str, Any]:
+    """Where the coordinate of the driver comes from, and what a cycle is."""
+    run = observation.cases[0].run
+    driver = next(iter(observation.mechanism.drivers))
+    turns = run.system.turns(driver) and run.system.span(run.values, driver).one_way
+    duration = run.cycle.duration
+    if not turns:
+        return {"cycle": f"{duration:.15g} s"}
+    drives = [float(np.ravel(run.system.drive(run.values, driver, time)[0])[0]) for time in (0.0, duration)]
+    found: dict[str, Any] = {"angle": _source(observation, driver)}
+    extent = math.degrees(abs(drives[1] - drives[0]))
+    if abs(extent - 360) > 1e-9:
+        found["cycle"] = f"{extent:.12g} deg"
+    if drives[0]:
+        found["start"] = f"{math.degrees(drives[0]):.12g} deg"
+    return found
+
+
+def _source(observation: Recorded, driver: str) -> dict[str, Any]:
+    """The encoder if there is one, else a constant speed, else a measured one."""
+    case = observation.cases[0]
+    encoder = observation.rig.encoder
+    if encoder:
+        found: dict[str, Any] = {"from": "pulses", "column": encoder.column, "per_turn": encoder.per_turn}
+        found["kind"] = encoder.kind
+        if encoder.kind == "level" and case.drive(observation.rate)[1] < 0:
+            found["sign"] = -1
+        zero = _counted_from(observation)
+        if zero:
+            found["zero"] = f"{math.degrees(zero):.12g} deg"
+        if encoder.index:
+            found["index"] = {"column": encoder.index}
+        return found
+    if speed_differs(observation.cases):
+        measured = next(name for name, one in observation.channels.items() if one.measures == f"rate:{driver}")
+        start = math.degrees(case.drive(observation.rate)[0])
+        return {"from": "speed", "channel": measured} | ({"zero": f"{start:.12g} deg"} if start else {})
+    start, speed = case.drive(observation.rate, -case.before)
+    return {"from": "time", "speed": f"{speed:.15g} rad/s", "zero": f"{math.degrees(start):.12g} deg"}
+
+
+def _counted_from(observation: Recorded) -> float:
+    """Coordinate, rad, where an encoder reads zero: at its index, else where its count is 0, its level rises."""
+    encoder, case = observation.rig.encoder, observation.cases[0]
+    assert encoder is not None  # asked of encoders only
+    zero, pitch = float(encoder.zero.evaluate()), 2 * math.pi / encoder.per_turn
+    start, speed = case.drive(observation.rate)
+    if encoder.index:
+        return zero if speed > 0 else zero + pitch  # backward, the first pulse is entered at its far end
+    if encoder.kind == "count":
+        return zero
+    count = (start - zero) / pitch
+    # backward, the level rises in the middle of a pulse
+    edge = math.floor(count + 1e-9) + 1 if speed > 0 else math.ceil(count - 0.5 - 1e-9) - 0.5
+    return zero + edge * pitch
+
+
+def _channel(observation: Recorded, name: str) -> dict[str, Any]:
+    channel = observation.channels[name]
+    stated = channel.stated
+    found: dict[str, Any] = {"column": channel.column, "measures": channel.measures, "unit": channel.reading}
+    if stated.sensitivity:
+        found["gain"] = stated.sensitivity.source
+    case = observation.cases[0]
+    if channel.zeroed and case.before > 1:
+        rest = (-case.origin, AT_REST * case.before - case.origin)
+        found["zero"] = {"over": [f"{one / observation.rate + 0.0:.6g} s" for one in rest]}
+    if stated.range:
+        found["range"] = stated.range.source
+    accuracy: dict[str, Any] = {}
+    if channel.gain:
+        accuracy["gain"] = stated.accuracy.gain.source
+    zero = _stated_zero(channel, observation.zero_uncertainty(name))
+    if zero:
+        accuracy["zero"] = f"{zero:.4g} {channel.unit}"
+    return found | ({"accuracy": accuracy} if accuracy else {})
+
+
+def _stated_zero(channel: Channel, zero: float) -> float:
+    """Uncertainty of the zero with the steps of a converter that noise does not carry over (GUM F.2.2.1)."""
+    return zero if channel.noise > channel.step / 2 else math.hypot(zero, channel.step / math.sqrt(12))
+
+
+# ---- the truth ------------------------------------------------------------------------------------------------
+
+
+def truth_of(observation: Recorded) -> dict[str, Any]:
+    """What was drawn and what is true, in SI: for a check of what is found from the files, not for finding it."""
+    mechanism = observation.mechanism
+    found: dict[str, Any] = {
+        "trunnion-truth": 1,
+        "made_by": f"trunnion {__version__}",
+        "model": mechanism.name,
+        "model_hash": mechanism.digest,
+        "seed": observation.seed,
+        "sensors": {
+            name: {
+                "measures": channel.measures,
+                "unit": channel.unit,
+                "gain_error": observation.drawn[name].gain,
+                "zero_error": observation.drawn[name].zero,
+                "offset": observation.drawn[name].offset,
+                "drift_per_second": _short(channel.drift),
+                "noise": _short(channel.noise),
+                "step": _short(channel.step),
+            }
+            for name, channel in observation.channels.items()
+        },
+        "conditions": [
+            {
+                "name": case.name,
+                "set": dict(case.settings),
+                "efficiency": case.efficiency if math.isfinite(case.efficiency) else None,
+                "cycle_seconds": case.run.cycle.duration,
+                "samples": "solved at each" if case.true.exact else f"between {len(case.true.time)} solved a cycle",
+                "mean": {name: _mean(observation, case, i) for i, name in enumerate(observation.channels)},
+            }
+            for case in observation.cases
+        ],
+    }
+    if observation.skipped:
+        found["left_out"] = list(observation.skipped)
+    if observation.rig.faults:
+        found["faults"] = [_fault(fault.model_dump(by_alias=True)) for fault in observation.rig.faults]
+    found["parameters"] = {
+        path: float(np.ravel(value)[0]) for path, value in mechanism.parameters().items() if np.size(value) == 1
+    }
+    return found
+
+
+def _short(value: float) -> float:
+    """Without the rounding of a unit that was taken out."""
+    return float(f"{value:.12g}")
+
+
+def _mean(observation: Recorded, case: Case, i: int) -> float:
+    """Mean of a true course over the recorded cycles."""
+    whole = round(observation.rig.schedule.turns * case.run.cycle.duration * observation.rate)
+    return float(np.mean(case.true.at_samples(i)[case.first : case.first + whole]))
+
+
+def _fault(data: dict[str, Any]) -> dict[str, Any]:
+    """A fault as it was stated."""
+    plain = {key: getattr(value, "source", value) for key, value in data.items()}
+    plain = {key: value["source"] if isinstance(value, dict) else value for key, value in plain.items()}
+    return {
+        key: list(value) if isinstance(value, tuple) else value for key, value in plain.items() if value is not None
+    }
+
+
+HEADS = {
+    MAPPING: "# What the columns of the data files measure: for `trunnion data`, `compare` and `identify`.\n",
+    TRUTH: "# What the virtual rig drew and what is true of the model, in SI: to check what is found from the files.\n",
+}
+
+
+def _yaml(flowing: bool) -> YAML:
+    """flowing: the innermost groups on one line."""
+    yaml = YAML(typ="safe", pure=True)
+    yaml.default_flow_style = None if flowing else False
+    yaml.allow_unicode = True
+    yaml.width = 118
+    yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]  # keys as stated
+    return yaml

@@ -1,0 +1,269 @@
+"""Sensors of a virtual rig: from the true course to the readings in a file.
+
+In order: pulses (of a speed told by them), first-order low-pass, gain, zero and drift, noise, clipping at the range,
+steps of the converter. All is worked out in the SI unit of what is measured; a reading is that times one factor.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from fractions import Fraction
+from zlib import crc32
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import signal
+
+from trunnion.errors import Finding, MechanismError
+from trunnion.model.units import UnitError
+from trunnion.rig.reading.amounts import Amount, Dimensions, alike, dimensions
+from trunnion.rig.reading.rig_file import Sensor
+
+__all__ = ["Channel", "Drawn", "draw", "resolved", "stream"]
+
+Array = NDArray[np.float64]
+READINGS = ("V", "A", "Hz")  # what the reading of a sensor with a sensitivity may be in
+FINE = 1e-3  # of a step of the converter, or of the noise: decimals of a reading beyond are not written
+
+
+@dataclass(frozen=True)
+class Channel:
+    """A sensor put to a mechanism: its numbers in the SI unit of what it measures.
+
+    unit: SI, of what is measured; reading: unit of the file; per: readings per SI unit, below 0 where the sensitivity
+    is; zero: standard uncertainty
+    while it runs; offset: of what it reads at rest; drift: per second; step: 0 without a converter; range and span:
+    inf without one; per_turn: pulses, 0 of a sensor that tells at once; stated: as in the file.
+    """
+
+    name: str
+    column: str
+    measures: str
+    unit: str
+    reading: str
+    per: float
+    range: float
+    noise: float
+    step: float
+    span: float
+    gain: float
+    zero: float
+    offset: float
+    drift: float
+    bandwidth: float | None
+    per_turn: int
+    stated: Sensor
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether it reads zero in an idle machine: what it measures is a force, a torque or a speed."""
+        return self.measures.partition(":")[0] in ("effort", "load", "reaction", "rate")
+
+    @property
+    def zeroed(self) -> bool:
+        """Whether its zero is taken from an idle stretch: pulses have none."""
+        return self.at_rest and not self.per_turn
+
+    @property
+    def limit(self) -> float:
+        """Largest magnitude that it can tell."""
+        return min(self.range, self.span)
+
+    @property
+    def decimals(self) -> int:
+        """Of a reading in its unit, so that what is left out is nothing beside step and noise."""
+        least = min((one for one in (self.step, self.noise) if one > 0), default=0.0) * abs(self.per) * FINE
+        whole = self.limit * abs(self.per) * 1e-9 if math.isfinite(self.limit) else 1e-9
+        return int(np.clip(-math.floor(math.log10(least or whole)), 0, 15))
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """The errors that a sensor has in fact: gain, relative; zero while it runs and offset, in the unit measured."""
+
+    gain: float
+    zero: float
+    offset: float
+
+
+def stream(seed: int, condition: int, name: str, purpose: str) -> np.random.Generator:
+    """Random numbers of their own for each condition, sensor and purpose: the same seed, the same bits.
+
+    Whatever else is added to the rig, they stay. condition: 0 of what all have in common.
+    """
+    key = (condition, crc32(name.encode()), crc32(purpose.encode()))
+    return np.random.Generator(np.random.Philox(np.random.SeedSequence(seed, spawn_key=key)))
+
+
+def draw(channel: Channel, seed: int) -> Drawn:
+    """The actual errors of a sensor, normal with the stated standard uncertainties; the same in all conditions."""
+    normal = stream(seed, 0, channel.name, "accuracy").standard_normal(3)
+    return Drawn(*(float(one) + 0.0 for one in normal * (channel.gain, channel.zero, channel.offset)))
+
+
+# ---- what is stated, in one unit ------------------------------------------------------------------------------
+
+
+def resolved(name: str, sensor: Sensor, column: str, unit: str) -> Channel:
+    """A sensor of what is measured in an SI unit; MechanismError for quantities that do not fit it."""
+    findings: list[Finding] = []
+    where = f"sensors.{name}"
+    try:
+        reading, per = _reading(sensor, unit)
+    except UnitError as error:
+        key = "sensitivity" if sensor.sensitivity else "unit"
+        raise MechanismError(Finding(error.what, f"{where}.{key}", error.remedy)) from None
+
+    def number(key: str, amount: Amount | None, absent: float = 0.0, over: str = "") -> float:
+        size = per if over else abs(per)  # a drift has a sign, all others are magnitudes
+        if amount is None:
+            return absent
+        if amount.plain:
+            return amount.value
+        own = _times(amount.dimensions, {"second": Fraction(bool(over))})
+        if alike(own, dimensions(unit)[1]):
+            return amount.value
+        factor, of_reading = dimensions(reading)
+        if alike(own, of_reading):
+            return amount.value / (size * factor)
+        units = dict.fromkeys(f"{one}/{over}" if over else one for one in (unit, reading))
+        what = f"'{amount.source}' is not in {' or in '.join(units)}"
+        remedy = f"state it in {', or as a reading in '.join(units)}"
+        findings.append(Finding(what, f"{where}.{key}", remedy))
+        return absent
+
+    limit = number("range", sensor.range, math.inf)
+    span = number("span", sensor.span, limit) if sensor.bits else math.inf
+    channel = Channel(
+        name, column, sensor.measures, unit, reading, per, limit,
+        noise=number("noise", sensor.noise),
+        step=2 * span / 2**sensor.bits if sensor.bits else 0.0,
+        span=span,
+        gain=float(sensor.accuracy.gain.evaluate()),
+        zero=number("accuracy.zero", sensor.accuracy.zero),
+        offset=number("offset", sensor.offset),
+        drift=number("drift", sensor.drift, over="s"),
+        bandwidth=sensor.bandwidth.value if sensor.bandwidth else None,
+        per_turn=sensor.per_turn or 0,
+        stated=sensor,
+    )  # fmt: skip
+    if findings:
+        raise MechanismError(findings)
+    return channel
+
+
+def _times(one: Dimensions, other: Dimensions, sign: int = 1) -> Dimensions:
+    """Dimensions of a product, or of a quotient with sign −1."""
+    return {key: one.get(key, Fraction(0)) + sign * other.get(key, Fraction(0)) for key in {*one, *other}}
+
+
+def _reading(sensor: Sensor, unit: str) -> tuple[str, float]:
+    """Unit of the reading, and how many of these there are for an SI unit of what is measured."""
+    measured = dimensions(unit)[1]
+    if sensor.sensitivity is None:
+        reading = sensor.unit or unit
+        factor, found = dimensions(reading)
+        if not alike(found, measured):
+            remedy = f"state a unit of {unit}, or the sensitivity: 100 mV/({unit})"
+            raise UnitError(f"'{reading}' does not measure what is in {unit}", remedy)
+        return reading, 1 / factor
+    given = sensor.sensitivity
+    ways = (
+        (_times(given.dimensions, measured), given.value),
+        (_times(measured, given.dimensions, -1), 1 / given.value),
+    )
+    for found, value in ways:
+        wanted = (sensor.unit,) if sensor.unit else READINGS
+        known = next((one for one in wanted if alike(found, dimensions(one)[1])), None)
+        if known:
+            reading = sensor.unit or _written(given.unit, known)
+            return reading, value / dimensions(reading)[0]
+    what = f"'{given.source}' does not turn {unit} into {sensor.unit or 'a reading in volt, ampere or hertz'}"
+    raise UnitError(what, f"write a reading per {unit}, such as 100 mV/({unit}), and the `unit` of the reading")
+
+
+def _written(text: str, known: str) -> str:
+    """The unit of the reading as it stands in a sensitivity, `mV` of `mV/(N m)`; else that of the table."""
+    for one in (text.partition("/")[0].strip(), text.rpartition("/")[2].strip("() ")):
+        try:
+            if one and alike(dimensions(one)[1], dimensions(known)[1]):
+                return one
+        except UnitError:
+            continue
+    return known
+
+
+# ---- readings -------------------------------------------------------------------------------------------------
+
+
+def smoothed(true: Array, bandwidth: float | None, rate: float) -> Array:
+    """A first-order low-pass of this bandwidth, Hz, exact for what runs straight between samples; at rest before."""
+    if bandwidth is None:
+        return true
+    step = 2 * np.pi * bandwidth / rate  # h/τ
+    kept = math.exp(-step)
+    last = 1 - (1 - kept) / step
+    start = np.array([(1 - last) * true[0]])  # as if it had always been at its first value
+    found, _ = signal.lfilter([last, 1 - kept - last], [1.0, -kept], true, zi=start)
+    return np.asarray(found)
+
+
+def pulsed(true: Array, running: slice, per_turn: int, rate: float) -> Array:
+    """A speed as worked out from recorded pulses: the pitch over the time from one to the next, at the middle between
+    them, and straight in between; before the first and after the last pulses as there."""
+    part = np.abs(true[running])
+    turned = np.concatenate([[0.0], np.cumsum((part[1:] + part[:-1]) / (2 * rate))])
+    pitch = 2 * np.pi / per_turn
+    count = int(turned[-1] / pitch) + 1
+    found = true.copy()
+    if count < 2:
+        found[running] = 0.0
+        return found
+    time = np.arange(len(part)) / rate
+    passed = np.interp(pitch * np.arange(count), turned, time)
+    speeds = np.interp(time, (passed[1:] + passed[:-1]) / 2, pitch / np.diff(passed))
+    found[running] = speeds * np.sign(true[running][len(part) // 2])
+    return found
+
+
+def readings(channel: Channel, true: Array, running: slice, rate: float, drawn: Drawn, noise: Array | None) -> Array:
+    """What a sensor makes of a true course, in the unit of its readings.
+
+    true: in SI at the samples, the idle stretches included; running: those in which the machine runs; noise: standard
+    normal numbers, None without.
+    """
+    value = pulsed(true, running, channel.per_turn, rate) if channel.per_turn else true
+    value = smoothed(value, channel.bandwidth, rate) * (1 + drawn.gain) + drawn.offset
+    value[running] += drawn.zero
+    if channel.drift:
+        value += channel.drift / rate * np.arange(len(value))
+    if noise is not None and channel.noise:
+        value += channel.noise * noise
+    return converted(channel, value)
+
+
+def converted(channel: Channel, value: Array) -> Array:
+    """Clipped, in steps, in the unit of the reading, with the decimals that a file has."""
+    value = np.clip(value, -channel.range, channel.range)
+    if channel.step:
+        way = math.copysign(1.0, channel.per)
+        most = channel.span - channel.step  # the upper end of a converter is one step short
+        value = way * np.clip(np.rint(way * value / channel.step) * channel.step, -channel.span, most)
+    return np.round(value * channel.per, channel.decimals) + 0.0  # + 0.0: no negative zero
+
+
+def pulses(angle: Array, per_turn: int, zero: float) -> NDArray[np.int64]:
+    """Running count of an encoder, at the coordinates (rad) of the driver."""
+    return np.floor((angle - zero) * (per_turn / (2 * np.pi)) + 1e-9).astype(np.int64)
+
+
+def level(angle: Array, per_turn: int, zero: float) -> NDArray[np.int64]:
+    """Level of the signal of an encoder: high in the first half of each pulse."""
+    part: Array = (angle - zero) * (per_turn / (2 * np.pi)) + 1e-9
+    return (part - np.floor(part) < 0.5).astype(np.int64)
+
+
+def index_level(angle: Array, per_turn: int, zero: float) -> NDArray[np.int64]:
+    """The index of an encoder: high for the first pulse of each turn."""
+    return np.asarray(pulses(angle, per_turn, zero) % per_turn == 0, np.int64)

@@ -1,0 +1,1 @@
+"""Positions: a mechanism made ready, motion forward through its modules, forces back, friction settled in each."""

@@ -1,0 +1,227 @@
+"""Deflection of the bristles of Dahl's and the LuGre law along the cycle.
+
+Their state follows ż = v − d(v) z, linear in z, where v is the slip speed of the joint: known from the motion alone,
+for the laws are proportional to the load. Over one interval of the cycle z therefore changes by an affine map
+z ↦ A z + B; the maps are found for all intervals at once, chained, and closed over a periodic cycle by
+z₀ = B/(1 − A). Over a range the bristles start at rest, z₀ = 0.
+
+Inside an interval v is the cubic through the speeds and accelerations at its ends. It is cut at the reversal of v, if
+there is one, and into steps that grow with the distance from it; in each the way is integrated exactly, d per way is
+taken at its middle and the steady deflection v/d as changing evenly, so that Dahl's law, where both are constant, is
+solved without error, and stiff bristles follow the steady deflection.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.algebra.dual import primal
+from trunnion.algebra.namespace import Number, namespace
+from trunnion.joints.friction import FrictionLaw
+from trunnion.solve.forward import Assembly, Forward, forward
+from trunnion.solve.system import Cycle, System, Values, law_of, rubbing
+
+__all__ = ["History", "histories"]
+
+INTERVALS = 720  # of one turn of the fastest driver
+GROWN = np.linspace(0.0, 1.0, 13) ** 2  # steps on either side of a reversal, by the distance from it
+SLOWEST = 1e-30  # m/s, so that d/|v| has a value at rest
+REFINEMENTS = 6  # of the place of a reversal
+Array = NDArray[np.float64]
+
+
+class _Slip(NamedTuple):
+    """Slip speed at the ends of intervals and its derivative by the share of the interval; interval length, s."""
+
+    v0: Number
+    v1: Number
+    a0: Number
+    a1: Number
+    length: Number
+
+    def speed(self, s: Number) -> Number:
+        """Cubic at the share s."""
+        u = 1 - s
+        return u * u * ((1 + 2 * s) * self.v0 + s * self.a0) + s * s * ((3 - 2 * s) * self.v1 - u * self.a1)
+
+    def reversal(self) -> Number:
+        """Share at which the speed changes sign; 0 where it does not.
+
+        Exact to rounding, for the step beside it then has no way to lose: so nothing depends on where it is cut.
+        """
+        real = _Slip(*(primal(number) for number in self))
+        v0, v1 = np.broadcast_arrays(real.v0, real.v1)
+        changes = v0 * v1 < 0
+        low, high = np.zeros(v0.shape), np.ones(v0.shape)
+        s = np.where(changes, v0 / np.where(changes, v0 - v1, 1.0), 0.0)
+        for _ in range(REFINEMENTS):
+            value = real.speed(s)
+            same = value * v0 > 0
+            low, high = np.where(same, s, low), np.where(same, high, s)
+            better = s - value / np.where(changes, real.slope(s), 1.0)
+            s = np.where((better > low) & (better < high), better, (low + high) / 2)
+        step = self.speed(s) / np.where(changes, real.slope(s), 1.0)  # 0 but for its dual part
+        return namespace(step).where(changes, s - step, 0.0)
+
+    def slope(self, s: Number) -> Number:
+        """Derivative of the cubic by the share."""
+        u = 1 - s
+        return 6 * s * u * (self.v1 - self.v0) + u * (1 - 3 * s) * self.a0 - s * (2 - 3 * s) * self.a1
+
+
+@dataclass(frozen=True)
+class History:
+    """Deflections of one joint's bristles at the ends of the intervals of a cycle, and how to get between them."""
+
+    law: FrictionLaw
+    parameters: dict[str, Number]
+    speeds: Number  # (…, interval + 1), m/s
+    rates: Number  # likewise, m/s²
+    length: Number  # of an interval, s
+    deflections: Number  # (…, interval + 1), m
+    periodic: bool
+
+    def at(self, time: Number) -> Number:
+        """Deflection at times from the start of the cycle, m."""
+        count = np.shape(primal(self.speeds))[-1] - 1
+        place = time / self.length
+        if self.periodic:
+            place = place - count * np.floor(primal(place) / count)
+        index = np.clip(np.floor(primal(place)).astype(int), 0, count - 1)
+        v0, v1 = _picked(self.speeds, index), _picked(self.speeds, index + 1)
+        a0, a1 = _picked(self.rates, index), _picked(self.rates, index + 1)
+        slip = _Slip(v0, v1, a0 * self.length, a1 * self.length, self.length)
+        keep, gain = _mapped(self.law, self.parameters, slip, place - index)
+        return keep * _picked(self.deflections, index) + gain
+
+
+def histories(
+    system: System, values: Values, assembly: Assembly, cycle: Cycle, reverse: bool = False
+) -> dict[str, History]:
+    """The history of every joint whose law has bristles, for these values; reverse: with the cycle run backward."""
+    joints = [name for name in rubbing(system) if law_of(system, name).relaxation is not None]
+    if not joints or cycle.duration <= 0:
+        return {}
+    count = INTERVALS * max(1, int(np.ceil(cycle.turns)))
+    duration = cycle.duration * _stretch(system, values)
+    walk = forward(system, values, assembly, np.linspace(0.0, 1.0, count + 1) * duration)
+    return {name: _history(walk, name, duration / count, cycle.periodic, reverse) for name in joints}
+
+
+def _stretch(system: System, values: Values) -> Number:
+    """How much longer the cycle takes than the nominal one, as its slowest driver does."""
+    nominal = system.mechanism.parameters()
+    spans = {name: float(np.ravel(primal(system.span(nominal, name).duration))[0]) for name in system.mechanism.drivers}
+    slowest = max(spans, key=spans.__getitem__)
+    return system.span(values, slowest).duration / spans[slowest]
+
+
+def _history(walk: Forward, joint: str, length: Number, periodic: bool, reverse: bool) -> History:
+    law = law_of(walk.system, joint)
+    path = f"joints.{joint}.friction"
+    parameters = {name: walk.values[f"{path}.{name}"] for name in law.parameters}
+    speed, rate = walk.slip_motion(joint)
+    count = np.shape(primal(walk.time))[-1]
+    speed, rate = (_full(number, count) for number in (speed, rate))
+    if reverse:
+        speed, rate = -_picked(speed, np.arange(count)[::-1]), _picked(rate, np.arange(count)[::-1])
+    lower, upper = np.arange(count - 1), np.arange(1, count)
+    ends = _picked(speed, lower), _picked(speed, upper)
+    slip = _Slip(*ends, _picked(rate, lower) * length, _picked(rate, upper) * length, length)
+    keep, gain = _mapped(law, parameters, slip, np.ones(count - 1))
+    deflections = _chained(keep, gain, periodic)
+    return History(law, parameters, speed, rate, length, deflections, periodic)
+
+
+def _mapped(law: FrictionLaw, parameters: dict[str, Number], slip: _Slip, until: Number) -> tuple[Number, Number]:
+    """A and B of z ↦ A z + B from the start of intervals to the share `until` of them."""
+    cut = slip.reversal()
+    cut = namespace(cut, until).minimum(cut, until)
+    keep: Number = 1.0
+    gain: Number = 0.0
+    for low, high, shares in ((0.0, cut, 1 - GROWN[::-1]), (cut, until, GROWN)):
+        for left, right in pairwise(shares):
+            step = low + left * (high - low), low + right * (high - low)
+            keep, gain = _stepped(law, parameters, slip, step, (keep, gain))
+    return keep, gain
+
+
+def _stepped(
+    law: FrictionLaw,
+    parameters: dict[str, Number],
+    slip: _Slip,
+    step: tuple[Number, Number],
+    known: tuple[Number, Number],
+) -> tuple[Number, Number]:
+    """One step of z′ = z_s − z by x = ∫ d dt, where z_s = v/d changes evenly from z₀ to z₁:
+    z ↦ e z + z₁ − e z₀ − (z₁ − z₀) (1 − e)/x, e = exp(−x). d/|v| is that of the middle."""
+    if law.relaxation is None:
+        raise ValueError("the law has no bristles")
+    (left, right), (keep, gain) = step, known
+    v0, middle, v1 = slip.speed(left), slip.speed((left + right) / 2), slip.speed(right)
+    way = slip.length * (right - left) * (v0 + 4 * middle + v1) / 6
+    xp = namespace(way)
+    sense = xp.sign(way)
+    x = _per_way(law, parameters, middle) * xp.abs(way)
+    z0, z1 = (sense / _per_way(law, parameters, speed) for speed in (v0, v1))
+    xp = namespace(x)
+    left_over = xp.exp(-x)
+    tiny = primal(x) < 1e-12
+    share = xp.where(tiny, 1.0, (1 - left_over) / xp.where(tiny, 1.0, x))
+    return left_over * keep, left_over * gain + z1 - left_over * z0 - (z1 - z0) * share
+
+
+def _per_way(law: FrictionLaw, parameters: dict[str, Number], speed: Number) -> Number:
+    """d/|v|, 1/m, also where v is 0."""
+    if law.relaxation is None:
+        raise ValueError("the law has no bristles")
+    xp = namespace(speed)
+    size = xp.maximum(xp.abs(speed), SLOWEST)
+    return law.relaxation(size, **parameters) / size
+
+
+def _chained(keep: Number, gain: Number, periodic: bool) -> Number:
+    """Deflections at all ends of intervals from their maps, periodic or from rest: by doubling the span of the maps."""
+    xp = namespace(keep, gain)
+    count = np.shape(primal(gain))[-1]
+    known = np.isfinite(primal(keep) + primal(gain))  # where there is no motion the bristles come to rest
+    keep, gain = xp.where(known, keep, 0.0), xp.where(known, gain, 0.0)
+    whole_keep, whole_gain = keep, gain
+    index = np.arange(count)
+    reach = 1
+    while reach < count:
+        earlier = np.maximum(index - reach, 0)
+        inside = index >= reach
+        before_keep, before_gain = _picked(whole_keep, earlier), _picked(whole_gain, earlier)
+        whole_gain = xp.where(inside, whole_keep * before_gain + whole_gain, whole_gain)
+        whole_keep = xp.where(inside, whole_keep * before_keep, whole_keep)
+        reach *= 2
+    start: Number = 0.0
+    if periodic:
+        last = np.array([count - 1])
+        lost = 1 - _picked(whole_keep, last)
+        moves = primal(lost) > 0
+        start = xp.where(moves, _picked(whole_gain, last) / xp.where(moves, lost, 1.0), 0.0)
+    ends = whole_keep * start + whole_gain
+    first = np.arange(count + 1) == 0
+    return xp.where(first, start, _picked(ends, np.maximum(np.arange(count + 1) - 1, 0)))
+
+
+def _full(number: Number, count: int) -> Number:
+    """The number with all its lanes along the last axis."""
+    return number + np.zeros(count)
+
+
+def _picked(number: Number, index: NDArray[np.intp]) -> Number:
+    """Entries along the last axis: the same for all samples, or a row of indices for each."""
+    if np.ndim(index) <= 1:
+        return number[..., index]
+    if len(np.shape(primal(number))) == 1:
+        return number[index]
+    rows = np.arange(np.shape(index)[0])[:, None]
+    return number[rows if np.shape(primal(number))[0] > 1 else 0 * rows, index]

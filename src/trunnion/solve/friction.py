@@ -1,0 +1,396 @@
+"""Friction and reactions of one module, settled with each other.
+
+The reactions are linear in the friction loads, R(φ) = R₀ + Σ_l G_l φ_l, so a module is asked once for R₀ and once
+for each G_l; what remains is φ_k = law(N_k(R), slip_k), one equation for each joint with friction. φ is the
+friction force at the contact, N: the friction torque of a pin is φ r.
+
+Two methods: [D]'s successive approximation, steps 1 to 5, and Newton (default). Where the friction is too
+strong for the map φ → law(N(R(φ))) to be a contraction, the solution is followed from no friction to full
+friction; where it ceases to exist on the way, the module is locked, and the share of the friction at which that
+happens is reported.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.algebra import linalg
+from trunnion.algebra.dual import Dual, primal
+from trunnion.algebra.namespace import Number
+from trunnion.algebra.nested import replaced
+from trunnion.algebra.traced import looped
+from trunnion.groups.planar import is_zero
+from trunnion.joints.pairs import Reaction
+from trunnion.solve import continuation
+from trunnion.solve.friction_method import FrictionMethod, method_named, peak
+from trunnion.solve.friction_problem import Contact, Problem, State, added, largest, total
+
+__all__ = [
+    "Contact",
+    "FrictionMethod",
+    "Problem",
+    "Settled",
+    "frictionless",
+    "identity_minus",
+    "method_named",
+    "scaled",
+    "settle",
+]
+
+OBEYED = 1e-10  # of the largest friction: by how much a friction may miss its law where it is called settled
+SETTLED = 1e-11  # of the largest friction: where the iteration ends
+SLOW = 1e-2  # of the miss: a round of Newton's method that leaves more has another matrix after it
+STUBBORN = 20  # rounds of Newton's method: a lane that takes more goes back and forth between the sides of a kink
+COMPILED_ROUNDS = 3  # of Newton's method where the numbers have no values to tell when to end; one more beyond FEW
+FEW = 3  # contacts of a dyad
+
+
+class Reacting(Protocol):
+    """A module, as far as its reactions go: flat tuples, linear in the loads on its links."""
+
+    def reactions(self, pose: Any, loads: Sequence[Any]) -> Sequence[Reaction]: ...
+
+
+class Settled(NamedTuple):
+    """Reactions (friction not included) and friction forces, with the figures of the iteration.
+
+    share: largest share of the friction for which a solution that starts frictionless was found, 1 unless the
+    module locks; margin: multiple of the friction at which it would lock, ∞ beyond what was asked for;
+    contraction: ∞-norm of the derivative of φ → law(N(R(φ))) (Newton), or the ratio of the last two
+    changes (successive approximation). residual: largest difference between a friction and what its law says for the
+    load that is found, N; where converged below OBEYED of the largest friction, unless a criterion is given. certain:
+    whether it is proved that there is no other solution; problem: the equations themselves.
+    """
+
+    reactions: Sequence[Reaction]
+    forces: list[Number]
+    iterations: Number
+    change: Number
+    contraction: Number
+    converged: Number
+    residual: Number = 0.0
+    share: Number = 1.0
+    margin: Number = np.inf
+    certain: Number = True
+    problem: Problem | None = None
+
+
+def settle(
+    group: Reacting, pose: object, loads: Sequence[Any], contacts: Sequence[Contact], method: FrictionMethod
+) -> Settled:
+    """Reactions and friction forces of one module under `loads` (about the link origins, friction not included)."""
+    start = group.reactions(pose, loads)
+    if not contacts:
+        return Settled(start, [], 0, 0.0, 0.0, True)
+    influence = [_with_own(contact, list(group.reactions(pose, contact.unit_loads))) for contact in contacts]
+    problem = Problem(contacts, start, influence)
+    if method.name == "successive-approximation":
+        return _successive(problem, method)
+    if problem.one_way:
+        return _at_once(problem)
+    return _unrolled(problem, method) if problem.compiled else _newton(problem, method)
+
+
+def _with_own(contact: Contact, column: list[Reaction]) -> list[Reaction]:
+    if contact.own is not None:
+        column[contact.joint] = added(column[contact.joint], contact.own)
+    return column
+
+
+def _newton(problem: Problem, method: FrictionMethod) -> Settled:
+    """Newton from no friction; lanes without the certificate of `bound` are followed by continuation.
+
+    So are certain lanes that kinks keep from settling: their continuation leads to the same, only solution. The rounds
+    counted are Newton's. A followed lane gets as many as it needs to obey its laws, as the others do.
+    """
+    real = _primal(problem)
+    none: list[Number] = [0.0] * len(real.contacts)
+    # a lane whose loads are no numbers, because another module locked or opened, is not this module's affair
+    bound = np.where(np.isfinite(peak(real.state(none).normals)), real.bound(), 0.0)
+    certain = ~(bound >= 1.0)
+    found = _iterated(real, _started(real, none, ~certain), method)
+    shares: Number = 1.0
+    left = ~certain
+    if method.limit >= STUBBORN:
+        left = left | ~(found.done | _obeyed(real, found))
+    if np.any(left):
+        forces, shares = _follow(real, found.forces, left)
+        again = _started(real, forces, ~left)
+        found = _iterated(real, replace(again, rows=found.rows, inverse=found.inverse, rounds=found.rounds), method)
+    state, rows, inverse = found.state, found.rows, found.inverse
+    depth = _depth(problem)
+    forces = found.forces
+    if depth:  # the ε parts need the matrix of the solution, not that of the way there
+        rows = real.map_derivative(state)
+        inverse = linalg.quick_inverse(identity_minus(rows))
+    for _ in range(depth):
+        forces = _corrected(forces, problem.gaps(problem.state(forces), forces), inverse)
+        state = problem.state(forces)
+    # of no lanes at all nothing is known
+    contraction = largest([total([np.abs(entry) for entry in row]) for row in rows]) if rows else 0.0
+    converged = found.done if method.criterion is not None else _obeyed(real, found)
+    return Settled(
+        reactions=problem.reactions(forces, state),
+        forces=forces,
+        iterations=found.rounds,
+        change=found.change,
+        contraction=contraction,
+        converged=converged & (shares >= 1.0),
+        residual=real.misfit(found.gaps),
+        share=shares,
+        margin=_margin(real, bound, method.margin_up_to, shares),
+        certain=certain,
+        problem=real,
+    )
+
+
+@dataclass(frozen=True)
+class _Iterate:
+    """Where Newton's method is: forces and, by lane, whether it is done there.
+
+    state, gaps: reactions and law − force under these forces; rows, inverse: A and (1 − A)⁻¹ as last needed; rounds,
+    change: how many it took and the last change of a normal load, N.
+    """
+
+    forces: list[Number]
+    done: Number
+    state: State
+    gaps: list[Number]
+    rows: Sequence[Sequence[Number]] = ()
+    inverse: Sequence[Sequence[Number]] = ()
+    rounds: Number = 0
+    change: Number = np.inf
+
+
+def _obeyed(real: Problem, at: _Iterate) -> Number:
+    """Where every law is obeyed as closely as a solved position promises; NaN is no answer and breaks no promise."""
+    return ~(real.excess(at.gaps, at.forces) > OBEYED)
+
+
+def _started(real: Problem, forces: list[Number], done: Number) -> _Iterate:
+    """At these forces, with nothing done in the lanes that are not."""
+    state = real.state(forces)
+    return _Iterate(forces, done, state, real.gaps(state, forces))
+
+
+def _iterated(real: Problem, start: _Iterate, method: FrictionMethod) -> _Iterate:
+    """Newton's method from a start, in the lanes that are not done; those that are stay as they are.
+
+    A is that of the side of each kink on which the normal loads are. It is kept while a round leaves less than a
+    hundredth of the residual, which in all but the worst cases is always; a lane that crosses a kink leaves more and
+    gets the A of its new side. So what a lane comes to does not depend on the lanes beside it. It is done when every
+    friction is what its law says for the load, whatever the last round changed.
+    """
+    forces, done, state, gaps = start.forces, start.done, start.state, start.gaps
+    rows, inverse, rounds, change = start.rows, start.inverse, start.rounds, start.change
+    excess: Number = 1.0  # of no friction at all
+    slow: Number = ~done
+    for _ in range(min(method.limit, STUBBORN)):
+        if np.all(done):
+            break
+        rounds = rounds + ~done
+        if np.any(slow):
+            fresh = real.map_derivative(state)
+            rows = _chosen(slow, fresh, rows)
+            inverse = _chosen(slow, linalg.quick_inverse(identity_minus(fresh)), inverse)
+        (forces,) = _chosen(~done, [_corrected(forces, gaps, inverse)], [forces])
+        before, state = state, real.state(forces)
+        gaps = real.gaps(state, forces)
+        previous, excess = excess, real.excess(gaps, forces)
+        here = _changed(state, before)
+        change = np.where(done, change, here) if np.any(done) else here
+        # a lane of NaN has nothing to wait for
+        ends = ~(excess > SETTLED) if method.criterion is None else ~np.greater(here, method.criterion)
+        done = done | ends
+        slow = (excess > SLOW * previous) & ~done
+    return _Iterate(forces, done, state, gaps, rows, inverse, rounds, change)
+
+
+def _chosen(lanes: Number, rows: Sequence[Sequence[Number]], others: Sequence[Sequence[Number]]) -> list[list[Number]]:
+    """The rows in the chosen lanes, the others elsewhere; either whole where that is what it comes to."""
+    if not others or np.all(lanes):
+        return [list(row) for row in rows]
+    if not np.any(lanes):
+        return [list(row) for row in others]
+    return [[np.where(lanes, a, b) for a, b in zip(*pair, strict=True)] for pair in zip(rows, others, strict=True)]
+
+
+def _unrolled(problem: Problem, method: FrictionMethod) -> Settled:
+    """Newton with a fixed number of rounds, for numbers that are compiled; the last one carries the derivatives.
+
+    Lanes that need more, and those without the certificate, are for whoever compiles to compute again.
+    """
+    real = _primal(problem)
+    forces: list[Number] = [0.0] * len(real.contacts)
+    state = real.state(forces)
+    bound = np.where(np.isfinite(peak(state.normals)), real.bound(), 0.0)
+    certain = ~(bound >= 1.0)
+
+    def step(now: list[Number]) -> list[Number]:
+        at = real.state(now)
+        return _corrected(now, real.gaps(at, now), _matrix(real, at))
+
+    if len(forces) <= FEW:  # written out: quicker to run, but not to compile
+        for _ in range(COMPILED_ROUNDS - 2):
+            forces = step(forces)
+    else:
+        forces = looped(step, forces, COMPILED_ROUNDS - 1)
+    forces = step(forces)
+    state = real.state(forces)
+    forces = _corrected(forces, problem.gaps(problem.state(forces), forces), _matrix(real, state))
+    before, state = state, problem.state(forces)
+    plain = [primal(force) for force in forces]
+    gaps = real.gaps(real.state(plain), plain)
+    return Settled(
+        reactions=problem.reactions(forces, state),
+        forces=forces,
+        iterations=COMPILED_ROUNDS,
+        change=_changed(state, before),
+        contraction=0.0,
+        converged=certain & ~(real.excess(gaps, plain) > SETTLED),
+        residual=real.misfit(gaps),
+        share=1.0,
+        margin=np.inf,
+        certain=certain,
+        problem=real,
+    )
+
+
+def _matrix(problem: Problem, state: State) -> list[list[Number]]:
+    """(1 − A)⁻¹ at a state where the rows of |A| add up to less than 1: no pivots are needed."""
+    matrix = identity_minus(problem.map_derivative(state))
+    return linalg.quick_inverse(matrix) if len(matrix) <= FEW else linalg.inverse(matrix, pivoting=False)
+
+
+def _at_once(problem: Problem) -> Settled:
+    """Friction from the frictionless reactions, which it does not change but in what no law looks at."""
+    forces = problem.target(problem.state([0.0] * len(problem.contacts)).normals)
+    reactions = problem.reactions(forces, problem.state(forces))
+    return Settled(reactions, forces, 1, 0.0, 0.0, True, problem=_primal(problem))
+
+
+def _corrected(forces: Sequence[Number], gaps: Sequence[Number], inverse: Sequence[Sequence[Number]]) -> list[Number]:
+    """φ + (1 − A)⁻¹ (law − φ)."""
+    moves = [total([entry * part for entry, part in zip(row, gaps, strict=True)]) for row in inverse]
+    return [move if is_zero(force) else force + move for force, move in zip(forces, moves, strict=True)]
+
+
+def _changed(state: State, before: State) -> Number:
+    """Largest change of a normal load, N."""
+    return largest([a - b for a, b in zip(state.normals, before.normals, strict=True)])
+
+
+def _successive(problem: Problem, method: FrictionMethod) -> Settled:
+    """[D] steps 1-5: friction from the last reactions, reactions from the last friction, until they rest."""
+    forces: list[Number] = [0.0] * len(problem.contacts)
+    state = problem.state(forces)
+    change: Number = np.inf
+    previous: Number = np.inf
+    done: Number = np.False_
+    rounds: Number = 0
+    for _ in range(method.limit):
+        rounds = rounds + ~done
+        forces = problem.target(state.normals)
+        before, state = state, problem.state(forces)
+        gaps = problem.gaps(state, forces)
+        previous, change = change, _changed(state, before)
+        done = ~(problem.excess(gaps, forces) > SETTLED) if method.criterion is None else ~(change > method.criterion)
+        if np.all(done):
+            break
+    done = ~(problem.excess(gaps, forces) > OBEYED) if method.criterion is None else change <= method.criterion
+    measurable = np.isfinite(previous) & (previous > 0)
+    ratio = np.where(measurable, change / np.where(measurable, previous, 1.0), 0.0)
+    real = _primal(problem)
+    bound = np.where(np.isfinite(peak(real.state([0.0] * len(real.contacts)).normals)), real.bound(), 0.0)
+    return Settled(
+        reactions=problem.reactions(forces, state),
+        forces=forces,
+        iterations=rounds,
+        change=change,
+        contraction=ratio,
+        converged=done & np.isfinite(change),  # not so where it ran off to infinity
+        residual=problem.misfit(gaps),
+        margin=_margin(real, bound, method.margin_up_to),
+        certain=~(bound >= 1.0),
+    )
+
+
+def _margin(problem: Problem, bound: Number, most: float, shares: Number = 1.0) -> Number:
+    """Multiple of the friction at which the module locks; ∞ where it does not up to `most`.
+
+    shares: those at which lanes are known to lock, 1 of the others.
+    """
+    if most <= 0:
+        return np.inf
+    known = np.asarray(shares) < 1.0
+    margin = np.where(known, shares, np.inf)
+    doubtful = (bound * most >= 1.0) & ~known
+    if not np.any(doubtful):
+        return margin
+    part, chosen = problem.picked(doubtful)
+    _, reached = continuation.follow(scaled(part), frictionless(part, chosen), most)
+    margin = np.broadcast_to(margin, chosen.shape).copy()
+    margin[chosen] = np.where(reached >= most, np.inf, reached)
+    return margin
+
+
+def _follow(problem: Problem, forces: Sequence[Number], lanes: Number) -> tuple[list[Number], NDArray[np.float64]]:
+    """Forces with the chosen lanes followed from no friction; NaN where they lock, and the share reached."""
+    part, chosen = problem.picked(lanes)
+    shape = chosen.shape
+    found, reached = continuation.follow(scaled(part), frictionless(part, chosen))
+    result = [replaced(force, chosen, value) for force, value in zip(forces, found, strict=True)]
+    shares = np.ones(shape)
+    shares[chosen] = reached
+    return result, shares
+
+
+Weights = Callable[[NDArray[np.float64], NDArray[np.intp]], Sequence[Number]]
+
+
+def scaled(problem: Problem, weights: Weights | None = None) -> continuation.Family:
+    """Residual φ − w(s) law(N(φ)) and its Jacobian; w(s, lanes): multiple of each contact's friction, or s."""
+
+    def family(lanes: NDArray[np.intp]) -> continuation.System:
+        part = problem.mapped(lambda number: number[lanes])
+
+        def system(
+            forces: Sequence[NDArray[np.float64]], share: NDArray[np.float64]
+        ) -> tuple[list[Number], list[list[Number]]]:
+            found = [share] * len(part.contacts) if weights is None else weights(share, lanes)
+            shares = [weight if contact.rubs else 1.0 for weight, contact in zip(found, part.contacts, strict=True)]
+            state = part.state(forces)
+            residual = [f - s * t for f, s, t in zip(forces, shares, part.target(state.normals), strict=True)]
+            slopes = part.map_derivative(state)
+            rows = [[s * entry for entry in row] for s, row in zip(shares, slopes, strict=True)]
+            return residual, identity_minus(rows)
+
+        return system
+
+    return family
+
+
+def frictionless(problem: Problem, chosen: NDArray[np.bool_]) -> list[NDArray[np.float64]]:
+    """Forces without friction, lane by lane: none but those that push gears apart."""
+    none = [np.zeros(int(np.count_nonzero(chosen))) for _ in problem.contacts]
+    target = problem.target(problem.state(none).normals)
+    return [zero if c.rubs else zero + t for zero, c, t in zip(none, problem.contacts, target, strict=True)]
+
+
+def identity_minus(rows: Sequence[Sequence[Number]]) -> list[list[Number]]:
+    return [[(1.0 if k == j else 0.0) - entry for j, entry in enumerate(row)] for k, row in enumerate(rows)]
+
+
+def _depth(problem: Problem) -> int:
+    """Levels of ε among the inputs: each costs one Newton step at the solution."""
+    return max((n.depth for n in problem.numbers() if isinstance(n, Dual)), default=0)
+
+
+def _primal(problem: Problem) -> Problem:
+    """The problem without derivatives."""
+    return problem.mapped(primal) if _depth(problem) or problem.compiled else problem

@@ -1,0 +1,59 @@
+"""How friction and reactions are settled: the method, when it ends, and how far to look for locking."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal, get_args
+
+import numpy as np
+
+from trunnion.algebra.dual import primal
+from trunnion.algebra.namespace import Number
+from trunnion.errors import Finding, MechanismError
+
+if TYPE_CHECKING:
+    pass
+__all__ = ["MARGIN", "FrictionMethod", "method_named", "peak"]
+
+Method = Literal["newton", "successive-approximation"]
+
+
+@dataclass(frozen=True)
+class FrictionMethod:
+    """How friction and reactions are settled.
+
+    name: "newton" or "successive-approximation" ([D] steps 1-5).
+    criterion: largest change of a normal load between two rounds, N, at which the iteration ends ([D]: 1e-3 N). None:
+    it ends when every friction is what its law says for the load found, to 1e-10 of the largest friction. With a
+    criterion how far the laws are missed is told by `friction_residual` alone.
+    limit: most rounds; a position that needs more is not converged.
+    margin_up_to: how far, in multiples of the friction, to look for the point at which it locks; 0: not at all.
+    """
+
+    name: Method = "newton"
+    criterion: float | None = None
+    limit: int = 200
+    margin_up_to: float = 0.0
+
+
+def method_named(name: str, criterion: float | None, limit: int) -> FrictionMethod:
+    """A method from its name and figures; MechanismError if they make no sense."""
+    for known in get_args(Method):
+        if name == known:
+            if criterion is not None and not criterion > 0:
+                raise MechanismError(Finding(f"a criterion of {criterion:g} N is never met", "criterion", "above 0"))
+            if limit < 1:
+                raise MechanismError(Finding(f"{limit} rounds settle nothing", "iterations", "give 1 or more"))
+            return FrictionMethod(known, criterion, limit)
+    known_names = " or ".join(get_args(Method))
+    raise MechanismError(Finding(f"there is no method '{name}'", "method", f"use {known_names}"))
+
+
+def peak(normals: Sequence[Number]) -> Number:
+    """Largest of numbers that are not negative; NaN if one is NaN."""
+    return functools.reduce(np.maximum, [primal(normal) for normal in normals])
+
+
+MARGIN = 10.0  # multiple of the friction up to which the locking margin is looked for

@@ -1,0 +1,172 @@
+"""A mechanism prepared once, to be solved at any times: what everything after solving stands on."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.algebra.namespace import Number
+from trunnion.groups.gear import rotation
+from trunnion.model.mechanism import Mechanism
+from trunnion.solve.backward import Backward, Given, Sense, solve
+from trunnion.solve.branches import Chosen, choose
+from trunnion.solve.bristles import History, histories
+from trunnion.solve.forward import Forward, Travel, forward
+from trunnion.solve.friction_method import FrictionMethod
+from trunnion.solve.geometry import build
+from trunnion.solve.seats import Seat, seats
+from trunnion.solve.space.determinacy import Determinacy
+from trunnion.solve.switches import Mechanisms, edges
+from trunnion.solve.system import COMMON_TURNS, Cycle, System, Values
+
+if TYPE_CHECKING:
+    pass
+
+__all__ = ["Run", "prepare"]
+
+
+TURN_STEPS = 720
+
+
+@dataclass(frozen=True)
+class Run:
+    """A mechanism prepared once: its system, nominal values, cycle and assembly. Evaluate it as often as needed."""
+
+    system: System
+    values: Values
+    cycle: Cycle
+    chosen: Chosen
+
+    def solve(
+        self,
+        time: Number,
+        values: Values | None = None,
+        method: FrictionMethod | None = None,
+        zero_slip: Mapping[str, Sense] | None = None,
+    ) -> Backward:
+        """Motion and forces at the given times (s), nominal or with other values; see `kinetostatics.solve`.
+
+        zero_slip: see `kinetostatics.Given`.
+        """
+        values = self.values if values is None else values
+        past = self._past if values is self.values else self._histories(values)
+        return self._solve(time, values, past, method, zero_slip)
+
+    def walk(self, time: Number) -> Forward:
+        """Motion alone at the given times (s)."""
+        return forward(self.system, self.values, self.chosen.assembly, time)
+
+    def _solve(
+        self,
+        time: Number,
+        values: Values,
+        past: Mapping[str, History],
+        method: FrictionMethod | None,
+        zero_slip: Mapping[str, Sense] | None = None,
+        travel: Mapping[str, Travel] | None = None,
+    ) -> Backward:
+        deflections = {joint: history.at(time) for joint, history in past.items()}
+        given = Given(zero_slip or {}, deflections, travel or {})
+        return solve(self.system, values, self.chosen.assembly, time, method, given)
+
+    def at(
+        self,
+        time: Number,
+        offsets: Mapping[str, Number],
+        method: FrictionMethod | None = None,
+        zero_slip: Mapping[str, Sense] | None = None,
+        travel: Mapping[str, Travel] | None = None,
+    ) -> Backward:
+        """Motion and forces at the given times (s) with the pins at offsets in their holes, as they travel there."""
+        return self._solve(time, {**self.values, **offsets}, self._past, method, zero_slip, travel)
+
+    def ideal(self, time: Number, method: FrictionMethod | None = None) -> Backward:
+        """Motion and forces at the given times (s) without errors and with every pin in the middle of its hole."""
+        return self._solve(time, self.ideal_values, self._ideal_past, method)
+
+    @functools.cached_property
+    def seats(self) -> list[Seat]:
+        """Joints whose pins lie in seats that are given or follow the load."""
+        return seats(self.system, self.values)
+
+    @functools.cached_property
+    def edges(self) -> NDArray[np.float64]:
+        """Times, s, from the start to the end of the cycle, between which its forces are smooth; see `switches`."""
+        return edges(Mechanisms(self.system, self.chosen.assembly, self.values, [self.cycle]))[0]
+
+    @property
+    def ideal_values(self) -> Values:
+        """The numbers of the mechanism without errors."""
+        return self.values if self._ideal_values is None else self._ideal_values
+
+    @functools.cached_property
+    def _ideal_values(self) -> Values | None:
+        """The numbers of the ideal mechanism; None if they are those of the mechanism itself."""
+        ideal = self.system.mechanism.ideal_parameters()
+        same = all(value is self.values[path] or value == self.values[path] for path, value in ideal.items())
+        return None if same else ideal
+
+    @functools.cached_property
+    def erring(self) -> bool:
+        """Whether it is another mechanism than the ideal one."""
+        return bool(self.seats) or self._ideal_values is not None
+
+    @functools.cached_property
+    def _ideal_past(self) -> dict[str, History]:
+        return self._past if self._ideal_values is None else self._histories(self._ideal_values)
+
+    def _histories(self, values: Values) -> dict[str, History]:
+        with np.errstate(all="ignore"):
+            return histories(self.system, values, self.chosen.assembly, self.cycle)
+
+    @functools.cached_property
+    def determinacy(self) -> Determinacy | None:
+        """What of motion and reactions the joints leave open; None in the plane, where the structure decides it."""
+        found: Determinacy | None = self.system.geometry.determinacy(self.system, self.values, self.chosen, self.cycle)
+        return found
+
+    @functools.cached_property
+    def _past(self) -> dict[str, History]:
+        """Histories of the bristles at the nominal values."""
+        return self._histories(self.values)
+
+
+@np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
+def prepare(mechanism: Mechanism) -> Run:
+    """Decompose a mechanism and choose its assembly. Raises MechanismError if its structure is not determined."""
+    system = build(mechanism)
+    values = mechanism.parameters()
+    cycle = system.cycle(values)
+    run = Run(system, values, cycle, choose(system, values, cycle))
+    turns = _unknown_turns(run)
+    if any(turns.values()):
+        cycle = system.cycle(values, turns)
+        run = Run(system, values, cycle, choose(system, values, cycle))
+    return run
+
+
+def _unknown_turns(run: Run) -> dict[str, float]:
+    """Turns in the cycle of a joint of every chain of gear pairs that no driver turns, from a first walk."""
+    mechanism = run.system.mechanism
+    found: dict[str, float] = {}
+    if not mechanism.gears or not run.cycle.periodic:
+        return found
+    duration = run.cycle.duration
+    for gear in mechanism.gears.values():
+        joint = gear.joints[0]
+        if joint in run.system.geared_turns(run.values, duration, found):
+            continue
+        # up to just before the end: there a track begins again
+        time = np.linspace(0.0, duration * (1 - 1e-9), TURN_STEPS)
+        walk = forward(run.system, run.values, run.chosen.assembly, time)
+        first, second = (walk.motions[link].frame for link in run.system.joints[joint][1])
+        angle = np.unwrap(np.ravel(rotation((first, second))))
+        turns = (angle[-1] - angle[0]) / (2 * np.pi)
+        whole = np.rint(COMMON_TURNS * turns) / COMMON_TURNS
+        found[joint] = float(whole if abs(whole - turns) < 1e-6 else turns) if np.isfinite(turns) else 0.0
+    return found

@@ -1,0 +1,168 @@
+"""The contacts with friction of each spatial pair: what presses on them, which way they slip, what friction does.
+
+A contact is a normal load, a slip speed and the wrench of a friction force of 1 N along the slip. A cylindrical pair
+slips along the vector (r θ̇, ṡ), so its friction is one force along that, not a full torque and a full force beside each
+other; the model `pezzuti` has both [P 17, 19]. A helical pair slips along its thread. A universal pair is two pins.
+A ball's friction moment opposes the relative angular velocity with the lever of the radius: what a ball has that
+bears on its great circle across that velocity, and the most for any other place of the contact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from trunnion.algebra.dual import primal
+from trunnion.algebra.namespace import Number, namespace
+from trunnion.algebra.rigid import Frame, Screw, about
+from trunnion.algebra.space import Vector3, dot, plus, scaled
+from trunnion.joints.pairs import ContactLoad
+from trunnion.joints.spatial_load import BallLoad, BearingLoad
+from trunnion.solve.backward import ZERO_SLIP
+from trunnion.solve.space.motion import SpatialWalk
+
+__all__ = ["Rubbing", "at_rest", "bearing_middle", "contacts", "stillness"]
+
+NULL: Vector3 = (0.0, 0.0, 0.0)
+
+
+class Rubbing(NamedTuple):
+    """One contact: load, slip speed, m/s, unit friction on the second link, where the speed is zero but for rounding,
+    and whether the joint itself feels its friction; turning: the share of the friction that acts about the joint's own
+    axis and so turns the pin's seat, None if it does not.
+    """
+
+    load: ContactLoad
+    slip: Number
+    unit: Screw
+    zero: Number
+    felt: bool = False
+    turning: Number | None = None
+
+
+def bearing_middle(walk: SpatialWalk, joint: str) -> Vector3:
+    """Middle of a joint's bearing: its point on the second link, moved along the axis by the offset of the pin, m."""
+    second = walk.element(walk.system.joints[joint][1][1], joint)
+    offset = walk.values.get(f"joints.{joint}.pin.offset")
+    return second.place if offset is None else plus(second.place, scaled(offset, second.z))
+
+
+def stillness(walk: SpatialWalk, joint: str) -> tuple[Number, Number]:
+    """Rates of turn and slide of a joint below which their sign is rounding noise, rad/s and m/s."""
+    first, second = walk.system.joints[joint][1]
+    turn = ZERO_SLIP * (walk.spins[first] + walk.spins[second] + walk.pace)
+    return turn, turn * walk.size
+
+
+def at_rest(walk: SpatialWalk, joint: str) -> list[Number]:
+    """Where each contact of a joint does not slip, in the order of `contacts`."""
+    kind, links = walk.system.joints[joint]
+    turn_scale, slide_scale = stillness(walk, joint)
+    if kind == "universal":
+        one, two = (walk.element(link, joint) for link in links)
+        return [np.abs(primal(rate)) <= turn_scale for rate in pin_rates(walk, joint, one, two)]
+    if kind in ("spherical", "planar"):
+        spin = walk.against(joint).u
+        return [np.sqrt(primal(dot(spin, spin))) <= turn_scale]
+    turn, slide = (primal(rate) for rate in walk.rates(joint))
+    still = [np.abs(turn) <= turn_scale, np.abs(slide) <= slide_scale]
+    if kind == "cylindrical":
+        return still if _summed(walk, joint) else [still[0] & still[1]]
+    return still[1:] if kind == "prismatic" else still[:1]
+
+
+def contacts(walk: SpatialWalk, joint: str) -> Iterator[Rubbing]:
+    """The contacts of a joint."""
+    zero = at_rest(walk, joint)
+    kind = walk.system.joints[joint][0]
+    middle = bearing_middle(walk, joint)
+    second = walk.element(walk.system.joints[joint][1][1], joint)
+    axis = second.z
+    if kind == "spherical":
+        yield _ball(walk, joint, middle, zero[0])
+        return
+    if kind == "universal":
+        yield from _two_pins(walk, joint, middle, zero)
+        return
+    load = _bearing(walk, joint, kind, second._replace(place=middle))
+    turn, slide = walk.rates(joint)
+    if kind == "prismatic":
+        yield Rubbing(load, slide, about(axis, NULL, middle), zero[0])
+        return
+    lever = walk.values[f"joints.{joint}.pin.radius"]
+    moment = Screw(NULL, scaled(lever, axis))
+    if kind == "revolute":
+        yield Rubbing(load, lever * turn, moment, zero[0], turning=1.0)
+    elif kind == "helical":
+        lead = walk.space.lead(walk.values, joint)
+        way = namespace(lead, lever).sqrt(lever * lever + lead * lead)
+        yield Rubbing(load, way * turn, _mixed(axis, middle, lever, lever / way, lead / way), zero[0])
+    elif _summed(walk, joint):
+        yield Rubbing(load, lever * turn, moment, zero[0], turning=1.0)
+        yield Rubbing(load, slide, about(axis, NULL, middle), zero[1])
+    else:
+        yield _resultant(load, axis, middle, lever, (lever * turn, slide), zero[0])
+
+
+def _resultant(
+    load: ContactLoad, axis: Vector3, middle: Vector3, lever: Number, slip: tuple[Number, Number], zero: Number
+) -> Rubbing:
+    """Friction along the vector of the slip; where there is none, about the axis."""
+    square = slip[0] * slip[0] + slip[1] * slip[1]
+    xp = namespace(square)
+    moves = (primal(square) > 0) & np.logical_not(zero)
+    speed = xp.where(moves, xp.sqrt(xp.where(moves, square, 1.0)), 0.0)
+    share = 1 / xp.where(moves, speed, 1.0)
+    cosine, sine = xp.where(moves, slip[0] * share, 1.0), xp.where(moves, slip[1] * share, 0.0)
+    return Rubbing(load, speed, _mixed(axis, middle, lever, cosine, sine), zero, turning=xp.abs(cosine))
+
+
+def _mixed(axis: Vector3, middle: Vector3, lever: Number, cosine: Number, sine: Number) -> Screw:
+    """A unit friction force, its part across the axis with a lever."""
+    return about(scaled(sine, axis), scaled(lever * cosine, axis), middle)
+
+
+def _summed(walk: SpatialWalk, joint: str) -> bool:
+    friction = walk.system.mechanism.effective_joints[joint].friction
+    return friction is not None and friction.model == "pezzuti"
+
+
+def _bearing(walk: SpatialWalk, joint: str, kind: str, frame: Frame) -> BearingLoad:
+    values, path = walk.values, f"joints.{joint}"
+    if kind == "prismatic":
+        length = values[f"{path}.guide.length"]
+        return BearingLoad(frame, length, _summed(walk, joint), values.get(f"{path}.guide.width"))
+    flank = None
+    if kind == "helical":
+        slope = walk.space.lead(values, joint) / values[f"{path}.pin.radius"]
+        flank = namespace(slope).sqrt(1 + slope * slope)
+    return BearingLoad(frame, values[f"{path}.pin.bearing"], _summed(walk, joint), flank=flank)
+
+
+def _ball(walk: SpatialWalk, joint: str, middle: Vector3, zero: Number) -> Rubbing:
+    turn = walk.against(joint).u
+    radius = walk.values[f"joints.{joint}.pin.radius"]
+    square = dot(turn, turn)
+    xp = namespace(square)
+    moves = primal(square) > 0
+    speed = xp.where(moves, xp.sqrt(xp.where(moves, square, 1.0)), 0.0)
+    direction = scaled(1 / xp.where(moves, speed, 1.0), turn)
+    return Rubbing(BallLoad(), radius * speed, Screw(NULL, scaled(radius, direction)), zero, turning=1.0)
+
+
+def _two_pins(walk: SpatialWalk, joint: str, middle: Vector3, zero: Sequence[Number]) -> Iterator[Rubbing]:
+    """Each pin of the cross is a revolute bearing; friction of one is carried by the other as a moment across it."""
+    values, path = walk.values, f"joints.{joint}"
+    first, second = (walk.element(link, joint) for link in walk.system.joints[joint][1])
+    lever = values[f"{path}.pin.radius"]
+    for pin, rate, still in zip((first, second), pin_rates(walk, joint, first, second), zero, strict=True):
+        load = BearingLoad(pin._replace(place=middle), values[f"{path}.pin.bearing"], _summed(walk, joint))
+        yield Rubbing(load, lever * rate, Screw(NULL, scaled(lever, pin.z)), still, felt=True)
+
+
+def pin_rates(walk: SpatialWalk, joint: str, first: Frame, second: Frame) -> tuple[Number, Number]:
+    """Rates about the two pins of a universal pair, at right angles, rad/s."""
+    turn = walk.against(joint).u
+    return dot(turn, first.z), dot(turn, second.z)

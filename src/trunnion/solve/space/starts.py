@@ -1,0 +1,124 @@
+"""Poses to start from where a loop does not close: those of the mechanism without errors, or where it is open least."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.groups.redundant import RANK
+from trunnion.solve.branch_tracking import GUESSES, SEED, guess_reaches
+from trunnion.solve.branches import Chosen, choose
+from trunnion.solve.forward import forward, start
+from trunnion.solve.hints import distance
+from trunnion.solve.space.determinacy import look
+from trunnion.solve.space.loops import Loops
+from trunnion.solve.space.system import SpatialSystem
+from trunnion.solve.system import Cycle, Values
+
+__all__ = ["Start", "start_of"]
+
+Array = NDArray[np.float64]
+NEARLY = 0.05  # rad, or of the size: an assembly open by more is none
+FOLLOWED = 180  # positions of a cycle through which the one that is open least is followed
+JUMP = 0.5  # rad, or of the size: farther from one of them to the next it is another assembly
+
+
+class Start(Protocol):
+    """Coordinates (lane, kept) near those of the closed loops at times, s; NaN where there are none."""
+
+    def __call__(self, time: Array) -> Array: ...
+
+
+@dataclass(frozen=True)
+class _Ideal:
+    """The mechanism without errors, which closes."""
+
+    system: SpatialSystem
+    values: Values
+    chosen: Chosen
+
+    def __call__(self, time: Array) -> Array:
+        pose = forward(self.system, self.values, self.chosen.assembly, time).poses[0]
+        return np.stack([np.broadcast_to(pose.q[i], time.shape) for i in self.system.groups[0].kept], axis=-1)
+
+
+@dataclass(frozen=True)
+class _Nearly:
+    """A mechanism that closes nowhere, followed along the poses in which it is open least."""
+
+    time: Array
+    rows: Array  # (grid, kept)
+    periodic: bool
+
+    def __call__(self, time: Array) -> Array:
+        moment = np.mod(time, self.time[-1]) if self.periodic and self.time[-1] else np.asarray(time)
+        near = np.argmin(np.abs(moment[:, None] - self.time), axis=1)
+        return np.asarray(self.rows[near])
+
+
+def start_of(system: SpatialSystem, values: Values, ideal: Values, cycle: Cycle) -> tuple[Start, list[Finding]]:
+    """Where to start from, and what there is to say of it.
+
+    Raises MechanismError where the mechanism leaves a freedom undetermined, or is nowhere even nearly closed.
+    """
+    chosen = choose(system, ideal, cycle)
+    told = [one for one in look(system, ideal, chosen, cycle).findings() if one.where == "drivers"]
+    if told:
+        raise MechanismError(told)
+    if chosen.found[0]:
+        return _Ideal(system, ideal, chosen), list(chosen.findings)
+    nearly = _followed(system, values, cycle)
+    what = "the axes and lengths as stated do not fit, and neither do they without the errors"
+    if nearly is None:
+        raise MechanismError(Finding(f"{what}: nowhere is every loop nearly closed", "links", "check the lengths"))
+    remedy = "what is off counts from where the loops are open least; it may be stated as misalignment or errors"
+    return nearly, [Finding(what, "links", remedy, Severity.NOTE)]
+
+
+def _followed(system: SpatialSystem, values: Values, cycle: Cycle) -> _Nearly | None:
+    """The assembly nearest the hints, of those nearly closed, from the first position that has one on, and back."""
+    time = np.linspace(0.0, cycle.duration, FOLLOWED + 1 if cycle.duration else 1)
+    loops = Loops.of(system, values, (), time)
+    rows = np.full((len(time), len(loops.group.kept)), np.nan)
+    for begin in sorted({int(i) for i in np.linspace(0, len(time) - 1, 13)}):
+        first = _nearest(system, values, loops.at(np.full(GUESSES, begin)))
+        if first is not None:
+            break
+    else:
+        return None
+    for order in (range(begin, len(time)), range(begin, -1, -1)):
+        q = first
+        for place in order:
+            found, gap = loops.at(np.array([place])).least_open(q[None], np.zeros((1, 0)))
+            if not gap[0] <= NEARLY or not np.max(np.abs(found[0] - q)) <= JUMP:
+                break
+            rows[place] = q = found[0]
+    return _Nearly(time, rows, cycle.periodic)
+
+
+def _nearest(system: SpatialSystem, values: Values, loops: Loops) -> Array | None:
+    """Coordinates of the assembly nearest the hints at one position, from many guesses; None if none nearly closes."""
+    rng = np.random.default_rng(SEED)
+    guesses = [rng.uniform(-reach, reach, GUESSES) for reach in guess_reaches(loops.group, loops.size)]
+    none = np.zeros((GUESSES, 0))
+    with np.errstate(all="ignore"):
+        q, gap = loops.least_open(np.stack(guesses, axis=-1), none)
+    good = np.flatnonzero(gap <= NEARLY)
+    if not len(good):
+        return None
+    part = loops.at(good)
+    singular = np.linalg.svd(part.linear(q[good], none[good]).jacobian, compute_uv=False)
+    if loops.group.free and np.all(singular[:, -1] <= RANK * singular[:, 0]):
+        what = "the joints leave a freedom undetermined"
+        raise MechanismError(Finding(what, "drivers", "drive it, or give the links joints that hold them"))
+    far = distance(start(system, values), system.plan.modules[0], part.frames(q[good], none[good]), _same, _same)
+    order = np.lexsort((gap[good], np.round(np.broadcast_to(far, good.shape) / loops.size**2, 6)))
+    return np.asarray(q[good[order[0]]])
+
+
+def _same(number: Array) -> Array:
+    return number

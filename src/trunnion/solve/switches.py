@@ -1,0 +1,334 @@
+"""Where forces and powers jump or bend along a cycle, as the model says it: between these places they are smooth.
+
+Loads jump at the ends of a `between` and bend at the points of a table or where a `max` goes over to its other side;
+friction and what resists a joint turn round where its relative speed does; a spring that only pulls lets go at its free
+length; motion laws go from one function to the next. A number of the motion belongs to each of these, which passes a
+level there. They are looked for on a scan of the cycle - also where such a number only dips through its level between
+two places of it - and located to rounding. What no model states, such as a guide that tilts over, is not looked for.
+
+Roots: T. R. Chandrupatla, A new hybrid quadratic/bisection algorithm, Adv. Eng. Softw. 28 (1997) 145-149,
+doi:10.1016/S0965-9978(96)00051-8.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.algebra.dual import primal
+from trunnion.algebra.namespace import Number
+from trunnion.model.parts import Spring
+from trunnion.solve import loads
+from trunnion.solve.backward import slip_of
+from trunnion.solve.forward import Assembly, Forward, forward, start
+from trunnion.solve.loads import Stated, Switch
+from trunnion.solve.space import loads as space_loads
+from trunnion.solve.space.contacts import pin_rates, stillness
+from trunnion.solve.space.motion import SpatialWalk
+from trunnion.solve.system import Cycle, System, Values, rubbing
+
+__all__ = ["Mechanisms", "edges"]
+
+Array = NDArray[np.float64]
+Rows = NDArray[np.intp]
+
+SCANNED = 180  # places of a turn at which the motion is looked at; what the model states of it takes less
+STATED_SCANNED = 1440
+MOST_SCANNED = 20_000
+MOST_LEVELS = 720  # of one table in a turn: of more points every n-th, so that no node of a panel is far from any
+PANELS = 6  # of a turn: the widest that is integrated in one go
+MOST_EDGES = 2000  # of a cycle of very many turns: the error of its means is told
+ROUNDS = 60
+SETTLED = 1e-11  # of the cycle
+CLOSE = 1e-10  # of the cycle: edges that are one
+NOISE = 1e-9  # of the largest value: zero but for rounding
+
+
+@dataclass(frozen=True)
+class Mechanisms:
+    """One mechanism, or many that differ in numbers alone: their values, (mechanism, 1) where they vary, and cycles."""
+
+    system: System
+    assembly: Assembly
+    values: Values
+    cycles: Sequence[Cycle]
+
+    def picked(self, rows: Rows) -> Values:
+        """The values of some of them, one for each lane."""
+        if len(self.cycles) == 1:
+            return self.values
+        return {path: value[rows] if np.ndim(primal(value)) == 2 else value for path, value in self.values.items()}
+
+    def lanes(self, time: Array) -> Array:
+        """Times, (lane, place), as a walk takes them: those of one mechanism in a row."""
+        return time.ravel() if len(self.cycles) == 1 else time
+
+    def shaped(self, number: Number, time: Array) -> Array:
+        """A number that a walk at `lanes` has, (lane, place)."""
+        shape = (1, time.size) if len(self.cycles) == 1 else time.shape
+        found: Array = np.broadcast_to(np.asarray(primal(number), float), shape).reshape(time.shape)
+        return found
+
+    def row(self, number: Number) -> Array:
+        """A number that does not change along the way, (mechanism,)."""
+        return np.broadcast_to(np.asarray(primal(number), float), (len(self.cycles), 1))[:, 0]
+
+
+Look = Callable[[Forward], Iterator[Switch]]
+
+
+class _Scan(NamedTuple):
+    """How switches are worked out: a walk at the times of some mechanisms, and what is read from it."""
+
+    walk: Callable[[Mechanisms, Rows, Array], Forward]
+    look: Look
+    wanted: Callable[[System], bool]
+    places: int
+    noise: float
+
+
+def edges(of: Mechanisms) -> list[Array]:
+    """Times, s, of every mechanism between which its forces are smooth as far as the model says it, both ends included.
+
+    No two are farther apart than a PANELS-th of a turn.
+    """
+    found = [[0.0, cycle.duration] for cycle in of.cycles]
+    for row, moment in _knots(of):
+        found[row].append(moment)
+    for scan in (
+        _Scan(_stated, lambda walk: Stated(walk).switches(), _varies, STATED_SCANNED, 0.0),
+        _Scan(_moving, _of_motion, _switches, SCANNED, NOISE),
+    ):
+        for row, moment in _passages(of, scan):
+            found[row].append(moment)
+    return [_parted(np.array(times), cycle) for times, cycle in zip(found, of.cycles, strict=True)]
+
+
+def _parted(times: Array, cycle: Cycle) -> Array:
+    """Rising, those that are one taken once, wide gaps parted evenly."""
+    times = np.sort(times[(times >= 0) & (times <= cycle.duration)])
+    kept = times[np.append(np.diff(times) > CLOSE * cycle.duration, True)]
+    kept[0] = 0.0
+    widest = cycle.duration / min(PANELS * max(1.0, np.ceil(cycle.turns - 1e-9)), MOST_EDGES)
+    counts = np.ceil(np.diff(kept) / widest * (1 - 1e-9)).astype(int)
+    parts = [np.linspace(a, b, n + 1)[:-1] for a, b, n in zip(kept[:-1], kept[1:], counts, strict=True)]
+    return np.concatenate([*parts, kept[-1:]])
+
+
+def _knots(of: Mechanisms) -> Iterator[tuple[int, float]]:
+    """Times at which a motion law goes from one function to the next."""
+    for name in of.system.mechanism.drivers:
+        knots, span = of.system.knots(of.values, name), of.system.span(of.values, name)
+        if not knots:
+            continue
+        each, periods = np.array([of.row(knot) for knot in knots]).T, of.row(span.duration)
+        for row, (times, period, cycle) in enumerate(zip(each, periods, of.cycles, strict=True)):
+            most = max(1.0, MOST_EDGES / len(times))
+            laps = np.arange(min(np.ceil(cycle.duration / period), most)) if span.periodic else np.zeros(1)
+            again = np.mod(times, period) if span.periodic else times
+            yield from ((row, float(moment)) for moment in (again[:, None] + laps * period).ravel())
+
+
+# ---- numbers of the motion that pass a level -------------------------------------------------------------------
+
+
+def _stated(of: Mechanisms, rows: Rows, time: Array) -> Forward:
+    """A walk that knows the drivers alone."""
+    walk = start(of.system, of.picked(rows))
+    walk.time = of.lanes(time)
+    return walk
+
+
+def _moving(of: Mechanisms, rows: Rows, time: Array) -> Forward:
+    return forward(of.system, of.picked(rows), of.assembly, of.lanes(time))
+
+
+def _of_motion(walk: Forward) -> Iterator[Switch]:
+    """Relative speeds that friction or a load follows, and elongations of springs that switch."""
+    for joint in _followed(walk.system):
+        if isinstance(walk, SpatialWalk):
+            yield from (Switch(rate) for rate in _rates(walk, joint))
+        else:
+            slip = slip_of(walk, joint)
+            yield Switch(np.where(slip.zero, 0.0, primal(slip.speed)))
+    yield from (Switch(elongation) for spring, elongation in _elongations(walk) if _lets_go(walk.system, spring))
+
+
+def _varies(system: System) -> bool:
+    """Whether any number of the model varies with the motion."""
+    return any(entry.varies for entry in system.mechanism.parameter_set.entries.values())
+
+
+def _switches(system: System) -> bool:
+    """Whether anything in the mechanism switches as it moves."""
+    return bool(_followed(system)) or any(_lets_go(system, spring) for spring in system.mechanism.springs.values())
+
+
+def _followed(system: System) -> list[str]:
+    """Joints whose sense of motion decides a friction or a load."""
+    resisted = [load.joint for load in system.mechanism.loads.values() if load.joint is not None]
+    return list(dict.fromkeys([*rubbing(system), *resisted]))
+
+
+def _lets_go(system: System, spring: Spring) -> bool:
+    """Whether a spring acts one way only, or jumps by a turn half a turn from its free angle."""
+    turns = spring.joint is not None and system.turns(spring.joint) and spring.joint not in system.mechanism.drivers
+    return turns or spring.only is not None
+
+
+def _rates(walk: SpatialWalk, joint: str) -> Iterator[Number]:
+    """Speeds of a joint in space that turn round; that of a ball, or of a pin that slides too, has no sign."""
+    kind, links = walk.system.joints[joint]
+    turn, slide = stillness(walk, joint)
+    if kind == "universal":
+        one, two = (walk.element(link, joint) for link in links)
+        yield from (_moves(rate, turn) for rate in pin_rates(walk, joint, one, two))
+    elif kind in ("revolute", "helical", "cylindrical"):
+        yield _moves(walk.rates(joint)[0], turn)
+    if kind in ("prismatic", "cylindrical"):
+        yield _moves(walk.rates(joint)[1], slide)
+
+
+def _moves(rate: Number, least: Number) -> Number:
+    return np.where(np.abs(primal(rate)) <= least, 0.0, primal(rate))
+
+
+def _elongations(walk: Forward) -> Iterator[tuple[Spring, Number]]:
+    named = walk.system.mechanism.springs
+    if not named:
+        return
+    if isinstance(walk, SpatialWalk):
+        states = [(name, state) for name, _, state in space_loads.springs(walk)]
+    else:
+        joints = [one.joint for one in named.values() if one.joint is not None]
+        slips = {joint: slip_of(walk, joint) for joint in joints}
+        states = [(name, state) for name, _, state in loads.springs(walk, slips)]
+    yield from ((named[name], state.elongation) for name, state in states)
+
+
+# ---- where they do ---------------------------------------------------------------------------------------------
+
+
+class _Crossing(NamedTuple):
+    """A function that passes a level between two times, with its values there; one entry each."""
+
+    row: Rows
+    function: Rows
+    level: Array
+    low: Array
+    high: Array
+    at_low: Array
+    at_high: Array
+
+
+def _passages(of: Mechanisms, scan: _Scan) -> Iterator[tuple[int, float]]:
+    """(mechanism, time) of every passage that a scan shows."""
+    duration = np.array([cycle.duration for cycle in of.cycles])
+    turns = max(cycle.turns for cycle in of.cycles)
+    count = int(min(scan.places * max(1.0, np.ceil(turns - 1e-9)), MOST_SCANNED))
+    time = duration[:, None] * np.linspace(0.0, 1.0, count + 1)
+    if not scan.wanted(of.system):
+        return
+    switches = list(scan.look(scan.walk(of, np.arange(len(duration)), time)))
+    if not switches:
+        return
+
+    def values(rows: Rows, times: Array) -> Array:
+        found = scan.look(scan.walk(of, rows, times))
+        return np.stack([of.shaped(switch.number, times) for switch in found])
+
+    courses = np.stack([of.shaped(switch.number, time) for switch in switches])
+    noise = scan.noise * np.nanmax(np.abs(np.nan_to_num(courses)), axis=-1, keepdims=True)
+    courses = np.where(np.abs(courses) <= noise, 0.0, courses)
+    found: list[tuple[float, ...]] = []
+    for k, (switch, course) in enumerate(zip(switches, courses, strict=True)):
+        for row in range(len(duration)):
+            levels = _levels(of, switch, row, course[row])
+            found += [(row, k, *one) for one in _passed(course[row], levels, time[row])]
+    dips = list(_dips(switches, courses, time, values))
+    if found or dips:
+        columns = [np.array(column) for column in zip(*found, *dips, strict=True)]
+        one = _Crossing(columns[0].astype(np.intp), columns[1].astype(np.intp), *columns[2:])
+        yield from zip(one.row.tolist(), _located(one, values, duration[one.row]).tolist(), strict=True)
+
+
+def _levels(of: Mechanisms, switch: Switch, row: int, course: Array) -> Array:
+    """The levels of a switch that its course may pass, rising."""
+    levels = np.array([of.row(level)[row] for level in switch.levels])
+    known = course[np.isfinite(course)]
+    if switch.period is not None and len(known):
+        period = of.row(switch.period)[row]
+        first, last = np.floor((np.min(known) - levels[0]) / period), np.ceil((np.max(known) - levels[0]) / period)
+        levels = np.unique((levels[:-1] + period * np.arange(first, last + 1)[:, None]).ravel())
+    if len(known):
+        levels = levels[(levels >= np.min(known)) & (levels <= np.max(known))]
+    most = min(MOST_LEVELS * max(1.0, np.ceil(of.cycles[row].turns - 1e-9)), MOST_SCANNED)
+    return levels[:: max(1, int(np.ceil(len(levels) / most)))]
+
+
+def _passed(course: Array, levels: Array, time: Array) -> Iterator[tuple[float, ...]]:
+    """Level, time before and after, value before and after, wherever a course passes a level between two places."""
+    above = np.searchsorted(levels, course, side="right")
+    there = np.isfinite(course)
+    for k in np.flatnonzero((above[1:] != above[:-1]) & there[1:] & there[:-1]):
+        between = slice(min(above[k], above[k + 1]), max(above[k], above[k + 1]))
+        yield from ((level, time[k], time[k + 1], course[k], course[k + 1]) for level in levels[between])
+
+
+def _dips(
+    switches: Sequence[Switch], courses: Array, time: Array, values: Callable[[Rows, Array], Array]
+) -> Iterator[tuple[float, ...]]:
+    """Where a course goes through its only level and back between two places: its parabola does, and so does itself."""
+    single = np.array([len(switch.levels) == 1 for switch in switches])
+    before, here, after = courses[..., :-2], courses[..., 1:-1], courses[..., 2:]
+    with np.errstate(all="ignore"):
+        bend = before - 2 * here + after
+        least = here - (after - before) ** 2 / (8 * bend)
+        inside = (np.abs(here) <= np.abs(before)) & (np.abs(here) <= np.abs(after)) & (before * after > 0)
+        dips = inside & (before * here > 0) & (least * here < 0) & single[:, None, None]
+    functions, rows, places = np.nonzero(dips)
+    if not len(rows):
+        return
+    one, two, three = (
+        np.array([time[row, place + k] for row, place in zip(rows, places, strict=True)]) for k in range(3)
+    )
+    with np.errstate(all="ignore"):
+        shift = (before - after)[dips] / (2 * bend[dips])
+    middle = two + shift * (two - one)
+    there = values(rows, middle[:, None])[functions, np.arange(len(rows)), 0]
+    for i in np.flatnonzero(there * here[dips] < 0):
+        yield rows[i], functions[i], 0.0, one[i], middle[i], before[dips][i], there[i]
+        yield rows[i], functions[i], 0.0, middle[i], three[i], there[i], after[dips][i]
+
+
+def _located(one: _Crossing, values: Callable[[Rows, Array], Array], duration: Array) -> Array:
+    """The times of all crossings, by inverse quadratic interpolation where that is sure to converge, else bisection."""
+    lanes = np.arange(len(one.row))
+
+    def off(time: Array) -> Array:
+        found: Array = values(one.row, time[:, None])[one.function, lanes, 0] - one.level
+        return found
+
+    a, b = one.low.copy(), one.high.copy()
+    fa, fb = one.at_low - one.level, one.at_high - one.level
+    with np.errstate(all="ignore"):
+        share = np.clip(fa / (fa - fb), 0.0, 1.0)
+        for _ in range(ROUNDS):
+            at = a + share * (b - a)
+            value = off(at)
+            same = np.sign(value) == np.sign(fa)
+            c, fc = np.where(same, a, b), np.where(same, fa, fb)
+            b, fb = np.where(same, b, a), np.where(same, fb, fa)
+            a, fa = at, value
+            if np.all((np.abs(b - a) <= SETTLED * duration) | (fa == 0) | (fb == 0) | np.isnan(fa)):
+                break
+            xi, phi = (a - b) / (c - b), (fa - fb) / (fc - fb)
+            sure = (phi**2 < xi) & ((1 - phi) ** 2 < 1 - xi)
+            inverse = fa / (fb - fa) * fc / (fb - fc) + (c - a) / (b - a) * fa / (fc - fa) * fb / (fc - fb)
+            least = np.minimum(0.5, SETTLED * duration / np.abs(b - c))
+            share = np.clip(np.where(sure & np.isfinite(inverse), inverse, 0.5), least, 1 - least)
+    return np.where(np.abs(fa) <= np.abs(fb), a, b)

@@ -1,0 +1,406 @@
+"""A mechanism made ready to run: its plan, its modules, what hangs where, and how it is driven."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.algebra.dual import primal
+from trunnion.algebra.namespace import Number, namespace
+from trunnion.errors import Finding, MechanismError
+from trunnion.groups import GROUPS, Group
+from trunnion.groups.gear import Gear
+from trunnion.groups.general import OUTER, General, GroupJoint
+from trunnion.groups.planar import Frame
+from trunnion.joints.friction import FRICTION_LAWS, FrictionLaw
+from trunnion.joints.motion import Span
+from trunnion.joints.pairs import PAIRS
+from trunnion.model.mechanism import Mechanism
+from trunnion.solve import shifts
+from trunnion.structure.decompose import Module, Plan
+
+__all__ = ["Cycle", "Dial", "Place", "Positions", "System", "Values"]
+
+COMMON_TURNS = 60  # of the slowest driver, within which the others must come back too
+Values = Mapping[str, Number]  # every number of a mechanism by its path, SI
+
+
+MOST_INTERVALS = 6  # named in one finding; the rest are counted
+
+Positions = NDArray[np.intp]
+
+
+class Dial(NamedTuple):
+    """How positions are named to a person: the drive coordinate in degrees or mm, or time."""
+
+    values: NDArray[np.float64]
+    unit: str
+    of: str
+
+    def at(self, position: int) -> str:
+        """One position."""
+        number = f"{self.values[position]:.4g}"
+        return f"{number}{self.unit}"
+
+    def intervals(self, positions: Positions) -> str:
+        """Positions as intervals: 'at 12° and between 132° and 228° of A'."""
+        runs = np.split(positions, np.flatnonzero(np.diff(positions) > 1) + 1)
+        if len(positions) == len(self.values):
+            return "at every position" if len(self.values) > 1 else "in its one position"
+        texts = [
+            f"at {self.at(run[0])}" if len(run) == 1 else f"between {self.at(run[0])} and {self.at(run[-1])}"
+            for run in runs[:MOST_INTERVALS]
+        ]
+        more = f" and in {len(runs) - MOST_INTERVALS} more places" if len(runs) > MOST_INTERVALS else ""
+        return ", ".join(texts) + more + (f" of {self.of}" if self.of else "")
+
+
+@dataclass(frozen=True)
+class Place:
+    """A joint as its module sees it: kind, links and whether each is outside, in the module's order of sides.
+
+    A witness is a joint between two known links, of which only the module's gear pairs speak.
+    """
+
+    joint: str
+    kind: str
+    links: tuple[str, str]
+    outer: tuple[bool, bool]
+    reversed_: bool
+
+    @property
+    def witness(self) -> bool:
+        return all(self.outer)
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """One period or range of the drivers: how long it takes, s, whether its end is its start again, and the most
+    turns that a driver makes in it, at its largest rate."""
+
+    duration: float
+    periodic: bool
+    turns: float = 1.0
+
+    def times(self, steps: int) -> np.ndarray:
+        """`steps` equally spaced times, s; the end is left out where it repeats the start."""
+        return np.linspace(0.0, self.duration, steps, endpoint=not self.periodic)
+
+    def mean(self, values: NDArray[np.float64]) -> float:
+        """Mean of values at `times`: plain over a period, by trapezoids over a range; NaN with a gap."""
+        if len(values) == 1 or self.periodic:
+            return float(np.mean(values))
+        return float(np.trapezoid(values) / (len(values) - 1))
+
+
+@dataclass(frozen=True)
+class System:
+    """A mechanism, its plan and its modules. Numbers stay outside: every walk is given its `Values`.
+
+    geometry: what is done differently in the plane and in space.
+    """
+
+    mechanism: Mechanism
+    plan: Plan
+    geometry: Any = None
+
+    @cached_property
+    def groups(self) -> tuple[Group, ...]:
+        """The module that computes each entry of the plan."""
+        return tuple(self._group(module) for module in self.plan.modules)
+
+    @cached_property
+    def places(self) -> tuple[tuple[Place, ...], ...]:
+        """The joints of each module, then its witnesses."""
+        return tuple(
+            tuple(self._place(module, name) for name in (*module.joints, *module.witnesses))
+            for module in self.plan.modules
+        )
+
+    @cached_property
+    def joints(self) -> dict[str, tuple[str, tuple[str, str]]]:
+        """Kind and links of every joint, as the file has them."""
+        return {name: (joint.type, joint.links) for name, joint in self.mechanism.effective_joints.items()}
+
+    @cached_property
+    def order(self) -> dict[str, int]:
+        """Where the joints stand in the file."""
+        return {name: place for place, name in enumerate(self.joints)}
+
+    def resting(self, joint: str) -> int:
+        """How many contacts of a joint rest or slip each by itself, for `kinetostatics.Given`."""
+        return 1
+
+    def turns(self, joint: str) -> bool:
+        """Whether a joint's coordinate, as drivers and loads see it, is an angle."""
+        return "rotation" in PAIRS[self.joints[joint][0]].freedoms
+
+    @cached_property
+    def points(self) -> tuple[tuple[str, str], ...]:
+        """(link, point) of every named point."""
+        return tuple((name, point) for name, link in self.mechanism.effective_links.items() for point in link.points)
+
+    def _place(self, module: Module, name: str) -> Place:
+        kind, (first, second) = self.joints[name]
+        reversed_ = name in module.joints and module.reversed_[module.joints.index(name)]
+        links = (second, first) if reversed_ else (first, second)
+        outer = (links[0] not in module.links, links[1] not in module.links)
+        return Place(name, kind, links, outer, reversed_)
+
+    def _group(self, module: Module) -> Group:
+        if module.kind in GROUPS:
+            return GROUPS[module.kind]
+        number = {link: i for i, link in enumerate(module.links)}
+        names = (*module.joints, *module.witnesses)
+        joints = tuple(
+            GroupJoint(kind, (number.get(first, OUTER), number.get(second, OUTER)))
+            for kind, (first, second) in (self.joints[name] for name in names)
+        )
+        driven = tuple(names.index(name) for name in module.driven)
+        return General(len(module.links), joints, driven, tuple(self._gear(name, names) for name in module.gears))
+
+    def _gear(self, name: str, names: Sequence[str]) -> Gear:
+        first, second = (names.index(joint) for joint in self.gear_joints(name))
+        carriers = self.mechanism.carriers(name) if self.mechanism.gears[name].teeth else None
+        if carriers and name in self.turned_round:
+            carriers = carriers[1], carriers[0]
+        return Gear(first, second, carriers)
+
+    @cached_property
+    def turned_round(self) -> frozenset[str]:
+        """Gear pairs whose second joint is the one whose turns are known: driven, or geared to such a joint.
+
+        φ₁ = (φ₂ − φ₀)/i then says what φ₂ = i φ₁ + φ₀ leaves open by whole turns of φ₂.
+        """
+        known, found = set(self.mechanism.drivers), set()
+        for _ in self.mechanism.gears:
+            for name, gear in self.mechanism.gears.items():
+                first, second = gear.joints
+                if second in known and first not in known:
+                    found.add(name)
+                if first in known or second in known:
+                    known |= {first, second}
+        return frozenset(found)
+
+    def gear_joints(self, name: str) -> tuple[str, str]:
+        """Joints of a gear pair, that whose turns are known first."""
+        first, second = self.mechanism.gears[name].joints
+        return (second, first) if name in self.turned_round else (first, second)
+
+    def gear_numbers(self, values: Values, name: str) -> tuple[Number, Number]:
+        """Ratio and phase of a gear pair in the order of `gear_joints`."""
+        ratio, phase = values[f"gears.{name}.ratio"], values[f"gears.{name}.phase"]
+        return (1 / ratio, -phase / ratio) if name in self.turned_round else (ratio, phase)
+
+    def elements(self, values: Values) -> dict[tuple[str, str], Any]:
+        """Local frame of every joint's element, by (link, joint): errors of joints are in the second ones.
+
+        Seats are in the elements of the links that carry them.
+        """
+        found = self.holes(values)
+        for name, (kind, (first, second)) in self.joints.items():
+            found[first, name] = shifts.journaled_planar(found[first, name], kind, values, name)
+            found[second, name] = shifts.seated_planar(found[second, name], kind, values, name)
+        return found
+
+    def holes(self, values: Values) -> dict[tuple[str, str], Any]:
+        """The same where every pin lies in the middle of its hole."""
+        found = self.stated_elements(values)
+        for name, (_, (_, second)) in self.joints.items():
+            found[second, name] = shifts.misaligned_planar(found[second, name], values, name)
+        return found
+
+    def stated_elements(self, values: Values) -> dict[tuple[str, str], Any]:
+        """The same without errors of joints; c, s is the direction of a slide."""
+        found: dict[tuple[str, str], Frame] = {}
+        for name, (kind, links) in self.joints.items():
+            for link in links:
+                path = f"links.{link}.points.{name}"
+                x, y = values[f"{path}.x"], values[f"{path}.y"]
+                if "planar" in PAIRS[kind].needs_axis:
+                    ax, ay = values[f"{path}.axis.x"], values[f"{path}.axis.y"]
+                    length = namespace(ax, ay).hypot(ax, ay)
+                    found[link, name] = Frame(x, y, ax / length, ay / length)
+                else:
+                    found[link, name] = Frame(x, y)
+        return found
+
+    def centre(self, values: Values, link: str) -> tuple[Number, Number]:
+        """Local place of a link's mass centre, m."""
+        path = f"links.{link}.centre"
+        if f"{path}.distance" in values:
+            distance, angle = values[f"{path}.distance"], values[f"{path}.angle"]
+            xp = namespace(distance, angle)
+            return distance * xp.cos(angle), distance * xp.sin(angle)
+        return values[f"{path}.x"], values[f"{path}.y"]
+
+    def drive(self, values: Values, name: str, time: Number) -> tuple[Number, Number, Number]:
+        """Coordinate, rate and second derivative of a driver at `time` (s) from the start, by its motion law."""
+        law = self.mechanism.drivers[name].motion
+        return law.function(time, self._motion(values, name))
+
+    def span(self, values: Values, name: str) -> Span:
+        """One cycle of a driver."""
+        return self.mechanism.drivers[name].motion.span(self._motion(values, name))
+
+    def knots(self, values: Values, name: str) -> list[Number]:
+        """Times, s, within one cycle of a driver at which a derivative of its coordinate jumps."""
+        return self.mechanism.drivers[name].motion.knots(self._motion(values, name))
+
+    def _motion(self, values: Values, name: str) -> dict[str, Number]:
+        """What the motion law of a driver is given."""
+        found: dict[str, Number] = {key: values[path] for key, path in self._driver_paths[name] if path in values}
+        found.update(self.mechanism.drivers[name].options)
+        return found
+
+    @cached_property
+    def _driver_paths(self) -> dict[str, list[tuple[str, str]]]:
+        """(key, path) of the numbers of each driver."""
+        found: dict[str, list[tuple[str, str]]] = {name: [] for name in self.mechanism.drivers}
+        for path in self.mechanism.parameter_set.entries:
+            section, _, rest = path.partition(".")
+            if section == "drivers":
+                name, _, key = rest.partition(".")
+                found[name].append((key, path))
+        return found
+
+    def dial(self, values: Values, time: NDArray[np.float64]) -> Dial:
+        """Positions by the coordinate of the only driver if it runs one way, else by time (s)."""
+        drivers = list(self.mechanism.drivers)
+        if len(drivers) != 1 or not self.span(values, drivers[0]).one_way:
+            return Dial(time, " s", "")
+        q = np.broadcast_to(self.drive(values, drivers[0], time)[0], time.shape)
+        revolute = self.turns(drivers[0])
+        return Dial(np.degrees(q) if revolute else q * 1e3, "°" if revolute else " mm", drivers[0])
+
+    def pace(self, values: Values) -> Number:
+        """Angular speed typical of the mechanism, rad/s: the peak of its fastest driver, a slide's per size."""
+        rates: list[Number] = [0.0]
+        for name in self.mechanism.drivers:
+            speed = self.span(values, name).peak
+            rates.append(speed if self.turns(name) else speed / self.size(values))
+        return functools.reduce(np.maximum, rates)
+
+    def size(self, values: Values) -> Number:
+        """Length typical of the mechanism, m: the widest spread of two points on one link."""
+        widest: Number = 0.0
+        for name, link in self.mechanism.links.items():
+            places = [
+                tuple(primal(values[f"links.{name}.points.{point}.{axis}"]) for axis in "xy") for point in link.points
+            ]
+            for x, y in places[1:]:
+                widest = np.maximum(widest, np.hypot(x - places[0][0], y - places[0][1]))
+        return np.where(widest > 0, widest, 1.0)
+
+    def cycle(self, values: Values, turns: Mapping[str, float] | None = None) -> Cycle:
+        """How long the drivers take: the longest that ends, or the least time in which all make whole periods.
+
+        So do joints behind gear pairs. turns: whole turns, in one period of the drivers, of joints that a gear pair
+        starts from and that are neither driven nor geared; none if not given.
+        Where it is over COMMON_TURNS periods of the slowest, the cycle is its one period and not periodic.
+        Raises MechanismError where a range runs against its speed or two drivers do not fit one cycle.
+        """
+        drivers = self.mechanism.drivers
+        if not drivers:
+            return Cycle(0.0, periodic=False)
+        nominal = {path: float(np.ravel(primal(value))[0]) for path, value in values.items() if "drivers." in path}
+        spans = {name: self.span(nominal, name) for name in drivers}
+        findings: list[Finding] = []
+        for name, span in spans.items():
+            if span.duration < 0:
+                speed = nominal[f"drivers.{name}.speed"]
+                what = f"the range runs {'down' if speed > 0 else 'up'}, the speed is {speed:g} (SI)"
+                findings.append(Finding(what, f"drivers.{name}.range", "swap the ends of the range, or the sign"))
+        longest = float(max(span.duration for span in spans.values()))
+        ending = [name for name, span in spans.items() if not span.periodic]
+        for name in ending:
+            if not findings and not spans[name].rests and abs(spans[name].duration - longest) > 1e-9 * longest:
+                what = f"its range takes {spans[name].duration:g} s, the whole cycle takes {longest:g} s"
+                findings.append(Finding(what, f"drivers.{name}", "let all drivers with a range take the same time"))
+        if findings:
+            raise MechanismError(findings)
+        periods = [longest / span.duration for span in spans.values()]
+        if self.mechanism.gears:
+            periods += self.geared_turns(values, longest, turns).values()
+        whole = next((n for n in range(1, COMMON_TURNS + 1) if all(_is_whole(n * period) for period in periods)), 0)
+        periodic = bool(whole and not ending)
+        duration = whole * longest if periodic else longest
+        return Cycle(duration, periodic, max(self._turns(name, span, duration) for name, span in spans.items()))
+
+    def geared_turns(
+        self, values: Values, duration: float, known: Mapping[str, float] | None = None
+    ) -> dict[str, float]:
+        """Turns that driven joints and those geared to them make in a time; known: of others, to start from."""
+        turns = dict(known or {})
+        for name in self.mechanism.drivers:
+            if self.turns(name):
+                ends = [float(np.ravel(primal(self.drive(values, name, time)[0]))[0]) for time in (0.0, duration)]
+                turns.setdefault(name, (ends[1] - ends[0]) / (2 * np.pi))
+        for _ in self.mechanism.gears:  # each round reaches one gear pair farther, whichever way it is stated
+            for name, gear in self.mechanism.gears.items():
+                first, second = gear.joints
+                ratio = float(np.ravel(primal(values[f"gears.{name}.ratio"]))[0])
+                if first in turns:
+                    turns.setdefault(second, ratio * turns[first])
+                elif second in turns:
+                    turns[first] = turns[second] / ratio
+        return turns
+
+    def _turns(self, driver: str, span: Span, duration: float) -> float:
+        """Turns that a driver would make in a time at its largest rate; of a slide, how often it would travel."""
+        revolute = self.turns(driver)
+        return float(span.peak * duration / (2 * np.pi if revolute else span.travel))
+
+
+def driven_coordinates(
+    system: System, module: Module, places: Sequence[Place], values: Values, time: Number
+) -> tuple[list[Number], list[Number], list[Number]]:
+    """Coordinates, rates and second derivatives of a module's driven joints, in the module's sense.
+
+    Then come three numbers for each of its gear pairs: ratio, phase and rotation of the first joint, which is known
+    with its whole turns if it is driven and otherwise taken as the nearest to 0.
+    """
+    q: list[Number] = []
+    rate: list[Number] = []
+    second: list[Number] = []
+    for name in module.driven:
+        place = next(place for place in places if place.joint == name)
+        sign = -1.0 if place.reversed_ else 1.0
+        for target, value in zip((q, rate, second), system.drive(values, name, time), strict=True):
+            target.append(sign * value)
+    for name in module.gears:
+        first = system.gear_joints(name)[0]
+        turned = system.drive(values, first, time)[0] if first in system.mechanism.drivers else 0.0
+        ratio, phase = system.gear_numbers(values, name)
+        q += [ratio, phase, turned]
+        rate += [ratio, 0.0, 0.0]
+        second += [ratio, 0.0, 0.0]
+    return q, rate, second
+
+
+def _is_whole(number: float) -> bool:
+    return abs(number - round(number)) < 1e-9 * max(1.0, number)
+
+
+def rubbing(system: System) -> list[str]:
+    """Joints that have friction."""
+    return [name for name, joint in system.mechanism.effective_joints.items() if joint.friction is not None]
+
+
+def law_of(system: System, joint: str) -> FrictionLaw:
+    """Friction law of a joint that has friction."""
+    friction = system.mechanism.effective_joints[joint].friction
+    return FRICTION_LAWS[friction.law if friction and friction.law else "coulomb"]
+
+
+def sticking(system: System) -> list[str]:
+    """Joints whose friction, or a load that resists them, is an interval where their relative speed is zero."""
+    resisted = {load.joint for load in system.mechanism.loads.values() if load.joint is not None}
+    rubbed = {name for name in rubbing(system) if law_of(system, name).interval_at_rest}
+    return [name for name in system.joints if name in resisted | rubbed]

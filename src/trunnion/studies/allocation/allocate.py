@@ -1,0 +1,359 @@
+"""The question of allocation: the tolerances and plays of least cost with which a mechanism keeps its limits.
+
+First order makes rows of the mechanism (`rows`), the rows and the costs make a convex or mixed-integer problem
+(`solve`), and what it finds goes back into the mechanism: effects that depend on the tolerances are taken again until
+they stay the same. Then the mechanism is analysed with the tolerances found: worst case by search, and samples.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.algebra.dual import Dual, derivative
+from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.model.mechanism import Mechanism
+from trunnion.model.prices import Price
+from trunnion.solve.friction_method import FrictionMethod
+from trunnion.statistics.costs import Cost
+from trunnion.studies.allocation.problem import CRITERIA, SHOWN, Answer, Contribution, Criterion, Option, Problem, none
+from trunnion.studies.allocation.rows import Rows, joined, part_of, rows_of
+from trunnion.studies.allocation.solve import CHOICES, solve, trade_off
+from trunnion.studies.allocation.solve import Choice as Way
+from trunnion.studies.tolerance.first_order import Study, study
+from trunnion.studies.tolerance.study import DEFAULT_SAMPLES, tolerance
+from trunnion.studies.tolerance.targets import limits
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+from trunnion.studies.allocation.allocated import CLOSE, DEFAULT_YIELD, Allocated, Asked, Choice, share_of
+
+__all__ = ["allocate", "half_widths"]
+
+Array = NDArray[np.float64]
+START = 1e-5  # m: a play that is none yet is first looked at with this one
+ROUNDS = 10
+SAME = 1e-9  # of a limit: effects that no longer change
+MOST_FACTORS = 201
+RANGE = (0.5, 2.0)  # of the stated limits: the curve of cost over accuracy
+
+
+def allocate(
+    mechanism: Mechanism,
+    measures: Sequence[str] | None = None,
+    criterion: Criterion = "worst-case",
+    target: float = DEFAULT_YIELD,
+    choice: Choice = "auto",
+    steps: int = 360,
+    at: float | str | None = None,
+    samples: int = DEFAULT_SAMPLES,
+    seed: int = 1,
+    curve: int = 0,
+    *,
+    exact: bool = False,
+    friction: FrictionMethod | None = None,
+    jobs: int | None = 1,
+    progress: Callable[[int], None] | None = None,
+) -> xr.Dataset:
+    """The tolerances and plays of least cost with which measures keep their limits, and what they do then.
+
+    What is to be chosen are the tolerances and plays with a cost (`Mechanism.prices`); all others stay as they are.
+    measures: those with limits that are to be kept; all of the model if not given. criterion: an entry of `CRITERIA`:
+    worst-case, rss, or yield, of which target is the share of mechanisms within all limits. choice: continuous,
+    discrete, or auto: discrete where any cost is a list of processes or options. steps: positions of a whole cycle; at:
+    the place of measures that state none. samples, seed: of the samples that verify it, none if 0; jobs: processes for
+    them. curve: how many points of cost over accuracy, all limits being multiplied by 0.5 to 2.
+    exact: take limits narrower until the worst case found on the mechanism keeps them, and not first order alone.
+    Returns the Dataset of `tolerance` for the mechanism with the tolerances found (`half_widths`), and over
+    (parameter), (measure), (offer) those of `result.VARIABLES`.
+    Raises MechanismError if nothing has a cost, no measure a limit, or as `tolerance` does. That no tolerances keep the
+    limits is a finding of the result.
+    """
+    from trunnion.studies.allocation.result import dataset
+
+    asked = Asked(criterion, target, choice, steps, at, samples, seed, friction, jobs, curve, exact)
+    _check(asked)
+    found = _found(mechanism, _limited(mechanism, measures), asked)
+    with_them = mechanism.with_tolerances(found.bought) if found.answer.found else mechanism
+    names = [of.measure.name for of in found.study.linear.measures]
+    methods = ["linear", "worst-case"] if found.answer.found else ["linear"]
+    if samples and found.answer.found:
+        methods.append("monte-carlo")
+    known = tolerance(
+        with_them, names, methods, max(samples, 1), seed, steps, at, friction=friction, jobs=jobs, progress=progress
+    )
+    return dataset(found, known)
+
+
+def half_widths(result: xr.Dataset) -> dict[str, float]:
+    """What an allocation found other than stated, by path, SI, for `Mechanism.with_tolerances`."""
+    if not result.attrs["found"]:
+        return {}
+    columns = (result[key].values.tolist() for key in ("parameter", "bought", "tolerance", "tolerance_before"))
+    return {name: t for name, there, t, was in zip(*columns, strict=True) if there and abs(t - was) > 1e-12 * t}
+
+
+def _check(asked: Asked) -> None:
+    findings = []
+    if asked.criterion not in CRITERIA:
+        remedy = f"use {', '.join(CRITERIA)}"
+        findings.append(Finding(f"there is no criterion '{asked.criterion}'", "criterion", remedy))
+    if asked.choice not in ("auto", *CHOICES):
+        remedy = f"use {', '.join(('auto', *CHOICES))}"
+        findings.append(Finding(f"there is no choice '{asked.choice}'", "choice", remedy))
+    if not 0 < asked.target < 1:
+        what = f"a yield of {asked.target:g} cannot be asked for"
+        findings.append(Finding(what, "yield", "give a share above 0 and below 1, such as 0.9973"))
+    if asked.samples < 0:
+        findings.append(Finding(f"{asked.samples} samples", "samples", "give a number from 0"))
+    if not (asked.curve == 0 or 2 <= asked.curve <= MOST_FACTORS):
+        findings.append(Finding(f"a curve of {asked.curve} points", "curve", f"give 2 to {MOST_FACTORS}"))
+    if findings:
+        raise MechanismError(findings)
+
+
+def _limited(mechanism: Mechanism, measures: Sequence[str] | None) -> list[str]:
+    """Names of the measures that have a limit, of those named; MechanismError if none has."""
+    names = list(mechanism.measures) if measures is None else list(measures)
+    keys = ("limit", "at_least", "at_most")
+    stated = mechanism.measures
+    found = [name for name in names if name in stated and any(getattr(stated[name], key) is not None for key in keys)]
+    if not found:
+        what = f"none of the measures {', '.join(names)} has a limit" if names else "no measure is stated"
+        remedy = "state what is to be kept, as measures: {position: {angle: rocker, limit: ±0.1 deg}}"
+        raise MechanismError(Finding(what, "measures", remedy))
+    return found
+
+
+def _found(mechanism: Mechanism, measures: Sequence[str], asked: Asked) -> Allocated:
+    """The allocation, with effects that belong to the tolerances found."""
+    if not mechanism.costs:
+        remedy = "say what tolerances cost, as costs: {AB: {model: power, B: 1, k: 0.45, unit: mm}}"
+        raise MechanismError(Finding("no tolerance has a cost", "costs", remedy))
+    absent = {one.path: _start(one) for one in mechanism.prices() if one.play and not _clearance(mechanism, one.path)}
+    now = _studied(mechanism.with_tolerances(absent) if absent else mechanism, measures, asked)
+    prices, told = _prices(now)
+    before = {**_stated(now, prices), **{path: 0.0 for path in absent if path in prices}}
+    way: Way = asked.choice if asked.choice != "auto" else _way(prices)
+    first = rows_of(now, _stated(now, prices), asked.criterion)
+    told += [_unknown(name) for name in first.unknown]
+    search = _Search(mechanism, measures, asked, prices, way)
+    answer, now, rows, more = search.run(now)
+    if asked.exact and asked.criterion == "worst-case" and answer.found:
+        answer, now, rows, more = search.tightened(answer, now, rows, more)
+    offers: list[tuple[float, Answer]] = []
+    if asked.curve and answer.found:
+        factors = np.geomspace(*RANGE, asked.curve).tolist()
+        offers = list(zip(factors, trade_off(answer.problem, factors, way, _target(asked)), strict=True))
+    findings = (*told, *more)
+    return Allocated(asked, now, rows, answer, way, prices, before, findings, search.tight, tuple(offers))
+
+
+def _studied(mechanism: Mechanism, measures: Sequence[str], asked: Asked) -> Study:
+    return study(mechanism, measures, asked.steps, asked.at, asked.friction)
+
+
+def _target(asked: Asked) -> float | None:
+    return asked.target if asked.criterion == "yield" else None
+
+
+def _way(prices: Mapping[str, Price]) -> Way:
+    return "discrete" if any(one.choices for one in prices.values()) else "continuous"
+
+
+# ---- what is bought -------------------------------------------------------------------------------------------
+
+
+def _clearance(mechanism: Mechanism, path: str) -> float:
+    """The radial clearance of a joint as it is stated."""
+    numbers, joint = mechanism.parameter_set.nominal, path.split(".")[1]
+    return next(
+        (float(numbers[name]) for part in ("pin", "guide") if (name := f"joints.{joint}.{part}.clearance") in numbers),
+        0.0,
+    )
+
+
+def _start(one: Price) -> float:
+    """A half width to begin with, where there is none."""
+    if one.choices:
+        return one.choices[0].tolerance
+    ends = [end for end in (one.least, one.most) if 0 < end < np.inf]
+    return float(np.sqrt(np.prod(ends))) if len(ends) == 2 else (ends[0] if ends else START)
+
+
+def _prices(found: Study) -> tuple[dict[str, Price], list[Finding]]:
+    """What can be bought of a study's numbers, by path, and what of the costs is of no use."""
+    mechanism, inputs = found.run.system.mechanism, found.inputs
+    known = {one.path: one for one in inputs.tolerances}
+    prices, findings = {}, []
+    for one in mechanism.prices():
+        what = ""
+        if one.path not in inputs.names:
+            what = "its pin has a given seat: the play does not vary"
+        elif one.path in known and known[one.path].direction:
+            what = "it may point anywhere: its tolerance has no middle to stay at"
+        elif plays := _plays_of(found, one.path):
+            what = (
+                f"it changes the play of {', '.join(plays)}: state pin.clearance and buy {plays[0]}.clearance instead"
+            )
+        if what:
+            remedy = "remove the cost; the tolerance stays as it is"
+            findings.append(Finding(f"cannot be bought, {what}", f"costs.{one.path}", remedy, Severity.WARNING))
+        else:
+            prices[one.path] = one
+    if not prices:
+        raise MechanismError(findings or [Finding("no tolerance has a cost", "costs", "say what a tolerance costs")])
+    return prices, findings
+
+
+def _plays_of(found: Study, path: str) -> list[str]:
+    """Joints whose pins may lie anywhere in a play that the number changes."""
+    mechanism, inputs = found.run.system.mechanism, found.inputs
+    if not any(one.path == path for one in inputs.tolerances):
+        return []
+    values = mechanism.parameters(deviations={path: Dual(0.0, 1.0)})
+    plays = {joint: inputs.play(joint, values) for joint in inputs.loose}
+    return [
+        joint for joint, play in plays.items() if play and any(np.any(derivative(radius) != 0) for radius in play.radii)
+    ]
+
+
+def _stated(found: Study, prices: Mapping[str, Price]) -> dict[str, float]:
+    """Half widths and clearances of a study, of what can be bought."""
+    mechanism = found.run.system.mechanism
+    known = {one.path: one.half_width for one in found.inputs.tolerances}
+    return {path: known[path] if path in known else _clearance(mechanism, path) for path in prices}
+
+
+def _contributions(found: Study, prices: Mapping[str, Price]) -> tuple[Contribution, ...]:
+    """All that varies: what can be bought with its price, the others with their effects as they are."""
+    return tuple(
+        _contribution(prices[name]) if name in prices else Contribution(name, 1.0) for name in found.inputs.names
+    )
+
+
+def _contribution(one: Price) -> Contribution:
+    cost = Cost(one.model, one.parameters) if one.model else None
+    options = tuple(Option(each.name, each.tolerance, each.cost) for each in one.choices)
+    return Contribution(one.path, 0.0, cost, options, one.group, one.least, one.most)
+
+
+# ---- rounds ---------------------------------------------------------------------------------------------------
+
+Found = tuple[Answer, Study, Rows, list[Finding]]
+
+
+class _Search:
+    """Rounds of rows and answers until they belong together."""
+
+    def __init__(
+        self, mechanism: Mechanism, measures: Sequence[str], asked: Asked, prices: Mapping[str, Price], way: Way
+    ) -> None:
+        self.mechanism, self.measures, self.asked, self.prices, self.way = mechanism, measures, asked, prices, way
+        self.tight: dict[str, float] = {}
+
+    def run(self, now: Study) -> Found:
+        """The answer with rows taken at its own tolerances, from those of a study."""
+        kept: Rows | None = None
+        rows = self._rows(now, _stated(now, self.prices))
+        for count in range(1, ROUNDS + 1):
+            whole = rows if kept is None else joined(rows, kept)
+            problem = Problem(_contributions(now, self.prices), whole.effects, self.asked.criterion)
+            off = _off(now)
+            answer = none(problem, off) if off else self._solved(problem)
+            if not answer.found:
+                break
+            bought = self._bought(answer)
+            after = _studied(self.mechanism.with_tolerances(bought), self.measures, self.asked)
+            ahead = self._rows(after, bought)
+            if _same(answer.problem, answer.tolerances, rows, ahead):
+                return answer, after, whole, []
+            if count < ROUNDS:
+                moving = part_of(rows, rows.moving)
+                kept = moving if kept is None else joined(moving, kept)
+                rows, now = ahead, after
+        else:
+            what = f"what the tolerances do depends on themselves, and has not settled after {ROUNDS} rounds"
+            return answer, now, whole, [Finding(what, "costs", "rely on the verification", Severity.WARNING)]
+        return answer, now, whole, []
+
+    def tightened(self, answer: Answer, now: Study, rows: Rows, told: list[Finding]) -> Found:
+        """The same with limits narrowed until the worst case found on the mechanism keeps the stated ones."""
+        for _ in range(ROUNDS):
+            beyond = {of.measure.name: share for of, share in zip(now.linear.measures, _beyond(now), strict=True)}
+            if max(beyond.values()) <= 1 + CLOSE:
+                break
+            for name, share in beyond.items():
+                if share > 1:
+                    self.tight[name] = self.tight.get(name, 1.0) / (share * (1 + CLOSE / 2))
+            answer, now, rows, told = self.run(now)
+            if not answer.found:
+                break
+        return answer, now, rows, told
+
+    def _rows(self, now: Study, bought: Mapping[str, float]) -> Rows:
+        return rows_of(now, bought, self.asked.criterion, self.tight)
+
+    def _bought(self, answer: Answer) -> dict[str, float]:
+        return {name: t for name, t in answer.by_name.items() if name in self.prices}
+
+    def _solved(self, problem: Problem) -> Answer:
+        """The answer of a problem; of a yield that of the samples."""
+        asked, names = self.asked, [one.name for one in problem.contributions]
+
+        def verify(tolerances: Array) -> tuple[float, float, float]:
+            bought = {name: float(t) for name, t in zip(names, tolerances, strict=True) if name in self.prices}
+            sampled = tolerance(
+                self.mechanism.with_tolerances(bought), self.measures, ["monte-carlo"], asked.samples, asked.seed,
+                asked.steps, asked.at, friction=asked.friction, jobs=asked.jobs,
+            )  # fmt: skip
+            if sampled.attrs["stopped"]:  # a part of the samples decides no tolerances
+                raise KeyboardInterrupt
+            share, low, high = (float(sampled[f"yield_all{end}"]) for end in ("", "_low", "_high"))
+            return share, low, high
+
+        return solve(problem, self.way, _target(asked), verify if asked.samples else None)
+
+
+def _same(problem: Problem, tolerances: Array, rows: Rows, ahead: Rows) -> bool:
+    """Whether the rows at the tolerances found take as much of their room as those they were found with."""
+    if len(ahead.measure) != len(rows.measure):
+        return False
+    before, after = (replace(problem, effects=one.effects).used(tolerances) for one in (rows, ahead))
+    still = ~rows.moving
+    return bool(np.all(np.abs(after - before)[still] <= SAME) and np.all(after[rows.moving] <= 1 + SAME))
+
+
+def _beyond(now: Study) -> list[float]:
+    """The worst case that is found on the mechanism, as a share of the limit it is nearest to, of each measure."""
+    found = []
+    for of, (least, most) in zip(now.linear.measures, now.worst(), strict=True):
+        lower, upper = limits(of)
+        found.append(max(share_of(least.value, lower), share_of(most.value, upper)))
+    return found
+
+
+def _off(now: Study) -> list[Finding]:
+    """Measures whose nominal figure is beyond their bounds, which no tolerance mends."""
+    found = []
+    for of in now.linear.measures:
+        lower, upper = limits(of)
+        if lower > 0 or upper < 0:
+            measure, nominal = of.measure, of.reference.figure
+            word, bound = ("at_least", nominal + lower) if lower > 0 else ("at_most", nominal + upper)
+            unit = measure.figure_unit(now.run.system, now.run.values)
+            factor, shown = SHOWN.get(unit, (1.0, "" if unit == "1" else unit))
+            told, limit = (f"{factor * value:.6g} {shown}".rstrip() for value in (nominal, bound))
+            what = f"the nominal figure is {told}, {word} is {limit}: no tolerance mends that"
+            found.append(Finding(what, f"measures.{measure.name}", "change the mechanism or the bound"))
+    return found
+
+
+def _unknown(name: str) -> Finding:
+    what = "first order says nothing of it: no tolerances were chosen for its limits"
+    return Finding(what, f"measures.{name}", "see whether the samples keep them", Severity.WARNING)

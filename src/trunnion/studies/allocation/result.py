@@ -1,0 +1,195 @@
+"""The Dataset of `allocate`: that of `tolerance` with the tolerances found, what they cost, and what accuracy costs."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.cycle.account import finding_row
+from trunnion.errors import Severity
+from trunnion.model.prices import Price
+from trunnion.statistics.costs import Cost
+from trunnion.studies.allocation.allocated import Allocated
+from trunnion.studies.allocation.said import findings_of, summary
+from trunnion.studies.tolerance.result import Variable
+from trunnion.studies.tolerance.targets import MISSED
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["VARIABLES", "cost_of", "dataset"]
+
+Array = NDArray[np.float64]
+M, P, T = ("measure",), ("parameter",), ("trial",)
+VARIABLES: dict[str, Variable] = {
+    "tolerance": Variable(P, "parameter", "half width found; of a clearance the radial clearance; else as stated"),
+    "bought": Variable(P, "1", "1 if the tolerance has a cost and was chosen, 0 if it stays as stated"),
+    "choice": Variable(P, "", "process or option, where there are such"),
+    "cost": Variable(P, "1", "cost of the tolerance found"),
+    "cost_share": Variable(P, "1", "share of the whole cost"),
+    "tolerance_before": Variable(P, "parameter", "half width as stated"),
+    "cost_before": Variable(P, "1", "cost of the tolerance as stated; NaN where no option has that half width"),
+    "tolerance_least": Variable(P, "parameter", "least half width that may be bought"),
+    "tolerance_most": Variable(P, "parameter", "largest half width that may be bought"),
+    "option_tolerance": Variable(("parameter", "option"), "parameter", "half width that an option keeps"),
+    "option_cost": Variable(("parameter", "option"), "1", "cost of an option"),
+    "used": Variable(M, "1", "largest share of its room between the limits that the measure takes, by the criterion"),
+    "used_curve": Variable(("measure", "position"), "1", "share of its room that the measure takes, by the criterion"),
+    "saving": Variable(M, "1/", "cost that one unit more of room at every position would save"),
+    "cost_total": Variable((), "1", "cost of all tolerances found"),
+    "cost_total_before": Variable((), "1", "cost of all tolerances as stated"),
+    "cost_bound": Variable((), "1", "cost below which no tolerances keep the limits, to first order"),
+    "gap": Variable((), "1", "how far the cost may lie above the least, as a share of what the tolerances change"),
+    "yield_expected": Variable((), "1", "yield of normal deviations, to first order"),
+    "trial_margin": Variable(T, "1", "standard deviations of room in a trial"),
+    "trial_cost": Variable(T, "1", "cost of a trial"),
+    "trial_yield": Variable(T, "1", "share of the samples within all limits in a trial"),
+    "trial_yield_low": Variable(T, "1", "yield of a trial, lower end of the 95 % interval"),
+    "trial_yield_high": Variable(T, "1", "yield of a trial, upper end of the 95 % interval"),
+    "trade_off_factor": Variable(("offer",), "1", "what all limits are multiplied by"),
+    "trade_off_cost": Variable(("offer",), "1", "least cost of such limits; NaN if nothing keeps them"),
+    "trade_off_tolerance": Variable(("offer", "parameter"), "parameter", "half widths of least cost of such limits"),
+}
+
+
+def cost_of(price: Price, t: float) -> float:
+    """Cost of a half width, SI; of options, of the one that has it, NaN if none has."""
+    if price.model:
+        return Cost(price.model, price.parameters).value(t)
+    same = [one.cost for one in price.choices if abs(one.tolerance - t) <= 1e-9 * one.tolerance]
+    return min(same, default=np.nan)
+
+
+def dataset(found: Allocated, known: xr.Dataset) -> xr.Dataset:
+    """The result with the numbers of the allocation. known: `tolerance` of the mechanism with the tolerances found."""
+    import xarray as xr
+
+    arrays = {**_bought(found, known), **_rows(found, known), **_whole(found)}
+    units = json.loads(known.attrs["parameter_units"])
+    one = units[0] if len(set(units)) == 1 else ""
+    variables = {
+        name: xr.Variable(
+            VARIABLES[name].dims,
+            values,
+            {
+                "units": {"parameter": one, "1/": ""}.get(VARIABLES[name].units, VARIABLES[name].units),
+                "long_name": VARIABLES[name].long_name,
+            },
+        )
+        for name, values in arrays.items()
+    }
+    told = json.loads(known.attrs["findings"])
+    kept = [row for row in told if not row["what"].startswith(MISSED)]  # the criterion says what is to be kept
+    own = [finding_row(finding) for finding in findings_of(found, known)]
+    errors = [row for row in own if row["severity"] == Severity.ERROR.value]
+    attributes: dict[str, Any] = {
+        "found": int(found.answer.found),
+        "criterion": found.asked.criterion,
+        "target": found.asked.target,
+        "choices": found.way,
+        "proven": int(found.answer.proven),
+        "prices": json.dumps([_plain(price) for price in found.prices.values()], ensure_ascii=False),
+        "summary": json.dumps(
+            [*summary(found, known, arrays), *json.loads(known.attrs["summary"])], ensure_ascii=False
+        ),
+        "findings": json.dumps([*own, *kept], ensure_ascii=False),
+        "missed": json.dumps([f"{row['where']}: {row['what']}".lstrip(": ") for row in errors], ensure_ascii=False),
+    }
+    return known.assign(variables).assign_attrs(attributes)
+
+
+def _plain(price: Price) -> dict[str, Any]:
+    """A price for JSON, which has no infinite numbers."""
+    return {**asdict(price), "most": price.most if np.isfinite(price.most) else None}
+
+
+def _bought(found: Allocated, known: xr.Dataset) -> dict[str, Any]:
+    """What is of each parameter."""
+    names = [str(name) for name in known["parameter"].values]
+    answer, prices = found.answer, found.prices
+    halves = (known["parameter_upper"].values - known["parameter_lower"].values) / 2
+    as_stated = [
+        float(known["parameter_nominal"].values[i]) if _is_play(found, name) else float(halves[i])
+        for i, name in enumerate(names)
+    ]
+    costs = dict(zip((one.name for one in answer.problem.contributions), answer.costs.tolist(), strict=True))
+    chosen, before = found.bought, found.before
+    cost = np.array([costs[name] if name in prices else np.nan for name in names])
+    width = max((len(one.choices) for one in prices.values()), default=0)
+    options = np.full((2, len(names), width), np.nan)
+    for i, name in enumerate(names):
+        for k, one in enumerate(prices[name].choices if name in prices else ()):
+            options[:, i, k] = one.tolerance, one.cost
+    arrays: dict[str, Any] = {
+        "tolerance": np.array([chosen.get(name, half) for name, half in zip(names, as_stated, strict=True)]),
+        "bought": np.array([int(name in prices) for name in names], np.int8),
+        "choice": np.array([answer.choices.get(name, "") for name in names], str),
+        "cost": cost,
+        "cost_share": cost / answer.cost if answer.cost else np.full(len(names), np.nan),
+        "tolerance_before": np.array([before.get(name, half) for name, half in zip(names, as_stated, strict=True)]),
+        "cost_before": np.array([cost_of(prices[name], before[name]) if name in prices else np.nan for name in names]),
+        "tolerance_least": np.array([prices[name].least if name in prices else np.nan for name in names]),
+        "tolerance_most": np.array([_most(prices[name]) if name in prices else np.nan for name in names]),
+    }
+    if width:
+        arrays |= {"option_tolerance": options[0], "option_cost": options[1]}
+    if found.offers:
+        offered = [answer.by_name for _, answer in found.offers]
+        arrays["trade_off_tolerance"] = np.array([[one[name] if name in prices else np.nan for name in names]
+                                                  for one in offered])  # fmt: skip
+    return arrays
+
+
+def _is_play(found: Allocated, name: str) -> bool:
+    return name.endswith(".clearance") and name.split(".")[1] in found.study.inputs.loose and name.count(".") == 2
+
+
+def _most(price: Price) -> float:
+    return price.most if np.isfinite(price.most) else np.nan
+
+
+def _rows(found: Allocated, known: xr.Dataset) -> dict[str, Any]:
+    """How much of its room each measure takes, and what more of it would save."""
+    count, positions = known.sizes["measure"], known.sizes["position"]
+    used, curve, saving = np.full(count, np.nan), np.full((count, positions), np.nan), np.full(count, np.nan)
+    if found.answer.found:
+        shares = found.answer.used[: len(found.rows.measure)]
+        prices = found.answer.price[: len(found.rows.measure)]
+        for k in range(count):
+            own = found.rows.measure == k
+            if np.any(own):
+                used[k], saving[k] = float(np.max(shares[own])), float(np.sum(prices[own]))
+                placed = own & (found.rows.position >= 0)
+                curve[k, found.rows.position[placed]] = shares[placed]
+    return {"used": used, "used_curve": curve, "saving": saving}
+
+
+def _whole(found: Allocated) -> Mapping[str, Any]:
+    """What is of the whole."""
+    answer = found.answer
+    before = [cost_of(price, found.before[name]) for name, price in found.prices.items()]
+    arrays: dict[str, Any] = {
+        "cost_total": np.array(answer.cost),
+        "cost_total_before": np.array(float(np.sum(before))),
+        "cost_bound": np.array(answer.bound),
+        "gap": np.array(answer.gap),
+    }
+    if found.asked.criterion == "yield":
+        arrays["yield_expected"] = np.array(answer.expected)
+    if answer.trials:
+        arrays |= {
+            "trial_margin": np.array([one.z for one in answer.trials]),
+            "trial_cost": np.array([one.cost for one in answer.trials]),
+            "trial_yield": np.array([one.sampled.share for one in answer.trials]),
+            "trial_yield_low": np.array([one.sampled.low for one in answer.trials]),
+            "trial_yield_high": np.array([one.sampled.high for one in answer.trials]),
+        }
+    if found.offers:
+        arrays["trade_off_factor"] = np.array([factor for factor, _ in found.offers])
+        arrays["trade_off_cost"] = np.array([answer.cost for _, answer in found.offers])
+    return arrays

@@ -1,0 +1,128 @@
+"""What an allocation says in words: its summary, its findings, and whether the limits are kept on the mechanism."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from trunnion.errors import Finding, Severity
+from trunnion.studies.allocation.allocated import CLOSE, DEFAULT_YIELD, share_of
+from trunnion.studies.allocation.problem import SHOWN
+from trunnion.studies.tolerance.targets import limits
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from trunnion.studies.allocation.allocated import Allocated
+
+__all__ = ["findings_of", "summary"]
+
+TWICE = 2.0  # so many rejects as an RSS stands for are an error
+ROUGH, SLIGHT = 0.01, 0.001  # of a limit: what first order may leave out before it is an error, and a warning
+
+
+def summary(found: Allocated, known: xr.Dataset, arrays: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """What all costs, and before; what of the room is taken."""
+    answer = found.answer
+    rows = [("cost, least", answer.cost if answer.found else None)]
+    if np.isfinite(arrays["cost_total_before"]):
+        rows.append(("cost as stated", float(arrays["cost_total_before"])))
+    if answer.found:
+        rows.append(("lower bound of the cost", answer.bound))
+    if answer.sampled is not None:
+        rows += [("yield asked for", found.asked.target), ("yield of the samples", answer.sampled.share)]
+    names = [str(name) for name in known["measure"].values]
+    for name, used in zip(names, arrays["used"].tolist(), strict=True):
+        if answer.found and np.isfinite(used):
+            rows.append((f"{name}, share of its room that is taken", used))
+    return [{"label": label, "value": _plain(value), "unit": "1"} for label, value in rows]
+
+
+def _plain(value: Any) -> float | None:
+    number = None if value is None else float(value)
+    return number if number is not None and np.isfinite(number) else None
+
+
+def findings_of(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:
+    """Why there is no allocation; that it is proven; limits that are not kept on the mechanism itself."""
+    answer = found.answer
+    yield from found.findings
+    yield from answer.findings
+    if not answer.found:
+        return
+    if answer.proven:
+        what = f"no tolerances cost less, to first order: proven to {max(answer.gap, 0.0):.1e} of what they change"
+        if found.asked.criterion == "yield":
+            what = "no tolerances with the same margin at every limit cost less, to first order"
+        yield Finding(what, "", "", Severity.NOTE)
+    for name, share in found.tight.items():
+        what = f"its limits were taken {100 * (1 - share):.2g} % narrower, so that the mechanism itself keeps them"
+        yield Finding(what, f"measures.{name}", "", Severity.NOTE)
+    if found.asked.criterion != "yield" and found.study.effects.correlated:
+        what = f"the criterion {found.asked.criterion} leaves the correlations out"
+        yield Finding(what, "correlations", "ask for a yield, which has them", Severity.WARNING)
+    if found.asked.criterion == "worst-case":
+        yield from _searched(found, known)
+    if found.asked.criterion == "rss" and "yield" in known:
+        yield from _promised(known)
+    if found.asked.criterion == "yield" and "yield_all" in known and answer.sampled is not None:
+        yield from _yielded(found, known)
+    missing = [factor for factor, one in found.offers if not one.found]
+    if missing:
+        least = min((factor for factor, one in found.offers if one.found), default=np.nan)
+        points = f"1 of the {len(found.offers)} points of the curve has"
+        if len(missing) > 1:
+            points = f"{len(missing)} of the {len(found.offers)} points of the curve have"
+        remedy = f"limits of at least {least:.3g} times the stated ones can be kept" if np.isfinite(least) else ""
+        yield Finding(f"{points} no tolerances that keep the limits", "", remedy, Severity.NOTE)
+
+
+def _yielded(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:
+    """That the samples have less than the yield asked for: an error if it is not within their interval."""
+    target, any_other = found.asked.target, any(one.where == "yield" for one in found.answer.findings)
+    share, low, high = (float(known[f"yield_all{end}"]) for end in ("", "_low", "_high"))
+    if high < target and not any_other:
+        what = f"the yield of the samples is {share:.6g}, {target:g} was asked for"
+        yield Finding(what, "yield", "ask for more, or allow narrower tolerances")
+    elif share < target <= high:
+        what = f"the yield of the samples is {share:.6g}, less than {target:g}, which lies in its interval "
+        remedy = "take more samples, or ask for more, to be surer"
+        yield Finding(f"{what}{low:.6g} to {high:.6g}", "yield", remedy, Severity.NOTE)
+
+
+def _promised(known: xr.Dataset) -> Iterator[Finding]:
+    """Measures of whose samples fewer keep the limits than three deviations of a normal one would.
+
+    That is what RSS means where the tolerances are three deviations of theirs; other distributions, means off the
+    middle, and correlations make it another.
+    """
+    for name, share, high in zip(
+        *(known[key].values.tolist() for key in ("measure", "yield", "yield_high")), strict=True
+    ):
+        if not high < DEFAULT_YIELD:
+            continue
+        what = f"the yield of the samples is {share:.6g}, an RSS within the limits stands for {DEFAULT_YIELD:g}"
+        remedy = "ask for that yield, which takes distributions, means and correlations as they are"
+        severity = Severity.ERROR if 1 - high > TWICE * (1 - DEFAULT_YIELD) else Severity.WARNING
+        yield Finding(what, f"measures.{name}", remedy, severity)
+
+
+def _searched(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:
+    """Measures whose worst case, as found on the mechanism, is beyond a limit that first order keeps."""
+    units = json.loads(known.attrs["measure_units"])
+    for k, of in enumerate(found.study.linear.measures):
+        lower, upper = limits(of)
+        low, high = float(known["searched_lower"][k]), float(known["searched_upper"][k])
+        shares = share_of(low, lower), share_of(high, upper)
+        beyond = max(shares) - 1
+        if not beyond > CLOSE:
+            continue
+        factor, unit = SHOWN.get(units[k], (1.0, units[k]))
+        value, limit = (high, upper) if shares[1] >= shares[0] else (low, lower)
+        what = f"the worst case found on the mechanism is {factor * value:+.6g} {unit}, {100 * beyond:.2g} % beyond "
+        what += f"the limit {factor * limit:+.6g} {unit} that first order keeps"
+        severity = Severity.ERROR if beyond > ROUGH else Severity.WARNING if beyond > SLIGHT else Severity.NOTE
+        yield Finding(what, f"measures.{of.measure.name}", "ask for `exact`, which takes them narrower", severity)

@@ -1,0 +1,178 @@
+"""Least cost that keeps a yield: the margin z of all rows, first for normal deviations, then as sampled.
+
+The yield of all rows together, linearly and with normal deviations, is a normal probability of a polytope. With the
+deviations in polar form its radius is integrated exactly (chi distribution) and its direction by a Sobol sequence
+(I. Deák, Three digit accurate multiple normal probabilities, Numerische Mathematik 35 (1980) 369–380). Rows of one
+measure at neighbouring positions fail together, so this is far closer than the sum of their failures (Bonferroni),
+which bounds z from above. The margin found is then corrected until the yield that the caller samples meets the target.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+from scipy.special import chdtr, ndtr, ndtri
+
+from trunnion.errors import Finding, Severity
+from trunnion.statistics.streams import SobolStream, factor
+from trunnion.studies.allocation.problem import Answer, Problem, Sampled, Trial
+
+__all__ = ["Verify", "meet", "normal_yield"]
+
+Array = NDArray[np.float64]
+Verify = Callable[[Array], tuple[float, float, float]]
+DIRECTIONS = 2048
+ROWS = 128  # worked on at once
+FAR = 6.0  # standard deviations: a row with more room than that never fails
+TRIALS = 12
+STEP = 1.0  # of z, at most, after one sampling
+CLOSE = 1e-3  # of z: two choices of processes that lie closer are neighbours
+SURE = 1e-9  # of the target, in standard scores
+
+
+def normal_yield(problem: Problem, tolerances: Array) -> float:
+    """Share of mechanisms within all limits, for normal deviations and linear rows.
+
+    The row that fails most is reckoned exactly, and the directions only say what the others add to it.
+    """
+    effects = problem.effects
+    sigma = effects.sigma() * tolerances
+    if effects.correlation is not None:
+        sigma = sigma @ factor(effects.correlation)
+    middle = effects.middle() + effects.drift() @ tolerances
+    each = np.sqrt(np.sum(sigma**2, axis=1))
+    room = np.stack([effects.upper - middle, middle - effects.lower])
+    still = each == 0
+    if np.any(room[:, still] < 0):
+        return 0.0
+    rows = np.flatnonzero((np.min(room, axis=0) < FAR * each) & ~still)
+    parts = np.flatnonzero(np.any(sigma[rows] != 0, axis=0))
+    if not len(rows):
+        return 1.0
+    fails = np.sum(ndtr(-room[:, rows] / each[rows]), axis=0)
+    worst = int(np.argmax(fails))
+    within = _within(sigma[np.ix_(rows, parts)], room[:, rows])
+    alone = _within(sigma[np.ix_(rows[worst : worst + 1], parts)], room[:, rows[worst : worst + 1]])
+    return float(np.clip(1 - fails[worst] + within - alone, 0.0, 1.0))
+
+
+def _within(sigma: Array, room: Array) -> float:
+    """Share of the directions' rays that lies within all rows: sigma (row, part), room (side, row)."""
+    dims = sigma.shape[1]
+    directions = _directions(dims)
+    first, last = np.zeros(directions.shape[1]), np.full(directions.shape[1], np.inf)
+    for start in range(0, len(sigma), ROWS):
+        part = slice(start, start + ROWS)
+        along = sigma[part] @ directions
+        for slope, free in ((along, room[0, part, None]), (-along, room[1, part, None])):
+            with np.errstate(divide="ignore", invalid="ignore"):
+                radius = free / slope
+            last = np.minimum(last, np.min(np.where(slope > 0, radius, np.inf), axis=0))
+            if np.any(free < 0):
+                first = np.maximum(first, np.max(np.where(slope < 0, radius, -np.inf), axis=0))
+    inside = chdtr(dims, np.maximum(last, 0.0) ** 2) - chdtr(dims, first**2)
+    return float(np.mean(np.where(last > first, inside, 0.0)))
+
+
+@lru_cache(maxsize=8)
+def _directions(dims: int) -> Array:
+    """Unit vectors, each with its opposite, (component, direction)."""
+    if dims == 1:
+        return np.array([[1.0, -1.0]])
+    points = ndtri(SobolStream(seed=0, replicate=0, dims=dims).points(0, DIRECTIONS // 2))
+    points = points / np.sqrt(np.sum(points**2, axis=0))
+    return np.concatenate([points, -points], axis=1)
+
+
+def meet(problem: Problem, target: float, solve: Callable[[Problem], Answer], verify: Verify | None = None) -> Answer:
+    """The allocation of least cost whose yield meets the target.
+
+    solve: of a problem with z given; verify: half widths (contribution,) → yield, and its interval, low and high.
+    """
+    answer = _expected(problem, target, solve)
+    if not answer.found or verify is None:
+        return answer
+    return _sampled(answer, target, solve, verify)
+
+
+def _expected(problem: Problem, target: float, solve: Callable[[Problem], Answer]) -> Answer:
+    """The cheapest allocation that meets the target for normal deviations."""
+    tried: list[Answer] = []
+
+    def over(z: float) -> float:
+        answer = solve(replace(problem, z=z))
+        if not answer.found:
+            return 8.0
+        answer = replace(answer, expected=normal_yield(problem, answer.tolerances))
+        tried.append(answer)
+        return _score(answer.expected) - _score(target)
+
+    rows = len(problem.effects.worst)
+    low, high = max(float(ndtri(target)) - 1e-3, 1e-3), float(ndtri(1 - (1 - target) / (2 * rows))) + 1e-3
+    if over(low) < 0 and over(high) > 0:
+        brentq(over, low, high, xtol=1e-9, rtol=1e-12)
+    if not tried:
+        return solve(replace(problem, z=low))
+    enough = [one for one in tried if _score(one.expected) >= _score(target) - SURE * 10]
+    if enough:
+        return min(enough, key=lambda one: one.cost)
+    best = max(tried, key=lambda one: one.expected)
+    what = f"with all tolerances as narrow as they can be the yield is {best.expected:.6g}, not {target:g}"
+    doubt = Finding(what, "yield", "allow narrower tolerances, widen a limit or ask for less", Severity.ERROR)
+    return replace(best, findings=(*best.findings, doubt))
+
+
+def _sampled(answer: Answer, target: float, solve: Callable[[Problem], Answer], verify: Verify) -> Answer:
+    """The same with the margin corrected by what is sampled, until the target lies in the interval of the yield."""
+    low, high = 0.0, np.inf
+    z, problem = answer.problem.z, answer.problem
+    seen: dict[bytes, Answer] = {}
+    trials: list[Trial] = []
+    while len(trials) < TRIALS:
+        if answer.found:
+            key = np.round(answer.tolerances, 15).tobytes()
+            known = seen.get(key)
+            sampled = known.sampled if known and known.sampled else Sampled(*verify(answer.tolerances))
+            seen[key] = answer = replace(answer, sampled=sampled)
+            trials.append(Trial(z, answer.cost, sampled))
+            if sampled.low <= target <= sampled.high:
+                break
+            short = sampled.high < target
+            step = _correction(trials, target)
+        else:
+            short, step = False, np.nan
+        low, high = (z, high) if short else (low, z)
+        if high - low < CLOSE:
+            break
+        z = z + step
+        if not low < z < high:
+            z = (low + high) / 2 if np.isfinite(high) else low + STEP
+        answer = solve(replace(problem, z=z))
+        if answer.found:
+            answer = replace(answer, expected=normal_yield(problem, answer.tolerances))
+    met = [one for one in seen.values() if one.sampled and one.sampled.high >= target]
+    best = min(met, key=lambda one: one.cost) if met else max(seen.values(), key=lambda one: (one.sampled or (0.0,))[0])
+    if met:
+        return replace(best, trials=tuple(trials))
+    share = best.sampled.share if best.sampled else np.nan
+    what = f"the best yield that was sampled is {share:.6g}, not {target:g}"
+    doubt = Finding(what, "yield", "allow narrower tolerances, widen a limit or ask for less", Severity.ERROR)
+    return replace(best, trials=tuple(trials), findings=(*best.findings, doubt))
+
+
+def _correction(trials: list[Trial], target: float) -> float:
+    """Change of z by the line through the last two trials, or from 0 through the one: scores are nearly linear in z."""
+    z, score = trials[-1].z, _score(trials[-1].sampled.share)
+    z0, score0 = (trials[-2].z, _score(trials[-2].sampled.share)) if len(trials) > 1 else (0.0, 0.0)
+    rise = (score - score0) / (z - z0) if z != z0 else 1.0
+    return float(np.clip((_score(target) - score) / max(rise, 0.1), -STEP, STEP))
+
+
+def _score(share: float) -> float:
+    """The standard score whose symmetric range has this probability, within ±8."""
+    return float(ndtri((1 + min(max(share, 0.0), 1 - 1e-12)) / 2))

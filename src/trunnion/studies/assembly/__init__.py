@@ -1,0 +1,1 @@
+"""Whether an over-constrained mechanism goes together as it is built."""

@@ -1,0 +1,287 @@
+"""What the answer to "does it go together?" consists of, what it says, and how it is handed out."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from enum import IntEnum
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.algebra.dual import primal
+from trunnion.cycle.account import finding_row
+from trunnion.errors import Finding, Severity
+from trunnion.solve.system import System, Values
+from trunnion.version import __version__
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["ENOUGH", "FIGURES", "Fit", "Result", "labels"]
+
+Array = NDArray[np.float64]
+ENOUGH = 1 + 1e-9  # of the stated clearances: all of it is enough
+EVERYWHERE = "everywhere"
+SAME = 1e-6  # of a need: one that varies by less has no place
+TOLD = 0.05  # a joint's part in the need that is worth telling
+SOURCE = (
+    "P. J. Goulart and Y. Chen, Clarabel: an interior-point solver for conic programs with quadratic objectives, "
+    "arXiv:2405.12762"
+)
+
+
+class Fit(IntEnum):
+    """What a position came to."""
+
+    text: str
+
+    def __new__(cls, value: int, text: str) -> Fit:
+        """An integer code that carries its sentence."""
+        one = int.__new__(cls, value)
+        one._value_ = value
+        one.text = text
+        return one
+
+    FITS = 0, "it can be assembled"
+    SHORT = 1, "the stated clearances do not suffice"
+    RIGID = 2, "no play is stated that could close the loops, however large"
+    UNSETTLED = 3, "the least clearance was not found"
+    APART = 4, "it cannot be assembled, with or without errors"
+
+
+class Figure(NamedTuple):
+    """Dimensions, unit, long name."""
+
+    dims: tuple[str, ...]
+    units: str
+    long_name: str
+
+
+LANES = ("position",)
+OFFSETS = ("joint", "end", "axis", "position")
+PARTS = ("joint", "end", "position")
+FIGURES: dict[str, Figure] = {
+    "smallest_clearance": Figure((), "m", "the largest needed clearance of the cycle, between the positions too"),
+    "largest_share": Figure((), "1", "the largest needed share of the cycle, between the positions too"),
+    "drive_coordinate": Figure(("driver", "position"), "", "coordinate of the driver, rad or m"),
+    "needed_share": Figure(
+        LANES, "1", "share of the stated clearances that it takes to close the loops; above 1: too small"
+    ),
+    "needed_clearance": Figure(LANES, "m", "smallest radial clearance, the same in every pin, that closes the loops"),
+    "open_angle": Figure(LANES, "rad", "how far the loops stay open without play, in angle"),
+    "open_length": Figure(LANES, "m", "how far the loops stay open without play, in length"),
+    "stated_offset": Figure(OFFSETS, "m", "offset of the pin's end at the needed share, in the hole's frame"),
+    "uniform_offset": Figure(OFFSETS, "m", "offset of the pin's end at the needed clearance, in the hole's frame"),
+    "stated_part": Figure(PARTS, "1", "part that an end's play has in the needed share; they add up to 1"),
+    "uniform_part": Figure(PARTS, "1", "part that an end's play has in the needed clearance; they add up to 1"),
+    "closure_residual": Figure(LANES, "1", "largest exact opening of a loop at these offsets, rad or of the size"),
+    "certificate": Figure(LANES, "1", "how far the proven lower bound of the need lies below it, relative"),
+    "status": Figure(LANES, "1", "code of what the position came to; see the attribute flag_meanings"),
+}
+
+
+def labels(system: System) -> dict[str, list[str]]:
+    """Names along the dimensions."""
+    ends = {"end": ["1", "2", "3", "4"], "axis": ["x", "y", "z"]}
+    return {"driver": list(system.mechanism.drivers), "joint": list(system.joints), **ends}
+
+
+@dataclass
+class Result:
+    """What was found, at times, s: arrays by the names of FIGURES, and what there is to say.
+
+    share, clearance: the largest needs of the cycle, each with its time; of: joints whose clearance is looked for;
+    pins: whether they are pins alone; played: whether any play is stated; nil: whether a clearance of 0 is.
+    """
+
+    system: System
+    values: Values
+    time: Array
+    arrays: dict[str, NDArray[Any]] = field(init=False)
+    findings: list[Finding] = field(default_factory=list)
+    share: tuple[float, float] = (0.0, 0.0)
+    clearance: tuple[float, float] = (0.0, 0.0)
+    of: str = ""
+    pins: bool = True
+    played: bool = False
+    nil: bool = False
+
+    def __post_init__(self) -> None:
+        sizes = {"position": len(self.time), **{dim: len(names) for dim, names in labels(self.system).items()}}
+        self.arrays = {
+            name: np.full([sizes[dim] for dim in one.dims], 0.0 if one.dims == PARTS else np.nan)
+            for name, one in FIGURES.items()
+        }
+        self.arrays["status"] = np.zeros(len(self.time), np.int8)
+        for i, driver in enumerate(self.system.mechanism.drivers):
+            self.arrays["drive_coordinate"][i] = primal(self.system.drive(self.values, driver, self.time)[0])
+
+    def where(self, time: float) -> str:
+        """A time in words: the drive coordinate, if there is one."""
+        dial = self.system.dial(self.values, np.array([time]))
+        return f"{dial.at(0)} of {dial.of}" if dial.of else dial.at(0)
+
+    def _place(self, most: tuple[float, float], needs: NDArray[Any]) -> str:
+        """Where the largest need, with its time, is among those of the positions: everywhere, if it is one number."""
+        need, time = most
+        same = len(needs) > 1 and bool(np.all(np.isfinite(needs))) and need - float(np.min(needs)) <= SAME * need
+        return EVERYWHERE if same else f"at {self.where(time)}"
+
+    def _share_place(self) -> str:
+        return self._place(self.share, self.arrays["needed_share"])
+
+    def _need_place(self) -> str:
+        return self._place(self.clearance, self.arrays["needed_clearance"])
+
+    # ---- what there is to say -------------------------------------------------------------------------------
+
+    def tell(self) -> None:
+        """Add where the clearances suffice and where not, and what would."""
+        count = len(self.findings)
+        self._apart()
+        self._short()
+        self._rigid()
+        unsettled = np.flatnonzero(self.arrays["status"] == Fit.UNSETTLED)
+        if len(unsettled):
+            remedy = "pins that share an axis hold each other along it: give one an end float, or make it cylindrical"
+            self._say(f"{Fit.UNSETTLED.text} {self._intervals(unsettled)}", "joints", remedy)
+        if len(self.findings) > count or not self.of:
+            return
+        share = self.share[0]
+        what = "the axes fit: the loops close without any clearance"
+        if share > 0:
+            what = f"the stated clearances take up the errors: {_share(share)} of them is needed, {self._share_place()}"
+        self._say(what, "joints", "", Severity.NOTE)
+
+    def _say(self, what: str, where: str, remedy: str, severity: Severity = Severity.ERROR) -> None:
+        self.findings.append(Finding(what, where, remedy, severity))
+
+    def _intervals(self, places: NDArray[np.intp]) -> str:
+        return self.system.dial(self.values, self.time).intervals(places)
+
+    def _apart(self) -> None:
+        places = np.flatnonzero(self.arrays["status"] == Fit.APART)
+        if len(places):
+            remedy = "check the lengths, or limit the range of the driver"
+            self._say(f"{Fit.APART.text} {self._intervals(places)}", "links", remedy)
+
+    def _short(self) -> None:
+        (share, at), short = self.share, np.flatnonzero(self.arrays["status"] == Fit.SHORT)
+        what = "the stated clearances do not close the loops"
+        if len(short):
+            place, takes = self._share_place(), f"it takes {_share(share)} times as much"
+            takes = f"{takes} {place}" if place == EVERYWHERE else f"{place} {takes}"
+            what = f"{what} {self._intervals(short)}: {takes}"
+            self._say(what, "joints", self._remedy())
+        elif np.isfinite(share) and share > ENOUGH:  # between the positions
+            what = f"{what} near {self.where(at)}: it takes {_share(share)} times as much"
+            self._say(what, "joints", self._remedy())
+
+    def _rigid(self) -> None:
+        places = np.flatnonzero(self.arrays["status"] == Fit.RIGID)
+        if not len(places):
+            return
+        angle, length = (float(np.nanmax(self.arrays[name])) for name in ("open_angle", "open_length"))
+        sizes = [f"{1e3 * length:.4g} mm"] * (length > 0) + [f"{np.degrees(angle):.4g}°"] * (angle > 0)
+        by = f"{' and '.join(sizes)} {self._intervals(places)}"
+        none = "a stated clearance of 0 is no play: the loops" if self.nil else "no play is stated: the loops"
+        if self.played:
+            zero = " (a clearance of 0 is none)" if self.nil else ""
+            none = f"the stated play cannot close the loops, however large{zero}: they"
+        self._say(f"{none} stay open by up to {by}", "joints", self._remedy())
+
+    def _remedy(self) -> str:
+        need = self.clearance[0]
+        if not np.isfinite(need):
+            return "give pins a clearance, those that nothing lets move along their axis an end float; or mend the axes"
+        size = f"{_enough(1e3 * need)} mm" if need >= 1e-4 else f"{_enough(1e6 * need)} um"
+        pins = "the pins " if self.pins else ""
+        return f"the smallest radial clearance, the same in {pins}{self.of}, is {size}, needed {self._need_place()}"
+
+    # ---- figures --------------------------------------------------------------------------------------------
+
+    def summary(self) -> list[dict[str, Any]]:
+        """The figures one looks at first."""
+        share, need = self.share[0], self.clearance[0]
+        if not self.of:
+            return [_row("smallest clearance that is needed", 0.0, "mm")]
+        angle, length = (float(np.nanmax(self.arrays[name], initial=0.0)) for name in ("open_angle", "open_length"))
+        rows = [
+            _row("loops open without play, angle", float(np.degrees(angle)), "deg"),
+            _row("loops open without play, length", 1e3 * length, "mm"),
+        ]
+        if angle > 0 or length > 0:
+            rows = [row for row in rows if row["value"] > 0]
+        if self.played:
+            # what six digits show as 1 is told by as many as it takes
+            told = _share(share) if f"{share:.6g}" == "1" or np.isinf(share) else _number(share)
+            rows.append(_row("needed share of the stated clearances", told, "1"))
+            rows += [_row("  at", self._share_place().removeprefix("at "), "")] if 0 < share < np.inf else []
+        rows.append(_row(f"smallest clearance, the same in {self.of}", _number(1e3 * need), "mm"))
+        if 0 < need < np.inf:
+            rows.append(_row("  at", self._need_place().removeprefix("at "), ""))
+            rows.append(_row("  part of each joint's clearance", self._parts(), ""))
+        return rows
+
+    def _parts(self) -> str:
+        """Joints by their part in the largest need."""
+        place = int(np.nanargmax(self.arrays["needed_clearance"]))
+        parts = self.arrays["uniform_part"][:, :, place].sum(axis=1)
+        carried = sorted(zip(parts, self.system.joints, strict=True), reverse=True)
+        return ", ".join(f"{name} {100 * part:.0f} %" for part, name in carried if part > TOLD)
+
+    def dataset(self) -> xr.Dataset:
+        """The result with names, units and provenance."""
+        import xarray as xr
+
+        mechanism = self.system.mechanism
+        self.arrays["smallest_clearance"] = np.array(self.clearance[0])
+        self.arrays["largest_share"] = np.array(self.share[0])
+        variables = {
+            name: xr.Variable(one.dims, self.arrays[name], {"units": one.units, "long_name": one.long_name})
+            for name, one in FIGURES.items()
+        }
+        coordinates: dict[str, Any] = {
+            dim: (dim, np.asarray(names, dtype=str)) for dim, names in labels(self.system).items()
+        }
+        coordinates["time"] = ("position", self.time, {"units": "s", "long_name": "time"})
+        units = ["rad" if self.system.turns(name) else "m" for name in mechanism.drivers]
+        attributes: dict[str, str | int] = {
+            "name": mechanism.name,
+            "formula": self.system.plan.formula,
+            "assembling": self.of,
+            "summary": json.dumps(self.summary(), ensure_ascii=False),
+            "findings": json.dumps([finding_row(one) for one in self.findings], ensure_ascii=False),
+            "coordinate_units": json.dumps(units),
+            "periodic": int(self.system.cycle(self.values).periodic),
+            "model_hash": mechanism.digest,
+            "trunnion_version": __version__,
+            "references": "\n".join([SOURCE, *mechanism.references]),
+            "flag_values": " ".join(str(int(code)) for code in Fit),
+            "flag_meanings": " ".join(code.name.lower() for code in Fit),
+        }
+        return xr.Dataset(variables, coordinates, attributes)
+
+
+def _row(label: str, value: float | str | None, unit: str) -> dict[str, Any]:
+    return {"label": label, "value": value, "unit": unit}
+
+
+def _share(share: float) -> str:
+    """Four digits, or as many as it takes to tell it from 1; ∞."""
+    if np.isinf(share):
+        return "∞"
+    told = (f"{share:.{digits}g}" for digits in range(4, 11))
+    return next((text for text in told if float(text) != 1), "1")
+
+
+def _enough(size: float) -> str:
+    """Five digits, rounded up: the number that is written suffices."""
+    step = 10.0 ** (np.floor(np.log10(size)) - 4)
+    return f"{np.ceil(size / step * (1 - 1e-12)) * step:.5g}" if size > 0 else "0"
+
+
+def _number(value: float) -> float | None:
+    return value if np.isfinite(value) else None

@@ -1,0 +1,481 @@
+"""What a designer also asks of a planar linkage: does it transmit well, where does it turn back, how does it shake.
+
+Everything is read off one run over the cycle: the poses of the dyads, the twists of the links, the efforts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.algebra.linalg import cross, dot
+from trunnion.errors import Finding, MechanismError
+from trunnion.groups import prp, rpp, rpr, rrp, rrr
+from trunnion.model.mechanism import Mechanism
+from trunnion.solve.backward import Backward
+from trunnion.solve.forward import Forward, forward
+from trunnion.solve.run import Run, prepare
+
+__all__ = [
+    "Counterweight",
+    "Design",
+    "Extremes",
+    "all_instant_centres",
+    "counterweights",
+    "curvature",
+    "dead_centres",
+    "design",
+    "grashof",
+    "instant_centre",
+    "limits",
+    "pressure_angles",
+    "report_rows",
+    "shaking",
+    "transmission_angles",
+]
+
+Array = NDArray[np.float64]
+
+ROOT_TOLERANCE = 1e-12  # of the cycle, to which times of dead centres and limits are found
+
+
+@dataclass(frozen=True)
+class Counterweight:
+    """Mass times place (kg m, in the link's frame) to add to a link that turns about the ground."""
+
+    link: str
+    x: float
+    y: float
+
+
+class Extremes(NamedTuple):
+    """Least and largest value over the positions of a cycle, and the drive coordinates (rad, m; s) where they are."""
+
+    least: float
+    at_least: float
+    largest: float
+    at_largest: float
+
+
+@dataclass(frozen=True)
+class Design:
+    """Figures of a linkage over its cycle; angles in rad, SI.
+
+    transmission_angle: least of each dyad, folded into 0 … π/2 (π/2 is best); pressure_angle: extremes of each
+    dyad in −π/2 … π/2 (0 is best); dead_centres: of each link that turns about the ground or slides on it, the
+    drive coordinates where it turns back; limits: drive coordinates between which the linkage can be assembled;
+    shaking_force, shaking_moment (about the ground's origin): largest
+    that inertia puts on the frame; rms_effort, peak_power: of the first driver; energy_swing: largest change of
+    its energy about the mean, J; mean_speed: of that driver, 0 if it turns back; grashof: type of a four-bar, empty
+    if it is none.
+    """
+
+    grashof: str
+    transmission_angle: dict[str, float]
+    pressure_angle: dict[str, Extremes]
+    dead_centres: dict[str, tuple[float, ...]]
+    limits: tuple[tuple[float, float], ...]
+    shaking_force: float
+    shaking_moment: float
+    rms_effort: float
+    peak_power: float
+    mean_power: float
+    energy_swing: float
+    mean_speed: float
+
+    def flywheel(self, fluctuation: float) -> float:
+        """Inertia on the drive shaft, kg m², that keeps its speed within mean · (1 ± fluctuation/2).
+
+        J = ΔE / (δ ω²): the energy swing over the coefficient of fluctuation and the mean speed squared. NaN for a
+        drive that turns back, which has no speed to keep.
+        Source: any textbook of machine theory, e.g. R. L. Norton, Design of Machinery, "Flywheels".
+        """
+        if not fluctuation > 0:
+            raise MechanismError(Finding(f"a fluctuation of {fluctuation:g} needs no end of inertia", "fluctuation"))
+        return self.energy_swing / (fluctuation * self.mean_speed**2) if self.mean_speed else float("nan")
+
+
+def design(mechanism: Mechanism, steps: int = 720) -> Design:
+    """The figures of `Design` over `steps` positions of the cycle."""
+    run = _planar(mechanism)
+    time = run.cycle.times(steps)
+    back = run.solve(time)
+    walk = back.walk
+    force, moment = shaking(back)
+    steps = len(time)
+    driver = next(iter(mechanism.drivers), "")
+    effort = np.broadcast_to(back.efforts[driver], time.shape) if driver else np.zeros(steps)
+    rate = np.broadcast_to(run.system.drive(run.values, driver, time)[1], time.shape) if driver else np.zeros(steps)
+    power = effort * rate
+    swing = np.cumsum(power - np.mean(power)) * (time[1] - time[0] if steps > 1 else 0.0)
+    return Design(
+        grashof(mechanism, run),
+        {name: _least(np.broadcast_to(angle, time.shape)) for name, angle in transmission_angles(walk).items()},
+        {name: _extremes(run, np.broadcast_to(angle, time.shape)) for name, angle in pressure_angles(walk).items()},
+        dead_centres(run, steps),
+        limits(run, steps),
+        _largest(np.hypot(*force)),
+        _largest(moment),
+        float(np.sqrt(np.mean(effort**2))),
+        _largest(power),
+        float(np.mean(power)),
+        float(np.max(swing) - np.min(swing)),
+        0.0 if np.any(rate * np.sum(rate) <= 0) else float(np.mean(rate)),
+    )
+
+
+def _planar(mechanism: Mechanism) -> Run:
+    """The mechanism prepared; MechanismError if it is spatial."""
+    if mechanism.space != "planar":
+        what = "the figures of design (transmission angle, Grashof, instant centres, shaking force) are of the plane"
+        raise MechanismError(Finding(what, "space", "use analyse and locking; screw axes are in the report"))
+    return prepare(mechanism)
+
+
+def _least(values: Array) -> float:
+    return float(np.nanmin(values)) if np.any(np.isfinite(values)) else float("nan")
+
+
+def _largest(values: Array) -> float:
+    return float(np.nanmax(np.abs(values))) if np.any(np.isfinite(values)) else float("nan")
+
+
+def transmission_angles(walk: Forward) -> dict[str, Array]:
+    """Transmission angle of every dyad along the walk, rad in 0 … π/2, by its joints' names: π/2 less |φ|.
+
+    φ is the pressure angle. RRR: between the two links at their common pin, folded to be acute; RRP: between the rod
+    and the normal of the guide's path; RPR: between the line of the outer pins and the normal of the slide; PRP and
+    RPP: between the two guides.
+    """
+    return {name: np.pi / 2 - np.abs(angle) for name, angle in pressure_angles(walk).items()}
+
+
+def pressure_angles(walk: Forward) -> dict[str, Array]:
+    """Pressure angle φ of every dyad along the walk, rad in −π/2 … π/2, by its joints' names.
+
+    The angle between the force that the first link puts on the second, had the first neither friction nor loads,
+    and the velocity of the point of the second that it acts on, against the link that holds the second. But for RPP
+    it is the same the other way round. cos φ is 2 over the condition number of the dyad. With its joints B, C, D:
+
+    RRR   force along BC, velocity of C across DC: sin φ = cos(BC, DC), positive where the angle at C is acute
+    RRP   force along BC, velocity along the guide u: sin φ = p/|BC|, C being p to the left of the line along u by B
+    RPR   force across the slide, through B, velocity across BD: sin φ = e/|BD|, D being e to the left of that line
+    PRP, RPP   force across the one guide u, velocity along the other v: sin φ = cos(u, v)
+
+    Source: R. L. Norton, Design of Machinery, "Transmission angle" (π/2 less |φ|) and "Pressure angle".
+    """
+    found: dict[str, Array] = {}
+    with np.errstate(all="ignore"):
+        for module, pose in zip(walk.system.plan.modules, walk.poses, strict=True):
+            match pose:  # what is lost of the force, and what moves
+                case rrr.Pose():
+                    lost, moves = dot(pose.bc, pose.dc), 1 / pose.area
+                case rrp.Pose():
+                    lost, moves = pose.p, pose.r
+                case rpr.Pose():
+                    lost, moves = pose.offset, pose.along
+                case prp.Pose() | rpp.Pose():
+                    lost, moves = dot(pose.u, pose.v), cross(pose.u, pose.v)
+                case _:
+                    continue
+            found["-".join(module.joints)] = np.arctan2(lost, np.abs(moves))
+    return found
+
+
+def _extremes(run: Run, values: Array) -> Extremes:
+    """Extremes over the positions of a cycle; NaN where there is no number at all."""
+    if not np.any(np.isfinite(values)):
+        return Extremes(*([float("nan")] * 4))
+    time = run.cycle.times(len(values))
+    low, high = int(np.nanargmin(values)), int(np.nanargmax(values))
+    return Extremes(float(values[low]), _coordinate(run, time[low]), float(values[high]), _coordinate(run, time[high]))
+
+
+def shaking(back: Backward) -> tuple[tuple[Array, Array], Array]:
+    """Force (x, y), N, and moment about the ground's origin, N m, that inertia and weightless links put on the frame.
+
+    −Σ m a of all mass centres, and −Σ (r × m a + J α): what the foundation feels of the motion alone.
+    """
+    walk, values = back.walk, back.walk.values
+    shape = np.shape(back.walk.motions[walk.system.mechanism.fixed_link].twist.w)
+    x, y, turn = np.zeros(shape), np.zeros(shape), np.zeros(shape)
+    for name, link in walk.system.mechanism.links.items():
+        if name == walk.system.mechanism.fixed_link:
+            continue
+        mass, inertia = values[f"links.{name}.mass"], values[f"links.{name}.inertia"]
+        local = walk.system.centre(values, name)
+        if link.inertia_about == "origin":
+            inertia = inertia - mass * (local[0] ** 2 + local[1] ** 2)
+        centre = walk.local_point(name, *local)
+        fx, fy = -mass * centre.acceleration[0], -mass * centre.acceleration[1]
+        x, y = x + fx, y + fy
+        alpha = walk.motions[name].acceleration.w
+        turn = turn + centre.place[0] * fy - centre.place[1] * fx - inertia * alpha
+    return (x, y), turn
+
+
+def instant_centre(walk: Forward, first: str, second: str) -> tuple[Array, Array]:
+    """Point (x, y), m, where two links have the same velocity; at infinity (±inf or NaN) where they turn alike."""
+    one, two = walk.motions[first], walk.motions[second]
+    w = two.twist.w - one.twist.w
+    # velocities at the origin of the drawing: v − ω × place
+    x1, y1 = one.twist.x + one.twist.w * one.frame.y, one.twist.y - one.twist.w * one.frame.x
+    x2, y2 = two.twist.x + two.twist.w * two.frame.y, two.twist.y - two.twist.w * two.frame.x
+    with np.errstate(all="ignore"):
+        return -(y2 - y1) / w, (x2 - x1) / w
+
+
+def curvature(walk: Forward, link: str, point: str) -> Array:
+    """Curvature of the path of a point, 1/m: (v × a)/|v|³, positive where it bends to the left."""
+    motion = walk.point(link, point)
+    (vx, vy), (ax, ay) = motion.velocity, motion.acceleration
+    with np.errstate(all="ignore"):
+        return np.asarray((vx * ay - vy * ax) / np.hypot(vx, vy) ** 3, float)
+
+
+def grashof(mechanism: Mechanism, run: Run | None = None) -> str:
+    """Type of a four-bar by Grashof's rule; empty for any other linkage.
+
+    With s shortest, l longest, p, q the others: s + l < p + q lets a link turn fully; which one depends on where the
+    shortest link is.
+    """
+    run = run or _planar(mechanism)
+    kinds = [module.kind for module in run.system.plan.modules]
+    if kinds != ["R", "RRR"]:
+        return ""
+    driver, dyad = run.system.plan.modules
+    local = run.system.elements(run.values)
+    ground, crank = mechanism.fixed_link, driver.links[0]
+    a = driver.joints[0]
+    b, c, d = dyad.joints
+    if crank not in run.system.joints[b][1]:
+        b, d = d, b
+    if crank not in run.system.joints[b][1] or ground not in run.system.joints[d][1]:
+        return ""
+    coupler = next(link for link in run.system.joints[b][1] if link != crank)
+    rocker = next(link for link in run.system.joints[d][1] if link != ground)
+
+    def span(link: str, one: str, two: str) -> float:
+        p, q = local[link, one], local[link, two]
+        return float(np.hypot(p.x - q.x, p.y - q.y))
+
+    sides = {
+        "ground": span(ground, a, d),
+        "input": span(crank, a, b),
+        "coupler": span(coupler, b, c),
+        "output": span(rocker, c, d),
+    }
+    lengths = sorted(sides.values())
+    margin = lengths[1] + lengths[2] - lengths[0] - lengths[3]
+    if abs(margin) <= 1e-12 * lengths[3]:
+        return "change point"
+    if margin < 0:
+        return "triple rocker"
+    shortest = min(sides, key=sides.__getitem__)
+    return {
+        "ground": "double crank",
+        "input": "crank-rocker",
+        "coupler": "double rocker",
+        "output": "rocker-crank",
+    }[shortest]
+
+
+def dead_centres(run: Run, steps: int = 720) -> dict[str, tuple[float, ...]]:
+    """Drive coordinates (rad, m) at which each link on the ground turns back; times (s) without a driver."""
+    system = run.system
+    time = np.append(run.cycle.times(steps), run.cycle.duration) if run.cycle.periodic else run.cycle.times(steps)
+    found: dict[str, tuple[float, ...]] = {}
+    for name, (kind, links) in system.joints.items():
+        if system.mechanism.fixed_link not in links or name in system.mechanism.drivers:
+            continue
+
+        def speed(moment: Array, joint: str = name, slides: bool = kind == "prismatic") -> Array:
+            motion = forward(system, run.values, run.chosen.assembly, moment)
+            first, second = system.joints[joint][1]
+            if not slides:
+                return np.asarray(motion.motions[second].twist.w - motion.motions[first].twist.w, float)
+            axis = motion.element(first, joint)
+            one, two = motion.twist(first, joint), motion.twist(second, joint)
+            return np.asarray(axis.c * (two.x - one.x) + axis.s * (two.y - one.y), float)
+
+        values = np.broadcast_to(speed(time), time.shape)
+        turning = np.flatnonzero(values[:-1] * values[1:] < 0)
+        around = np.concatenate([values[-2:-1] if run.cycle.periodic else [0.0], values])
+        exact = time[:-1][(values[:-1] == 0) & (around[:-2] * values[1:] < 0)]  # a link at rest does not turn back
+        roots = [_root(speed, time[k], time[k + 1]) for k in turning]
+        found[name] = tuple(sorted({round(_coordinate(run, moment), 14) for moment in [*roots, *exact]}))
+    return found
+
+
+def _root(function: Callable[[Array], Array], low: float, high: float) -> float:
+    """Zero of a function that changes sign in an interval."""
+    from scipy.optimize import brentq
+
+    return float(brentq(lambda t: float(np.ravel(function(np.array([t])))[0]), low, high, xtol=1e-15, rtol=1e-15))
+
+
+def _coordinate(run: Run, moment: float) -> float:
+    """Coordinate of the first driver at a time; the time itself if there is none."""
+    driver = next(iter(run.system.mechanism.drivers), "")
+    return float(run.system.drive(run.values, driver, moment)[0]) if driver else moment
+
+
+def limits(run: Run, steps: int = 720) -> tuple[tuple[float, float], ...]:
+    """Intervals of the drive coordinate (rad, m) over which the linkage can be assembled, ends found by bisection."""
+    time = run.cycle.times(steps)
+    if run.cycle.periodic:
+        time = np.append(time, run.cycle.duration)
+
+    def closed(moments: Array) -> NDArray[np.bool_]:
+        walk = forward(run.system, run.values, run.chosen.assembly, moments)
+        good = np.ones(np.shape(moments), bool)
+        for motion in walk.motions.values():
+            good &= np.isfinite(np.broadcast_to(motion.frame.x + motion.frame.c, good.shape))
+        return good
+
+    good = closed(time)
+    found: list[tuple[float, float]] = []
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], good, [False]]).astype(int)))
+    for first, after in zip(edges[::2], edges[1::2], strict=True):
+        low = time[first] if first == 0 else _edge(closed, time[first], time[first - 1])
+        high = time[after - 1] if after == len(time) else _edge(closed, time[after - 1], time[after])
+        reached = _reached(run, low, high)
+        if not any(np.allclose(reached, other, rtol=1e-9, atol=0) for other in found):  # there and back again
+            found.append(reached)
+    return tuple(found)
+
+
+def _reached(run: Run, low: float, high: float) -> tuple[float, float]:
+    """Coordinates of the first driver between which it moves from one time to another; of one way in its sense."""
+    ends = _coordinate(run, low), _coordinate(run, high)
+    driver = next(iter(run.system.mechanism.drivers), "")
+    if not driver:
+        return ends
+
+    def rate(moment: Array) -> Array:
+        return np.broadcast_to(run.system.drive(run.values, driver, moment)[1], np.shape(moment))
+
+    time = np.linspace(low, high, 720)
+    rates = rate(time)
+    if not (np.any(rates > 0) and np.any(rates < 0)):
+        return ends
+    turns = [_root(rate, time[k], time[k + 1]) for k in np.flatnonzero(rates[:-1] * rates[1:] < 0)]
+    places = [*ends, *(_coordinate(run, float(moment)) for moment in [*time, *turns])]
+    return min(places), max(places)
+
+
+def _edge(closed: Callable[[Array], NDArray[np.bool_]], inside: float, outside: float) -> float:
+    """The last time that can be assembled between one that can and one that cannot."""
+    while abs(outside - inside) > ROOT_TOLERANCE * max(abs(inside), abs(outside)):
+        middle = (inside + outside) / 2
+        if middle in (inside, outside):
+            break
+        if closed(np.array([middle]))[0]:
+            inside = middle
+        else:
+            outside = middle
+    return inside
+
+
+def counterweights(run: Run, steps: int = 90) -> tuple[tuple[Counterweight, ...], float]:
+    """Counterweights on the links that turn about the ground that best cancel the shaking force, and what is left.
+
+    The momentum of the counterweight with mass times place p on link i is ω_i z × R_i p: linear in p. p is found so
+    that the total momentum is nearest to constant over the cycle (least squares). The second number is the share of the
+    RMS shaking force that remains: 0 to rounding for a four-bar of revolute pairs (Berkof and Lowen 1969).
+    Raises MechanismError if no link turns about the ground.
+    """
+    system, time = run.system, run.cycle.times(steps)
+    back = run.solve(time)
+    walk, ground = back.walk, system.mechanism.fixed_link
+    turning = [
+        next(link for link in links if link != ground)
+        for kind, links in system.joints.values()
+        if kind == "revolute" and ground in links
+    ]
+    if not turning:
+        raise MechanismError(Finding("no link turns about the ground", "joints", "counterweights need one that does"))
+    columns = []
+    for link in turning:
+        frame, w = walk.motions[link].frame, walk.motions[link].twist.w
+        alpha = walk.motions[link].acceleration.w
+        for c, s in ((frame.c, frame.s), (-frame.s, frame.c)):  # R p for the unit vectors p = x, p = y
+            # acceleration of the place: α × r − ω² r
+            columns.append(np.concatenate([_full(-alpha * s - w * w * c, time), _full(alpha * c - w * w * s, time)]))
+    force = np.concatenate([_full(part, time) for part in shaking(back)[0]])
+    matrix = np.array(columns).T
+    solved = np.isfinite(force) & np.isfinite(matrix).all(axis=1)
+    matrix, force = matrix[solved], force[solved]
+    solution = np.linalg.lstsq(matrix, force, rcond=None)[0] if len(force) else np.full(matrix.shape[1], np.nan)
+    size = float(np.linalg.norm(force))
+    left = np.linalg.norm(force - matrix @ solution) / size if size > 0 else float("nan")
+    weights = tuple(
+        Counterweight(link, float(solution[2 * i]), float(solution[2 * i + 1])) for i, link in enumerate(turning)
+    )
+    return weights, float(left)
+
+
+def _full(values: Array, time: Array) -> Array:
+    return np.broadcast_to(values, time.shape)
+
+
+def all_instant_centres(walk: Forward) -> dict[tuple[str, str], tuple[Array, Array]]:
+    """Instant centres of every pair of links: n (n − 1)/2 of them."""
+    return {(a, b): instant_centre(walk, a, b) for a, b in combinations(walk.system.mechanism.links, 2)}
+
+
+def _told(label: str, extremes: Extremes, scale: float, unit: str) -> tuple[str, float | str]:
+    """Label with the places and value with the extremes of an angle, in degrees; scale, unit: of the places."""
+    low, high = np.degrees(extremes.least), np.degrees(extremes.largest)
+    if not high - low > 1e-9:
+        return f"{label}, everywhere", low
+    gap = "" if unit == "°" else " "
+    places = " and ".join(f"{place * scale:.5g}{gap}{unit}" for place in (extremes.at_least, extremes.at_largest))
+    return f"{label}, at {places}", f"{low:.6g} … {high:.6g}"
+
+
+def report_rows(mechanism: Mechanism, steps: int = 720, fluctuation: float = 0.05) -> list[dict[str, Any]]:
+    """The figures as rows with label, value (number, text or None) and unit, as a table shows them."""
+    run = _planar(mechanism)
+    found = design(mechanism, steps)
+    driver = next(iter(mechanism.drivers), "")
+    turns = not driver or run.system.joints[driver][0] == "revolute"
+    unit, scale = ("°", 180 / np.pi) if turns else ("mm", 1e3)
+    rows: list[dict[str, Any]] = []
+
+    def row(label: str, value: float | str, unit: str = "1") -> None:
+        told = value if isinstance(value, str) or np.isfinite(value) else None
+        rows.append({"label": label, "value": told, "unit": unit})
+
+    if found.grashof:
+        row("four-bar type (Grashof)", found.grashof)
+    for name, angle in found.transmission_angle.items():
+        row(f"transmission angle of {name}, least", angle * 180 / np.pi, "°")
+    for name, extremes in found.pressure_angle.items():
+        row(*_told(f"pressure angle of {name}", extremes, scale, unit), "°")
+    for name, places in found.dead_centres.items():
+        if places:
+            row(f"{name} turns back at", ", ".join(f"{place * scale:.8g}" for place in places), f"{unit} of {driver}")
+    told = ", ".join(f"{low * scale:.8g} … {high * scale:.8g}" for low, high in found.limits)
+    row("can be assembled over", told or "no position", f"{unit} of {driver}" if driver else "")
+    row("shaking force, largest", found.shaking_force, "N")
+    row("shaking moment about the ground's origin, largest", found.shaking_moment, "N m")
+    row("drive effort, RMS", found.rms_effort, "N m" if turns else "N")
+    row("drive power, largest", found.peak_power, "W")
+    row("drive power, mean", found.mean_power, "W")
+    row("energy swing about the mean", found.energy_swing, "J")
+    if turns and driver and run.cycle.periodic and found.mean_speed:
+        row(f"flywheel for a fluctuation of {fluctuation:g}", found.flywheel(fluctuation), "kg m^2")
+    if any(kind == "revolute" and mechanism.fixed_link in links for kind, links in run.system.joints.values()):
+        weights, left = counterweights(run)
+        for weight in weights if np.isfinite(left) else ():  # without mass there is nothing to balance
+            place = f"({weight.x:.5g}, {weight.y:.5g})"
+            row(f"counterweight on {weight.link}, mass × place in its frame", place, "kg m")
+        if np.isfinite(left):
+            row("shaking force left with these", left if left > 1e-12 else 0.0, "of its RMS")
+    return rows

@@ -1,0 +1,184 @@
+"""The Dataset of `play`: names, units, summary and provenance."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.algebra.dual import primal
+from trunnion.cycle.account import finding_row, references
+from trunnion.errors import Finding, Severity, Status
+from trunnion.measures.measures import Measure
+from trunnion.solve.shifts import Play
+from trunnion.version import __version__
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from trunnion.solve.run import Run
+
+__all__ = ["VARIABLES", "Variable", "dataset", "relied_on"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Variable:
+    """Dimensions, unit (empty: that of each measure, in the attribute `measure_units`) and long name of a result."""
+
+    dims: tuple[str, ...]
+    units: str
+    long_name: str
+
+
+OVER = ("measure", "position")
+BY_JOINT = ("measure", "joint", "position")
+VARIABLES: dict[str, Variable] = {
+    "value": Variable(OVER, "", "the measure with every pin in the middle of its hole"),
+    "worst_case": Variable(BY_JOINT, "", "largest change that the play of the joint can make, to either side"),
+    "deviation": Variable(BY_JOINT, "", "standard deviation by the play of the joint, pins anywhere in their holes"),
+    "worst_case_total": Variable(OVER, "", "worst case of all joints together: the sum"),
+    "rss": Variable(OVER, "", "root of the sum of the squares of the joints' worst cases"),
+    "deviation_total": Variable(OVER, "", "standard deviation by the play of all joints, independent of one another"),
+    "sensitivity": Variable(
+        ("measure", "joint", "end", "axis", "position"), "", "change of the measure for an offset of 1 m at an end"
+    ),
+    "radius": Variable(("joint", "end"), "m", "how far the pin can go from the middle at an end"),
+    "status": Variable(("position",), "1", "code of the position's status; see the attribute flag_meanings"),
+}
+
+
+class Found(Protocol):
+    """What the Dataset is made of; see `play.Effect`."""
+
+    @property
+    def run(self) -> Run: ...
+    @property
+    def measures(self) -> Sequence[Measure]: ...
+    @property
+    def plays(self) -> Mapping[str, Play]: ...
+    @property
+    def time(self) -> Array: ...
+    @property
+    def value(self) -> Array: ...
+    @property
+    def worst_case(self) -> Array: ...
+    @property
+    def deviation(self) -> Array: ...
+    @property
+    def total(self) -> Array: ...
+    @property
+    def loads(self) -> Array: ...
+    @property
+    def status(self) -> NDArray[np.int8]: ...
+
+
+def dataset(found: Found, findings: Sequence[Finding]) -> xr.Dataset:
+    """The arrays as an xarray Dataset with coordinates, units, long names and attributes."""
+    import xarray as xr
+
+    system, mechanism = found.run.system, found.run.system.mechanism
+    ends = found.loads.shape[2]
+    arrays: dict[str, Array | NDArray[np.int8]] = {
+        "value": found.value,
+        "worst_case": found.worst_case,
+        "deviation": found.deviation,
+        "worst_case_total": found.total,
+        "rss": np.sqrt(np.sum(found.worst_case**2, axis=1)),
+        "deviation_total": np.sqrt(np.sum(found.deviation**2, axis=1)),
+        "sensitivity": found.loads,
+        "radius": _radii(found.plays, ends),
+        "status": found.status,
+    }
+    units = [measure.unit(system) for measure in found.measures]
+    variables = {
+        name: xr.Variable(one.dims, arrays[name], {"long_name": one.long_name, **_unit(one, units)})
+        for name, one in VARIABLES.items()
+    }
+    coordinates = {
+        "measure": [measure.name for measure in found.measures],
+        "joint": list(found.plays),
+        "end": [str(k + 1) for k in range(ends)],
+        "axis": ["x", "y", "z"],
+    }
+    dial = system.dial(found.run.values, found.time)
+    attributes: dict[str, str | int] = {
+        "name": mechanism.name,
+        "formula": system.plan.formula,
+        "model_hash": mechanism.digest,
+        "trunnion_version": __version__,
+        "references": "\n".join(references(mechanism)),
+        "flag_values": " ".join(str(int(code)) for code in Status),
+        "flag_meanings": " ".join(code.name.lower() for code in Status),
+        "measure_units": json.dumps(units),
+        "limits": json.dumps([measure.limit for measure in found.measures]),
+        "drive": dial.of,
+        "drive_unit": dial.unit.strip(),
+        "periodic": int(found.run.cycle.periodic),
+        "summary": json.dumps(_summary(found, units, dial), ensure_ascii=False),
+        "findings": json.dumps([finding_row(finding) for finding in findings], ensure_ascii=False),
+        "missed": json.dumps(
+            [
+                f"{one.where}: {one.what}"
+                for one in findings
+                if one.where.endswith(".limit") and one.severity is Severity.ERROR
+            ],
+            ensure_ascii=False,
+        ),
+    }
+    told = {dim: (dim, np.asarray(names, dtype=str)) for dim, names in coordinates.items()}
+    times = xr.Variable("position", found.time, {"units": "s", "long_name": "time from the start of the cycle"})
+    over = xr.Variable(
+        "position",
+        np.asarray(dial.values, float),
+        {"units": dial.unit.strip(), "long_name": f"coordinate of {dial.of}" if dial.of else "time"},
+    )
+    return xr.Dataset(variables, {**told, "time": times, "drive": over}, attributes)
+
+
+def relied_on(numbers: Array, status: NDArray[np.int8]) -> Array:
+    """The numbers, (…, position), NaN close to dead centres, where first order says little; all if all are close."""
+    near = status >= Status.NEAR_SINGULAR
+    return numbers if np.all(near) else np.where(near, np.nan, numbers)
+
+
+def _unit(variable: Variable, units: Sequence[str]) -> dict[str, str]:
+    """The unit, if it is one for all measures."""
+    if variable.units:
+        return {"units": variable.units}
+    same = units[0] if len(set(units)) == 1 else ""
+    return {"units": f"{same}/m" if same and "end" in variable.dims else same}
+
+
+def _radii(plays: Mapping[str, Play], ends: int) -> Array:
+    found = np.full((len(plays), ends), np.nan)
+    for row, play in zip(found, plays.values(), strict=True):
+        for k, radius in enumerate(play.radii):
+            row[k] = float(np.ravel(primal(radius))[0])
+    return found
+
+
+def _summary(found: Found, units: Sequence[str], dial: Any) -> list[dict[str, Any]]:
+    """Of each measure the largest worst case, what each joint has in it, RSS and deviation there."""
+    rows: list[dict[str, Any]] = []
+    for i, (measure, unit) in enumerate(zip(found.measures, units, strict=True)):
+        total = relied_on(found.total[i], found.status)
+        if not np.any(np.isfinite(total)):
+            rows.append({"label": f"{measure.name}, worst case", "value": None, "unit": unit})
+            continue
+        top = int(np.nanargmax(total))
+        rows.append(
+            {"label": f"{measure.name}, worst case, largest, at {dial.at(top)}", "value": total[top], "unit": unit}
+        )
+        rss, deviation = (float(np.sqrt(np.sum(part[i, :, top] ** 2))) for part in (found.worst_case, found.deviation))
+        rows.append({"label": f"{measure.name}, RSS there", "value": rss, "unit": unit})
+        rows.append({"label": f"{measure.name}, standard deviation there", "value": deviation, "unit": unit})
+        for j, joint in enumerate(found.plays):
+            value = float(found.worst_case[i, j, top])
+            rows.append({"label": f"{measure.name}, of which {joint}", "value": value, "unit": unit})
+    return [{**row, "value": None if row["value"] is None else float(row["value"])} for row in rows]

@@ -1,0 +1,339 @@
+"""What the play of every joint does to a measure: worst case and scatter, one number for each clearance.
+
+A small offset cᵢ of the pin in the end i of its hole changes a measure y by Qᵢ · cᵢ. Of a measure of the motion, Qᵢ
+is what the pin presses on that end under the measure's unit load alone, without friction and with the drivers at
+rest: virtual work. So one walk backward through the modules serves all joints. Of an effort no load stands for it,
+and Qᵢ is its derivative by the offset, friction included: dual numbers through the whole analysis.
+
+With the offset anywhere in a disc of radius ρ (an interval, a ball, n components):
+
+    worst case   Σ ρᵢ |Qᵢ|
+    variance     Σ ρᵢ² |Qᵢ|²/(n + 2)      offsets independent, each uniform over its disc
+
+since ∫ x² over the unit ball of n dimensions is 1/(n + 2) of its volume: ρ²/3 in an interval, ρ²/4 in a disc, ρ²/5 in
+a ball. Both are of first order in the play.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.algebra.dual import Dual, derivative
+from trunnion.algebra.namespace import Number
+from trunnion.cycle.account import model_notes
+from trunnion.cycle.fill import unwrap_row
+from trunnion.cycle.positions import check_steps
+from trunnion.errors import Finding, MechanismError, Severity, Status
+from trunnion.joints.clearance import CLEARANCE_MODELS, Vector, worst_case
+from trunnion.measures.measures import MOTIONS, Measure, named, outputs
+from trunnion.model.contact import clearance
+from trunnion.model.mechanism import Mechanism
+from trunnion.solve import backward as kinetostatics
+from trunnion.solve import shifts
+from trunnion.solve.forward import Forward, forward
+from trunnion.solve.friction_method import FrictionMethod
+from trunnion.solve.run import Run, prepare
+from trunnion.solve.shifts import HOLE, Play
+from trunnion.solve.space import forces
+from trunnion.solve.space.motion import SpatialWalk
+from trunnion.solve.status import pose_status, status_of
+from trunnion.solve.system import System, Values
+from trunnion.studies.play.result import dataset, relied_on
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["Effect", "by_duals", "by_virtual_load", "play", "plays", "variance"]
+
+CHUNK = 4096  # positions at a time
+
+Array = NDArray[np.float64]
+Loads = dict[str, list[Vector]]  # load at each end, by joint
+
+
+# ---- what an offset does --------------------------------------------------------------------------------------
+
+
+def plays(system: System, values: Values) -> dict[str, Play]:
+    """The play of every joint that states some, by joint; where it is less than none, the fit presses: none."""
+    space, found = system.mechanism.space, {}
+    for name, (kind, _) in system.joints.items():
+        one = shifts.play_of(space, kind, values, name)
+        if one is not None:
+            found[name] = one._replace(radii=tuple(np.where(radius > 0, radius, 0.0) for radius in one.radii))
+    return found
+
+
+def by_virtual_load(walk: Forward, measure: Measure, known: Mapping[str, Play]) -> Loads:
+    """Qᵢ of a measure of the motion at each end of each joint: ∂y/∂cᵢ, in its unit a metre, hole's frame."""
+    loads = measure.loads(walk)
+    back = forces.under(walk, loads) if isinstance(walk, SpatialWalk) else kinetostatics.under(walk, loads)
+    return {name: play.model.loads(*back.on_hole(name), play.length) for name, play in known.items()}
+
+
+def by_duals(
+    run: Run, measure: Measure, known: Mapping[str, Play], time: Array, method: FrictionMethod, carrier: str = HOLE
+) -> Loads:
+    """The same by derivatives through the whole analysis, of measures of the motion or of an effort.
+
+    carrier: of `shifts.CARRIERS`, the link on which seats stay: pins that turn with one or the other move otherwise.
+    """
+    paths = [f"{carrier}.{name}.{key}" for name, play in known.items() for end in play.model.ends for key in end]
+    rows = np.eye(len(paths))[:, :, None]  # (offset, sample, 1): each sample moves one offset
+    offsets = {path: Dual(0.0, row) for path, row in zip(paths, rows, strict=True)}
+    with np.errstate(all="ignore"):
+        if measure.of_motion:
+            number = measure.value(forward(run.system, {**run.values, **offsets}, run.chosen.assembly, time))
+        else:
+            number = run.at(time, offsets, method).efforts[measure.subject]
+    slopes = iter(np.broadcast_to(derivative(number), (len(paths), len(time))))
+    return {name: [tuple(next(slopes) for _ in end) for end in play.model.ends] for name, play in known.items()}
+
+
+def variance(loads: Sequence[Vector], radii: Sequence[Number]) -> Number:
+    """Variance of the work of the loads with each offset uniform over its interval, disc or ball: Σ ρ² |Q|²/(n + 2)."""
+    total: Number = 0.0
+    for load, radius in zip(loads, radii, strict=True):
+        square: Number = 0.0
+        for part in load:
+            square = square + part * part
+        total = total + radius * radius * square / (len(load) + 2)
+    return total
+
+
+# ---- over the cycle -------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Effect:
+    """What play does over the cycle. measures; plays by joint; time, s, (position,); value (measure, position);
+    worst_case and deviation (measure, joint, position); loads (measure, joint, end, axis, position); status.
+    """
+
+    run: Run
+    measures: Sequence[Measure]
+    plays: Mapping[str, Play]
+    time: Array
+    value: Array
+    worst_case: Array
+    deviation: Array
+    loads: Array
+    status: NDArray[np.int8]
+
+    @property
+    def total(self) -> Array:
+        """Worst case of all joints together, (measure, position)."""
+        found: Array = np.sum(self.worst_case, axis=1)
+        return found
+
+
+def play(mechanism: Mechanism, measures: Sequence[str] | None = None, steps: int = 360) -> xr.Dataset:
+    """What the play of every joint does to measures over the cycle: worst case and standard deviation.
+
+    measures: names of the model's, or `link.point.x`, `angle:link` (in space `angle:link.x`, about a global axis),
+    `rotation:joint`, `slide:joint`, `effort:driver`; all of the model if not given, or, where it states none, rotation
+    and slide of every joint to the ground that is not driven. Returns a Dataset over (measure, joint, position) of
+    `play_result.VARIABLES`: SI, each measure in its own unit. NaN where a position has no answer.
+    Method: virtual work for measures of the motion, derivatives by dual numbers for efforts; first order in the play,
+    about the mechanism with every pin in the middle of its hole.
+    Raises MechanismError if no joint states a clearance, for an unknown measure, or as `analyse` does.
+    """
+    check_steps(steps)
+    run = prepare(mechanism)
+    if run.determinacy is not None:
+        run.determinacy.refuse()
+    found, told = _measures(run, measures)
+    known = plays(run.system, run.values)
+    _check(known)
+    effect = _over_the_cycle(run, found, known, steps if run.cycle.duration > 0 else 1)
+    return dataset(effect, [*_model_findings(run, effect), *told])
+
+
+def _measures(run: Run, names: Sequence[str] | None) -> tuple[list[Measure], list[Finding]]:
+    """The measures asked for; notes where they are chosen because none is stated, or some are left out."""
+    mechanism = run.system.mechanism
+    found = named(mechanism, mechanism.measures if names is None else names, run.values)
+    others = [one.name for one in found if one.kind not in (*MOTIONS, "effort")]
+    what = f"play is known of measures {', '.join(MOTIONS)} and effort, which {', '.join(others)} is none of"
+    remedy = "`trunnion tolerance` knows the others"
+    if others and names is not None:
+        raise MechanismError(Finding(what, "measures", remedy))
+    told = [Finding(f"{what}: left out", "measures", remedy, Severity.NOTE)] if others else []
+    found = [one for one in found if one.name not in others]
+    if found:
+        return found, told
+    found = outputs(run.system)
+    remedy = "state measures: in the model, or give --measure link.point.x"
+    if not found:
+        raise MechanismError(
+            Finding("no measure is stated, and no joint to the ground is an output", "measures", remedy)
+        )
+    what = f"no measure is stated: {', '.join(one.name for one in found)} taken, joints to the ground without a driver"
+    return found, [Finding(what, "measures", remedy, Severity.NOTE), *told]
+
+
+def _check(known: Mapping[str, Play]) -> None:
+    """MechanismError if there is no play, or not all that is to know of one."""
+    if not known:
+        remedy = "state joints.NAME.pin.clearance (guide.clearance), such as 20 um"
+        raise MechanismError(Finding("no joint states a clearance", "joints", remedy))
+    findings = [finding for name, one in known.items() for finding in shifts.unstated_length(name, one)]
+    if findings:
+        raise MechanismError(findings)
+
+
+def _over_the_cycle(run: Run, measures: Sequence[Measure], known: Mapping[str, Play], steps: int) -> Effect:
+    time = run.cycle.times(steps)
+    shape = (len(measures), len(known), steps)
+    ends = max(len(play.model.ends) for play in known.values())
+    effect = Effect(
+        run, measures, known, time, np.zeros((len(measures), steps)), np.zeros(shape), np.zeros(shape),
+        np.full((len(measures), len(known), ends, 3, steps), np.nan), np.zeros(steps, np.int8),
+    )  # fmt: skip
+    rates = np.zeros((len(measures), steps))
+    for low in range(0, steps, CHUNK):
+        window = slice(low, min(low + CHUNK, steps))
+        with np.errstate(all="ignore"):
+            _fill(effect, rates, window)
+    step = float(time[1] - time[0]) if steps > 1 else 0.0
+    for i, measure in enumerate(measures):
+        if measure.turning(run.system):
+            unwrap_row(effect.value[i], rates[i], step)
+    return effect
+
+
+def _fill(effect: Effect, rates: Array, window: slice) -> None:
+    """The numbers of some positions; NaN where there is no answer."""
+    run, time = effect.run, effect.time[window]
+    walk = forward(run.system, run.values, run.chosen.assembly, time)
+    status = pose_status(walk, time.shape)
+    posed = status < Status.SINGULAR
+    method = FrictionMethod()
+    back, acting = None, posed
+    if not all(measure.of_motion for measure in effect.measures):
+        back = run.solve(time, method=method)
+        status = np.maximum(status, status_of(back, time.shape))
+        acting = status < Status.NOT_CONVERGED
+    effect.status[window] = status
+    for i, measure in enumerate(effect.measures):
+        if back is None or measure.of_motion:
+            value, known, rates[i, window] = measure.value(walk), posed, measure.rate(walk)
+            loads, others = by_virtual_load(walk, measure, effect.plays), None
+            placed = status < Status.NOT_ASSEMBLED
+        else:
+            value, known = back.efforts[measure.subject], acting
+            loads, others = _both(run, measure, effect.plays, time, method)
+            placed = acting
+        effect.value[i, window] = np.where(placed, value, np.nan)
+        _put(effect, i, loads, window, known, others or {})
+
+
+def _both(
+    run: Run, measure: Measure, known: Mapping[str, Play], time: Array, method: FrictionMethod
+) -> tuple[Loads, Loads]:
+    """Loads of an effort with every seat on the link that carries it, and on the other where the model does not say."""
+    carriers = {name: shifts.carriers_of(run.system.mechanism, name) for name in known}
+    found = []
+    for place in range(2):
+        loads: Loads = {}
+        for carrier in shifts.CARRIERS:
+            own = {name: one for name, one in known.items() if carriers[name][place : place + 1] == (carrier,)}
+            loads |= by_duals(run, measure, own, time, method, carrier) if own else {}
+        found.append(loads)
+    return found[0], found[1]
+
+
+def _put(effect: Effect, i: int, loads: Loads, window: slice, known: NDArray[np.bool_], others: Loads) -> None:
+    """Worst case and deviation of one measure; others: loads with seats on the other links, for the worst case."""
+    for j, (name, one) in enumerate(effect.plays.items()):
+        most = worst_case(loads[name], one.radii)
+        most = np.maximum(most, worst_case(others[name], one.radii)) if name in others else most
+        effect.worst_case[i, j, window] = np.where(known, most, np.nan)
+        effect.deviation[i, j, window] = np.where(known, np.sqrt(variance(loads[name], one.radii)), np.nan)
+        for k, (end, load) in enumerate(zip(one.model.ends, loads[name], strict=True)):
+            for key, part in zip(end, load, strict=True):
+                axis = "xyz".index(key.rpartition(".")[2])
+                effect.loads[i, j, k, axis, window] = np.where(known, part, np.nan)
+
+
+# ---- what there is to say -------------------------------------------------------------------------------------
+
+
+def _model_findings(run: Run, effect: Effect) -> Iterator[Finding]:
+    mechanism = run.system.mechanism
+    yield from (one for one in model_notes(mechanism, run.system) if one.severity is not Severity.NOTE)
+    yield from run.chosen.findings
+    if run.determinacy is not None:
+        yield from run.determinacy.findings()
+        if any(part.redundant for part in run.determinacy.parts):
+            what = "constraints are redundant: the worst case is an upper bound, for pins that must fit one another"
+            yield Finding(what, "joints", "the deviation supposes that each may lie anywhere", Severity.WARNING)
+    yield from _left_out(run, effect.plays)
+    yield from _spinning(run, effect.measures)
+    if run.seats:
+        what = f"play is counted from the middle of the holes: the seats of {', '.join(one.joint for one in run.seats)}"
+        yield Finding(f"{what} are not taken", "joints", "analyse takes them", Severity.NOTE)
+    yield from _limits(run, effect)
+    dial = run.system.dial(run.values, effect.time)
+    for code in Status:
+        where = np.flatnonzero(effect.status == code)
+        if code >= Status.NOT_CONVERGED and len(where):
+            yield Finding(f"{code.text} {dial.intervals(where)}", "", "no effect of play is known there")
+
+
+def _left_out(run: Run, known: Mapping[str, Play]) -> Iterator[Finding]:
+    """Joints whose play has no model, or does more than the model of the mechanism knows."""
+    mechanism = run.system.mechanism
+    models = CLEARANCE_MODELS[mechanism.space]
+    stated = [
+        name
+        for name, (kind, _) in run.system.joints.items()
+        if kind not in models and clearance(name, run.values) is not None
+    ]
+    if stated:
+        kinds = ", ".join(f"{name} is {run.system.joints[name][0]}" for name in stated)
+        what = f"the play of {', '.join(stated)} is left out ({kinds})"
+        yield Finding(what, "joints", f"play is modelled in {', '.join(models)} joints", Severity.WARNING)
+    toothed = sorted({
+        joint for gear in mechanism.gears.values() if gear.teeth for joint in gear.joints if joint in known
+    })  # fmt: skip
+    if toothed:
+        what = f"gears turn in {', '.join(toothed)}: what their play does between the teeth is left out"
+        remedy = "a gear's centre off by e across the line of centres turns it by e over its pitch radius more"
+        yield Finding(what, "gears", remedy, Severity.WARNING)
+
+
+def _spinning(run: Run, measures: Sequence[Measure]) -> Iterator[Finding]:
+    """Measures of links that may spin about the line of their joints."""
+    for link, *ends in (one for module in run.system.plan.modules for one in module.spinning):
+        for measure in measures:
+            owner, _, point = measure.subject.partition(".")
+            if owner == link and (measure.kind == "angle" or (measure.kind == "point" and point not in ends)):
+                what = (
+                    f"'{link}' can spin about the line of {' and '.join(ends)}: it is taken not to, whatever the play"
+                )
+                yield Finding(what, f"measures.{measure.name}", "measure one of these points", Severity.WARNING)
+
+
+def _limits(run: Run, effect: Effect) -> Iterator[Finding]:
+    """Measures whose worst case is above their limit, and those that keep theirs."""
+    dial = run.system.dial(run.values, effect.time)
+    for measure, total in zip(effect.measures, relied_on(effect.total, effect.status), strict=True):
+        if measure.limit is None or not np.any(np.isfinite(total)):
+            continue
+        over, where = np.flatnonzero(total > measure.limit), f"measures.{measure.name}.limit"
+        unit = measure.unit(run.system)
+        factor, shown = (180 / np.pi, "deg") if unit == "rad" else (1e3, "mm") if unit == "m" else (1.0, unit)
+        top = int(np.nanargmax(total))
+        what = f"the worst case is {factor * total[top]:.4g} {shown} at {dial.at(top)}, the limit is "
+        what += f"{factor * measure.limit:.4g} {shown}"
+        if len(over):
+            what += f"; it is above {dial.intervals(over)}"
+            yield Finding(what, where, "tighten the joints with the largest share")
+        else:
+            yield Finding(f"{what}: it is kept", where, severity=Severity.NOTE)

@@ -1,0 +1,1 @@
+"""How the figures of a cycle change with numbers of the mechanism."""

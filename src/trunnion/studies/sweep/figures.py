@@ -1,0 +1,99 @@
+"""The figures of a cycle: what its positions come to, and the reduction that every point of a sweep goes through."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.cycle.account import sound_positions
+from trunnion.cycle.means import Means
+from trunnion.errors import Status
+from trunnion.solve.system import System
+
+__all__ = ["FIGURES", "INTEGERS", "Figure", "Reduced", "reduced"]
+
+Arrays = Mapping[str, NDArray[Any]]
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A number of a cycle: dimensions before the swept names, unit, long name; part: "errors" of those that only
+    mechanisms with errors have, "margin" of the one that is looked for only if asked.
+    """
+
+    dims: tuple[str, ...]
+    units: str
+    long_name: str
+    part: str = ""
+
+
+FIGURES: dict[str, Figure] = {
+    "efficiency": Figure((), "1", "useful work over drive work of the cycle"),
+    "efficiency_error": Figure((), "1", "how far the errors of its integrals may have moved the efficiency"),
+    "efficiency_ideal": Figure((), "1", "efficiency of the mechanism without errors", "errors"),
+    "drive_effort_min": Figure(("driver",), "N m", "least drive effort"),
+    "drive_effort_max": Figure(("driver",), "N m", "largest drive effort"),
+    "drive_effort_rms": Figure(("driver",), "N m", "root mean square of the drive effort"),
+    "drive_power_mean": Figure((), "W", "mean power of all drivers"),
+    "useful_power_mean": Figure((), "W", "mean power taken by the useful loads"),
+    "friction_power_mean": Figure((), "W", "mean power lost to friction"),
+    "reaction_max": Figure(("joint",), "N", "largest reaction"),
+    "transmission_error_max": Figure(
+        ("joint",), "rad", "largest error of the joint's rotation, of a prismatic joint its slide", "errors"
+    ),
+    "locking_margin": Figure(
+        (), "1", "least multiple of the friction at which a position locks, ∞ if beyond 10", "margin"
+    ),
+    "without_answer": Figure((), "1", "positions without an answer"),
+    "not_valid": Figure((), "1", "positions at which a pin loses contact, left out of the figures", "errors"),
+    "status": Figure((), "1", "code of the gravest status of a position; see the attribute flag_meanings"),
+}
+INTEGERS = {"status": np.int8, "without_answer": np.int32, "not_valid": np.int32}
+Reduced = dict[str, Any]
+
+
+def reduced(arrays: Arrays, means: Means, ideal: Means | None, system: System) -> Reduced:
+    """The figures of FIGURES of one cycle; numbers, or rows over drivers or joints.
+
+    arrays: over positions, by the names of `results.VARIABLES`: status, drive_effort, reaction_force, and
+    locking_margin if it was looked for; means: over the cycle; ideal: those of the mechanism without errors, None if it
+    has none, else arrays also have joint_rotation_error and joint_slide_error.
+    """
+    status = arrays["status"]
+    missing = int(np.count_nonzero(status >= Status.NOT_CONVERGED))
+    told: Reduced = {"status": int(np.max(status)), "without_answer": missing}
+    told["not_valid"] = int(np.count_nonzero(status == Status.CONTACT_LOST))
+    if "locking_margin" in arrays:
+        valid = status != Status.CONTACT_LOST
+        told["locking_margin"] = float(np.min(arrays["locking_margin"][valid], initial=np.inf))
+    if ideal:
+        told["efficiency_ideal"] = ideal.efficiency
+    if missing:
+        return told
+    sound = sound_positions(status)
+    kept = sound if len(sound) else np.flatnonzero(status < Status.CONTACT_LOST)
+    if not len(kept):  # contact is lost everywhere
+        return told
+    effort = arrays["drive_effort"]
+    size = np.sqrt(np.sum(arrays["reaction_force"] ** 2, axis=1))
+    if ideal:
+        turned, slid = (np.abs(arrays[f"joint_{what}_error"][:, kept]) for what in ("rotation", "slide"))
+        slides = np.array([kind == "prismatic" for kind, _ in system.joints.values()])
+        told["transmission_error_max"] = np.where(slides, np.max(slid, axis=1), np.max(turned, axis=1))
+    else:  # beside points with errors
+        told |= {"efficiency_ideal": means.efficiency, "transmission_error_max": 0.0}
+    return told | {
+        "efficiency": means.efficiency,
+        "efficiency_error": means.efficiency_error,
+        "drive_effort_min": np.min(effort[:, kept], axis=1),
+        "drive_effort_max": np.max(effort[:, kept], axis=1),
+        "drive_effort_rms": means.drive_effort_rms,
+        "drive_power_mean": means.drive_power_mean,
+        "useful_power_mean": means.useful_power_mean,
+        "friction_power_mean": means.friction_power.net,
+        "reaction_max": np.max(size[:, kept], axis=1),
+    }

@@ -1,0 +1,167 @@
+"""The grid of a sweep: which numbers of a mechanism take which values, in the units they were given in."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.errors import Finding, MechanismError
+from trunnion.model.expression import LITERAL, normalise
+from trunnion.model.mechanism import Mechanism
+from trunnion.model.units import Dimension, si_unit, unit
+from trunnion.studies.sweep.figures import FIGURES
+
+__all__ = ["MOST_NAMES", "MOST_POINTS", "Over", "Swept", "at", "grid", "named", "say"]
+
+MOST_POINTS = 100_000
+MOST_NAMES = 6
+SUBJECTS = ("driver", "joint")  # the dimensions that are not swept
+
+Values = Sequence[float | str] | NDArray[np.float64]
+Over = Mapping[str, Values | tuple[float | str, float | str, int]]
+
+
+@dataclass(frozen=True)
+class Swept:
+    """A number that is swept: its name as given, its path, its values in SI.
+
+    written: the unit that the values were given in, empty for plain numbers; factor: that unit in SI.
+    """
+
+    name: str
+    path: str
+    unit: str
+    values: NDArray[np.float64]
+    written: str = ""
+    factor: float = 1.0
+
+    def say(self, index: int) -> str:
+        """The value at an index as an equation, in the unit it was given in."""
+        shown = (self.written or self.unit).removeprefix("1")
+        return f"{self.name} = {self.values[index] / self.factor + 0.0:.6g} {shown}".rstrip()
+
+
+def grid(mechanism: Mechanism, over: Over) -> tuple[Swept, ...]:
+    """The swept numbers; MechanismError with what is wrong with any of them."""
+    if not 1 <= len(over) <= MOST_NAMES:
+        what = f"{len(over)} names to sweep over"
+        raise MechanismError(Finding(what, "over", f"give 1 to {MOST_NAMES}, such as misalignment=0deg:30deg:7"))
+    paths: dict[str, str] = {}
+    for name in over:
+        path = mechanism.path_of(name)
+        if path in paths:
+            what = f"'{paths[path]}' and '{name}' are the same number, {path}"
+            raise MechanismError(Finding(what, "over", "sweep over each once"))
+        if name in FIGURES or name in SUBJECTS:
+            what = f"the name '{name}' is also one of the result"
+            raise MechanismError(Finding(what, "over", f"write it as {path}"))
+        paths[path] = name
+    counts = [_count(name, values) for name, values in over.items()]
+    points = int(np.prod(counts, dtype=object))
+    if points > MOST_POINTS:
+        what = f"a grid of {' × '.join(f'{count:,}' for count in counts)} points"
+        raise MechanismError(Finding(what, "over", f"give at most {MOST_POINTS:,} in all"))
+    return tuple(_swept(mechanism, name, path, over[name]) for path, name in paths.items())
+
+
+def _count(name: str, values: Any) -> int:
+    """How many values there are of a name; MechanismError if that is none."""
+    remedy = "give a list of values, or from, to and count such as 0deg:30deg:7"
+    if isinstance(values, str) or not isinstance(values, (Sequence, np.ndarray)) or np.ndim(values) > 1:
+        raise MechanismError(Finding(f"'{values}' is no range and no list of values", name, remedy))
+    if not isinstance(values, tuple):
+        if not len(values):
+            raise MechanismError(Finding("has no values to take", name, remedy))
+        return len(values)
+    count = values[-1] if len(values) == 3 else None
+    if not isinstance(count, (int, np.integer)) or isinstance(count, bool):
+        raise MechanismError(Finding(f"{values} is not from, to and count", name, remedy))
+    if count < 2:
+        what = f"a range of {count} value{'s' * (count != 1)} has no two ends"
+        raise MechanismError(Finding(what, name, "give a count of 2 or more, or a single value"))
+    return int(count)
+
+
+@dataclass(frozen=True)
+class _Value:
+    """A value as read: in SI; the number and the unit it was written in, if it is nothing but these."""
+
+    si: float
+    number: Fraction
+    unit: str
+    plain: bool
+
+
+def _swept(mechanism: Mechanism, name: str, path: str, given: Any) -> Swept:
+    ends = given[:2] if isinstance(given, tuple) else given
+    read, measured = [], ""
+    for value in ends:
+        value = value.item() if isinstance(value, np.generic) else value
+        with_it = mechanism.with_values({path: value})
+        measured = measured or _unit_of(with_it, path)
+        read.append(_read(with_it, path, value))
+    measured = measured or _unit_of(mechanism, path)  # plain numbers are in the unit of what they replace
+    written = next((one.unit for one in read if one.unit), "")
+    bare = next((value for one, value in zip(read, ends, strict=True) if one.plain and one.si), None)
+    if written and bare is not None:
+        raise MechanismError(
+            Finding(f"{bare} has no unit, and others have", name, f"write it with one, as {bare} {written}")
+        )
+    factor = unit(written)[0] if written else Fraction(1)
+    values = [one.si for one in read]
+    if isinstance(given, tuple):
+        count = int(given[2])
+        exact = all(one.unit == written or not one.number for one in read)
+        low, high = (one.number if exact else Fraction(one.si) / factor for one in read)
+        # exact until rounded once, so that a point is the same float as when its value is written in a file
+        between = (float((low * (count - 1 - k) + high * k) / (count - 1) * factor) for k in range(1, count - 1))
+        values = [values[0], *between, values[1]]
+    return Swept(name, path, measured, np.array(values, float), written, float(factor))
+
+
+def _read(changed: Mechanism, path: str, value: float | str) -> _Value:
+    """A value that the mechanism took, as it was written."""
+    if path not in changed.parameters():
+        what = f"'{value}' is no number but changes with the motion"
+        raise MechanismError(Finding(what, path, "sweep over a dimension in it"))
+    si = float(changed.parameter_set.stated(path))
+    text = normalise(value).strip() if isinstance(value, str) else ""
+    literal = LITERAL.fullmatch(text.removeprefix("-").strip())
+    if not literal:
+        return _Value(si, Fraction(si), "", not text)
+    number = Fraction(literal["number"]) * (-1 if text.startswith("-") else 1)
+    return _Value(si, number, literal["unit"] or literal["per"] or "", not (literal["unit"] or literal["per"]))
+
+
+def _unit_of(mechanism: Mechanism, path: str) -> str:
+    """SI unit of a number; of a dimension, as its value tells."""
+    known: dict[str, Dimension | None] = {}
+    for one, entry in mechanism.parameter_set.entries.items():  # dimensions first, in order of evaluation
+        if one.startswith("dimensions."):
+            known[one.removeprefix("dimensions.")] = entry.quantity.check(known)
+    name = path.removeprefix("dimensions.")
+    return si_unit(known[name]) if name in known and name != path else mechanism.parameter_set.entries[path].kind.unit
+
+
+def at(swept: Sequence[Swept], index: tuple[int, ...]) -> dict[str, float | str]:
+    return {one.path: float(one.values[i]) for one, i in zip(swept, index, strict=True)}
+
+
+def say(swept: Sequence[Swept], index: Sequence[int]) -> str:
+    return ", ".join(one.say(int(i)) for one, i in zip(swept, index, strict=True))
+
+
+@contextmanager
+def named(swept: Sequence[Swept], index: tuple[int, ...]) -> Iterator[None]:
+    """What is wrong at a point of the grid says at which."""
+    try:
+        yield
+    except MechanismError as error:
+        where = say(swept, index)
+        raise MechanismError([replace(one, what=f"{one.what} (at {where})") for one in error.findings]) from None

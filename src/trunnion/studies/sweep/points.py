@@ -1,0 +1,332 @@
+"""The points of a sweep: mechanisms that differ in numbers only are solved in one pass, others each by itself.
+
+In one pass go points whose modules are put together in the same way. What decides that is looked at: the numbers of a
+model at every point, the choice of a closed form at every start, and mechanisms of their own at values of every name
+and at the corners of the grid, where groups that are followed must come to the same figures. What the pass cannot
+answer for is prepared and analysed alone: gears, seats of pins, bristles, redundant constraints, points that may pass a
+change point, and those where a followed group does not close.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import product
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.algebra.namespace import Number
+from trunnion.cycle.account import model_notes
+from trunnion.cycle.means import AVERAGED, Means, means_of, still
+from trunnion.cycle.positions import check_steps, filled, positions
+from trunnion.errors import Finding, MechanismError, Severity, Status
+from trunnion.model.checks.values import check_values
+from trunnion.model.mechanism import Mechanism
+from trunnion.model.parameters import ParameterSet
+from trunnion.solve import change_points
+from trunnion.solve.backward import Backward
+from trunnion.solve.forward import pose_of, start
+from trunnion.solve.friction_method import MARGIN, FrictionMethod
+from trunnion.solve.hints import distance, hints, named_way
+from trunnion.solve.run import Run, prepare
+from trunnion.solve.switches import Mechanisms
+from trunnion.solve.system import Cycle, law_of, rubbing
+from trunnion.studies.sweep.figures import Reduced, reduced
+from trunnion.studies.sweep.grid import Swept, named
+from trunnion.studies.sweep.measures import of_point
+
+__all__ = ["Points"]
+
+AT_ONCE = 10_000  # numbers in an array, which then stays in cache
+FEWEST = 24  # positions on which a change point between them shows
+PROBES = 24  # values of a name at which a mechanism of its own is looked at
+PROBES_FOLLOWED = 5  # the same with groups that are followed, which takes long
+SAME = 1e-6  # of a figure: what two ways to the same assembly may differ by
+WANTED = ("drive_effort", "reaction_force", "locking_margin", "joint_rotation_error", "joint_slide_error")
+Array = NDArray[np.float64]
+Index = tuple[int, ...]
+
+
+@dataclass
+class Points:
+    """The points of a grid and how their cycles are run.
+
+    looked: points that were prepared by themselves; said: what they have to say, by place and text and then by point;
+    erring: whether any point has errors; run: of the first point.
+    """
+
+    mechanism: Mechanism
+    swept: Sequence[Swept]
+    steps: int
+    method: FrictionMethod
+    margin: bool = False
+
+    def __post_init__(self) -> None:
+        check_steps(self.steps)
+        self.said: dict[tuple[str, str], dict[Index, Finding]] = {}
+        self.looked: set[Index] = set()
+        self.erring = False
+        self.run = self._prepared(tuple(0 for _ in self.swept))
+
+    @property
+    def shape(self) -> Index:
+        return tuple(len(one.values) for one in self.swept)
+
+    def solved(self) -> Iterator[tuple[Index, Reduced]]:
+        """Figures of every point, in any order."""
+        left = list(np.ndindex(self.shape))
+        if self._similar:
+            size, later = max(1, AT_ONCE // self.steps), []
+            for low in range(0, len(left), size):
+                part = left[low : low + size]
+                for index, found in zip(part, self._together(part), strict=True):
+                    if found is None:
+                        later.append(index)
+                    else:
+                        yield index, found
+            left = later
+        for index in left:
+            yield index, self._alone(index)
+
+    # ---- each by itself ---------------------------------------------------------------------------------------
+
+    def _prepared(self, index: Index) -> Run:
+        """The mechanism of a point by itself; MechanismError says at which."""
+        with named(self.swept, index):
+            changed = self.mechanism.with_values(
+                {one.path: float(one.values[i]) for one, i in zip(self.swept, index, strict=True)}
+            )
+            run = prepare(changed)
+            if run.determinacy is not None:
+                run.determinacy.refuse()
+            self.looked.add(index)
+            self.erring = self.erring or run.erring
+            for finding in _findings(run):
+                self.said.setdefault((finding.where, finding.what), {})[index] = finding
+        return run
+
+    def _alone(self, index: Index, run: Run | None = None) -> Reduced:
+        run = run or (self._prepared(index) if any(index) else self.run)
+        with named(self.swept, index):
+            found = positions(run, self.steps, self.method, margin=self.margin)
+        return self._reduced(found.arrays, found.means, found.ideal)
+
+    def measured(self, index: Index, names: Sequence[str]) -> dict[str, float]:
+        """Figures of measures at a point."""
+        with named(self.swept, index):
+            return of_point(self._prepared(index) if any(index) else self.run, names, self.steps, self.method)
+
+    def _reduced(self, arrays: Mapping[str, Array], means: Means, ideal: Means | None) -> Reduced:
+        wanted = arrays if self.margin else {key: one for key, one in arrays.items() if key != "locking_margin"}
+        return reduced(wanted, means, ideal, self.run.system)
+
+    # ---- in one pass ------------------------------------------------------------------------------------------
+
+    @cached_property
+    def _similar(self) -> bool:
+        """Whether points may differ in nothing but numbers that flow through the modules' closed forms."""
+        run, mechanism = self.run, self.run.system.mechanism
+        joints = mechanism.effective_joints.values()
+        if run.cycle.duration <= 0 or self.steps < FEWEST or mechanism.gears:
+            return False
+        if any(joint.seat not in (None, "free") for joint in joints):
+            return False
+        if any(law_of(run.system, name).relaxation is not None for name in rubbing(run.system)):
+            return False
+        if any(module.redundant for module in run.system.plan.modules):
+            return False
+        alike = all(self._like(index) for index in self._probes())
+        # what a joint is turned by its errors is told from the start of its own cycle, which a followed group has alone
+        return alike and not (self._followed and self.erring)
+
+    @cached_property
+    def _followed(self) -> bool:
+        """Whether any group is followed along the cycle of the first point."""
+        return any(hasattr(one, "pose") for one in self.run.chosen.assembly)
+
+    def _probes(self) -> list[Index]:
+        """Points along every name from the first, and the corners."""
+        first, most = tuple(0 for _ in self.shape), PROBES_FOLLOWED if self._followed else PROBES
+        along = [
+            (*first[:axis], int(i), *first[axis + 1 :])
+            for axis, count in enumerate(self.shape)
+            for i in np.unique(np.linspace(0, count - 1, min(count, most)).astype(int))
+        ]
+        return list(dict.fromkeys([*along, *product(*({0, count - 1} for count in self.shape))]))
+
+    def _like(self, index: Index) -> bool:
+        """Whether a point by itself has the numbers that one pass would give it, and leaves as much open."""
+        run = self._prepared(index) if any(index) else self.run
+        own, meant = run.values, self._values([index])
+        if own.keys() != meant.keys() or run.system.plan.formula != self.run.system.plan.formula:
+            return False
+        same = all(np.array_equal(own[path], np.ravel(value)[0], equal_nan=True) for path, value in meant.items())
+        left_open = [[(one.where, one.what) for one in each.determinacy.findings()] if each.determinacy else []
+                     for each in (run, self.run)]  # fmt: skip
+        if not same or left_open[0] != left_open[1]:
+            return False
+        if not self._followed:
+            return True
+        (found,) = self._together([index])
+        return found is None or _agree(found, self._alone(index, run))
+
+    def _values(self, points: Sequence[Index], ideal: bool = False) -> dict[str, Number]:
+        """Every number of the mechanism, (point, 1) where it varies."""
+        mechanism, columns = self.run.system.mechanism, np.array(points, int).T
+        entries = mechanism.parameter_set.entries
+        stated: dict[str, Number] = {}
+        for one, places in zip(self.swept, columns, strict=True):
+            error = entries[one.path].error
+            numbers = one.values[places][:, np.newaxis]
+            stated[one.path] = numbers + (0.0 if ideal or not error else self.run.values[error])
+        return mechanism.ideal_parameters(stated) if ideal else mechanism.parameters(stated)
+
+    def _together(self, points: Sequence[Index]) -> list[Reduced | None]:
+        """Figures of some points; None where a point has to be looked at alone."""
+        run, shape = self.run, (len(points), self.steps)
+        values, ideal_values = self._values(points), self._values(points, ideal=True)
+        self._check(points, values)
+        cycles = self._cycles(points, values)
+        time = np.array([cycle.times(self.steps) for cycle in cycles])
+        time = time[0] if np.all(time == time[0]) else time
+        method = _with_margin(self.method) if self.margin else self.method
+        errs = _differ(values, ideal_values, len(points))
+        self.erring = self.erring or bool(errs.any())
+        with np.errstate(all="ignore"):
+            ours = _as_chosen(run, values, len(points))
+            back = run.solve(time, values, method)
+            meant = run.solve(time, ideal_values, self.method) if errs.any() else None
+            arrays, ideal = filled(back, meant, time, shape, WANTED)
+            ours &= ~_may_change(back, shape, run.cycle.periodic)
+            if self._followed:
+                ours &= np.all(arrays["status"] != Status.NOT_ASSEMBLED, axis=1)
+            means = self._means(values, cycles, ours & _answered(arrays))
+            likes = self._means(ideal_values, cycles, ours & errs & _answered(ideal)) if errs.any() else {}
+        found: list[Reduced | None] = []
+        for i in range(len(points)):
+            own = {name: array[..., i, :] for name, array in arrays.items()}
+            like = (likes.get(i) or still(own)) if errs[i] else None
+            found.append(self._reduced(own, means.get(i) or still(own), like) if ours[i] else None)
+        return found
+
+    def _means(
+        self, values: Mapping[str, Number], cycles: Sequence[Cycle], wanted: NDArray[np.bool_]
+    ) -> dict[int, Means]:
+        """Means over the cycles of those mechanisms of a batch that are wanted, by their number."""
+        rows, run = np.flatnonzero(wanted), self.run
+        if not len(rows):
+            return {}
+        everyone = Mechanisms(run.system, run.chosen.assembly, values, cycles)
+        of = Mechanisms(run.system, run.chosen.assembly, everyone.picked(rows), [cycles[int(row)] for row in rows])
+
+        def powers(lanes: NDArray[np.intp], time: Array) -> dict[str, Array]:
+            with np.errstate(all="ignore"):
+                back = run.solve(of.lanes(time), of.picked(lanes), self.method)
+                shape = (1, time.size) if len(rows) == 1 else time.shape
+                arrays, _ = filled(back, None, of.lanes(time), shape, AVERAGED)
+            return {name: arrays[name].reshape(*arrays[name].shape[:-2], *time.shape) for name in AVERAGED}
+
+        return dict(zip(rows.tolist(), means_of(of, powers), strict=True))
+
+    def _check(self, points: Sequence[Index], values: Mapping[str, Number]) -> None:
+        """MechanismError where the numbers of a point are none that a mechanism can have."""
+        mechanism = self.run.system.mechanism
+        numbers: ParameterSet = copy.copy(mechanism.parameter_set)
+        for k, index in enumerate(points):
+            numbers.nominal = {path: _nth(value, k) for path, value in values.items()}
+            with named(self.swept, index), np.errstate(all="ignore"):
+                wrong = [one for one in check_values(mechanism, numbers) if one.severity is Severity.ERROR]
+                if wrong:
+                    raise MechanismError(wrong)
+
+    def _cycles(self, points: Sequence[Index], values: Mapping[str, Number]) -> list[Cycle]:
+        """The cycle of every point."""
+        drive = {path: value for path, value in values.items() if path.startswith("drivers.")}
+        if not any(np.ndim(value) for value in drive.values()):
+            return [self.run.cycle] * len(points)
+        found = []
+        for k, index in enumerate(points):
+            with named(self.swept, index):
+                found.append(self.run.system.cycle({path: _nth(value, k) for path, value in drive.items()}))
+        return found
+
+
+def _answered(arrays: Mapping[str, Array]) -> NDArray[np.bool_]:
+    """Which mechanisms of a batch have an answer at every position."""
+    return np.asarray(np.all(arrays["status"] < Status.NOT_CONVERGED, axis=1))
+
+
+def _agree(found: Reduced, other: Reduced) -> bool:
+    """Whether two cycles come to the same statuses, efforts and reactions; powers follow from these."""
+    if found.keys() != other.keys() or any(found[name] != other[name] for name in ("status", "without_answer")):
+        return False
+    return all(
+        np.allclose(found[name], other[name], rtol=0.0, atol=SAME * np.max(np.abs(other[name])))
+        for name in ("drive_effort_rms", "drive_effort_max", "reaction_max")
+        if name in found
+    )
+
+
+def _with_margin(method: FrictionMethod) -> FrictionMethod:
+    return replace(method, margin_up_to=MARGIN)
+
+
+def _nth(number: Number, k: int) -> float:
+    """The number of one mechanism of a batch."""
+    return float(number[k, 0]) if np.ndim(number) else float(number)
+
+
+def _findings(run: Run) -> Iterator[Finding]:
+    yield from model_notes(run.system.mechanism, run.system)
+    yield from run.chosen.findings
+    if run.determinacy is not None:
+        yield from run.determinacy.findings()
+
+
+def _differ(values: Mapping[str, Number], others: Mapping[str, Number], count: int) -> NDArray[np.bool_]:
+    """Which mechanisms of a batch are others than their ideal ones."""
+    found = np.zeros(count, bool)
+    for path, value in others.items():
+        if value is not values[path]:
+            found |= np.broadcast_to(np.not_equal(value, values[path]), (count, 1))[:, 0]
+    return found
+
+
+def _as_chosen(run: Run, values: Mapping[str, Number], count: int) -> NDArray[np.bool_]:
+    """Which mechanisms of a batch go together as the first does: nearest to the hints at the start, as in `choose`."""
+    system, time = run.system, np.zeros(1)
+    walk = start(system, values)
+    ours = np.ones(count, bool)
+    for number, module in enumerate(system.plan.modules):
+        branches, assembly = system.groups[number].BRANCHES, run.chosen.assembly[number]
+        free = module.rank > 1 and len(branches) > 1 and named_way(system, module, len(branches)) is None
+        if free and hints(walk, module):
+            poses = [pose_of(walk, number, branch, time) for branch in branches]
+            away = [
+                np.broadcast_to(distance(walk, module, pose.frames, _every, _every), (count, 1))[:, 0] for pose in poses
+            ]
+            nearest = np.where(away[1] < away[0], branches[1], branches[0])
+            ours &= np.isfinite(away[0]) & np.isfinite(away[1]) & (nearest == assembly)
+        walk.assembly.append(assembly)
+        walk.take(number, pose_of(walk, number, assembly, time), time)
+    return ours
+
+
+def _every(number: Number) -> Any:
+    return number
+
+
+def _may_change(back: Backward, shape: tuple[int, int], periodic: bool) -> NDArray[np.bool_]:
+    """Which mechanisms of a batch may pass a change point: see `change_points.suspects`."""
+    walk = back.walk
+    found = np.zeros(shape[0], bool)
+    for module, group, pose in zip(walk.system.plan.modules, walk.system.groups, walk.poses, strict=True):
+        if module.rank > 1 and group.BRANCHES:
+            margin = np.broadcast_to(1 / group.condition(pose), shape)
+            around = np.concatenate([margin[:, -1:], margin, margin[:, :1]], axis=1) if periodic else margin
+            found |= np.any(change_points.suspects(around), axis=-1)
+    return found

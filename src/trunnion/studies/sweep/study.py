@@ -1,0 +1,162 @@
+"""How the figures of a cycle change with some of the mechanism's numbers.
+
+Every point of the grid is a mechanism of its own; its cycle comes to one number of each of FIGURES. Points that differ
+in nothing but numbers are solved in one pass (`sweep_points`). A point with a position without an answer has no figures
+of the cycle but its status, and the efficiency of the ideal mechanism if that has an answer everywhere.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.cycle.account import effort_units, finding_row, references
+from trunnion.errors import Finding, Severity, Status, agreeing, counted
+from trunnion.model.mechanism import Mechanism
+from trunnion.solve.friction_method import FrictionMethod
+from trunnion.studies.sweep.figures import FIGURES, INTEGERS, Figure
+from trunnion.studies.sweep.grid import MOST_POINTS, Over, Swept, grid, say
+from trunnion.studies.sweep.measures import left_out, measures_of
+from trunnion.studies.sweep.points import Points
+from trunnion.version import __version__
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["FIGURES", "MOST_POINTS", "Figure", "Swept", "sweep"]
+
+
+def sweep(
+    mechanism: Mechanism,
+    over: Over,
+    steps: int = 360,
+    method: FrictionMethod | None = None,
+    progress: Callable[[int], None] | None = None,
+    margin: bool = False,
+    measures: Sequence[str] = (),
+) -> xr.Dataset:
+    """Figures of the cycle over a grid of some numbers of the mechanism.
+
+    over: by name, as for `Mechanism.with_values` (a path or an ending that is unique), a list of values, or from, to
+    and count: `{"misalignment": ("0 deg", "30 deg", 7), "input.speed": [50, 100]}`; plain numbers are SI.
+    margin: whether the locking margin is looked for as well, which takes many times as long as all else.
+    measures: names of the model's, or written as for `play`, each with one figure a cycle: variables of these names.
+    Returns a Dataset with a dimension for each name, last, its coordinate in SI, and the variables of `FIGURES`. Where
+    any position of the cycle has no answer they are NaN, but for the locking margin of positions that lock: `status`
+    and `without_answer` tell. Extremes leave out what `analyse` leaves out of its summary: positions with a relative
+    speed of zero or close to a dead centre, unless there are no others.
+    progress: called with the number of points done.
+    Raises MechanismError for a name that is unknown or stands for several numbers, values that the model refuses (at
+    any point), none or more than MOST_POINTS of them, or a structure that does not determine the motion.
+    """
+    points = Points(mechanism, grid(mechanism, over), steps, method or FrictionMethod(), margin)
+    labels: dict[str, list[str]] = {
+        "driver": list(mechanism.drivers),
+        "joint": list(mechanism.effective_joints),
+    }
+    arrays = {
+        name: np.full((*(len(labels[dim]) for dim in one.dims), *points.shape), 0 if name in INTEGERS else np.nan,
+                      INTEGERS.get(name, np.float64))
+        for name, one in FIGURES.items() if margin or one.part != "margin"
+    }  # fmt: skip
+    watched = {one.name: one for one in measures_of(points.run, measures)} if measures else {}
+    arrays |= {name: np.full(points.shape, np.nan) for name in watched}
+    for done, (index, told) in enumerate(points.solved(), 1):
+        if watched:
+            told |= points.measured(index, list(watched))
+        for name, value in told.items():
+            place: Any = (..., *index)
+            arrays[name][place] = value
+        if progress:
+            progress(done)
+    found = [*_answers(points.swept, arrays), *_shared(points), *left_out(mechanism, measures)]
+    of_errors = () if points.erring else (name for name, one in FIGURES.items() if one.part == "errors")
+    for name in of_errors:
+        arrays.pop(name, None)
+    figures = FIGURES | {
+        name: Figure((), one.figure_unit(points.run.system, points.run.values), f"measure {name}")
+        for name, one in watched.items()
+    }
+    return _dataset(points, labels, arrays, found, figures)
+
+
+# ---- what there is to say -------------------------------------------------------------------------------------
+
+
+def _shared(points: Points) -> Iterator[Finding]:
+    """What the points have to say that were looked at by themselves, each once; notes only if all have them."""
+    total, looked = int(np.prod(points.shape)), len(points.looked)
+    whole = counted(total, "point") if looked == total else f"{counted(looked, 'point')} looked at"
+    for found in points.said.values():
+        one, count = next(iter(found.values())), len(found)
+        if count == looked:
+            yield one
+        elif one.severity is not Severity.NOTE:
+            yield replace(one, what=f"{one.what} (at {count:,} of {whole})")
+
+
+def _answers(swept: Sequence[Swept], arrays: Mapping[str, NDArray[Any]]) -> Iterator[Finding]:
+    """An error for every status that leaves points without figures."""
+    status, missing = arrays["status"], arrays["without_answer"]
+    for code in Status:
+        where = np.argwhere(status == code)
+        if code.solved or not len(where):
+            continue
+        first = tuple(int(i) for i in where[0])
+        count = int(missing[first])
+        some_positions = f"{counted(count, 'position')} without an answer"
+        some = f"{len(where):,} of {counted(status.size, 'point')} {agreeing(len(where), 'has', 'have')} no figures"
+        what = f"{some}, first at {say(swept, first)} ({some_positions}): {code.text}"
+        names = " and ".join(one.name for one in swept)
+        yield Finding(what, names, "run analyse with these values: it says where in the cycle, and why")
+
+
+# ---- the result -----------------------------------------------------------------------------------------------
+
+
+def _dataset(
+    points: Points,
+    labels: Mapping[str, Sequence[str]],
+    arrays: Mapping[str, NDArray[Any]],
+    findings: Sequence[Finding],
+    figures: Mapping[str, Figure],
+) -> xr.Dataset:
+    import xarray as xr
+
+    mechanism, run, swept = points.mechanism, points.run, points.swept
+    names = tuple(one.name for one in swept)
+    variables = {
+        name: xr.Variable((*figures[name].dims, *names), array,
+                          {"units": figures[name].units, "long_name": figures[name].long_name})
+        for name, array in arrays.items()
+    }  # fmt: skip
+    if "transmission_error_max" in variables:
+        units = ["m" if kind == "prismatic" else "rad" for kind, _ in run.system.joints.values()]
+        variables["transmission_error_max"].attrs["member_units"] = json.dumps(units)
+    coordinates = {
+        one.name: xr.Variable(one.name, one.values, {
+            "units": one.unit, "long_name": one.path, "written_unit": one.written, "written_factor": one.factor,
+        })
+        for one in swept
+    }  # fmt: skip
+    told = {dim: (dim, np.asarray(members, dtype=str)) for dim, members in labels.items()}
+    attributes: dict[str, str | int] = {
+        "name": mechanism.name,
+        "formula": run.system.plan.formula,
+        "swept": json.dumps(names, ensure_ascii=False),
+        "steps": points.steps,
+        "model_hash": mechanism.digest,
+        "trunnion_version": __version__,
+        "method": points.method.name,
+        "references": "\n".join(references(mechanism)),
+        "flag_values": " ".join(str(int(code)) for code in Status),
+        "flag_meanings": " ".join(code.name.lower() for code in Status),
+        "driver_units": json.dumps(effort_units(run.system)),
+        "findings": json.dumps([finding_row(finding) for finding in findings], ensure_ascii=False),
+    }
+    return xr.Dataset(variables, {**told, **coordinates}, attributes)

@@ -1,0 +1,156 @@
+"""What a study of tolerances knows before any sample is drawn: measures, what varies, and its first order."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from trunnion.cycle.positions import check_steps
+from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.measures.figures import Reference
+from trunnion.measures.measures import Measure, named, outputs
+from trunnion.measures.positions import Plan, plan
+from trunnion.model.measure_kinds import place_kind
+from trunnion.model.mechanism import Mechanism
+from trunnion.model.quantity import Quantity
+from trunnion.model.units import UnitError
+from trunnion.solve.friction_method import FrictionMethod
+from trunnion.solve.run import Run, prepare
+from trunnion.studies.tolerance.effects import Effects, effects_of
+from trunnion.studies.tolerance.inputs import Inputs, inputs_of
+from trunnion.studies.tolerance.kernel import NumpyKernel, references
+from trunnion.studies.tolerance.linear import Linear, linear, searched
+from trunnion.studies.tolerance.sampling import Sampler, Sampling, towards
+from trunnion.studies.tolerance.search import Corner
+
+if TYPE_CHECKING:
+    pass
+
+__all__ = ["FEW", "Study", "placed", "study"]
+
+
+FEW = 10_000_000  # configurations up to which further processes cost more than they save
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """A mechanism whose numbers vary, with what is measured, made ready: evaluate it by any method.
+
+    told: what there is to say of the choice of measures.
+    """
+
+    run: Run
+    inputs: Inputs
+    measures: tuple[Measure, ...]
+    steps: int
+    friction: FrictionMethod
+    told: tuple[Finding, ...] = ()
+
+    @cached_property
+    def plan(self) -> Plan:
+        """The positions that the measures need."""
+        return plan(self.run, self.measures, self.steps)
+
+    @cached_property
+    def kernel(self) -> NumpyKernel:
+        return NumpyKernel(self.run, self.measures, self.friction)
+
+    @cached_property
+    def effects(self) -> Effects:
+        """Rows of the batch that first order takes."""
+        return effects_of(self.inputs)
+
+    @cached_property
+    def references(self) -> dict[str, Reference]:
+        """The measures of the nominal mechanism."""
+        return references(self.kernel, self.plan, self.inputs)
+
+    @cached_property
+    def linear(self) -> Linear:
+        """First order of every measure."""
+        return linear(self.kernel, self.plan, self.effects, self.references)
+
+    def worst(self) -> list[tuple[Corner, Corner]]:
+        """Least and largest deviation of every measure on the mechanism itself."""
+        return [searched(self.kernel, self.linear, of) for of in self.linear.measures]
+
+    def sampling(self, method: Any, samples: int, seed: int, engine: str = "numpy") -> Sampling:
+        """The run of a sampling method."""
+        spread, curves = [], []
+        for of in self.linear.measures:
+            known = of.reference
+            centre = known.figure + _finite(of.total[3])
+            spread.append((centre, _finite(of.total[4])))
+            middle = 0.0 * of.curve if known.against else of.curve  # what `shown` gives of the nominal mechanism
+            curves.append((np.nan_to_num(middle), np.nan_to_num(of.curve_total[4])))
+        model = self.run.system.mechanism.data()
+        rotation = None
+        if method == "quasi-monte-carlo" and self.inputs.tolerances:
+            count = len(self.inputs.tolerances)
+            rotation = towards(np.array([self.effects.gradient(of.slope)[:count] for of in self.linear.measures]))
+        return Sampling(
+            model, self.measures, self.steps, method, samples, seed, engine, self.friction, len(self.plan.times),
+            tuple(spread), tuple(curves), rotation,
+        )  # fmt: skip
+
+    def sampler(self, job: Sampling) -> Sampler:
+        """What draws and analyses blocks, in this process."""
+        return job.prepare()
+
+
+def _finite(number: Any) -> float:
+    return float(np.nan_to_num(number, posinf=0.0, neginf=0.0))
+
+
+def study(
+    mechanism: Mechanism,
+    measures: Sequence[str] | None = None,
+    steps: int = 360,
+    at: float | str | None = None,
+    friction: FrictionMethod | None = None,
+) -> Study:
+    """A study of a mechanism. Raises MechanismError as `tolerance` does."""
+    check_steps(steps)
+    run = prepare(mechanism)
+    inputs = inputs_of(run)
+    names = list(mechanism.measures) if measures is None else list(measures)
+    told: list[Finding] = []
+    if names:
+        found = named(mechanism, names, run.values)
+    else:
+        found = outputs(run.system)
+        remedy = "state measures: in the model, or give --measure link.point.x"
+        if not found:
+            what = "no measure is stated, and no joint to the ground is an output"
+            raise MechanismError(Finding(what, "measures", remedy))
+        listed = ", ".join(one.name for one in found)
+        what = f"no measure is stated: {listed} taken, joints to the ground without a driver"
+        told.append(Finding(what, "measures", remedy, Severity.NOTE))
+    if run.determinacy is not None and not all(one.of_motion for one in found):
+        run.determinacy.refuse()
+    if run.cycle.duration <= 0:  # there is one position
+        found = [replace(one, statistic="value") if one.rule == "deviation" else one for one in found]
+    if at is not None:
+        found = [placed(mechanism, one, at) for one in found]
+    return Study(run, inputs, tuple(found), steps, friction or FrictionMethod(), tuple(told))
+
+
+def placed(mechanism: Mechanism, measure: Measure, at: float | str) -> Measure:
+    """A measure taken at a place if it has none of its own and no figure of a whole course."""
+    if measure.at is not None or measure.over is not None or measure.statistic or measure.rule not in ("deviation",):
+        return measure
+    remedy = "write 60deg, 20mm or 0.1s, as the driver turns or slides"
+    try:
+        quantity = Quantity.read(at)
+        kind = place_kind(mechanism, quantity, {})
+        quantity.check({}, kind)
+        value = float(quantity.evaluate())
+    except UnitError as error:
+        raise MechanismError(Finding(f"'{at}' is no place: {error.what}", "at", remedy)) from None
+    except KeyError:
+        raise MechanismError(Finding(f"'{at}' is no place", "at", remedy)) from None
+    return replace(measure, at=value, timed=kind.unit == "s")

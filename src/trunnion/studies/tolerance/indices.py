@@ -1,0 +1,115 @@
+"""Variance-based sensitivity: which share of the scatter of a measure each number makes, alone and with the others.
+
+First order S_i = V(E(y | p_i))/V(y), total S_Ti = 1 − V(E(y | all but p_i))/V(y), by `scipy.stats.sobol_indices`
+(estimators of A. Saltelli et al., Comput. Phys. Commun. 181 (2010) 259-270, doi:10.1016/j.cpc.2009.09.018) on scrambled
+Sobol points, with percentile intervals by bootstrap. The two
+coordinates of a pin in its hole, and the size and direction of a run-out, count as one number each.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.errors import Finding, MechanismError
+from trunnion.statistics.streams import SobolStream
+from trunnion.studies.tolerance.sampling import Sampler
+
+__all__ = ["Indices", "indices"]
+
+Array = NDArray[np.float64]
+BOOTSTRAPS = 200
+LEAST, MOST = 64, 1 << 16
+
+
+@dataclass(frozen=True)
+class Indices:
+    """First and total order, (measure, parameter), with the ends of their 95 % intervals; base: points of a matrix."""
+
+    first: Array
+    first_low: Array
+    first_high: Array
+    total: Array
+    total_low: Array
+    total_high: Array
+    base: int
+    lost: int
+
+
+def indices(sampler: Sampler, samples: int, seed: int, progress: Callable[[int], None] | None = None) -> Indices:
+    """Sobol' indices of every measure by about so many samples in all. Raises MechanismError where they mean nothing.
+
+    Of correlated numbers there is no such share. Samples without an answer are set to the mean of the others.
+    """
+    inputs = sampler.inputs
+    correlation = inputs.population.correlation
+    if not np.array_equal(correlation, np.eye(len(correlation))):
+        what = "variance-based indices are of independent numbers, and some are correlated"
+        raise MechanismError(Finding(what, "correlations", "leave out --method sobol, or the correlations"))
+    parts = inputs.parts
+    base = min(max(1 << (max(1, samples // (len(parts) + 2)).bit_length() - 1), LEAST), MOST)
+    u = SobolStream(seed, 0, 2 * inputs.dims).points(0, base)
+    one, two = u[: inputs.dims], u[inputs.dims :]
+    done = 0
+
+    def analysed(points: Array) -> Array:
+        nonlocal done
+        size = sampler.job.block_size
+        found = np.empty((len(sampler.job.measures), points.shape[1]))
+        for low in range(0, points.shape[1], size):
+            with np.errstate(all="ignore"):
+                found[:, low : low + size] = sampler.figures(points[:, low : low + size])[0]
+            done += min(size, points.shape[1] - low)
+            if progress:
+                progress(done)
+        return found
+
+    y_one, y_two = analysed(one), analysed(two)
+    mixed = np.empty((len(parts), *y_one.shape))
+    for i, rows in enumerate(parts):
+        points = one.copy()
+        points[rows] = two[rows]
+        mixed[i] = analysed(points)
+    lost = int(sum(np.count_nonzero(np.any(np.isnan(y), axis=0)) for y in (y_one, y_two, *mixed)))
+    return _indices(_filled(y_one), _filled(y_two), _filled(mixed), seed, lost)
+
+
+def _indices(y_one: Array, y_two: Array, mixed: Array, seed: int, lost: int) -> Indices:
+    """Both orders with percentile intervals: scipy's own bootstrap cannot be given a seed."""
+    from scipy.stats import sobol_indices  # takes longer to import than the rest
+
+    base = y_one.shape[-1]
+    shape = len(y_one), len(mixed)  # of one measure scipy leaves out the axis
+
+    def both(points: Any) -> Array:
+        parts = {"f_A": y_one[..., points], "f_B": y_two[..., points], "f_AB": mixed[..., points]}
+        found = sobol_indices(func=parts, n=base)
+        return np.array([np.reshape(found.first_order, shape), np.reshape(found.total_order, shape)])
+
+    rng = np.random.Generator(np.random.Philox(seed))
+    with np.errstate(all="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # a measure that nothing moves has no shares: NaN
+        first, total = both(slice(None))
+        drawn = np.array([both(rng.integers(base, size=base)) for _ in range(BOOTSTRAPS)])
+        low, high = np.nanquantile(drawn, [0.025, 0.975], axis=0)
+    return Indices(
+        first, _closed(low[0], first), _closed(high[0], first), total, _closed(low[1], total), _closed(high[1], total),
+        base, lost,
+    )  # fmt: skip
+
+
+def _closed(end: Array, index: Array) -> Array:
+    """An end of an interval, the index itself where nothing scatters."""
+    return np.where(np.isnan(end), index, end)
+
+
+def _filled(y: Array) -> Array:
+    """Without gaps: the mean of the rest in their place."""
+    with np.errstate(all="ignore"):
+        mean = np.nan_to_num(np.nanmean(y, axis=-1, keepdims=True)) if np.any(np.isnan(y)) else 0.0
+    return np.where(np.isnan(y), mean, y)

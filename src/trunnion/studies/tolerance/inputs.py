@@ -1,0 +1,219 @@
+"""What varies from one mechanism to the next: toleranced numbers, and where pins lie in their holes.
+
+A toleranced number is its value as built plus a random deviation (`statistics.distributions`). A pin in a play that no
+seat decides lies anywhere in its hole: each end uniform over its interval, disc or ball, whose radius is that of the
+sample. It keeps that place on the link of the hole as the joint turns, or on the one that the model names. A run-out
+has a random size and a direction that is uniform over a turn.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.algebra.dual import Dual, derivative
+from trunnion.algebra.namespace import Number
+from trunnion.errors import Finding, MechanismError
+from trunnion.model.mechanism import Mechanism
+from trunnion.model.tolerances import FULL_TURN, Tolerance
+from trunnion.solve import shifts
+from trunnion.solve.run import Run
+from trunnion.solve.seats import given_offsets
+from trunnion.solve.shifts import Play
+from trunnion.statistics.population import Marginal, Population
+from trunnion.statistics.streams import correlated
+
+__all__ = ["Inputs", "inputs_of"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """The random numbers of a mechanism, in the order in which they are drawn.
+
+    tolerances: of numbers, drawn from the population; loose: joints whose pins may lie anywhere in their holes; held:
+    those whose seats are given.
+    """
+
+    run: Run
+    tolerances: tuple[Tolerance, ...]
+    loose: tuple[str, ...]
+    held: tuple[str, ...]
+    population: Population
+
+    @property
+    def names(self) -> list[str]:
+        """Paths of the toleranced numbers, and `joints.NAME.clearance` for every pin that may lie anywhere."""
+        return [*(one.path for one in self.tolerances), *(f"joints.{name}.clearance" for name in self.loose)]
+
+    @cached_property
+    def dims(self) -> int:
+        """How many uniform numbers a sample takes."""
+        play = sum(len(end) for name in self.loose for end in self.ends(name))
+        return len(self.tolerances) + sum(bool(one.direction) for one in self.tolerances) + play
+
+    @property
+    def parts(self) -> list[list[int]]:
+        """Which of the uniform numbers each of `names` is drawn from."""
+        found: list[list[int]] = [[i] for i in range(len(self.tolerances))]
+        place = len(self.tolerances)
+        for own, tolerance in zip(found, self.tolerances, strict=True):
+            if tolerance.direction:
+                own.append(place)
+                place += 1
+        for name in self.loose:
+            count = sum(len(end) for end in self.ends(name))
+            found.append(list(range(place, place + count)))
+            place += count
+        return found
+
+    def ends(self, joint: str) -> Sequence[Sequence[str]]:
+        """Names of the components of the pin's offset at each end of a joint's hole."""
+        play = self.play(joint, self.run.values)
+        assert play is not None  # else it would not be loose
+        return play.model.ends
+
+    def carriers(self, joint: str) -> tuple[str, ...]:
+        """Which of `shifts.CARRIERS` may carry the seat of a pin as the joint turns; the first does in samples."""
+        return shifts.carriers_of(self.run.system.mechanism, joint)
+
+    def angle(self, i: int) -> str:
+        """Path of the angle that a toleranced number is, or that goes with it."""
+        return self.tolerances[i].direction or self.tolerances[i].path
+
+    @cached_property
+    def turned(self) -> dict[int, int]:
+        """Of each toleranced number that changes the size of what points anywhere, which of them is the direction."""
+        angles = [i for i, one in enumerate(self.tolerances) if one.direction or one.distribution == FULL_TURN]
+        if not angles:
+            return {}
+        count = len(self.tolerances)
+        seeds = np.eye(2 * count)[:, :, None]
+        deviations = {one.path: Dual(0.0, seeds[i]) for i, one in enumerate(self.tolerances)}
+        for i in angles:  # the angle of a run-out is no toleranced number
+            path, own = self.angle(i), Dual(0.0, seeds[count + i])
+            deviations[path] = deviations[path] + own if path in deviations else own
+        values = self.run.system.mechanism.parameters(deviations=deviations)
+        found: dict[int, int] = {}
+        for sizes, angle in self._directed(values):
+            turning = [i for i in angles if np.any(_by(values[angle], count + i, 2 * count))]
+            numbers = [
+                i for i in range(count) if i not in angles and any(np.any(_by(size, i, 2 * count)) for size in sizes)
+            ]
+            found.update({i: turning[0] for i in numbers if turning})
+        return found
+
+    def _directed(self, values: Mapping[str, Number]) -> Iterator[tuple[tuple[Number, ...], str]]:
+        """Sizes, and the path of the direction they point in: of misaligned axes and of seats that are given."""
+        for joint in self.run.system.joints:
+            path = f"joints.{joint}.misalignment"
+            aside = "offset_towards" if f"{path}.offset_towards" in values else "towards"
+            for size, angle in (("tilt", "towards"), ("offset", aside)):
+                if {f"{path}.{size}", f"{path}.{angle}"} <= values.keys():
+                    yield (values[f"{path}.{size}"],), f"{path}.{angle}"
+        for joint in self.held:
+            play = self.play(joint, values)
+            assert play is not None  # a seat is one of a play
+            for angle in (f"joints.{joint}.seat.{key}" for key in ("xi", "beta")):
+                if angle in values:
+                    yield play.radii, angle
+
+    def play(self, joint: str, values: Mapping[str, Number]) -> Play | None:
+        """The play of a joint with these numbers."""
+        return shifts.play_of(self.run.system.mechanism.space, self.run.system.joints[joint][0], values, joint)
+
+    def values(self, u: Array, rotation: Array | None = None) -> dict[str, Number]:
+        """Every number of the mechanism, (sample, 1) where it varies, from u, (dims, sample), uniform in (0, 1).
+
+        rotation: orthogonal, of the normal scores of the toleranced numbers; it changes none of their distributions.
+        """
+        count = len(self.tolerances)
+        rest = iter(u[count:])
+        own = u[:count] if rotation is None else correlated(u[:count], rotation)
+        deviations: dict[str, Number] = {}
+        turned: dict[str, Number] = {}
+        for tolerance, row in zip(self.tolerances, self.population.draw(own), strict=True):
+            deviations[tolerance.path] = row[:, None]
+            if tolerance.direction:
+                turned[tolerance.direction] = (2 * np.pi * next(rest) - np.pi)[:, None]
+        values = self.run.system.mechanism.parameters(turned, deviations)
+        for joint in self.loose:
+            values.update(self._anywhere(joint, values, rest))
+        for joint in self.held:
+            values.update(self.seat(joint, values))
+        return values
+
+    def seat(self, joint: str, values: Mapping[str, Number]) -> dict[str, Number]:
+        """Offsets of a pin whose seat is given."""
+        play = self.play(joint, values)
+        assert play is not None  # a seat is one of a play
+        return play.model.paths(f"seats.{joint}", given_offsets(values, joint, play))
+
+    def _anywhere(self, joint: str, values: Mapping[str, Number], rest: Iterator[Array]) -> dict[str, Number]:
+        """Offsets of a pin at each end, uniform over the interval, disc or ball, on the link that carries its seat."""
+        play = self.play(joint, values)
+        assert play is not None
+        offsets = []
+        for end, radius in zip(play.model.ends, play.radii, strict=True):
+            unit = within([next(rest) for _ in end])
+            room = np.maximum(radius, 0.0)  # a fit that presses leaves none
+            offsets.append(tuple(room * part[:, None] for part in unit))
+        return play.model.paths(f"{self.carriers(joint)[0]}.{joint}", offsets)
+
+
+def _by(number: Number, i: int, count: int) -> Array:
+    """Derivative of a number by the i-th of so many seeds."""
+    found: Array = np.broadcast_to(np.asarray(derivative(number), float), (count, 1))[i]
+    return found
+
+
+def within(u: Sequence[Array]) -> list[Array]:
+    """Points uniform over the interval (−1, 1), the unit disc or the unit ball, from as many numbers in (0, 1)."""
+    if len(u) == 1:
+        return [2 * u[0] - 1]
+    angle = 2 * np.pi * u[1]
+    if len(u) == 2:
+        radius = np.sqrt(u[0])
+        return [radius * np.cos(angle), radius * np.sin(angle)]
+    radius, height = np.cbrt(u[0]), 2 * u[2] - 1
+    across = radius * np.sqrt(1 - height * height)
+    return [across * np.cos(angle), across * np.sin(angle), radius * height]
+
+
+def inputs_of(run: Run) -> Inputs:
+    """The random numbers of a mechanism. Raises MechanismError if nothing varies, or a play has no length."""
+    mechanism = run.system.mechanism
+    tolerances = tuple(mechanism.tolerated())
+    given = {seat.joint for seat in run.seats if seat.given is not None}
+    plays = {name: play for name in run.system.joints if (play := _play(run, name)) is not None}
+    loose = tuple(name for name in plays if name not in given)
+    held = tuple(name for name in plays if name in given)
+    if not tolerances and not loose:
+        remedy = "write `60 mm ± 0.05 mm`, an entry in `tolerances`, or a clearance of a joint"
+        raise MechanismError(Finding("nothing has a tolerance or a clearance", "tolerances", remedy))
+    findings = list(_uneven(mechanism, tolerances))
+    for name, play in plays.items():
+        findings += shifts.unstated_length(name, play)
+    if findings:
+        raise MechanismError(findings)
+    marginals = [Marginal(one.distribution, one.lower, one.upper, one.options) for one in tolerances]
+    return Inputs(run, tolerances, loose, held, Population(marginals, mechanism.correlation()))
+
+
+def _uneven(mechanism: Mechanism, tolerances: Sequence[Tolerance]) -> Iterator[Finding]:
+    """Speeds and ranges that vary while there are other drivers, which would no longer be at the same positions."""
+    for one in tolerances:
+        section, _, rest = one.path.partition(".")
+        key = rest.partition(".")[2].partition(".")[0]
+        if section == "drivers" and len(mechanism.drivers) > 1 and key != "start":
+            what = "it cannot vary alone: the drivers would no longer be at the same positions together"
+            yield Finding(what, f"tolerances.{one.path}", "leave it out, or vary the start of the driver")
+
+
+def _play(run: Run, joint: str) -> Play | None:
+    return shifts.play_of(run.system.mechanism.space, run.system.joints[joint][0], run.values, joint)

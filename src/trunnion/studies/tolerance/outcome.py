@@ -1,0 +1,31 @@
+"""All that the methods of a tolerance study have found."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from trunnion.studies.tolerance.first_order import Study
+from trunnion.studies.tolerance.indices import Indices
+from trunnion.studies.tolerance.sampling import Sampling, Tally
+from trunnion.studies.tolerance.search import Corner
+
+if TYPE_CHECKING:
+    pass
+
+__all__ = ["Outcome"]
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What the methods that were asked for found; None of those that were not. target: the yield asked for."""
+
+    study: Study
+    methods: tuple[str, ...]
+    worst: Sequence[tuple[Corner, Corner]] | None = None
+    job: Sampling | None = None
+    tally: Tally | None = None
+    indices: Indices | None = None
+    stopped: bool = False
+    target: float | None = None

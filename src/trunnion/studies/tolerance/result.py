@@ -1,0 +1,290 @@
+"""The Dataset of `tolerance`: names, units, summary and provenance."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.cycle.account import finding_row, references
+from trunnion.errors import Finding, Status
+from trunnion.measures.figures import moment
+from trunnion.model.parameters import dimension_kinds
+from trunnion.studies.tolerance.first_order import Study
+from trunnion.studies.tolerance.said import findings_of, summary
+from trunnion.studies.tolerance.sampled import QUANTILES, sampled
+from trunnion.studies.tolerance.targets import MISSED
+from trunnion.studies.tolerance.words import course_text, text_of
+from trunnion.version import __version__
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from trunnion.studies.tolerance.linear import Of
+
+from trunnion.studies.tolerance.outcome import Outcome
+
+__all__ = ["VARIABLES", "Variable", "dataset"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Variable:
+    """Dimensions, unit and long name of a result.
+
+    Unit empty: that of each measure, in the attribute `measure_units`; "parameter": that of each parameter, in
+    `parameter_units`; "ratio": measure over parameter; "course": that of each course, in `curve_units`; "course ratio":
+    course over parameter; "drive": deg, mm or s, as `drive_unit` says.
+    """
+
+    dims: tuple[str, ...]
+    units: str
+    long_name: str
+
+
+M, P, MP, MPOS = ("measure",), ("parameter",), ("measure", "parameter"), ("measure", "position")
+VARIABLES: dict[str, Variable] = {
+    "nominal": Variable(M, "", "figure of the nominal mechanism"),
+    "place": Variable(M, "drive", "drive coordinate at which the figure is taken; of an extreme, the nominal one"),
+    "parameter_nominal": Variable(P, "parameter", "nominal value; of a clearance its radius"),
+    "parameter_lower": Variable(P, "parameter", "lower limit of the deviation from nominal"),
+    "parameter_upper": Variable(P, "parameter", "upper limit of the deviation from nominal"),
+    "parameter_deviation": Variable(P, "parameter", "standard deviation; of a clearance, of an offset along one axis"),
+    "parameter_shift": Variable(P, "parameter", "mean deviation from nominal"),
+    "sensitivity": Variable(MP, "ratio", "derivative of the figure; of a clearance, by its radius in the worst case"),
+    "contribution_worst_case": Variable(MP, "", "largest change of the figure by the parameter alone, to first order"),
+    "contribution_rss": Variable(MP, "1", "share of the parameter in the square of the RSS half width"),
+    "contribution_variance": Variable(
+        MP, "1", "share of the parameter in the variance, to first order: its covariance with the figure, signed"
+    ),
+    "worst_case_lower": Variable(M, "", "least deviation of the figure, to first order"),
+    "worst_case_upper": Variable(M, "", "largest deviation of the figure, to first order"),
+    "rss": Variable(M, "", "half width by the root of the sum of squares; without correlation"),
+    "deviation_linear": Variable(M, "", "standard deviation, to first order"),
+    "shift_linear": Variable(M, "", "mean deviation from nominal, to first order"),
+    "searched_lower": Variable(M, "", "least deviation found on the mechanism itself"),
+    "searched_upper": Variable(M, "", "largest deviation found on the mechanism itself"),
+    "corner_lower": Variable(MP, "parameter", "value of the parameter at the least deviation"),
+    "corner_upper": Variable(MP, "parameter", "value of the parameter at the largest deviation"),
+    "curve": Variable(MPOS, "course", "course of the measure on the nominal mechanism"),
+    "curve_sensitivity": Variable(("measure", "parameter", "position"), "course ratio", "derivative of the course"),
+    "curve_worst_case_lower": Variable(MPOS, "course", "least deviation of the course, to first order"),
+    "curve_worst_case_upper": Variable(MPOS, "course", "largest deviation of the course, to first order"),
+    "curve_rss": Variable(
+        MPOS, "course", "half width of the course by the root of the sum of squares; without correlation"
+    ),
+    "curve_shift": Variable(MPOS, "course", "mean deviation of the course from nominal, to first order"),
+    "curve_deviation": Variable(MPOS, "course", "standard deviation of the course, to first order"),
+    "status": Variable(("position",), "1", "code of the position's status; see the attribute flag_meanings"),
+    "samples": Variable((), "1", "number of samples"),
+    "mean": Variable(M, "", "mean of the figure"),
+    "mean_low": Variable(M, "", "mean, lower end of the 95 % interval"),
+    "mean_high": Variable(M, "", "mean, upper end of the 95 % interval"),
+    "deviation": Variable(M, "", "standard deviation of the figure"),
+    "deviation_low": Variable(M, "", "standard deviation, lower end of the 95 % interval"),
+    "deviation_high": Variable(M, "", "standard deviation, upper end of the 95 % interval"),
+    "skewness": Variable(M, "1", "skewness of the figure"),
+    "kurtosis": Variable(M, "1", "kurtosis of the figure, 3 of a normal distribution"),
+    "least": Variable(M, "", "least figure"),
+    "most": Variable(M, "", "largest figure"),
+    "quantile_value": Variable(("measure", "quantile"), "", "figure that this share does not exceed"),
+    "quantile_low": Variable(("measure", "quantile"), "", "quantile, lower end of the 95 % interval"),
+    "quantile_high": Variable(("measure", "quantile"), "", "quantile, upper end of the 95 % interval"),
+    "yield": Variable(
+        M, "1", "share of the samples within the limits of the measure, or with an answer if it has none"
+    ),
+    "yield_low": Variable(M, "1", "yield, lower end of the 95 % interval"),
+    "yield_high": Variable(M, "1", "yield, upper end of the 95 % interval"),
+    "yield_all": Variable((), "1", "share of the samples within all limits"),
+    "yield_all_low": Variable((), "1", "yield of all, lower end of the 95 % interval"),
+    "yield_all_high": Variable((), "1", "yield of all, upper end of the 95 % interval"),
+    "cp": Variable(M, "1", "capability index C_p of the figure"),
+    "cpk": Variable(M, "1", "capability index C_pk of the figure"),
+    "failed": Variable(("cause",), "1", "samples without an answer, by the gravest status of their positions"),
+    "histogram": Variable(("measure", "bin"), "1", "samples in a bin"),
+    "edge": Variable(("measure", "edge"), "", "edges of the bins; those at the ends stand for all beyond"),
+    "band": Variable(
+        ("measure", "quantile", "position"),
+        "course",
+        "deviation of the course from nominal that this share does not exceed",
+    ),
+    "convergence_samples": Variable(("size",), "1", "first so many samples"),
+    "convergence_mean": Variable(("measure", "size"), "", "mean of the first samples"),
+    "convergence_deviation": Variable(("measure", "size"), "", "standard deviation of the first samples"),
+    "convergence_yield": Variable(("measure", "size"), "1", "yield of the first samples"),
+    "first_order": Variable(MP, "1", "Sobol' index of first order: share of the variance by the parameter alone"),
+    "first_order_low": Variable(MP, "1", "first order, lower end of the 95 % interval"),
+    "first_order_high": Variable(MP, "1", "first order, upper end of the 95 % interval"),
+    "total_order": Variable(MP, "1", "Sobol' index of total order: share with all its interactions"),
+    "total_order_low": Variable(MP, "1", "total order, lower end of the 95 % interval"),
+    "total_order_high": Variable(MP, "1", "total order, upper end of the 95 % interval"),
+}
+
+
+def dataset(outcome: Outcome, told: Sequence[Finding]) -> xr.Dataset:
+    """The numbers of all methods as an xarray Dataset with coordinates, units, long names and attributes."""
+    import xarray as xr
+
+    found = outcome.study
+    system, mechanism = found.run.system, found.run.system.mechanism
+    counted = None if outcome.tally is None or outcome.job is None else sampled(outcome.job, outcome.tally, found)
+    stated = [finding_row(finding) for finding in [*findings_of(outcome, counted), *told]]
+    arrays = {**_linear(found), **_worst(outcome), **(counted.arrays if counted else {}), **_shares(outcome)}
+    units = [measure.figure_unit(system, found.run.values) for measure in found.measures]
+    curve_units = [measure.unit(system) for measure in found.measures]
+    dimensions = {f"dimensions.{name}": kind for name, kind in dimension_kinds(mechanism).items()}
+    kinds = {**mechanism.parameter_kinds(), **dimensions}
+    parameter_units = [kinds[name].unit if name in kinds else "m" for name in found.inputs.names]
+    dial = system.dial(found.run.values, found.plan.times)
+    known = _units(units, curve_units, parameter_units, dial.unit)
+    variables = {
+        name: xr.Variable(of.dims, array, {"long_name": of.long_name, "units": known.get(of.units, of.units)})
+        for (name, array), of in zip(arrays.items(), map(VARIABLES.__getitem__, arrays), strict=True)
+    }
+    used = {dim for name in variables for dim in VARIABLES[name].dims}
+    coordinates: dict[str, Any] = {
+        "measure": [measure.name for measure in found.measures],
+        "parameter": found.inputs.names,
+        "cause": [*(code.text for code in Status), "the figure does not exist"],
+    }
+    told_of = {dim: (dim, np.asarray(names, str)) for dim, names in coordinates.items() if dim in used}
+    if "quantile" in used:
+        told_of["quantile"] = ("quantile", np.array(QUANTILES))
+    times = xr.Variable("position", found.plan.times, {"units": "s", "long_name": "time from the start of the cycle"})
+    name = f"coordinate of {dial.of}" if dial.of else "time"
+    over = xr.Variable("position", np.asarray(dial.values, float), {"units": dial.unit.strip(), "long_name": name})
+    attributes: dict[str, Any] = {
+        "name": mechanism.name,
+        "formula": system.plan.formula,
+        "model_hash": mechanism.digest,
+        "trunnion_version": __version__,
+        "references": "\n".join(references(mechanism)),
+        "flag_values": " ".join(str(int(code)) for code in Status),
+        "flag_meanings": " ".join(code.name.lower() for code in Status),
+        "methods": json.dumps(outcome.methods),
+        "sampling": outcome.job.method if outcome.job else "",
+        "engine": outcome.job.engine if outcome.job else "numpy",
+        "seed": outcome.job.seed if outcome.job else -1,
+        **_of_measures(found, units, curve_units),
+        "parameter_units": json.dumps(parameter_units),
+        "distributions": json.dumps(
+            [*(one.distribution for one in found.inputs.tolerances), *("play" for _ in found.inputs.loose)]
+        ),
+        "correlated": int(found.effects.correlated),
+        "drive": dial.of,
+        "drive_unit": dial.unit.strip(),
+        "periodic": int(found.run.cycle.periodic),
+        "steps": found.steps,
+        "stopped": int(outcome.stopped),
+        "summary": json.dumps(summary(outcome, counted, units, dial), ensure_ascii=False),
+        "findings": json.dumps(stated, ensure_ascii=False),
+        "missed": json.dumps(
+            [f"{row['where']}: {row['what']}" for row in stated if row["what"].startswith(MISSED)], ensure_ascii=False
+        ),
+    }
+    return xr.Dataset(variables, {**told_of, "time": times, "drive": over}, attributes)
+
+
+def _of_measures(found: Study, units: Sequence[str], curve_units: Sequence[str]) -> dict[str, str]:
+    """Attributes that are a list each, an entry for each measure."""
+    system, measures = found.run.system, found.measures
+    limits = [None if (one.lower, one.upper) == (None, None) else [one.lower, one.upper] for one in measures]
+    told: dict[str, list[Any]] = {
+        "measure_units": list(units),
+        "measure_texts": [text_of(one, system) for one in measures],
+        "measure_rules": [one.rule for one in measures],
+        "curve_units": list(curve_units),
+        "curve_texts": [course_text(one, system) for one in measures],
+        "limits": limits,
+        "bounds": [[one.at_least, one.at_most] for one in measures],
+    }
+    return {key: json.dumps(entries, ensure_ascii=False) for key, entries in told.items()}
+
+
+def _units(own: Sequence[str], courses: Sequence[str], parameters: Sequence[str], drive: str) -> dict[str, str]:
+    """The units that `Variable` names by another: where it is one for all measures and parameters, else none."""
+    figure, course, parameter = (many[0] if len(set(many)) == 1 else "" for many in (own, courses, parameters))
+    ratios = (f"{one}/{parameter}" if one and parameter else "" for one in (figure, course))
+    found = {"": figure, "course": course, "parameter": parameter, "drive": drive.strip().replace("°", "deg")}
+    return found | dict(zip(("ratio", "course ratio"), ratios, strict=True))
+
+
+def _linear(found: Study) -> dict[str, Any]:
+    first, inputs = found.linear, found.inputs
+    rows = first.measures
+    effects = found.effects
+    total = np.array([[float(part) for part in of.total] for of in rows]).reshape(-1, 5).T
+    halves = np.array([of.spread.half for of in rows])
+    scatter = np.array([effects.covariances(of.spread, of.slope) for of in rows])
+    worst = np.array([np.maximum(-of.spread.lower, of.spread.upper) for of in rows])
+    with np.errstate(all="ignore"):
+        shares = halves**2 / np.sum(halves**2, axis=1, keepdims=True)
+        variance = scatter / np.sum(scatter, axis=1, keepdims=True)
+    numbers = effects.numbers()
+    return {
+        "nominal": np.array([of.reference.figure for of in rows]),
+        "place": np.array([_place(found, of) for of in rows], float),
+        **{f"parameter_{key}": array for key, array in numbers.items()},
+        "sensitivity": np.array([of.sensitivity for of in rows]),
+        "contribution_worst_case": worst,
+        "contribution_rss": shares,
+        "contribution_variance": variance,
+        "worst_case_lower": total[0], "worst_case_upper": total[1], "rss": total[2],
+        "shift_linear": total[3], "deviation_linear": total[4],
+        "curve": _spread_out(found, [of.curve for of in rows], ()),
+        "curve_sensitivity": _spread_out(found, [of.curve_sensitivity for of in rows], (len(inputs.names),)),
+        "curve_worst_case_lower": _spread_out(found, [of.curve_total[0] for of in rows], ()),
+        "curve_worst_case_upper": _spread_out(found, [of.curve_total[1] for of in rows], ()),
+        "curve_rss": _spread_out(found, [of.curve_total[2] for of in rows], ()),
+        "curve_shift": _spread_out(found, [of.curve_total[3] for of in rows], ()),
+        "curve_deviation": _spread_out(found, [of.curve_total[4] for of in rows], ()),
+        "status": first.status,
+    }  # fmt: skip
+
+
+def _place(found: Study, of: Of) -> float:
+    """The drive coordinate at which a figure is taken; NaN if it is of no single position."""
+    run, known = found.run, of.reference
+    time = known.window.time[of.place] if of.place >= 0 else moment(known)
+    if not np.isfinite(time) or run.cycle.duration <= 0:
+        return float("nan")
+    time = time % run.cycle.duration if run.cycle.periodic else time
+    return float(run.system.dial(run.values, np.array([time])).values[0])
+
+
+def _spread_out(found: Study, arrays: Sequence[Array], shape: tuple[int, ...]) -> Array:
+    """Numbers over the windows of measures as one array over all positions, NaN outside."""
+    whole = np.full((len(arrays), *shape, len(found.plan.times)), np.nan)
+    for row, array, of in zip(whole, arrays, found.linear.measures, strict=True):
+        row[..., of.reference.window.index] = array
+    return whole
+
+
+def _worst(outcome: Outcome) -> dict[str, Any]:
+    if outcome.worst is None:
+        return {}
+    found, inputs = outcome.study, outcome.study.inputs
+    radii = found.effects.numbers()["nominal"]
+    values = {}
+    for k, key in enumerate(("lower", "upper")):
+        corners = [pair[k] for pair in outcome.worst]
+        values[f"searched_{key}"] = np.array([corner.value for corner in corners])
+        values[f"corner_{key}"] = np.array(
+            [[corner.at.get(name, radii[i]) for i, name in enumerate(inputs.names)] for corner in corners]
+        )
+    return values
+
+
+def _shares(outcome: Outcome) -> dict[str, Any]:
+    one = outcome.indices
+    if one is None:
+        return {}
+    return {
+        "first_order": one.first, "first_order_low": one.first_low, "first_order_high": one.first_high,
+        "total_order": one.total, "total_order_low": one.total_low, "total_order_high": one.total_high,
+    }  # fmt: skip

@@ -1,0 +1,180 @@
+"""One job on one core, on all of them or on a cluster: the same tally to the last bit.
+
+`run` cuts the blocks of a job into portions, has a crew do them, a bounded number at a time, and merges what comes
+back. Memory does not grow with the number of samples. A worker that dies is replaced and its blocks are done again;
+what a checkpoint holds need not be done again; Ctrl-C ends the run and keeps what is done.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from time import perf_counter
+from typing import Generic
+
+from trunnion.errors import Finding, MechanismError
+from trunnion.studies.tolerance.arithmetic import fingerprint, mixed
+from trunnion.studies.tolerance.checkpoint import Checkpoint
+from trunnion.studies.tolerance.interruption import Interruption
+from trunnion.studies.tolerance.processes import Processes
+from trunnion.studies.tolerance.protocol import Blocks, Crew, Job, Part, Prepared, T, Tally
+from trunnion.studies.tolerance.ranges import Pace, Plan, count
+
+__all__ = ["Crew", "Job", "Part", "Prepared", "Run", "Tally", "run"]
+
+NEAR, FAR = 1.0, 10.0  # s: what a portion takes on this machine, and on a cluster, unless `chunk` says otherwise
+
+
+@dataclass(frozen=True)
+class Run(Generic[T]):
+    """The tally of what was done; `stopped`: by Ctrl-C, before the end.
+
+    notes: a checkpoint that could not be written; machines whose last bits differ.
+    """
+
+    tally: T
+    stopped: bool
+    notes: tuple[Finding, ...] = ()
+
+
+class Here(Generic[T]):
+    """`Crew` of this process alone."""
+
+    workers = 1
+
+    def __init__(self, job: Job[T]) -> None:
+        self._prepared = job.prepare()
+        self._given: list[Blocks] = []
+
+    @property
+    def room(self) -> int:
+        return 1 - len(self._given)
+
+    def give(self, blocks: Blocks) -> None:
+        self._given.append(blocks)
+
+    def wait(self) -> Sequence[Part[T]]:
+        start = perf_counter()
+        blocks = self._given[0]
+        tally = self._prepared.evaluate(*blocks)
+        self._given.clear()
+        return [Part(blocks, perf_counter() - start, tally, fingerprint())]
+
+    def close(self, finished: bool) -> None:
+        pass
+
+
+def _crew(job: Job[T], jobs: int, cluster: str | None, left: int) -> Crew[T]:
+    if cluster is not None:
+        from trunnion.studies.tolerance.cluster import Cluster  # its package is an extra
+
+        return Cluster(job, cluster, min(jobs, left))
+    return Here(job) if min(jobs, left) <= 1 else Processes(job, min(jobs, left))
+
+
+def _checked(jobs: int | None, chunk: int | None, resume: bool, checkpoint: object) -> int:
+    """Number of jobs; MechanismError if the arguments make no sense."""
+    findings = []
+    if jobs is not None and jobs < 1:
+        findings.append(Finding(f"{jobs} jobs", "jobs", "state 1 or more, or none for all cores"))
+    if chunk is not None and chunk < 1:
+        findings.append(
+            Finding(f"a portion of {chunk} samples", "chunk", "state 1 or more; it is rounded up to blocks")
+        )
+    if resume and checkpoint is None:
+        findings.append(Finding("nothing to go on from", "resume", "name the file: --checkpoint FILE"))
+    if findings:
+        raise MechanismError(findings)
+    return jobs or os.cpu_count() or 1
+
+
+def run(
+    job: Job[T],
+    *,
+    jobs: int | None = 1,
+    chunk: int | None = None,
+    cluster: str | None = None,
+    checkpoint: str | os.PathLike[str] | None = None,
+    resume: bool = False,
+    progress: Callable[[int], None] | None = None,
+) -> Run[T]:
+    """Do the job, or what a checkpoint leaves of it.
+
+    jobs: processes on this machine (None: one per core); one job and no cluster needs none beside this.
+    chunk: samples handed out at a time, rounded up to whole blocks; by default what takes about a second (on a
+    cluster ten). cluster: "local" (a Dask cluster of `jobs` processes here) or the address of a Dask scheduler.
+    checkpoint: file that the tally is written to every 30 s or more, at Ctrl-C, at an error and at the end.
+    resume: go on from that file if it is there. progress: called with the samples done, in this thread.
+
+    Raises MechanismError, with one finding each, if the checkpoint is damaged or of another job, if the same blocks
+    end three workers in turn, if the cluster cannot be reached. Whatever is raised, what is done is kept first.
+    """
+    jobs = _checked(jobs, chunk, resume, checkpoint)
+    kept = None if checkpoint is None else Checkpoint(checkpoint, job)
+    tally = job.empty() if kept is None else kept.begin(resume)
+    arithmetic = set[str]() if kept is None else kept.arithmetic
+    plan = Plan(tally.blocks, job.blocks)
+    stopped = False
+    if plan.left:
+        stated = None if chunk is None else math.ceil(chunk / job.block_size)
+        pace = Pace(stated, NEAR if cluster is None else FAR)
+        with Interruption() as interruption:
+            crew = _crew(job, jobs, cluster, plan.left)
+            spread = _Spread(job, crew, plan, pace, kept, progress, arithmetic, tally)
+            try:
+                spread.go(interruption)
+            finally:
+                tally = spread.tally
+                stopped = count(tally.blocks) < job.blocks
+                try:
+                    if kept is not None:
+                        kept.keep(tally)
+                finally:
+                    crew.close(finished=not stopped)
+    elif progress is not None:
+        progress(job.samples)
+    trouble = (kept.trouble,) if kept is not None and kept.trouble is not None else ()
+    return Run(tally, stopped, trouble + mixed(arithmetic))
+
+
+@dataclass
+class _Spread(Generic[T]):
+    """A run under way."""
+
+    job: Job[T]
+    crew: Crew[T]
+    plan: Plan
+    pace: Pace
+    kept: Checkpoint[T] | None
+    progress: Callable[[int], None] | None
+    arithmetic: set[str]
+    tally: T
+
+    def go(self, interruption: Interruption) -> None:
+        """Until all blocks are done or Ctrl-C is pressed."""
+        blocks = self.job.blocks
+        under_way = 0
+        self._tell()
+        while not interruption.asked:
+            while self.plan.left and self.crew.room > 0:
+                size = self.pace.blocks(self.plan.left, self.crew.workers)
+                self.crew.give(self.plan.take(size, self.pace.aligned))
+                under_way += 1
+            if not under_way:
+                break
+            for part in interruption.during(self.crew.wait) or ():
+                under_way -= 1
+                self.tally = self.tally.merge(part.tally)
+                self.arithmetic.add(part.arithmetic)
+                self.pace.seen(count([part.blocks]), part.seconds)
+                self._tell()
+            if self.kept is not None and (under_way or self.plan.left):
+                self.kept.perhaps(self.tally)
+        assert interruption.asked or count(self.tally.blocks) == blocks
+
+    def _tell(self) -> None:
+        if self.progress is not None:
+            done = count(self.tally.blocks)
+            self.progress(round(self.job.samples * (done / self.job.blocks)))

@@ -1,0 +1,296 @@
+"""Random mechanisms by the block: drawn, analysed, counted; nothing of a sample is kept.
+
+A block is a fixed number of samples, chosen by the number of positions alone, and is drawn, analysed and summed up by
+itself: its bits depend neither on what is worked out beside it nor where. So a run has the same answer to the last bit
+for any portions of blocks and any number of workers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from typing import Any, Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.errors import Status
+from trunnion.measures.figures import Reference, judged
+from trunnion.measures.measures import Measure
+from trunnion.measures.positions import Plan, plan
+from trunnion.model.mechanism import Mechanism
+from trunnion.solve.friction_method import FrictionMethod
+from trunnion.solve.run import prepare
+from trunnion.statistics.histogram import Bins, count
+from trunnion.statistics.streams import SobolStream, uniforms
+from trunnion.statistics.tally import Moments, Tree, moments_of
+from trunnion.studies.tolerance.inputs import Inputs, inputs_of
+from trunnion.studies.tolerance.kernel import Courses, Kernel, NumpyKernel, batch_of, kernel_of, references
+from trunnion.version import __version__
+
+__all__ = ["METHODS", "Sampling", "Tally", "towards"]
+
+Array = NDArray[np.float64]
+Counts = NDArray[np.int64]
+Method = Literal["monte-carlo", "quasi-monte-carlo"]
+METHODS: tuple[Method, ...] = ("monte-carlo", "quasi-monte-carlo")
+
+BATCHES = 8  # of the kernel in a block, so that summing up costs little beside the analysis
+MOST = 2048  # samples in a block, so that few of them show how figures converge
+REPLICATES = 8  # independent scramblings, whose spread is the error
+CAUSES = len(Status) + 1  # by status; the last: a figure that does not exist, such as a dead centre out of range
+BAND = {"fineness": 4, "octaves": 8}  # of the histograms at every position
+
+
+@dataclass(frozen=True, eq=False)
+class Tally:
+    """What is counted of some blocks.
+
+    histogram (replicate, measure, bin), band (measure, position, bin), failed (cause): counts. trees: by replicate,
+    moments over its blocks of the figures, of whether each is within its limits, and of whether all are.
+    """
+
+    histogram: Counts
+    band: Counts
+    failed: Counts
+    trees: tuple[Tree[Moments], ...]
+    per_replicate: int
+
+    @property
+    def blocks(self) -> Sequence[tuple[int, int]]:
+        """The blocks done, as ranges."""
+        size = self.per_replicate
+        found: list[tuple[int, int]] = []
+        for i, tree in enumerate(self.trees):
+            for low, high in tree.ranges:
+                if found and found[-1][1] == i * size + low:
+                    found[-1] = (found[-1][0], i * size + high)
+                else:
+                    found.append((i * size + low, i * size + high))
+        return found
+
+    def merge(self, other: Self) -> Self:
+        """The tally of both; integers add up, moments merge in the fixed order of the tree."""
+        trees = tuple(one.merge(two) for one, two in zip(self.trees, other.trees, strict=True))
+        return type(self)(
+            self.histogram + other.histogram, self.band + other.band, self.failed + other.failed, trees,
+            self.per_replicate,
+        )  # fmt: skip
+
+    def to_arrays(self) -> dict[str, NDArray[Any]]:
+        """Everything as arrays by name."""
+        found: dict[str, NDArray[Any]] = {
+            "histogram": self.histogram, "band": self.band, "failed": self.failed,
+            "per_replicate": np.array(self.per_replicate),
+        }  # fmt: skip
+        for i, tree in enumerate(self.trees):
+            found |= {f"tree{i}.{name}": array for name, array in tree.to_arrays().items()}
+        return found
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, NDArray[Any]]) -> Self:
+        """From `to_arrays`."""
+        trees = []
+        for i in range(len(arrays["histogram"])):
+            own = {name.partition(".")[2]: array for name, array in arrays.items() if name.startswith(f"tree{i}.")}
+            trees.append(Tree.from_arrays(own, Moments.unpacked))
+        size = int(arrays["per_replicate"])
+        return cls(arrays["histogram"], arrays["band"], arrays["failed"], tuple(trees), size)
+
+
+@dataclass(frozen=True, eq=False)
+class Sampling:
+    """A whole run: which mechanism, what is measured where, how many samples and how they are drawn.
+
+    model: plain data of the mechanism; spread: for each measure where its figures are expected, (centre, deviation),
+    for the bins; curve_spread: nominal value and deviation of its curve over its window. rotation: see `towards`.
+    """
+
+    model: Mapping[str, Any]
+    measures: tuple[Measure, ...]
+    steps: int
+    method: Method
+    asked: int
+    seed: int
+    engine: str
+    friction: FrictionMethod
+    positions: int
+    spread: tuple[tuple[float, float], ...]
+    curve_spread: tuple[tuple[Array, Array], ...]
+    rotation: Array | None = None
+
+    @cached_property
+    def block_size(self) -> int:
+        """Samples in a block."""
+        most = self.drawing
+        if self.engine != "numpy":  # what pays to be compiled takes more at a time
+            most *= max(1, batch_of(self.engine, self.positions) // self.drawing)
+        if self.method == "monte-carlo":
+            return most
+        return min(1 << (most.bit_length() - 1), self._points)
+
+    @property
+    def drawing(self) -> int:
+        """Samples whose random numbers are drawn together: the same by any engine."""
+        return max(1, min(BATCHES * batch_of("numpy", self.positions), MOST))
+
+    @cached_property
+    def _points(self) -> int:
+        """Points of a replicate: the power of two that uses up no more than the samples asked for."""
+        return 1 << (max(1, self.asked // REPLICATES).bit_length() - 1)
+
+    @property
+    def replicates(self) -> int:
+        return 1 if self.method == "monte-carlo" else REPLICATES
+
+    @property
+    def samples(self) -> int:
+        """Samples in all blocks."""
+        return self.asked if self.method == "monte-carlo" else REPLICATES * self._points
+
+    @property
+    def per_replicate(self) -> int:
+        """Blocks of a replicate."""
+        return -(-self.samples // (self.block_size * self.replicates))
+
+    @property
+    def blocks(self) -> int:
+        """Number of blocks."""
+        return self.per_replicate * self.replicates
+
+    def identity(self) -> Mapping[str, Any]:
+        """All that the answer depends on."""
+        return {
+            "model": self.model,
+            "measures": [asdict(measure) for measure in self.measures],
+            "steps": self.steps,
+            "method": self.method,
+            "samples": self.samples,
+            "seed": self.seed,
+            "engine": self.engine,
+            "friction": asdict(self.friction),
+            "block": self.block_size,
+            "spread": self.spread,
+            "curve_spread": self.curve_spread,
+            "rotation": self.rotation,
+            "version": __version__,
+        }
+
+    def empty(self) -> Tally:
+        """The tally of no blocks."""
+        return Tally(
+            np.zeros((self.replicates, len(self.measures), Bins(0.0, 1.0).number), np.int64),
+            np.zeros((len(self.measures), self.positions, Bins(0.0, 1.0, **BAND).number), np.int64),
+            np.zeros(CAUSES, np.int64),
+            tuple(Tree() for _ in range(self.replicates)),
+            self.per_replicate,
+        )
+
+    @cached_property
+    def bins(self) -> Bins:
+        """Bins of the figures."""
+        centres, deviations = np.array(self.spread).reshape(-1, 2).T
+        return Bins.around(centres, deviations)
+
+    def curve_bins(self, i: int) -> Bins:
+        """Bins of the deviation of the curve of a measure from nominal at every position of its window."""
+        nominal, deviation = self.curve_spread[i]
+        return Bins.around(0.0 * nominal, deviation, **BAND)
+
+    def prepare(self) -> Sampler:
+        """The mechanism read and prepared; once in every process."""
+        run = prepare(Mechanism(**self.model))
+        places = plan(run, self.measures, self.steps)
+        inputs = inputs_of(run)
+        known = references(NumpyKernel(run, self.measures, self.friction), places, inputs)
+        return Sampler(self, inputs, places, kernel_of(self.engine, run, self.measures, self.friction), known)
+
+
+def towards(gradients: Array) -> Array:
+    """A rotation of the normal scores that turns the first axes to where measures change most, for Sobol points.
+
+    gradients: of each measure by the scores, (measure, score). The rows of the rotation's transpose are their right
+    singular vectors, so that the first coordinates of the points, the evenest, decide most of every measure (linear
+    transformation of J. Imai, K. S. Tan, J. Comput. Finance 10 (2006) 129-155, doi:10.21314/JCF.2006.162).
+    """
+    scale = np.sqrt(np.sum(gradients**2, axis=1, keepdims=True))
+    known = np.nan_to_num(gradients / np.where(scale > 0, scale, 1.0))
+    rotation: Array = np.linalg.svd(known, full_matrices=True)[2].T
+    return rotation
+
+
+def _joined(parts: Sequence[tuple[Array, ...]]) -> tuple[Array, ...]:
+    """The courses of batches, one after the other."""
+    return tuple(np.concatenate(part) for part in zip(*parts, strict=True))
+
+
+@dataclass(frozen=True, eq=False)
+class Sampler:
+    """A run ready to draw and analyse blocks."""
+
+    job: Sampling
+    inputs: Inputs
+    plan: Plan
+    kernel: Kernel
+    nominal: Mapping[str, Reference]
+
+    @cached_property
+    def _streams(self) -> list[SobolStream]:
+        return [SobolStream(self.job.seed, i, self.inputs.dims) for i in range(self.job.replicates)]
+
+    def drawn(self, block: int) -> Array:
+        """The uniform numbers of a block, (dims, sample)."""
+        job = self.job
+        replicate, place = divmod(block, job.per_replicate)
+        if job.method == "quasi-monte-carlo":
+            return self._streams[replicate].points(place * job.block_size, job.block_size)
+        first, last = block * job.block_size, min((block + 1) * job.block_size, job.samples)
+        parts = [
+            uniforms(job.seed, low // job.drawing, self.inputs.dims, min(job.drawing, last - low))
+            for low in range(first, last, job.drawing)
+        ]
+        return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1)
+
+    def figures(self, u: Array) -> tuple[Array, Array, list[Array], NDArray[np.int8]]:
+        """Of samples drawn: figures and whether they conform, (measure, sample), curves, status (sample, position)."""
+        count, batch = u.shape[1], batch_of(self.job.engine, self.job.positions)
+        parts = [self._courses(u[:, low : low + batch]) for low in range(0, count, batch)]
+        courses = {name: _joined([part[name] for part, _ in parts]) for name in parts[0][0]}
+        status = np.concatenate([part for _, part in parts])
+        found, passed, curves = np.empty((len(self.job.measures), count)), np.empty((len(self.job.measures), count)), []
+        for i, measure in enumerate(self.job.measures):
+            course, known = courses[measure.name], self.nominal[measure.name]
+            found[i], passed[i], curve = judged(course, known)
+            curves.append(curve)
+        return found, passed, curves, status
+
+    def _courses(self, u: Array) -> tuple[Courses, NDArray[np.int8]]:
+        """Courses of a batch, each part (sample, position)."""
+        values = self.inputs.values(u, self.job.rotation)
+        courses, status = self.kernel.courses(values, self.plan.moved(values))
+        full = status.shape
+        return {name: tuple(np.broadcast_to(part, full) for part in course) for name, course in courses.items()}, status
+
+    def evaluate(self, first: int, last: int) -> Tally:
+        """The tally of blocks first, …, last − 1."""
+        tally = self.job.empty()
+        for block in range(first, last):
+            self._add(tally, block)
+        return tally
+
+    def _add(self, tally: Tally, block: int) -> None:
+        replicate, place = divmod(block, self.job.per_replicate)
+        with np.errstate(all="ignore"):
+            found, passed, curves, status = self.figures(self.drawn(block))
+            lost = np.any(np.isnan(found), axis=0)
+            tally.histogram[replicate] += count(found, self.job.bins)
+            for i, curve in enumerate(curves):
+                whole = np.broadcast_to(curve, (found.shape[1], curve.shape[-1])) - self.job.curve_spread[i][0]
+                tally.band[i, : whole.shape[1]] += count(whole.T, self.job.curve_bins(i))
+            if np.any(lost):
+                gravest = np.max(status, axis=-1)[lost]
+                cause = np.where(gravest >= Status.NOT_CONVERGED, gravest, CAUSES - 1)
+                tally.failed[:] += np.bincount(cause, minlength=CAUSES)
+            everything = np.concatenate([found, passed, np.min(passed, axis=0)[None]])
+            tally.trees[replicate].add(place, moments_of(everything))

@@ -1,0 +1,95 @@
+"""The worst case on the mechanism itself: the corner of the tolerance box that first order names, followed and re-run.
+
+From the linear corner, derivatives are taken again at the corner until it stays the same; then every number is moved
+to its other limit alone, and to nominal, and the best of these is kept as long as it is better. Pins lie at the rims of
+their holes, turned as the loads at the corner say. It finds the worst corner of a measure that is monotone in each
+number over its tolerance, and of others the best that such steps reach.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.algebra.namespace import Number
+from trunnion.studies.tolerance.effects import NOBODY, Effects, Row
+
+__all__ = ["Corner", "search"]
+
+Array = NDArray[np.float64]
+MOST_ROUNDS = 12
+
+# (real, slope) of the figure for a batch of values, (row,): what is made as large as can be
+Objective = Callable[[Mapping[str, Number], Effects], tuple[Array, Array]]
+
+
+class Corner(NamedTuple):
+    """The largest (least) figure found, the numbers there by path, and how many batches it took.
+
+    assembles: whether the corner that first order names has an answer.
+    """
+
+    value: float
+    at: dict[str, float]
+    rounds: int
+    assembles: bool = True
+
+
+def search(effects: Effects, objective: Objective, start: Mapping[str, float], sign: float, known: bool) -> Corner:
+    """The corner with the largest figure (sign 1) or the least (−1), from that of first order.
+
+    known: whether the nominal mechanism has the figure. NaN if none is found.
+    """
+    among = known and all(one.lower <= 0.0 <= one.upper for one in effects.inputs.tolerances)
+    at, best, assembles = dict(start), Corner(0.0 if among else np.nan, {}, 0), True  # the nominal mechanism
+    for rounds in range(1, MOST_ROUNDS + 1):
+        real, slope = objective(effects.values(at), effects)
+        best = _better(best, Corner(float(real[0]), at, rounds), sign)
+        assembles = assembles and (rounds > 1 or bool(np.isfinite(real[0])))
+        if not np.all(np.isfinite(slope)):
+            break
+        turned = effects.corner(slope, sign, at)
+        if _same(turned, at):
+            break
+        at = turned
+    for rounds in range(best.rounds + 1, best.rounds + 1 + MOST_ROUNDS):
+        flips = _flips(effects, best.at)
+        if not flips:
+            break
+        batch = replace(effects, rows=tuple(Row(NOBODY, 0, flip, "") for flip in flips))
+        real, _ = objective(batch.values(best.at), batch)
+        if not np.any(np.isfinite(real)):
+            break
+        top = int(np.nanargmax(sign * real))
+        found = _better(best, Corner(float(real[top]), {**best.at, **flips[top]}, rounds), sign)
+        if found is best:
+            break
+        best = found
+    return best._replace(assembles=assembles)
+
+
+def _flips(effects: Effects, at: Mapping[str, float]) -> list[dict[str, float]]:
+    """Each toleranced number alone at its other limit, or at its nominal value if its limits let it."""
+    found = []
+    for i, one in enumerate(effects.inputs.tolerances):
+        if one.direction or one.distribution == "direction":
+            continue
+        nominal = effects.nominal(i)
+        within = {nominal} if one.lower <= 0.0 <= one.upper else set()
+        places = {*within, nominal + one.lower, nominal + one.upper} - {at.get(one.path, nominal)}
+        found += [{one.path: place} for place in sorted(places)]
+    return found
+
+
+def _better(best: Corner, found: Corner, sign: float) -> Corner:
+    gain = sign * (found.value - best.value)
+    least = 1e-12 * abs(best.value) if np.isfinite(best.value) else 0.0
+    return found if np.isfinite(found.value) and (not np.isfinite(best.value) or gain > least) else best
+
+
+def _same(one: Mapping[str, float], other: Mapping[str, float]) -> bool:
+    return all(abs(value - other[path]) <= 1e-9 * max(1.0, abs(value)) for path, value in one.items())

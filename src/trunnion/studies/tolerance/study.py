@@ -1,0 +1,134 @@
+"""The question of tolerances: what the scatter of a mechanism's numbers does to measures, and which of them does it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from trunnion.errors import Finding, MechanismError, Severity, counted
+from trunnion.model.mechanism import Mechanism
+from trunnion.solve.friction_method import FrictionMethod
+from trunnion.studies.tolerance import runner
+from trunnion.studies.tolerance.indices import Indices, indices
+from trunnion.studies.tolerance.sampling import METHODS as SAMPLINGS
+from trunnion.studies.tolerance.sampling import Sampling, Tally
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+from trunnion.studies.tolerance.first_order import FEW, study
+
+__all__ = ["DEFAULT_METHODS", "METHODS", "tolerance"]
+
+ENGINES = ("numpy", "jax")
+METHODS = ("linear", "worst-case", *SAMPLINGS, "sobol")
+DEFAULT_METHODS = ("linear", "worst-case", "monte-carlo")
+DEFAULT_SAMPLES = 10_000
+MOST_SAMPLES = 10**15
+
+
+def tolerance(
+    mechanism: Mechanism,
+    measures: Sequence[str] | None = None,
+    methods: Sequence[str] = DEFAULT_METHODS,
+    samples: int = DEFAULT_SAMPLES,
+    seed: int = 1,
+    steps: int = 360,
+    at: float | str | None = None,
+    *,
+    friction: FrictionMethod | None = None,
+    jobs: int | None = None,
+    chunk: int | None = None,
+    engine: str = "numpy",
+    cluster: str | None = None,
+    checkpoint: str | os.PathLike[str] | None = None,
+    resume: bool = False,
+    progress: Callable[[int], None] | None = None,
+    target: float | None = None,
+) -> xr.Dataset:
+    """What the tolerances and plays of a mechanism do to measures: limits, scatter, yield, and what each contributes.
+
+    measures: names of the model's, or as on the command line (`measures.named`); all of the model if not given, or,
+    where it states none, rotation and slide of every joint to the ground that is not driven. methods: of METHODS.
+    samples: of the sampling method, and of the variance-based indices; seed: of its random numbers. steps: positions of
+    a whole cycle; at: the place (driver coordinate or time) of measures that state neither a place nor a figure.
+    jobs: processes, one a core if not given and worth it; chunk, cluster, checkpoint, resume, progress: `runner.run`.
+    engine: numpy, or jax (an extra). target: the yield that is asked for; limits are missed below it, and if none is
+    given where a worst case, a yield below 1 or a C_pk below 1 breaks them: errors among the findings.
+    Returns a Dataset over (measure, parameter, position, …) of `result.VARIABLES`; SI, each measure in its own unit.
+    Method: exact first derivatives by dual numbers; the worst corner of the tolerances found on the mechanism itself;
+    Monte Carlo or scrambled Sobol points through the whole analysis; Sobol' indices. Samples that have no answer are
+    counted, and are outside every limit.
+    Raises MechanismError if nothing varies, for an unknown measure or method, or as `analyse` does.
+    """
+    from trunnion.studies.tolerance.outcome import Outcome
+    from trunnion.studies.tolerance.result import dataset
+
+    _check(methods, samples, seed, engine)
+    _check_target(target, methods)
+    found = study(mechanism, measures, steps, at, friction)
+    worst = found.worst() if "worst-case" in methods else None
+    method = next((one for one in methods if one in SAMPLINGS), None)
+    job: Sampling | None = None
+    tally: Tally | None = None
+    shares: Indices | None = None
+    notes: list[Finding] = []
+    stopped = False
+    if method is not None:
+        job = found.sampling(method, samples, seed, engine)
+        alone = job.samples * job.positions < FEW and cluster is None
+        jobs = 1 if jobs is None and (alone or engine != "numpy") else jobs
+        ran = runner.run(
+            job, jobs=jobs, chunk=chunk, cluster=cluster, checkpoint=checkpoint, resume=resume, progress=progress
+        )
+        tally, stopped = ran.tally, ran.stopped
+        notes += ran.notes
+        if stopped:
+            what = f"stopped before the end: {done_of(job, tally):,} of {counted(job.samples, 'sample')}"
+            remedy = "go on with --resume" if checkpoint is not None else "with --checkpoint FILE what is done is kept"
+            notes.append(Finding(what, "samples", remedy, Severity.WARNING))
+    if "sobol" in methods:
+        # Not turned: each number is to have its own coordinates of the points.
+        own = replace(found.sampling("quasi-monte-carlo", samples, seed), rotation=None)
+        shares = indices(found.sampler(own), samples, seed)
+    return dataset(Outcome(found, tuple(methods), worst, job, tally, shares, stopped, target), [*found.told, *notes])
+
+
+def done_of(job: Sampling, tally: Tally) -> int:
+    """Samples in a tally."""
+    return int(sum(np.max(total.count) for tree in tally.trees if (total := tree.total()) is not None))
+
+
+def _check(methods: Sequence[str], samples: int, seed: int, engine: str) -> None:
+    known = ", ".join(METHODS)
+    findings = [
+        Finding(f"there is no method '{method}'", "method", f"use {known}")
+        for method in methods
+        if method not in METHODS
+    ]
+    if sum(method in SAMPLINGS for method in methods) > 1:
+        findings.append(Finding("two sampling methods at once", "method", f"take one of {' and '.join(SAMPLINGS)}"))
+    if not isinstance(samples, int) or not 1 <= samples <= MOST_SAMPLES:
+        remedy = f"give a whole number from 1 to {MOST_SAMPLES:,}, or leave the sampling methods out"
+        findings.append(Finding(f"{samples} samples", "samples", remedy))
+    if engine not in ENGINES:
+        findings.append(Finding(f"there is no engine '{engine}'", "engine", f"use {' or '.join(ENGINES)}"))
+    if not 0 <= seed < 1 << 63:
+        findings.append(Finding(f"a seed of {seed}", "seed", "give a whole number from 0"))
+    if findings:
+        raise MechanismError(findings)
+
+
+def _check_target(target: float | None, methods: Sequence[str]) -> None:
+    """MechanismError for a yield that cannot be asked for."""
+    if target is None:
+        return
+    if not 0 < target < 1:
+        what = f"a yield of {target:g} cannot be asked for"
+        raise MechanismError(Finding(what, "yield", "give a share above 0 and below 1, such as 0.9973"))
+    if not any(method in SAMPLINGS for method in methods):
+        raise MechanismError(Finding("a yield is one of samples", "yield", f"add the method {' or '.join(SAMPLINGS)}"))

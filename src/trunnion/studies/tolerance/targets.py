@@ -1,0 +1,209 @@
+"""Whether measures keep their limits, and what helps where they do not.
+
+The worst case is that found on the mechanism where it was searched, else that of first order. A yield below 1 and a
+C_pk below 1 miss them too; but where the worst case keeps the limits no mechanism breaks them, however it scatters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.errors import Finding
+from trunnion.measures.measures import Measure
+
+if TYPE_CHECKING:
+    from trunnion.studies.tolerance.linear import Of
+    from trunnion.studies.tolerance.outcome import Outcome
+    from trunnion.studies.tolerance.sampled import Sampled
+
+__all__ = ["MISSED", "against", "limited", "limits", "missed"]
+
+Array = NDArray[np.float64]
+MISSED = "limits not kept"  # with which such a finding begins
+CLOSE, SLIGHT = 1e-6, 1e-3  # of a limit: rounding, and what first order leaves out where it was kept
+HALF = 0.5  # of the room: a nominal figure that is further off its middle is to be brought there first
+SHOWN = {"rad": (180 / np.pi, "deg"), "m": (1e3, "mm")}
+
+
+def limited(measure: Measure) -> bool:
+    """Whether a measure has a limit or a bound."""
+    return any(one is not None for one in (measure.lower, measure.upper, measure.at_least, measure.at_most))
+
+
+def limits(of: Of) -> tuple[float, float]:
+    """Least and largest deviation from nominal that a measure may have; infinite where there is no limit."""
+    measure = of.measure
+    lower = -np.inf if measure.lower is None else measure.lower
+    upper = np.inf if measure.upper is None else measure.upper
+    least = -np.inf if measure.at_least is None else measure.at_least
+    most = np.inf if measure.at_most is None else measure.at_most
+    if measure.rule == "deviation":
+        return max(lower, -most), min(upper, most)
+    if not against(of):
+        return max(lower, least - of.reference.figure), min(upper, most - of.reference.figure)
+    if measure.rule == "maximum" and measure.kind != "path_error":
+        return -np.inf, min(upper, most)
+    if measure.rule == "minimum" and measure.kind != "path_error":
+        return max(lower, least), np.inf
+    if measure.rule == "mean" and measure.kind != "path_error":
+        return max(lower, least), min(upper, most)
+    return -min(upper, most), min(upper, most)  # what has a size and no sign
+
+
+def against(of: Of) -> bool:
+    """Whether the figure is made of deviations from the nominal mechanism and is 0 there."""
+    return of.measure.kind == "path_error" or (of.reference.against and of.measure.rule != "value")
+
+
+# ---- what is missed -------------------------------------------------------------------------------------------
+
+
+def missed(outcome: Outcome, counted: Sampled | None) -> Iterator[Finding]:
+    """Each measure whose worst case, yield or capability is outside its limits: errors, with what helps.
+
+    Where a yield is asked for, that alone decides.
+    """
+    if outcome.target is not None:
+        yield from _below(outcome, counted, outcome.target)
+        return
+    for i, of in enumerate(outcome.study.linear.measures):
+        if not limited(of.measure):
+            continue
+        say = _Words(outcome, of)
+        known, beyond = _worst(outcome, i, of)
+        parts = [say.range(*known)] if beyond else []
+        short = _short(counted, i, sure=bool(np.all(np.isfinite(known))) and not beyond)
+        if parts or short:
+            what = f"{MISSED}: {'; '.join([*parts, *short])}; {say.limits()}"
+            yield Finding(what, f"measures.{of.measure.name}", _remedy(outcome, of, say))
+
+
+def _below(outcome: Outcome, counted: Sampled | None, target: float) -> Iterator[Finding]:
+    """Measures with a lower yield than is asked for, or else all of them together."""
+    if counted is None or not counted.done:
+        return
+    fine = True
+    for i, of in enumerate(outcome.study.linear.measures):
+        if limited(of.measure) and float(counted.arrays["yield_high"][i]) < target:
+            fine, say = False, _Words(outcome, of)
+            what = f"{MISSED}: {_short(counted, i, sure=True)[0]}, {100 * target:.6g} % asked for; {say.limits()}"
+            yield Finding(what, f"measures.{of.measure.name}", _remedy(outcome, of, say))
+    share, low, high = (float(counted.arrays[f"yield_all{end}"]) for end in ("", "_low", "_high"))
+    if fine and high < target:
+        what = f"{MISSED}: yield of all measures together {100 * share:.6g} % (95 % interval {100 * low:.5g} to "
+        what += f"{100 * high:.5g} %), {100 * target:.6g} % asked for"
+        yield Finding(what, "measures", "narrower tolerances of the measure with the lowest yield first")
+
+
+def _worst(outcome: Outcome, i: int, of: Of) -> tuple[tuple[float, float], bool]:
+    """Worst case to either side, as far as it was asked for, and whether it is outside the limits."""
+    known, slight = (np.nan, np.nan), CLOSE
+    if "linear" in outcome.methods:
+        known = float(of.total[0]), float(of.total[1])
+    if outcome.worst is not None and all(np.isfinite(one.value) for one in outcome.worst[i]):
+        known, slight = (outcome.worst[i][0].value, outcome.worst[i][1].value), SLIGHT
+    lower, upper = limits(of)
+    size = max([abs(end) for end in (lower, upper) if np.isfinite(end)], default=0.0)
+    return known, known[0] < lower - slight * size or known[1] > upper + slight * size
+
+
+def _short(counted: Sampled | None, i: int, sure: bool) -> list[str]:
+    """What the samples say of the yield and of C_pk, if they are short; sure: the worst case keeps the limits."""
+    if counted is None or not counted.done:
+        return []
+    share, low, high, cpk = (float(counted.arrays[key][i]) for key in ("yield", "yield_low", "yield_high", "cpk"))
+    found = []
+    if share < 1:
+        found.append(f"yield {100 * share:.6g} % (95 % interval {100 * low:.5g} to {100 * high:.5g} %)")
+    if cpk < 1 and not sure:
+        found.append(f"Cpk {cpk:.3g}")
+    return found
+
+
+class _Words:
+    """Deviations of a measure with their unit."""
+
+    def __init__(self, outcome: Outcome, of: Of) -> None:
+        run = outcome.study.run
+        unit = of.measure.figure_unit(run.system, run.values)
+        self.of = of
+        self.factor, self.unit = SHOWN.get(unit, (1.0, "" if unit == "1" else unit))
+
+    def say(self, value: float, sign: str = "+") -> str:
+        return f"{format(self.factor * value + 0.0, f'{sign}.4g')} {self.unit}".rstrip()
+
+    def range(self, low: float, high: float) -> str:
+        if limits(self.of)[0] == -limits(self.of)[1] and low == 0.0:
+            return f"worst case {self.say(high, '')}"
+        return f"worst case {format(self.factor * low + 0.0, '+.4g')} to {self.say(high)}"
+
+    def limits(self) -> str:
+        """Deviations, and bounds of the figure itself with the nominal one."""
+        one, told = self.of.measure, []
+        if one.lower is not None or one.upper is not None:
+            ends = [self.say(end) for end in (one.lower, one.upper) if end is not None]
+            told.append(f"allowed {' to '.join(ends)}")
+        bounds = (("at_least", one.at_least), ("at_most", one.at_most))
+        told += [f"{word} {self.say(end, '')}" for word, end in bounds if end is not None]
+        if one.at_least is not None or one.at_most is not None:
+            told.append(f"nominal {self.say(self.of.reference.figure, '')}")
+        return ", ".join(told)
+
+
+# ---- what helps -----------------------------------------------------------------------------------------------
+
+
+def _remedy(outcome: Outcome, of: Of, say: _Words) -> str:
+    """What brings the measure within its limits: another nominal mechanism, other middles, or narrower tolerances."""
+    lower, upper = limits(of)
+    if lower > 0 or upper < 0:
+        return "the nominal figure itself is outside: no tolerance mends that, change the mechanism or the limit"
+    middle, fixed = _middle(outcome, of)
+    if not np.isfinite(middle):
+        return "first order has no answer: change the nominal mechanism, or narrow the tolerances and sample again"
+    if not lower < middle < upper:
+        what = f"the tolerances and what points anywhere are off by {say.say(middle)} in their middle"
+        return f"{what}: no narrower ones mend that, centre them or change the nominal mechanism"
+    off = _off_middle(lower, upper, middle)
+    first = f"bring the nominal mechanism {say.say(-off)} nearer to the middle of the limits, and " if off else ""
+    name, share, priced = _largest(outcome, of)
+    told = f"{first}narrow first '{name}', {100 * share:.3g} % of the worst case"
+    if not priced:
+        return f"{told}; `allocate` finds how far at least cost, once `costs` say what narrower tolerances cost"
+    if not fixed:
+        return f"{told}; what has no cost takes more than the limits by itself, and `allocate` leaves that as it is"
+    return f"{told}; `allocate` finds how far at least cost"
+
+
+def _middle(outcome: Outcome, of: Of) -> tuple[float, bool]:
+    """Deviation of the middle of all tolerances, and whether what has no cost keeps the limits by itself."""
+    study = outcome.study
+    priced = {one.path for one in study.run.system.mechanism.prices()}
+    alone = [name for name in study.inputs.names if name not in priced]
+    lower, upper = np.asarray(of.spread.lower, float), np.asarray(of.spread.upper, float)
+    middles = 0.5 * (lower + upper)
+    some = np.array([name in alone for name in study.inputs.names])
+    ends = [float(np.sum(np.where(some, end, middles))) for end in (lower, upper)]
+    low, high = limits(of)
+    return float(np.sum(middles)), low <= ends[0] and ends[1] <= high
+
+
+def _off_middle(lower: float, upper: float, middle: float) -> float:
+    """How far the middle of the tolerances is off that of the limits, if it is much; 0 else, or of a single limit."""
+    room = 0.5 * (upper - lower)
+    off = middle - 0.5 * (lower + upper)
+    return off if np.isfinite(room) and abs(off) > HALF * room else 0.0
+
+
+def _largest(outcome: Outcome, of: Of) -> tuple[str, float, bool]:
+    """The number with the largest part in the worst case, its share, and whether anything has a cost."""
+    study = outcome.study
+    worst = np.nan_to_num(np.maximum(-of.spread.lower, of.spread.upper))
+    top = int(np.argmax(worst))
+    total = float(np.sum(worst))
+    priced = bool(study.run.system.mechanism.costs)
+    return study.inputs.names[top], float(worst[top]) / total if total > 0 else 0.0, priced

@@ -1,0 +1,1 @@
+"""Views of the ways in which a mechanism can be assembled, and of whether it can."""

@@ -1,0 +1,149 @@
+"""The ways in which the groups of a mechanism can be assembled, each as a small drawing of the whole mechanism."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from trunnion.algebra.dual import primal
+from trunnion.cycle.analyse import analyse
+from trunnion.errors import Finding, MechanismError
+from trunnion.model.mechanism import Mechanism
+from trunnion.solve.assemblies import Choice, Way, choices, put_together
+from trunnion.solve.forward import forward
+from trunnion.solve.run import Run, prepare
+from trunnion.views.assembly.space import space_ways
+from trunnion.views.assembly.ways import some
+from trunnion.views.common.cycle import Array, layout
+from trunnion.views.common.drawing import Picture, framed, labels, sketch
+from trunnion.views.common.figures import INK, MUTED, RULE, new
+from trunnion.views.common.lettering import plain
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure, SubFigure
+
+__all__ = ["ways"]
+
+COLUMNS = 4  # at most, of drawings
+WIDTH = 2.4  # of a drawing, in
+MOST_DRAWN = 24  # ways of one group
+SYMBOLS = 1.25  # size of joints and bearings, as if the mechanism were so much larger
+STEPS = 90  # positions of a turn, of the paths
+MOST_STEPS = 1440
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """One way: its picture, the position at which the mechanism is drawn, and links that have no place there."""
+
+    way: Way
+    shown: Picture
+    index: int
+    missing: tuple[str, ...]
+
+
+def ways(mechanism: Mechanism, found: Sequence[Choice] | None = None) -> Figure:
+    """A drawing for every way of every group that has several, with the paths of the points; the taken one is marked.
+
+    Each is what the mechanism becomes if that way is named in the file and all else is left, so later groups follow
+    their own hints. A row is a group, or more rows if it has more than four ways. found: the choices, if known.
+    Raises MechanismError if there is nothing to choose or to draw.
+    """
+    found = choices(prepare(mechanism)) if found is None else found
+    if not found:
+        what = "no group has more than one assembly: there is nothing to choose and nothing to draw"
+        raise MechanismError(Finding(what, remedy="draw the mechanism with `trunnion plot --kind mechanism`"))
+    if mechanism.space == "spatial":
+        return space_ways(mechanism, found)
+    result = analyse(mechanism, 1)
+    rows = [[_drawn(mechanism, layout(result), choice, way) for way in some(choice, MOST_DRAWN)] for choice in found]
+    box = _box([one.shown for row in rows for one in row])
+    columns = min(COLUMNS, max(map(len, rows)))
+    lines = [math.ceil(len(row) / columns) for row in rows]
+    high = WIDTH * min(max((box[3] - box[1]) / (box[2] - box[0]), 0.45), 1.6) + 0.28
+    width = max(columns * WIDTH, 2 * WIDTH) + 0.2
+    figure = new("Ways to assemble", result, 0.6 + sum(0.3 + line * high for line in lines), width)
+    parts = figure.subfigures(len(found), 1, squeeze=False, height_ratios=[0.3 + line * high for line in lines])[:, 0]
+    for part, choice, row in zip(parts, found, rows, strict=True):
+        _group(part, choice, row, columns, box)
+    return figure
+
+
+def _drawn(mechanism: Mechanism, stated: dict[str, Any], choice: Choice, way: Way) -> Drawn:
+    """The whole mechanism with one group put together in one way, as far as it can be assembled."""
+    run = _run(mechanism, choice, way)
+    turns = max(1, math.ceil(run.cycle.turns)) if run.cycle.duration > 0 else 1
+    times = np.union1d(run.cycle.times(min(STEPS * turns, MOST_STEPS)), choice.time)
+    walk = forward(run.system, run.values, run.chosen.assembly, times)
+    tracks: dict[str, Array] = {}
+    for link, name in run.system.points:
+        place = walk.point(link, name).place
+        tracks[f"{link}.{name}"] = np.array([np.broadcast_to(primal(n), times.shape) for n in place])
+    angles = {
+        link: np.broadcast_to(np.arctan2(primal(motion.frame.s), primal(motion.frame.c)), times.shape)
+        for link, motion in walk.motions.items()
+        if link != mechanism.fixed_link
+    }
+    index = int(np.searchsorted(times, choice.time))
+    missing = tuple(link for link, angle in angles.items() if not np.isfinite(angle[index]))
+    picture = framed(stated, tracks, angles)
+    return Drawn(way, replace(picture, weight=0.5, only=choice.links), index, missing)
+
+
+def _run(mechanism: Mechanism, choice: Choice, way: Way) -> Run:
+    """The mechanism put together in a way; without the names of other groups' ways if those then do not exist."""
+    changed = put_together(mechanism, choice, way)
+    try:
+        return prepare(changed)
+    except MechanismError:
+        stated = changed.data()
+        hints = {key: hint for key, hint in changed.assembly.items() if key == choice.link or not isinstance(hint, str)}
+        kept = {key: stated["assembly"][key] for key in hints}
+        return prepare(Mechanism(**{**stated, "assembly": kept}))
+
+
+def _box(pictures: Sequence[Picture]) -> tuple[float, float, float, float]:
+    """Around all that the pictures show, so that they have one scale, with a margin."""
+    boxes = np.array([picture.box for picture in pictures])
+    low, high = boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)
+    size = float(np.hypot(*(high - low))) or 1.0
+    (left, below), (right, above) = (low - 0.08 * size).tolist(), (high + 0.08 * size).tolist()
+    return left, below - 0.03 * size, right, above  # a bearing reaches below its joint
+
+
+def _group(
+    part: SubFigure, choice: Choice, row: Sequence[Drawn], columns: int, box: tuple[float, float, float, float]
+) -> None:
+    """The drawings of one group under its label."""
+    where = f", at {choice.where}" if choice.where else ""
+    more = f", {len(row)} of {len(choice.ways)} ways" if len(row) < len(choice.ways) else ""
+    head = f"{choice.label}    {', '.join(choice.links)}{where}{more}"
+    part.suptitle(plain(head), x=0.012, ha="left", fontsize=9, color=INK)
+    grid = part.subplots(math.ceil(len(row) / columns), columns, squeeze=False).ravel()
+    for axes in grid[len(row) :]:
+        axes.set_visible(False)
+    for axes, one in zip(grid, row, strict=False):
+        axes.set_aspect("equal")
+        axes.set(xlim=(box[0], box[2]), ylim=(box[1], box[3]), xticks=[], yticks=[])
+        _one(axes, choice, one, float(np.hypot(box[2] - box[0], box[3] - box[1])))
+
+
+def _one(axes: Axes, choice: Choice, one: Drawn, size: float) -> None:
+    """One drawing: in a frame, which is bold around the way that is taken, under the name of the way."""
+    paint, width = (INK, 1.8) if one.way.taken else (RULE, 1.0)
+    for spine in axes.spines.values():
+        spine.set(color=paint, linewidth=width)
+    title = f"{choice.link}: {one.way.name}" + "  taken" * one.way.taken
+    weight = "bold" if one.way.taken else "normal"
+    axes.set_title(plain(title), fontsize=8.5, fontweight=weight, color=INK, loc="left", pad=4)
+    shown = replace(one.shown, size=SYMBOLS * size)
+    sketch(axes, shown, one.index)
+    labels(axes, shown, one.index, list(one.way.joints))
+    if one.missing:
+        text = f"not assembled here: {', '.join(one.missing)}"
+        axes.text(0.03, 0.03, plain(text), transform=axes.transAxes, fontsize=7, color=MUTED, zorder=8)

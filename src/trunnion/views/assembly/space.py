@@ -1,0 +1,105 @@
+"""The ways in which the groups of a spatial mechanism can be assembled, each as a small drawing from one side."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from trunnion.cycle.analyse import analyse
+from trunnion.errors import MechanismError
+from trunnion.model.mechanism import Mechanism
+from trunnion.solve.assemblies import Choice, Way, put_together
+from trunnion.views.assembly.ways import some
+from trunnion.views.common.figures import INK, MUTED, RULE, new
+from trunnion.views.common.lettering import plain
+from trunnion.views.space.bodies import Space, space
+from trunnion.views.space.camera import best, looking
+from trunnion.views.space.figure import Scenery, labels, scenery, sketch
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure, SubFigure
+
+__all__ = ["space_ways"]
+
+COLUMNS = 3  # of drawings
+WIDTH = 2.9  # of a drawing, in
+MOST_DRAWN = 12  # ways of one group
+STEPS = 48  # positions, of the paths
+
+Drawn = tuple[Way, Space | None, int]  # a way, the mechanism in it if it can be put together, the position
+
+
+def space_ways(mechanism: Mechanism, found: Sequence[Choice]) -> Figure:
+    """A drawing for every way of every group that has several, all from one side; the one that is taken is marked."""
+    result = analyse(mechanism.with_friction("off"), 1)
+    rows = [[_drawn(mechanism, choice, way) for way in some(choice, MOST_DRAWN)] for choice in found]
+    known = [shown for row in rows for _, shown, _ in row if shown is not None]
+    camera = looking(*best(known[0])) if known else looking(-1.0, 0.5)
+    looks = [scenery(shown, camera) for shown in known]
+    box = np.array([look.box for look in looks] or [(0.0, 0.0, 1.0, 1.0)])
+    low, high = box[:, :2].min(axis=0), box[:, 2:].max(axis=0)
+    margin = 0.08 * float(np.hypot(*(high - low)))
+    frame = (*(low - margin), *(high + margin))
+    columns = min(COLUMNS, max(map(len, rows)))
+    lines = [math.ceil(len(row) / columns) for row in rows]
+    tall = WIDTH * min(max((frame[3] - frame[1]) / (frame[2] - frame[0]), 0.45), 1.4) + 0.28
+    figure = new(
+        "Ways to assemble", result, 0.6 + sum(0.3 + line * tall for line in lines), max(columns, 2) * WIDTH + 0.2
+    )
+    parts = figure.subfigures(len(found), 1, squeeze=False, height_ratios=[0.3 + line * tall for line in lines])[:, 0]
+    for part, choice, row in zip(parts, found, rows, strict=True):
+        _group(part, choice, row, columns, frame, looks)
+    return figure
+
+
+def _drawn(mechanism: Mechanism, choice: Choice, way: Way) -> Drawn:
+    """The whole mechanism with one group put together in one way."""
+    try:
+        result = analyse(put_together(mechanism, choice, way).with_friction("off"), STEPS)
+        shown = space(result)
+    except MechanismError:
+        return way, None, 0
+    known = np.flatnonzero(shown.drawable)
+    times = np.asarray(result["time"].values, dtype=float)
+    return way, shown, int(known[np.argmin(np.abs(times[known] - choice.time))])
+
+
+def _group(
+    part: SubFigure, choice: Choice, row: list[Drawn], columns: int, frame: tuple[float, ...], looks: list[Scenery]
+) -> None:
+    """The drawings of one group under its label."""
+    where = f", at {choice.where}" if choice.where else ""
+    more = f", {len(row)} of {len(choice.ways)} ways" if len(row) < len(choice.ways) else ""
+    head = f"{choice.label}    {', '.join(choice.links)}{where}{more}"
+    part.suptitle(plain(head), x=0.012, ha="left", fontsize=9, color=INK)
+    grid = part.subplots(math.ceil(len(row) / columns), columns, squeeze=False).ravel()
+    for axes in grid[len(row) :]:
+        axes.set_visible(False)
+    for axes, (way, shown, index) in zip(grid, row, strict=False):
+        axes.set_aspect("equal")
+        axes.set(xlim=(frame[0], frame[2]), ylim=(frame[1], frame[3]), xticks=[], yticks=[])
+        _one(axes, choice, way, next((look for look in looks if look.shown is shown), None), index)
+
+
+def _one(axes: Axes, choice: Choice, way: Way, look: Scenery | None, index: int) -> None:
+    """One drawing: in a frame, which is bold around the way that is taken, under the name of the way."""
+    paint, width = (INK, 1.8) if way.taken else (RULE, 1.0)
+    for spine in axes.spines.values():
+        spine.set(color=paint, linewidth=width)
+    title = f"{choice.link}: {way.name}" + "  taken" * way.taken
+    weight = "bold" if way.taken else "normal"
+    axes.set_title(plain(title), fontsize=8.5, fontweight=weight, color=INK, loc="left", pad=4)
+    if look is None:
+        axes.text(
+            0.03, 0.03, "cannot be assembled in this way", transform=axes.transAxes, fontsize=7, color=MUTED, zorder=8
+        )
+        return
+    sketch(axes, look, index, choice.links)
+    wide = axes.get_xlim()[1] - axes.get_xlim()[0]
+    lettered = replace(look, box=(0.0, 0.0, wide * 1.6, wide * 0.8))  # letters are as large as in a figure of its own
+    labels(axes, lettered, index, [], tuple(way.joints), 7.5)

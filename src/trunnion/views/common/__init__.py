@@ -1,0 +1,1 @@
+"""What all views share: one look, letters, numbers, scripts."""

@@ -1,0 +1,217 @@
+"""What every view asks of a result first: what to draw it over, where it is silent, what it describes."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.errors import Status
+from trunnion.views.common.quantities import prefixed
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = [
+    "Abscissa", "Interval", "abscissa", "attribute", "intervals", "layout", "mean_friction", "numbers", "series",
+    "status_text", "thin", "valid",
+]  # fmt: skip
+
+Array = NDArray[np.float64]
+TEXTS = {int(status): status.text for status in Status}
+
+
+@dataclass(frozen=True)
+class Abscissa:
+    """What the curves are drawn over: the drive's angle (°) or slide, else time, else the count of positions.
+
+    values: (position,) in `unit`; closed: a whole turn whose end is not repeated, so that after the last
+    position comes the first; period: the length of the turn in `unit`, 0 if not closed.
+    """
+
+    label: str
+    unit: str
+    values: Array
+    closed: bool = False
+    period: float = 0.0
+
+    @property
+    def title(self) -> str:
+        """Label with unit, for an axis."""
+        return f"{self.label} [{self.unit}]" if self.unit else self.label
+
+    def say(self, index: int) -> str:
+        """The place of a position in words: "132°", "12.5 mm"."""
+        value = float(self.values[index])
+        return f"{value:.4g}{'' if self.unit in ('°', '') else ' '}{self.unit}".replace("-", "−")
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A run of positions start ≤ i < stop with one status."""
+
+    start: int
+    stop: int
+    status: int
+
+    @property
+    def text(self) -> str:
+        """The status in a sentence."""
+        return status_text(self.status)
+
+
+def attribute(result: xr.Dataset, name: str, default: Any) -> Any:
+    """A JSON attribute of the result, `default` if it is absent or empty."""
+    text = result.attrs.get(name, "")
+    return json.loads(text) if text else default
+
+
+def layout(result: xr.Dataset) -> dict[str, Any]:
+    """The mechanism as a small dict: ground, links with points, joints with links, loads."""
+    stated: dict[str, Any] = attribute(result, "scene", {})
+    return {"ground": "", "links": {}, "joints": {}, "loads": {}, "springs": {}, "gears": {}} | stated
+
+
+def names(result: xr.Dataset, dim: str) -> list[str]:
+    """The names along a dimension as plain text; none if the result lacks it."""
+    return [str(name) for name in result[dim].values] if dim in result.coords else []
+
+
+def column(result: xr.Dataset, name: str, **where: str) -> Array | None:
+    """One variable as an array, picked by names along its dimensions; None if the result lacks it."""
+    if name not in result:
+        return None
+    picked = result[name].sel(where) if where else result[name]
+    return np.asarray(picked.values, dtype=float)
+
+
+def abscissa(result: xr.Dataset) -> Abscissa:
+    """The drive of the first driver, if it runs one way; otherwise time or the count of positions."""
+    drivers = names(result, "driver")
+    if drivers:
+        first = drivers[0]
+        sliding = layout(result)["joints"].get(first, {}).get("type") == "prismatic"
+        name, turn = ("joint_slide", 0.0) if sliding else ("joint_rotation", 2 * np.pi)
+        values = _filled(result, column(result, name, joint=first), turn)
+        if values is not None:
+            return _over_slide(first, values) if sliding else _over_angle(first, values)
+    time = column(result, "time")
+    if time is not None and np.isfinite(time).all():
+        factor, unit = prefixed(float(np.abs(time).max(initial=0)), "s")
+        return Abscissa("time", unit, time * factor)
+    return Abscissa("position", "", np.arange(result.sizes["position"], dtype=float))
+
+
+def _over_angle(name: str, values: Array) -> Abscissa:
+    degrees = np.degrees(values)
+    step = float(degrees[1] - degrees[0]) if degrees.size > 2 else 0.0
+    turn = step * degrees.size
+    closed = bool(step) and abs(abs(turn) - 360.0) < 1e-6 * 360.0
+    return Abscissa(f"drive angle {name}", "°", degrees, closed, turn if closed else 0.0)
+
+
+def _over_slide(name: str, values: Array) -> Abscissa:
+    factor, unit = prefixed(float(np.abs(values).max(initial=0)), "m")
+    return Abscissa(f"drive slide {name}", unit, values * factor)
+
+
+def _filled(result: xr.Dataset, values: Array | None, turn: float) -> Array | None:
+    """The drive, carried on at its constant speed where it is not known; None unless it runs one way.
+
+    turn: 2π for angles, whose count of whole turns may be lost over a gap; 0 for slides.
+    """
+    if values is None or not values.size:
+        return None
+    known = np.isfinite(values)
+    if not known.all():
+        line = _constant_speed(column(result, "time"), values, known)
+        if line is None:
+            return None
+        turns = np.round((line - values)[known] / turn) * turn if turn else 0.0
+        if np.abs(values[known] + turns - line[known]).max() > 1e-6 * np.ptp(line):
+            return None
+        values = line
+    steps = np.diff(values)
+    return values if not steps.size or (steps > 0).all() or (steps < 0).all() else None
+
+
+def _constant_speed(time: Array | None, values: Array, known: NDArray[np.bool_]) -> Array | None:
+    """The line over time that the first two known neighbours span, as a row of values; None without such two."""
+    pairs = np.flatnonzero(known[:-1] & known[1:])
+    if time is None or not pairs.size or not np.isfinite(time).all():
+        return None
+    first, last = pairs[0], pairs[0] + 1
+    while last + 1 < known.size and known[last + 1]:  # the longer the base, the better the slope
+        last += 1
+    slope = (values[last] - values[first]) / (time[last] - time[first])
+    return np.asarray(values[first] + slope * (time - time[first]), dtype=float)
+
+
+def numbers(values: Array) -> list[float | None]:
+    """Numbers with seven digits, None for what is not finite."""
+    return [float(f"{value:.7g}") if np.isfinite(value) else None for value in values.tolist()]
+
+
+def series(values: Array | None) -> list[float | None]:
+    """A series for JSON; a single number if it never changes, nothing if there is none."""
+    if values is None:
+        return []
+    constant = values.size > 0 and bool(np.all(values == values[0]))
+    return numbers(values[:1] if constant else values)
+
+
+def status_text(code: int) -> str:
+    """The sentence of a status code."""
+    return TEXTS.get(code, f"no answer (status {code})")
+
+
+def intervals(result: xr.Dataset, lowest: int = Status.NOT_CONVERGED) -> list[Interval]:
+    """Runs of positions with one status of at least `lowest`; without an answer, unless told otherwise."""
+    status = column(result, "status")
+    if status is None or not status.size:
+        return []
+    edges = np.flatnonzero(np.diff(status)) + 1
+    starts, stops = [0, *edges.tolist()], [*edges.tolist(), status.size]
+    runs = (Interval(start, stop, int(status[start])) for start, stop in zip(starts, stops, strict=True))
+    return [run for run in runs if run.status >= lowest]
+
+
+def valid(result: xr.Dataset, values: Array) -> Array:
+    """A column, NaN at positions that are not valid, for a pin loses contact there."""
+    status = column(result, "status")
+    return values if status is None else np.where(status == Status.CONTACT_LOST, np.nan, values)
+
+
+def mean_friction(result: xr.Dataset, joint: str, of: str = "") -> float:
+    """Mean friction power of a joint, W; of: "_ideal" of the mechanism without errors. NaN where there is no answer.
+
+    A result that was written before there were such means has that of its positions.
+    """
+    told = column(result, f"friction_power_mean{of}", joint=joint)
+    if told is not None:
+        return float(told)
+    values = column(result, "friction_power", joint=joint)
+    if of and values is not None:
+        change = column(result, "friction_power_change", joint=joint)
+        values = None if change is None else values - change
+    return float("nan") if values is None or not np.isfinite(values).any() else float(np.nanmean(values))
+
+
+def thin(values: Array, most: int = 4000) -> NDArray[np.intp]:
+    """Indices of about `most` samples that keep every peak and gap: least, greatest, first NaN of each bucket."""
+    count = values.size
+    if count <= most:
+        return np.arange(count)
+    width = -(-2 * count // most)
+    padded = np.full(-(-count // width) * width, np.nan)
+    padded[:count] = values
+    rows = padded.reshape(-1, width)
+    start = np.arange(rows.shape[0]) * width
+    low = start + np.where(np.isnan(rows), np.inf, rows).argmin(axis=1)
+    high = start + np.where(np.isnan(rows), -np.inf, rows).argmax(axis=1)
+    holes = start + np.isnan(rows).argmax(axis=1)  # without a NaN, the start
+    picked = np.unique(np.concatenate([low, high, holes, [count - 1]]))
+    return picked[picked < count]

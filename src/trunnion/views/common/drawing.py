@@ -1,0 +1,347 @@
+"""The mechanism as a drawing: links as bodies, ground hatched, joints named, coupler curves, ghost positions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.patches import Circle, Polygon, Rectangle
+from matplotlib.transforms import Affine2D
+
+from trunnion.errors import Finding, MechanismError
+from trunnion.views.common.cycle import Array, column, layout, names
+from trunnion.views.common.figures import INK, MUTED, PALETTE
+from trunnion.views.common.lettering import plain
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+
+GHOSTS = 8
+PALE = "#b4bac1"  # of links that are not spoken of
+
+
+@dataclass(frozen=True)
+class Picture:
+    """What is needed to draw a result at any position: its layout, tracks of points, angles of links, a size.
+
+    tracks: "link.point" → (axis, position) m; angles: link → (position,) rad; size: diagonal of all of it, m.
+    weight: of lines, 1 in a figure of its own; only: links that have a colour, all if none is named.
+    """
+
+    stated: dict[str, Any]
+    tracks: dict[str, Array]
+    angles: dict[str, Array]
+    size: float
+    box: tuple[float, float, float, float]
+    weight: float = 1.0
+    only: tuple[str, ...] = ()
+
+    @property
+    def letters(self) -> float:
+        """The size of letters, which must stay readable, 1 in a figure of its own."""
+        return max(self.weight, 0.75)
+
+    @property
+    def ground(self) -> str:
+        """The name of the fixed link."""
+        return str(self.stated["ground"])
+
+    @property
+    def moving(self) -> list[str]:
+        """The names of the other links."""
+        return [link for link in self.stated["links"] if link != self.ground]
+
+    def colour(self, link: str) -> str:
+        """What a moving link is drawn in."""
+        if self.only and link not in self.only:
+            return PALE
+        return PALETTE[self.moving.index(link) % len(PALETTE)]
+
+    def joints(self, link: str) -> list[str]:
+        """Keys of a link's points that are drawn as its body."""
+        return [f"{link}.{point}" for point in self.stated["links"][link]["points"] if f"{link}.{point}" in self.tracks]
+
+    def axis(self, name: str, index: int) -> float:
+        """Direction of a prismatic joint's guide in the global frame, rad."""
+        joint = self.stated["joints"][name]
+        x, y = (joint.get("axis") or [1.0, 0.0])[:2]
+        first = self.angles.get(joint["links"][0])
+        return float(np.arctan2(y, x) + (0.0 if first is None else first[index]))
+
+
+def picture(result: xr.Dataset) -> Picture:
+    """Gather what the drawings need; raises MechanismError if no position can be drawn."""
+    tracks = {key: _track(result, key) for key in names(result, "point")}
+    angles = {link: column(result, "link_angle", link=link) for link in names(result, "link")}
+    known = {link: angle for link, angle in angles.items() if angle is not None}
+    return framed(layout(result), tracks, known)
+
+
+def framed(stated: dict[str, Any], tracks: dict[str, Array], angles: dict[str, Array]) -> Picture:
+    """The picture with the box around all that is known; raises MechanismError if nothing is."""
+    points = np.concatenate([track.T for track in tracks.values()]) if tracks else np.empty((0, 2))
+    points = points[np.isfinite(points).all(axis=1)]
+    if not points.size:
+        what = "no position of the mechanism can be assembled: there is nothing to draw"
+        raise MechanismError(Finding(what, remedy="change the lengths or the range of the driver"))
+    centres = [(tracks[circle["at"]], circle["radius"]) for pair in stated["gears"].values() for circle in pair]
+    rims = [_rim(track, radius) for track, radius in centres if np.isfinite(track).any()]
+    points = np.concatenate([points, *rims])
+    low, high = points.min(axis=0), points.max(axis=0)
+    size = float(np.hypot(*(high - low))) or 1.0
+    return Picture(stated, tracks, angles, size, (float(low[0]), float(low[1]), float(high[0]), float(high[1])))
+
+
+def _rim(track: Array, radius: float) -> Array:
+    """Corners of the box that a circle sweeps, (corner, axis)."""
+    return np.array([np.nanmin(track, axis=1) - radius, np.nanmax(track, axis=1) + radius])
+
+
+def _track(result: xr.Dataset, key: str) -> Array:
+    return np.asarray(result["point_position"].sel(point=key).transpose("axis", "position").values, dtype=float)
+
+
+def draw(axes: Axes, shown: Picture, index: int) -> None:
+    """Everything at position `index`, over the ghosts and the coupler curves."""
+    _ghosts(axes, shown, index)
+    sketch(axes, shown, index)
+    labels(axes, shown, index)
+
+
+def sketch(axes: Axes, shown: Picture, index: int) -> None:
+    """Links, springs, gears and joints at position `index` over the coupler curves, without a letter."""
+    _curves(axes, shown)
+    for link in sorted(shown.moving, key=lambda link: link in shown.only):  # what is spoken of lies above
+        _body(axes, shown, link, index, shown.colour(link))
+    for spring in shown.stated["springs"].values():
+        _spring(axes, shown, spring.get("between") or (), index)
+    for pair in shown.stated["gears"].values():
+        for circle in pair:
+            _pitch_circle(axes, shown.tracks[circle["at"]][:, index], circle["radius"])
+    for name, joint in shown.stated["joints"].items():
+        _joint(axes, shown, name, joint, index)
+
+
+def _ghosts(axes: Axes, shown: Picture, index: int) -> None:
+    count = next(iter(shown.tracks.values())).shape[1]
+    for step in range(1, GHOSTS):
+        other = (index + round(step * count / GHOSTS)) % count
+        for link in shown.stated["links"]:
+            corners = _corners(shown, link, other)
+            if link != shown.ground and corners is not None and other != index:
+                closed = np.vstack([corners, corners[:1]]) if len(corners) > 2 else corners
+                axes.plot(*closed.T, color=MUTED, linewidth=0.6, alpha=0.35, zorder=2, solid_joinstyle="round")
+
+
+def _curves(axes: Axes, shown: Picture) -> None:
+    """Tracks of points that are no joints, and thinly those of the moving joints."""
+    for key, track in shown.tracks.items():
+        link, point = key.split(".", 1)
+        if link == shown.ground:
+            continue
+        free = point not in shown.stated["joints"]
+        x, y = np.hstack([track, track[:, :1]]) if _closes(track) else track
+        if free:
+            axes.plot(x, y, color=INK, linewidth=1.3 * shown.weight, zorder=2.5)
+        else:
+            axes.plot(x, y, color=MUTED, linewidth=0.7, linestyle=(0, (1, 2)), zorder=2.5)
+
+
+def _closes(track: Array) -> bool:
+    """Whether the end of a track is no farther from its start than its steps are long."""
+    if track.shape[1] < 8 or not np.isfinite(track).all():
+        return False
+    steps = np.hypot(*np.diff(track, axis=1))
+    return bool(np.hypot(*(track[:, 0] - track[:, -1])) <= 2.0 * steps.max())
+
+
+def _corners(shown: Picture, link: str, index: int) -> Array | None:
+    """A link's points as the corners of its convex body, (corner, axis); None where it has no place."""
+    keys = shown.joints(link)
+    points = np.array([shown.tracks[key][:, index] for key in keys]).reshape(-1, 2)
+    if not len(points) or not np.isfinite(points).all():
+        return None
+    return hull(points)
+
+
+def hull(points: Array) -> Array:
+    """The convex hull of a few points (corner, axis), counter-clockwise; Andrew's monotone chain."""
+    ordered = sorted({(float(x), float(y)) for x, y in points})
+    if len(ordered) < 3:
+        return np.array(ordered)
+
+    def half(chain: list[tuple[float, float]]) -> list[tuple[float, float]]:
+        kept: list[tuple[float, float]] = []
+        for point in chain:
+            while len(kept) > 1 and _turn(kept[-2], kept[-1], point) <= 0:
+                kept.pop()
+            kept.append(point)
+        return kept[:-1]
+
+    return np.array(half(ordered) + half(ordered[::-1]))
+
+
+def _turn(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> float:
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+
+
+def _body(axes: Axes, shown: Picture, link: str, index: int, colour: str) -> None:
+    """A rounded plate around the link's points: the same outline drawn wide, then less wide in a tint."""
+    corners = _corners(shown, link, index)
+    if corners is None or len(corners) < 2:
+        return
+    for width, paint in ((12.0, colour), (9.6, tint(colour))):
+        width *= shown.weight
+        if len(corners) == 2:
+            axes.plot(*corners.T, color=paint, linewidth=width, solid_capstyle="round", zorder=4)
+        else:
+            axes.add_patch(Polygon(corners, closed=True, facecolor=paint, edgecolor=paint, linewidth=width,
+                                   joinstyle="round", zorder=4))  # fmt: skip
+
+
+def tint(colour: str, share: float = 0.28) -> str:
+    """The colour mixed with white."""
+    parts = (int(colour[place : place + 2], 16) for place in (1, 3, 5))
+    return "#" + "".join(f"{round(255 - share * (255 - part)):02x}" for part in parts)
+
+
+COILS = np.array([[0.0, 0.18, *np.linspace(0.2, 0.8, 16), 0.82, 1.0], [0, 0, *np.tile([1.0, -1.0], 8), 0, 0]])
+
+
+def _spring(axes: Axes, shown: Picture, ends: Sequence[str], index: int) -> None:
+    """A zigzag between the ends of a spring."""
+    places = [shown.tracks[end][:, index] for end in ends if end in shown.tracks]
+    if len(places) < 2 or not np.isfinite(places).all():
+        return
+    along = places[1] - places[0]
+    across = np.array([-along[1], along[0]]) / (np.hypot(*along) or 1.0) * 0.012 * shown.size
+    path = places[0][:, None] + np.outer(along, COILS[0]) + np.outer(across, COILS[1])
+    axes.plot(*path, color=MUTED, linewidth=1.1, zorder=4.5, solid_joinstyle="round")
+
+
+def _pitch_circle(axes: Axes, place: Array, radius: float) -> None:
+    """The pitch circle of a gear, dash-dotted as on a drawing."""
+    if np.isfinite(place).all():
+        line = (0, (8, 2, 1.5, 2))
+        axes.add_patch(Circle((place[0], place[1]), radius, fill=False, edgecolor=INK, linestyle=line, zorder=3.5))
+
+
+def _joint(axes: Axes, shown: Picture, name: str, joint: dict[str, Any], index: int) -> None:
+    first, second = joint["links"]
+    track = shown.tracks.get(f"{second}.{name}")
+    if track is None or not np.isfinite(track[:, index]).all():
+        return
+    if f"{first}.{name}" in shown.tracks and not np.isfinite(shown.tracks[f"{first}.{name}"][:, index]).all():
+        return  # its first link has no place
+    place = track[:, index]
+    grounded = shown.ground in (first, second)
+    if joint["type"] == "prismatic":
+        _slider(axes, shown, name, index, place, grounded)
+        return
+    if grounded:
+        _support(axes, place, 0.022 * shown.size)
+    r = 0.0095 * shown.size
+    axes.add_patch(Circle((place[0], place[1]), r, facecolor="white", edgecolor=INK, linewidth=1.3, zorder=6))
+
+
+def _support(axes: Axes, place: Array, r: float) -> None:
+    """A fixed bearing: a triangle on a hatched line."""
+    x, y = place
+    axes.add_patch(Polygon([(x, y), (x - 1.2 * r, y - 2 * r), (x + 1.2 * r, y - 2 * r)], closed=True,
+                           facecolor="white", edgecolor=INK, linewidth=1.2, joinstyle="round", zorder=3))  # fmt: skip
+    _hatched(axes, place + np.array([0, -2 * r]), 0.0, 2.2 * r, r)
+
+
+def _hatched(axes: Axes, middle: Array, angle: float, half: float, r: float) -> None:
+    """A line with hatching below it: the ground."""
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    ends = (turn @ np.array([[-half, half], [0.0, 0.0]])).T + middle
+    axes.plot(*ends.T, color=INK, linewidth=1.3, zorder=3, solid_capstyle="butt")
+    for along in np.linspace(-half + 0.55 * r, half, max(2, round(2 * half / (0.62 * r)))):
+        stroke = (turn @ np.array([[along, along - 0.55 * r], [0.0, -0.6 * r]])).T + middle
+        axes.plot(*stroke.T, color=INK, linewidth=0.8, zorder=3)
+
+
+def _slider(axes: Axes, shown: Picture, name: str, index: int, place: Array, grounded: bool) -> None:
+    """A block on its guide; the guide is hatched if it is fixed."""
+    angle = shown.axis(name, index)
+    r = 0.022 * shown.size
+    if grounded:
+        track = shown.tracks[f"{shown.stated['joints'][name]['links'][1]}.{name}"]
+        way = np.array([np.cos(angle), np.sin(angle)]) @ track
+        low, high = float(np.nanmin(way)), float(np.nanmax(way))
+        here = float(np.array([np.cos(angle), np.sin(angle)]) @ place)
+        middle = place + ((low + high) / 2 - here) * np.array([np.cos(angle), np.sin(angle)])
+        below = np.array([np.sin(angle), -np.cos(angle)]) * r
+        _hatched(axes, middle + below, angle, (high - low) / 2 + 2.4 * r, r)
+    else:
+        _slot(axes, shown, name, index, 2.4 * r)
+    turned = Affine2D().rotate(angle).translate(*place) + axes.transData
+    axes.add_patch(Rectangle((-1.7 * r, -r), 3.4 * r, 2 * r, transform=turned, facecolor="white", edgecolor=INK,
+                             linewidth=1.3, zorder=5))  # fmt: skip
+
+
+def _slot(axes: Axes, shown: Picture, name: str, index: int, beyond: float) -> None:
+    """The guide on a moving first link: as long as the block travels in it, and a little beyond."""
+    first, second = shown.stated["joints"][name]["links"]
+    on, at = shown.tracks[f"{first}.{name}"], shown.tracks[f"{second}.{name}"]
+    turns = np.array([shown.axis(name, position) for position in range(on.shape[1])])
+    along = np.array([np.cos(turns), np.sin(turns)])
+    slide = np.sum((at - on) * along, axis=0)
+    travel = np.array([np.nanmin(slide) - beyond, np.nanmax(slide) + beyond])
+    body = np.array([min(travel[0], 0.0), max(travel[1], 0.0)])  # as far as the link's own point
+    colour = shown.colour(first)
+    for reach, width, paint in ((body, 12.0, colour), (body, 9.6, tint(colour)), (travel, 2.4, "white")):
+        ends = on[:, index, None] + along[:, index, None] * reach
+        axes.plot(*ends, color=paint, linewidth=width * shown.weight, solid_capstyle="round", zorder=4.2)
+
+
+def labels(axes: Axes, shown: Picture, index: int, only: Sequence[str] | None = None) -> None:
+    """Names of joints and points, all or only some, pushed away from the middle of the mechanism."""
+    places: dict[str, Array] = {}
+    for key, track in shown.tracks.items():
+        link, point = key.split(".", 1)
+        joint = shown.stated["joints"].get(point)
+        if np.isfinite(track[:, index]).all() and (joint is None or joint["links"][1] == link):
+            places[point] = track[:, index]
+            if joint is None and link != shown.ground:
+                axes.plot(*track[:, index], "o", markersize=4.5 * shown.weight, color=INK, zorder=6)
+    if not places:
+        return
+    middle = np.mean(list(places.values()), axis=0)
+    places = places if only is None else {point: place for point, place in places.items() if point in only}
+    for text, points in _together(places, 0.02 * shown.size):
+        place = places[points[0]]
+        away = place - middle
+        away = away / (np.hypot(*away) or 1.0)
+        joints = [shown.stated["joints"].get(point, {}) for point in points]
+        if any(joint.get("type") == "prismatic" for joint in joints):
+            away = np.array([0.0, 1.3])
+        elif any(shown.ground in joint.get("links", ()) for joint in joints):
+            away = np.array([-1.05 if away[0] < 0 else 1.05, -0.5])  # beside the bearing, not on the link
+        beside = away * (14 + 3 * len(text), 17) * shown.letters
+        axes.annotate(
+            plain(text), (place[0], place[1]), xytext=beside, textcoords="offset points", ha="center", va="center",
+            fontsize=10 * shown.letters, fontweight="bold", color=INK, zorder=7,
+            bbox={"boxstyle": "round,pad=0.12", "facecolor": "white", "edgecolor": "none", "alpha": 0.75},
+        )  # fmt: skip
+
+
+def _together(places: dict[str, Array], near: float) -> list[tuple[str, list[str]]]:
+    """Names of points that lie on one spot, joined to one label."""
+    groups: list[list[str]] = []
+    for point, place in places.items():
+        home = next((group for group in groups if np.hypot(*(places[group[0]] - place)) < near), None)
+        if home is None:
+            groups.append([point])
+        else:
+            home.append(point)
+    return [(", ".join(map(_short, group)), group) for group in groups]
+
+
+def _short(name: str) -> str:
+    """A name that fits into the drawing."""
+    return name if len(name) <= 18 else f"{name[:17]}…"

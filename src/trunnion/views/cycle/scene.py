@@ -1,0 +1,179 @@
+"""A result as plain data for the browser: what `web/` animates and plots, in JSON.
+
+Every series holds one number a position, or a single number if it never changes. Numbers carry seven digits,
+as float32 does; None stands for NaN. Units are SI, except the abscissa, which says its own.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.views.common.cycle import abscissa, attribute, column, intervals, layout, names, numbers, series
+from trunnion.views.common.peaks import ease
+from trunnion.views.cycle.as_built import losses
+from trunnion.views.cycle.built_scene import built
+from trunnion.views.space.bodies import is_spatial, without_noise
+from trunnion.views.space.scene import space_scene
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["scene"]
+
+FORMAT = 1
+SUMS = ("useful_power", "efficiency_instant", "closure_residual", "condition", "power_residual",
+        "friction_iterations", "friction_change", "friction_residual", "friction_contraction")  # fmt: skip
+
+
+def scene(result: xr.Dataset, ideal: xr.Dataset | None = None, max_positions: int = 720) -> dict[str, Any]:
+    """The result as JSON-able data, thinned evenly to `max_positions` (`thinned` then tells the full count).
+
+    ideal: the same run without friction, for comparison; it must have the same positions.
+    """
+    count = result.sizes["position"]
+    if ideal is not None and ideal.sizes["position"] != count:
+        raise ValueError(f"`ideal` has {ideal.sizes['position']} positions, the result {count}")
+    if is_spatial(result):
+        result, ideal = without_noise(result), None if ideal is None else without_noise(ideal)
+    picked = _picked(count, max_positions)
+    over = abscissa(result)
+    kept = result.isel(position=picked)
+    other = None if ideal is None else ideal.isel(position=picked)
+    stated = layout(result)
+    points = _points(kept)
+    shown = {
+        "format": FORMAT,
+        "name": result.attrs.get("name", ""),
+        "formula": result.attrs.get("formula", ""),
+        "count": int(picked.size),
+        "thinned": count if picked.size < count else None,
+        "abscissa": {"label": over.label, "unit": over.unit, "closed": over.closed, "period": over.period,
+                     "values": numbers(over.values[picked])},
+        "time": series(column(kept, "time")),
+        "status": [int(code) for code in kept["status"].values],
+        "ease": series(ease(result)[picked]),
+        "states": {str(run.status): run.text for run in intervals(kept, 0)},
+        "gaps": [{"from": over.say(int(run.start)), "to": over.say(int(run.stop) - 1), "text": run.text}
+                 for run in intervals(result)],
+        "points": points,
+        "links": _links(stated, kept, points),
+        "joints": _joints(stated, kept, other),
+        "loads": _loads(stated, points),
+        "springs": _springs(stated, points),
+        "gears": [{"name": name, **circle} for name, pair in stated["gears"].items() for circle in pair],
+        "drivers": _drivers(kept, other, stated),
+        "sums": {name: series(column(kept, name)) for name in SUMS if name in kept},
+        "efficiency": _single(result, "efficiency"),
+        "built": built(kept, _lost(result, count, int(picked.size))),
+    }  # fmt: skip
+    return shown | space_scene(kept) if is_spatial(result) else shown
+
+
+def _lost(result: xr.Dataset, count: int, kept: int) -> list[int]:
+    """The shown positions that are nearest to those at which a joint loses contact."""
+    stride = -(-count // max(kept, 1))
+    found = {int(index) // stride for places in losses(result).values() for index in places}
+    return sorted(found)
+
+
+def _picked(count: int, most: int) -> NDArray[np.intp]:
+    """Indices of evenly spaced positions, at most `most` of them, from the first on."""
+    stride = -(-count // max(most, 1)) if count else 1
+    return np.arange(0, count, stride)
+
+
+def _single(result: xr.Dataset, name: str) -> float | None:
+    value = column(result, name)
+    return None if value is None or value.ndim else numbers(value.reshape(1))[0]
+
+
+def _points(result: xr.Dataset) -> dict[str, dict[str, Any]]:
+    """Each "link.point" with its track; none in space, where the poses of the links tell them."""
+    if is_spatial(result):
+        return {}
+    return {
+        name: {axis: series(column(result, "point_position", point=name, axis=axis)) for axis in ("x", "y")}
+        for name in names(result, "point")
+    }
+
+
+def _links(stated: dict[str, Any], result: xr.Dataset, points: dict[str, Any]) -> list[dict[str, Any]]:
+    """Links with the keys of their points, their angle, and which of their points are no joints."""
+    known = names(result, "link")
+    rows = []
+    for name, link in stated["links"].items():
+        keys = [f"{name}.{point}" for point in link["points"] if f"{name}.{point}" in points]
+        free = [key for key in keys if key[len(name) + 1 :] not in stated["joints"]]
+        angle = series(column(result, "link_angle", link=name)) if name in known and not is_spatial(result) else [0.0]
+        rows.append({"name": name, "ground": name == stated["ground"], "points": keys, "free": free, "angle": angle})
+    return rows
+
+
+def _joints(stated: dict[str, Any], result: xr.Dataset, ideal: xr.Dataset | None) -> list[dict[str, Any]]:
+    """Joints with their loads and the point they are drawn at: the second link's, where the reaction acts."""
+    known = names(result, "joint")
+    rows = []
+    for name, joint in stated["joints"].items():
+        if name not in known:
+            continue
+        first, second = joint["links"]
+        rows.append(
+            {
+                "name": name, "type": joint["type"], "links": [first, second], "axis": joint.get("axis"),
+                "at": f"{second}.{name}", "on": f"{first}.{name}",
+                "reaction": _reaction(result, name),
+                "ideal": None if ideal is None else _reaction(ideal, name),
+                "moment": _moment(result, name),
+                "friction_power": series(column(result, "friction_power", joint=name)),
+            }
+        )  # fmt: skip
+    return rows
+
+
+def _reaction(result: xr.Dataset, joint: str) -> dict[str, Any]:
+    return {axis: series(column(result, "reaction_force", joint=joint, axis=axis)) for axis in names(result, "axis")}
+
+
+def _moment(result: xr.Dataset, joint: str) -> Any:
+    """A series; in space one for each axis."""
+    if not is_spatial(result):
+        return series(column(result, "reaction_moment", joint=joint))
+    return {axis: series(column(result, "reaction_moment", joint=joint, axis=axis)) for axis in names(result, "axis")}
+
+
+def _loads(stated: dict[str, Any], points: dict[str, Any]) -> list[dict[str, Any]]:
+    """Loads that can be drawn: a force at a known point, a moment on a link; those in space are told apart."""
+    rows: list[dict[str, Any]] = []
+    if stated.get("space") == "spatial":
+        return rows
+    for name, load in stated["loads"].items():
+        at = f"{load.get('link')}.{load.get('at')}"
+        force = [float(part) for part in load.get("force") or (0.0, 0.0)]
+        rows.append({"name": name, "link": load.get("link"), "at": at if at in points else None,
+                     "force": force, "moment": float(load.get("moment") or 0.0),
+                     "frame": load.get("frame", "global"), "varies": bool(load.get("varies")),
+                     "useful": bool(load.get("useful"))})  # fmt: skip
+    return rows
+
+
+def _springs(stated: dict[str, Any], points: dict[str, Any]) -> list[dict[str, Any]]:
+    """Springs between two known points."""
+    ends = {name: spring.get("between") or () for name, spring in stated["springs"].items()}
+    return [{"name": name, "ends": list(two)} for name, two in ends.items() if two and set(two) <= points.keys()]
+
+
+def _drivers(result: xr.Dataset, ideal: xr.Dataset | None, stated: dict[str, Any]) -> list[dict[str, Any]]:
+    """Drivers with effort (an interval where friction leaves it open), power, and effort without friction."""
+    units = attribute(result, "driver_units", [])
+    rows = []
+    for index, name in enumerate(names(result, "driver")):
+        values = {key: series(column(result, f"drive_{key}", driver=name))
+                  for key in ("effort", "effort_lower", "effort_upper", "power")}  # fmt: skip
+        free = None if ideal is None else series(column(ideal, "drive_effort", driver=name))
+        unit = units[index] if index < len(units) else "N m"
+        kind = stated["joints"].get(name, {}).get("type", "revolute")
+        rows.append({"name": name, "unit": unit, "type": kind, "ideal": free, **values})
+    return rows

@@ -1,0 +1,125 @@
+"""An identification as one HTML file that opens and prints anywhere without a network or a script.
+
+Every figure is an SVG inside the page. The content security policy allows these and the one style, named by its hash,
+and nothing else, so no name in a model or a file can become code.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from trunnion.views.common.bundle import web_text
+from trunnion.views.common.cycle import attribute
+from trunnion.views.common.quantities import number
+from trunnion.views.compare.tables import files
+from trunnion.views.cycle.report import hashed
+from trunnion.views.identify.figure import figure
+from trunnion.views.identify.identified import estimates
+from trunnion.views.identify.tables import budget, correlations, estimated, fits, held_out, sensors
+from trunnion.views.tolerance.report import source, template
+from trunnion.views.tolerance.tables import Table
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["report"]
+
+FEW = 2  # estimates whose correlation needs no picture
+DEFINITIONS = (
+    (
+        "Estimate",
+        "The values that make Σ w (ȳ − (1 + g) f − z)² + Σ a² least: ȳ the means over the turns, f the model, g and z "
+        "the errors of gain and zero of each sensor, a the same in their stated standard uncertainties. The weights w "
+        "are 1 over the variance of the mean, by the scatter between turns and its correlation along a turn.",
+    ),
+    (
+        "Standard uncertainty",
+        "By what each turn adds to the estimate, whatever the correlation within it (type A), and by the stated "
+        "uncertainties of zero, gain and resolution (type B), both through the exact derivatives of the model. Where "
+        "the model does not fit, or the conditions disagree, what is left over is added.",
+    ),
+    (
+        "Interval",
+        "It holds the true value in 95 of 100 such experiments if the model is right: estimate ± t u, Student's t for "
+        "the effective degrees of freedom (Welch and Satterthwaite, GUM G.4.1). On a limit it is one-sided.",
+    ),
+    (
+        "Reduced χ²",
+        "Squares of the residuals of the means over what the scatter between turns explains, frequency by frequency "
+        "along the cycle: near 1 if the model fits.",
+    ),
+    (
+        "Not told",
+        "Numbers that act on the data in the same way have no estimate; a finding says which of their combinations is "
+        "known.",
+    ),
+)
+
+
+def report(result: xr.Dataset) -> str:
+    """The whole report as HTML."""
+    from markupsafe import Markup  # with jinja2 only needed here, and slow to import
+
+    style = web_text("report.css") + web_text("tolerance.css") + web_text("compare.css")
+    found = attribute(result, "findings", [])
+    context: dict[str, Any] = {
+        "name": str(result.attrs["identified"]) or "Measurement", "model": str(result.attrs["name"]) or "model",
+        "formula": str(result.attrs["formula"]), "facts": _facts(result), "summary": _summary(result),
+        "findings": [row for row in found if row["severity"] != "note"],
+        "notes": [row for row in found if row["severity"] == "note"],
+        "sections": _sections(result), "done": attribute(result, "done", []),
+        "files": files(result, "data_files"), "data_findings": attribute(result, "data_findings", []),
+        "definitions": DEFINITIONS,
+        "references": [line for line in str(result.attrs.get("references", "")).splitlines() if line.strip()],
+        "version": result.attrs.get("trunnion_version", ""), "model_hash": result.attrs.get("model_hash", ""),
+        "style": Markup(style), "style_hash": hashed(style),
+    }  # fmt: skip
+    return template("identify.html.j2").render(context)
+
+
+def _facts(result: xr.Dataset) -> list[tuple[str, str]]:
+    """(figure, what it counts)."""
+    counts = [(result.sizes["parameter"], "parameter"), (result.sizes["channel"], "channel")]
+    counts += [(result.sizes["condition"], "condition"), (int(result["used"].sum()), "position")]
+    return [(f"{count:,}", f"{what}{'' if count == 1 else 's'}") for count, what in counts]
+
+
+def _summary(result: xr.Dataset) -> list[tuple[str, list[tuple[str, str]]]]:
+    """The first estimates, and whether the model fits."""
+    rows = [(one.short, [_told(one)]) for one in estimates(result)[:3]]
+    chi = float(result["reduced_chi_squared"])
+    if np.isfinite(chi):
+        rows.append(("reduced χ²", [(number(chi, 3), "near 1 if the model fits")]))
+    return rows
+
+
+def _told(one: Any) -> tuple[str, str]:
+    if not one.told:
+        return "not told", "by these data"
+    if one.limit:
+        return one.say(one.value), "on its limit"
+    return one.say(one.value), f"± {one.say(one.half)}, 95 %"
+
+
+def _sections(result: xr.Dataset) -> list[dict[str, Any]]:
+    """Parts of the page: a title, what it is about, a picture, tables."""
+    told = [one for one in estimates(result) if one.told]
+    several = correlations(result)
+    held = held_out(result)
+    unheld = "Measured less model over the cycle before and after; of many conditions some."
+    found = [
+        _section("Estimates", result, "intervals", [estimated(result), budget(result), sensors(result)]),
+        _section("Correlation", result, "correlation" if len(told) > FEW else "", [several]) if several else None,
+        _section("Residuals", result, "residuals", [fits(result)], unheld),
+        _section("Held out", result, "", [held], "What was not fitted, and how well it is predicted.")
+        if held
+        else None,
+    ]
+    return [one for one in found if one is not None]
+
+
+def _section(title: str, result: xr.Dataset, kind: str, tables: list[Table | None], about: str = "") -> dict[str, Any]:
+    picture = {"alt": title, "source": source(figure(result, kind))} if kind else None
+    return {"title": title, "about": about, "picture": picture, "tables": [one for one in tables if one is not None]}

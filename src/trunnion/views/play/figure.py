@@ -1,0 +1,140 @@
+"""Play in figure and table: the worst case of a measure over the turn, and what each joint has in it."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from trunnion.studies.play.result import relied_on
+from trunnion.views.common.cycle import Abscissa, Array, thin
+from trunnion.views.common.figures import INK, PALETTE, along, frame_peak, legend, new, shade
+from trunnion.views.common.lettering import plain
+from trunnion.views.common.peaks import ease, usual_peak
+from trunnion.views.common.quantities import prefixed, quantity
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["MOST_PANELS", "Table", "figure", "tables"]
+
+MOST_PANELS = 6
+PANEL = 3.3  # height, inches
+FLOATING = 3  # ends of a pin: two across and that of the float
+HATCHES = ("", "//", "..", "xx")
+
+
+def figure(result: xr.Dataset) -> Figure:
+    """A panel for each measure: the joints' worst cases on top of one another, their RSS dashed."""
+    over, names = _over(result), result["measure"].values[:MOST_PANELS]
+    sheet = new("What the play of the joints does", result, height=1.0 + PANEL * len(names))
+    units, limits = (json.loads(result.attrs[key]) for key in ("measure_units", "limits"))
+    panels = sheet.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
+    for i, (axes, name) in enumerate(zip(panels, names, strict=True)):
+        _panel(axes, result.isel(measure=i), over, str(name), units[i], limits[i])
+        shade(axes, result, over)
+        if axes is not panels[-1]:
+            axes.set_xlabel("")
+    return sheet
+
+
+def _panel(axes: Axes, result: xr.Dataset, over: Abscissa, name: str, unit: str, limit: float | None) -> None:
+    rows, total, rss = (result[key].values for key in ("worst_case", "worst_case_total", "rss"))
+    most, shown = float(np.nanmax(total, initial=0.0)), usual_peak(ease(result), total)
+    factor, label = prefixed(shown, unit)
+    along(axes, over, plain(f"worst case of {name} [{label}]"))
+    picked = thin(total)
+    x, lanes = over.values[picked], [row[picked] * factor for row in (*rows, rss)]
+    if over.closed:
+        x, lanes = np.append(x, x[0] + over.period), [np.append(row, row[0]) for row in lanes]
+    floor = np.zeros(len(x))
+    for k, (joint, row) in enumerate(zip(result["joint"].values, lanes[:-1], strict=True)):
+        if np.nanmax(row, initial=0.0) > 0:
+            look: dict[str, Any] = {
+                "facecolor": PALETTE[k % len(PALETTE)],
+                "hatch": HATCHES[k // len(PALETTE) % len(HATCHES)],
+            }
+            axes.fill_between(x, floor, floor + row, label=plain(str(joint)), alpha=0.75, linewidth=0, **look)
+        floor = floor + row
+    axes.plot(x, floor, color=INK, linewidth=1.4, label="sum: worst case", **_marks(x))
+    axes.plot(x, lanes[-1], color=INK, linewidth=1.2, linestyle=(0, (5, 2)), label="RSS")
+    if limit is not None:
+        axes.axhline(limit * factor, color=PALETTE[1], linewidth=1.2, linestyle=(0, (1, 1.5)), label="limit")
+    axes.set_ylim(bottom=0.0)
+    frame_peak(axes, most, shown, factor, unit)
+    legend(axes)
+
+
+def _marks(x: Array) -> dict[str, Any]:
+    """A single position makes no line."""
+    return {"marker": "o"} if len(x) == 1 else {}
+
+
+def _over(result: xr.Dataset) -> Abscissa:
+    values, unit, driver = result["drive"].values, result.attrs["drive_unit"], result.attrs["drive"]
+    if not driver:
+        return Abscissa("time", unit, values)
+    step = float(values[1] - values[0]) if len(values) > 2 else 0.0
+    turn = step * len(values)
+    closed = bool(result.attrs["periodic"]) and unit == "°" and abs(abs(turn) - 360.0) < 1e-6 * 360.0
+    return Abscissa(f"drive {'angle' if unit == '°' else 'slide'} {driver}", unit, values, closed, turn * closed)
+
+
+# ---- table ----------------------------------------------------------------------------------------------------
+
+
+class Table(NamedTuple):
+    """What the command line prints of one measure."""
+
+    title: str
+    head: list[str]
+    rows: list[list[str]]
+
+
+HEAD = ["joint", "play", "largest effect ±", "at", "share"]
+
+
+def tables(result: xr.Dataset) -> list[Table]:
+    """For each measure: the joints with their play, largest effect and where, and share in the largest worst case."""
+    units, over = json.loads(result.attrs["measure_units"]), _over(result)
+    return [
+        _table(result.isel(measure=i), over, str(name), unit)
+        for i, (name, unit) in enumerate(zip(result["measure"].values, units, strict=True))
+    ]
+
+
+def _table(result: xr.Dataset, over: Abscissa, name: str, unit: str) -> Table:
+    total = _relied_on(result, "worst_case_total")
+    if not np.isfinite(total).any():
+        return Table(f"{name}: no position has an answer", HEAD, [])
+    top, rows, effects = int(np.nanargmax(total)), list[list[str]](), _relied_on(result, "worst_case")
+    for j, joint in enumerate(result["joint"].values):
+        effect = effects[j]
+        where = over.say(int(np.nanargmax(effect))) if np.nanmax(effect) > 0 else "—"
+        share = f"{100 * effect[top] / total[top]:.1f} %" if total[top] > 0 else "—"
+        rows.append([str(joint), _play(result, j), quantity(float(np.nanmax(effect)), unit), where, share])
+    for label, key in (
+        ("all, worst case", "worst_case_total"),
+        ("all, RSS", "rss"),
+        ("all, standard deviation", "deviation_total"),
+    ):
+        row = _relied_on(result, key)
+        best = int(np.nanargmax(row))
+        rows.append([label, "", quantity(float(row[best]), unit), over.say(best), ""])
+    low, high = (quantity(float(pick(result["value"].values)), unit) for pick in (np.nanmin, np.nanmax))
+    return Table(f"{name}, from {low} to {high}; shares are at {over.say(top)}", HEAD, rows)
+
+
+def _relied_on(result: xr.Dataset, name: str) -> Array:
+    return relied_on(result[name].values, result["status"].values)
+
+
+def _play(result: xr.Dataset, j: int) -> str:
+    """How far the pin of a joint can go to either side, its end float apart; nothing said of a float of 0."""
+    radii = [float(radius) for radius in result["radius"].values[j] if np.isfinite(radius)]
+    across, along = (radii[:2], radii[2:]) if len(radii) == FLOATING else (radii, [])
+    found = [f"±{quantity(radius, 'm')}" for radius in dict.fromkeys(across)]
+    return ", ".join([*found, *(f"float ±{quantity(radius, 'm')}" for radius in along if radius > 0)])

@@ -1,0 +1,67 @@
+"""Tables of a measurement for the command line: its conditions, its channels."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from trunnion.rig.reading.measurement import Course, Measurement
+from trunnion.views.rig.conditions import shortened
+
+__all__ = ["Rows", "tables"]
+
+Rows = tuple[str, list[str], list[list[str]]]
+MOST = 40  # conditions shown
+
+
+def tables(measurement: Measurement) -> list[Rows]:
+    """The conditions with the mean of each channel, then the channels with scatter and uncertainty over all of them."""
+    conditions = measurement.conditions
+    channels = list(conditions[0].courses)
+    speeds = np.isfinite([one.speed for one in conditions]).any()
+    named, short = shortened([one.name for one in conditions])
+    settings = [named] if named == "condition" else named.split(", ")
+    head = [*settings, "turns", *(["speed rpm"] if speeds else [])]
+    head += [f"{name} {_unit(conditions[0].courses[name].unit)}".strip() for name in channels]
+    rows = []
+    for one, name in list(zip(conditions, short, strict=True))[:MOST]:
+        turns = max(course.turns.shape[0] for course in one.courses.values())
+        speed = [f"{one.speed * 30 / np.pi:.5g}"] if speeds else []
+        own = [name] if named == "condition" else [part.replace(" ", "\u00a0") for part in name.split(", ")]
+        rows.append([*own, f"{turns:,}", *speed, *(_figure(_overall(one.courses[key])) for key in channels)])
+    if len(conditions) > MOST:
+        rows.append([f"{len(conditions) - MOST} more", *[""] * (len(head) - 1)])
+    shown: list[Rows] = [(f"{measurement.name}\nconditions: mean over turns and positions", head, rows)]
+    head = ["channel", "measures", "unit", "least", "largest", "scatter", "uncertainty"]
+    rows = [[name, *_channel([one.courses[name] for one in conditions])] for name in channels]
+    shown.append(("channels: mean courses, what turns scatter, standard uncertainty of the mean", head, rows))
+    return shown
+
+
+def _channel(courses: list[Course]) -> list[str]:
+    """Measure and unit of a channel; extremes of its mean courses; RMS of scatter and of uncertainty."""
+    means = np.concatenate([one.mean for one in courses])
+    known = means[np.isfinite(means)]
+    extremes = [_figure(float(known.min())), _figure(float(known.max()))] if known.size else ["none", "none"]
+    spreads = [np.concatenate([getattr(one, figure) for one in courses]) for figure in ("scatter", "uncertainty")]
+    return [courses[0].measures, _unit(courses[0].unit), *extremes, *(_figure(_rms(one), 3) for one in spreads)]
+
+
+def _overall(course: Course) -> float:
+    known = course.mean[np.isfinite(course.mean)]
+    with np.errstate(over="ignore"):
+        return float(known.mean()) if known.size else np.nan
+
+
+def _rms(values: np.ndarray) -> float:
+    known = values[np.isfinite(values)]
+    with np.errstate(over="ignore"):
+        return float(np.sqrt(np.mean(known**2))) if known.size else np.nan
+
+
+def _figure(value: float, digits: int = 5) -> str:
+    return "not known" if not np.isfinite(value) else f"{value + 0.0:.{digits}g}"
+
+
+def _unit(unit: str) -> str:
+    """A unit that is not broken between lines."""
+    return "" if unit == "1" else unit.replace(" ", "\u00a0")

@@ -1,0 +1,257 @@
+"""A spatial result as bodies that move: poses of the links, frames of the joints, and how large all of it is.
+
+Vectors have their component first: places are (3, position), rotations (3, 3, position) from the link's frame to the
+global one. What no position has is NaN.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.errors import Finding, MechanismError
+from trunnion.views.common.cycle import Array, attribute, column, layout, names
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["Pose", "Space", "gathered", "is_spatial", "rotation_matrix", "space", "without_noise"]
+
+PIN = 14.0  # a mechanism is drawn at least as large as so many radii of its thickest pin
+NEAR = 0.1  # joints whose points lie closer than this share of the size are drawn apart
+SMALLEST = 1e-9  # m, of a mechanism that has a size
+APART = 0.34  # as far from their common point as this share of the size, where all axes meet in one
+ASIDE = 0.16  # where only some do
+NOISE = 1e-9  # reactions below this share of what moments and lengths make likely are rounding
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Where a link is: matrix (3, 3, position) and origin (3, position), m."""
+
+    matrix: Array
+    origin: Array
+
+    def place(self, point: Array) -> Array:
+        """A point of the link, (3,) in its frame, in the global one, (3, position)."""
+        return np.asarray(self.origin + np.einsum("ijn,j->in", self.matrix, point), dtype=float)
+
+    def direction(self, vector: Array) -> Array:
+        """A direction fixed in the link, in the global frame, (3, position)."""
+        return np.asarray(np.einsum("ijn,j->in", self.matrix, vector), dtype=float)
+
+    @property
+    def known(self) -> NDArray[np.bool_]:
+        """Whether it has a place, (position,)."""
+        return np.asarray(np.isfinite(self.matrix).all(axis=(0, 1)) & np.isfinite(self.origin).all(axis=0))
+
+
+@dataclass(frozen=True)
+class Space:
+    """What is needed to draw a spatial result at any position.
+
+    stated: the layout; poses: of every link; free: "link.point" → place in the link's frame, of points that are no
+    joints; thickest: radius of the thickest pin, 0 if none is told, m.
+    """
+
+    stated: dict[str, Any]
+    poses: dict[str, Pose]
+    free: dict[str, Array]
+    thickest: float = 0.0
+
+    @property
+    def ground(self) -> str:
+        """The name of the fixed link."""
+        return str(self.stated["ground"])
+
+    @property
+    def moving(self) -> list[str]:
+        """The names of the other links."""
+        return [link for link in self.stated["links"] if link != self.ground]
+
+    @cached_property
+    def joints(self) -> dict[str, dict[str, Any]]:
+        """The joints whose links have poses."""
+        stated: dict[str, dict[str, Any]] = self.stated["joints"]
+        return {name: one for name, one in stated.items() if set(one["links"]) <= self.poses.keys()}
+
+    def element(self, joint: str, side: int) -> Array:
+        """Point, z and x of a joint's element on its first (0) or second (1) link, rows (3, 3), in the link's frame."""
+        return np.array(self.joints[joint]["frames"][side], dtype=float)
+
+    def at(self, joint: str, side: int = 1) -> Array:
+        """Track of the joint's point on a link, (3, position)."""
+        return self.poses[self.joints[joint]["links"][side]].place(self.element(joint, side)[0])
+
+    def axis(self, joint: str, side: int = 1) -> Array:
+        """Direction of the axis of a joint's element, (3, position)."""
+        return self.poses[self.joints[joint]["links"][side]].direction(self.element(joint, side)[1])
+
+    def slides(self, joint: str) -> Array:
+        """How far the point on the second link is along the axis of the first, (position,) m."""
+        apart = self.at(joint, 1) - self.at(joint, 0)
+        return np.asarray((apart * self.axis(joint, 0)).sum(axis=0), dtype=float)
+
+    @cached_property
+    def middle(self) -> Array:
+        """Middle of the box around all places, (3,) m."""
+        low, high = self.spots.min(axis=0), self.spots.max(axis=0)
+        return np.asarray((low + high) / 2, dtype=float)
+
+    def track(self, key: str) -> Array:
+        """Track of a free point, (3, position)."""
+        return self.poses[key.split(".", 1)[0]].place(self.free[key])
+
+    @cached_property
+    def drawable(self) -> NDArray[np.bool_]:
+        """Whether every link has a place, (position,)."""
+        return np.asarray(np.all([pose.known for pose in self.poses.values()], axis=0))
+
+    @cached_property
+    def spots(self) -> Array:
+        """All places of joints and points over the run, (n, 3)."""
+        tracks = [self.at(name, side) for name in self.joints for side in (0, 1)]
+        tracks += [self.track(key) for key in self.free]
+        found = np.concatenate([track.T for track in tracks]) if tracks else np.empty((0, 3))
+        return np.asarray(found[np.isfinite(found).all(axis=1)], dtype=float)
+
+    @cached_property
+    def extent(self) -> float:
+        """Diagonal of the box around all that moves, or what the pins ask for, m; 0 where nothing has a length."""
+        extent = float(np.linalg.norm(np.ptp(self.spots, axis=0))) if len(self.spots) else 0.0
+        extent = max(extent, PIN * self.thickest)
+        return extent if extent > SMALLEST else 0.0
+
+    @property
+    def size(self) -> float:
+        """The extent; 1 m where there is none, as where all axes meet in one point and no pin has a radius."""
+        return self.extent or 1.0
+
+    @cached_property
+    def shifts(self) -> dict[str, float]:
+        """How far along its axis each joint is drawn from its point, m, so that joints on one spot are told apart."""
+        found: dict[str, float] = dict.fromkeys(self.joints, 0.0)
+        places = [self.at(name)[:, self.drawable] for name in self.joints]
+        spread = float(np.linalg.norm(np.ptp(np.hstack(places), axis=1))) if places else 0.0
+        share = APART if spread < APART * self.size else ASIDE
+        for name in self._crowded():
+            found[name] = share * self.size * self._sense(name, found)
+        return found
+
+    def _crowded(self) -> list[str]:
+        """Joints with an axis whose point lies on that of another joint of one of their links, with another axis."""
+        index = int(np.argmax(self.drawable))
+        found = []
+        for name, joint in self.joints.items():
+            if joint["type"] not in AXIAL:
+                continue
+            others = [
+                one for one, other in self.joints.items() if one != name and set(joint["links"]) & set(other["links"])
+            ]
+            for other in others:
+                near = np.linalg.norm(self.at(name)[:, index] - self.at(other)[:, index]) < NEAR * self.size
+                turned = np.linalg.norm(np.cross(self.axis(name)[:, index], self.axis(other)[:, index])) > 0.02
+                if near and (turned or self.joints[other]["type"] not in AXIAL):
+                    found.append(name)
+                    break
+        return found
+
+    def _sense(self, name: str, found: dict[str, float]) -> float:
+        """+1 or −1 along the axis: a joint of the ground away from those of the ground before it."""
+        index = int(np.argmax(self.drawable))
+        if self.ground not in self.joints[name]["links"]:
+            return 1.0
+        sum_before = sum(
+            (np.sign(shift) * self.axis(one)[:, index] for one, shift in found.items()
+             if shift and self.ground in self.joints[one]["links"]),
+            np.zeros(3),
+        )  # fmt: skip
+        return -1.0 if float(self.axis(name)[:, index] @ sum_before) > 0 else 1.0
+
+    def seat(self, joint: str, side: int = 1) -> Array:
+        """Place of a joint's symbol on a link, (3,) in the link's frame."""
+        point, z, _ = self.element(joint, side)
+        return np.asarray(point + self.shifts[joint] * z, dtype=float)
+
+    def seated(self, joint: str) -> Array:
+        """Track of a joint's symbol, (3, position)."""
+        return self.poses[self.joints[joint]["links"][1]].place(self.seat(joint))
+
+
+AXIAL = ("revolute", "cylindrical", "helical", "prismatic")  # whose symbol may lie anywhere on the axis
+
+
+def is_spatial(result: xr.Dataset) -> bool:
+    """Whether a result is of a mechanism in space."""
+    return layout(result).get("space") == "spatial"
+
+
+def rotation_matrix(quaternion: Array) -> Array:
+    """Matrix (3, 3, …) of a quaternion w, x, y, z (4, …)."""
+    w, x, y, z = quaternion
+    return np.array([
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ])  # fmt: skip
+
+
+def space(result: xr.Dataset) -> Space:
+    """Gather what the drawings need; raises MechanismError if no position can be drawn."""
+    shown = gathered(result)
+    if not shown.drawable.any():
+        what = "no position of the mechanism can be assembled: there is nothing to draw"
+        raise MechanismError(Finding(what, remedy="change the lengths or the range of the driver"))
+    return shown
+
+
+def without_noise(result: xr.Dataset) -> xr.Dataset:
+    """The result with zero for reactions that are only rounding beside the moments, and the other way round."""
+    force, moment = column(result, "reaction_force"), column(result, "reaction_moment")
+    if force is None or moment is None or not force.size:
+        return result
+    size = gathered(result).size
+    most = [float(np.abs(one[np.isfinite(one)]).max(initial=0.0)) for one in (force, moment)]
+    floors = {"reaction_force": NOISE * most[1] / size, "reaction_moment": NOISE * most[0] * size}
+    return result.assign(
+        {name: result[name].where(~(np.abs(result[name]) < floor), 0.0) for name, floor in floors.items()}
+    )
+
+
+def gathered(result: xr.Dataset) -> Space:
+    """The same, whether or not a position can be drawn."""
+    stated = layout(result)
+    count = result.sizes["position"]
+    poses = {link: _pose(result, link) for link in names(result, "link")}
+    still = np.broadcast_to(np.eye(3)[:, :, None], (3, 3, count)), np.zeros((3, count))
+    poses[stated["ground"]] = Pose(*still)  # the global frame, also where nothing else is known
+    free = {}
+    for key in names(result, "point"):
+        link, point = key.split(".", 1)
+        if link in poses and point not in stated["joints"]:
+            local = _local(result, key, poses[link])
+            if local is not None:
+                free[key] = local
+    radii = [float(row["value"]) for row in attribute(result, "inputs", [])
+             if str(row["path"]).endswith("pin.radius") and isinstance(row.get("value"), int | float)]  # fmt: skip
+    return Space(stated, poses, free, max(radii, default=0.0))
+
+
+def _pose(result: xr.Dataset, link: str) -> Pose:
+    turn = result["link_rotation"].sel(link=link).transpose("component", "position")
+    place = result["link_position"].sel(link=link).transpose("axis", "position")
+    return Pose(rotation_matrix(np.asarray(turn.values, dtype=float)), np.asarray(place.values, dtype=float))
+
+
+def _local(result: xr.Dataset, key: str, pose: Pose) -> Array | None:
+    """A point in the frame of its link, from the first position that is known."""
+    track = np.asarray(result["point_position"].sel(point=key).transpose("axis", "position").values, dtype=float)
+    known = np.flatnonzero(np.isfinite(track).all(axis=0) & pose.known)
+    if not known.size:
+        return None
+    index = known[0]
+    return np.asarray(pose.matrix[:, :, index].T @ (track[:, index] - pose.origin[:, index]), dtype=float)

@@ -1,0 +1,293 @@
+"""The figure of a spatial mechanism: bodies in parallel projection, coupler curves, names, reactions, axes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.patches import FancyArrowPatch
+from matplotlib.patheffects import Normal, Stroke
+
+from trunnion.errors import Finding, MechanismError, Status
+from trunnion.views.common.cycle import Array, abscissa, column, status_text
+from trunnion.views.common.drawing import PALE
+from trunnion.views.common.figures import INK, MUTED, PALETTE, new
+from trunnion.views.common.lettering import plain
+from trunnion.views.common.peaks import ease, usual_peak
+from trunnion.views.common.quantities import prefixed
+from trunnion.views.space.bodies import Space, space, without_noise
+from trunnion.views.space.camera import Camera, best, looking
+from trunnion.views.space.paint import JOINT, Strokes, paint
+from trunnion.views.space.solids import Solid, solids
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["Scenery", "mechanism", "scenery", "sketch"]
+
+GREY = "#9aa3ad"  # of the ground
+REACTION = "#c01f2e"
+HEIGHTS = 3.2, 8.0  # in, of the drawing, which is 7.2 in wide
+LENGTH = 0.3  # of the longest reaction, share of the size of the picture
+FEW = 400  # pieces of a curve
+
+
+@dataclass(frozen=True)
+class Scenery:
+    """A mechanism with its solids and the camera; box: left, below, right, above (m) of all that may be seen."""
+
+    shown: Space
+    solids: list[Solid]
+    camera: Camera
+    box: tuple[float, float, float, float]
+
+    @property
+    def diagonal(self) -> float:
+        """Size of the picture, m."""
+        left, below, right, above = self.box
+        return float(np.hypot(right - left, above - below))
+
+
+def scenery(shown: Space, camera: Camera | None = None) -> Scenery:
+    """Look at a mechanism, from the best side if not told."""
+    camera = camera or looking(*best(shown))
+    found = solids(shown)
+    corners = []
+    picked = np.flatnonzero(shown.drawable)
+    picked = picked[:: max(1, picked.size // 60)]
+    for solid in found:
+        pose = shown.poses[solid.link]
+        points = solid.points if solid.kind != "box" else _corners(solid.points)
+        places = np.einsum("ijn,kj->nki", pose.matrix[:, :, picked], points) + pose.origin[:, picked].T[:, None]
+        seen = camera.seen(places.reshape(-1, 3))[:, :2]
+        corners += [seen.min(axis=0) - solid.radius, seen.max(axis=0) + solid.radius]
+    low, high = np.min(corners, axis=0), np.max(corners, axis=0)
+    return Scenery(shown, found, camera, (float(low[0]), float(low[1]), float(high[0]), float(high[1])))
+
+
+def _corners(points: Array) -> Array:
+    middle, *halves = points
+    signs = np.array([[a, b, c] for a in (-1, 1) for b in (-1, 1) for c in (-1, 1)], dtype=float)
+    return np.asarray(middle + signs @ np.array(halves), dtype=float)
+
+
+def mechanism(result: xr.Dataset, index: int | None = None) -> Figure:
+    """The mechanism at a position: that of the largest reaction that can be drawn, if not told."""
+    result = without_noise(result)
+    look = scenery(space(result))
+    count, told = result.sizes["position"], index is not None
+    if index is None:
+        index = _telling(result, look.shown)
+    elif not 0 <= index < count:
+        remedy = f"name one from 0 to {count - 1}"
+        raise MechanismError(Finding(f"there is no position {index} among the {count}", "index", remedy))
+    if not look.shown.drawable[index]:
+        what = f"position {index} cannot be assembled: there is nothing to draw"
+        raise MechanismError(Finding(what, "index", "name a position that has an answer"))
+    arrows, most = _reactions(look, result, index)
+    low, high = _limits(look, arrows)
+    figure = new("Mechanism", result, float(np.clip(7.2 * (high - low)[1] / (high - low)[0], *HEIGHTS)) + 0.7)
+    axes = figure.subplots()
+    axes.set_aspect("equal")
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+    axes.axis("off")
+    sketch(axes, look, index)
+    for start, end in arrows:
+        _arrow(axes, start, end, REACTION)
+    labels(axes, look, index, [start + np.linspace(0.2, 1.0, 5)[:, None] * (end - start) for start, end in arrows])
+    _key(axes, look, most)
+    over = abscissa(result)
+    facts = [f"{over.label} = {over.say(index)}", str(result.attrs.get("formula", ""))]
+    if arrows and not told:
+        facts[0] += ", where the reaction is largest"
+    status = int(result["status"].values[index])
+    if status >= Status.NOT_CONVERGED:
+        facts.append(status_text(status).split(":")[0])
+    if any(look.shown.shifts.values()):
+        facts.append("joints on one spot drawn apart")
+    axes.set_title(plain("    ".join(filter(None, facts))), fontsize=8.5, color=MUTED, loc="left")
+    return figure
+
+
+def _limits(look: Scenery, arrows: list[tuple[Array, Array]]) -> tuple[Array, Array]:
+    """Corners below left and above right of the figure (m): all that may be seen, the key below, no narrow strip."""
+    margin = 0.07 * look.diagonal
+    reach = np.array([look.box[:2], look.box[2:], *(end for _, end in arrows)])
+    low, high = reach.min(axis=0) - margin, reach.max(axis=0) + margin
+    low[1] -= 1.6 * margin
+    width, height = high - low
+    wider = max(0.0, height * 7.2 / HEIGHTS[1] - width) / 2
+    taller = max(0.0, width * HEIGHTS[0] / 7.2 - height) / 2
+    more = np.array([wider, taller])
+    return low - more, high + more
+
+
+def _telling(result: xr.Dataset, shown: Space) -> int:
+    """The position of the largest usual reaction, or one in the first eighth where there is none."""
+    known = np.flatnonzero(shown.drawable)
+    forces = column(result, "reaction_force")
+    if forces is not None and forces.size:
+        sizes = np.linalg.norm(forces, axis=1)
+        most = usual_peak(ease(result), sizes)
+        each = np.where(np.isfinite(sizes) & (sizes <= most * (1 + 1e-12)), sizes, -1.0).max(axis=0)[known]
+        if most > 0 and each.max() > 0 and np.ptp(each) > 1e-6 * most:
+            return int(known[each.argmax()])
+    return int(known[known.size // 8])
+
+
+def sketch(axes: Axes, look: Scenery, index: int, only: tuple[str, ...] = (), curves: bool = True) -> None:
+    """Bodies and curves at a position, without a letter; only: links that have a colour, all if none is named."""
+    shown = look.shown
+    bodies = [
+        (solid, shown.poses[solid.link].matrix[:, :, index], shown.poses[solid.link].origin[:, index],
+         _colour(shown, solid.paint, only))
+        for solid in look.solids
+    ]  # fmt: skip
+    strokes: list[Strokes] = []
+    if curves:
+        free = [key for key in shown.free if key.split(".", 1)[0] != shown.ground]
+        inner = [name for name, joint in shown.joints.items()
+                 if shown.ground not in joint["links"] and not shown.shifts[name]]  # fmt: skip
+        strokes += [Strokes(_pieces(shown.track(key)), INK, 1.2) for key in free]
+        strokes += [Strokes(_dashed(shown.seated(name), 0.013 * shown.size), MUTED, 0.7) for name in inner]
+    paint(axes, look.camera, bodies, strokes, shown.size)
+
+
+def _colour(shown: Space, name: str, only: tuple[str, ...]) -> str:
+    if not name:
+        return JOINT
+    if name == shown.ground:
+        return GREY
+    if only and name not in only:
+        return PALE
+    return PALETTE[shown.moving.index(name) % len(PALETTE)]
+
+
+def _pieces(track: Array) -> Array:
+    """A track (3, position) as straight pieces (n, 2, 3), closed where its end lies no farther off than its steps."""
+    stride = -(-track.shape[1] // FEW)
+    line = track[:, ::stride].T
+    steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
+    if len(line) > 7 and np.isfinite(line).all() and np.linalg.norm(line[0] - line[-1]) <= 2 * steps.max():
+        line = np.vstack([line, line[:1]])
+    pieces = np.stack([line[:-1], line[1:]], axis=1)
+    return np.asarray(pieces[np.isfinite(pieces).all(axis=(1, 2))], dtype=float)
+
+
+def _dashed(track: Array, dash: float) -> Array:
+    """Every second piece of a track cut into pieces of one length (m), (n, 2, 3)."""
+    pieces = _pieces(track)
+    lengths = np.linalg.norm(pieces[:, 1] - pieces[:, 0], axis=1)
+    ends = np.concatenate([[0.0], np.cumsum(lengths)])
+    if ends[-1] < dash:
+        return pieces[:0]
+    marks = np.arange(0.0, ends[-1], dash)
+    line = np.vstack([pieces[:1, 0], pieces[:, 1]])
+    cut = np.array([np.interp(marks, ends, axis) for axis in line.T]).T
+    return np.stack([cut[:-1], cut[1:]], axis=1)[::2]
+
+
+def _reactions(look: Scenery, result: xr.Dataset, index: int) -> tuple[list[tuple[Array, Array]], float]:
+    """Start and end of the arrow of each joint's reaction that can be seen, and the largest of them, N."""
+    forces = column(result, "reaction_force")
+    if forces is None or not np.isfinite(forces[..., index]).any():
+        return [], 0.0
+    here = {str(name): forces[row, :, index] for row, name in enumerate(result["joint"].values)}
+    most = max((float(np.linalg.norm(force)) for force in here.values() if np.isfinite(force).all()), default=0.0)
+    found = []
+    for name, force in here.items():
+        if name not in look.shown.joints or not np.isfinite(force).all() or np.linalg.norm(force) <= 0.01 * most:
+            continue
+        start = look.camera.seen(look.shown.seated(name)[:, index])[:2]
+        end = start + look.camera.seen(force)[:2] * LENGTH * look.diagonal / most
+        if np.hypot(*(end - start)) > 0.01 * look.diagonal:
+            found.append((start, end))
+    return found, most
+
+
+def _arrow(axes: Axes, start: Array, end: Array, colour: str) -> None:
+    axes.add_patch(FancyArrowPatch((start[0], start[1]), (end[0], end[1]), arrowstyle="-|>,head_length=5,head_width=2",
+                                   shrinkA=0, shrinkB=0, linewidth=1.7, color=colour, zorder=6, mutation_scale=1.1,
+                                   path_effects=[Stroke(linewidth=3.2, foreground="white"), Normal()]))  # fmt: skip
+
+
+def _round(value: float) -> float:
+    """The round number next below: 1, 2 or 5 times a power of ten."""
+    base = 10.0 ** np.floor(np.log10(value))
+    return float(next(step * base for step in (5, 2, 1) if step * base <= value * (1 + 1e-9)))
+
+
+def _key(axes: Axes, look: Scenery, most: float) -> None:
+    """A triad of the global axes, bars of a round length and, where reactions reach `most` N, of a round force."""
+    (x0, x1), y0 = axes.get_xlim(), axes.get_ylim()[0]
+    if most > 0:
+        size = _round(0.6 * most)
+        factor, unit = prefixed(size, "N")
+        y, long = y0 + 0.025 * look.diagonal, size / most * LENGTH * look.diagonal
+        start = np.array([x1 - long - 0.01 * look.diagonal, y])
+        _arrow(axes, start, start + np.array([long, 0.0]), REACTION)
+        axes.annotate(f"reaction {size * factor:g} {unit}", (start[0], y), xytext=(-5, 0), textcoords="offset points",
+                      ha="right", va="center", fontsize=8, color=MUTED)  # fmt: skip
+    arm = 0.05 * look.diagonal
+    origin = np.array([x0 + 1.25 * arm, y0 + 1.1 * arm])
+    for name, axis in zip("xyz", look.camera.matrix.T, strict=True):
+        end = origin + arm * axis[:2]
+        axes.annotate("", (end[0], end[1]), xytext=(origin[0], origin[1]), zorder=7,
+                      arrowprops={"arrowstyle": "-|>", "color": MUTED, "linewidth": 1.1, "shrinkA": 0, "shrinkB": 0,
+                                  "mutation_scale": 7})  # fmt: skip
+        away = end + 0.32 * arm * axis[:2] / (np.hypot(*axis[:2]) or 1.0)
+        if np.hypot(*axis[:2]) > 0.15:
+            axes.text(away[0], away[1], name, ha="center", va="center", fontsize=8, style="italic", color=MUTED)
+    if not look.shown.extent:
+        axes.text(origin[0] + 1.8 * arm, y0 + 0.025 * look.diagonal, "all axes meet in one point: drawn on a sphere",
+                  fontsize=8, color=MUTED, va="center")  # fmt: skip
+        return
+    length = _round(0.18 * (x1 - x0))
+    factor, unit = prefixed(length, "m")
+    left, y, tick = origin[0] + 2.1 * arm, y0 + 0.025 * look.diagonal, 0.006 * look.diagonal
+    axes.plot([left, left, left, left + length, left + length, left + length],
+              [y - tick, y + tick, y, y, y - tick, y + tick], color=MUTED, linewidth=1.1, zorder=6)  # fmt: skip
+    axes.annotate(f"{length * factor:g} {unit}", (left + length, y), xytext=(5, 0), textcoords="offset points",
+                  ha="left", va="center", fontsize=8, color=MUTED)  # fmt: skip
+
+
+def labels(
+    axes: Axes, look: Scenery, index: int, arrows: list[Array], only: tuple[str, ...] = (), size: float = 9.5
+) -> None:
+    """Names of joints and free points, each on that side of its place where least else lies."""
+    shown, camera = look.shown, look.camera
+    spots = {name: camera.seen(shown.seated(name)[:, index])[:2] for name in shown.joints}
+    dots = {key.split(".", 1)[1]: camera.seen(shown.track(key)[:, index])[:2] for key in shown.free
+            if not key.startswith(f"{shown.ground}.")}  # fmt: skip
+    taken = list(np.concatenate([_covered(look, index), *arrows]))
+    places = spots | dots
+    for name, spot in places.items():
+        if only and name not in only:
+            continue
+        text = plain(name if len(name) <= 18 else f"{name[:17]}…")
+        half = np.array([0.007 * len(text) + 0.012, 0.016]) * look.diagonal * size / 9.5
+        ring = [np.array([np.cos(angle), np.sin(angle)]) for angle in np.radians(np.arange(0, 360, 30))]
+        reach = 0.034 * look.diagonal
+        options = [spot + (reach + half * np.abs(side)) * side for side in ring]
+        blocked = [sum(bool((np.abs(other - place) < half * 1.15).all()) for other in taken) for place in options]
+        place = options[int(np.argmin(blocked))]
+        taken += [place + half * [share, 0.0] for share in (-0.9, -0.45, 0, 0.45, 0.9)]
+        axes.text(
+            place[0], place[1], text, ha="center", va="center", fontsize=size, fontweight="bold", color=INK, zorder=8,
+            bbox={"boxstyle": "round,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.7},
+        )  # fmt: skip
+
+
+def _covered(look: Scenery, index: int) -> Array:
+    """Places (n, 2) that bodies lie on, for labels to keep off."""
+    found = []
+    for solid in look.solids:
+        pose = look.shown.poses[solid.link]
+        points = solid.points if solid.kind != "box" else _corners(solid.points)
+        if solid.kind == "rod":
+            points = points[0] + np.linspace(0, 1, 9)[:, None] * (points[1] - points[0]) if len(points) == 2 else points
+        found.append(look.camera.seen(points @ pose.matrix[:, :, index].T + pose.origin[:, index])[:, :2])
+    return np.concatenate(found)

@@ -1,0 +1,128 @@
+"""The spatial part of a scene: poses of the links, their bodies, free points, loads, screw axes, and the first view.
+
+Places and directions that never move in a link are told in its frame; the browser moves them with the link's pose.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from trunnion.views.common.cycle import Array, column, names, series
+from trunnion.views.space.bodies import Space, gathered
+from trunnion.views.space.camera import best, looking
+from trunnion.views.space.figure import scenery
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["screw_axis", "space_scene"]
+
+STILL = 1e-6  # a link that turns slower than this share of its fastest has no screw axis worth a line
+
+
+def space_scene(result: xr.Dataset) -> dict[str, Any]:
+    """What a scene of a mechanism in space has besides curves; `solids` is empty if no position can be drawn."""
+    shown = gathered(result)
+    drawn = bool(shown.drawable.any())
+    links = [
+        {"name": link, "ground": link == shown.ground, "pose": _pose(result, link) if drawn else None,
+         "screw": _screw(result, shown, link) if drawn and link != shown.ground else None}
+        for link in shown.stated["links"]
+    ]  # fmt: skip
+    parts: dict[str, Any] = {"space": "spatial", "links": links, "solids": [], "free": [], "seats": {}, "loads": []}
+    if not drawn:
+        return parts
+    around, above = best(shown)
+    look = scenery(shown, looking(around, above))
+    return parts | {
+        "size": _number(shown.size), "scaled": bool(shown.extent), "middle": [_number(n) for n in shown.middle],
+        "view": {"around": around, "above": above, "box": [_number(edge) for edge in look.box]},
+        "solids": [solid.data() for solid in look.solids],
+        "free": [{"key": key, "link": key.split(".", 1)[0], "at": _vector(at)} for key, at in shown.free.items()],
+        "seats": {name: _seat(shown, name) for name in shown.joints},
+        "loads": _loads(shown), "apart": any(shown.shifts.values()),
+    }  # fmt: skip
+
+
+def _number(value: float) -> float:
+    return float(f"{value:.7g}")
+
+
+def _vector(values: Array) -> list[float]:
+    return [_number(float(value)) for value in values]
+
+
+def _pose(result: xr.Dataset, link: str) -> dict[str, Any]:
+    """Place x, y, z (m) and quaternion w, i, j, k."""
+    if link not in names(result, "link"):
+        return {"x": [0.0], "y": [0.0], "z": [0.0], "w": [1.0], "i": [0.0], "j": [0.0], "k": [0.0]}
+    place = {axis: series(column(result, "link_position", link=link, axis=axis)) for axis in "xyz"}
+    turn = {to: series(column(result, "link_rotation", link=link, component=one))
+            for to, one in zip("wijk", "wxyz", strict=True)}  # fmt: skip
+    return place | turn
+
+
+def _seat(shown: Space, name: str) -> dict[str, Any]:
+    """Where a joint's symbol sits on its second link and along which axis; no axis of a ball, a cross or a weld."""
+    joint = shown.joints[name]
+    turning = joint["type"] not in ("spherical", "universal", "fixed")
+    axes = [{"link": joint["links"][1], "along": _vector(shown.element(name, 1)[1])}] if turning else []
+    if joint["type"] == "universal":
+        axes = [
+            {"link": link, "along": _vector(shown.element(name, side)[1])} for side, link in enumerate(joint["links"])
+        ]
+    return {"link": joint["links"][1], "at": _vector(shown.seat(name)), "axes": axes}
+
+
+def _loads(shown: Space) -> list[dict[str, Any]]:
+    """Forces at their points and moments on their links, with the place they are drawn at in the link's frame."""
+    rows = []
+    for name, load in shown.stated["loads"].items():
+        link = load.get("link")
+        if link not in shown.poses:
+            continue
+        seats = {joint: shown.seat(joint, one["links"].index(link)) for joint, one in shown.joints.items()
+                 if link in one["links"]}  # fmt: skip
+        known = seats | {key.split(".", 1)[1]: at for key, at in shown.free.items() if key.split(".", 1)[0] == link}
+        at = known.get(load.get("at") or load.get("joint") or "")
+        if at is None and load.get("at") is None and seats:
+            at = np.mean(list(seats.values()), axis=0)
+        if at is not None:
+            rows.append({"name": name, "link": link, "at": _vector(at), "force": load.get("force") or [0.0, 0.0, 0.0],
+                         "moment": load.get("moment") or [0.0, 0.0, 0.0], "frame": load.get("frame", "global"),
+                         "varies": bool(load.get("varies")), "useful": bool(load.get("useful"))})  # fmt: skip
+    return rows
+
+
+def _screw(result: xr.Dataset, shown: Space, link: str) -> dict[str, Any] | None:
+    """The instantaneous screw axis of a link against the ground: a point, a unit direction, pitch (m/rad)."""
+    spin = column(result, "link_angular_velocity", link=link)
+    key = next((key for key in names(result, "point") if key.split(".", 1)[0] == link), None)
+    if spin is None or key is None:
+        return None
+    place, velocity = (column(result, f"point_{what}", point=key) for what in ("position", "velocity"))
+    if place is None or velocity is None:
+        return None
+    point, along, pitch = screw_axis(spin, place, velocity, shown.middle)
+    return {
+        **{axis: series(part) for axis, part in zip("xyz", point, strict=True)},
+        **{axis: series(part) for axis, part in zip("uvw", along, strict=True)},
+        "pitch": series(pitch),
+    }
+
+
+def screw_axis(spin: Array, place: Array, velocity: Array, near: Array) -> tuple[Array, Array, Array]:
+    """Screw axis of a body that turns with ω while its point p moves with v: c = p + ω × v/|ω|², h = ω · v/|ω|².
+
+    All (3, position); near (3,): the point of the axis that is given is the one nearest to this. NaN where it does not
+    turn, and the axis is at infinity.
+    """
+    speed = np.linalg.norm(spin, axis=0)
+    fastest = speed[np.isfinite(speed)].max(initial=0.0)
+    turning = np.where(speed > STILL * fastest, speed, np.nan)
+    along = spin / turning
+    point = place + np.cross(along, velocity, axis=0) / turning
+    point = point + along * ((near[:, None] - point) * along).sum(axis=0)
+    return point, along, (along * velocity).sum(axis=0) / turning

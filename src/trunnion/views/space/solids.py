@@ -1,0 +1,317 @@
+"""The bodies a spatial mechanism is drawn as: rods, balls, boxes and wires, each fixed in one link.
+
+A link is rods between its joints; a joint is a symbol by its type: revolute a sleeve between two collars, cylindrical a
+sleeve on a long shaft, helical one on a thread, prismatic a block on a rail, spherical a ball, universal a cross,
+planar a slab on a plate, fixed a cube. What the ground carries stands on a hatched foot. Static figure and browser
+draw the same list.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from trunnion.views.common.cycle import Array
+from trunnion.views.space.bodies import Space
+
+__all__ = ["Solid", "solids"]
+
+# shares of the size of the mechanism
+BAR, FINE, SHAFT, SLEEVE, HALF, BALL, BLOCK = 0.0125, 0.005, 0.0095, 0.022, 0.03, 0.024, 0.024
+COLLAR, FOOT = 0.0165, 0.05
+TURNS, STEPS = 5, 10  # of a thread, and its corners a turn
+ARC = np.radians(9)  # of a rod that is part of an arc
+UP = np.array([0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True)
+class Solid:
+    """One body fixed in a link, lengths in m in the link's frame.
+
+    kind: "rod" (along the line through the points, with a radius), "ball" (at points[0]), "box" (points[0] its middle,
+    the other three its half edges), "wire" (a line through the points); paint: the link whose colour it has, "" for the
+    colour of joints.
+    """
+
+    kind: str
+    link: str
+    points: Array
+    radius: float = 0.0
+    paint: str = ""
+
+    def data(self) -> dict[str, Any]:
+        """As JSON, with seven digits."""
+        points = [[float(f"{value:.7g}") for value in point] for point in self.points.tolist()]
+        return {"kind": self.kind, "link": self.link, "points": points, "radius": float(f"{self.radius:.7g}"),
+                "paint": self.paint}  # fmt: skip
+
+
+def solids(shown: Space) -> list[Solid]:
+    """All bodies of a mechanism."""
+    found = [one for link in shown.moving for one in _body(shown, link)]
+    for name, joint in shown.joints.items():
+        found += SYMBOLS[joint["type"]](shown, name)
+        if shown.ground in joint["links"]:
+            found += _foot(shown, name)
+    return found
+
+
+def _rod(link: str, start: Array, end: Array, radius: float, paint: str = "") -> Solid:
+    return Solid("rod", link, np.array([start, end]), radius, paint)
+
+
+def _box(link: str, middle: Array, halves: Array, paint: str = "") -> Solid:
+    return Solid("box", link, np.array([middle, *halves]), 0.0, paint)
+
+
+# ---- links ----------------------------------------------------------------------------------------------------
+
+
+def _body(shown: Space, link: str) -> list[Solid]:
+    """Rods along the shortest tree through the joints of a link, finer ones to its free points."""
+    sides = {name: joint["links"].index(link) for name, joint in shown.joints.items() if link in joint["links"]}
+    seats = {name: shown.seat(name, side) for name, side in sides.items()}
+    found = []
+    for one, two in _tree(seats):
+        route = np.array(_route(shown, (one, sides[one]), (two, sides[two])))
+        route[0] += _clear(shown, one, sides[one], route[1] - route[0])
+        route[-1] += _clear(shown, two, sides[two], route[-2] - route[-1])
+        if np.linalg.norm(np.diff(route, axis=0), axis=1).min() > 1e-6 * shown.size:
+            found.append(Solid("rod", link, route, BAR * shown.size, link))
+    for key, place in shown.free.items():
+        if key.split(".", 1)[0] == link and seats:
+            base = _nearest(place, list(seats.values()), found)
+            found.append(_rod(link, base, place, FINE * shown.size, link))
+            found.append(Solid("ball", link, place[None], 0.011 * shown.size, link))
+    return found
+
+
+def _clear(shown: Space, name: str, side: int, way: Array) -> Array:
+    """How far a rod that leaves a joint starts from its middle, so that it meets its symbol from outside."""
+    kind, length = shown.joints[name]["type"], float(np.linalg.norm(way))
+    radius = {"spherical": 0.85 * BALL, "prismatic": 0.9 * BLOCK, "fixed": 0.02}.get(kind, 0.0)
+    if kind in ("revolute", "cylindrical", "helical"):
+        across = abs(float(way @ shown.element(name, side)[1])) < 0.5 * length
+        radius = 0.85 * SLEEVE if across else 0.0
+    return way * (radius * shown.size / length) if length > 3 * radius * shown.size > 0 else 0.0 * way
+
+
+def _nearest(place: Array, seats: list[Array], rods: list[Solid]) -> Array:
+    """The place on a link's rods or at its joints that is nearest to a point."""
+    candidates = list(seats)
+    for rod in rods:
+        for start, end in pairwise(rod.points):
+            along = end - start
+            candidates.append(start + np.clip((place - start) @ along / (along @ along), 0.0, 1.0) * along)
+    return min(candidates, key=lambda one: float(np.linalg.norm(place - one)))
+
+
+def _tree(seats: dict[str, Array]) -> list[tuple[str, str]]:
+    """Edges of the shortest tree through the places, by Prim's algorithm."""
+    names = list(seats)
+    inside, edges = names[:1], []
+    while len(inside) < len(names):
+        pairs = [(one, two) for one in inside for two in names if two not in inside]
+        best = min(pairs, key=lambda pair: float(np.linalg.norm(seats[pair[0]] - seats[pair[1]])))
+        edges.append(best)
+        inside.append(best[1])
+    return edges
+
+
+def _route(shown: Space, one: tuple[str, int], two: tuple[str, int]) -> list[Array]:
+    """Corners of the rods from joint to joint: around the common point, else along an axis first and then across it."""
+    start, end = shown.seat(*one), shown.seat(*two)
+    if shown.shifts[one[0]] and shown.shifts[two[0]]:
+        centres = shown.element(*one)[0], shown.element(*two)[0]
+        if np.linalg.norm(centres[0] - centres[1]) < 0.2 * shown.size:
+            return _arc(start, end, *centres)
+    for (name, side), here, there in ((one, start, end), (two, end, start)):
+        if shown.joints[name]["type"] in ("revolute", "cylindrical", "helical"):
+            axis = shown.element(name, side)[1]
+            along = float((there - here) @ axis)
+            across = float(np.linalg.norm(there - here - along * axis))
+            if HALF * shown.size < abs(along) < 4 * across:
+                corners = [here, here + along * axis, there]
+                return corners if here is start else corners[::-1]
+    return [start, end]
+
+
+def _arc(start: Array, end: Array, first: Array, second: Array) -> list[Array]:
+    """From start, seen from the point `first`, to end, seen from `second`, turning about both alike."""
+    a, b = start - first, end - second
+    angle = np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b)
+    if not ARC < angle < np.radians(175):
+        return [start, end]
+    share = np.linspace(0.0, 1.0, 1 + int(np.ceil(angle / ARC)))[:, None]
+    turned = (np.sin((1 - share) * angle) * a + np.sin(share * angle) * b) / np.sin(angle)
+    return list(turned + first + share * (second - first))
+
+
+# ---- joints ---------------------------------------------------------------------------------------------------
+
+
+def _outer(shown: Space, name: str) -> int:
+    """Side of the link that holds sleeve, rail or plate: the ground's, else the second of a pair that turns."""
+    joint = shown.joints[name]
+    if shown.ground in joint["links"]:
+        return int(joint["links"].index(shown.ground))
+    return 0 if joint["type"] in ("prismatic", "planar") else 1
+
+
+def _reach(shown: Space, name: str) -> tuple[float, float]:
+    """Least and greatest slide, m."""
+    slides = shown.slides(name)
+    return float(np.nanmin(slides)), float(np.nanmax(slides))
+
+
+def _seats(shown: Space, name: str) -> tuple[Array, tuple[float, float], int]:
+    """Of a pair that slides: middle of the outer part in its link, its reach along the axis of the inner link, side.
+
+    The reach is told from the seat on the inner link, along the axis there.
+    """
+    low, high = _reach(shown, name)
+    outer = _outer(shown, name)
+    seat, axis = shown.seat(name, outer), shown.element(name, outer)[1]
+    if outer == 1:
+        return seat, (low, high), outer
+    middle = (low + high) / 2
+    return seat + middle * axis, (middle - high, middle - low), outer
+
+
+def _turning(shown: Space, name: str) -> list[Solid]:
+    """Sleeve of the outer link on the shaft of the inner one; a revolute pair has collars, a helical one a thread."""
+    size, joint = shown.size, shown.joints[name]
+    middle, (low, high), outer = _seats(shown, name)
+    links, z = joint["links"], shown.element(name, outer)[1]
+    inner = 1 - outer
+    seat, axis = shown.seat(name, inner), shown.element(name, inner)[1]
+    paint = shown.ground if links[outer] == shown.ground else ""
+    found = [_rod(links[outer], middle - HALF * size * z, middle + HALF * size * z, SLEEVE * size, paint)]
+    stub = (HALF + (0.012 if joint["type"] == "revolute" else 0.03)) * size
+    ends = seat + (min(low, 0.0) - stub) * axis, seat + (max(high, 0.0) + stub) * axis
+    found.append(_rod(links[inner], *ends, SHAFT * size, links[inner]))
+    if joint["type"] == "revolute":
+        for side in (-1, 1):
+            near = seat + ((low if side < 0 else high) + side * (HALF + 0.002) * size) * axis
+            found.append(_rod(links[inner], near, near + side * 0.008 * size * axis, COLLAR * size, links[inner]))
+    if joint["type"] == "helical":
+        found.append(_thread(links[inner], *ends, shown.element(name, inner)[2], SHAFT * 1.35 * size))
+    return found
+
+
+def _thread(link: str, start: Array, end: Array, x: Array, radius: float) -> Solid:
+    """A helix around a shaft; its turns only tell that it is a thread."""
+    length = float(np.linalg.norm(end - start))
+    axis = (end - start) / length
+    turns = max(TURNS, round(length / (2.2 * radius)))
+    angle = np.linspace(0, 2 * np.pi * turns, STEPS * turns + 1)[:, None]
+    points = (
+        start + angle / angle[-1] * (end - start) + radius * (np.cos(angle) * x + np.sin(angle) * np.cross(axis, x))
+    )
+    return Solid("wire", link, points)
+
+
+def _sliding(shown: Space, name: str) -> list[Solid]:
+    """A block of the inner link on the rail of the outer one."""
+    size, links = shown.size, shown.joints[name]["links"]
+    low, high = _reach(shown, name)
+    outer = _outer(shown, name)
+    _, z, x = shown.element(name, outer)
+    if outer == 1:  # the block is on the first link: seen from the second it goes the other way
+        low, high = -high, -low
+    shift = shown.shifts[name]
+    reach = (shift + low - 2.2 * BLOCK * size, shift + high + 2.2 * BLOCK * size)
+    base = shown.element(name, outer)[0]
+    rail = [(reach[1] - reach[0]) / 2 * z, 0.011 * size * x, 0.011 * size * np.cross(z, x)]
+    found = [_box(links[outer], base + (reach[0] + reach[1]) / 2 * z, np.array(rail), links[outer])]
+    _, w, v = shown.element(name, 1 - outer)
+    block = np.array([1.3 * BLOCK * size * w, BLOCK * size * v, BLOCK * size * np.cross(w, v)])
+    found.append(_box(links[1 - outer], shown.seat(name, 1 - outer), block))
+    return found
+
+
+def _ball(shown: Space, name: str) -> list[Solid]:
+    return [Solid("ball", shown.joints[name]["links"][1], shown.seat(name)[None], BALL * shown.size)]
+
+
+def _cross(shown: Space, name: str) -> list[Solid]:
+    """The two pins of a cross, each along the axis of its link."""
+    size, found = shown.size, []
+    for side, link in enumerate(shown.joints[name]["links"]):
+        middle, z, _ = shown.element(name, side)
+        arm = (HALF + 0.016) * size * z
+        found.append(_rod(link, middle - arm, middle + arm, 0.012 * size))
+        eyes = [(middle + end * 0.72 * arm, middle + end * arm) for end in (-1, 1)]  # of the link's fork
+        found += [_rod(link, *eye, 0.019 * size, link) for eye in eyes]
+    return [*found, Solid("ball", shown.joints[name]["links"][1], shown.seat(name)[None], 0.019 * size)]
+
+
+def _flat(shown: Space, name: str) -> list[Solid]:
+    """A slab of the inner link on the plate of the outer one, as wide as it travels."""
+    size, links = shown.size, shown.joints[name]["links"]
+    outer = _outer(shown, name)
+    point, z, x = shown.element(name, outer)
+    y = np.cross(z, x)
+    frame = shown.poses[links[outer]]
+    apart = shown.at(name, 1 - outer) - frame.place(point)
+    across = [np.einsum("in,in->n", apart, frame.direction(one)) for one in (x, y)]
+    half = max(float(np.nanmax(np.abs(across))) + 1.6 * BLOCK * size, 3 * BLOCK * size)
+    plate = np.array([half * x, half * y, 0.004 * size * z])
+    found = [_box(links[outer], point - 0.014 * size * z, plate, links[outer])]
+    _, w, v = shown.element(name, 1 - outer)
+    slab = np.array([1.3 * BLOCK * size * v, 1.3 * BLOCK * size * np.cross(w, v), 0.01 * size * w])
+    return [*found, _box(links[1 - outer], shown.seat(name, 1 - outer), slab)]
+
+
+def _cube(shown: Space, name: str) -> list[Solid]:
+    link = shown.joints[name]["links"][1]
+    return [_box(link, shown.seat(name), 0.02 * shown.size * np.eye(3))]
+
+
+SYMBOLS = {
+    "revolute": _turning, "cylindrical": _turning, "helical": _turning, "prismatic": _sliding, "spherical": _ball,
+    "universal": _cross, "planar": _flat, "fixed": _cube,
+}  # fmt: skip
+
+
+# ---- ground ---------------------------------------------------------------------------------------------------
+
+
+def _foot(shown: Space, name: str) -> list[Solid]:
+    """A post from the joint to a hatched plate: downwards, or along an axis that stands upright."""
+    size, ground, kind = shown.size, shown.ground, shown.joints[name]["type"]
+    side = shown.joints[name]["links"].index(ground)
+    turning = kind in ("revolute", "cylindrical", "helical")
+    seat = _seats(shown, name)[0] if turning else shown.seat(name, side)
+    _, z, x = shown.element(name, side)
+    if kind == "prismatic":
+        seat = seat + (np.clip(0.0, *_along(shown, name))) * z
+    down = -UP + (UP @ z) * z
+    if kind in ("spherical", "fixed"):
+        z, x, down = np.eye(3)[1], np.eye(3)[0], -UP
+    if kind == "planar" or np.linalg.norm(down) < 0.45:
+        down, x = -z if z[2] >= 0 or kind == "planar" else z, x
+    else:
+        down, x = down / np.linalg.norm(down), z
+    y = np.cross(down, x)
+    plate = seat + FOOT * size * down
+    half = 0.04 * size
+    found = [
+        _rod(ground, seat, plate, 0.011 * size, ground),
+        _box(ground, plate, np.array([half * x, half * y, 0.0035 * size * down]), ground),
+    ]
+    rim = plate + 0.0035 * size * down
+    for along, across in ((x, y), (y, x), (x, -y), (y, -x)):  # strokes away from the edges of the plate
+        starts = [rim + half * ((share + 0.4) * along + across) for share in np.linspace(-1, 1, 6)[:-1]]
+        stroke = 0.45 * half * (down - 0.7 * along)
+        found += [Solid("wire", ground, np.array([start, start + stroke]), 0.0, ground) for start in starts]
+    return found
+
+
+def _along(shown: Space, name: str) -> tuple[float, float]:
+    """The reach of a rail on the ground from its seat."""
+    low, high = _reach(shown, name)
+    return (low, high) if shown.joints[name]["links"][0] == shown.ground else (-high, -low)

@@ -1,0 +1,136 @@
+"""A sweep as short tables: figures over one name, or one figure over two, with a table for each value of further names.
+
+Long tables are thinned evenly, their ends kept; how many points are left out is told.
+"""
+
+from __future__ import annotations
+
+from itertools import product
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from trunnion.errors import Status
+from trunnion.results.export import figures
+from trunnion.views.sweep.swept import Arrangement, arrange, cause, grid, statuses, thinned
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import xarray as xr
+    from numpy.typing import NDArray
+
+    from trunnion.views.common.cycle import Array
+
+__all__ = ["Table", "tables"]
+
+MOST_ROWS, MOST_COLUMNS = 40, 8  # of a table
+LEAST_COLUMNS = 3
+LEAST_ROWS, MOST_TABLES = 6, 6  # where there are several
+BESIDE = "friction_power_mean", "locking_margin"  # told beside the measure, if the sweep has them
+
+
+class Table(NamedTuple):
+    """Title, head and rows of texts; left_out: points that are not shown."""
+
+    title: str
+    head: list[str]
+    rows: list[list[str]]
+    left_out: int
+
+
+def tables(
+    result: xr.Dataset, measures: Sequence[str] = ("efficiency",), x: str = "", family: str = "", room: int = 1000
+) -> list[Table]:
+    """One table of several figures over a single name; of more names one for each measure and value of the facets.
+
+    room: characters in a line, which limit how many columns of a long table are shown.
+    """
+    plan = arrange(result, x, family)
+    if plan.other is None:
+        return [_list(result, measures, plan)]
+    return [table for measure in measures for table in _matrices(result, measure, plan, room)]
+
+
+def _list(result: xr.Dataset, measures: Sequence[str], plan: Arrangement) -> Table:
+    found = figures(result)
+    efforts = [name for name in found if name.endswith(".effort_max")]
+    shown = [*measures, "efficiency", "efficiency_ideal", *efforts, *BESIDE]
+    shown = [name for name in dict.fromkeys(shown) if name in found or name in measures]
+    columns = [grid(result, plan, name)[1][:, 0] for name in shown]
+    picked, status = thinned(len(plan.x.values), MOST_ROWS), statuses(result, plan)[:, 0]
+    titles = [f"{name.replace('_', ' ')} [{found[name][0]}]".removesuffix(" [1]") for name in shown]
+    words = [_word(int(code)) for code in status]
+    head = [plan.x.title, *titles, *(["status"] if any(words) else [])]
+    rows = []
+    for i in picked:
+        cells = ["" if np.isnan(column[i]) else _number(column[i]) for column in columns]
+        rows.append([_number(plan.x.values[i]), *cells, *([words[i]] if any(words) else [])])
+    said = ", ".join(name.replace("_", " ") for name in measures)
+    return Table(_titled(f"{said} over {plan.x.name}", plan.at()), head, rows, len(plan.x.values) - len(picked))
+
+
+def _matrices(result: xr.Dataset, measure: str, plan: Arrangement, room: int) -> list[Table]:
+    """A table for each combination of the facets' values; of many of them some."""
+    assert plan.other is not None  # a matrix has columns
+    unit, values = grid(result, plan, measure)
+    status = statuses(result, plan)
+    places = list(product(*(range(len(one.values)) for one in plan.facets)))
+    shown = [places[i] for i in thinned(len(places), MOST_TABLES)]
+    most = max(LEAST_ROWS, MOST_ROWS // len(shown))
+    name = measure.replace("_", " ") + (f" [{unit}]" if unit not in ("", "1") else "")
+    title = f"{name} over {plan.x.name} and, in columns, {plan.other.name}"
+    made = []
+    for place in shown:
+        at = ", ".join([*(one.told(i) for one, i in zip(plan.facets, place, strict=True)), *_listed(plan.at())])
+        index: Any = (slice(None), slice(None), *place)
+        made.append(_matrix(_titled(title, at), plan, values[index], status[index], (most, room)))
+    hidden = (len(places) - len(shown)) * plan.x.values.size * plan.other.values.size
+    made[-1] = made[-1]._replace(left_out=made[-1].left_out + hidden)
+    return made
+
+
+def _matrix(title: str, plan: Arrangement, values: Array, status: NDArray[np.int8], most: tuple[int, int]) -> Table:
+    """most: rows, and characters in a line."""
+    assert plan.other is not None
+    down = thinned(values.shape[0], most[0])
+    columns = [[plan.x.title, *(_number(plan.x.values[i]) for i in down)]]
+    for k, (numbers, codes) in enumerate(zip(values[down].T, status[down].T, strict=True)):
+        columns += [[plan.other.say(k), *map(_cell, numbers.tolist(), codes.tolist())]]
+    across = thinned(values.shape[1], MOST_COLUMNS)
+    while len(across) > LEAST_COLUMNS and _width(columns, across) > most[1]:
+        across = thinned(values.shape[1], len(across) - 1)
+    head, *rows = ([columns[0][i], *(columns[k + 1][i] for k in across)] for i in range(len(down) + 1))
+    return Table(title, head, rows, values.size - len(down) * len(across))
+
+
+def _cell(value: float, status: int) -> str:
+    if not np.isnan(value):
+        return _number(value)
+    return cause(status) if status >= Status.NOT_CONVERGED else ""
+
+
+def _width(columns: list[list[str]], across: list[int]) -> int:
+    """Characters that the first and these columns take; the words of a cause may stand below each other."""
+    picked = [columns[0], *(columns[k + 1] for k in across)]
+    return sum(3 + max(len(column[0]), *(len(word) for cell in column for word in cell.split())) for column in picked)
+
+
+def _titled(title: str, at: str) -> str:
+    return f"{title}, at {at}" if at else title
+
+
+def _listed(text: str) -> list[str]:
+    return [text] if text else []
+
+
+def _word(code: int) -> str:
+    """What a table says of a point that has no figures, or not quite sound ones."""
+    if code >= Status.NOT_CONVERGED:
+        return cause(code)
+    milder = {int(Status.NEAR_SINGULAR): "near singular", int(Status.CONTACT_LOST): "contact lost"}
+    return milder.get(code, "")
+
+
+def _number(value: float) -> str:
+    return f"{value + 0.0:.6g}".replace("inf", "∞")  # + 0.0: no negative zero

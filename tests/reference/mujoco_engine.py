@@ -134,7 +134,7 @@ class Engine:
             last = friction
             loads = {name: coefficient * self._normal(name, *reactions[name]) for name in self.joints}
             friction = {name: -np.sign(speed[name]) * load for name, load in loads.items()}
-            if all(abs(friction[n] - last[n]) <= 1e-15 * np.max(np.abs(reactions[n])) for n in friction):
+            if all(abs(friction[n] - last[n]) <= 1e-14 * np.max(np.abs(reactions[n])) for n in friction):
                 return reactions, friction, drive
         raise AssertionError("friction does not settle")
 

@@ -19,6 +19,7 @@ from model_samples import DURANGO, EXAMPLES, FOURBAR
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.checks.check import check_model
 from trunnion.model.mechanism import Mechanism, read_mechanism
+from trunnion.model.rewrite import rewrite_mechanism
 
 FindingsOf = Callable[..., tuple[Finding, ...]]
 
@@ -283,3 +284,18 @@ def test_no_odd_value_anywhere_gives_anything_but_findings(example: Path) -> Non
             remedies = [finding.remedy for finding in error.findings]
             if not all(remedies):
                 raise
+
+
+def test_anchors_mean_nothing(tmp_path: Path) -> None:
+    """Nothing may refer to them, so two of one name are no matter; and the text stays as it is written."""
+    source = next(path for path in EXAMPLES if path.stem == "slider-crank")
+    text = source.read_text(encoding="utf-8")
+    anchored = text.replace("\nlinks:", "\nlinks: &a", 1).replace("\ndrivers:", "\ndrivers: &a", 1)
+    assert anchored.count("&a") == 2
+    (tmp_path / "anchored.yaml").write_text(anchored, encoding="utf-8")
+    mechanism = read_mechanism(tmp_path / "anchored.yaml")
+    assert mechanism.data() == read_mechanism(source).data()
+    name = next(iter(mechanism.dimensions))
+    for values in ({name: "1.5 m"}, {f"errors.{name}": "1 mm"}):
+        rewrite_mechanism(mechanism.with_values(values), tmp_path / "anchored.yaml", tmp_path / "other.yaml")
+        assert read_mechanism(tmp_path / "other.yaml").data() == mechanism.with_values(values).data()

@@ -27,7 +27,7 @@ from trunnion.model.csv_table import TableFiles, place_findings, with_own_points
 from trunnion.model.named_file import in_folder, stated_files
 from trunnion.model.text import read_text
 
-__all__ = ["Lines", "files_named", "place", "placed", "read_entries", "read_model", "write_model"]
+__all__ = ["Lines", "composed", "files_named", "place", "placed", "read_entries", "read_model", "write_model"]
 
 MAX_BYTES = 1_000_000  # some ten thousand links; parsing takes seconds
 MAX_DEPTH = 30
@@ -201,9 +201,7 @@ def _parse_yaml(text: str, kind: str) -> tuple[dict[str, Any], Lines]:
     if kind == "JSON":
         text = text.replace("\t", " ")  # allowed between the tokens of JSON, not of YAML
     try:
-        reader = YAML(typ="safe", pure=True)
-        reader.Parser = _Parser
-        root = reader.compose(text)
+        root = composed(text)
     except MechanismError:
         raise
     except MarkedYAMLError as error:
@@ -226,6 +224,15 @@ def _parse_yaml(text: str, kind: str) -> tuple[dict[str, Any], Lines]:
     if builder.findings:
         raise MechanismError(builder.findings)
     return data, builder.lines
+
+
+def composed(text: str) -> Node:
+    """The nodes of a YAML text with where each stands; MechanismError on what no model file has."""
+    reader = YAML(typ="safe", pure=True)
+    reader.Parser = _Parser
+    reader.composer.warn_double_anchors = False  # nothing may refer to one
+    root: Node = reader.compose(text)
+    return root
 
 
 class _Parser(Parser):

@@ -16,7 +16,7 @@ from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.files import whole
-from trunnion.model.file import read_entries
+from trunnion.model.file import composed, read_entries
 from trunnion.model.mechanism import Mechanism, read_mechanism
 from trunnion.model.named_file import stated_files
 
@@ -84,7 +84,7 @@ def _name_files(before: dict[str, Any], after: Mapping[str, Any], source: Path, 
 
 def _edited(text: str, before: Mapping[str, Any], after: Mapping[str, Any]) -> str | None:
     """The text with values changed where they stand, and entries added; None if there is more to change."""
-    root = YAML(typ="safe", pure=True).compose(text)
+    root = composed(text)
     edits = [_edit(text, root, location, value) for location, value in _changed(before, after)]
     for edit in sorted((one for one in edits if one), key=lambda one: one[0])[::-1]:
         start, end, new = edit
@@ -177,6 +177,7 @@ def _rewritten(text: str, before: Mapping[str, Any], mechanism: Mechanism) -> st
     yaml.allow_unicode = True
     yaml.width = 4096  # lines stay as long as they are
     try:
+        yaml.composer.warn_double_anchors = False  # nothing may refer to one
         tree = yaml.load(text)
         _change(tree, before, mechanism.data())
         stream = StringIO()

@@ -29,7 +29,9 @@ PAGES = sorted([ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").r
 FENCE = re.compile(r"^( *)```(\w+)?([^\n]*)\n(.*?)^\1```$", re.DOTALL | re.MULTILINE)
 MARK = re.compile(r"<!-- (exit|test): (\w+) -->\s*$")
 NUMBER = re.compile(r"(?<![\w.])[-−]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?(?![\w.]*\w)")
-LAYERS = "algebra|joints|statistics|model|structure|groups|results|export|analysis|views|verbs|cli|errors"
+LAYERS = (
+    "algebra|joints|statistics|model|structure|groups|results|solve|cycle|measures|studies|rig|views|cli|errors|files"
+)
 
 
 @dataclass(frozen=True)

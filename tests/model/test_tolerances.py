@@ -375,6 +375,13 @@ def test_a_sample_that_cannot_be_read(varied: Mechanism, tmp_path: Path, text: s
     assert finding.remedy
 
 
+def test_a_sample_without_a_finite_variance(varied: Mechanism, tmp_path: Path) -> None:
+    (tmp_path / "wild.csv").write_text("0.01\n-0.02\n1e308\n", encoding="utf-8")
+    with pytest.raises(MechanismError) as error:
+        varied.with_samples("CD", tmp_path / "wild.csv")
+    assert [one.where for one in error.value.findings] == ["tolerances.dimensions.CD"]
+
+
 def test_a_sample_of_nothing(varied: Mechanism, tmp_path: Path) -> None:
     with pytest.raises(MechanismError, match="no number named 'XY'"):
         varied.with_samples("XY", tmp_path / "sample.csv")

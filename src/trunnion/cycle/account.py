@@ -98,6 +98,7 @@ def findings(run: Run, at: Positions) -> tuple[list[Finding], near_locking.Locki
         *run.chosen.findings,
         *(run.determinacy.findings() if run.determinacy else []),
         *_over_the_cycle(run, at.arrays, at.causes, at.time, near),
+        *_missed_peaks(run.system, at),
         *contact_loss.findings(at.losses, at.arrays, list(run.system.joints), run.system.dial(run.values, at.time)),
     ], near
 
@@ -186,6 +187,21 @@ def _over_the_cycle(
         remedy = "means and efficiency are of that time; choose speeds with a common period, or ranges"
         found.append(Finding(what, "drivers", remedy, Severity.WARNING))
     return [*found, *_loads_over_the_cycle(run, arrays, time)]
+
+
+def _missed_peaks(system: System, at: Positions) -> Iterator[Finding]:
+    """An effort whose mean square says that it is larger between the positions than at any of them."""
+    sound = sound_positions(at.arrays["status"])
+    if not len(sound):
+        return
+    for i, (name, unit) in enumerate(zip(system.mechanism.drivers, effort_units(system), strict=True)):
+        largest, rms = float(np.max(np.abs(at.arrays["drive_effort"][i][sound]))), float(at.means.drive_effort_rms[i])
+        if rms > (1 + 1e-6) * largest:
+            what = (
+                f"its RMS over the cycle, {rms:.4g} {unit}, is above the largest at any position, {largest:.4g} {unit}"
+            )
+            remedy = "use more --steps: what acts between two positions is in the means, not in the extremes"
+            yield Finding(what, f"drivers.{name}", remedy, Severity.WARNING)
 
 
 def _loads_over_the_cycle(run: Run, arrays: Arrays, time: NDArray[np.float64]) -> Iterator[Finding]:

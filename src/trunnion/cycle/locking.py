@@ -43,6 +43,7 @@ def locking(mechanism: Mechanism, steps: int = 360) -> xr.Dataset:
     return look(prepare(mechanism), steps)
 
 
+@np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
 def look(run: Run, steps: int = 360) -> xr.Dataset:
     """What `locking` does, for a mechanism that is prepared."""
     import xarray as xr

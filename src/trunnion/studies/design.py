@@ -100,6 +100,7 @@ class Design:
         return self.energy_swing / (fluctuation * self.mean_speed**2) if self.mean_speed else float("nan")
 
 
+@np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
 def design(mechanism: Mechanism, steps: int = 720) -> Design:
     """The figures of `Design` over `steps` positions of the cycle."""
     run = _planar(mechanism)

@@ -184,6 +184,9 @@ def _limits(
     where: str,
 ) -> Iterator[Finding]:
     path, lower, upper = tolerance.path, tolerance.lower, tolerance.upper
+    with np.errstate(all="ignore"):
+        if not np.isfinite(np.var(np.atleast_1d(tolerance.options.get("values", 0.0)))):
+            yield Finding(f"the deviations of '{path}' have no finite variance", where, "remove the wild ones")
     unstated = variation.limits is None and written is None
     if unstated and not {"values"} & tolerance.options.keys() and tolerance.distribution != FULL_TURN:
         remedy = "add limits: ±0.05 mm, or write them where the number stands, as 60 mm ± 0.05 mm"

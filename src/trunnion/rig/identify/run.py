@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 from trunnion.rig.identify.identified import Identified
+from trunnion.rig.identify.result import dataset
+from trunnion.rig.identify.written import values
 
 __all__ = ["identify", "with_estimates"]
 
@@ -39,6 +41,7 @@ Array = NDArray[np.float64]
 Errors = Literal["channel", "condition"]
 
 
+@np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
 def identify(
     mechanism: Mechanism,
     measurement: Measurement,
@@ -67,8 +70,6 @@ def identify(
     Method: weighted least squares with exact derivatives, trust region; covariances by the scatter between turns.
     Raises MechanismError for names, channels or conditions that are not there, or where the model has no answer.
     """
-    from trunnion.rig.identify.result import dataset
-
     return dataset(identified(mechanism, measurement, parameters, channels, start, hold_out, sensors, delay, guard,
                               starts, method))  # fmt: skip
 
@@ -212,6 +213,4 @@ def with_estimates(mechanism: Mechanism, result: xr.Dataset) -> Mechanism:
 
     Those that were not told apart stay as they are.
     """
-    from trunnion.rig.identify.written import values
-
     return mechanism.with_values(values(mechanism, result))

@@ -14,7 +14,9 @@ from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.files import reading
+from trunnion.rig.reading.binary_tables import read_parquet, read_tdms
 from trunnion.rig.reading.columns import Table, failed
+from trunnion.rig.reading.text_tables import read_csv
 
 __all__ = ["FORMATS", "read_table"]
 
@@ -50,20 +52,14 @@ def read_table(path: Path, wanted: Iterable[str], optional: Iterable[str] = ()) 
 
 
 def _csv(path: Path, wanted: Sequence[str], optional: Sequence[str]) -> Table:
-    from trunnion.rig.reading.text_tables import read_csv
-
     return read_csv(path, wanted, optional)
 
 
 def _parquet(path: Path, wanted: Sequence[str], optional: Sequence[str]) -> Table:
-    from trunnion.rig.reading.binary_tables import read_parquet
-
     return read_parquet(path, wanted, optional)
 
 
 def _tdms(path: Path, wanted: Sequence[str], optional: Sequence[str]) -> Table:
-    from trunnion.rig.reading.binary_tables import read_tdms
-
     return read_tdms(path, wanted, optional)
 
 

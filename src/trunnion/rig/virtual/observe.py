@@ -52,6 +52,7 @@ class Observation(Recorded):
         return write(self, folder, form or self.rig.format, progress)
 
 
+@np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
 def observe(
     mechanism: Mechanism,
     rig: Rig | Mapping[str, Any] | str | os.PathLike[str],

@@ -58,6 +58,7 @@ class _Module:
     pose: Pose
 
 
+@np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
 def look(system: System, values: Values, chosen: Chosen, cycle: Cycle) -> Determinacy:
     """What the rank says of every module that closes a loop and could be assembled."""
     walk = forward(system, values, chosen.assembly, cycle.times(LOOKED) if cycle.duration else np.zeros(1))

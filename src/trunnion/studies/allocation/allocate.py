@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 from trunnion.studies.allocation.allocated import CLOSE, DEFAULT_YIELD, Allocated, Asked, Choice, share_of
+from trunnion.studies.allocation.result import dataset
 
 __all__ = ["allocate", "half_widths"]
 
@@ -43,6 +44,7 @@ MOST_FACTORS = 201
 RANGE = (0.5, 2.0)  # of the stated limits: the curve of cost over accuracy
 
 
+@np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
 def allocate(
     mechanism: Mechanism,
     measures: Sequence[str] | None = None,
@@ -74,8 +76,6 @@ def allocate(
     Raises MechanismError if nothing has a cost, no measure a limit, or as `tolerance` does. That no tolerances keep the
     limits is a finding of the result.
     """
-    from trunnion.studies.allocation.result import dataset
-
     asked = Asked(criterion, target, choice, steps, at, samples, seed, friction, jobs, curve, exact)
     _check(asked)
     found = _found(mechanism, _limited(mechanism, measures), asked)

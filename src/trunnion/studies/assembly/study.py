@@ -44,6 +44,7 @@ MOST_TOPS = 4
 BETWEEN, NARROWED = 9, 5  # points in the interval around a maximum, and how often it is narrowed to a quarter
 
 
+@np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
 def assemble(
     mechanism: Mechanism,
     steps: int = 72,

@@ -132,6 +132,7 @@ class Effect:
         return found
 
 
+@np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
 def play(mechanism: Mechanism, measures: Sequence[str] | None = None, steps: int = 360) -> xr.Dataset:
     """What the play of every joint does to measures over the cycle: worst case and standard deviation.
 

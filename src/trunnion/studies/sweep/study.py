@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 __all__ = ["FIGURES", "MOST_POINTS", "Figure", "Swept", "sweep"]
 
 
+@np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
 def sweep(
     mechanism: Mechanism,
     over: Over,

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 from trunnion.studies.tolerance.first_order import FEW, study
+from trunnion.studies.tolerance.outcome import Outcome
+from trunnion.studies.tolerance.result import dataset
 
 __all__ = ["DEFAULT_METHODS", "METHODS", "tolerance"]
 
@@ -31,6 +33,7 @@ DEFAULT_SAMPLES = 10_000
 MOST_SAMPLES = 10**15
 
 
+@np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
 def tolerance(
     mechanism: Mechanism,
     measures: Sequence[str] | None = None,
@@ -65,9 +68,6 @@ def tolerance(
     counted, and are outside every limit.
     Raises MechanismError if nothing varies, for an unknown measure or method, or as `analyse` does.
     """
-    from trunnion.studies.tolerance.outcome import Outcome
-    from trunnion.studies.tolerance.result import dataset
-
     _check(methods, samples, seed, engine)
     _check_target(target, methods)
     found = study(mechanism, measures, steps, at, friction)

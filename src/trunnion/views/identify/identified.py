@@ -15,6 +15,8 @@ from trunnion.views.common.cycle import Array, attribute, names
 if TYPE_CHECKING:
     import xarray as xr
 
+from trunnion.rig.identify.uncertainty import quantile
+
 __all__ = ["Estimate", "channels", "conditions", "curve_of", "estimates", "percent"]
 
 
@@ -41,8 +43,6 @@ class Estimate:
     @cached_property
     def half(self) -> float:
         """Expanded uncertainty, half of the two-sided interval."""
-        from trunnion.rig.identify.uncertainty import quantile
-
         return float(quantile(self.freedom)) * self.deviation if self.told else math.nan
 
     @cached_property

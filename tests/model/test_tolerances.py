@@ -379,7 +379,7 @@ def test_a_sample_without_a_finite_variance(varied: Mechanism, tmp_path: Path) -
     (tmp_path / "wild.csv").write_text("0.01\n-0.02\n1e308\n", encoding="utf-8")
     with pytest.raises(MechanismError) as error:
         varied.with_samples("CD", tmp_path / "wild.csv")
-    assert [one.where for one in error.value.findings] == ["tolerances.dimensions.CD"]
+    assert [one.where for one in error.value.findings] == ["tolerances.CD"]
 
 
 def test_a_sample_of_nothing(varied: Mechanism, tmp_path: Path) -> None:

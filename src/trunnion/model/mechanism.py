@@ -21,7 +21,6 @@ from trunnion.model.assign import assign
 from trunnion.model.checks.check import check_model
 from trunnion.model.contact import has_play, play
 from trunnion.model.csv_table import TableFiles, place_findings, with_points
-from trunnion.model.file import read_model, write_model
 from trunnion.model.findings import repair, schema_findings
 from trunnion.model.limit_texts import DIGITS
 from trunnion.model.merge import DEFAULT_LAW
@@ -97,10 +96,14 @@ class Mechanism(Numbers):
         tables: CSV files with the points of drivers and tables, by name, see `with_table`; they go before those that
         the model names.
         """
+        from trunnion.model.file import read_model  # with ruamel.yaml
+
         return read_model(path, lambda data: cls(**data), tables)
 
     def write(self, path: str | os.PathLike[str]) -> None:
         """Write the model as YAML or JSON, by extension; reading it again gives an equal mechanism."""
+        from trunnion.model.file import write_model
+
         write_model(self.data(), path)
 
     def parameters(

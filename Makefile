@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 OUT ?= out
 EXAMPLE ?= examples/durango-fourbar.yaml
 
-.PHONY: demo test bench docs clean
+.PHONY: demo test test-all bench docs clean
 
 # The main job on a real example: a table on the screen, and report, CSV and figures in $(OUT).
 demo: $(VENV)/.base
@@ -16,14 +16,18 @@ demo: $(VENV)/.base
 	$(BIN)/trunnion plot $(EXAMPLE) --out $(OUT)
 	@echo "open $(OUT)/four-bar.html in a browser"
 
-# Lint, types, layer rule, tests, documentation.
+# Lint, types, layer rule, tests, documentation: some minutes.
 test: $(VENV)/.dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/python -m pytest -n 2 --dist worksteal
+	$(BIN)/python -m pytest -n 2 --dist worksteal -m "not slow"
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet --site-dir $(VENV)/site
+
+# What `make test` leaves out: every example, long counts, further oracles, every page of the documentation.
+test-all: $(VENV)/.dev
+	$(BIN)/python -m pytest -n 2 --dist worksteal -m slow
 
 # Ratios to peers and hand-written kernels, measured in one run.
 bench: $(VENV)/.bench

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+from collections import defaultdict
 
+import pytest
 from hypothesis import HealthCheck, settings
 
 # Matrices here are small: a second thread of the linear algebra only spins beside the other test process. Said before
@@ -21,3 +23,16 @@ settings.register_profile(
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much],
 )
 settings.load_profile("trunnion")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Of a test marked `spread(n)`, n of its cases, evenly chosen, stay in `make test`; the others become slow."""
+    cases: defaultdict[tuple[str, int], list[pytest.Item]] = defaultdict(list)
+    for item in items:
+        if mark := item.get_closest_marker("spread"):
+            cases[item.nodeid.partition("[")[0], mark.args[0]].append(item)
+    for (_, count), found in cases.items():
+        kept = {round((k + 0.5) * len(found) / count - 0.5) for k in range(count)}
+        for k, item in enumerate(found):
+            if k not in kept:
+                item.add_marker(pytest.mark.slow)

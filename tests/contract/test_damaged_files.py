@@ -12,6 +12,7 @@ SEED = 2026
 CASES = 240
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("part", range(6))
 def test_damaged_files_are_findings(part: int, tmp_path: Path) -> None:
     """As in the benchmark, which runs tens of thousands; a machine that does much else may take longer."""

@@ -105,6 +105,7 @@ def figures(mechanism: trunnion.Mechanism) -> np.ndarray[Any, Any]:
     return np.concatenate([result[name].values.ravel() for name in names if name in result])
 
 
+@pytest.mark.spread(10)
 @pytest.mark.parametrize(("space", "kind", "key"), samples())
 def test_a_key_changes_something_or_is_told(
     space: str, kind: str, key: str, bare: dict[tuple[str, str], dict[str, Any]]

@@ -208,6 +208,7 @@ def shift_numbers(shift: Any) -> tuple[np.ndarray, np.ndarray]:
     return np.array([[float(n) for n in axis] for axis in shift[:3]]).T, np.array([float(n) for n in shift[3]])
 
 
+@pytest.mark.spread(3)
 @pytest.mark.parametrize(("space", "kind"), PLAYS)
 @given(st.integers(0, 10**6), st.floats(1e-6, 1e-2), st.floats(0.02, 1.0))
 def test_shift_stays_within_the_clearance(space: str, kind: str, seed: int, rho: float, length: float) -> None:
@@ -227,6 +228,7 @@ def test_shift_stays_within_the_clearance(space: str, kind: str, seed: int, rho:
     np.testing.assert_array_equal(none[1], np.zeros(3))
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize(("space", "kind"), PLAYS)
 @given(wrenches, wrenches, st.floats(0.02, 1.0), st.floats(-50, 50), st.integers(0, 10**6))
 def test_seat_and_worst_case(

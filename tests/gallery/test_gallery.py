@@ -20,6 +20,7 @@ def test_every_example_has_an_entry() -> None:
     assert sorted([*ENTRIES, *REFUSED]) == sorted(path.stem for path in EXAMPLES.glob("*.yaml"))
 
 
+@pytest.mark.spread(18)
 @pytest.mark.parametrize("name", [*ENTRIES, *REFUSED])
 def test_every_example_has_a_name_and_notes(name: str) -> None:
     mechanism = trunnion.read(EXAMPLES / f"{name}.yaml")
@@ -27,6 +28,7 @@ def test_every_example_has_a_name_and_notes(name: str) -> None:
     assert mechanism.notes.strip().endswith("."), "the gallery shows the notes: give a sentence or two"
 
 
+@pytest.mark.spread(3)
 @pytest.mark.parametrize("name", ENTRIES)
 def test_example(name: str) -> None:
     """No error but those of the entry, no position without forces but those of the entry, and the fact."""

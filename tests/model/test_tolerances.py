@@ -235,6 +235,7 @@ def test_a_deviation_of_a_default_is_of_every_joint(varied: Mechanism) -> None:
 # ---- another model --------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @given(st.floats(0, 1e-3), st.floats(1e-9, 0.5))
 def test_other_tolerances(length: float, friction: float) -> None:
     one = Mechanism.read(Path(__file__).parents[2] / "examples" / "toleranced-slider-crank.yaml").with_values(

@@ -192,6 +192,7 @@ def test_lopsided_tolerances_take_room() -> None:
     assert (coupler.lower + coupler.upper) / 2 == pytest.approx(1e-5)
 
 
+@pytest.mark.spread(6)
 @pytest.mark.parametrize(
     "measure",
     [

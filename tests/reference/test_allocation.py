@@ -92,6 +92,7 @@ def test_exponential_costs_of_one_row_have_their_closed_form() -> None:
     assert answer.proven
 
 
+@pytest.mark.spread(12)
 @pytest.mark.parametrize("seed", range(12))
 @pytest.mark.parametrize("criterion", ["worst-case", "rss", "yield"])
 def test_random_problems_agree_with_scipy(criterion: Criterion, seed: int) -> None:

@@ -23,6 +23,7 @@ def exhaustive(problem: Problem) -> float:
     return best
 
 
+@pytest.mark.spread(20)
 @pytest.mark.parametrize("seed", range(24))
 @pytest.mark.parametrize("criterion", ["worst-case", "rss", "yield"])
 def test_four_dimensions_by_six_processes_equal_exhaustive_search(criterion: Criterion, seed: int) -> None:
@@ -46,6 +47,7 @@ def test_four_dimensions_by_six_processes_equal_exhaustive_search(criterion: Cri
         assert answer.findings
 
 
+@pytest.mark.spread(12)
 @pytest.mark.parametrize("seed", range(8))
 @pytest.mark.parametrize("criterion", ["worst-case", "rss", "yield"])
 def test_a_mixture_equals_the_best_of_all_choices(criterion: Criterion, seed: int) -> None:

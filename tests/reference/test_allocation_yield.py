@@ -59,6 +59,7 @@ def test_dependent_shifted_rows_agree_with_scipy() -> None:
     assert normal_yield(problem, t) == pytest.approx(float(exact), abs=3e-4)
 
 
+@pytest.mark.slow
 def test_four_bar_meets_its_yield_when_sampled() -> None:
     problem = four_bar("yield")
     reckoned = solve(problem, target=0.9973)
@@ -70,6 +71,7 @@ def test_four_bar_meets_its_yield_when_sampled() -> None:
     assert solve(four_bar("rss")).cost < reckoned.cost < solve(four_bar()).cost
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wider", [0.7, 1.3])
 def test_what_is_sampled_tightens_and_loosens(wider: float) -> None:
     """Deviations wider than reckoned by a factor need half widths narrower by it."""
@@ -81,6 +83,7 @@ def test_what_is_sampled_tightens_and_loosens(wider: float) -> None:
     assert answer.tolerances == pytest.approx(solve(problem, target=0.99).tolerances / wider, rel=2e-2)
 
 
+@pytest.mark.slow
 def test_processes_meet_a_yield_at_least_cost() -> None:
     rng = np.random.default_rng(2)
     parts = tuple(Contribution(f"p{i}", options=random_options(rng, 6)) for i in range(4))

@@ -116,6 +116,7 @@ def leaned(apart: float, pin: float, tilt: float) -> float:
     return float(grown / (np.sqrt(total**2 + grown) + total) / (2 * t))
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize(("apart", "pin"), [(0.3, 0.03), (0.05, 0.04)])
 @pytest.mark.parametrize("degrees", [0.02, 0.2, 1.0])
 def test_hinges_with_a_leaned_hole(apart: float, pin: float, degrees: float) -> None:
@@ -142,6 +143,7 @@ def test_hinges_with_a_hole_out_of_line(towards: float) -> None:
     np.testing.assert_allclose(found.needed_clearance, offset * pin / (2 * apart), rtol=1e-7)
 
 
+@pytest.mark.slow
 def test_hinges_held_along_their_axis() -> None:
     """Without any end float the pins also keep their distance: against SciPy on the geometry of the pin line."""
     apart, pin, tilt = 0.3, 0.03, np.radians(0.2)
@@ -295,6 +297,7 @@ class Loop:
         return float(np.max(np.abs(rows(found.x))))
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("joint", ["B", "D"])
 def test_four_bar_against_an_independent_closure(joint: str) -> None:
     errors = {joint: {**LEAN, "towards": 0.5}}
@@ -321,6 +324,7 @@ def test_four_bar_against_an_independent_closure(joint: str) -> None:
     assert max(below) < 1.001 * min(below)
 
 
+@pytest.mark.slow
 def test_stated_clearances_enough_and_not() -> None:
     errors = {"B": LEAN}
     need = float(solved(four_bar(errors)).smallest_clearance)
@@ -340,6 +344,7 @@ def test_stated_clearances_enough_and_not() -> None:
     assert "14.346 um" in told["remedy"]  # rounded up
 
 
+@pytest.mark.slow
 def test_a_joint_without_play_has_no_offset() -> None:
     """Its ends are no unknowns, the others need more; other clearances count by their own sizes."""
     errors = {"B": LEAN}
@@ -381,6 +386,7 @@ def told_of(clearance: str) -> tuple[str, str, dict[str, Any]]:
     return told["what"], told["remedy"], {row["label"]: row["value"] for row in json.loads(found.attrs["summary"])}
 
 
+@pytest.mark.slow
 def test_close_to_the_limit_the_share_is_told_from_one() -> None:
     what, remedy, _ = told_of("8.726 um")
     assert (
@@ -395,6 +401,7 @@ def test_close_to_the_limit_the_share_is_told_from_one() -> None:
     assert rows["  at"] == "everywhere"
 
 
+@pytest.mark.slow
 def test_a_clearance_of_none_and_lengths_of_rounding() -> None:
     what, _, rows = told_of("0 mm")
     assert what == (
@@ -418,6 +425,7 @@ def test_check_says_that_it_goes_together_by_its_play_only() -> None:
     assert not any(words in told for words in ("seat: loaded", "check the lengths", "remove a driver"))
 
 
+@pytest.mark.slow
 def test_part_is_the_derivative() -> None:
     """A little more clearance in one pin lowers the needed share of all by its part."""
     errors, clearance, more = {"B": LEAN}, 2e-5, 1e-9
@@ -431,6 +439,7 @@ def test_part_is_the_derivative() -> None:
 # ---- other linkages -------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_bennett_with_a_twist_that_is_off() -> None:
     """The same whether the error is stated as one, and so the ideal linkage is known, or the twist as it is."""
     plain = trunnion.read("examples/bennett.yaml")
@@ -446,6 +455,7 @@ def test_bennett_with_a_twist_that_is_off() -> None:
     assert any("do not fit" in row["what"] for row in json.loads(direct.attrs["findings"]))
 
 
+@pytest.mark.spread(3)
 @pytest.mark.parametrize("name", ["bennett", "sarrus", "fourbar-in-space", "spherical-four-bar"])
 def test_axes_that_fit_need_nothing(name: str) -> None:
     found = solved(trunnion.read(f"examples/{name}.yaml"), 12)
@@ -470,6 +480,7 @@ def test_no_redundant_joint_needs_no_clearance(name: str, said: str) -> None:
     assert any(said in row["what"] for row in json.loads(found.attrs["findings"]))
 
 
+@pytest.mark.slow
 def test_guide_and_pins() -> None:
     """A slider-crank in space whose crank pin leans: the guide's own play helps, and can share the clearance."""
 
@@ -538,6 +549,7 @@ def test_derivatives_by_differences() -> None:
         np.testing.assert_allclose(linear.effect[..., k], (up - down) / (2 * step), atol=1e-6)
 
 
+@pytest.mark.slow
 def test_invariances() -> None:
     """Lengths times 1000, another frame of the ground, other orders of the joints."""
     errors = {"B": LEAN, "C": {"tilt": 1e-3, "towards": 1.0, "offset": 2e-5}}
@@ -557,11 +569,13 @@ def test_invariances() -> None:
         np.testing.assert_allclose(found.uniform_part.sum("end"), plain.uniform_part.sum("end"), atol=1e-4)
 
 
+@pytest.mark.slow
 def test_sampling_does_not_decide_the_smallest_clearance() -> None:
     coarse, fine = (float(solved(four_bar({"B": LEAN}), steps).smallest_clearance) for steps in (10, 144))
     assert coarse == pytest.approx(fine, rel=1e-7)
 
 
+@pytest.mark.slow
 def test_where_it_cannot_be_assembled() -> None:
     """A linkage that does not turn all the way says where, with its answer elsewhere."""
     data = four_bar({"B": LEAN})
@@ -585,6 +599,7 @@ def test_a_freedom_that_nothing_drives_is_refused() -> None:
         solved(data)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("degrees", [1, 5, 15])
 def test_errors_that_are_not_small(degrees: float) -> None:
     """The sequence of cone programmes settles on the exact closure there too; the need is nearly proportional."""

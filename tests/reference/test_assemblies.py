@@ -71,6 +71,7 @@ def test_the_list_of_a_four_bar_is_the_two_meets_of_two_circles() -> None:
     assert choice.line(choice.ways[1]) == "assembly: {coupler: way-2}"
 
 
+@pytest.mark.spread(2)
 @pytest.mark.parametrize("name", MODELS)
 def test_every_listed_way_is_what_its_name_gives(name: str) -> None:
     """The joints lie where the list says, and nothing is left to say about the choice."""
@@ -148,6 +149,7 @@ def test_the_ways_of_a_class_three_group_are_all_there_are() -> None:
     assert sorted(angles) == pytest.approx(plate_angles(0.1, 0.0), abs=1e-4)
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("model", [class_three, excavator, geared_loop])
 def test_the_numbering_is_the_same_on_every_run_and_whichever_is_taken(model: Any) -> None:
     first = choice_of(model())
@@ -157,6 +159,7 @@ def test_the_numbering_is_the_same_on_every_run_and_whichever_is_taken(model: An
         assert [one.joints for one in again.ways] == [one.joints for one in first.ways]
 
 
+@pytest.mark.slow
 def test_a_general_group_is_followed_in_the_way_that_is_named() -> None:
     data = class_three()
     choice = choice_of(data)
@@ -199,6 +202,7 @@ def test_one_group_cannot_be_in_two_ways() -> None:
     trunnion.prepare(build(named(four_bar(), coupler="way-2", rocker="way-2")))
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize(("model", "link", "pin"), [(four_bar, "rocker", "C"), (class_three, "plate", "P")])
 def test_a_name_beats_a_place_and_says_so(model: Any, link: str, pin: str) -> None:
     data = model()
@@ -239,6 +243,7 @@ def islands() -> Any:
     return analyse(named(data, plate="way-2"), 360)
 
 
+@pytest.mark.slow
 def test_a_group_is_found_again_on_both_ranges_of_the_crank(islands: Any) -> None:
     """Everywhere that the sweep finds an assembly the analysis has one, and nowhere else, to a degree."""
     exists = np.array([bool(plate_angles(0.3, turn, 1440)) for turn in np.radians(np.arange(360))])

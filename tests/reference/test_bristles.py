@@ -54,6 +54,7 @@ def state_by_integrator(run: Any, joint: str, law: dict[str, Any], turns: int) -
     return wanted - (turns - 1) * duration, found.y[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", [DAHL, LUGRE], ids=["dahl", "lugre"])
 @pytest.mark.parametrize(("data", "joint"), [(four_bar(), "D"), (slider_crank(), "P")])
 def test_state_against_a_stiff_integrator(data: Any, joint: str, law: dict[str, Any]) -> None:
@@ -65,6 +66,7 @@ def test_state_against_a_stiff_integrator(data: Any, joint: str, law: dict[str, 
     np.testing.assert_allclose(found, expected, rtol=0, atol=2e-4 * largest)
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("law", [DAHL, LUGRE], ids=["dahl", "lugre"])
 def test_state_is_periodic_and_settled_whatever_the_steps(law: dict[str, Any]) -> None:
     run = trunnion.prepare(build(four_bar(), friction=law))
@@ -111,6 +113,7 @@ def test_presliding_is_a_spring() -> None:
     assert law(50.0, 1e-12, deflection=1e-7, **options) == pytest.approx(-2e4 * 1e-7 * 50.0, rel=1e-6)
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("law", [DAHL, LUGRE], ids=["dahl", "lugre"])
 def test_power_balance_and_loss_over_the_cycle(law: dict[str, Any]) -> None:
     """Bristles store a little and give it back; over the cycle they only lose."""
@@ -128,6 +131,7 @@ def test_bristles_in_a_linkage_with_gaps(law: dict[str, Any]) -> None:
     assert np.all(np.isfinite(result["drive_effort"].values[:, solved]))
 
 
+@pytest.mark.slow
 def test_stiff_bristles_slide_steadily() -> None:
     """κ → ∞ leaves Stribeck's curve at every position, beside reversals too."""
     law = {**LUGRE, "stiffness": 1e9, "damping": 0.0, "stribeck_speed": 0.05}

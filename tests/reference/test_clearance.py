@@ -132,6 +132,7 @@ def precise(rho: Any, length: Any, beta: Any, xi: Any) -> tuple[list[list[Any]],
     return [[turn[i, k] for k in range(3)] for i in range(3)], [d * c, d * s, mp.mpf(0)]
 
 
+@pytest.mark.spread(2)
 @pytest.mark.parametrize("exponent", [0, -1, -3, -6, -9, -12, -15, -100])
 def test_no_digit_is_lost_at_small_beta(exponent: int) -> None:
     """Tilt and displacement hold 15 digits of their own however small β is; so do those near β = π."""
@@ -301,6 +302,7 @@ def test_every_play_has_a_picture() -> None:
     assert set(PICTURE) == set(MODELS)
 
 
+@pytest.mark.spread(2)
 @pytest.mark.parametrize(("space", "kind"), MODELS)
 def test_loaded_seat_does_most_work(space: str, kind: str) -> None:
     """F · t + M · φ over the play, against an optimiser: offsets to 1e-6 of the clearance."""
@@ -393,6 +395,7 @@ def test_ends_carry_the_force_and_the_moment() -> None:
 # ---- friction turns the seat ------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_friction_turns_a_pin_against_the_slip() -> None:
     """Q = N (n − μ t): t the way the hole's wall slips past the pin at the contact n, ω z × n; each end by itself."""
     rng = np.random.default_rng(21)
@@ -429,6 +432,7 @@ def test_friction_turns_both_ends_of_a_pin_in_space() -> None:
         np.testing.assert_allclose(whole[[0, 1, 3, 4]], [*force[:2], *moment[:2]], rtol=0, atol=1e-14)
 
 
+@pytest.mark.slow
 def test_friction_turns_a_ball_about_its_spin() -> None:
     """Q = N (n − μ t), t ∥ ω × n, for any load and spin; on the pole, within atan μ, it need not slip."""
     rng, poles = np.random.default_rng(23), 0

@@ -71,6 +71,7 @@ def free(run: Run) -> list[str]:
     ]
 
 
+@pytest.mark.slow
 def test_a_guide_beside_its_kink() -> None:
     """Where the load of a guide changes ends the compiled rounds agree with NumPy too, or are taken again."""
     run = prepare(eccentric_press())
@@ -83,6 +84,7 @@ def test_a_guide_beside_its_kink() -> None:
     assert np.array_equal(status, statuses)
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize(
     "example",
     ["durango-fourbar", "slider-crank", "whitworth-quick-return", "scotch-yoke", "geared-five-bar", "universal-joint"],
@@ -111,6 +113,7 @@ def test_motion_alone() -> None:
     agree(curves, by_numpy(run, values, time, read_off)[0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("example", ["inverted-slider-crank", "jansen", "rccc"])
 def test_motion_of_other_modules(example: str) -> None:
     """A general group with slides, three loops, a closed form in space."""
@@ -136,6 +139,7 @@ def with_law(law: dict[str, Any]) -> Run:
     return prepare(Mechanism.model_validate(data))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", LAWS, ids=lambda law: law["law"])
 def test_friction_laws(law: dict[str, Any]) -> None:
     run = with_law(law)

@@ -89,6 +89,7 @@ def modules(draw: st.DrawFn) -> tuple[Array, Array, list[tuple[Load, Any]]]:
     return start, influence, contacts
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(modules())
 def test_converged_lanes_obey_their_laws(case: tuple[Array, Array, list[tuple[Load, Any]]]) -> None:
@@ -107,6 +108,7 @@ def test_converged_lanes_obey_their_laws(case: tuple[Array, Array, list[tuple[Lo
     assert np.allclose(np.array(newton.forces)[:, both], np.array(named.forces)[:, both], rtol=1e-7, atol=0)
 
 
+@pytest.mark.slow
 @settings(max_examples=20, deadline=None)
 @given(modules())
 def test_a_lane_does_not_depend_on_the_lanes_beside_it(case: tuple[Array, Array, list[tuple[Load, Any]]]) -> None:
@@ -137,6 +139,7 @@ def test_derivatives_are_those_of_the_side_of_the_kink() -> None:
 NAMES = ("offset-slider-crank", "pezzuti-cardan", "fourbar-with-play", "rssr", "geared-five-bar")
 
 
+@pytest.mark.spread(4)
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("method", ["newton", "successive-approximation"])
 def test_the_residual_is_a_result(name: str, method: str) -> None:

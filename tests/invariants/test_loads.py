@@ -53,6 +53,7 @@ def refused(**data: Any) -> str:
 # ---- expressions of the motion --------------------------------------------------------------------------------
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("friction", [None, 0.1])
 def test_expression_equals_the_constant_force_of_each_position(friction: float | None) -> None:
     data = slider_crank()

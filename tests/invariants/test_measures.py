@@ -61,11 +61,13 @@ def _hold_together(run: Run, steps: int = 24) -> None:
             assert own == pytest.approx(number[statistic], rel=1e-12, abs=1e-12 * scale)
 
 
+@pytest.mark.spread(2)
 @pytest.mark.parametrize("name", mechanisms.MODELS)
 def test_statistics_hold_together_in_the_plane(name: str) -> None:
     _hold_together(prepare(build(mechanisms.MODELS[name]())))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["RSSR", "RCCC", "HUSR", "RUSP", "two RSSR in series"])
 def test_statistics_hold_together_in_space(name: str) -> None:
     drawn = mechanisms_space.MODELS[name]()
@@ -86,6 +88,7 @@ def started(data: Any, start: float) -> Run:
     return prepare(build(data))
 
 
+@pytest.mark.slow
 @settings(max_examples=15)
 @given(st.floats(0, 6.283))
 def test_figures_do_not_depend_on_where_the_cycle_starts(start: float) -> None:

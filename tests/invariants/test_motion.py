@@ -225,6 +225,7 @@ def test_written_and_read_again_it_is_the_same(name: str, extension: str, tmp_pa
 # ---- the analysis ---------------------------------------------------------------------------------------------
 
 
+@pytest.mark.spread(5)
 @pytest.mark.parametrize("name", DRIVERS)
 def test_power_balances_and_the_motion_is_the_prescribed_one(name: str) -> None:
     mechanism = driven(DRIVERS[name])
@@ -241,6 +242,7 @@ def test_power_balances_and_the_motion_is_the_prescribed_one(name: str) -> None:
     np.testing.assert_allclose(result.drive_power[0], result.drive_effort[0] * rate, rtol=1e-12, atol=1e-12)
 
 
+@pytest.mark.spread(4)
 @pytest.mark.parametrize("name", ["harmonic", "cycloidal", "modified-sine", "periodic table", "late rise"])
 def test_the_work_of_the_drive_is_that_of_friction_over_a_cycle_without_loads(name: str) -> None:
     """Between two rests, or over a period, nothing else takes or gives: velocity and power belong together."""
@@ -276,6 +278,7 @@ def test_positions_of_a_drive_that_turns_back_are_told_by_time() -> None:
         assert run.system.dial(run.values, run.cycle.times(5)).unit == unit
 
 
+@pytest.mark.spread(2)
 @pytest.mark.parametrize("law", ["harmonic", *PROFILES])
 def test_a_prismatic_driver(law: str) -> None:
     ends = {"mean": "0.25 m", "amplitude": "200 mm", "period": 2.0}
@@ -316,6 +319,7 @@ def test_periods_and_ranges_that_do_not_fit() -> None:
         trunnion.prepare(build(data))
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("name", ["harmonic", "modified-sine", "periodic table", "late rise", "clamped table"])
 def test_a_general_group_follows_any_law(name: str) -> None:
     """Its track, read by time, and a slower run of the same motion."""

@@ -61,6 +61,7 @@ def test_toggle_amplifies_by_its_angle() -> None:
     assert gain.max() == pytest.approx(np.sqrt(0.2**2 - 0.001**2) / 0.002, rel=1e-5)  # 100 times at 1 mm
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("coefficient", [0.05, 0.1, 0.2])
 def test_toggle_locks_within_its_friction_circles(coefficient: float) -> None:
     """The punch cannot push the knee away while one line touches the circles of O, A and P: knee nearer than 2 f ρ.

@@ -75,6 +75,7 @@ def leaned(across: Array, place: Array) -> Frame:
     return Frame(np.array([*place, 0.0]), turn)
 
 
+@pytest.mark.spread(2)
 @pytest.mark.parametrize(
     "degrees", [(0.0, 0.0), (0.0, 40.0), (180.0, 0.0), (180.0, -70.0), (95.0, 150.0), (-60.0, 10.0)]
 )
@@ -123,6 +124,7 @@ def test_given_seat_of_a_ball() -> None:
     np.testing.assert_allclose(found, RHO * np.array([1.0, -2.0, 2.0]) / 3, rtol=1e-14)
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("aside", [None, 1.9])
 def test_misaligned_axis(aside: float | None) -> None:
     """Leaned by `tilt` towards `towards`, moved along `offset_towards`; beside the ideal one."""

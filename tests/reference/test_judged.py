@@ -21,6 +21,7 @@ DRAWN = {"planar": planar.drawn, "spatial": spatial.drawn}
 JUDGED = {"planar": judged_planar.judge, "spatial": judged_spatial.judge}
 
 
+@pytest.mark.spread(2)
 @pytest.mark.parametrize(
     ("space", "seeds"),
     [
@@ -67,6 +68,7 @@ def altered(result: Results, name: str, factor: float) -> Results:
     return Results.of(arrays, result.dims, labels, result.time)
 
 
+@pytest.mark.spread(6)
 @pytest.mark.parametrize("space", DRAWN)
 @pytest.mark.parametrize(
     ("name", "check"),

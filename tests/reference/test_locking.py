@@ -185,6 +185,7 @@ HEAVY = {
 }
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("name", HEAVY)
 def test_locked_positions(name: str) -> None:
     """The same positions lock, each at the same share, as by small steps on the equations of all links at once."""
@@ -202,6 +203,7 @@ def test_locked_positions(name: str) -> None:
         assert np.all(np.isfinite(np.broadcast_to(force, (STEPS,))[free])), joint
 
 
+@pytest.mark.slow
 def test_some_positions_lock_and_the_others_keep_their_numbers() -> None:
     data = four_bar()
     result = trunnion.analyse(build(data, friction=1.0, radius=0.5), 72)

@@ -84,6 +84,7 @@ def finely(run: Run, cells: int) -> float:
     return float(work[0] / work[1])
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("force", LOADS)
 def test_efficiency_does_not_depend_on_the_number_of_positions(force: str) -> None:
     mechanism = press(force)
@@ -114,6 +115,7 @@ def test_a_sweep_has_the_efficiencies_of_the_analysis_at_any_number_of_positions
     np.testing.assert_allclose(few["efficiency"], one, rtol=1e-8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", ["rssr", "rccc", "klann", "indexing-press", "offset-slider-crank"])
 def test_examples_in_plane_and_space(model: str) -> None:
     mechanism = trunnion.read(EXAMPLES / f"{model}.yaml")
@@ -141,6 +143,7 @@ def test_friction_of_nothing_is_no_power() -> None:
     assert rows["friction power, mean"] == 0
 
 
+@pytest.mark.slow
 def test_one_way_springs_and_laws_part_the_integral() -> None:
     """A bumper that the slide just touches for some degrees; a table; a dwell."""
     data = json.loads(json.dumps(PRESS))

@@ -57,6 +57,7 @@ class Found:
     worst: dict[str, tuple[float, int, str]] = field(default_factory=dict)
     broken: dict[str, int] = field(default_factory=dict)
     refused: str = ""
+    crashed: str = ""
     seconds: float = 0.0
 
 
@@ -83,6 +84,8 @@ def examine(space: str, seed: int, steps: int = 24, whole: bool = True) -> Found
         result = result_of(data, steps, whole)
     except trunnion.MechanismError as error:
         return Found(name, family, refused=str(error).splitlines()[0])
+    except Exception as error:
+        return Found(name, family, crashed=f"{type(error).__name__}: {error}")
     verdict = judge(data, result)
     return Found(
         name,
@@ -159,11 +162,15 @@ def _worst(console: Console, found: Sequence[Found]) -> int:
     return sum(sum(one.broken.values()) for one in judged)
 
 
-def _refused(console: Console, found: Sequence[Found]) -> None:
-    """Models that the check turned away, by its words."""
+def _refused(console: Console, found: Sequence[Found]) -> int:
+    """Models that the check turned away, by its words, and those that ended the program; how many of these."""
     reasons = Counter(f"{one.family}: {one.refused}" for one in found if one.refused)
     for reason, count in reasons.most_common(SHOWN):
         console.print(f"refused {count} × {reason}", highlight=False)
+    crashed = [one for one in found if one.crashed]
+    for one in crashed:
+        console.print(f"crashed: {one.name} ({one.family}) {one.crashed}", highlight=False)
+    return len(crashed)
 
 
 def _replay(console: Console, names: Sequence[str], steps: int, model: bool) -> int:
@@ -191,7 +198,7 @@ def _replay(console: Console, names: Sequence[str], steps: int, model: bool) -> 
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """The command line; 1 if a solved position breaks a limit."""
+    """The command line; 1 if a solved position breaks a limit or a mechanism ends the program."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.random_mechanisms", description=__doc__.splitlines()[0])
     parser.add_argument("--planar", type=int, default=10_000, help="planar mechanisms (10000)")
     parser.add_argument("--spatial", type=int, default=1_000, help="spatial mechanisms (1000)")
@@ -216,8 +223,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     console.print(f"{len(found):,} mechanisms, seeds from {options.seed}, {time.perf_counter() - begin:.0f} s")
     _counts(console, found)
     broken = _worst(console, found)
-    _refused(console, found)
-    return int(broken > 0)
+    crashed = _refused(console, found)
+    return int(broken + crashed > 0)
 
 
 if __name__ == "__main__":

@@ -60,6 +60,8 @@ def critical_multiples(back: Backward, most: float) -> dict[str, Array]:
             continue
         contacts = settled.problem.contacts
         places = list(dict.fromkeys(contact.joint for contact in contacts if contact.rubs))
+        if not places:  # nothing but gears pushed apart
+            continue
         own = np.array([[contact.joint == place for contact in contacts] for place in places], bool)
         for place, multiple in zip(places, _alone(settled.problem, own, most), strict=True):
             found[system.places[number][place].joint] = np.broadcast_to(multiple, positions)

@@ -79,6 +79,7 @@ class Plan:
     findings: tuple[Finding, ...]
 
 
+@np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN or infinite
 def plan(observation: Observation) -> Plan:
     """What to expect of the sensors of an observation, and of the efficiency in each of its conditions."""
     expected: dict[str, list[tuple[int, float, float, bool]]] = {name: [] for name in observation.channels}

@@ -18,8 +18,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from trunnion.results.attributes import attribute, summary_of
 from trunnion.views.common.bundle import bundle, web_text
-from trunnion.views.common.cycle import abscissa, attribute, column, intervals, names
+from trunnion.views.common.cycle import abscissa, column, intervals, names
 from trunnion.views.common.quantities import number, quantity
 from trunnion.views.cycle.built_tables import error_rows, loss_rows
 from trunnion.views.cycle.scene import scene
@@ -105,7 +106,7 @@ def _ordinal(shown: dict[str, Any]) -> str:
 def _summary(result: xr.Dataset) -> list[tuple[str, list[tuple[str, str]]]]:
     """Subjects, each with its figures and what they are: ("drive torque of A", [("9.3 kN m", "largest, at 24°")])."""
     rows = []
-    for row in attribute(result, "summary", []):
+    for row in summary_of(result):
         subject, *remarks = ASPECT.fullmatch(str(row["label"])).groups()  # type: ignore[union-attr]
         value = quantity(row["value"], str(row.get("unit") or "")) or "—"
         if "more than" in remarks:
@@ -119,7 +120,7 @@ def _summary(result: xr.Dataset) -> list[tuple[str, list[tuple[str, str]]]]:
 def _findings(result: xr.Dataset) -> list[dict[str, str]]:
     """The findings of the result; intervals without an answer, if no error among them speaks of such."""
     rows = [{key: str(row.get(key) or "") for key in ("severity", "where", "what", "remedy")}
-            for row in attribute(result, "findings", [])]  # fmt: skip
+            for row in attribute(result, "findings")]  # fmt: skip
     over = abscissa(result)
     if any(row["severity"] == "error" for row in rows):
         return rows
@@ -161,7 +162,7 @@ def _worst(label: str, values: Any, unit: str, meaning: str, over: Any) -> dict[
 
 def inputs_of(result: xr.Dataset) -> list[tuple[str, list[dict[str, str]]]]:
     """Input rows by section of the model, the first name of their path."""
-    rows = attribute(result, "inputs", [])
+    rows = attribute(result, "inputs")
     sections = []
     for section, members in groupby(rows, key=lambda row: str(row["path"]).split(".")[0]):
         lines = [{"path": str(row["path"]).removeprefix(f"{section}."), "text": _stated(row)} for row in members]

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from trunnion.results.attributes import attribute
 from trunnion.views.common.bundle import web_text
-from trunnion.views.common.cycle import attribute
 from trunnion.views.common.quantities import number
 from trunnion.views.compare.tables import files
 from trunnion.views.cycle.report import hashed
@@ -63,14 +63,14 @@ def report(result: xr.Dataset) -> str:
     from markupsafe import Markup  # with jinja2 only needed here, and slow to import
 
     style = web_text("report.css") + web_text("tolerance.css") + web_text("compare.css")
-    found = attribute(result, "findings", [])
+    found = attribute(result, "findings")
     context: dict[str, Any] = {
         "name": str(result.attrs["identified"]) or "Measurement", "model": str(result.attrs["name"]) or "model",
         "formula": str(result.attrs["formula"]), "facts": _facts(result), "summary": _summary(result),
         "findings": [row for row in found if row["severity"] != "note"],
         "notes": [row for row in found if row["severity"] == "note"],
-        "sections": _sections(result), "done": attribute(result, "done", []),
-        "files": files(result, "data_files"), "data_findings": attribute(result, "data_findings", []),
+        "sections": _sections(result), "done": attribute(result, "done"),
+        "files": files(result, "data_files"), "data_findings": attribute(result, "data_findings"),
         "definitions": DEFINITIONS,
         "references": [line for line in str(result.attrs.get("references", "")).splitlines() if line.strip()],
         "version": result.attrs.get("trunnion_version", ""), "model_hash": result.attrs.get("model_hash", ""),

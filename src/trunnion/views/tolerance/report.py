@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from matplotlib import rc_context
 
+from trunnion.results.attributes import attribute
 from trunnion.views.common.bundle import web_text
-from trunnion.views.common.cycle import attribute
 from trunnion.views.cycle.report import hashed, inputs_of
 from trunnion.views.tolerance.figure import KINDS, drawable, figure
 from trunnion.views.tolerance.notes import NOTES, ON_SAMPLES
@@ -54,13 +54,13 @@ def report(result: xr.Dataset, first: Sequence[Section] = (), kicker: str = "Wha
     from markupsafe import Markup  # with jinja2 only needed here, and slow to import
 
     style = web_text("report.css") + web_text("tolerance.css")
-    reads, found = readings(result), attribute(result, "findings", [])
+    reads, found = readings(result), attribute(result, "findings")
     run = methods(result)
     parts = [*first, *(_measure(result, read) for read in reads)]
     context: dict[str, Any] = {
         "kicker": kicker, "name": str(result.attrs.get("name", "")) or "Mechanism",
         "formula": str(result.attrs.get("formula", "")), "facts": _facts(result, run),
-        "summary": headline(result), "missed": attribute(result, "missed", []),
+        "summary": headline(result), "missed": attribute(result, "missed"),
         "findings": [row for row in found if row["severity"] != "note"],
         "notes": [row for row in found if row["severity"] == "note"],
         "overview": overview(result), "sections": [_drawn(part) for part in parts], "whole": failed(result),

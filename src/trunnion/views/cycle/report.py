@@ -11,6 +11,7 @@ import base64
 import hashlib
 import json
 import re
+from collections.abc import Sequence
 from functools import cache
 from itertools import groupby
 from operator import itemgetter
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from jinja2 import Template
 
-__all__ = ["embedded", "hashed", "inputs_of", "report"]
+__all__ = ["embedded", "hashed", "inputs_of", "report", "said"]
 
 # A label of the summary: the subject with its unit in words, which of its figures, or in brackets why it is so.
 ASPECT = re.compile(
@@ -53,21 +54,17 @@ def report(result: xr.Dataset, ideal: xr.Dataset | None = None) -> str:
 
     shown = scene(result, ideal)
     style, script = web_text("report.css"), bundle("report.js")
-    runs, found = intervals(result), _findings(result)
+    runs = intervals(result)
     context = {
         "name": shown["name"] or "Mechanism", "formula": shown["formula"], "compared": ideal is not None,
         "spatial": shown.get("space") == "spatial",
         "positions": result.sizes["position"], "thinned": _ordinal(shown), "method": result.attrs.get("method", ""),
         "unanswered": sum(run.stop - run.start for run in runs),
         "summary": _summary(result),
-        "findings": [row for row in found if row["severity"] != "note"],
-        "notes": [row for row in found if row["severity"] == "note"],
         "errors": error_rows(result), "losses": loss_rows(result),
         "seats": bool(shown["built"] and shown["built"]["seats"]),
         "balance": _balance(result), "inputs": inputs_of(result),
-        "references": [line for line in str(result.attrs.get("references", "")).splitlines() if line.strip()],
-        "version": result.attrs.get("trunnion_version", ""), "model_hash": result.attrs.get("model_hash", ""),
-        "style": Markup(style), "style_hash": hashed(style), "script": Markup(script), "script_hash": hashed(script),
+        **said(result, style, _findings(result)), "script": Markup(script), "script_hash": hashed(script),
         "scene": Markup(embedded(shown)),
     }  # fmt: skip
     return _template().render(context)
@@ -87,6 +84,22 @@ def embedded(data: Any) -> str:
     for sign in "<>&\u2028\u2029":
         text = text.replace(sign, f"\\u{ord(sign):04x}")
     return text
+
+
+def said(result: xr.Dataset, style: str, found: Sequence[dict[str, str]] | None = None) -> dict[str, Any]:
+    """What every report says: findings, notes apart from them, and where the result comes from; with its style."""
+    from markupsafe import Markup
+
+    rows = attribute(result, "findings") if found is None else found
+    return {
+        "findings": [row for row in rows if row["severity"] != "note"],
+        "notes": [row for row in rows if row["severity"] == "note"],
+        "references": [line for line in str(result.attrs.get("references", "")).splitlines() if line.strip()],
+        "version": result.attrs.get("trunnion_version", ""),
+        "model_hash": result.attrs.get("model_hash", ""),
+        "style": Markup(style),
+        "style_hash": hashed(style),
+    }
 
 
 def hashed(text: str) -> str:

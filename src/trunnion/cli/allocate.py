@@ -26,8 +26,9 @@ from trunnion.cli.options import (
     TableFile,
     UnitsRow,
 )
-from trunnion.cli.terminal import bar, console, findings_of, say, say_missed, show_rows, wrote
+from trunnion.cli.terminal import bar, console, say, say_missed, show_rows, wrote
 from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.results.attributes import findings_of
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -42,9 +42,10 @@ from trunnion.cli.options import (
 from trunnion.cli.rig import rig
 from trunnion.cli.study import tolerance
 from trunnion.cli.sweep import sweep
-from trunnion.cli.terminal import bar, console, findings_of, say, show_figures, wrote
+from trunnion.cli.terminal import bar, console, say, show_figures, wrote
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.files import folder
+from trunnion.results.attributes import findings_of, summary_of
 from trunnion.version import __version__
 
 if TYPE_CHECKING:
@@ -425,9 +426,7 @@ def _write_report(mechanism: Mechanism, result: xr.Dataset, path: Path, uncut: b
 
 def _summary(result: xr.Dataset, file: Path) -> None:
     """The short table of an analysis, and its findings."""
-    import json
-
-    show_figures(f"{result.attrs['name']}\n{result.attrs['formula']}", json.loads(result.attrs["summary"]))
+    show_figures(f"{result.attrs['name']}\n{result.attrs['formula']}", summary_of(result))
     say(placed(findings_of(result), file, ["assembly"]))
 
 

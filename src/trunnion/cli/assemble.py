@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -10,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from trunnion.cli.model import exit_status, lines_of, placed, stated
-from trunnion.cli.terminal import bar, findings_of, say, show_figures, wrote
+from trunnion.cli.terminal import bar, say, show_figures, wrote
+from trunnion.results.attributes import findings_of, summary_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -58,7 +58,7 @@ def assemble(
             _draw(result, path)
         else:
             save(result, path, units_row)
-    show_figures(f"{result.attrs['name'] or file}\n{result.attrs['formula']}", json.loads(result.attrs["summary"]))
+    show_figures(f"{result.attrs['name'] or file}\n{result.attrs['formula']}", summary_of(result))
     findings = findings_of(result)
     say(placed(findings, file, ["assembly"]))
     for path in out or []:

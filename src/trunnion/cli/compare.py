@@ -10,9 +10,10 @@ import typer
 from trunnion.cli.inputs import spare_data
 from trunnion.cli.model import lines_of, placed, stated
 from trunnion.cli.options import IMAGES, DataFiles, File, FrictionLaw, MappingFile, Out, Seats, Set, TableFile, UnitsRow
-from trunnion.cli.terminal import bar, console, findings_of, say, show_rows, wrote
+from trunnion.cli.terminal import bar, console, say, show_rows, wrote
 from trunnion.cli.tolerance import PAGES
 from trunnion.errors import Finding, MechanismError, Severity, counted
+from trunnion.results.attributes import findings_of
 
 if TYPE_CHECKING:
     import xarray as xr

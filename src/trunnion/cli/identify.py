@@ -24,9 +24,10 @@ from trunnion.cli.options import (
     UnitsRow,
     setting,
 )
-from trunnion.cli.terminal import console, findings_of, say, show_rows, wrote
+from trunnion.cli.terminal import console, say, show_rows, wrote
 from trunnion.cli.tolerance import PAGES
 from trunnion.errors import Finding, MechanismError, Severity, counted
+from trunnion.results.attributes import findings_of
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -23,7 +23,8 @@ from trunnion.cli.options import (
     UnitsRow,
     named_file,
 )
-from trunnion.cli.terminal import bar, findings_of, say
+from trunnion.cli.terminal import bar, say
+from trunnion.results.attributes import findings_of
 
 __all__ = ["tolerance"]
 

@@ -23,9 +23,10 @@ from trunnion.cli.options import (
     over,
     points,
 )
-from trunnion.cli.terminal import bar, console, findings_of, say, show_rows, wrote
+from trunnion.cli.terminal import bar, console, say, show_rows, wrote
 from trunnion.errors import Finding, MechanismError, counted
 from trunnion.files import folder
+from trunnion.results.attributes import findings_of
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import sys
 from collections.abc import Callable, Iterator
@@ -10,12 +9,12 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from trunnion.errors import Finding, Severity
+from trunnion.results.attributes import attribute
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["bar", "console", "findings_of", "say", "say_missed", "show_figures", "show_rows", "wrote"]
+__all__ = ["bar", "console", "say", "say_missed", "show_figures", "show_rows", "wrote"]
 
 
 def console() -> Any:
@@ -98,15 +97,9 @@ def _broken(text: str, width: int, length: Callable[[str], int]) -> str:
     return "\n".join(lines)
 
 
-def findings_of(result: xr.Dataset) -> list[Finding]:
-    """The findings that a result carries."""
-    rows = json.loads(result.attrs["findings"])
-    return [Finding(row["what"], row["where"], row["remedy"], Severity(row["severity"])) for row in rows]
-
-
 def say_missed(result: xr.Dataset) -> None:
     """What of the limits is not kept, before anything else."""
-    for line in json.loads(result.attrs.get("missed", "[]")):
+    for line in attribute(result, "missed"):
         console().print(line, style="bold", markup=False, highlight=False, soft_wrap=True)
 
 

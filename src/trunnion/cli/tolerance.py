@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING
 from trunnion.cli.options import IMAGES
 from trunnion.cli.terminal import console, say_missed, show_figures, show_rows, wrote
 from trunnion.errors import Finding, MechanismError
+from trunnion.results.attributes import summary_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -61,7 +61,7 @@ def show(
     say_missed(result)
     shown = tables(result)
     if not shown:
-        show_figures(mechanism.name, json.loads(result.attrs.get("summary", "[]")))
+        show_figures(mechanism.name, summary_of(result))
     for i, table in enumerate(shown):
         if i:
             console().print()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -21,11 +20,11 @@ from trunnion.model.mechanism import Mechanism
 from trunnion.model.quantity import Quantity
 from trunnion.model.units import KINDS, Dimension, si_unit
 from trunnion.results import variables as results
+from trunnion.results.attributes import cited, finding_rows, origin
 from trunnion.solve.forward import start
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.loads import Stated
 from trunnion.solve.system import Dial, System, rubbing
-from trunnion.version import __version__
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -39,7 +38,6 @@ from trunnion.solve.loads import useful_loads
 
 __all__ = [
     "effort_units",
-    "finding_row",
     "finish",
     "inputs",
     "model_notes",
@@ -67,22 +65,16 @@ def finish(run: Run, found_positions: Positions) -> xr.Dataset:
     mechanism, arrays, time = run.system.mechanism, found_positions.arrays, found_positions.time
     method = found_positions.method
     found, near = findings(run, found_positions)
-    attributes: dict[str, str | float] = {
-        "name": mechanism.name,
-        "formula": run.system.plan.formula,
-        "mobility": run.system.plan.mobility,
-        "model_hash": mechanism.digest,
-        "trunnion_version": __version__,
+    attributes: dict[str, Any] = {
+        **origin(mechanism, run.system.plan.formula, mobility=run.system.plan.mobility),
         "method": method.name,
-        "references": "\n".join(references(mechanism)),
-        "flag_values": " ".join(str(int(code)) for code in Status),
-        "flag_meanings": " ".join(code.name.lower() for code in Status),
-        "driver_units": json.dumps(effort_units(run.system)),
-        "spring_units": json.dumps(spring_units(run.system)),
-        "findings": json.dumps([finding_row(finding) for finding in found], ensure_ascii=False),
-        "summary": json.dumps(_summary(run, found_positions, near), ensure_ascii=False),
-        "inputs": json.dumps(inputs(mechanism), ensure_ascii=False),
-        "scene": json.dumps(_scene(run), ensure_ascii=False),
+        **cited(references(mechanism)),
+        "driver_units": effort_units(run.system),
+        "spring_units": spring_units(run.system),
+        "findings": finding_rows(found),
+        "summary": _summary(run, found_positions, near),
+        "inputs": inputs(mechanism),
+        "scene": _scene(run),
         "periodic": int(run.cycle.periodic),
     }
     return results.dataset(
@@ -112,15 +104,6 @@ def spring_units(system: System) -> list[list[str]]:
     """Units of every spring's force and elongation."""
     turns = [spring.joint is not None and system.turns(spring.joint) for spring in system.mechanism.springs.values()]
     return [["N m", "rad"] if turn else ["N", "m"] for turn in turns]
-
-
-def finding_row(finding: Finding) -> dict[str, str]:
-    return {
-        "severity": str(finding.severity),
-        "where": finding.where,
-        "what": finding.what,
-        "remedy": finding.remedy,
-    }
 
 
 def model_notes(mechanism: Mechanism, system: System) -> list[Finding]:

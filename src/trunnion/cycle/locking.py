@@ -11,6 +11,7 @@ from trunnion.cycle.analyse import analyse_run
 from trunnion.cycle.near_locking import Reverse, critical_multiples, critical_row, others, reverse, reverse_row
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.model.mechanism import Mechanism
+from trunnion.results.dataset import Variable, described
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.loads import useful_loads
 from trunnion.solve.run import Run, prepare
@@ -23,12 +24,20 @@ __all__ = ["MOST_STEPS", "locking", "look", "report_rows"]
 
 MOST_STEPS = 8192
 
-_NAMES = {
-    "critical_multiple": ("1", "multiple of the joint's own friction at which the position locks"),
-    "other_solutions": ("1", "solutions found at full friction beside the one given"),
-    "drive_effort_reverse": ("N m", "drive effort with the motion run backward; NaN where that locks"),
-    "power_delivered_reverse": ("W", "power that the drivers take out with the motion run backward"),
-    "power_given_reverse": ("W", "power that the useful loads put in with the motion run backward"),
+VARIABLES = {
+    "critical_multiple": Variable(
+        ("joint", "position"), "1", "multiple of the joint's own friction at which the position locks"
+    ),
+    "other_solutions": Variable(("position",), "1", "solutions found at full friction beside the one given"),
+    "drive_effort_reverse": Variable(
+        ("driver", "position"), "N m", "drive effort with the motion run backward; NaN where that locks"
+    ),
+    "power_delivered_reverse": Variable(
+        ("position",), "W", "power that the drivers take out with the motion run backward"
+    ),
+    "power_given_reverse": Variable(
+        ("position",), "W", "power that the useful loads put in with the motion run backward"
+    ),
 }
 
 
@@ -46,8 +55,6 @@ def locking(mechanism: Mechanism, steps: int = 360) -> xr.Dataset:
 @np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
 def look(run: Run, steps: int = 360) -> xr.Dataset:
     """What `locking` does, for a mechanism that is prepared."""
-    import xarray as xr
-
     mechanism = run.system.mechanism
     if run.determinacy is not None:
         run.determinacy.refuse()
@@ -62,26 +69,17 @@ def look(run: Run, steps: int = 360) -> xr.Dataset:
         other = reverse(run, back.walk, FrictionMethod(), useful_loads(mechanism))
     known = (status < Status.NOT_CONVERGED) | (status == Status.LOCKED)
     nothing = np.full(len(time), np.nan)
-    arrays: dict[str, tuple[tuple[str, ...], Any]] = {
-        "critical_multiple": (
-            ("joint",),
-            [np.where(known, multiples.get(str(name), nothing), np.nan) for name in result["joint"].values],
-        ),
-        "other_solutions": ((), more),
-        "drive_effort_reverse": (
-            ("driver",),
-            np.array([np.where(other.locked, np.nan, other.efforts[name]) for name in mechanism.drivers]).reshape(
-                len(mechanism.drivers), len(time)
-            ),
-        ),
-        "power_delivered_reverse": ((), np.where(other.locked, np.nan, other.delivered)),
-        "power_given_reverse": ((), other.given),
+    efforts = [np.where(other.locked, np.nan, other.efforts[name]) for name in mechanism.drivers]
+    arrays: dict[str, Any] = {
+        "critical_multiple": [
+            np.where(known, multiples.get(str(name), nothing), np.nan) for name in result["joint"].values
+        ],
+        "other_solutions": more,
+        "drive_effort_reverse": np.array(efforts).reshape(len(efforts), len(time)),
+        "power_delivered_reverse": np.where(other.locked, np.nan, other.delivered),
+        "power_given_reverse": other.given,
     }
-    added = {
-        name: xr.Variable((*dims, "position"), values, dict(zip(("units", "long_name"), _NAMES[name], strict=True)))
-        for name, (dims, values) in arrays.items()
-    }
-    return result.assign(added)
+    return result.assign(described(arrays, VARIABLES))
 
 
 def report_rows(run: Run, found: xr.Dataset) -> list[dict[str, Any]]:

@@ -34,6 +34,7 @@ from numpy.typing import NDArray
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.files import whole
 from trunnion.model.names import guarded
+from trunnion.results.attributes import attribute
 from trunnion.results.columns import tables_of
 
 if TYPE_CHECKING:
@@ -60,7 +61,7 @@ def columns(result: xr.Dataset, table: str = "measures") -> list[Column]:
         return _fit(result)
     if "measured" in result.attrs:
         return [(name, unit, values.__getitem__) for name, unit, values in _courses(result)]
-    stated = json.loads(result.attrs["scene"])
+    stated = attribute(result, "scene", "{}")
     spatial = stated.get("space") == "spatial"
     kinds = {name: joint["type"] for name, joint in stated["joints"].items()}
     found: list[Column] = [("time", "s", lambda window: result["time"].values[window])]
@@ -93,9 +94,7 @@ def _played(result: xr.Dataset) -> list[Column]:
     """Of the play of joints: each measure, its worst case, RSS, standard deviation, and each joint's part in them."""
     found: list[Column] = [("time", "s", lambda window: result["time"].values[window])]
     found.append(("drive", str(result["drive"].attrs["units"]), lambda window: result["drive"].values[window]))
-    for i, (measure, unit) in enumerate(
-        zip(result["measure"].values, json.loads(result.attrs["measure_units"]), strict=True)
-    ):
+    for i, (measure, unit) in enumerate(zip(result["measure"].values, attribute(result, "measure_units"), strict=True)):
         keys = {"value": "", "worst_case_total": ".worst_case", "rss": ".rss", "deviation_total": ".deviation"}
         parts: list[tuple[str, str, tuple[int, ...]]] = [(key, f"{measure}{end}", (i,)) for key, end in keys.items()]
         for j, joint in enumerate(result["joint"].values):
@@ -109,7 +108,7 @@ def _played(result: xr.Dataset) -> list[Column]:
 def _fit(result: xr.Dataset) -> list[Column]:
     """Of whether a mechanism goes together: needs, openings, then offsets of the ends that have a play."""
     found: list[Column] = [("time", "s", lambda window: result["time"].values[window])]
-    units = json.loads(result.attrs["coordinate_units"])
+    units = attribute(result, "coordinate_units")
     for i, (driver, unit) in enumerate(zip(result["driver"].values, units, strict=True)):
         _, _, values = _column(result, "drive_coordinate", "", (i,))
         found.append((f"{driver}.coordinate", unit, values))
@@ -133,7 +132,7 @@ def _courses(result: xr.Dataset) -> Iterator[tuple[str, str, NDArray[Any]]]:
     for i, name in enumerate(result["setting"].values):
         yield str(name), "", np.repeat(result["set"].values[:, i], positions)
     yield "phase", "1", np.tile(result["phase"].values, result.sizes["condition"])
-    units = json.loads(result["mean"].attrs["member_units"])
+    units = attribute(result["mean"], "member_units")
     for i, (channel, unit) in enumerate(zip(result["channel"].values, units, strict=True)):
         for figure in ("mean", "scatter", "uncertainty", "turns"):
             yield f"{channel}.{figure}", "1" if figure == "turns" else unit, result[figure].values[:, i].ravel()
@@ -214,9 +213,7 @@ def _spatial_link(result: xr.Dataset, i: int, link: str) -> list[Column]:
 def _drivers(result: xr.Dataset) -> list[Column]:
     """Effort of each driver with the ends of its interval, in the unit of the driver."""
     found: list[Column] = []
-    for i, (driver, unit) in enumerate(
-        zip(result["driver"].values, json.loads(result.attrs["driver_units"]), strict=True)
-    ):
+    for i, (driver, unit) in enumerate(zip(result["driver"].values, attribute(result, "driver_units"), strict=True)):
         for end in ("", "_lower", "_upper"):
             name, _, values = _column(result, f"drive_effort{end}", f"{driver}.effort{end}", (i,))
             found.append((name, unit, values))
@@ -229,7 +226,7 @@ def _drivers(result: xr.Dataset) -> list[Column]:
 def _springs(result: xr.Dataset) -> list[Column]:
     found: list[Column] = []
     for i, spring in enumerate(result["spring"].values if "spring" in result.dims else ()):
-        for variable, unit in zip(("force", "elongation"), json.loads(result.attrs["spring_units"])[i], strict=True):
+        for variable, unit in zip(("force", "elongation"), attribute(result, "spring_units")[i], strict=True):
             name, _, values = _column(result, f"spring_{variable}", f"{spring}.{variable}", (i,))
             found.append((name, unit, values))
         found.append(_column(result, "spring_power", f"{spring}.spring_power", (i,)))
@@ -250,9 +247,9 @@ def _column(result: xr.Dataset, variable: str, name: str, index: tuple[int, ...]
 
 def figures(sweep: xr.Dataset) -> dict[str, tuple[str, NDArray[Any]]]:
     """(unit, values, one a point of the grid, the last name running fastest) of a sweep, by the name of the column."""
-    swept = json.loads(sweep.attrs["swept"])
+    swept = attribute(sweep, "swept")
     shape = tuple(sweep.sizes[name] for name in swept)
-    efforts = json.loads(sweep.attrs["driver_units"])
+    efforts = attribute(sweep, "driver_units")
     grid = np.meshgrid(*(sweep[name].values for name in swept), indexing="ij")
     flat = {name: (str(sweep[name].attrs["units"]), axis.ravel()) for name, axis in zip(swept, grid, strict=True)}
     for name, figure in sweep.data_vars.items():
@@ -261,7 +258,7 @@ def figures(sweep: xr.Dataset) -> dict[str, tuple[str, NDArray[Any]]]:
         rows = figure.transpose(..., *swept).values.reshape(-1, int(np.prod(shape)))
         if not subject:
             flat[key] = (unit, rows[0])
-        own = efforts if subject == "driver" else json.loads(figure.attrs.get("member_units", "[]"))
+        own = efforts if subject == "driver" else attribute(figure, "member_units")
         for i, member in enumerate(sweep[subject].values if subject else ()):
             flat[f"{member}.{key.removeprefix('drive_')}"] = (own[i] if own else unit, rows[i])
     flat["status"] = ("", np.array([status.name.lower() for status in Status])[flat["status"][1]])
@@ -284,7 +281,7 @@ def _count(result: xr.Dataset, found: list[Column]) -> int:
         return max(len(found[0][2](slice(None))), 1)
     if "measured" in result.attrs:
         return result.sizes["condition"] * result.sizes["position"]
-    swept = json.loads(result.attrs.get("swept", "[]"))
+    swept = attribute(result, "swept")
     return result.sizes.get("position") or int(np.prod([result.sizes[name] for name in swept]))
 
 

@@ -1,45 +1,32 @@
-"""Results with names, units, long names and provenance, put on once.
+"""What the result of a cycle consists of.
 
-`VARIABLES` is the whole vocabulary. Dims: position last; joint, link, point ("link.point"), axis (x, y, in space z),
-component (of a quaternion: w, x, y, z), driver, spring (only of a mechanism that has any).
+`VARIABLES` is the whole vocabulary. Dims, before `position`: joint, link, point ("link.point"), axis (x, y, in space
+z), component (of a quaternion: w, x, y, z), driver, spring (only of a mechanism that has any).
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.results.dataset import TIME, Variable, dataset_of, described
+
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["CYCLE", "VARIABLES", "Variable", "allocate", "dataset", "variables"]
-
-
-@dataclass(frozen=True)
-class Variable:
-    """Dimensions before `position`, unit and long name of a result; the only space that has it, empty if both.
-
-    part: of what results alone: "seats" of pins that do not lie in the middle of their holes, "errors" of a
-    mechanism with any error.
-    """
-
-    dims: tuple[str, ...]
-    units: str
-    long_name: str
-    space: str = ""
-    part: str = ""
+__all__ = ["CYCLE", "VARIABLES", "allocate", "dataset", "variables"]
 
 
 def _rates(name: str, dims: tuple[str, ...], unit: str, long_name: str, space: str = "") -> dict[str, Variable]:
     """A quantity with its first and second derivative by time."""
     return {
-        name: Variable(dims, unit, long_name, space),
-        f"{name}_velocity": Variable(dims, f"{unit}/s", f"rate of the {long_name}", space),
-        f"{name}_acceleration": Variable(dims, f"{unit}/s^2", f"second derivative of the {long_name}", space),
+        name: Variable(dims, unit, long_name, space=space),
+        f"{name}_velocity": Variable(dims, f"{unit}/s", f"rate of the {long_name}", space=space),
+        f"{name}_acceleration": Variable(dims, f"{unit}/s^2", f"second derivative of the {long_name}", space=space),
     }
 
 
@@ -47,10 +34,12 @@ VARIABLES: dict[str, Variable] = {
     **_rates("joint_rotation", ("joint",), "rad", "rotation of the joint, second link against first"),
     **_rates("joint_slide", ("joint",), "m", "slide of the joint, second link against first"),
     **_rates("link_angle", ("link",), "rad", "angle of the link's x axis", "planar"),
-    "link_position": Variable(("link", "axis"), "m", "place of the link's origin", "spatial"),
-    "link_rotation": Variable(("link", "component"), "1", "unit quaternion of the link's axes", "spatial"),
-    "link_angular_velocity": Variable(("link", "axis"), "rad/s", "angular velocity of the link", "spatial"),
-    "link_angular_acceleration": Variable(("link", "axis"), "rad/s^2", "angular acceleration of the link", "spatial"),
+    "link_position": Variable(("link", "axis"), "m", "place of the link's origin", space="spatial"),
+    "link_rotation": Variable(("link", "component"), "1", "unit quaternion of the link's axes", space="spatial"),
+    "link_angular_velocity": Variable(("link", "axis"), "rad/s", "angular velocity of the link", space="spatial"),
+    "link_angular_acceleration": Variable(
+        ("link", "axis"), "rad/s^2", "angular acceleration of the link", space="spatial"
+    ),
     "point_position": Variable(("point", "axis"), "m", "place of the point"),
     "point_velocity": Variable(("point", "axis"), "m/s", "velocity of the point"),
     "point_acceleration": Variable(("point", "axis"), "m/s^2", "acceleration of the point"),
@@ -59,7 +48,7 @@ VARIABLES: dict[str, Variable] = {
     "friction_torque": Variable(("joint",), "N m", "friction torque on the second link by the first"),
     "friction_force": Variable(("joint",), "N", "friction force along the slide on the second link by the first"),
     "friction_moment": Variable(
-        ("joint", "axis"), "N m", "friction moment on the second link, about the middle of the bearing", "spatial"
+        ("joint", "axis"), "N m", "friction moment on the second link, about the middle of the bearing", space="spatial"
     ),
     "friction_power": Variable(("joint",), "W", "power lost to friction"),
     "drive_effort": Variable(("driver",), "N m", "drive effort on the second link by the first"),
@@ -77,12 +66,12 @@ VARIABLES: dict[str, Variable] = {
     "closure_residual": Variable((), "m", "largest opening of a closed loop"),
     "condition": Variable((), "1", "largest condition number of a module's Jacobian"),
     "power_residual": Variable((), "W", "drive + loads + inertia − friction power; 0 but for rounding"),
-    "friction_iterations": Variable((), "1", "rounds to settle friction and reactions"),
+    "friction_iterations": Variable((), "1", "rounds to settle friction and reactions", np.int32),
     "friction_change": Variable((), "N", "largest change of a reaction in the last round"),
     "friction_residual": Variable((), "N", "largest difference between a friction and its law for the load found"),
     "friction_contraction": Variable((), "1", "contraction of the friction iteration; from 1 on it may diverge"),
     "locking_margin": Variable((), "1", "multiple of the friction at which the position locks, ∞ if beyond 10"),
-    "status": Variable((), "1", "code of the position's status; see the attribute flag_meanings"),
+    "status": Variable((), "1", "code of the position's status; see the attribute flag_meanings", np.int8),
     "seat_offset": Variable(
         ("joint", "end", "axis"), "m", "offset of the pin's axis from the hole's at each end, hole's axes", part="seats"
     ),
@@ -95,14 +84,14 @@ VARIABLES: dict[str, Variable] = {
     "contact_position": Variable(
         ("joint", "end", "axis"), "m", "place where the pin touches its hole at each end", part="seats"
     ),
-    "contact_lost": Variable(("joint",), "1", "1 where the seat of the pin would have to jump", part="seats"),
+    "contact_lost": Variable(("joint",), "1", "1 where the seat of the pin would have to jump", np.int8, part="seats"),
     "contact_loss_number": Variable(
         ("joint",), "rad/(N s)", "rate of turn of the reaction over its size (Earles and Wu)", part="seats"
     ),
     "seat_travel": Variable(
-        (), "1", "1 where the velocities and accelerations contain the travel of the seats", part="seats"
+        (), "1", "1 where the velocities and accelerations contain the travel of the seats", np.int8, part="seats"
     ),
-    "seat_rounds": Variable((), "1", "rounds to settle seats and reactions", part="seats"),
+    "seat_rounds": Variable((), "1", "rounds to settle seats and reactions", np.int32, part="seats"),
     "seat_change": Variable((), "1", "change of a seat that one more round would make, of its clearance", part="seats"),
     "point_error": Variable(("point", "axis"), "m", "place of the point against the ideal mechanism", part="errors"),
     "link_error": Variable(("link",), "rad", "angle of the link against the ideal mechanism", part="errors"),
@@ -130,24 +119,21 @@ IN_SPACE = {
         ("link", "axis"), "rad", "rotation vector of the link against the ideal mechanism", part="errors"
     ),
 }
-INTEGERS = {
-    "status": np.int8,
-    "friction_iterations": np.int32,
-    "contact_lost": np.int8,
-    "seat_rounds": np.int32,
-    "seat_travel": np.int8,
-}
 # the same array until something sets them apart
 SAME_AS = {"drive_effort_lower": "drive_effort", "drive_effort_upper": "drive_effort"}
 
-# of the cycle as a whole, beside VARIABLES: dimensions, unit, long name
-CYCLE: dict[str, tuple[tuple[str, ...], str, str]] = {
-    "efficiency": ((), "1", "useful work over drive work of the cycle"),
-    "efficiency_error": ((), "1", "how far the errors of the integrals may have moved the efficiency"),
-    "drive_effort_rms": (("driver",), "N m", "root mean square of the drive effort"),
-    "drive_power_mean": ((), "W", "mean power of all drivers"),
-    "useful_power_mean": ((), "W", "mean power taken by the useful loads"),
-    "friction_power_mean": (("joint",), "W", "mean power lost to friction"),
+# of the cycle as a whole, beside VARIABLES
+CYCLE: dict[str, Variable] = {
+    "efficiency": Variable((), "1", "useful work over drive work of the cycle"),
+    "efficiency_error": Variable((), "1", "how far the errors of the integrals may have moved the efficiency"),
+    "drive_effort_rms": Variable(("driver",), "N m", "root mean square of the drive effort"),
+    "drive_power_mean": Variable((), "W", "mean power of all drivers"),
+    "useful_power_mean": Variable((), "W", "mean power taken by the useful loads"),
+    "friction_power_mean": Variable(("joint",), "W", "mean power lost to friction"),
+}
+IDEAL = {
+    f"{name}_ideal": replace(CYCLE[name], long_name=f"{CYCLE[name].long_name}, of the mechanism without errors")
+    for name in ("efficiency", "friction_power_mean")
 }
 
 
@@ -203,12 +189,12 @@ def allocate(
         if name in absent:
             arrays[name] = np.broadcast_to(np.zeros(()), shape)
         elif wanted is not None and name not in wanted:
-            cell = np.zeros(1, INTEGERS.get(name, np.float64))
+            cell = np.zeros(1, variable.dtype)
             arrays[name] = np.lib.stride_tricks.as_strided(cell, shape, (0,) * len(shape))
         else:
             # zeroed pages take no memory until something is written: rows of the ground never are
-            arrays[name] = np.zeros(shape, INTEGERS.get(name, np.float64))
-            if variable.part == "seats" and name not in INTEGERS:
+            arrays[name] = np.zeros(shape, variable.dtype)
+            if variable.part == "seats" and variable.dtype is np.float64:
                 arrays[name][:] = np.nan  # of joints and ends that have none
     for name, other in SAME_AS.items():
         arrays[name] = arrays[other]
@@ -220,27 +206,12 @@ def dataset(
     labels: Labels,
     time: NDArray[np.float64],
     means: CycleMeans,
-    attributes: Mapping[str, str | float],
+    attributes: Mapping[str, Any],
     ideal: CycleMeans | None = None,
 ) -> xr.Dataset:
-    """The arrays as an xarray Dataset with coordinates, units and long names."""
-    import xarray as xr
-
-    known = variables(_space(labels))
-    found = {
-        name: xr.Variable(
-            (*known[name].dims, "position"),
-            array,
-            {"units": known[name].units, "long_name": known[name].long_name},
-        )
-        for name, array in arrays.items()
-    }
-    for name, (dims, unit, long_name) in CYCLE.items():
-        found[name] = xr.Variable(dims, getattr(means, name), {"units": unit, "long_name": long_name})
-    for name in ("efficiency", "friction_power_mean") if ideal is not None else ():
-        dims, unit, long_name = CYCLE[name]
-        told = {"units": unit, "long_name": f"{long_name}, of the mechanism without errors"}
-        found[f"{name}_ideal"] = xr.Variable(dims, getattr(ideal, name), told)
-    coordinates = {dim: (dim, np.asarray(names, dtype=str)) for dim, names in labels.items()}
-    times = xr.Variable("position", time, {"units": "s", "long_name": "time from the start of the cycle"})
-    return xr.Dataset(found, {**coordinates, "time": times}, dict(attributes))
+    """The result of a cycle."""
+    known = {name: one.over("position") for name, one in variables(_space(labels)).items()}
+    found = described(arrays, known) | described({name: getattr(means, name) for name in CYCLE}, CYCLE)
+    if ideal is not None:
+        found |= described({name: getattr(ideal, name.removesuffix("_ideal")) for name in IDEAL}, IDEAL)
+    return dataset_of(found, labels, attributes, described({"time": time}, {"time": TIME}))

@@ -8,12 +8,13 @@ efficiency. SI.
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from trunnion.results.attributes import attribute
 
 if TYPE_CHECKING:
     import os
@@ -50,7 +51,7 @@ def _named(result: xr.Dataset, what: str, codes: NDArray[Any]) -> NDArray[Any]:
 
 def _set(result: xr.Dataset, times: int) -> Flat:
     """What was set, each condition so many times over."""
-    units = json.loads(result.attrs["set_units"])
+    units = attribute(result, "set_units")
     rows = result["value"].values
     return [
         (str(name), unit, np.repeat(rows[i], times))
@@ -66,9 +67,7 @@ def _courses(result: xr.Dataset) -> Flat:
     found.append(("phase", "1", result["phase"].values.ravel()))
     found.append(("drive", str(result.attrs["drive_unit"]), result["drive"].values.ravel()))
     found.append(("status", "", _named(result, "flag", result["status"].values)))
-    for i, (channel, unit) in enumerate(
-        zip(result["channel"].values, json.loads(result.attrs["channel_units"]), strict=True)
-    ):
+    for i, (channel, unit) in enumerate(zip(result["channel"].values, attribute(result, "channel_units"), strict=True)):
         for name in COURSES:
             own = "1" if name == "compared" else unit
             found.append((f"{channel}.{name}", own, result[name].values[i].ravel()))
@@ -77,7 +76,7 @@ def _courses(result: xr.Dataset) -> Flat:
 
 def _figures(result: xr.Dataset) -> Flat:
     channels, conditions = result.sizes["channel"], result.sizes["condition"]
-    units = [str(unit) for unit in json.loads(result.attrs["channel_units"])]
+    units = [str(unit) for unit in attribute(result, "channel_units")]
 
     def by_condition(values: NDArray[Any]) -> NDArray[Any]:
         return values.T.ravel()

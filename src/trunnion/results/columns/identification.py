@@ -6,12 +6,13 @@ in SI; a unit that is not one for a whole column is in the column `unit`.
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from trunnion.results.attributes import attribute
 
 if TYPE_CHECKING:
     import os
@@ -53,8 +54,8 @@ def _parameters(result: xr.Dataset) -> Flat:
     names = _texts(result["parameter"].values)
     found: Flat = [
         ("parameter", "", names),
-        ("paths", "", _texts([" ".join(one) for one in json.loads(result.attrs["parameter_paths"])])),
-        ("unit", "", _texts(json.loads(result.attrs["parameter_units"]))),
+        ("paths", "", _texts([" ".join(one) for one in attribute(result, "parameter_paths")])),
+        ("unit", "", _texts(attribute(result, "parameter_units"))),
         *((key, "", result[key].values) for key in FIGURES),
         ("degrees_of_freedom", "1", result["degrees_of_freedom"].values),
         ("limit", "1", result["limit"].values),
@@ -72,7 +73,7 @@ def _pairs(result: xr.Dataset) -> NDArray[np.intp]:
 
 
 def _subjects(result: xr.Dataset, pairs: NDArray[np.intp]) -> Flat:
-    units = _texts(json.loads(result.attrs["channel_units"]))
+    units = _texts(attribute(result, "channel_units"))
     return [
         ("channel", "", _texts(result["channel"].values)[pairs[:, 0]]),
         ("condition", "", _texts(result["condition"].values)[pairs[:, 1]]),

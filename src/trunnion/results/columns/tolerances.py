@@ -8,13 +8,14 @@ the drive is at: degrees, mm or s. A unit that is not one for a whole column is 
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from trunnion.results.attributes import attribute
 
 if TYPE_CHECKING:
     import os
@@ -59,16 +60,16 @@ def flat(result: xr.Dataset, table: str) -> Flat:
 
 
 def _units(result: xr.Dataset) -> list[str]:
-    return [str(unit) for unit in json.loads(result.attrs["measure_units"])]
+    return [str(unit) for unit in attribute(result, "measure_units")]
 
 
 def _course_units(result: xr.Dataset) -> list[str]:
     """Of the course of each measure; that of a dead centre is no angle of the drive."""
-    return [str(unit) for unit in json.loads(result.attrs.get("curve_units", result.attrs["measure_units"]))]
+    return [str(unit) for unit in attribute(result, "curve_units") or _units(result)]
 
 
 def _parameter_units(result: xr.Dataset) -> list[str]:
-    return [str(unit) for unit in json.loads(result.attrs["parameter_units"])]
+    return [str(unit) for unit in attribute(result, "parameter_units")]
 
 
 def _common(units: list[str]) -> str:
@@ -97,7 +98,7 @@ def _measures(result: xr.Dataset) -> Flat:
     """One row a measure: its figures; quantiles as `quantile_0.05`; limits and bounds as they are stated."""
     found: Flat = [("measure", "", np.array(_names(result, "measure"))), ("unit", "", np.array(_units(result)))]
     for key, ends in (("limits", ("limit_lower", "limit_upper")), ("bounds", ("at_least", "at_most"))):
-        stated = json.loads(result.attrs.get(key, "[]"))
+        stated = attribute(result, key)
         for k, name in enumerate(ends):
             column = [np.nan if pair is None or pair[k] is None else float(pair[k]) for pair in stated]
             found += [(name, _common(_units(result)), np.array(column))] if column else []

@@ -3,42 +3,35 @@
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.cycle.account import PEZZUTI, finding_row, inputs, references
+from trunnion.cycle.account import PEZZUTI, inputs, references
 from trunnion.errors import Status
 from trunnion.model.mechanism import Mechanism
+from trunnion.results.attributes import cited, codes, finding_rows, origin
+from trunnion.results.dataset import Variable, dataset_of, described
 from trunnion.rig.compare.judge import Verdict, difference, expanded, probability, uncertainty_of
 from trunnion.rig.compare.pairs import Compared, Pair
 from trunnion.rig.compare.said import findings_of, gathered, units_set
 from trunnion.rig.reading.measurement import Condition, Measurement
 from trunnion.solve.friction_method import FrictionMethod
-from trunnion.version import __version__
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["VARIABLES", "Variable", "dataset"]
+__all__ = ["VARIABLES", "data_findings", "dataset", "hashed_files"]
 
 Array = NDArray[Any]
 GUM = "JCGM 100:2008, Evaluation of measurement data - Guide to the expression of uncertainty in measurement (GUM)"
 
 
-class Variable(NamedTuple):
-    """Dimensions, unit and long name. Unit empty: that of each channel, in the attribute `channel_units`; "set": of
-    what is set, in `set_units`; "drive": rad, m or s, as `drive_unit` says."""
-
-    dims: tuple[str, ...]
-    units: str
-    long_name: str
-
-
+# unit empty: that of each channel, in the attribute `channel_units`; "set": of what is set, in `set_units`; "drive":
+# rad, m or s, as `drive_unit` says
 CC, C = ("channel", "condition"), ("condition",)
 COURSE = (*CC, "position")
 VARIABLES: dict[str, Variable] = {
@@ -47,15 +40,17 @@ VARIABLES: dict[str, Variable] = {
     ),
     "phase": Variable(("condition", "position"), "1", "share of the cycle from its start"),
     "drive": Variable(("condition", "position"), "drive", "coordinate of the first driver, or time"),
-    "status": Variable(("condition", "position"), "1", "code of the model's status; see the attribute flag_meanings"),
+    "status": Variable(
+        ("condition", "position"), "1", "code of the model's status; see the attribute flag_meanings", np.int8
+    ),
     "measured": Variable(COURSE, "", "mean over the turns"),
     "scatter": Variable(COURSE, "", "standard deviation between turns"),
     "uncertainty": Variable(COURSE, "", "standard uncertainty of the mean: scatter, zero, gain"),
     "expanded": Variable(COURSE, "", "expanded uncertainty U of the mean"),
     "model": Variable(COURSE, "", "the model with the values of the condition"),
     "residual": Variable(COURSE, "", "measured less model"),
-    "compared": Variable(COURSE, "1", "1 where the position counts in the figures of the channel"),
-    "turns": Variable(CC, "1", "turns that were measured"),
+    "compared": Variable(COURSE, "1", "1 where the position counts in the figures of the channel", np.int8),
+    "turns": Variable(CC, "1", "turns that were measured", np.int32),
     "accuracy_zero": Variable(CC, "", "standard uncertainty of the zero"),
     "accuracy_gain": Variable(CC, "1", "standard uncertainty of the gain, relative"),
     "rms": Variable(CC, "", "root mean square of the residual"),
@@ -67,13 +62,14 @@ VARIABLES: dict[str, Variable] = {
     "within": Variable(CC, "1", "share of the positions within ±U"),
     "within_least": Variable(CC, "1", "share from which the course is taken to be within"),
     "correlation": Variable(CC, "1", "correlation of measured and model over the positions"),
-    "verdict": Variable(CC, "1", "code of the verdict; see the attribute verdict_meanings"),
+    "verdict": Variable(CC, "1", "code of the verdict; see the attribute verdict_meanings", np.int8),
     "efficiency": Variable(C, "1", "measured efficiency"),
     "efficiency_expanded": Variable(C, "1", "expanded uncertainty of the measured efficiency"),
     "efficiency_model": Variable(C, "1", "efficiency of the model"),
-    "efficiency_within": Variable(C, "1", "1 where the model's efficiency lies within ±U, −1 where one is not known"),
+    "efficiency_within": Variable(
+        C, "1", "1 where the model's efficiency lies within ±U, −1 where one is not known", np.int8
+    ),
 }
-INTEGERS = {"status": np.int8, "compared": np.int8, "turns": np.int32, "verdict": np.int8, "efficiency_within": np.int8}
 EFFICIENCY = [name for name in VARIABLES if name.startswith("efficiency")]
 JUDGED = {"largest": "largest", "rms": "rms", "bias": "bias", "bias_expanded": "bias_expanded", "within": "within",
           "rms_unbiased": "rms_unbiased", "within_least": "least", "correlation": "correlation"}  # fmt: skip
@@ -87,33 +83,20 @@ def dataset(
     coverage: float,
     method: FrictionMethod,
 ) -> xr.Dataset:
-    """The numbers with their coordinates, units, long names and attributes."""
-    import xarray as xr
-
+    """The numbers with all that is said of them."""
     sets = list(dict.fromkeys(name for one in found for name in one.condition.values))
     positions = max(len(one.condition.phase) for one in found)
     sizes = {"set": len(sets), "condition": len(found), "channel": len(channels), "position": positions}
-    arrays = {
-        name: np.full([sizes[dim] for dim in one.dims], *(
-            (Verdict.NOTHING if name == "verdict" else -1 if name == "efficiency_within" else 0, INTEGERS[name])
-            if name in INTEGERS else (np.nan, np.float64)
-        ))
-        for name, one in VARIABLES.items()
-    }  # fmt: skip
+    arrays = {name: one.blank(sizes) for name, one in VARIABLES.items()}
+    arrays["verdict"][:], arrays["efficiency_within"][:] = Verdict.NOTHING, -1
     arrays["status"][:] = Status.NOT_ASSEMBLED  # of positions that a condition with fewer does not have
     for k, one in enumerate(found):
         _fill(arrays, k, one, sets, list(channels), coverage)
     if all(one.efficiency is None for one in found):
         arrays = {name: array for name, array in arrays.items() if name not in EFFICIENCY}
-    variables = {
-        name: xr.Variable(VARIABLES[name].dims, array,
-                          {"units": VARIABLES[name].units, "long_name": VARIABLES[name].long_name})
-        for name, array in arrays.items()
-    }  # fmt: skip
     labels = {"channel": list(channels), "condition": [one.condition.name for one in found], "set": sets}
-    coordinates = {dim: (dim, np.asarray(names, dtype=str)) for dim, names in labels.items()}
     attributes = _attributes(mechanism, measurement, channels, found, coverage, method)
-    return xr.Dataset(variables, coordinates, attributes)
+    return dataset_of(described(arrays, VARIABLES), labels, attributes)
 
 
 def _fill(
@@ -170,37 +153,32 @@ def _attributes(
     sets = list(dict.fromkeys(name for one in found for name in one.condition.values))
     written = units_set(mechanism, sets, [one.condition.name for one in found])
     told = findings_of(mechanism, channels, found, coverage)
-    rows: dict[str, Any] = {
+    origins = origin(
+        mechanism,
+        first.run.system.plan.formula,
+        drive_unit=first.unit,
+        drive_name=drivers[0] if drivers and first.unit != "s" else "",
+        drive_span=first.span,
+        periodic=int(all(one.model.run.cycle.periodic for one in found)),
+        all_within=int(_all_within(found)),
+        coverage=coverage,
+        probability=probability(coverage),
+    )
+    return {
+        "comparing": measurement.name,
+        **origins,
+        "method": method.name,
+        **cited(dict.fromkeys([GUM, PEZZUTI, *references(mechanism)])),
+        **codes("verdict", Verdict),
         "channel_units": list(units.values()),
         "channel_measures": list(channels.values()),
         **dict(zip(("set_units", "set_written"), written, strict=True)),
-        "findings": [finding_row(finding) for finding in told],
-        "data_findings": [{**finding_row(one), "file": one.file} for one in gathered(measurement.findings)],
+        "findings": finding_rows(told),
+        "data_findings": data_findings(measurement),
         "done": list(measurement.done),
         "files": hashed_files(one.condition for one in found),
         "condition_files": [list(one.condition.files) for one in found],
         "inputs": inputs(mechanism),
-    }
-    return {
-        "comparing": measurement.name,
-        "name": mechanism.name,
-        "formula": first.run.system.plan.formula,
-        "drive_unit": first.unit,
-        "drive_name": drivers[0] if drivers and first.unit != "s" else "",
-        "drive_span": first.span,
-        "periodic": int(all(one.model.run.cycle.periodic for one in found)),
-        "all_within": int(_all_within(found)),
-        "coverage": coverage,
-        "probability": probability(coverage),
-        "model_hash": mechanism.digest,
-        "trunnion_version": __version__,
-        "method": method.name,
-        "references": "\n".join(dict.fromkeys([GUM, PEZZUTI, *references(mechanism)])),
-        "flag_values": " ".join(str(int(code)) for code in Status),
-        "flag_meanings": " ".join(code.name.lower() for code in Status),
-        "verdict_values": " ".join(str(int(code)) for code in Verdict),
-        "verdict_meanings": " ".join(code.name.lower() for code in Verdict),
-        **{name: json.dumps(row, ensure_ascii=False) for name, row in rows.items()},
     }
 
 
@@ -208,6 +186,12 @@ def _all_within(found: Sequence[Compared]) -> bool:
     """Whether every course is within, and every efficiency."""
     courses = all(pair.within for one in found for pair in one.pairs.values())
     return courses and all(one.efficiency.within for one in found if one.efficiency is not None)
+
+
+def data_findings(measurement: Measurement) -> list[dict[str, str]]:
+    """What was found while the data were read, with the file."""
+    told = gathered(measurement.findings)
+    return [{**row, "file": one.file} for row, one in zip(finding_rows(told), told, strict=True)]
 
 
 def hashed_files(conditions: Iterable[Condition]) -> list[dict[str, Any]]:

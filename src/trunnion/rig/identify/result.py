@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import json
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.cycle.account import finding_row, references
-from trunnion.rig.compare.result import hashed_files
-from trunnion.rig.compare.said import gathered
+from trunnion.cycle.account import references
+from trunnion.results.attributes import finding_rows, origin
+from trunnion.results.dataset import Variable, dataset_of, described
+from trunnion.rig.compare.result import data_findings, hashed_files
 from trunnion.rig.identify.identified import Identified
 from trunnion.rig.identify.judged import Judged
 from trunnion.rig.identify.said import sentences
 from trunnion.rig.identify.uncertainty import CONFIDENCE
-from trunnion.version import __version__
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -32,52 +30,43 @@ SOURCES = (
 
 def dataset(found: Identified) -> xr.Dataset:
     """Estimates with all that is said of them."""
-    import xarray as xr
-
     judged = Judged(found)
     problem, measurement = found.problem, found.measurement
     unknowns = problem.model.unknowns
     names = [one.name for one in unknowns]
     rows = _parameters(judged) | _sensors(judged) | _blocks(judged)
-    coordinates: dict[str, Any] = {
-        "parameter": ("parameter", np.array(names, str)),
-        "parameter_2": ("parameter_2", np.array(names, str)),
-        "source": ("source", np.array(judged.budget[0], str)),
-        "sensor": ("sensor", np.array([one.name for one in problem.sensors], str)),
-        "channel": ("channel", np.array(list(problem.model.measures), str)),
-        "condition": ("condition", np.array([one.name for one in measurement.conditions], str)),
+    labels = {
+        "parameter": names,
+        "parameter_2": names,
+        "source": judged.budget[0],
+        "sensor": [one.name for one in problem.sensors],
+        "channel": list(problem.model.measures),
+        "condition": [one.name for one in measurement.conditions],
     }
-    variables = {
-        key: xr.Variable(one.dims, rows[key], {"units": one.units, "long_name": one.long_name})
-        for key, one in VARIABLES.items()
-    }
+    variables = described({name: rows[name] for name in VARIABLES}, VARIABLES)
     system = found.run.system
-    attributes: dict[str, Any] = {
-        "name": found.mechanism.name,
+    attributes = {
+        "name": found.mechanism.name,  # ahead of `identified`, as it always was
         "identified": measurement.name,
-        "formula": system.plan.formula,
-        "model_hash": found.mechanism.digest,
-        "trunnion_version": __version__,
+        **origin(found.mechanism, system.plan.formula),
         "confidence": CONFIDENCE,
-        "parameter_paths": json.dumps([one.paths for one in unknowns], ensure_ascii=False),
-        "parameter_units": json.dumps([one.unit for one in unknowns]),
-        "channel_units": json.dumps([one.unit(system) for one in problem.model.measures.values()]),
-        "channel_measures": json.dumps([one.name for one in problem.model.measures.values()]),
+        "parameter_paths": [one.paths for one in unknowns],
+        "parameter_units": [one.unit for one in unknowns],
+        "channel_units": [one.unit(system) for one in problem.model.measures.values()],
+        "channel_measures": [one.name for one in problem.model.measures.values()],
         "drive": _drive(found),
-        "drive_range": json.dumps(_driven(judged)),
-        "files": json.dumps([list(one.files) for one in measurement.conditions], ensure_ascii=False),
-        "data_files": json.dumps(hashed_files(measurement.conditions), ensure_ascii=False),
-        "data_findings": json.dumps(
-            [{**finding_row(one), "file": one.file} for one in gathered(measurement.findings)], ensure_ascii=False
-        ),
-        "done": json.dumps(list(measurement.done), ensure_ascii=False),
+        "drive_range": _driven(judged),
+        "files": [list(one.files) for one in measurement.conditions],
+        "data_files": hashed_files(measurement.conditions),
+        "data_findings": data_findings(measurement),
+        "done": list(measurement.done),
         "evaluations": problem.evaluations,
         "starts": found.search.starts,
         "converged": int(found.search.fit.converged),
         "references": "\n".join([*SOURCES, *references(found.mechanism)]),
-        "findings": json.dumps([finding_row(one) for one in sentences(judged)], ensure_ascii=False),
+        "findings": finding_rows(sentences(judged)),
     }
-    return xr.Dataset(variables, coordinates, attributes)
+    return dataset_of(variables, labels, attributes)
 
 
 def _drive(found: Identified) -> str:
@@ -90,15 +79,6 @@ def _driven(judged: Judged) -> list[list[float] | None]:
     model = judged.problem.model
     ends = (model.driven(k, judged.told) for k in range(len(model.phases)))
     return [[first, last] if np.isfinite([first, last]).all() else None for first, last, _ in ends]
-
-
-@dataclass(frozen=True)
-class Variable:
-    """A variable of the result: its dimensions, unit, and what it is."""
-
-    dims: tuple[str, ...]
-    units: str
-    long_name: str
 
 
 VARIABLES = {

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import math
 from typing import TYPE_CHECKING
 
 from trunnion.model.expression import LITERAL, normalise
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.units import UnitError, unit
+from trunnion.results.attributes import attribute
 from trunnion.rig.identify.amounts import decimals
 
 if TYPE_CHECKING:
@@ -22,13 +22,13 @@ USUAL = {"rad": "deg", "m": "mm"}
 def values(mechanism: Mechanism, result: xr.Dataset) -> dict[str, float | str]:
     """Values by path for `Mechanism.with_values`, of all that the data tell."""
     found: dict[str, float | str] = {}
-    paths = json.loads(result.attrs["parameter_paths"])
-    for p, own in enumerate(paths):
+    units = attribute(result, "parameter_units")
+    for p, own in enumerate(attribute(result, "parameter_paths")):
         estimate = float(result["estimate"].values[p])
         spread = float(result["standard_uncertainty"].values[p])
         if math.isfinite(estimate):
             for path in own:
-                found[path] = _text(mechanism, path, estimate, spread, json.loads(result.attrs["parameter_units"])[p])
+                found[path] = _text(mechanism, path, estimate, spread, units[p])
     return found
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
@@ -10,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.cycle.account import finding_row
 from trunnion.errors import Severity
 from trunnion.model.prices import Price
+from trunnion.results.attributes import attribute, encoded, finding_rows, findings_of, summary_of
+from trunnion.results.dataset import Variable, described
 from trunnion.statistics.costs import Cost
+from trunnion.studies.allocation import said
 from trunnion.studies.allocation.allocated import Allocated
-from trunnion.studies.allocation.said import findings_of, summary
-from trunnion.studies.tolerance.result import Variable
 from trunnion.studies.tolerance.targets import MISSED
 
 if TYPE_CHECKING:
@@ -67,40 +66,24 @@ def cost_of(price: Price, t: float) -> float:
 
 def dataset(found: Allocated, known: xr.Dataset) -> xr.Dataset:
     """The result with the numbers of the allocation. known: `tolerance` of the mechanism with the tolerances found."""
-    import xarray as xr
-
     arrays = {**_bought(found, known), **_rows(found, known), **_whole(found)}
-    units = json.loads(known.attrs["parameter_units"])
-    one = units[0] if len(set(units)) == 1 else ""
-    variables = {
-        name: xr.Variable(
-            VARIABLES[name].dims,
-            values,
-            {
-                "units": {"parameter": one, "1/": ""}.get(VARIABLES[name].units, VARIABLES[name].units),
-                "long_name": VARIABLES[name].long_name,
-            },
-        )
-        for name, values in arrays.items()
-    }
-    told = json.loads(known.attrs["findings"])
-    kept = [row for row in told if not row["what"].startswith(MISSED)]  # the criterion says what is to be kept
-    own = [finding_row(finding) for finding in findings_of(found, known)]
-    errors = [row for row in own if row["severity"] == Severity.ERROR.value]
+    units = attribute(known, "parameter_units")
+    variables = described(arrays, VARIABLES, {"parameter": units[0] if len(set(units)) == 1 else "", "1/": ""})
+    # the criterion says what is to be kept
+    kept = [one for one in findings_of(known) if not one.what.startswith(MISSED)]
+    own = list(said.findings_of(found, known))
     attributes: dict[str, Any] = {
         "found": int(found.answer.found),
         "criterion": found.asked.criterion,
         "target": found.asked.target,
         "choices": found.way,
         "proven": int(found.answer.proven),
-        "prices": json.dumps([_plain(price) for price in found.prices.values()], ensure_ascii=False),
-        "summary": json.dumps(
-            [*summary(found, known, arrays), *json.loads(known.attrs["summary"])], ensure_ascii=False
-        ),
-        "findings": json.dumps([*own, *kept], ensure_ascii=False),
-        "missed": json.dumps([f"{row['where']}: {row['what']}".lstrip(": ") for row in errors], ensure_ascii=False),
+        "prices": [_plain(price) for price in found.prices.values()],
+        "summary": [*said.summary(found, known, arrays), *summary_of(known)],
+        "findings": finding_rows([*own, *kept]),
+        "missed": [f"{one.where}: {one.what}".lstrip(": ") for one in own if one.severity is Severity.ERROR],
     }
-    return known.assign(variables).assign_attrs(attributes)
+    return known.assign(variables).assign_attrs(encoded(attributes))
 
 
 def _plain(price: Price) -> dict[str, Any]:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from trunnion.errors import Finding, Severity
+from trunnion.results.attributes import attribute
 from trunnion.studies.allocation.allocated import CLOSE, DEFAULT_YIELD, share_of
 from trunnion.studies.allocation.problem import SHOWN
 from trunnion.studies.tolerance.targets import limits
@@ -112,7 +112,7 @@ def _promised(known: xr.Dataset) -> Iterator[Finding]:
 
 def _searched(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:
     """Measures whose worst case, as found on the mechanism, is beyond a limit that first order keeps."""
-    units = json.loads(known.attrs["measure_units"])
+    units = attribute(known, "measure_units")
     for k, of in enumerate(found.study.linear.measures):
         lower, upper = limits(of)
         low, high = float(known["searched_lower"][k]), float(known["searched_upper"][k])

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import json
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
-from trunnion.cycle.account import finding_row
 from trunnion.errors import Finding, Severity
+from trunnion.results.attributes import cited, finding_rows, origin
+from trunnion.results.dataset import TIME, Variable, dataset_of, described
 from trunnion.solve.system import System, Values
-from trunnion.version import __version__
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -51,34 +50,26 @@ class Fit(IntEnum):
     APART = 4, "it cannot be assembled, with or without errors"
 
 
-class Figure(NamedTuple):
-    """Dimensions, unit, long name."""
-
-    dims: tuple[str, ...]
-    units: str
-    long_name: str
-
-
 LANES = ("position",)
 OFFSETS = ("joint", "end", "axis", "position")
 PARTS = ("joint", "end", "position")
-FIGURES: dict[str, Figure] = {
-    "smallest_clearance": Figure((), "m", "the largest needed clearance of the cycle, between the positions too"),
-    "largest_share": Figure((), "1", "the largest needed share of the cycle, between the positions too"),
-    "drive_coordinate": Figure(("driver", "position"), "", "coordinate of the driver, rad or m"),
-    "needed_share": Figure(
+FIGURES: dict[str, Variable] = {
+    "smallest_clearance": Variable((), "m", "the largest needed clearance of the cycle, between the positions too"),
+    "largest_share": Variable((), "1", "the largest needed share of the cycle, between the positions too"),
+    "drive_coordinate": Variable(("driver", "position"), "", "coordinate of the driver, rad or m"),
+    "needed_share": Variable(
         LANES, "1", "share of the stated clearances that it takes to close the loops; above 1: too small"
     ),
-    "needed_clearance": Figure(LANES, "m", "smallest radial clearance, the same in every pin, that closes the loops"),
-    "open_angle": Figure(LANES, "rad", "how far the loops stay open without play, in angle"),
-    "open_length": Figure(LANES, "m", "how far the loops stay open without play, in length"),
-    "stated_offset": Figure(OFFSETS, "m", "offset of the pin's end at the needed share, in the hole's frame"),
-    "uniform_offset": Figure(OFFSETS, "m", "offset of the pin's end at the needed clearance, in the hole's frame"),
-    "stated_part": Figure(PARTS, "1", "part that an end's play has in the needed share; they add up to 1"),
-    "uniform_part": Figure(PARTS, "1", "part that an end's play has in the needed clearance; they add up to 1"),
-    "closure_residual": Figure(LANES, "1", "largest exact opening of a loop at these offsets, rad or of the size"),
-    "certificate": Figure(LANES, "1", "how far the proven lower bound of the need lies below it, relative"),
-    "status": Figure(LANES, "1", "code of what the position came to; see the attribute flag_meanings"),
+    "needed_clearance": Variable(LANES, "m", "smallest radial clearance, the same in every pin, that closes the loops"),
+    "open_angle": Variable(LANES, "rad", "how far the loops stay open without play, in angle"),
+    "open_length": Variable(LANES, "m", "how far the loops stay open without play, in length"),
+    "stated_offset": Variable(OFFSETS, "m", "offset of the pin's end at the needed share, in the hole's frame"),
+    "uniform_offset": Variable(OFFSETS, "m", "offset of the pin's end at the needed clearance, in the hole's frame"),
+    "stated_part": Variable(PARTS, "1", "part that an end's play has in the needed share; they add up to 1"),
+    "uniform_part": Variable(PARTS, "1", "part that an end's play has in the needed clearance; they add up to 1"),
+    "closure_residual": Variable(LANES, "1", "largest exact opening of a loop at these offsets, rad or of the size"),
+    "certificate": Variable(LANES, "1", "how far the proven lower bound of the need lies below it, relative"),
+    "status": Variable(LANES, "1", "code of what the position came to; see the attribute flag_meanings", np.int8),
 }
 
 
@@ -234,35 +225,21 @@ class Result:
 
     def dataset(self) -> xr.Dataset:
         """The result with names, units and provenance."""
-        import xarray as xr
-
         mechanism = self.system.mechanism
         self.arrays["smallest_clearance"] = np.array(self.clearance[0])
         self.arrays["largest_share"] = np.array(self.share[0])
-        variables = {
-            name: xr.Variable(one.dims, self.arrays[name], {"units": one.units, "long_name": one.long_name})
-            for name, one in FIGURES.items()
-        }
-        coordinates: dict[str, Any] = {
-            dim: (dim, np.asarray(names, dtype=str)) for dim, names in labels(self.system).items()
-        }
-        coordinates["time"] = ("position", self.time, {"units": "s", "long_name": "time"})
-        units = ["rad" if self.system.turns(name) else "m" for name in mechanism.drivers]
-        attributes: dict[str, str | int] = {
-            "name": mechanism.name,
-            "formula": self.system.plan.formula,
-            "assembling": self.of,
-            "summary": json.dumps(self.summary(), ensure_ascii=False),
-            "findings": json.dumps([finding_row(one) for one in self.findings], ensure_ascii=False),
-            "coordinate_units": json.dumps(units),
-            "periodic": int(self.system.cycle(self.values).periodic),
-            "model_hash": mechanism.digest,
-            "trunnion_version": __version__,
-            "references": "\n".join([SOURCE, *mechanism.references]),
-            "flag_values": " ".join(str(int(code)) for code in Fit),
-            "flag_meanings": " ".join(code.name.lower() for code in Fit),
-        }
-        return xr.Dataset(variables, coordinates, attributes)
+        attributes = origin(
+            mechanism,
+            self.system.plan.formula,
+            assembling=self.of,
+            summary=self.summary(),
+            findings=finding_rows(self.findings),
+            coordinate_units=["rad" if self.system.turns(name) else "m" for name in mechanism.drivers],
+            periodic=int(self.system.cycle(self.values).periodic),
+        ) | cited([SOURCE, *mechanism.references], Fit)
+        time = described({"time": self.time}, {"time": replace(TIME, long_name="time")})
+        variables = described({name: self.arrays[name] for name in FIGURES}, FIGURES)
+        return dataset_of(variables, labels(self.system), attributes, time)
 
 
 def _row(label: str, value: float | str | None, unit: str) -> dict[str, Any]:

@@ -2,40 +2,31 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
-from trunnion.cycle.account import finding_row, references
+from trunnion.cycle.account import references
 from trunnion.errors import Finding, Severity, Status
 from trunnion.measures.measures import Measure
+from trunnion.results.attributes import cited, finding_rows, origin
+from trunnion.results.dataset import Variable, dataset_of, described, driven
 from trunnion.solve.shifts import Play
-from trunnion.version import __version__
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from trunnion.solve.run import Run
 
-__all__ = ["VARIABLES", "Variable", "dataset", "relied_on"]
+__all__ = ["VARIABLES", "dataset", "relied_on"]
 
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class Variable:
-    """Dimensions, unit (empty: that of each measure, in the attribute `measure_units`) and long name of a result."""
-
-    dims: tuple[str, ...]
-    units: str
-    long_name: str
-
-
+# unit empty: that of each measure, in the attribute `measure_units`
 OVER = ("measure", "position")
 BY_JOINT = ("measure", "joint", "position")
 VARIABLES: dict[str, Variable] = {
@@ -46,10 +37,10 @@ VARIABLES: dict[str, Variable] = {
     "rss": Variable(OVER, "", "root of the sum of the squares of the joints' worst cases"),
     "deviation_total": Variable(OVER, "", "standard deviation by the play of all joints, independent of one another"),
     "sensitivity": Variable(
-        ("measure", "joint", "end", "axis", "position"), "", "change of the measure for an offset of 1 m at an end"
+        ("measure", "joint", "end", "axis", "position"), "/m", "change of the measure for an offset of 1 m at an end"
     ),
     "radius": Variable(("joint", "end"), "m", "how far the pin can go from the middle at an end"),
-    "status": Variable(("position",), "1", "code of the position's status; see the attribute flag_meanings"),
+    "status": Variable(("position",), "1", "code of the position's status; see the attribute flag_meanings", np.int8),
 }
 
 
@@ -79,9 +70,7 @@ class Found(Protocol):
 
 
 def dataset(found: Found, findings: Sequence[Finding]) -> xr.Dataset:
-    """The arrays as an xarray Dataset with coordinates, units, long names and attributes."""
-    import xarray as xr
-
+    """The arrays with all that is said of them."""
     system, mechanism = found.run.system, found.run.system.mechanism
     ends = found.loads.shape[2]
     arrays: dict[str, Array | NDArray[np.int8]] = {
@@ -96,63 +85,38 @@ def dataset(found: Found, findings: Sequence[Finding]) -> xr.Dataset:
         "status": found.status,
     }
     units = [measure.unit(system) for measure in found.measures]
-    variables = {
-        name: xr.Variable(one.dims, arrays[name], {"long_name": one.long_name, **_unit(one, units)})
-        for name, one in VARIABLES.items()
-    }
-    coordinates = {
+    same = units[0] if len(set(units)) == 1 else ""
+    variables = described(arrays, VARIABLES, {"": same, "/m": f"{same}/m" if same else ""})
+    labels = {
         "measure": [measure.name for measure in found.measures],
         "joint": list(found.plays),
         "end": [str(k + 1) for k in range(ends)],
         "axis": ["x", "y", "z"],
     }
     dial = system.dial(found.run.values, found.time)
-    attributes: dict[str, str | int] = {
-        "name": mechanism.name,
-        "formula": system.plan.formula,
-        "model_hash": mechanism.digest,
-        "trunnion_version": __version__,
-        "references": "\n".join(references(mechanism)),
-        "flag_values": " ".join(str(int(code)) for code in Status),
-        "flag_meanings": " ".join(code.name.lower() for code in Status),
-        "measure_units": json.dumps(units),
-        "limits": json.dumps([measure.limit for measure in found.measures]),
+    attributes = {
+        **origin(mechanism, system.plan.formula),
+        **cited(references(mechanism)),
+        "measure_units": units,
+        "limits": [measure.limit for measure in found.measures],
         "drive": dial.of,
         "drive_unit": dial.unit.strip(),
         "periodic": int(found.run.cycle.periodic),
-        "summary": json.dumps(_summary(found, units, dial), ensure_ascii=False),
-        "findings": json.dumps([finding_row(finding) for finding in findings], ensure_ascii=False),
-        "missed": json.dumps(
-            [
-                f"{one.where}: {one.what}"
-                for one in findings
-                if one.where.endswith(".limit") and one.severity is Severity.ERROR
-            ],
-            ensure_ascii=False,
-        ),
+        "summary": _summary(found, units, dial),
+        "findings": finding_rows(findings),
+        "missed": [
+            f"{one.where}: {one.what}"
+            for one in findings
+            if one.where.endswith(".limit") and one.severity is Severity.ERROR
+        ],
     }
-    told = {dim: (dim, np.asarray(names, dtype=str)) for dim, names in coordinates.items()}
-    times = xr.Variable("position", found.time, {"units": "s", "long_name": "time from the start of the cycle"})
-    over = xr.Variable(
-        "position",
-        np.asarray(dial.values, float),
-        {"units": dial.unit.strip(), "long_name": f"coordinate of {dial.of}" if dial.of else "time"},
-    )
-    return xr.Dataset(variables, {**told, "time": times, "drive": over}, attributes)
+    return dataset_of(variables, labels, attributes, driven(found.time, *dial))
 
 
 def relied_on(numbers: Array, status: NDArray[np.int8]) -> Array:
     """The numbers, (…, position), NaN close to dead centres, where first order says little; all if all are close."""
     near = status >= Status.NEAR_SINGULAR
     return numbers if np.all(near) else np.where(near, np.nan, numbers)
-
-
-def _unit(variable: Variable, units: Sequence[str]) -> dict[str, str]:
-    """The unit, if it is one for all measures."""
-    if variable.units:
-        return {"units": variable.units}
-    same = units[0] if len(set(units)) == 1 else ""
-    return {"units": f"{same}/m" if same and "end" in variable.dims else same}
 
 
 def _radii(plays: Mapping[str, Play], ends: int) -> Array:

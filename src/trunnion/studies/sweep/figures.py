@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,47 +11,39 @@ from numpy.typing import NDArray
 from trunnion.cycle.account import sound_positions
 from trunnion.cycle.means import Means
 from trunnion.errors import Status
+from trunnion.results.dataset import Variable
 from trunnion.solve.system import System
 
-__all__ = ["FIGURES", "INTEGERS", "Figure", "Reduced", "reduced"]
+__all__ = ["FIGURES", "Reduced", "reduced"]
 
 Arrays = Mapping[str, NDArray[Any]]
 
 
-@dataclass(frozen=True)
-class Figure:
-    """A number of a cycle: dimensions before the swept names, unit, long name; part: "errors" of those that only
-    mechanisms with errors have, "margin" of the one that is looked for only if asked.
-    """
-
-    dims: tuple[str, ...]
-    units: str
-    long_name: str
-    part: str = ""
-
-
-FIGURES: dict[str, Figure] = {
-    "efficiency": Figure((), "1", "useful work over drive work of the cycle"),
-    "efficiency_error": Figure((), "1", "how far the errors of its integrals may have moved the efficiency"),
-    "efficiency_ideal": Figure((), "1", "efficiency of the mechanism without errors", "errors"),
-    "drive_effort_min": Figure(("driver",), "N m", "least drive effort"),
-    "drive_effort_max": Figure(("driver",), "N m", "largest drive effort"),
-    "drive_effort_rms": Figure(("driver",), "N m", "root mean square of the drive effort"),
-    "drive_power_mean": Figure((), "W", "mean power of all drivers"),
-    "useful_power_mean": Figure((), "W", "mean power taken by the useful loads"),
-    "friction_power_mean": Figure((), "W", "mean power lost to friction"),
-    "reaction_max": Figure(("joint",), "N", "largest reaction"),
-    "transmission_error_max": Figure(
-        ("joint",), "rad", "largest error of the joint's rotation, of a prismatic joint its slide", "errors"
+# dims before the swept names; part: "errors" of those that only mechanisms with errors have, "margin" of the one that
+# is looked for only if asked
+FIGURES: dict[str, Variable] = {
+    "efficiency": Variable((), "1", "useful work over drive work of the cycle"),
+    "efficiency_error": Variable((), "1", "how far the errors of its integrals may have moved the efficiency"),
+    "efficiency_ideal": Variable((), "1", "efficiency of the mechanism without errors", part="errors"),
+    "drive_effort_min": Variable(("driver",), "N m", "least drive effort"),
+    "drive_effort_max": Variable(("driver",), "N m", "largest drive effort"),
+    "drive_effort_rms": Variable(("driver",), "N m", "root mean square of the drive effort"),
+    "drive_power_mean": Variable((), "W", "mean power of all drivers"),
+    "useful_power_mean": Variable((), "W", "mean power taken by the useful loads"),
+    "friction_power_mean": Variable((), "W", "mean power lost to friction"),
+    "reaction_max": Variable(("joint",), "N", "largest reaction"),
+    "transmission_error_max": Variable(
+        ("joint",), "rad", "largest error of the joint's rotation, of a prismatic joint its slide", part="errors"
     ),
-    "locking_margin": Figure(
-        (), "1", "least multiple of the friction at which a position locks, ∞ if beyond 10", "margin"
+    "locking_margin": Variable(
+        (), "1", "least multiple of the friction at which a position locks, ∞ if beyond 10", part="margin"
     ),
-    "without_answer": Figure((), "1", "positions without an answer"),
-    "not_valid": Figure((), "1", "positions at which a pin loses contact, left out of the figures", "errors"),
-    "status": Figure((), "1", "code of the gravest status of a position; see the attribute flag_meanings"),
+    "without_answer": Variable((), "1", "positions without an answer", np.int32),
+    "not_valid": Variable(
+        (), "1", "positions at which a pin loses contact, left out of the figures", np.int32, part="errors"
+    ),
+    "status": Variable((), "1", "code of the gravest status of a position; see the attribute flag_meanings", np.int8),
 }
-INTEGERS = {"status": np.int8, "without_answer": np.int32, "not_valid": np.int32}
 Reduced = dict[str, Any]
 
 

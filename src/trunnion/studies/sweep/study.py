@@ -7,7 +7,6 @@ of the cycle but its status, and the efficiency of the ideal mechanism if that h
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -15,20 +14,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.cycle.account import effort_units, finding_row, references
+from trunnion.cycle.account import effort_units, references
 from trunnion.errors import Finding, Severity, Status, agreeing, counted
 from trunnion.model.mechanism import Mechanism
+from trunnion.results.attributes import cited, encoded, finding_rows, origin
+from trunnion.results.dataset import Variable, dataset_of, described
 from trunnion.solve.friction_method import FrictionMethod
-from trunnion.studies.sweep.figures import FIGURES, INTEGERS, Figure
+from trunnion.studies.sweep.figures import FIGURES
 from trunnion.studies.sweep.grid import MOST_POINTS, Over, Swept, grid, say
 from trunnion.studies.sweep.measures import left_out, measures_of
 from trunnion.studies.sweep.points import Points
-from trunnion.version import __version__
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["FIGURES", "MOST_POINTS", "Figure", "Swept", "sweep"]
+__all__ = ["FIGURES", "MOST_POINTS", "Swept", "sweep"]
 
 
 @np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
@@ -60,11 +60,12 @@ def sweep(
         "driver": list(mechanism.drivers),
         "joint": list(mechanism.effective_joints),
     }
+    sizes = {dim: len(names) for dim, names in labels.items()} | {one.name: len(one.values) for one in points.swept}
     arrays = {
-        name: np.full((*(len(labels[dim]) for dim in one.dims), *points.shape), 0 if name in INTEGERS else np.nan,
-                      INTEGERS.get(name, np.float64))
-        for name, one in FIGURES.items() if margin or one.part != "margin"
-    }  # fmt: skip
+        name: one.over(*(swept.name for swept in points.swept)).blank(sizes)
+        for name, one in FIGURES.items()
+        if margin or one.part != "margin"
+    }
     watched = {one.name: one for one in measures_of(points.run, measures)} if measures else {}
     arrays |= {name: np.full(points.shape, np.nan) for name in watched}
     for done, (index, told) in enumerate(points.solved(), 1):
@@ -80,7 +81,7 @@ def sweep(
     for name in of_errors:
         arrays.pop(name, None)
     figures = FIGURES | {
-        name: Figure((), one.figure_unit(points.run.system, points.run.values), f"measure {name}")
+        name: Variable((), one.figure_unit(points.run.system, points.run.values), f"measure {name}")
         for name, one in watched.items()
     }
     return _dataset(points, labels, arrays, found, figures)
@@ -125,39 +126,23 @@ def _dataset(
     labels: Mapping[str, Sequence[str]],
     arrays: Mapping[str, NDArray[Any]],
     findings: Sequence[Finding],
-    figures: Mapping[str, Figure],
+    figures: Mapping[str, Variable],
 ) -> xr.Dataset:
-    import xarray as xr
-
     mechanism, run, swept = points.mechanism, points.run, points.swept
-    names = tuple(one.name for one in swept)
-    variables = {
-        name: xr.Variable((*figures[name].dims, *names), array,
-                          {"units": figures[name].units, "long_name": figures[name].long_name})
-        for name, array in arrays.items()
-    }  # fmt: skip
+    names = [one.name for one in swept]
+    variables = described(arrays, {name: one.over(*names) for name, one in figures.items()})
     if "transmission_error_max" in variables:
         units = ["m" if kind == "prismatic" else "rad" for kind, _ in run.system.joints.values()]
-        variables["transmission_error_max"].attrs["member_units"] = json.dumps(units)
-    coordinates = {
-        one.name: xr.Variable(one.name, one.values, {
-            "units": one.unit, "long_name": one.path, "written_unit": one.written, "written_factor": one.factor,
-        })
-        for one in swept
-    }  # fmt: skip
-    told = {dim: (dim, np.asarray(members, dtype=str)) for dim, members in labels.items()}
-    attributes: dict[str, str | int] = {
-        "name": mechanism.name,
-        "formula": run.system.plan.formula,
-        "swept": json.dumps(names, ensure_ascii=False),
-        "steps": points.steps,
-        "model_hash": mechanism.digest,
-        "trunnion_version": __version__,
+        variables["transmission_error_max"].attrs |= encoded({"member_units": units})
+    along: dict[str, xr.Variable] = {}
+    for one in swept:
+        along |= described({one.name: one.values}, {one.name: Variable((one.name,), one.unit, one.path)})
+        along[one.name].attrs |= {"written_unit": one.written, "written_factor": one.factor}
+    attributes = {
+        **origin(mechanism, run.system.plan.formula, swept=names, steps=points.steps),
         "method": points.method.name,
-        "references": "\n".join(references(mechanism)),
-        "flag_values": " ".join(str(int(code)) for code in Status),
-        "flag_meanings": " ".join(code.name.lower() for code in Status),
-        "driver_units": json.dumps(effort_units(run.system)),
-        "findings": json.dumps([finding_row(finding) for finding in findings], ensure_ascii=False),
+        **cited(references(mechanism)),
+        "driver_units": effort_units(run.system),
+        "findings": finding_rows(findings),
     }
-    return xr.Dataset(variables, {**told, **coordinates}, attributes)
+    return dataset_of(variables, labels, attributes, along)

@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.cycle.account import finding_row, references
+from trunnion.cycle.account import references
 from trunnion.errors import Finding, Status
 from trunnion.measures.figures import moment
 from trunnion.model.parameters import dimension_kinds
+from trunnion.results.attributes import cited, finding_rows, origin
+from trunnion.results.dataset import Variable, dataset_of, described, driven
 from trunnion.studies.tolerance.first_order import Study
 from trunnion.studies.tolerance.said import findings_of, summary
 from trunnion.studies.tolerance.sampled import QUANTILES, sampled
 from trunnion.studies.tolerance.targets import MISSED
 from trunnion.studies.tolerance.words import course_text, text_of
-from trunnion.version import __version__
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -28,25 +27,14 @@ if TYPE_CHECKING:
 
 from trunnion.studies.tolerance.outcome import Outcome
 
-__all__ = ["VARIABLES", "Variable", "dataset"]
+__all__ = ["VARIABLES", "dataset"]
 
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class Variable:
-    """Dimensions, unit and long name of a result.
-
-    Unit empty: that of each measure, in the attribute `measure_units`; "parameter": that of each parameter, in
-    `parameter_units`; "ratio": measure over parameter; "course": that of each course, in `curve_units`; "course ratio":
-    course over parameter; "drive": deg, mm or s, as `drive_unit` says.
-    """
-
-    dims: tuple[str, ...]
-    units: str
-    long_name: str
-
-
+# units: empty: that of each measure, in the attribute `measure_units`; "parameter": that of each parameter, in
+# `parameter_units`; "ratio": measure over parameter; "course": that of each course, in `curve_units`; "course ratio":
+# course over parameter; "drive": deg, mm or s, as `drive_unit` says
 M, P, MP, MPOS = ("measure",), ("parameter",), ("measure", "parameter"), ("measure", "position")
 VARIABLES: dict[str, Variable] = {
     "nominal": Variable(M, "", "figure of the nominal mechanism"),
@@ -127,13 +115,11 @@ VARIABLES: dict[str, Variable] = {
 
 
 def dataset(outcome: Outcome, told: Sequence[Finding]) -> xr.Dataset:
-    """The numbers of all methods as an xarray Dataset with coordinates, units, long names and attributes."""
-    import xarray as xr
-
+    """The numbers of all methods with all that is said of them."""
     found = outcome.study
     system, mechanism = found.run.system, found.run.system.mechanism
     counted = None if outcome.tally is None or outcome.job is None else sampled(outcome.job, outcome.tally, found)
-    stated = [finding_row(finding) for finding in [*findings_of(outcome, counted), *told]]
+    stated = [*findings_of(outcome, counted), *told]
     arrays = {**_linear(found), **_worst(outcome), **(counted.arrays if counted else {}), **_shares(outcome)}
     units = [measure.figure_unit(system, found.run.values) for measure in found.measures]
     curve_units = [measure.unit(system) for measure in found.measures]
@@ -141,60 +127,46 @@ def dataset(outcome: Outcome, told: Sequence[Finding]) -> xr.Dataset:
     kinds = {**mechanism.parameter_kinds(), **dimensions}
     parameter_units = [kinds[name].unit if name in kinds else "m" for name in found.inputs.names]
     dial = system.dial(found.run.values, found.plan.times)
-    known = _units(units, curve_units, parameter_units, dial.unit)
-    variables = {
-        name: xr.Variable(of.dims, array, {"long_name": of.long_name, "units": known.get(of.units, of.units)})
-        for (name, array), of in zip(arrays.items(), map(VARIABLES.__getitem__, arrays), strict=True)
-    }
+    variables = described(arrays, VARIABLES, _units(units, curve_units, parameter_units, dial.unit))
     used = {dim for name in variables for dim in VARIABLES[name].dims}
-    coordinates: dict[str, Any] = {
+    labels = {
         "measure": [measure.name for measure in found.measures],
         "parameter": found.inputs.names,
         "cause": [*(code.text for code in Status), "the figure does not exist"],
     }
-    told_of = {dim: (dim, np.asarray(names, str)) for dim, names in coordinates.items() if dim in used}
-    if "quantile" in used:
-        told_of["quantile"] = ("quantile", np.array(QUANTILES))
-    times = xr.Variable("position", found.plan.times, {"units": "s", "long_name": "time from the start of the cycle"})
-    name = f"coordinate of {dial.of}" if dial.of else "time"
-    over = xr.Variable("position", np.asarray(dial.values, float), {"units": dial.unit.strip(), "long_name": name})
+    labels = {dim: names for dim, names in labels.items() if dim in used}
+    quantiles = {"quantile": ("quantile", np.array(QUANTILES))} if "quantile" in used else {}
     attributes: dict[str, Any] = {
-        "name": mechanism.name,
-        "formula": system.plan.formula,
-        "model_hash": mechanism.digest,
-        "trunnion_version": __version__,
-        "references": "\n".join(references(mechanism)),
-        "flag_values": " ".join(str(int(code)) for code in Status),
-        "flag_meanings": " ".join(code.name.lower() for code in Status),
-        "methods": json.dumps(outcome.methods),
+        **origin(mechanism, system.plan.formula),
+        **cited(references(mechanism)),
+        "methods": outcome.methods,
         "sampling": outcome.job.method if outcome.job else "",
         "engine": outcome.job.engine if outcome.job else "numpy",
         "seed": outcome.job.seed if outcome.job else -1,
         **_of_measures(found, units, curve_units),
-        "parameter_units": json.dumps(parameter_units),
-        "distributions": json.dumps(
-            [*(one.distribution for one in found.inputs.tolerances), *("play" for _ in found.inputs.loose)]
-        ),
+        "parameter_units": parameter_units,
+        "distributions": [
+            *(one.distribution for one in found.inputs.tolerances),
+            *("play" for _ in found.inputs.loose),
+        ],
         "correlated": int(found.effects.correlated),
         "drive": dial.of,
         "drive_unit": dial.unit.strip(),
         "periodic": int(found.run.cycle.periodic),
         "steps": found.steps,
         "stopped": int(outcome.stopped),
-        "summary": json.dumps(summary(outcome, counted, units, dial), ensure_ascii=False),
-        "findings": json.dumps(stated, ensure_ascii=False),
-        "missed": json.dumps(
-            [f"{row['where']}: {row['what']}" for row in stated if row["what"].startswith(MISSED)], ensure_ascii=False
-        ),
+        "summary": summary(outcome, counted, units, dial),
+        "findings": finding_rows(stated),
+        "missed": [f"{one.where}: {one.what}" for one in stated if one.what.startswith(MISSED)],
     }
-    return xr.Dataset(variables, {**told_of, "time": times, "drive": over}, attributes)
+    return dataset_of(variables, labels, attributes, {**quantiles, **driven(found.plan.times, *dial)})
 
 
-def _of_measures(found: Study, units: Sequence[str], curve_units: Sequence[str]) -> dict[str, str]:
+def _of_measures(found: Study, units: Sequence[str], curve_units: Sequence[str]) -> dict[str, list[Any]]:
     """Attributes that are a list each, an entry for each measure."""
     system, measures = found.run.system, found.measures
     limits = [None if (one.lower, one.upper) == (None, None) else [one.lower, one.upper] for one in measures]
-    told: dict[str, list[Any]] = {
+    return {
         "measure_units": list(units),
         "measure_texts": [text_of(one, system) for one in measures],
         "measure_rules": [one.rule for one in measures],
@@ -203,7 +175,6 @@ def _of_measures(found: Study, units: Sequence[str], curve_units: Sequence[str])
         "limits": limits,
         "bounds": [[one.at_least, one.at_most] for one in measures],
     }
-    return {key: json.dumps(entries, ensure_ascii=False) for key, entries in told.items()}
 
 
 def _units(own: Sequence[str], courses: Sequence[str], parameters: Sequence[str], drive: str) -> dict[str, str]:

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from trunnion.errors import Finding, MechanismError
+from trunnion.results.attributes import attribute
 from trunnion.statistics.costs import Cost
 from trunnion.views.allocation.cost import Offer, Price, tolerance_cost, trade_off
-from trunnion.views.common.cycle import attribute, names
+from trunnion.views.common.cycle import names
 from trunnion.views.tolerance.figure import KINDS as OF_TOLERANCES
 from trunnion.views.tolerance.figure import figure as tolerance_figure
 from trunnion.views.tolerance.report import Section
@@ -60,11 +61,11 @@ def headed(result: xr.Dataset) -> str:
 def bought(result: xr.Dataset) -> Table:
     """Each tolerance that has a cost: what it is to be, what it costs, and what it was."""
     rows = []
-    units = attribute(result, "parameter_units", [])
+    units = attribute(result, "parameter_units")
     paths, choices = names(result, "parameter"), [str(one) for one in result["choice"].values]
     keys = ("bought", "tolerance", "cost", "cost_share", "tolerance_before", "cost_before")
     columns = {key: np.asarray(result[key].values, float) for key in keys}
-    groups = {str(one["path"]): str(one["group"]) for one in attribute(result, "prices", [])}
+    groups = {str(one["path"]): str(one["group"]) for one in attribute(result, "prices")}
     for j in np.flatnonzero(columns["bought"]):
         t, cost, part, was, paid = (float(columns[key][j]) for key in keys[1:])
         sign = "" if _is_play(paths[j]) else "±"
@@ -182,10 +183,10 @@ def _limit(result: xr.Dataset) -> tuple[str, float, str] | None:
 
 def prices(result: xr.Dataset) -> list[Price]:
     """What each tolerance with a cost would cost at other half widths."""
-    units = dict(zip(names(result, "parameter"), attribute(result, "parameter_units", []), strict=True))
+    units = dict(zip(names(result, "parameter"), attribute(result, "parameter_units"), strict=True))
     place = {name: j for j, name in enumerate(names(result, "parameter"))}
     found = []
-    for one in attribute(result, "prices", []):
+    for one in attribute(result, "prices"):
         path = str(one["path"])
         t, cost = (float(result[key].values[place[path]]) for key in ("tolerance", "cost"))
         made = tuple((str(each["name"]), float(each["tolerance"]), float(each["cost"])) for each in one["choices"])

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from trunnion.results.attributes import attribute
 from trunnion.views.common.cycle import Abscissa, Array, column, names
 from trunnion.views.common.figures import INK, MUTED, PALETTE, SHADE, along, curve, legend, new, style_of
 from trunnion.views.common.lettering import plain
@@ -52,7 +52,7 @@ def _over(result: xr.Dataset) -> Abscissa:
     """The coordinate of the only driver if it runs one way, else time."""
     drivers, time = names(result, "driver"), np.asarray(result["time"].values, float)
     if len(drivers) == 1:
-        unit = json.loads(result.attrs["coordinate_units"])[0]
+        unit = attribute(result, "coordinate_units")[0]
         values = np.asarray(result["drive_coordinate"].values[0], float)
         steps = np.diff(values)
         if np.all(steps > 0) or np.all(steps < 0):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -10,13 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.errors import Status
+from trunnion.results.attributes import attribute
 from trunnion.views.common.quantities import prefixed
 
 if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
-    "Abscissa", "Interval", "abscissa", "attribute", "intervals", "layout", "mean_friction", "numbers", "series",
+    "Abscissa", "Interval", "abscissa", "intervals", "layout", "mean_friction", "numbers", "series",
     "status_text", "thin", "valid",
 ]  # fmt: skip
 
@@ -63,15 +63,9 @@ class Interval:
         return status_text(self.status)
 
 
-def attribute(result: xr.Dataset, name: str, default: Any) -> Any:
-    """A JSON attribute of the result, `default` if it is absent or empty."""
-    text = result.attrs.get(name, "")
-    return json.loads(text) if text else default
-
-
 def layout(result: xr.Dataset) -> dict[str, Any]:
     """The mechanism as a small dict: ground, links with points, joints with links, loads."""
-    stated: dict[str, Any] = attribute(result, "scene", {})
+    stated: dict[str, Any] = attribute(result, "scene", "{}")
     return {"ground": "", "links": {}, "joints": {}, "loads": {}, "springs": {}, "gears": {}} | stated
 
 

@@ -9,8 +9,9 @@ import numpy as np
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.names import nearest
+from trunnion.results.attributes import attribute
 from trunnion.rig.compare.judge import Verdict
-from trunnion.views.common.cycle import Abscissa, Array, attribute, names
+from trunnion.views.common.cycle import Abscissa, Array, names
 from trunnion.views.common.quantities import number, prefixed
 from trunnion.views.sweep.swept import Scale
 
@@ -39,7 +40,7 @@ TRIFLE = 0.005  # of a number: less is no change of a setting
 
 def units(result: xr.Dataset) -> list[str]:
     """SI unit of every channel."""
-    return [str(unit) for unit in attribute(result, "channel_units", [])]
+    return [str(unit) for unit in attribute(result, "channel_units")]
 
 
 def verdict(result: xr.Dataset, channel: int, condition: int) -> Verdict:
@@ -50,7 +51,7 @@ def verdict(result: xr.Dataset, channel: int, condition: int) -> Verdict:
 
 def sets(result: xr.Dataset) -> list[Scale]:
     """The numbers that were set, over the conditions, in the units that the model states them in."""
-    written = attribute(result, "set_written", [])
+    written = attribute(result, "set_written")
     found = []
     for i, name in enumerate(names(result, "set")):
         unit, factor = written[i]

@@ -13,13 +13,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from trunnion.results.attributes import attribute
 from trunnion.views.common.bundle import web_text
-from trunnion.views.common.cycle import attribute, names
+from trunnion.views.common.cycle import names
 from trunnion.views.compare.compared import label, units
 from trunnion.views.compare.figure import efficiency, panels, small
 from trunnion.views.compare.notes import definitions
 from trunnion.views.compare.tables import conditions, efficiencies, files, headline, results, sensors, verdicts
-from trunnion.views.cycle.report import hashed, inputs_of
+from trunnion.views.cycle.report import inputs_of, said
 from trunnion.views.tolerance.report import source, template
 
 if TYPE_CHECKING:
@@ -35,24 +36,19 @@ def report(result: xr.Dataset) -> str:
     from markupsafe import Markup  # with jinja2 only needed here, and slow to import
 
     style = web_text("report.css") + web_text("tolerance.css") + web_text("compare.css")
-    found = attribute(result, "findings", [])
     table = efficiencies(result)
     context: dict[str, Any] = {
         "name": str(result.attrs["comparing"]) or "Measurement", "model": str(result.attrs["name"]) or "model",
         "formula": str(result.attrs["formula"]), "facts": _facts(result), "summary": headline(result),
-        "findings": [row for row in found if row["severity"] != "note"],
-        "notes": [row for row in found if row["severity"] == "note"],
-        "data_findings": [_of_file(row) for row in attribute(result, "data_findings", [])],
+        "data_findings": [_of_file(row) for row in attribute(result, "data_findings")],
         "efficiency": table,
         "picture": _picture("Measured and modelled efficiency", efficiency(result)) if table else None,
         "verdicts": verdicts(result), "conditions": conditions(result), "sensors": sensors(result),
-        "files": files(result), "done": attribute(result, "done", []),
+        "files": files(result), "done": attribute(result, "done"),
         "channels": [_channel(result, i, name) for i, name in enumerate(names(result, "channel"))],
         "definitions": [(term, Markup(_lowered(text))) for term, text in definitions(result)],
         "inputs": inputs_of(result),
-        "references": [line for line in str(result.attrs.get("references", "")).splitlines() if line.strip()],
-        "version": result.attrs.get("trunnion_version", ""), "model_hash": result.attrs.get("model_hash", ""),
-        "style": Markup(style), "style_hash": hashed(style),
+        **said(result, style),
     }  # fmt: skip
     return template("compare.html.j2").render(context)
 
@@ -86,7 +82,7 @@ def _channel(result: xr.Dataset, channel: int, name: str) -> dict[str, Any]:
         worst = {k: _severity(result, channel, k) for k in there}
         shown = sorted(sorted(there, key=lambda k: -worst[k])[:MOST_DRAWN])
     unit = units(result)[channel]
-    about = [f"measures {attribute(result, 'channel_measures', [])[channel]}{f', {unit}' if unit != '1' else ''}"]
+    about = [f"measures {attribute(result, 'channel_measures')[channel]}{f', {unit}' if unit != '1' else ''}"]
     if len(shown) < len(there):
         about.append(
             f"{len(shown)} of {len(there)} conditions are drawn, those with the largest residuals for their uncertainty"

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from trunnion.results.attributes import attribute
 from trunnion.rig.compare.judge import Verdict
-from trunnion.views.common.cycle import Array, attribute, names
+from trunnion.views.common.cycle import Array, names
 from trunnion.views.common.quantities import number, prefixed
 from trunnion.views.compare.compared import coverage_of, scale_of, sets, setting, text, units, verdict
 from trunnion.views.rig.conditions import shortened
@@ -120,7 +121,7 @@ def _plain(value: float) -> str:
 
 def conditions(result: xr.Dataset) -> Table:
     """What was set in every condition, in how many turns it was measured, and where the data are."""
-    told, held = sets(result), attribute(result, "condition_files", [])
+    told, held = sets(result), attribute(result, "condition_files")
     rows = []
     for k, name in enumerate(names(result, "condition")):
         values = [setting(one.values[k], one.unit) if np.isfinite(one.values[k]) else NONE for one in told]
@@ -133,7 +134,7 @@ def conditions(result: xr.Dataset) -> Table:
 
 def sensors(result: xr.Dataset) -> Table:
     """What each channel measures, with the standard uncertainties of its zero and gain."""
-    measures = attribute(result, "channel_measures", [])
+    measures = attribute(result, "channel_measures")
     rows = []
     for i, (name, unit) in enumerate(zip(names(result, "channel"), units(result), strict=True)):
         zero, gain = (_spread(result[f"accuracy_{what}"].values[i]) for what in ("zero", "gain"))
@@ -155,7 +156,7 @@ def _spread(values: Array) -> list[float]:
 
 def files(result: xr.Dataset, key: str = "files") -> Table | None:
     """The files of the data with their size and hash; None if none is known. key: of the attribute that has them."""
-    held = attribute(result, key, [])
+    held = attribute(result, key)
     rows = [
         [
             row["file"],

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from trunnion.views.common.cycle import Abscissa, Array, abscissa, attribute, column, mean_friction, names, valid
+from trunnion.results.attributes import attribute
+from trunnion.views.common.cycle import Abscissa, Array, abscissa, column, mean_friction, names, valid
 from trunnion.views.common.quantities import number, quantity
 from trunnion.views.cycle.as_built import angle_scale, losses, outputs, worst_points
 
@@ -32,7 +33,7 @@ def error_rows(result: xr.Dataset) -> list[Row]:
         _error(f"Transmission error, {one.label}, largest", valid(result, one.error), one.unit, over)
         for one in outputs(result)
     ]
-    units = attribute(result, "driver_units", [])
+    units = attribute(result, "driver_units")
     for index, driver in enumerate(names(result, "driver")):
         unit = units[index] if index < len(units) else "N m"
         noun = "force" if unit == "N" else "torque"

@@ -16,11 +16,11 @@ from matplotlib.lines import Line2D
 
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.files import whole
+from trunnion.results.attributes import attribute
 from trunnion.views.common.cycle import (
     Abscissa,
     Array,
     abscissa,
-    attribute,
     column,
     layout,
     mean_friction,
@@ -73,7 +73,7 @@ FREE: dict[str, Any] = {"color": INK, "linewidth": 0.9, "linestyle": (0, (3, 2))
 def torque(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
     """Drive effort over the drive, one panel a driver; without friction dashed, its interval at zero slip as a band."""
     over, drivers = abscissa(result), names(result, "driver")
-    units = attribute(result, "driver_units", ["N m"] * len(drivers))
+    units = attribute(result, "driver_units") or ["N m"] * len(drivers)
     title = (
         "Drive force" if units and set(units) == {"N"} else "Drive torque" if set(units) == {"N m"} else "Drive effort"
     )

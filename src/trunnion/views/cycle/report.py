@@ -11,6 +11,7 @@ import base64
 import hashlib
 import json
 import re
+from collections.abc import Sequence
 from functools import cache
 from itertools import groupby
 from operator import itemgetter
@@ -18,8 +19,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from trunnion.results.attributes import attribute, summary_of
 from trunnion.views.common.bundle import bundle, web_text
-from trunnion.views.common.cycle import abscissa, attribute, column, intervals, names
+from trunnion.views.common.cycle import abscissa, column, intervals, names
 from trunnion.views.common.quantities import number, quantity
 from trunnion.views.cycle.built_tables import error_rows, loss_rows
 from trunnion.views.cycle.scene import scene
@@ -28,7 +30,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from jinja2 import Template
 
-__all__ = ["embedded", "hashed", "inputs_of", "report"]
+__all__ = ["embedded", "hashed", "inputs_of", "report", "said"]
 
 # A label of the summary: the subject with its unit in words, which of its figures, or in brackets why it is so.
 ASPECT = re.compile(
@@ -52,21 +54,17 @@ def report(result: xr.Dataset, ideal: xr.Dataset | None = None) -> str:
 
     shown = scene(result, ideal)
     style, script = web_text("report.css"), bundle("report.js")
-    runs, found = intervals(result), _findings(result)
+    runs = intervals(result)
     context = {
         "name": shown["name"] or "Mechanism", "formula": shown["formula"], "compared": ideal is not None,
         "spatial": shown.get("space") == "spatial",
         "positions": result.sizes["position"], "thinned": _ordinal(shown), "method": result.attrs.get("method", ""),
         "unanswered": sum(run.stop - run.start for run in runs),
         "summary": _summary(result),
-        "findings": [row for row in found if row["severity"] != "note"],
-        "notes": [row for row in found if row["severity"] == "note"],
         "errors": error_rows(result), "losses": loss_rows(result),
         "seats": bool(shown["built"] and shown["built"]["seats"]),
         "balance": _balance(result), "inputs": inputs_of(result),
-        "references": [line for line in str(result.attrs.get("references", "")).splitlines() if line.strip()],
-        "version": result.attrs.get("trunnion_version", ""), "model_hash": result.attrs.get("model_hash", ""),
-        "style": Markup(style), "style_hash": hashed(style), "script": Markup(script), "script_hash": hashed(script),
+        **said(result, style, _findings(result)), "script": Markup(script), "script_hash": hashed(script),
         "scene": Markup(embedded(shown)),
     }  # fmt: skip
     return _template().render(context)
@@ -88,6 +86,22 @@ def embedded(data: Any) -> str:
     return text
 
 
+def said(result: xr.Dataset, style: str, found: Sequence[dict[str, str]] | None = None) -> dict[str, Any]:
+    """What every report says: findings, notes apart from them, and where the result comes from; with its style."""
+    from markupsafe import Markup
+
+    rows = attribute(result, "findings") if found is None else found
+    return {
+        "findings": [row for row in rows if row["severity"] != "note"],
+        "notes": [row for row in rows if row["severity"] == "note"],
+        "references": [line for line in str(result.attrs.get("references", "")).splitlines() if line.strip()],
+        "version": result.attrs.get("trunnion_version", ""),
+        "model_hash": result.attrs.get("model_hash", ""),
+        "style": Markup(style),
+        "style_hash": hashed(style),
+    }
+
+
 def hashed(text: str) -> str:
     """The text's hash as a content security policy names it."""
     return "sha256-" + base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
@@ -105,7 +119,7 @@ def _ordinal(shown: dict[str, Any]) -> str:
 def _summary(result: xr.Dataset) -> list[tuple[str, list[tuple[str, str]]]]:
     """Subjects, each with its figures and what they are: ("drive torque of A", [("9.3 kN m", "largest, at 24°")])."""
     rows = []
-    for row in attribute(result, "summary", []):
+    for row in summary_of(result):
         subject, *remarks = ASPECT.fullmatch(str(row["label"])).groups()  # type: ignore[union-attr]
         value = quantity(row["value"], str(row.get("unit") or "")) or "—"
         if "more than" in remarks:
@@ -119,7 +133,7 @@ def _summary(result: xr.Dataset) -> list[tuple[str, list[tuple[str, str]]]]:
 def _findings(result: xr.Dataset) -> list[dict[str, str]]:
     """The findings of the result; intervals without an answer, if no error among them speaks of such."""
     rows = [{key: str(row.get(key) or "") for key in ("severity", "where", "what", "remedy")}
-            for row in attribute(result, "findings", [])]  # fmt: skip
+            for row in attribute(result, "findings")]  # fmt: skip
     over = abscissa(result)
     if any(row["severity"] == "error" for row in rows):
         return rows
@@ -161,7 +175,7 @@ def _worst(label: str, values: Any, unit: str, meaning: str, over: Any) -> dict[
 
 def inputs_of(result: xr.Dataset) -> list[tuple[str, list[dict[str, str]]]]:
     """Input rows by section of the model, the first name of their path."""
-    rows = attribute(result, "inputs", [])
+    rows = attribute(result, "inputs")
     sections = []
     for section, members in groupby(rows, key=lambda row: str(row["path"]).split(".")[0]):
         lines = [{"path": str(row["path"]).removeprefix(f"{section}."), "text": _stated(row)} for row in members]

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.views.common.cycle import abscissa, attribute, column, intervals, layout, names, numbers, series
+from trunnion.results.attributes import attribute
+from trunnion.views.common.cycle import abscissa, column, intervals, layout, names, numbers, series
 from trunnion.views.common.peaks import ease
 from trunnion.views.cycle.as_built import losses
 from trunnion.views.cycle.built_scene import built
@@ -167,7 +168,7 @@ def _springs(stated: dict[str, Any], points: dict[str, Any]) -> list[dict[str, A
 
 def _drivers(result: xr.Dataset, ideal: xr.Dataset | None, stated: dict[str, Any]) -> list[dict[str, Any]]:
     """Drivers with effort (an interval where friction leaves it open), power, and effort without friction."""
-    units = attribute(result, "driver_units", [])
+    units = attribute(result, "driver_units")
     rows = []
     for index, name in enumerate(names(result, "driver")):
         values = {key: series(column(result, f"drive_{key}", driver=name))

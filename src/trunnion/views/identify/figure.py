@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.views.common.cycle import Array, attribute, names
+from trunnion.results.attributes import attribute
+from trunnion.views.common.cycle import Array, names
 from trunnion.views.common.figures import INK, MUTED, PALETTE, SHADE, dress, legend, new
 from trunnion.views.common.lettering import plain
 from trunnion.views.common.quantities import prefixed
@@ -139,7 +140,7 @@ def residuals(result: xr.Dataset) -> Figure:
 
 def _angles(result: xr.Dataset, condition: int) -> Array | None:
     """Angle of the driver at each position, °; None where it names no position."""
-    ends = attribute(result, "drive_range", [])
+    ends = attribute(result, "drive_range")
     if condition >= len(ends) or ends[condition] is None:
         return None
     first, last = ends[condition]

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from trunnion.results.attributes import attribute
 from trunnion.rig.identify.amounts import decimals, scaled
-from trunnion.views.common.cycle import Array, attribute, names
+from trunnion.views.common.cycle import Array, names
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -84,7 +85,7 @@ def percent(part: float) -> str:
 def estimates(result: xr.Dataset) -> list[Estimate]:
     """Every unknown of a result."""
     found = []
-    units, paths = attribute(result, "parameter_units", []), attribute(result, "parameter_paths", [])
+    units, paths = attribute(result, "parameter_units"), attribute(result, "parameter_paths")
     sources = names(result, "source")
     for p, name in enumerate(names(result, "parameter")):
         factor, shown = scaled(units[p])
@@ -105,7 +106,7 @@ def estimates(result: xr.Dataset) -> list[Estimate]:
 
 def channels(result: xr.Dataset) -> list[tuple[int, str, str]]:
     """Number, name and SI unit of every channel."""
-    units = attribute(result, "channel_units", [])
+    units = attribute(result, "channel_units")
     return [(i, name, str(units[i])) for i, name in enumerate(names(result, "channel"))]
 
 

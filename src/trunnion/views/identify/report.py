@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from trunnion.results.attributes import attribute
 from trunnion.views.common.bundle import web_text
-from trunnion.views.common.cycle import attribute
 from trunnion.views.common.quantities import number
 from trunnion.views.compare.tables import files
-from trunnion.views.cycle.report import hashed
+from trunnion.views.cycle.report import said
 from trunnion.views.identify.figure import figure
 from trunnion.views.identify.identified import estimates
 from trunnion.views.identify.tables import budget, correlations, estimated, fits, held_out, sensors
@@ -60,21 +60,14 @@ DEFINITIONS = (
 
 def report(result: xr.Dataset) -> str:
     """The whole report as HTML."""
-    from markupsafe import Markup  # with jinja2 only needed here, and slow to import
-
     style = web_text("report.css") + web_text("tolerance.css") + web_text("compare.css")
-    found = attribute(result, "findings", [])
     context: dict[str, Any] = {
         "name": str(result.attrs["identified"]) or "Measurement", "model": str(result.attrs["name"]) or "model",
         "formula": str(result.attrs["formula"]), "facts": _facts(result), "summary": _summary(result),
-        "findings": [row for row in found if row["severity"] != "note"],
-        "notes": [row for row in found if row["severity"] == "note"],
-        "sections": _sections(result), "done": attribute(result, "done", []),
-        "files": files(result, "data_files"), "data_findings": attribute(result, "data_findings", []),
+        "sections": _sections(result), "done": attribute(result, "done"),
+        "files": files(result, "data_files"), "data_findings": attribute(result, "data_findings"),
         "definitions": DEFINITIONS,
-        "references": [line for line in str(result.attrs.get("references", "")).splitlines() if line.strip()],
-        "version": result.attrs.get("trunnion_version", ""), "model_hash": result.attrs.get("model_hash", ""),
-        "style": Markup(style), "style_hash": hashed(style),
+        **said(result, style),
     }  # fmt: skip
     return template("identify.html.j2").render(context)
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from trunnion.results.attributes import attribute
 from trunnion.studies.play.result import relied_on
 from trunnion.views.common.cycle import Abscissa, Array, thin
 from trunnion.views.common.figures import INK, PALETTE, along, frame_peak, legend, new, shade
@@ -31,7 +31,7 @@ def figure(result: xr.Dataset) -> Figure:
     """A panel for each measure: the joints' worst cases on top of one another, their RSS dashed."""
     over, names = _over(result), result["measure"].values[:MOST_PANELS]
     sheet = new("What the play of the joints does", result, height=1.0 + PANEL * len(names))
-    units, limits = (json.loads(result.attrs[key]) for key in ("measure_units", "limits"))
+    units, limits = (attribute(result, key) for key in ("measure_units", "limits"))
     panels = sheet.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
     for i, (axes, name) in enumerate(zip(panels, names, strict=True)):
         _panel(axes, result.isel(measure=i), over, str(name), units[i], limits[i])
@@ -99,7 +99,7 @@ HEAD = ["joint", "play", "largest effect ±", "at", "share"]
 
 def tables(result: xr.Dataset) -> list[Table]:
     """For each measure: the joints with their play, largest effect and where, and share in the largest worst case."""
-    units, over = json.loads(result.attrs["measure_units"]), _over(result)
+    units, over = attribute(result, "measure_units"), _over(result)
     return [
         _table(result.isel(measure=i), over, str(name), unit)
         for i, (name, unit) in enumerate(zip(result["measure"].values, units, strict=True))

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.views.common.cycle import Array, attribute, column, layout, names
+from trunnion.results.attributes import attribute
+from trunnion.views.common.cycle import Array, column, layout, names
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -236,7 +237,7 @@ def gathered(result: xr.Dataset) -> Space:
             local = _local(result, key, poses[link])
             if local is not None:
                 free[key] = local
-    radii = [float(row["value"]) for row in attribute(result, "inputs", [])
+    radii = [float(row["value"]) for row in attribute(result, "inputs")
              if str(row["path"]).endswith("pin.radius") and isinstance(row.get("value"), int | float)]  # fmt: skip
     return Space(stated, poses, free, max(radii, default=0.0))
 

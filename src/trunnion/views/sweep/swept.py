@@ -5,7 +5,6 @@ Figures are named as the columns of the CSV file: `efficiency`, `A.effort_max`, 
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.names import nearest
+from trunnion.results.attributes import attribute
 from trunnion.results.export import figures
 from trunnion.studies.sweep.study import FIGURES
 from trunnion.views.common.cycle import Array
@@ -80,7 +80,7 @@ def written(value: float) -> str:
 def scales(result: xr.Dataset) -> list[Scale]:
     """The swept names of a result."""
     found = []
-    for name in json.loads(result.attrs["swept"]):
+    for name in attribute(result, "swept"):
         told = result[name].attrs
         unit = str(told["written_unit"] or told["units"])
         found.append(
@@ -139,7 +139,7 @@ def check_axes(counts: Mapping[str, int], x: str = "", family: str = "") -> tupl
 
 def arranged(result: xr.Dataset, plan: Arrangement, values: NDArray[np.generic]) -> NDArray[np.generic]:
     """Values of all points in the order of the file as (axis, curve, *facets)."""
-    names = json.loads(result.attrs["swept"])
+    names = attribute(result, "swept")
     shown = [plan.x, *([plan.other] if plan.other else []), *plan.facets]
     cube = values.reshape([result.sizes[name] for name in names])
     cube = cube.transpose([names.index(one.name) for one in (*shown, *plan.fixed)])
@@ -161,7 +161,7 @@ def grid(result: xr.Dataset, plan: Arrangement, name: str) -> tuple[str, Array]:
 
 def statuses(result: xr.Dataset, plan: Arrangement) -> NDArray[np.int8]:
     """Codes of status, (axis, curve, *facets)."""
-    flat = result["status"].transpose(*json.loads(result.attrs["swept"])).values.ravel()
+    flat = result["status"].transpose(*attribute(result, "swept")).values.ravel()
     return np.asarray(arranged(result, plan, flat), np.int8)
 
 

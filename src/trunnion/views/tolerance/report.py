@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from matplotlib import rc_context
 
+from trunnion.results.attributes import attribute
 from trunnion.views.common.bundle import web_text
-from trunnion.views.common.cycle import attribute
-from trunnion.views.cycle.report import hashed, inputs_of
+from trunnion.views.cycle.report import inputs_of, said
 from trunnion.views.tolerance.figure import KINDS, drawable, figure
 from trunnion.views.tolerance.notes import NOTES, ON_SAMPLES
 from trunnion.views.tolerance.tables import (
@@ -51,25 +51,18 @@ class Section(NamedTuple):
 
 def report(result: xr.Dataset, first: Sequence[Section] = (), kicker: str = "What tolerances do to a linkage") -> str:
     """The whole report as HTML; first: parts that stand before those of the measures, as an allocation has them."""
-    from markupsafe import Markup  # with jinja2 only needed here, and slow to import
-
     style = web_text("report.css") + web_text("tolerance.css")
-    reads, found = readings(result), attribute(result, "findings", [])
-    run = methods(result)
+    reads, run = readings(result), methods(result)
     parts = [*first, *(_measure(result, read) for read in reads)]
     context: dict[str, Any] = {
         "kicker": kicker, "name": str(result.attrs.get("name", "")) or "Mechanism",
         "formula": str(result.attrs.get("formula", "")), "facts": _facts(result, run),
-        "summary": headline(result), "missed": attribute(result, "missed", []),
-        "findings": [row for row in found if row["severity"] != "note"],
-        "notes": [row for row in found if row["severity"] == "note"],
+        "summary": headline(result), "missed": attribute(result, "missed"),
         "overview": overview(result), "sections": [_drawn(part) for part in parts], "whole": failed(result),
         "toleranced": inputs(result), "inputs": inputs_of(result),
         "methods": [NOTES[name] for name in run if name in NOTES],
         "on_samples": ON_SAMPLES if any("monte-carlo" in name for name in run) else "",
-        "references": [line for line in str(result.attrs.get("references", "")).splitlines() if line.strip()],
-        "version": result.attrs.get("trunnion_version", ""), "model_hash": result.attrs.get("model_hash", ""),
-        "style": Markup(style), "style_hash": hashed(style),
+        **said(result, style),
     }  # fmt: skip
     return template("tolerance.html.j2").render(context)
 

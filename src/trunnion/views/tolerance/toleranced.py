@@ -5,7 +5,6 @@ All numbers of a measure are told in one unit, with as many decimals as its spre
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,7 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from trunnion.views.common.cycle import Abscissa, Array, attribute, names
+from trunnion.results.attributes import attribute
+from trunnion.views.common.cycle import Abscissa, Array, names
 from trunnion.views.common.quantities import number, prefixed
 
 if TYPE_CHECKING:
@@ -260,7 +260,7 @@ class Reading:
     @cached_property
     def contributions(self) -> list[Contribution]:
         """Of every toleranced number, the largest share first."""
-        units = attribute(self.result, "parameter_units", [])
+        units = attribute(self.result, "parameter_units")
         paths = names(self.result, "parameter")
         empty = np.full(len(paths), np.nan)
         worst, rss, variance, slope, lower, upper = (
@@ -283,7 +283,7 @@ class Reading:
 def readings(result: xr.Dataset) -> list[Reading]:
     """Every measure of a result."""
     keys = ("measure_units", "limits", "bounds", "measure_texts", "measure_rules", "curve_texts")
-    units, limits, bounds, texts, rules, courses = (attribute(result, key, []) for key in keys)
+    units, limits, bounds, texts, rules, courses = (attribute(result, key) for key in keys)
     found = []
     for i, name in enumerate(names(result, "measure")):
         about = [(one[i] if i < len(one) else None) or (None, None) for one in (limits, bounds)]
@@ -386,5 +386,5 @@ def failures(result: xr.Dataset) -> list[tuple[str, int]]:
 
 def methods(result: xr.Dataset) -> Sequence[str]:
     """Names of the methods that were run."""
-    found: Any = json.loads(result.attrs.get("methods", "[]"))
+    found: Any = attribute(result, "methods")
     return [str(one) for one in found]

@@ -1,0 +1,71 @@
+"""What a result says beside its numbers: where it comes from, its summary and findings; written and read here alone."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from enum import IntEnum
+from typing import TYPE_CHECKING, Any
+
+from trunnion.errors import Finding, Severity, Status
+from trunnion.version import __version__
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from trunnion.model.mechanism import Mechanism
+
+__all__ = [
+    "attribute", "cited", "codes", "encoded", "finding_rows", "findings_of", "origin", "summary_of",
+]  # fmt: skip
+
+
+def origin(mechanism: Mechanism, formula: str, **more: Any) -> dict[str, Any]:
+    """Whose result it is and by which version; more: what is said between."""
+    told = {"name": mechanism.name, "formula": formula, **more}
+    return {**told, "model_hash": mechanism.digest, "trunnion_version": __version__}
+
+
+def cited(references: Iterable[str], statuses: type[IntEnum] = Status) -> dict[str, Any]:
+    """What the result is founded on, and what the codes of `status` mean."""
+    return {"references": "\n".join(references), **codes("flag", statuses)}
+
+
+def codes(what: str, of: type[IntEnum]) -> dict[str, str]:
+    """Whole numbers and their words, as CF names them."""
+    return {
+        f"{what}_values": " ".join(str(int(code)) for code in of),
+        f"{what}_meanings": " ".join(code.name.lower() for code in of),
+    }
+
+
+def finding_rows(findings: Iterable[Finding]) -> list[dict[str, str]]:
+    """Findings for JSON."""
+    return [
+        {"severity": str(one.severity), "where": one.where, "what": one.what, "remedy": one.remedy} for one in findings
+    ]
+
+
+def encoded(attributes: Mapping[str, Any]) -> dict[str, Any]:
+    """Attributes as files can hold them: lists and dicts as JSON."""
+    return {
+        name: json.dumps(value, ensure_ascii=False) if isinstance(value, (list, tuple, dict)) else value
+        for name, value in attributes.items()
+    }
+
+
+def attribute(result: xr.Dataset | xr.DataArray, name: str, default: str = "[]") -> Any:
+    """An attribute that `encoded` wrote; that of `default` if it is absent or empty."""
+    return json.loads(result.attrs.get(name) or default)
+
+
+def findings_of(result: xr.Dataset) -> list[Finding]:
+    """The findings that a result carries."""
+    rows = attribute(result, "findings")
+    return [Finding(row["what"], row["where"], row["remedy"], Severity(row["severity"])) for row in rows]
+
+
+def summary_of(result: xr.Dataset) -> list[dict[str, Any]]:
+    """The figures that one looks at first: label, value and unit."""
+    rows: list[dict[str, Any]] = attribute(result, "summary")
+    return rows

@@ -1,0 +1,82 @@
+"""What describes a variable of a result, and the one place where arrays become an xarray Dataset."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from trunnion.results.attributes import encoded
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["TIME", "Variable", "dataset_of", "described", "driven"]
+
+
+@dataclass(frozen=True)
+class Variable:
+    """Dimensions, unit and long name of a variable of a result, and what its numbers are kept as.
+
+    units: or a word for one that only a result knows, as "parameter" for that of its parameters. Of what not every
+    result has: part, such as "errors" of a mechanism with any; space, the only one, "planar" or "spatial".
+    """
+
+    dims: tuple[str, ...]
+    units: str
+    long_name: str
+    dtype: type[Any] = np.float64
+    part: str = ""
+    space: str = ""
+
+    def over(self, *dims: str) -> Variable:
+        """The same with more dimensions, last."""
+        return replace(self, dims=(*self.dims, *dims))
+
+    def blank(self, sizes: Mapping[str, int]) -> NDArray[Any]:
+        """An array to be filled: NaN, or 0 of whole numbers."""
+        whole = self.dtype is not np.float64
+        return np.full([sizes[dim] for dim in self.dims], 0 if whole else np.nan, self.dtype)
+
+
+TIME = Variable(("position",), "s", "time from the start of the cycle")
+
+
+def described(
+    arrays: Mapping[str, ArrayLike], known: Mapping[str, Variable], units: Mapping[str, str] | None = None
+) -> dict[str, xr.Variable]:
+    """The arrays with dimensions, units and long names. units: for the words that stand for one."""
+    import xarray as xr
+
+    return {
+        name: xr.Variable(
+            (one := known[name]).dims,
+            array,
+            {"units": (units or {}).get(one.units, one.units), "long_name": one.long_name},
+        )
+        for name, array in arrays.items()
+    }
+
+
+def driven(time: NDArray[np.float64], values: ArrayLike, unit: str, of: str) -> dict[str, xr.Variable]:
+    """The coordinates along the positions: time, and the drive as a dial names it."""
+    drive = Variable(("position",), unit.strip(), f"coordinate of {of}" if of else "time")
+    return described({"time": time, "drive": np.asarray(values, float)}, {"time": TIME, "drive": drive})
+
+
+def dataset_of(
+    variables: Mapping[str, xr.Variable],
+    labels: Mapping[str, Sequence[str]],
+    attributes: Mapping[str, Any],
+    along: Mapping[str, Any] | None = None,
+) -> xr.Dataset:
+    """A result. labels: names along its dimensions; attributes: lists and dicts become JSON; along: other coordinates,
+    as xarray takes them.
+    """
+    import xarray as xr
+
+    names = {dim: (dim, np.asarray(members, dtype=str)) for dim, members in labels.items()}
+    return xr.Dataset(variables, {**names, **(along or {})}, encoded(attributes))

@@ -183,6 +183,15 @@ def test_tables_are_of_texts():
     assert "—" in results(case("one turn")).rows[0]
 
 
+def test_difference_of_efficiencies_is_measured_less_model():
+    """A reading of the drive torque that is too large makes the measured efficiency too small."""
+    result = case("wrong")
+    measured_, _, model, difference = (float(cell.replace("−", "-")) for cell in efficiencies(result).rows[0][1:5])
+    assert measured_ < model - 0.01
+    assert difference == pytest.approx(measured_ - model, abs=1.5e-4)
+    assert difference == pytest.approx(float(result.efficiency[0] - result.efficiency_model[0]), abs=6e-5)
+
+
 @cache
 def page_of(name):
     return report(case(name))

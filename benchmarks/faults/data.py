@@ -179,7 +179,7 @@ _RIG = (
         "rig/reading/clock.py",
         'hour = hour % 12 + 12 * (found["noon"] in "Pp")',
         'hour = hour + 12 * (found["noon"] in "Pp")',
-        ("tests/measured_data/test_laboratory_files.py", "-k", "time_stamps"),
+        ("tests/measured_data/test_laboratory_files.py", "-k", "noon"),
     ),
 )
 
@@ -234,7 +234,7 @@ _RESULTS = (
         "results/columns/comparison.py",
         "(str(name), unit, np.repeat(rows[i], times))",
         "(str(name), unit, np.tile(rows[i], times))",
-        ("tests/views/test_compare.py", "tests/rig/test_compare.py", "-k", "tables_of_files or columns"),
+        ("tests/views/test_compare.py", "tests/rig/test_compare.py", "-k", "stands_beside"),
     ),
 )
 

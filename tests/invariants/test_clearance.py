@@ -233,3 +233,14 @@ def test_ellipse_error(rho: float, radius: float, length: float, beta: float) ->
     assert float(ellipse_error(rho, radius, length, -beta)) == error
     assert float(ellipse_error(rho, radius, length, 0.0)) == 0
     assert float(ellipse_error(2 * rho, 2 * radius, 2 * length, beta)) == pytest.approx(error, rel=1e-14)
+
+
+@pytest.mark.parametrize("model", PINS)
+def test_a_force_at_one_end_of_a_pin_presses_there_alone(model: Any) -> None:
+    """A force at z = ±H/2 has the moment r × F about mid-length; the other end feels nothing of it."""
+    force, length = np.array([30.0, -40.0, 0.0]), 0.08
+    for end, z in ((0, -length / 2), (1, length / 2)):
+        moment = np.cross([0.0, 0.0, z], force)
+        loads = model.loads(tuple(force), tuple(moment), length)
+        np.testing.assert_allclose(loads[end], force[:2], atol=1e-12)
+        np.testing.assert_allclose(loads[1 - end], 0.0, atol=1e-12)

@@ -407,6 +407,17 @@ def test_meet(bc: float, cd: float, turn: float, bend: float, branch: int) -> No
     assert side * branch > 0
 
 
+@pytest.mark.parametrize("inward", [False, True])
+def test_circles_that_miss_each_other_by_a_nanometre_do_not_meet(inward: bool) -> None:
+    """Only what rounding leaves of a dead centre counts as one; beyond, however little, there is no position."""
+    bc, cd = 1.0, 0.5
+    centre = bc - cd if inward else bc + cd
+    for gap, meets in ((-1e-9, True), (0.0, True), (1e-12, False), (1e-9, False), (1e-7, False)):
+        with np.errstate(invalid="ignore"):
+            found = rrr.meet((0.0, 0.0), (centre - gap if inward else centre + gap, 0.0), bc, cd, 1)
+        assert bool(np.all(np.isfinite(found))) == meets, gap
+
+
 @pytest.mark.parametrize("name", ["RRP", "triad", "cylinder driven"])
 def test_general_does_not_mind_its_neighbours(name: str) -> None:
     """A lane solved alone has the pose and the condition that it has in a batch."""

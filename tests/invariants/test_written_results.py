@@ -5,6 +5,8 @@ from __future__ import annotations
 import csv
 import json
 import math
+import os
+import stat
 import sys
 from pathlib import Path
 from typing import Any
@@ -14,7 +16,7 @@ import pytest
 import xarray as xr
 
 import trunnion
-from mechanisms import DURANGO, MODELS, analyse, four_bar
+from mechanisms import DURANGO, MODELS, analyse, build, four_bar
 from trunnion import MechanismError, Status
 from trunnion.results.export import FORMATS
 
@@ -250,3 +252,8 @@ def test_infinite_numbers_do_not_reach_json(result: Any, tmp_path: Path) -> None
     odd["drive_effort"].values[0, 0] = math.inf
     trunnion.save(odd, tmp_path / "r.json")
     assert "Infinity" not in (tmp_path / "r.json").read_text("utf-8")
+
+
+def test_a_zarr_store_can_be_opened_by_others(tmp_path: Path) -> None:
+    trunnion.save(trunnion.analyse(build(four_bar()), 4), tmp_path / "r.zarr")
+    assert stat.S_IMODE(os.stat(tmp_path / "r.zarr").st_mode) & stat.S_IXUSR

@@ -10,6 +10,7 @@ import trunnion
 from manual.conftest import Run
 from manual.test_cli import EXAMPLES
 from trunnion import MechanismError
+from trunnion.cli.options import over, points
 
 FOUR_BAR, CARDAN = EXAMPLES / "durango-fourbar.yaml", EXAMPLES / "pezzuti-cardan.yaml"
 STRIBECK = {"joint_defaults.friction.static": "0.5", "joint_defaults.friction.stribeck_speed": "0.1 m/s"}
@@ -93,3 +94,8 @@ def test_a_default_parameter_can_be_set_before_it_is_stated() -> None:
     assert mechanism.parameters()["joints.C.friction.pair_factor"] == 1.25
     with pytest.raises(MechanismError, match=r"joint_defaults\.friction\.static"):
         trunnion.read(FOUR_BAR).with_values({"joint_defaults.friction.static": 0.5})
+
+
+def test_points_of_a_grid_are_all_combinations() -> None:
+    assert points(over(["a=0deg:30deg:7", "b=1,2,3"])) == 21
+    assert points({}) == 1

@@ -11,7 +11,10 @@ import pytest
 from measured_data.recording import IDLE, RPM, ZERO, Columns, faults, mapping, off, read, recorded
 from trunnion.errors import MechanismError
 from trunnion.model.units import KINDS
+from trunnion.rig.reading.account import Account
 from trunnion.rig.reading.channels import resolution
+from trunnion.rig.reading.counter import unwrapped
+from trunnion.rig.reading.mapping import AngleSource
 from trunnion.rig.reading.read import read_measured
 
 OMEGA = RPM * np.pi / 30
@@ -250,6 +253,24 @@ def test_a_wild_count_is_named(clean: Columns, tmp_path: Path) -> None:
     assert "2 counts of 'encoder'" in one.what
     assert "at 0.6, 1 s, such as 1e+09" in one.what
     assert off(found.conditions[0]) < 0.05
+
+
+def test_many_wild_counts_are_not_mended() -> None:
+    """Up to one in a hundred of 1000; more are no accident, and nothing is made up in their place."""
+    source, counts = AngleSource.model_validate(SOURCES["count"][0]), np.arange(1000.0)
+    for wild in (1, 10, 11, 40):
+        places = 20 * np.arange(1, wild + 1)
+        readings, account = counts.copy(), Account("run.csv")
+        readings[places] = 1e6
+        if wild > 10:
+            with pytest.raises(MechanismError):
+                unwrapped(source, readings, counts / 1000, account)
+            assert not account.findings
+            continue
+        found, _ = unwrapped(source, readings, counts / 1000, account)
+        np.testing.assert_array_equal(np.flatnonzero(found != counts), places)
+        np.testing.assert_array_equal(found[places], counts[places] - 1)
+        assert len(account.findings) == 1
 
 
 def test_a_counter_that_is_set_back(clean: Columns, tmp_path: Path) -> None:

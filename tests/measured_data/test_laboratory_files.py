@@ -223,3 +223,13 @@ def test_tdms_that_says_more_than_it_holds(tmp_path: Path, monkeypatch: pytest.M
     (finding,) = _refused(lambda: read_table(tmp_path / "a.tdms", ["a", "b"]))
     assert "60 rows of 2 columns" in finding.what
     assert read_table(tmp_path / "a.tdms", ["a"]).rows == 60
+
+
+def test_hours_before_and_after_noon(tmp_path: Path) -> None:
+    """12 AM is midnight and 12 PM is noon."""
+    times = ("12:00:05 AM", "01:00:05 AM", "11:59:59 AM", "12:00:00 PM", "01:00:00 PM", "11:00:00 PM")
+    (tmp_path / "a.csv").write_text("t;x\n" + "".join(f"{one};1\n" for one in times), encoding="utf-8")
+    clock = read_table(tmp_path / "a.csv", ["t", "x"]).columns["t"].clock
+    assert clock is not None
+    hours = np.array([5 / 3600, 1 + 5 / 3600, 12 - 1 / 3600, 12, 13, 23])
+    np.testing.assert_allclose(clock.seconds(), 3600 * (hours - hours[0]), rtol=1e-12)

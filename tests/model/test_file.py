@@ -18,6 +18,7 @@ from model_samples import DURANGO, EXAMPLES, FOURBAR
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.checks.check import check_model
+from trunnion.model.file import MAX_DEPTH
 from trunnion.model.mechanism import Mechanism, read_mechanism
 from trunnion.model.rewrite import rewrite_mechanism
 
@@ -122,6 +123,18 @@ def test_files_that_are_no_model(
     assert fitting, "\n".join(map(str, found))
     assert line is None or fitting[0].line == line
     assert all(one.remedy for one in found)
+
+
+@pytest.mark.parametrize("name", ["model.yaml", "model.json", "model.toml"])
+@pytest.mark.parametrize("depth", [MAX_DEPTH - 1, MAX_DEPTH, MAX_DEPTH + 1, MAX_DEPTH + 2])
+def test_nesting_up_to_the_limit(findings_of: FindingsOf, name: str, depth: int) -> None:
+    """The file itself is the first group; at the limit it is read, and what it says is refused for what it is."""
+    value = "[" * (depth - 1) + "]" * (depth - 1)
+    texts = {"yaml": f"trunnion: 1\nx: {value}\n", "json": f'{{"trunnion": 1, "x": {value}}}',
+             "toml": f"trunnion = 1\nx = {value}\n"}  # fmt: skip
+    found = findings_of(texts[name.partition(".")[2]], name)
+    assert any("nested" in one.what for one in found) == (depth > MAX_DEPTH)
+    assert any("'x' is unknown" in one.what for one in found) == (depth <= MAX_DEPTH)
 
 
 @pytest.mark.parametrize(

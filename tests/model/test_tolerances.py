@@ -550,3 +550,16 @@ def test_a_model_with_less_in_it_is_rewritten(varied: Mechanism, tmp_path: Path)
     rewrite_mechanism(named, tmp_path / "source.yaml", tmp_path / "named.yaml")
     assert Mechanism.read(tmp_path / "named.yaml") == named
     assert "AB: 31 mm, BC: 90 mm ± 0.02 mm" in (tmp_path / "named.yaml").read_text("utf-8")
+
+
+def test_what_is_said_of_a_joint_stands_against_what_is_said_of_all(varied: Mechanism) -> None:
+    """A joint that follows the defaults in its number may have a tolerance of its own, whichever is said first."""
+    names = ("joint_defaults.friction.coefficient", "B.friction.coefficient")
+    for order in (names, names[::-1]):
+        data = varied.data()
+        for key in ("correlations", "costs"):
+            data.pop(key, None)
+        data["tolerances"] = {name: {"limits": 0.02 if name == names[0] else 0.005} for name in order}
+        found = of(Mechanism(**data))
+        assert found["joints.B.friction.coefficient"].half_width == pytest.approx(0.005)
+        assert found["joints.D.friction.coefficient"].half_width == pytest.approx(0.02)

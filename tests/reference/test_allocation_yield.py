@@ -105,3 +105,11 @@ def test_a_yield_out_of_reach_is_told() -> None:
 def test_cost_falls_along_the_curve() -> None:
     costs = [one.cost for one in trade_off(four_bar("yield", positions=36), [0.5, 1.0, 2.0], target=0.9973)]
     assert costs == sorted(costs, reverse=True)
+
+
+@pytest.mark.parametrize("mean", [0.4, -0.4])
+def test_a_shift_counts_on_the_side_it_moves_to(mean: float) -> None:
+    """A deviation of mean m t and standard deviation t/3 keeps z of them within ±0.1: (z/3 + |m|) t = 0.1."""
+    effects = rows(np.array([[1.0]]), 0.1, mean=np.array([[mean]]))
+    answer = solve(Problem(bought([PLAIN]), effects, "yield", z=2.5))
+    assert answer.tolerances == pytest.approx(0.1 / (2.5 / 3 + 0.4), rel=1e-9)

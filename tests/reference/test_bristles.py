@@ -13,6 +13,7 @@ from mechanisms import Array, analyse, build, four_bar, slider_crank
 from trunnion.algebra.dual import Dual, derivative
 from trunnion.errors import Status
 from trunnion.joints.friction import FRICTION_LAWS
+from trunnion.solve.bristles import _chained
 
 DAHL = {"law": "dahl", "coefficient": 0.12, "stiffness": 4e3}
 LUGRE = {
@@ -163,3 +164,11 @@ def test_samples_of_speed_and_duals_of_the_law() -> None:
         expected = (ends[0] - ends[1]) / (2 * h)
         scale = np.abs(expected).max() + np.abs(plain).max() / value * 1e-3
         np.testing.assert_allclose(np.broadcast_to(found, time.shape), expected, rtol=0, atol=1e-4 * scale)
+
+
+def test_maps_of_intervals_are_chained_and_closed() -> None:
+    """z ↦ z/2 + 1, then z ↦ 0.8 z + 2: over both z ↦ 0.4 z + 2.8, which comes back to z₀ = 2.8/0.6; from rest 0."""
+    keep, gain = np.array([0.5, 0.8]), np.array([1.0, 2.0])
+    start = 2.8 / 0.6
+    np.testing.assert_allclose(_chained(keep, gain, True), [start, start / 2 + 1, start], rtol=1e-15)
+    np.testing.assert_allclose(_chained(keep, gain, False), [0.0, 1.0, 2.8], rtol=1e-15)

@@ -173,3 +173,12 @@ def test_work_that_cancels_gives_no_efficiency() -> None:
     data["drivers"] = {"A": {"law": "polynomial-345", "range": [0.0, 1.5], "duration": 0.5, "dwell": 0.1}}
     result = trunnion.analyse(Mechanism(**data), 360)
     assert np.isnan(result["efficiency"])
+
+
+def test_a_link_at_rest_does_not_turn_back() -> None:
+    """A drive that rises, dwells, returns and dwells over a part of the stroke stops the slide, at no dead centre."""
+    data = slider_crank()
+    (driver,), (slide,) = data["drivers"], (n for n, one in data["joints"].items() if one["type"] == "prismatic")
+    data["drivers"][driver] = {"law": "modified-sine", "range": [0.4, 1.2], "duration": 0.2, "dwell": 0.1}
+    found = figures.dead_centres(trunnion.prepare(build(data)), 60)
+    assert found[slide] == ()

@@ -12,6 +12,7 @@ import pytest
 import trunnion
 from trunnion import Mechanism
 from trunnion.algebra.quadrature import Effort, integrals
+from trunnion.cycle.account import balance
 from trunnion.errors import Status
 from trunnion.solve.loads import useful_loads
 from trunnion.solve.run import Run, prepare
@@ -243,3 +244,41 @@ def test_what_has_no_answer_has_no_integral_and_leaves_the_others_theirs() -> No
     )
     assert np.isnan(found.value[0, 1])
     np.testing.assert_allclose(found.value[0, [0, 2]], 0.5, rtol=1e-15)
+
+
+def test_useful_work_is_that_of_the_loads_marked_so() -> None:
+    """A shaft that turns a mill and a fan takes both torques; useful is what is marked, or all if nothing is."""
+    points = {"points": {"A": [0, 0]}}
+    loads = {name: {"joint": "A", "resisting_torque": size} for name, size in (("mill", 6.0), ("fan", 2.0))}
+    shaft = {"space": "planar", "links": {"ground": points, "shaft": points}, "drivers": {"A": {"speed": 5.0}},
+             "joints": {"A": {"type": "revolute", "links": ["ground", "shaft"]}}}  # fmt: skip
+    for marked, share in (("mill", 0.75), ("fan", 0.25), (None, 1.0)):
+        stated = {name: {**load, "useful": True} if name == marked else load for name, load in loads.items()}
+        result = trunnion.analyse(Mechanism(trunnion=1, **shaft, loads=stated), 12)
+        assert float(result["efficiency"]) == pytest.approx(share, rel=1e-12)
+        np.testing.assert_allclose(result["efficiency_instant"], share, rtol=1e-12)
+        np.testing.assert_allclose(result["useful_power"], 40.0 * share, rtol=1e-12)
+        np.testing.assert_allclose(result["drive_effort"], 8.0, rtol=1e-12)
+
+
+def test_power_residual_is_told_of_the_peak_power() -> None:
+    """Of the drive, or of whatever has the most where that has none; of no power at all as it is."""
+    arrays = {"power_residual": np.array([1e-6, -4e-6, 2e-6]), "drive_power": np.array([[3.0, -8.0, 5.0]]),
+              "useful_power": np.array([1.0, 2.0, 0.5])}  # fmt: skip
+    assert balance(arrays) == pytest.approx(4e-6 / 8.0)
+    assert balance(arrays | {"drive_power": np.zeros((1, 3))}) == pytest.approx(4e-6 / 2.0)
+    assert balance({name: 1e3 * one for name, one in arrays.items()}) == pytest.approx(4e-6 / 8.0)
+    nothing = {"drive_power": np.zeros((1, 3)), "useful_power": np.zeros(3)}
+    assert balance(arrays | nothing) == pytest.approx(4e-6)
+
+
+def test_root_mean_square_of_an_effort() -> None:
+    """Of a crank that lifts a weight the torque is m g r cos φ: its RMS m g r/√2."""
+    links = {"ground": {"points": {"A": [0, 0]}},
+             "crank": {"points": {"A": [0, 0]}, "mass": 2.0, "centre": [0.3, 0], "inertia": 0.0}}  # fmt: skip
+    joints = {"A": {"type": "revolute", "links": ["ground", "crank"]}}
+    crank = Mechanism(trunnion=1, space="planar", links=links, joints=joints, drivers={"A": {"speed": 2.0}},
+                      gravity=[0, -9.81])  # fmt: skip
+    result = trunnion.analyse(crank, 12)
+    (row,) = (row for row in json.loads(result.attrs["summary"]) if row["label"].endswith("RMS"))
+    assert row["value"] == pytest.approx(2.0 * 9.81 * 0.3 / np.sqrt(2), rel=1e-9)

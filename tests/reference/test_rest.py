@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from trunnion import analyse, read
+from mechanisms import build, slider_crank
+from trunnion import Status, analyse, read
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import prepare
 
@@ -50,3 +51,22 @@ def test_the_bounds_are_the_extremes_over_the_whole_interval(case):
         assert scan.min() - step <= lower[driver, at] <= scan.min() + noise
         assert scan.max() - noise <= upper[driver, at] <= scan.max() + step
     assert (max(beyond) > 1e-4) == inside
+
+
+def test_a_resisting_load_at_rest_is_part_of_the_interval():
+    """At a dead centre the load of a slider may act either way: both one-sided limits lie within the bounds."""
+    data = slider_crank()
+    (slide,) = (name for name, joint in data["joints"].items() if joint["type"] == "prismatic")
+    (driver,) = data["drivers"]
+    data["loads"] = {"work": {"joint": slide, "resisting_force": 500.0, "useful": True}}
+    result = analyse(build(data, friction=0.1), 72_000)
+    at_rest = np.flatnonzero(np.diff(np.sign(result["joint_slide_velocity"].sel(joint=slide).values)) != 0)
+    flagged = np.flatnonzero(result["status"].values == Status.ZERO_SLIP)
+    lower, upper = (result[f"drive_effort_{end}"].sel(driver=driver).values for end in ("lower", "upper"))
+    effort = result["drive_effort"].sel(driver=driver).values
+    assert len(at_rest)
+    for k in flagged:
+        sides = effort[[k - 1, (k + 1) % len(effort)]]
+        slack = 1e-2 * np.max(np.abs(effort))
+        assert np.all(sides >= lower[k] - slack)
+        assert np.all(sides <= upper[k] + slack)

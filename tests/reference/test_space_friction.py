@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise, product
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,9 @@ from reference.maximal_space import Data, unrolled
 from reference.space_oracle import Oracle
 from reference.test_newton_euler_space import Compared
 from reference.test_space_values import loop
+from trunnion.solve.space.determinacy import LOOKED
 
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 LOCKED = int(trunnion.Status.LOCKED)
 PIN, ARM = 0.010, 0.040  # radius of the cross pins, and where on the cross the forks hold it
 
@@ -254,3 +257,31 @@ def test_nut_pushed_along_its_screw(friction: float) -> None:
     assert float(result.efficiency) == pytest.approx(np.tan(LEAD - phi) / np.tan(LEAD), rel=1e-10)
     turn = np.ptp(result.joint_rotation.sel(joint="R").values)
     assert float(turn) == pytest.approx(2 * np.pi * 0.02 / PITCH, rel=1e-12)
+
+
+@pytest.mark.parametrize("turned", [(), ("B",)])
+def test_friction_that_drags_a_rod_round(turned: tuple[str, ...]) -> None:
+    """Each ball drags the rod by f r |F| along the other link's turn against it; what is along the rod adds up.
+
+    Whichever link of a ball is named first: here by the turns of the links themselves, over the same positions.
+    """
+    data = trunnion.Mechanism.read(EXAMPLES / "rssr.yaml").data()
+    for joint in turned:
+        data["joints"][joint]["links"] = data["joints"][joint]["links"][::-1]
+    run = trunnion.prepare(trunnion.Mechanism(**data))
+    assert run.determinacy is not None
+    back = run.solve(run.cycle.times(LOOKED))
+    motions, radius, friction = back.walk.motions, 0.007, 0.1
+
+    def vector(numbers: Any) -> Any:
+        return np.array([np.broadcast_to(one, LOOKED) for one in numbers], float)
+
+    ends = {joint: vector(back.walk.element("rod", joint).place) for joint in ("B", "C")}
+    line = ends["C"] - ends["B"]
+    line = line / np.linalg.norm(line, axis=0)
+    dragged = np.zeros(LOOKED)
+    for joint, other in (("B", "crank"), ("C", "rocker")):
+        turn = vector(motions[other].twist.u) - vector(motions["rod"].twist.u)
+        force = np.linalg.norm(vector(back.reactions[joint].u), axis=0)
+        dragged += friction * radius * force * np.sum(turn * line, axis=0) / np.linalg.norm(turn, axis=0)
+    assert run.determinacy.dragged["rod"] == pytest.approx(np.max(np.abs(dragged)), rel=1e-6)

@@ -206,6 +206,20 @@ def test_over_the_whole_turn() -> None:
     assert found["searched_lower"].item() == pytest.approx(np.min(changes), rel=1e-6)
 
 
+@pytest.mark.parametrize(("rule", "ends"), [("minimum", (np.max, np.min)), ("maximum", (np.min, np.max))])
+def test_worst_case_of_the_least_and_the_largest_deviation(rule: str, ends: tuple[Any, Any]) -> None:
+    """At a position the deviation is within ±Σ T |S|. The least of all may fall as far as the widest of these reaches
+    down, and can rise no farther than the narrowest reaches up; the largest likewise, the other way up."""
+    measures = {"error": {"transmission_error": "D", "as": rule}}
+    found = trunnion.tolerance(fourbar(measures=measures), methods=["linear", "worst-case"], steps=36)
+    turn = np.radians(found["drive"].values)
+    steep = np.array([slopes(lambda i=i, **at: fourbar_angle(**at, crank=turn[i]), FOURBAR, 3e-5) for i in range(36)])
+    worst = 5e-5 * np.sum(np.abs(steep), axis=1)
+    lower, upper = ends
+    assert found["worst_case_lower"].item() == pytest.approx(-lower(worst), rel=1e-6)
+    assert found["worst_case_upper"].item() == pytest.approx(upper(worst), rel=1e-6)
+
+
 # ---- what a number's distribution makes of it -----------------------------------------------------------------
 
 T = 5e-5

@@ -197,3 +197,13 @@ def test_few_turns_have_the_factor_of_student() -> None:
     two = efficiency_of(condition({name: course[:2] for name, course in turns.items()}, {}))
     assert two.factor() == pytest.approx(13.97, rel=1e-3)
     assert efficiency_of(condition(turns, {"T2": Accuracy(zero=10.0)})).factor() == pytest.approx(2, abs=1e-3)
+
+
+def test_scatter_of_the_efficiency_is_that_of_a_sample_of_turns() -> None:
+    """Brake torques of 0.9, 1 and 1.2 times the same course: η by as much, and s/√3 with s² of the three over 2."""
+    shares = np.array([0.9, 1.0, 1.2])
+    found = efficiency_of(condition({**exact(), "T2": shares[:, None] * TRUE["T2"]}, {}))
+    assert found.per_turn == pytest.approx(ETA * shares, rel=1e-12)
+    assert found.value == pytest.approx(ETA * 3.1 / 3, rel=1e-12)
+    spread = (np.sum(shares**2) - 3.1**2 / 3) / 2
+    assert found.uncertainty == pytest.approx(ETA * (spread / 3) ** 0.5, rel=1e-9)

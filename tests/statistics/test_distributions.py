@@ -148,6 +148,16 @@ def test_sample_is_the_empirical_distribution(values: list[float]) -> None:
     np.testing.assert_allclose(kind.cdf(np.array([-0.5, 0, 0.5]), 0, 0, options), below)
 
 
+def test_quantile_of_a_sample_at_its_steps() -> None:
+    """The least value with F(x) ≥ u: at u = k/n the kth smallest, the next one just above."""
+    kind, values = DISTRIBUTIONS["sample"], (5.0, -2.0, 7.0, 1.0)
+    steps = np.arange(1, 5) / 4
+    np.testing.assert_array_equal(kind.quantile(steps, 0, 0, {"values": values}), [-2, 1, 5, 7])
+    np.testing.assert_array_equal(kind.quantile(steps[:-1] + 1e-12, 0, 0, {"values": values}), [1, 5, 7])
+    np.testing.assert_array_equal(kind.quantile(np.array([0.0, 1.0]), 0, 0, {"values": values}), [-2, 7])
+    np.testing.assert_array_equal(kind.cdf(np.array([-2, 1, 5, 7]), 0, 0, {"values": values}), steps)
+
+
 @settings(max_examples=40)
 @given(st.floats(0.05, 300), st.floats(0.05, 300), st.floats(2.0**-53, 0.5))
 def test_beta_table(alpha: float, beta: float, u: float) -> None:

@@ -21,6 +21,7 @@ import trunnion
 from rig_measurements import measured, rocker
 from trunnion import MechanismError
 from trunnion.cli.app import main
+from trunnion.results.columns.comparison import flat
 from trunnion.rig.reading.measurement import Measurement
 from trunnion.views.common.bundle import web_text
 from trunnion.views.compare.compared import drive, label, levels, varied
@@ -181,6 +182,24 @@ def test_tables_are_of_texts():
     assert files(result).rows == [["run-1.csv", "—", "—"]]
     assert headline(result)[0][1][0][0] == "3 of 4"
     assert "—" in results(case("one turn")).rows[0]
+
+
+def test_difference_of_efficiencies_is_measured_less_model():
+    """A reading of the drive torque that is too large makes the measured efficiency too small."""
+    result = case("wrong")
+    measured_, _, model, difference = (float(cell.replace("−", "-")) for cell in efficiencies(result).rows[0][1:5])
+    assert measured_ < model - 0.01
+    assert difference == pytest.approx(measured_ - model, abs=1.5e-4)
+    assert difference == pytest.approx(float(result.efficiency[0] - result.efficiency_model[0]), abs=6e-5)
+
+
+def test_what_was_set_stands_beside_the_courses_of_its_condition():
+    result = case("family")
+    columns = {name: values for name, _, values in flat(result, "courses")}
+    for name in ("brake.resisting_torque", "A.speed"):
+        own = dict(zip(result["condition"].values, result["value"].sel({"set": name}).values, strict=True))
+        assert len(set(own.values())) > 1
+        assert columns[name].tolist() == [own[one] for one in columns["condition"]]
 
 
 @cache

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 from trunnion import Mechanism, analyse
 from trunnion.cli.app import app
 from trunnion.errors import Status
-from trunnion.views.common.peaks import ease, usual_peak, whole_peaks
+from trunnion.views.common.peaks import _touched, ease, usual_peak, whole_peaks
 from trunnion.views.cycle.plots import PLOTS, torque
 from trunnion.views.cycle.scene import scene
 
@@ -173,3 +173,9 @@ def test_every_verb_that_draws_can_show_all(verb, tmp_path):
             assert ('"ease":[1.0]' in text.replace(" ", "")) == bool(switch)
         elif verb == "plot":
             assert ("near a dead centre" in text) != bool(switch)
+
+
+def test_a_run_goes_on_from_the_last_position_to_the_first():
+    within, core = np.array([1, 1, 0, 1, 0, 1], bool), np.array([0, 0, 0, 0, 0, 1], bool)
+    np.testing.assert_array_equal(_touched(within, core, True), np.array([1, 1, 0, 0, 0, 1], bool))
+    np.testing.assert_array_equal(_touched(within, core, False), np.array([0, 0, 0, 0, 0, 1], bool))

@@ -1,0 +1,289 @@
+"""Faults of what is done with it: statistics, studies, rig, model, results, views, cli."""
+
+from __future__ import annotations
+
+from benchmarks.faults.fault import Fault
+
+__all__ = ["FAULTS"]
+
+_STATISTICS = (
+    Fault(
+        "empirical-quantile-off-by-one",
+        "statistics/distributions.py",
+        "place = np.ceil(np.asarray(u) * values.size).astype(np.int64) - 1",
+        "place = np.floor(np.asarray(u) * values.size).astype(np.int64)",
+        ("tests/statistics/test_distributions.py",),
+    ),
+    Fault(
+        "capability-to-the-farther-limit",
+        "statistics/capability.py",
+        "room = np.minimum(np.asarray(upper",
+        "room = np.maximum(np.asarray(upper",
+        ("tests/statistics",),
+    ),
+    Fault(
+        "merged-third-moment-sign",
+        "statistics/tally.py",
+        "3 * (rest * other.M2 - part * self.M2)",
+        "3 * (rest * other.M2 + part * self.M2)",
+        ("tests/statistics/test_tally.py",),
+    ),
+    Fault(
+        "cost-slope-unit-dropped",
+        "statistics/costs.py",
+        "return -k * B / unit * float(np.exp(-k * t / unit))",
+        "return -k * B * float(np.exp(-k * t / unit))",
+        ("tests/statistics/test_costs.py",),
+    ),
+    Fault(
+        "replicates-without-student",
+        "statistics/intervals.py",
+        "half = special.stdtrit(number - 1, (1 + confidence) / 2) * values.std",
+        "half = special.ndtri((1 + confidence) / 2) * values.std",
+        ("tests/statistics/test_intervals.py",),
+    ),
+)
+
+_STUDIES = (
+    Fault(
+        "worst-minimum-taken-as-maximum",
+        "studies/tolerance/linear.py",
+        "np.asarray(np.min(np.nan_to_num(end, nan=np.inf)))",
+        "np.asarray(np.max(np.nan_to_num(end, nan=-np.inf)))",
+        ("tests/reference/test_tolerance.py", "-k", "worst_case_of_figures or whole_turn"),
+    ),
+    Fault(
+        "play-scatter-of-another-dimension",
+        "studies/play/study.py",
+        "total = total + radius * radius * square / (len(load) + 2)",
+        "total = total + radius * radius * square / (len(load) + 1)",
+        ("tests/reference/test_play.py", "-k", "one_rule"),
+    ),
+    Fault(
+        "tolerance-mean-shift-sign",
+        "studies/tolerance/zones.py",
+        "half, slope * mean, np.abs(slope) * deviation)",
+        "half, -slope * mean, np.abs(slope) * deviation)",
+        ("tests/reference/test_tolerance.py", "-k", "limits_to_one_side or moments"),
+    ),
+    Fault(
+        "allocation-drift-forgotten-on-one-side",
+        "studies/allocation/sides.py",
+        "np.concatenate([(worst + drift)[keep[0]], (worst - drift)[keep[1]]])",
+        "np.concatenate([(worst + drift)[keep[0]], worst[keep[1]]])",
+        ("tests/reference/test_allocation_yield.py",),
+    ),
+    Fault(
+        "rss-is-a-sixth",
+        "studies/allocation/problem.py",
+        "return self.spread() / 3 if self.deviation is None",
+        "return self.spread() / 6 if self.deviation is None",
+        ("tests/reference/test_allocation_yield.py", "tests/reference/test_allocation.py"),
+    ),
+    Fault(
+        "dead-centre-of-a-resting-link",
+        "studies/design.py",
+        "(around[:-2] * values[1:] < 0)",
+        "(around[:-2] * values[1:] <= 0)",
+        ("tests/reference/test_design.py",),
+    ),
+)
+
+_RIG = (
+    Fault(
+        "misfit-of-conditions-independent",
+        "rig/identify/uncertainty.py",
+        "most = max(most, together / own if own > 0 else 1.0)",
+        "most = max(most, 1.0)",
+        ("tests/rig/test_identify_uncertainty.py",),
+    ),
+    Fault(
+        "turns-without-their-freedom",
+        "rig/identify/uncertainty.py",
+        "covariance = moved.T @ moved * (turns / (turns - 1))",
+        "covariance = moved.T @ moved",
+        ("tests/rig/test_identify_uncertainty.py",),
+    ),
+    Fault(
+        "bias-of-following-turns",
+        "rig/identify/uncertainty.py",
+        "products += float(np.sum(unit[1:] * unit[:-1])) + unit.shape[1] / turns",
+        "products += float(np.sum(unit[1:] * unit[:-1]))",
+        ("tests/rig/test_identify_uncertainty.py",),
+    ),
+    Fault(
+        "lack-of-fit-of-a-population",
+        "rig/identify/uncertainty.py",
+        "float(np.var(each, ddof=1))",
+        "float(np.var(each))",
+        ("tests/rig/test_identify_uncertainty.py",),
+    ),
+    Fault(
+        "scatter-of-a-population",
+        "rig/reading/measurement.py",
+        "np.nanstd(self.turns, axis=0, ddof=1)",
+        "np.nanstd(self.turns, axis=0)",
+        ("tests/rig/test_compare.py", "tests/rig/test_judge.py", "-k", "gum or freedom or scatter or turns"),
+    ),
+    Fault(
+        "efficiency-scatter-of-a-population",
+        "rig/reading/efficiency.py",
+        "float(np.std(per_turn, ddof=1))",
+        "float(np.std(per_turn))",
+        ("tests/rig/test_efficiency.py",),
+    ),
+    Fault(
+        "bias-scatter-of-a-population",
+        "rig/compare/judge.py",
+        "np.std(means, ddof=1)",
+        "np.std(means)",
+        ("tests/rig/test_compare.py", "tests/rig/test_judge.py", "-k", "gum or bias"),
+    ),
+    Fault(
+        "bias-without-its-local-part",
+        "rig/compare/judge.py",
+        "local = np.array([np.sqrt(np.mean(of.local**2) / len(of.local))])",
+        "local = np.zeros(1)",
+        ("tests/rig/test_compare.py", "tests/rig/test_judge.py", "-k", "gum or bias"),
+    ),
+    Fault(
+        "correlation-of-turns-biased",
+        "rig/compare/judge.py",
+        "/ square + 1 / len(means), len(means)",
+        "/ square, len(means)",
+        ("tests/rig/test_compare.py", "tests/rig/test_judge.py", "-k", "go_on or follow"),
+    ),
+    Fault(
+        "residual-is-model-less-measured",
+        "rig/compare/judge.py",
+        "residual = measured - model\n",
+        "residual = model - measured\n",
+        ("tests/rig/test_compare.py", "-k", "offset"),
+    ),
+    Fault(
+        "wild-readings-without-limit",
+        "rig/reading/counter.py",
+        "if not wild.size or wild.size > 0.01 * readings.size:",
+        "if not wild.size:",
+        ("tests/measured_data/test_angles.py", "-k", "wild"),
+    ),
+    Fault(
+        "sign-cut-in-two",
+        "rig/reading/text_tables.py",
+        "for cut in range(4):",
+        "for cut in range(1):",
+        ("tests/measured_data/test_tables.py", "-k", "ascii or cut_in_two"),
+    ),
+    Fault(
+        "noon-is-midnight",
+        "rig/reading/clock.py",
+        'hour = hour % 12 + 12 * (found["noon"] in "Pp")',
+        'hour = hour + 12 * (found["noon"] in "Pp")',
+        ("tests/measured_data/test_laboratory_files.py", "-k", "noon"),
+    ),
+)
+
+_MODEL = (
+    Fault(
+        "nesting-of-yaml-off-by-one",
+        "model/file.py",
+        "if self.nesting > MAX_DEPTH:",
+        "if self.nesting >= MAX_DEPTH:",
+        ("tests/model/test_file.py", "-k", "nest"),
+    ),
+    Fault(
+        "nesting-of-toml-off-by-one",
+        "model/file.py",
+        "if _depth(data) > MAX_DEPTH:",
+        "if _depth(data) > MAX_DEPTH + 1:",
+        ("tests/model/test_file.py", "-k", "nest"),
+    ),
+    Fault(
+        "alias-allowed",
+        "model/file.py",
+        "if isinstance(event, AliasEvent):",
+        "if isinstance(event, AliasEvent) and not event.anchor:",
+        ("tests/model/test_file.py", "-k", "no_model"),
+    ),
+    Fault(
+        "half-width-is-a-width",
+        "model/tolerances.py",
+        "return (self.upper - self.lower) / 2",
+        "return self.upper - self.lower",
+        ("tests/model/test_tolerances.py", "tests/reference/test_tolerance_zones.py"),
+    ),
+    Fault(
+        "defaults-over-what-is-stated",
+        "model/tolerances.py",
+        "return {**shared, **found}",
+        "return {**found, **shared}",
+        ("tests/model/test_tolerances.py",),
+    ),
+)
+
+_RESULTS = (
+    Fault(
+        "power-in-not-written",
+        "results/export.py",
+        'found.append(("power_in", "W", lambda window: drive[:, window].sum(axis=0)))',
+        'found.append(("power_in", "W", lambda window: drive[:1, window].mean(axis=0) * 0.0))',
+        ("tests/invariants/test_written_results.py", "-k", "csv"),
+    ),
+    Fault(
+        "set-values-of-the-next-condition",
+        "results/columns/comparison.py",
+        "(str(name), unit, np.repeat(rows[i], times))",
+        "(str(name), unit, np.tile(rows[i], times))",
+        ("tests/views/test_compare.py", "tests/rig/test_compare.py", "-k", "stands_beside"),
+    ),
+)
+
+_VIEWS = (
+    Fault(
+        "efficiency-difference-sign",
+        "views/compare/tables.py",
+        "(measured, wide, model, measured - model)",
+        "(measured, wide, model, model - measured)",
+        ("tests/views/test_compare.py", "-k", "tables or difference"),
+    ),
+    Fault(
+        "radians-for-degrees",
+        "views/common/quantities.py",
+        'return 180.0 / math.pi, "°"',
+        'return 1.0, "°"',
+        ("tests/views/test_quantities.py",),
+    ),
+    Fault(
+        "runs-are-not-closed",
+        "views/common/peaks.py",
+        "first = int(np.flatnonzero(~within)[0]) if closed else 0",
+        "first = 0",
+        ("tests/views/test_peaks.py",),
+    ),
+)
+
+_CLI = (
+    Fault(
+        "findings-end-well",
+        "cli/model.py",
+        "return 1 if any(",
+        "return 0 if any(",
+        ("tests/manual/test_cli.py",),
+    ),
+    Fault(
+        "bad-input-is-a-finding",
+        "cli/edge.py",
+        "BAD_INPUT, FAULT, STOPPED = 2, 3, 130",
+        "BAD_INPUT, FAULT, STOPPED = 1, 3, 130",
+        ("tests/manual/test_cli_errors.py", "tests/manual/test_cli_edge.py"),
+    ),
+    Fault(
+        "grid-points-of-one-axis",
+        "cli/options.py",
+        "return math.prod(values[2] if isinstance(values, tuple)",
+        "return max(values[2] if isinstance(values, tuple)",
+        ("tests/manual/test_cli_sweep.py", "tests/manual/test_cli_options.py"),
+    ),
+)
+
+FAULTS = (*_STATISTICS, *_STUDIES, *_RIG, *_MODEL, *_RESULTS, *_VIEWS, *_CLI)

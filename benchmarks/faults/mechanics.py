@@ -1,0 +1,265 @@
+"""Faults of the mechanics: algebra, joints, groups, solve, cycle, measures."""
+
+from __future__ import annotations
+
+from benchmarks.faults.fault import Fault
+
+__all__ = ["FAULTS"]
+
+_ALGEBRA = (
+    Fault(
+        "dual-quotient-sign",
+        "algebra/dual.py",
+        "(x.dual - quotient * y.dual)",
+        "(x.dual + quotient * y.dual)",
+        ("tests/algebra/test_dual.py",),
+    ),
+    Fault(
+        "dual-power-exponent",
+        "algebra/dual.py",
+        "base ** (exponent - 1) * self.dual",
+        "base**exponent * self.dual",
+        ("tests/algebra/test_dual.py",),
+    ),
+    Fault(
+        "screw-log-near-half-a-turn",
+        "algebra/screw.py",
+        "versine = xp.where(obtuse, 1 - cosine, 1.0)",
+        "versine = xp.where(obtuse, 1 + cosine, 1.0)",
+        ("tests/algebra/test_screw.py",),
+    ),
+    Fault(
+        "quadrature-error-without-difference",
+        "algebra/quadrature.py",
+        "off = half * np.abs(values @ (KRONROD - GAUSS))",
+        "off = 0.0 * half * np.abs(values @ (KRONROD - GAUSS))",
+        ("tests/reference/test_means.py::test_the_rule_is_exact_for_polynomials_and_tells_its_error",),
+    ),
+)
+
+_JOINTS = (
+    Fault(
+        "guide-torsion-halved",
+        "joints/spatial_load.py",
+        "found = found + 2 * namespace(more[1]).abs(more[1]) / self.width",
+        "found = found + namespace(more[1]).abs(more[1]) / self.width",
+        ("tests/invariants/test_bearing_loads.py",),
+    ),
+    Fault(
+        "guide-torsion-gradient-halved",
+        "joints/spatial_load.py",
+        "torsion = 2 * namespace(more[1]).sign(more[1]) / self.width",
+        "torsion = namespace(more[1]).sign(more[1]) / self.width",
+        ("tests/invariants/test_bearing_loads.py",),
+    ),
+    Fault(
+        "lugre-damping-dropped",
+        "joints/friction.py",
+        'parameters["damping"] * rate + parameters["viscous"] * slip) * normal',
+        'parameters["viscous"] * slip) * normal',
+        ("tests/invariants/test_friction_laws.py",),
+    ),
+    Fault(
+        "friction-pair-factor-ignored",
+        "joints/friction.py",
+        '(parameters["pair_factor"] * parameters["coefficient"]) * normal',
+        'parameters["coefficient"] * normal',
+        ("tests/invariants/test_friction_laws.py",),
+    ),
+    Fault(
+        "planar-guide-couple-halved",
+        "joints/pairs.py",
+        "return moment * (2 / self.length)",
+        "return moment * (1 / self.length)",
+        ("tests/invariants/test_bearing_loads.py",),
+    ),
+    Fault(
+        "clearance-load-of-the-other-end",
+        "joints/clearance.py",
+        "return [(hx - gx, hy - gy), (hx + gx, hy + gy)]",
+        "return [(hx + gx, hy + gy), (hx - gx, hy - gy)]",
+        ("tests/invariants/test_clearance.py",),
+    ),
+    Fault(
+        "motion-return-takes-the-rise",
+        "joints/motion.py",
+        "_risen(profile, moment - step, back)",
+        "_risen(profile, moment - step, duration)",
+        ("tests/invariants/test_motion.py::test_a_return_of_its_own_duration",),
+    ),
+)
+
+_GROUPS = (
+    Fault(
+        "dead-centre-tolerance",
+        "groups/planar.py",
+        "ROUNDING = 1e-15",
+        "ROUNDING = 1e-6",
+        ("tests/invariants/test_groups.py", "-k", "meet"),
+    ),
+    Fault(
+        "ball-acceleration-carried",
+        "groups/spatial.py",
+        "            found = added(found, bracket(twist, part))\n            if not motion.together:\n",
+        "            if not motion.together:\n                found = added(found, bracket(twist, part))\n",
+        ("tests/invariants/test_spatial_groups.py", "-k", "accelerations or free_spin"),
+    ),
+    Fault(
+        "freedoms-do-not-carry-those-after-them",
+        "groups/spatial.py",
+        "            if not motion.together:\n                twist",
+        "            if motion is None:\n                twist",
+        ("tests/invariants/test_spatial_groups.py", "-k", "accelerations"),
+    ),
+    Fault(
+        "rrr-centripetal-sign",
+        "groups/rrr.py",
+        "d.x - b.x + wi2 * pose.bc[0] - wj2 * pose.dc[0]",
+        "d.x - b.x - wi2 * pose.bc[0] - wj2 * pose.dc[0]",
+        ("tests/invariants/test_groups.py::test_rrr_equals_general",),
+    ),
+    Fault(
+        "coriolis-halved",
+        "groups/planar.py",
+        "coriolis = 2 * w * speed",
+        "coriolis = w * speed",
+        ("tests/invariants/test_groups.py::test_every_entry_equals_the_general_group",),
+    ),
+    Fault(
+        "gear-phase-sign",
+        "groups/gear.py",
+        "return _turn(placed[self.gear.second], ratio * first + phase)",
+        "return _turn(placed[self.gear.second], ratio * first - phase)",
+        ("tests/reference/test_gears.py",),
+    ),
+    Fault(
+        "spin-carried-the-wrong-way",
+        "groups/spins.py",
+        "sense = -1.0 if group.joints[k].sides[1] == link else 1.0",
+        "sense = 1.0 if group.joints[k].sides[1] == link else -1.0",
+        ("tests/invariants/test_spatial_groups.py", "tests/reference/test_space_values.py", "-k", "spin"),
+    ),
+)
+
+_SOLVE = (
+    Fault(
+        "useful-mark-ignored",
+        "solve/loads.py",
+        "marked = [name for name, load in mechanism.loads.items() if load.useful]",
+        "marked = [name for name, load in mechanism.loads.items() if load.useful and False]",
+        ("tests/reference/test_means.py",),
+    ),
+    Fault(
+        "spin-friction-sign",
+        "solve/space/determinacy.py",
+        "sign = 1.0 if walk.system.joints[name][1][1] == link else -1.0",
+        "sign = 1.0",
+        ("tests/reference/test_space_friction.py", "-k", "drags"),
+    ),
+    Fault(
+        "resisting-load-drives",
+        "solve/loads.py",
+        'return _in_joint(walk, load.joint or "", -sign * size, slip)',
+        'return _in_joint(walk, load.joint or "", sign * size, slip)',
+        ("tests/invariants/test_loads.py", "-k", "resist"),
+    ),
+    Fault(
+        "load-power-without-y",
+        "solve/loads.py",
+        "power = power + force[0] * at.velocity[0] + force[1] * at.velocity[1]",
+        "power = power + force[0] * at.velocity[0]",
+        ("tests/invariants/test_loads.py", "-k", "following or expression"),
+    ),
+    Fault(
+        "gyroscopic-moment-dropped",
+        "solve/space/forces.py",
+        "plus(times_tensor(local_second), cross(local_w, times_tensor(local_w)))",
+        "times_tensor(local_second)",
+        ("tests/reference/test_newton_euler_space.py",),
+    ),
+    Fault(
+        "friction-of-one-pin-of-a-cross-not-felt",
+        "solve/space/contacts.py",
+        "Screw(NULL, scaled(lever, pin.z)), still, felt=True)",
+        "Screw(NULL, scaled(lever, pin.z)), still)",
+        ("tests/reference/test_newton_euler_space.py",),
+    ),
+    Fault(
+        "screw-thread-lead-sign",
+        "solve/space/contacts.py",
+        "yield Rubbing(load, way * turn, _mixed(axis, middle, lever, lever / way, lead / way), zero[0])",
+        "yield Rubbing(load, way * turn, _mixed(axis, middle, lever, lever / way, -lead / way), zero[0])",
+        ("tests/reference/test_space_friction.py", "-k", "screw"),
+    ),
+    Fault(
+        "bristles-begin-anywhere",
+        "solve/bristles.py",
+        "_picked(whole_gain, last) / xp.where(moves, lost, 1.0), 0.0)",
+        "_picked(whole_gain, last), 0.0)",
+        ("tests/reference/test_bristles.py", "-k", "chained"),
+    ),
+)
+
+_CYCLE = (
+    Fault(
+        "residual-not-related-to-power",
+        "cycle/account.py",
+        "return residual / highest if highest > 0 else residual",
+        "return residual",
+        ("tests/reference/test_means.py",),
+    ),
+    Fault(
+        "efficiency-inverted",
+        "cycle/means.py",
+        'return self.useful_power.net / work if work > 0 else float("nan")',
+        'return work / self.useful_power.net if work > 0 else float("nan")',
+        ("tests/reference/test_means.py", "-k", "efficiency"),
+    ),
+    Fault(
+        "mean-effort-for-rms",
+        "cycle/means.py",
+        "efforts = np.sqrt(value[4 : 4 + drivers])",
+        "efforts = value[4 : 4 + drivers]",
+        ("tests/reference/test_means.py",),
+    ),
+    Fault(
+        "useful-power-sign",
+        "cycle/fill.py",
+        "useful = useful - back.load_powers[name]",
+        "useful = useful + back.load_powers[name]",
+        ("tests/reference/test_means.py", "-k", "efficiency"),
+    ),
+)
+
+_MEASURES = (
+    Fault(
+        "peak-to-peak-of-one-side",
+        "measures/figures.py",
+        '"peak-to-peak": lambda course: operator.add(*course.both()),',
+        '"peak-to-peak": lambda course: course.both()[0],',
+        ("tests/reference/test_measures.py", "-k", "stroke"),
+    ),
+    Fault(
+        "dead-centre-at-the-end-of-a-range",
+        "measures/figures.py",
+        "+ np.where(found.inside, 0.0, np.nan)",
+        "+ 0.0",
+        ("tests/reference/test_measures.py", "-k", "dead_centre"),
+    ),
+    Fault(
+        "straightness-angle-doubled",
+        "measures/lines.py",
+        "angle = 0.5 * xp.arctan2(*twice)",
+        "angle = 0.4 * xp.arctan2(*twice)",
+        ("tests/reference/test_measures.py", "-k", "straightness"),
+    ),
+    Fault(
+        "slope-of-a-polynomial-sign",
+        "measures/extremes.py",
+        "slope = slope * at + value",
+        "slope = slope * at - value",
+        ("tests/invariants/test_extremes.py",),
+    ),
+)
+
+FAULTS = (*_ALGEBRA, *_JOINTS, *_GROUPS, *_SOLVE, *_CYCLE, *_MEASURES)

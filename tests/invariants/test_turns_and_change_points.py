@@ -1,0 +1,77 @@
+"""Whole turns of the drive and coarse steps, positions where assemblies meet, and hints that tell them apart."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+import trunnion
+from mechanisms import MODELS, build, five_bar, four_bar, watt_six_bar
+
+
+def findings(result) -> list[dict[str, str]]:
+    return json.loads(result.attrs["findings"])
+
+
+def test_a_change_point_is_an_error_not_a_silent_change_of_assembly() -> None:
+    """A parallelogram goes through a position where it may become an antiparallelogram."""
+    data = four_bar(0.3, 1.0, 0.3, 1.0)
+    data["drivers"]["A"]["start"] = 1.0
+    data["assembly"] = {"C": [1.16, 0.25]}
+    errors = [row for row in findings(trunnion.analyse(build(data), 7)) if row["severity"] == "error"]
+    assert any("change point at 180°" in row["what"] for row in errors)
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_an_ordinary_linkage_has_no_change_point(name: str) -> None:
+    result = trunnion.analyse(build(MODELS[name]()), 12)
+    assert not any("change point" in row["what"] for row in findings(result))
+
+
+@pytest.mark.parametrize("branch", [1, -1])
+def test_a_hint_on_a_joint_of_a_later_group_counts(branch: int) -> None:
+    """F joins the rocker to a later dyad: its place tells the assemblies of the rocker's own dyad apart."""
+    data = watt_six_bar()
+    data["assembly"]["C"][1] *= branch
+    stated = trunnion.analyse(build(data), 3)
+    f = stated["point_position"].sel(point="rocker.F")[:, 0].values
+    data["assembly"] = {"F": f.tolist(), "H": data["assembly"]["H"]}
+    hinted = trunnion.analyse(build(data), 3)
+    np.testing.assert_array_equal(hinted["point_position"], stated["point_position"])
+    assert not any("no hint" in row["what"] for row in findings(hinted))
+
+
+def test_a_driven_rotation_is_the_prescribed_coordinate() -> None:
+    """Whole turns, a start beyond half a turn and coarse steps included."""
+    data = five_bar()
+    data["drivers"]["E"] |= {"speed": -20.0, "start": 3.5}
+    result = trunnion.analyse(build(data), 12)
+    np.testing.assert_allclose(result["joint_rotation"].sel(joint="E"), 3.5 - 20.0 * result["time"], rtol=1e-13)
+
+
+def test_angles_follow_their_rate_across_coarse_steps() -> None:
+    """A link that turns 0.9 turns a step is not taken to turn back 0.1."""
+    data = four_bar()
+    data["drivers"]["A"] |= {"range": [0.0, 36 * np.pi * 0.9]}
+    result = trunnion.analyse(build(data), 19)
+    crank = result["link_angle"].sel(link="crank").values
+    np.testing.assert_allclose(np.diff(crank), 2 * np.pi * 0.9, rtol=1e-12)
+
+
+@pytest.mark.parametrize("factor", [-1.0, 0.5, 3.0])
+def test_another_speed_is_the_same_motion_at_other_times(factor: float) -> None:
+    """General groups too: their track is read by the drive coordinate, not by time."""
+    run = trunnion.prepare(build(MODELS["class III"]()))
+    speed = float(run.values["drivers.A.speed"])
+    time = run.cycle.times(10)
+    plain = run.solve(time)
+    values = run.system.mechanism.parameters({"drivers.A.speed": factor * speed})
+    other = run.solve(time / factor, values)
+    for link, motion in plain.walk.motions.items():
+        np.testing.assert_allclose(
+            np.broadcast_to(other.walk.motions[link].frame.x, time.shape),
+            np.broadcast_to(motion.frame.x, time.shape),
+            atol=1e-12,
+        )

@@ -119,12 +119,11 @@ def models_of(pages: Any) -> dict[str, str]:
 
 def _drawn(model: str, models: dict[str, str], kinds: list[str], steps: int, report: bool) -> dict[str, bytes]:
     """The figures of a model, and its report, by file name."""
-    from trunnion.views.assemblies import ways
-    from trunnion.views.plots import PLOTS, save
-
     from trunnion import analyse, assemble, read
     from trunnion import report as page
-    from trunnion.views import fit
+    from trunnion.views.assembly import figure as fit
+    from trunnion.views.assembly.drawings import ways
+    from trunnion.views.cycle.plots import PLOTS, save
 
     base, values = VARIANTS.get(model, (model, {}))
     if base not in models:
@@ -162,7 +161,7 @@ def _swept(verb: str, name: str, text: str, models: dict[str, str]) -> bytes:
                 (Path(folder) / place / f"{model}.yaml").write_text(content, encoding="utf-8")
         wanted = [*(_measured(text, command[1]) if verb == "compare" else ()), command[1]]
         for one in wanted:
-            call = [sys.executable, "-m", "trunnion.cli", *shlex.split(one, comments=True)]
+            call = [sys.executable, "-m", "trunnion", *shlex.split(one, comments=True)]
             done = subprocess.run(call, cwd=folder, capture_output=True, text=True, check=False)
             if done.returncode not in (0, 1):
                 raise PluginError(f"trunnion {one}: {done.stderr}")
@@ -221,7 +220,7 @@ PARTS = {"": "", "seats": "with a seat", "errors": "with an error"}
 
 def results_table() -> str:
     """Every variable of a result, in the plane and in space: one row where it is the same in both."""
-    from trunnion.results import variables
+    from trunnion.results.variables import variables
 
     plane, space = variables("planar"), variables("spatial")
     rows: list[tuple[object, ...]] = []
@@ -248,7 +247,7 @@ def _in_order(first: list[str], second: list[str]) -> list[str]:
 
 def sweeps_table() -> str:
     """Every figure of a sweep."""
-    from trunnion.analysis.sweep import FIGURES
+    from trunnion.studies.sweep.study import FIGURES
 
     rows = [(_code(name), ", ".join(one.dims), _unit(one.units), one.long_name) for name, one in FIGURES.items()]
     return _rows(("variable", "dimension before the swept ones", "unit", "meaning"), rows)
@@ -256,7 +255,7 @@ def sweeps_table() -> str:
 
 def plays_table() -> str:
     """Every variable of the play of joints."""
-    from trunnion.analysis.play_result import VARIABLES
+    from trunnion.studies.play.result import VARIABLES
 
     rows = [
         (_code(name), ", ".join(one.dims), _unit(one.units) if one.units else "of the measure", one.long_name)
@@ -267,14 +266,14 @@ def plays_table() -> str:
 
 def tolerances_table() -> str:
     """Every variable of a tolerance analysis."""
-    from trunnion.analysis.tolerance.result import VARIABLES
+    from trunnion.studies.tolerance.result import VARIABLES
 
     return _toleranced(VARIABLES)
 
 
 def identification_table() -> str:
     """Every variable of an identification."""
-    from trunnion.analysis.rig.identify.result import VARIABLES
+    from trunnion.rig.identify.result import VARIABLES
 
     rows = [(_code(name), ", ".join(one.dims), _unit(one.units), one.long_name) for name, one in VARIABLES.items()]
     return _rows(("variable", "dimension", "unit", "meaning"), rows)
@@ -282,7 +281,7 @@ def identification_table() -> str:
 
 def allocations_table() -> str:
     """Every variable of an allocation beside those of the tolerance analysis."""
-    from trunnion.analysis.allocation.result import VARIABLES
+    from trunnion.studies.allocation.result import VARIABLES
 
     return _toleranced(VARIABLES)
 
@@ -306,7 +305,7 @@ def _toleranced(variables: Mapping[str, Any]) -> str:
 
 def measures_table() -> str:
     """Every kind of measure."""
-    from trunnion.analysis.measures import MEASURES
+    from trunnion.measures.measures import MEASURES
 
     figures = {
         "deviation": "largest deviation from nominal",
@@ -364,7 +363,7 @@ def costs_table() -> str:
 
 def comparisons_table() -> str:
     """Every variable of a comparison with a measurement."""
-    from trunnion.analysis.rig.compared import VARIABLES
+    from trunnion.rig.compare.result import VARIABLES
 
     told = {"": "of the channel", "set": "of what is set", "drive": "rad, m or s"}
     rows = [
@@ -376,7 +375,7 @@ def comparisons_table() -> str:
 
 def assembling_table() -> str:
     """Every variable of whether a mechanism goes together."""
-    from trunnion.analysis.assemblability import FIGURES
+    from trunnion.studies.assembly.study import FIGURES
 
     rows = [(_code(name), ", ".join(one.dims), _unit(one.units), one.long_name) for name, one in FIGURES.items()]
     return _rows(("variable", "dimensions", "unit", "meaning"), rows)
@@ -498,7 +497,7 @@ def groups_table() -> str:
 
 def plots_table() -> str:
     """Every plot."""
-    from trunnion.views.plots import PLOTS
+    from trunnion.views.cycle.plots import PLOTS
 
     return _rows(
         ("kind", "shows"), [(_code(name), (inspect.getdoc(f) or "").splitlines()[0]) for name, f in PLOTS.items()]
@@ -507,7 +506,7 @@ def plots_table() -> str:
 
 def formats_table() -> str:
     """Every format a result is written in."""
-    from trunnion.export import FORMATS
+    from trunnion.results.export import FORMATS
 
     rows = [
         (_code(name), f"`pip install 'trunnion[{extra}]'`" if extra else "") for name, (_, _, extra) in FORMATS.items()
@@ -527,7 +526,7 @@ def units_table() -> str:
 
 def command_line() -> str:
     """Every verb with its arguments and options."""
-    from trunnion.cli import app
+    from trunnion.cli.app import app
 
     parts = []
     for command in app.registered_commands:

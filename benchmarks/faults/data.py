@@ -50,7 +50,7 @@ _STUDIES = (
         "studies/tolerance/linear.py",
         "np.asarray(np.min(np.nan_to_num(end, nan=np.inf)))",
         "np.asarray(np.max(np.nan_to_num(end, nan=-np.inf)))",
-        ("tests/reference/test_tolerance.py", "-k", "worst_case_of_figures or whole_turn"),
+        ("tests/reference/test_tolerance.py", "-k", "worst_case_of_the_least"),
     ),
     Fault(
         "play-scatter-of-another-dimension",
@@ -282,7 +282,7 @@ _CLI = (
         "cli/options.py",
         "return math.prod(values[2] if isinstance(values, tuple)",
         "return max(values[2] if isinstance(values, tuple)",
-        ("tests/manual/test_cli_sweep.py", "tests/manual/test_cli_options.py"),
+        ("tests/manual/test_cli_options.py", "-k", "combinations"),
     ),
 )
 

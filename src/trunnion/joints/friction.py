@@ -61,7 +61,7 @@ class FrictionLaw:
     interval_at_rest: whether at slip 0 the force may be anything up to its value beside 0.
     scale: the parameter that the force is proportional to, if there is one.
     relaxation: of a law with bristles, `(slip, **parameters)` → d in ż = slip − d z, 1/s. Their deflection z, m,
-    depends on the slip alone; it is integrated along the cycle (`analysis.bristles`) and given to the function as
+    depends on the slip alone; it is integrated along the cycle (`solve.bristles`) and given to the function as
     `deflection`. Without it the function takes that of steady sliding, slip/d.
     """
 

@@ -11,9 +11,9 @@ CSV (and Parquet) have one row a position and flat columns: `time`, `<joint>.rot
 they were given, then `efficiency`, `<driver>.effort_max`, `<joint>.reaction_max`, …, `status`. The play of joints has
 `drive`, `<measure>`, `<measure>.worst_case`, `<measure>.rss`, `<measure>.deviation`, `<measure>.<joint>.worst_case`,
 …. Of tolerances the file's name says which table it holds: one row a measure, or of `x.parameters.csv` one a toleranced
-number, see `columns.tolerances`; so it does of a comparison with measurements and of what `identify` finds, see
-`columns.comparison` and `columns.identification`. What `assemble` finds has one row a position: `<driver>.coordinate`,
-`needed_share`, `needed_clearance`, …, `<joint>.uniform_1_x` of end 1, …, `status`. Measured courses have one row a
+number, see `results.columns.tolerances`; so it does of a comparison with measurements and of what `identify` finds, see
+`results.columns.comparison` and `results.columns.identification`. What `assemble` finds has one row a position:
+`<driver>.coordinate`, `needed_share`, `needed_clearance`, …, `<joint>.uniform_1_x` of end 1, …, `status`. Measured courses have one row a
 condition and position: `condition`, what was set, `phase`, `<channel>.mean`, `.scatter`, `.uncertainty`, `.turns`.
 """
 

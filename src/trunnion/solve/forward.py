@@ -51,7 +51,7 @@ GROUND = Motion(Frame(0.0, 0.0, 1.0, 0.0), Twist(0.0, 0.0, 0.0), Acceleration(0.
 class Forward:
     """What one walk forward found at the times (s) it was asked for; element frames are worked out once and kept.
 
-    In the plane; `analysis.space.motion` has the same of space.
+    In the plane; `solve.space.motion` has the same of space.
     """
 
     system: System

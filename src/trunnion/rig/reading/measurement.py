@@ -41,7 +41,7 @@ class Accuracy:
 class Course:
     """One channel in one condition.
 
-    channel: its name in the mapping; measures: what it measures, as `analysis.measures.named` reads it (`effort:input`,
+    channel: its name in the mapping; measures: what it measures, as `measures.measures.named` reads it (`effort:input`,
     `rate:output`, `load:brake`); unit: SI; turns: (turn, position), NaN where there is nothing to be had.
     """
 

@@ -1,6 +1,6 @@
 """The kernel of a tolerance run, compiled by JAX: the same walk forward and back, written down once and run often.
 
-`analysis.kinematics`, `analysis.kinetostatics`, the groups and the laws run on `algebra.traced` numbers; what comes out
+`solve.forward`, `solve.backward`, the groups and the laws run on `algebra.traced` numbers; what comes out
 is one function of the numbers that vary and of the times. Lanes that cannot be decided without values - not plainly
 solved, or without proof that the friction has one solution - are computed again by NumPy, so that the answer is
 NumPy's everywhere.

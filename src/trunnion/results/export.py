@@ -13,8 +13,9 @@ they were given, then `efficiency`, `<driver>.effort_max`, `<joint>.reaction_max
 …. Of tolerances the file's name says which table it holds: one row a measure, or of `x.parameters.csv` one a toleranced
 number, see `results.columns.tolerances`; so it does of a comparison with measurements and of what `identify` finds, see
 `results.columns.comparison` and `results.columns.identification`. What `assemble` finds has one row a position:
-`<driver>.coordinate`, `needed_share`, `needed_clearance`, …, `<joint>.uniform_1_x` of end 1, …, `status`. Measured courses have one row a
-condition and position: `condition`, what was set, `phase`, `<channel>.mean`, `.scatter`, `.uncertainty`, `.turns`.
+`<driver>.coordinate`, `needed_share`, `needed_clearance`, …, `<joint>.uniform_1_x` of end 1, …, `status`. Measured
+courses have one row a condition and position: `condition`, what was set, `phase`, `<channel>.mean`, `.scatter`,
+`.uncertainty`, `.turns`.
 """
 
 from __future__ import annotations

@@ -127,18 +127,25 @@ class Grid:
 def _maps(spots: Array, own: int) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
     """Coefficients of a polynomial through all nodes and through FEWER about the top, second differences; see above."""
     points = len(spots)
-    whole = np.asarray(np.linalg.inv(np.vander(spots, increasing=True)), float)
+    whole = _inverse(np.vander(spots, increasing=True))
     few = min(FEWER, points)
     first = int(np.clip(own - few // 2, 0, points - few))
     inner = slice(first, first + few)
     fewer = np.zeros((points, points))
-    fewer[:few, inner] = np.linalg.inv(np.vander(spots[inner], increasing=True))
+    fewer[:few, inner] = _inverse(np.vander(spots[inner], increasing=True))
     bends = np.zeros((max(points - 2, 0), points))
     for k in range(len(bends)):
         left, right = spots[k + 1] - spots[k], spots[k + 2] - spots[k + 1]
         bends[k, k : k + 3] = 1 / left, -1 / left - 1 / right, 1 / right
     index = np.arange(len(bends))
     return whole, fewer, bends, (index >= first) & (index + 3 <= first + few)
+
+
+def _inverse(powers: Array) -> Array:
+    """Inverse to rounding on any processor: what it leaves, taken in long floats, corrects it once."""
+    found = np.asarray(np.linalg.inv(powers), np.longdouble)
+    left = np.eye(len(powers)) - powers.astype(np.longdouble) @ found
+    return np.asarray(found + found @ left, float)
 
 
 class Extreme(NamedTuple):

@@ -128,14 +128,19 @@ class Engine:
     def forces(self, coefficient: float) -> tuple[dict[str, Array], dict[str, float], dict[str, float]]:
         """Reactions (x, y, moment about the joint's point on the second link), friction, drive efforts."""
         friction, speed = dict.fromkeys(self.joints, 0.0), {name: self.speed(name) for name in self.joints}
+        seen: list[dict[str, float]] = []  # rounding may go round in a circle of the same bits
         for _ in range(60):
             cut, drive = self._balance(friction)
             reactions = {name: self._reaction(name, cut) for name in self.joints}
             last = friction
             loads = {name: coefficient * self._normal(name, *reactions[name]) for name in self.joints}
             friction = {name: -np.sign(speed[name]) * load for name, load in loads.items()}
-            if all(abs(friction[n] - last[n]) <= 1e-14 * np.max(np.abs(reactions[n])) for n in friction):
+            if (
+                all(abs(friction[n] - last[n]) <= 1e-15 * np.max(np.abs(reactions[n])) for n in friction)
+                or friction in seen
+            ):
                 return reactions, friction, drive
+            seen.append(friction)
         raise AssertionError("friction does not settle")
 
     def _balance(self, friction: dict[str, float]) -> tuple[dict[str, Array], dict[str, float]]:

@@ -16,18 +16,20 @@ demo: $(VENV)/.base
 	$(BIN)/trunnion plot $(EXAMPLE) --out $(OUT)
 	@echo "open $(OUT)/four-bar.html in a browser"
 
-# Lint, types, layer rule, tests, documentation: some minutes.
+# Lint, types, layer rule, tests, the text and links of the documentation: some minutes.
 test: $(VENV)/.dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/python -m pytest -n 2 --dist worksteal -m "not slow"
-	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet --site-dir $(VENV)/site
+	NO_MKDOCS_2_WARNING=1 TRUNNION_DOCS=text $(BIN)/mkdocs build --strict --quiet --site-dir $(VENV)/site
 
-# What `make test` leaves out: every example, long counts, further oracles, every page of the documentation.
+# What `make test` leaves out: every example, long counts, further oracles, every page and figure of the
+# documentation.
 test-all: $(VENV)/.dev
 	$(BIN)/python -m pytest -n 2 --dist worksteal -m slow
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet --site-dir $(VENV)/site
 
 # Ratios to peers and hand-written kernels, measured in one run.
 bench: $(VENV)/.bench

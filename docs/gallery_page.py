@@ -32,25 +32,25 @@ def wanted() -> set[tuple[str, str, str]]:
     }
 
 
-def page() -> str:
-    """The entries as Markdown, by section."""
+def page(text_only: bool = False) -> str:
+    """The entries as Markdown, by section. text_only: without what has to be computed."""
     known = facts()
     missing = {path.stem for path in EXAMPLES.glob("*.yaml")} ^ {*known.ENTRIES, *known.REFUSED}
     if missing:
         raise ValueError(f"tests/gallery/facts.py and examples/ do not name the same models: {sorted(missing)}")
     parts = []
     for title, entries in known.SECTIONS.items():
-        parts += [f"## {title}", *(_entry(name, entry) for name, entry in entries.items())]
-    parts += ["## Diagnosed and refused", *map(_refused, known.REFUSED)]
+        parts += [f"## {title}", *(_entry(name, entry, text_only) for name, entry in entries.items())]
+    parts += ["## Diagnosed and refused", *(() if text_only else map(_refused, known.REFUSED))]
     return "\n\n".join(parts) + "\n"
 
 
-def _entry(name: str, entry: Any) -> str:
+def _entry(name: str, entry: Any, text_only: bool) -> str:
     import trunnion
     from gallery.entry import STEPS, Outcome
 
     mechanism = trunnion.read(EXAMPLES / f"{name}.yaml")
-    result = trunnion.analyse(mechanism, STEPS)
+    result = None if text_only else trunnion.analyse(mechanism, STEPS)
     drawings = [f"![{_alt(kind)}](figures/{name}/{kind}.svg)" for kind in entry.figures]
     report = f" · [report](figures/{name}/report.html)" if entry.report else ""
     parts = [
@@ -59,9 +59,9 @@ def _entry(name: str, entry: Any) -> str:
         '<div class="gallery" markdown>',
         *drawings,
         "</div>",
-        _checked(entry, Outcome(mechanism, result)),
+        "" if result is None else _checked(entry, Outcome(mechanism, result)),
         *_sources(mechanism),
-        f"`{result.attrs['formula']}` · [{name}.yaml](examples/{name}.yaml){report}",
+        ("" if result is None else f"`{result.attrs['formula']}` · ") + f"[{name}.yaml](examples/{name}.yaml){report}",
     ]
     return "\n\n".join(parts)
 

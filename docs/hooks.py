@@ -10,12 +10,16 @@
 - The line that says that a page has no tables in the repository is left out.
 - The gallery is made of the examples and of `tests/gallery/facts.py`; see `gallery_page.py`.
 - `$x$` and `$$x$$` become MathML, which browsers set without any script.
+
+With TRUNNION_DOCS=text in the environment every figure is an empty one and the gallery's figures are not computed:
+text, links and tables are checked within seconds, as `make test` does.
 """
 
 from __future__ import annotations
 
 import importlib.util
 import inspect
+import os
 import re
 import shlex
 import subprocess
@@ -40,6 +44,8 @@ ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
 EXAMPLES = ROOT / "examples"
 
+TEXT_ONLY = os.environ.get("TRUNNION_DOCS") == "text"
+EMPTY = b'<svg xmlns="http://www.w3.org/2000/svg"/>'
 # folders of figures that a command draws
 COMMANDS = ("sweeps", "plays", "assembles", "tolerances", "allocates", "compares")
 
@@ -119,15 +125,16 @@ def models_of(pages: Any) -> dict[str, str]:
 
 def _drawn(model: str, models: dict[str, str], kinds: list[str], steps: int, report: bool) -> dict[str, bytes]:
     """The figures of a model, and its report, by file name."""
+    if TEXT_ONLY:
+        _base_of(model, models)
+        return dict.fromkeys((*(f"{kind}.svg" for kind in kinds), *(["report.html"] if report else [])), EMPTY)
     from trunnion import analyse, assemble, read
     from trunnion import report as page
     from trunnion.views.assembly import figure as fit
     from trunnion.views.assembly.drawings import ways
     from trunnion.views.cycle.plots import PLOTS, save
 
-    base, values = VARIANTS.get(model, (model, {}))
-    if base not in models:
-        raise PluginError(f"figures/{model}: there is no model '{base}'")
+    base, values = _base_of(model, models)
     drawn = {}
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / f"{base}.yaml"
@@ -149,11 +156,21 @@ def _drawn(model: str, models: dict[str, str], kinds: list[str], steps: int, rep
     return drawn
 
 
+def _base_of(model: str, models: dict[str, str]) -> tuple[str, dict[str, float | str]]:
+    """The model file that figures are made from, and what is replaced in it."""
+    base, values = VARIANTS.get(model, (model, {}))
+    if base not in models:
+        raise PluginError(f"figures/{model}: there is no model '{base}'")
+    return base, values
+
+
 def _swept(verb: str, name: str, text: str, models: dict[str, str]) -> bytes:
     """The figure that a page's own command draws, so that the two cannot differ."""
     command = re.search(rf"^trunnion ({verb} .*--out {re.escape(name)}\.svg.*)$", text, re.MULTILINE)
     if command is None:
         raise PluginError(f"figures/{verb}s/{name}.svg: no page has a command that writes {name}.svg")
+    if TEXT_ONLY:
+        return EMPTY
     with tempfile.TemporaryDirectory() as folder:
         (Path(folder) / "examples").mkdir()
         for model, content in models.items():
@@ -678,5 +695,5 @@ TABLES: dict[str, Callable[..., str]] = {
     "command-line": command_line,
     "public-names": public_names,
     "section": section,
-    "gallery": lambda: _gallery().page(),
+    "gallery": lambda: _gallery().page(TEXT_ONLY),
 }

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from itertools import product
 
 import pytest
 
+from trunnion.model import units
 from trunnion.model.quantity import Quantity
 from trunnion.model.units import KINDS, UnitError, unit
 from trunnion.rig.reading.amounts import dimensions
@@ -61,3 +63,16 @@ def test_degrees_in_german_are_no_giga_radians() -> None:
         Quantity.read("6 Grad", KINDS["angle"])
     with pytest.raises(UnitError, match="not in common use"):
         Quantity.read("6 deg ± 1 Grad", KINDS["angle"])
+
+
+def test_units_read_without_pint_are_as_pint_reads_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    known = units._COMMON
+    pairs = [f"{a}{between}{b}" for a, b in product(known, known) for between in (" ", "/", "^2 * ")]
+    texts = [*known, *pairs, "Nm", "kNm", "N m/rad s", "m s^-2", "kg m^2/s^2", "m/s/s", "N m s/rad"]
+    short = {text: found for text in texts if (found := units._common(units.plain(text)))}
+    assert len(short) > 0.9 * len(texts)
+    assert {"N m", "Nm", "rad/s", "m s^-2"} <= set(short)
+    monkeypatch.setattr(units, "_common", lambda spaced: None)
+    for text, (factor, exponents, names) in short.items():
+        by_pint = units.root.__wrapped__(text)
+        assert (factor, exponents, sorted(names)) == (by_pint[0], by_pint[1], sorted(by_pint[2])), text

@@ -2,7 +2,8 @@
 
 A dimension is the exponents of (length, mass, time, angle). Angle counts as one, although SI calls it a pure
 number, so that 30 deg is not taken for a length nor 30 mm for an angle; beside other dimensions it drops out
-(N m/rad is N m). pint knows the units; it is imported when the first unit is read.
+(N m/rad is N m). pint knows the units; those that nearly every model is written in stand here as well, since pint
+takes a third of a second to load.
 """
 
 from __future__ import annotations
@@ -139,6 +140,50 @@ def _registry() -> pint.UnitRegistry[Fraction]:
     return registry
 
 
+_PI = Fraction("3.1415926535897932384626433832795028841971693993751")  # as pint has it
+_M, _RAD, _S = {"meter": Fraction(1)}, {"radian": Fraction(1)}, {"second": Fraction(1)}
+_NEWTON = {"gram": Fraction(1), "meter": Fraction(1), "second": Fraction(-2)}
+# of the units in most models: name and root as pint has them, factor to SI; a test holds them against pint
+_COMMON: dict[str, tuple[str, Fraction, dict[str, Fraction]]] = {
+    "mm": ("millimeter", Fraction(1, 1000), _M),
+    "cm": ("centimeter", Fraction(1, 100), _M),
+    "m": ("meter", Fraction(1), _M),
+    "um": ("micrometer", Fraction(1, 10**6), _M),
+    "µm": ("micrometer", Fraction(1, 10**6), _M),
+    "deg": ("degree", _PI / 180, _RAD),
+    "rad": ("radian", Fraction(1), _RAD),
+    "rpm": ("revolutions_per_minute", _PI / 30, {"radian": Fraction(1), "second": Fraction(-1)}),
+    "kg": ("kilogram", Fraction(1), {"gram": Fraction(1)}),
+    "g": ("gram", Fraction(1, 1000), {"gram": Fraction(1)}),
+    "s": ("second", Fraction(1), _S),
+    "ms": ("millisecond", Fraction(1, 1000), _S),
+    "N": ("newton", Fraction(1), _NEWTON),
+    "kN": ("kilonewton", Fraction(1000), _NEWTON),
+}
+_FACTOR = re.compile(r"([^\W\d]+)(?:\^(-?[1-9]))?")
+_PRODUCT_OF_COMMON = re.compile(rf"{_FACTOR.pattern}(?: ?[ */] ?{_FACTOR.pattern})*")
+
+
+def _common(spaced: str) -> tuple[Fraction, dict[str, Fraction], tuple[str, ...]] | None:
+    """`root` of a product of the units in `_COMMON`, each once, without pint; None of any other."""
+    spaced = spaced[1:-1] if re.fullmatch(r"\([^()]*\)", spaced) else spaced
+    if not _PRODUCT_OF_COMMON.fullmatch(spaced):
+        return None
+    total, exponents, names = Fraction(1), dict[str, Fraction](), list[str]()
+    for found in _FACTOR.finditer(spaced):
+        if found[1] not in _COMMON:
+            return None
+        name, factor, base = _COMMON[found[1]]
+        power = int(found[2] or 1) * (-1 if spaced[: found.start()].rstrip().endswith("/") else 1)
+        total *= factor**power
+        names.append(name)
+        for one, exponent in base.items():
+            exponents[one] = exponents.get(one, Fraction(0)) + power * exponent
+    if len(set(names)) < len(names):
+        return None
+    return total, {one: exponent for one, exponent in exponents.items() if exponent}, tuple(names)
+
+
 MOST_POWER = 1000  # of all powers in a unit, one on the other
 # one power, not itself raised to another
 _POWER = re.compile(r"(?:\*\*|\^)\s*\(?\s*[+-]?\s*(\d{1,2})(?:[./]\d{1,2})?\s*\)?(?!\s*(?:\*\*|\^)|[\d.])")
@@ -180,8 +225,10 @@ def _check_powers(text: str, spaced: str) -> None:
 @cache
 def root(text: str) -> tuple[Fraction, dict[str, Fraction], tuple[str, ...]]:
     """Factor to SI, exponents by base unit of pint, and the units named, of any unit in use; UnitError if none."""
-    registry = _registry()
     spaced = plain(text)
+    if known := _common(spaced):
+        return known
+    registry = _registry()
     _check_spelling(text, spaced)
     _check_powers(text, spaced)
     try:

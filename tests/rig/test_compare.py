@@ -41,6 +41,7 @@ def codes(result):
 # ---- judging --------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.spread(5)
 @pytest.mark.parametrize("turns", [3, 12])
 @pytest.mark.parametrize(("zero", "gain"), [(0.0, 0.0), (0.3, 0.0), (0.05, 0.01)])
 @pytest.mark.parametrize("smooth", [1, 9])

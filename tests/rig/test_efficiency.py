@@ -44,6 +44,7 @@ def exact(turns: int = 3) -> dict[str, NDArray[np.float64]]:
     return {name: np.tile(course, (turns, 1)) for name, course in TRUE.items()}
 
 
+@pytest.mark.slow
 def test_uncertainty_is_the_scatter_of_many_rigs() -> None:
     """2000 rigs with errors and noise as stated: their standard deviation is u, and 2 u covers 95 %."""
     random = np.random.default_rng(5)

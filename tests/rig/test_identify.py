@@ -75,6 +75,7 @@ def covered(model: trunnion.Mechanism, data: True_, true: float, seeds: int, sen
 # ---- intervals ------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "sensors",
     [Sensors(), Sensors(step=0.004), Sensors(cut_off=0.15)],
@@ -87,6 +88,7 @@ def test_the_interval_of_a_four_bar_holds_the_true_coefficient(
     assert covered(four_bar, torque, 0.3, 30, sensors) >= 24
 
 
+@pytest.mark.slow
 def test_the_interval_of_a_cardan_joint_holds_the_true_coefficient(cardan: trunnion.Mechanism, shaft: True_) -> None:
     sensors = Sensors(noise=0.01, zero=0.002, gain=0.002, step=0.002)
     assert covered(cardan, shaft, 0.35, 12, sensors) >= 9
@@ -303,6 +305,7 @@ def test_one_turn_alone_takes_its_scatter_from_the_residuals(four_bar: trunnion.
 # ---- the search -----------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_start_that_locks_is_left(cardan: trunnion.Mechanism) -> None:
     short = cardan.with_values({"bearing": "10 mm"})
     true = truth(short, TURNED[:2], {"torque-in": "effort:input"}, {FRICTION: 0.1})
@@ -324,6 +327,7 @@ def test_a_clearance_by_the_seat_it_is_given(four_bar: trunnion.Mechanism) -> No
     assert found["standard_uncertainty"].values[0] < 0.1e-3
 
 
+@pytest.mark.slow
 def test_a_clearance_by_pins_that_lie_as_they_are_loaded() -> None:
     model = read_mechanism("examples/fourbar-with-play.yaml")
     joint = next(iter(model.seated))

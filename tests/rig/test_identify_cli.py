@@ -56,6 +56,7 @@ def call(folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFi
     return run
 
 
+@pytest.mark.slow
 def test_tables_files_and_the_model(folder: Path, call) -> None:  # type: ignore[no-untyped-def]
     files = ["x.csv", "x.fit.csv", "x.residuals.csv", "x.nc", "x.json", "x.svg"]
     outs = [part for name in files for part in ("--out", name)]
@@ -80,6 +81,7 @@ def test_tables_files_and_the_model(folder: Path, call) -> None:  # type: ignore
     assert "http" not in page.replace("http-equiv", "")
 
 
+@pytest.mark.slow
 def test_numbers_that_are_not_told_apart_are_not_written(folder: Path, call) -> None:  # type: ignore[no-untyped-def]
     kind = "correlation"
     pair = ",".join(f"{name}.friction.pair_factor" for name in ("input", "pin-1", "pin-2", "output"))
@@ -120,6 +122,7 @@ def test_results_are_not_written_over_what_is_read(  # type: ignore[no-untyped-d
     assert [(folder / name).read_bytes() for name in names] == before
 
 
+@pytest.mark.spread(7)
 @pytest.mark.parametrize(
     ("options", "message"),
     [

@@ -29,6 +29,7 @@ def run(program: Run) -> Run:
     return functools.partial(program, "rig")
 
 
+@pytest.mark.slow
 def test_plan_and_files(run: Run, tmp_path: Path) -> None:
     planned = run(FOUR_BAR, RIG)
     assert planned.code == 0
@@ -56,6 +57,7 @@ def test_files_in_the_wrong_order(run: Run) -> None:
     assert "is no rig file" in run(FOUR_BAR, FOUR_BAR).err
 
 
+@pytest.mark.slow
 def test_left_out_conditions_end_with_1(run: Run, tmp_path: Path) -> None:
     text = RIG.read_text("utf-8").replace("work.resisting_torque: 2 N m", "l2: 80 mm")
     (tmp_path / "rig.yaml").write_text(text, encoding="utf-8")
@@ -77,6 +79,7 @@ sensors:
 """
 
 
+@pytest.mark.spread(12)
 @pytest.mark.parametrize(
     ("old", "new", "line", "what", "remedy"),
     [
@@ -183,6 +186,7 @@ def _files(folder: Path) -> dict[str, bytes]:
     return {str(one.relative_to(folder)): one.read_bytes() for one in folder.rglob("*") if one.is_file()}
 
 
+@pytest.mark.spread(5)
 @pytest.mark.parametrize("where", ["data", "not/yet/there"])
 @pytest.mark.parametrize("form", ["csv", "parquet", "tdms"])
 @pytest.mark.parametrize("error", [OSError(28, "No space left on device"), KeyboardInterrupt(), MemoryError()])

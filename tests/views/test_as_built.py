@@ -39,6 +39,7 @@ def _label(axes, name):
     return next(line for line in axes.lines if line.get_label() == name)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("which", ["slider", "cardan", "balls"])
 def test_every_figure_is_drawn(which, request, tmp_path):
     result = request.getfixturevalue(which)
@@ -271,6 +272,7 @@ def test_the_scene_of_the_result_tells_the_plays(cardan):
 # ---- sweeps ---------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_sweep_is_drawn_beside_the_ideal_mechanism(slider, tmp_path):
     mechanism = trunnion.Mechanism.read(EXAMPLES / "pezzuti-cardan-as-built.yaml")
     swept = trunnion.sweep(mechanism, {"misalignment": ["0 deg", "10 deg", "20 deg"]}, 36)

@@ -41,6 +41,7 @@ if NODE:  # not a skip: what must hold everywhere is tested in Python; this is t
     def test_arithmetic():
         run("format.test.mjs")
 
+    @pytest.mark.spread(5)
     def test_every_kind_of_result_makes_a_page(case, tmp_path):
         _, result = case
         shown = page(result, tmp_path, result)

@@ -58,6 +58,7 @@ def _without_errors():
     return trunnion.Mechanism.model_validate(yaml.safe_load(FOUR_BAR.replace(", seat: {xi: 30 deg}", "")))
 
 
+@pytest.mark.slow
 def test_a_link_in_space_is_moved_turned_and_stretched_to_its_errors(cardan):
     """The mean shift, the turn about the middle and the stretch of each point add up to the error of that point."""
     built = scene(cardan)["built"]

@@ -207,6 +207,7 @@ def page_of(name):
     return report(case(name))
 
 
+@pytest.mark.spread(2)
 @pytest.mark.parametrize("name", ["wrong", "one turn", "one position", "motion only"])
 def test_every_result_makes_a_page_that_fetches_and_runs_nothing(name):
     text = page_of(name)
@@ -306,6 +307,7 @@ def run(monkeypatch, capsys, *arguments):
     return end.value.code, *capsys.readouterr()
 
 
+@pytest.mark.slow
 def test_the_verb_from_the_files_of_a_virtual_rig(tmp_path, monkeypatch, capsys):
     model = EXAMPLES / "toleranced-fourbar.yaml"
     (tmp_path / "rig.yaml").write_text(RIG, encoding="utf-8")

@@ -19,6 +19,7 @@ PLAIN = [name for name in PLOTS if name not in READY]  # of results without erro
 SIGNATURES = {".png": b"\x89PNG", ".pdf": b"%PDF", ".svg": b"<?xml"}
 
 
+@pytest.mark.spread(7)
 @pytest.mark.parametrize("name", PLAIN)
 def test_every_figure_of_every_result(name, case, tmp_path):
     kind, result = case
@@ -108,6 +109,7 @@ def test_a_font_that_has_the_sign_is_used(fonts, tmp_path):
     assert save(PLOTS["polar"](four_bar(12, rename={"A": sign}), None), tmp_path / "polar.png").exists()
 
 
+@pytest.mark.slow
 def test_a_hundred_thousand_positions(tmp_path):
     short = four_bar(400)
     long = short.isel(position=np.arange(100_000) * 400 // 100_000)
@@ -175,6 +177,7 @@ def test_hull_leaves_inner_points_out():
     assert {tuple(corner) for corner in corners} == {(0, 0), (4, 0), (0, 4)}
 
 
+@pytest.mark.spread(9)
 @pytest.mark.parametrize("name", PLAIN)
 def test_svg_is_well_formed_and_fetches_nothing(name, case, tmp_path):
     kind, result = case

@@ -42,6 +42,7 @@ def results():
     return found
 
 
+@pytest.mark.slow
 def test_figures_of_every_example(results, tmp_path):
     for name, result in results.items():
         for kind in ("mechanism", "motion"):
@@ -119,6 +120,7 @@ def test_ways_of_a_spatial_group_are_drawn(tmp_path):
 if shutil.which("node"):  # as in test_browser.py
     from test_browser import page
 
+    @pytest.mark.slow
     def test_every_example_makes_a_page(results, tmp_path):
         for name, result in results.items():
             shown = page(result, tmp_path)

@@ -34,6 +34,7 @@ def spatial(request):
     return request.param, SPATIAL[request.param]()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in PLOTS if name not in READY])
 def test_every_figure_of_every_spatial_result(name, spatial, tmp_path):
     kind, result = spatial
@@ -179,6 +180,7 @@ def test_solids_stay_in_the_box_that_the_figure_shows():
 # ---- scene ----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.spread(6)
 def test_every_spatial_result_becomes_plain_json(spatial):
     kind, result = spatial
     shown = json.loads(json.dumps(scene(result, result), allow_nan=False))
@@ -235,6 +237,7 @@ def test_screw_axes_of_the_scene():
 # ---- page -----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.spread(5)
 def test_every_spatial_result_makes_a_page_without_a_net(spatial):
     _, result = spatial
     text = report(result, result)
@@ -251,6 +254,7 @@ if shutil.which("node"):  # as in test_browser.py
     def test_arithmetic_of_the_drawing():
         run("space.test.mjs")
 
+    @pytest.mark.spread(1)
     def test_every_spatial_result_is_shown(spatial, tmp_path):
         kind, result = spatial
         shown = page(result, tmp_path, result)

@@ -266,6 +266,7 @@ ODD = {
 }
 
 
+@pytest.mark.spread(2)
 @pytest.mark.parametrize("case", ODD)
 def test_odd_cases_are_drawn_and_nothing_is_cut_off(case):
     """Warnings are errors here; all that is drawn lies within the sheet, and no legend on the title."""

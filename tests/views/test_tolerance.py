@@ -67,6 +67,7 @@ def labels(axes):
 # ---- every kind of result -----------------------------------------------------------------------------------------
 
 
+@pytest.mark.spread(3)
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_figure_of_every_result_stays_on_its_sheet(case, kind):
     reads = [read for read in readings(case) if read.name in few(case)]
@@ -77,6 +78,7 @@ def test_every_figure_of_every_result_stays_on_its_sheet(case, kind):
     assert not outside(figure(case, kind, few(case)))
 
 
+@pytest.mark.slow
 def test_every_result_makes_a_sheet(case, tmp_path):
     drawn = sheet(case, few(case))
     assert not outside(drawn)
@@ -241,6 +243,7 @@ def prices(count):
     ]  # fmt: skip
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("count", [1, 2, 4, 14])
 def test_costs_of_tolerances(count):
     drawn = tolerance_cost(toleranced(24, 100), prices(count))
@@ -343,6 +346,7 @@ def test_files_are_refused_before_anything_is_computed(tmp_path):
             check_files(*arguments)
 
 
+@pytest.mark.slow
 def test_the_verb_writes_what_is_asked_for(tmp_path, capsys):
     out = [tmp_path / name for name in ("t.csv", "t.parameters.csv", "t.nc", "t.json", "t.svg", "t.pdf")]
     mechanism = SimpleNamespace(name="Four-bar")

@@ -22,6 +22,7 @@ from trunnion.views.tolerance.toleranced import readings
 SOURCE = "data:image/svg+xml;base64,"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in CASES if name != "twelve measures"])
 def test_every_kind_of_result_makes_a_well_formed_page(name):
     result = CASES[name]()
@@ -33,12 +34,14 @@ def test_every_kind_of_result_makes_a_well_formed_page(name):
         ElementTree.fromstring(base64.b64decode(picture.removeprefix(SOURCE)))
 
 
+@pytest.mark.slow
 def test_several_measures_are_told_together_first():
     words = " ".join(Page(report(toleranced(24, 300, measures=2))).words)
     assert words.index("All limits together") < words.index("Measures") < words.index("Toleranced numbers")
     assert words.count("Results") == 2
 
 
+@pytest.mark.slow
 def test_nothing_is_fetched_and_nothing_runs():
     text = report(odd_names())
     assert not re.search(r"https?://", text)
@@ -55,12 +58,14 @@ def test_nothing_is_fetched_and_nothing_runs():
     assert "url(" not in style
 
 
+@pytest.mark.slow
 def test_names_are_text():
     words = " ".join(Page(report(odd_names())).words)
     assert "</script><script>alert(1)</script>" in words
     assert "_$ω$ <b>曲柄</b>" in words
 
 
+@pytest.mark.slow
 def test_methods_that_were_run_are_explained():
     words = " ".join(Page(report(CASES["sobol"]())).words)
     assert all(NOTES[name][1] in words for name in ("linear", "quasi-monte-carlo", "sobol"))
@@ -69,6 +74,7 @@ def test_methods_that_were_run_are_explained():
     assert "Wilson" not in " ".join(Page(report(CASES["linear only"]())).words)
 
 
+@pytest.mark.slow
 def test_findings_notes_and_inputs_are_told():
     result = toleranced(24, 300)
     rows = json.loads(result.attrs["findings"])
@@ -78,6 +84,7 @@ def test_findings_notes_and_inputs_are_told():
     assert words.index("the worst case is 0.19°") < words.index("a note of its own") < words.index("Input data")
 
 
+@pytest.mark.slow
 def test_other_parts_may_come_first():
     result = toleranced(24, 300)
     table = Table("chosen", ["tolerance", "cost"], [["AB", "4.507"]])

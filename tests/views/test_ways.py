@@ -63,6 +63,7 @@ def test_the_links_of_the_group_have_a_colour_and_the_others_none():
         ), title
 
 
+@pytest.mark.slow
 def test_all_drawings_have_one_scale_and_hold_the_mechanism():
     drawn = panels(ways(build(class_three()))).values()
     assert len({axes.get_xlim() + axes.get_ylim() for axes in drawn}) == 1
@@ -97,6 +98,7 @@ def test_a_name_of_another_group_that_then_does_not_exist_is_left_out():
     assert known.shown.tracks["rod.H"] == pytest.approx(unknown.shown.tracks["rod.H"])
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("extension", SIGNATURES)
 def test_written_whole_in_every_format_with_the_names_in_it(tmp_path, extension):
     path = save(ways(build(four_bar())), tmp_path / f"ways{extension}")
@@ -109,6 +111,7 @@ def test_written_whole_in_every_format_with_the_names_in_it(tmp_path, extension)
         assert b"<!-- coupler: way-2 -->" in content
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("name", MODELS)
 def test_every_mechanism_with_a_choice_is_drawn(name, tmp_path):
     mechanism = build(MODELS[name]())

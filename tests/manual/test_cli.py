@@ -49,6 +49,7 @@ def files(folder: Path) -> set[str]:
 # ---- what works -----------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_analyse_prints_the_figures_of_the_case_study_and_writes_every_format(run: Run, tmp_path: Path) -> None:
     done = run("analyse", FOUR_BAR, "--out", "r.csv", "--out", "r.nc", "--out", "r.json", "--report", "r.html")
     assert done.code == 0
@@ -77,6 +78,7 @@ def test_set_replaces_dimensions_and_paths(run: Run) -> None:
     assert run("analyse", FOUR_BAR, "--set", "B.friction.coefficient=0.1").out != plain
 
 
+@pytest.mark.slow
 def test_points_come_from_a_csv_file(run: Run, tmp_path: Path) -> None:
     """Every verb that reads a model takes them; what is wrong with the file has its line."""
     (tmp_path / "motion.csv").write_text("time [s];angle [deg]\n0;0\n0,5;60\n1;90\n", encoding="utf-8")
@@ -142,6 +144,7 @@ def test_bad_pictures_of_the_ways(run: Run, tmp_path: Path) -> None:
     assert not files(tmp_path)
 
 
+@pytest.mark.spread(17)
 @pytest.mark.parametrize("verb", ["check", "analyse", "design", "plot", "report"])
 @pytest.mark.parametrize(
     ("hint", "told"),
@@ -182,6 +185,7 @@ def test_a_value_set_on_the_command_line_is_not_blamed_on_a_line(run: Run) -> No
     assert not done.err.startswith(str(FOUR_BAR))
 
 
+@pytest.mark.slow
 def test_plots_are_written_one_by_one_or_all(run: Run, tmp_path: Path) -> None:
     assert run("plot", FOUR_BAR, "--kind", "torque", "--out", "torque.svg", "--steps", "36").code == 0
     assert (tmp_path / "torque.svg").read_text("utf-8").lstrip().startswith("<?xml")
@@ -202,6 +206,7 @@ def test_examples_are_listed_and_copied(run: Run, tmp_path: Path) -> None:
     assert "durango-fourbar" in run("examples", "nothing-like-it").err
 
 
+@pytest.mark.slow
 def test_parquet_and_zarr_hold_the_same_numbers(run: Run, tmp_path: Path) -> None:
     assert (
         run("analyse", FOUR_BAR, "--steps", "24", "--out", "r.parquet", "--out", "r.zarr", "--out", "r.csv").code == 0
@@ -254,6 +259,7 @@ def test_a_linkage_that_never_closes_is_said_to(run: Run) -> None:
     assert "no answer" in done.out or "0" in done.out
 
 
+@pytest.mark.slow
 def test_friction_that_locks_gives_a_status_and_no_number(run: Run, tmp_path: Path) -> None:
     done = run("analyse", FOUR_BAR, "--set", "joint_defaults.pin.radius=4m", "--out", "r.csv")
     assert done.code == 1
@@ -288,6 +294,7 @@ def test_wrong_mobility_is_bad_input(run: Run, tmp_path: Path) -> None:
     assert files(tmp_path) == {"model.yaml"}
 
 
+@pytest.mark.slow
 def test_a_spatial_model_is_checked_and_analysed(run: Run) -> None:
     done = run("check", EXAMPLES / "rssr.yaml")
     assert (done.code, "mobility 2 by formula, 2 by rank" in done.out) == (0, True)
@@ -331,6 +338,7 @@ BAD_TEXTS = {
 }
 
 
+@pytest.mark.spread(20)
 @pytest.mark.parametrize("verb", ["check", "analyse"])
 @pytest.mark.parametrize("case", BAD_TEXTS)
 def test_bad_models_are_refused_with_a_message(run: Run, tmp_path: Path, verb: str, case: str) -> None:
@@ -408,6 +416,7 @@ def test_bad_plot_options(run: Run) -> None:
     assert run("plot", FOUR_BAR, "--out", "x.png").code == 2
 
 
+@pytest.mark.slow
 def test_the_program_as_a_process(tmp_path: Path) -> None:
     """Exit status, streams and encoding of the installed command, not only of its functions."""
     program = Path(sys.executable).with_name("trunnion")
@@ -432,6 +441,7 @@ def test_help_needs_no_heavy_imports() -> None:
 # ---- in space -------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_redundant_bearings_are_refused_by_every_verb_and_can_be_asked_for(run: Run) -> None:
     model = EXAMPLES / "fourbar-in-space.yaml"
     for verb in ("analyse", "locking"):
@@ -442,6 +452,7 @@ def test_redundant_bearings_are_refused_by_every_verb_and_can_be_asked_for(run: 
     assert run("analyse", model, "--set", "over_constraint=minimum-norm", "--steps", "8").code == 0
 
 
+@pytest.mark.slow
 def test_too_many_drivers_in_space(run: Run, tmp_path: Path) -> None:
     text = (EXAMPLES / "rccc.yaml").read_text("utf-8").replace("drivers:", "drivers:\n  D: {speed: 5 rpm}", 1)
     model = tmp_path / "model.yaml"

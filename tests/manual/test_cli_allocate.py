@@ -32,6 +32,7 @@ def run(program: Run) -> Run:
     return call
 
 
+@pytest.mark.slow
 def test_tables_and_files(run: Run, tmp_path: Path) -> None:
     files = ["a.csv", "a.measures.csv", "a.offers.csv", "a.json", "a.nc", "a.parquet", "a.svg", "a.png"]
     code, out, err = run(
@@ -108,6 +109,7 @@ def test_the_model_itself_is_not_overwritten(run: Run, tmp_path: Path) -> None:
     assert {path.name for path in tmp_path.iterdir()} == {"m.yaml"}
 
 
+@pytest.mark.slow
 def test_yield_and_rss(run: Run) -> None:
     code, out, _ = run(FOURBAR, "--steps", 24, "--samples", 1000, "--yield", 0.95)
     assert code == 0
@@ -177,6 +179,7 @@ def test_models_without_costs_or_limits(run: Run) -> None:
     assert "no measure is stated" in err
 
 
+@pytest.mark.slow
 def test_the_figures_of_the_verification(run: Run, tmp_path: Path) -> None:
     for kind in ("cost", "histogram", "envelope", "contributions"):
         code, _, _ = run(FOURBAR, *QUICK, "--kind", kind, "--out", f"{kind}.svg")
@@ -270,6 +273,7 @@ def test_no_model_of_limits_that_are_not_kept(run: Run, tmp_path: Path) -> None:
     assert "positions" not in place
 
 
+@pytest.mark.slow
 def test_a_yield_within_its_interval_is_said(run: Run, tmp_path: Path) -> None:
     """Whether the samples reach the yield or not: the heading and a note say it if they do not."""
     said = []

@@ -44,6 +44,7 @@ def read(path: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
+@pytest.mark.slow
 def test_too_little_clearance(run: Run, model: Path, tmp_path: Path) -> None:
     done = run(
         model, "--steps", 36, *(f"--out=f{end}" for end in (".csv", ".json", ".nc", ".svg", ".png")), "--units-row"
@@ -67,6 +68,7 @@ def test_too_little_clearance(run: Run, model: Path, tmp_path: Path) -> None:
     assert (tmp_path / "f.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
 def test_enough(run: Run, model: Path) -> None:
     every = [option for joint in "ABCD" for option in ("--set", f"joints.{joint}.pin.clearance=0.02mm")]
     done = run(model, "--steps", 12, *every)
@@ -106,6 +108,7 @@ def test_a_pin_without_a_length(run: Run) -> None:
     assert done.err.count("depends on its length, which is not stated — state length or bearing: 20 mm") == 4
 
 
+@pytest.mark.slow
 def test_figure_says_what_it_shows(model: Path) -> None:
     """Every panel is labelled; where the clearances do not suffice it is grey."""
     short = figure(trunnion.assemble(trunnion.read(model), 12))

@@ -56,6 +56,7 @@ def test_debug_shows_where(
     assert "please report" in err.splitlines()[-1]
 
 
+@pytest.mark.slow
 def test_an_interrupt_that_became_another_exception(program: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     """A library whose import is broken off may raise an ImportError."""
 
@@ -73,6 +74,7 @@ def test_an_interrupt_that_became_another_exception(program: Run, monkeypatch: p
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("after", [0.1, 0.2, 0.4, 0.7, 1.0])
 def test_ctrl_c_while_the_program_is_loaded(after: float, tmp_path: Path) -> None:
     """Counted from where Python runs the program at all; before that it is Python's own affair."""
@@ -91,6 +93,7 @@ def test_ctrl_c_while_the_program_is_loaded(after: float, tmp_path: Path) -> Non
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("end", ["csv", "json", "nc", "parquet", "zarr"])
 def test_a_full_disk_is_a_finding(end: str, tmp_path: Path) -> None:
     """A limit of the size of files stands for it: the process is not taken along, and nothing is left behind."""

@@ -14,6 +14,7 @@ from manual.test_cli import EXAMPLES
 SLIDER, FOUR_BAR = EXAMPLES / "toleranced-slider-crank.yaml", EXAMPLES / "fourbar-with-play.yaml"
 
 
+@pytest.mark.slow
 def test_seats_of_all_joints_by_an_option(program: Run, tmp_path: Path) -> None:
     """--seat loaded gives seats, errors and what they cost; free is the mechanism with its pins in the middle."""
     done = program("analyse", SLIDER, "--seat", "loaded", "--out", tmp_path / "a.csv", "--out", tmp_path / "a.nc")
@@ -39,6 +40,7 @@ def test_a_seating_that_is_none(program: Run) -> None:
     assert "loaded or free" in done.err + done.out
 
 
+@pytest.mark.slow
 def test_errors_and_misalignment_by_name(program: Run, tmp_path: Path) -> None:
     """Any number off nominal, any axis off: the result is told against the ideal mechanism."""
     program("analyse", FOUR_BAR, "--seat", "free", "--set", "errors.coupler=0.1mm", "--out", tmp_path / "a.nc")
@@ -51,6 +53,7 @@ def test_errors_and_misalignment_by_name(program: Run, tmp_path: Path) -> None:
         assert float(abs(found.link_error).max()) > 1e-4
 
 
+@pytest.mark.slow
 def test_what_play_does_and_whether_it_assembles(program: Run) -> None:
     done = program("play", FOUR_BAR)
     assert done.code == 0

@@ -38,6 +38,7 @@ def model(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.spread(21)
 @pytest.mark.parametrize("verb", VERBS)
 @pytest.mark.parametrize("way", ["same", "dots", "symlink", "hard link"])
 def test_model_is_not_written_over(program: Run, model: Path, verb: str, way: str) -> None:

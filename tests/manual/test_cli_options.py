@@ -27,6 +27,7 @@ VERBS = [
 ]
 
 
+@pytest.mark.spread(3)
 @pytest.mark.parametrize("verb", VERBS, ids=lambda verb: str(verb[0]))
 def test_parameters_of_a_law_that_an_option_names(program: Run, verb: tuple[object, ...]) -> None:
     """Another law and its parameters by --set, in either order."""

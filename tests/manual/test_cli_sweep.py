@@ -182,6 +182,7 @@ def test_a_figure_of_nothing_and_of_many() -> None:
     assert figure.axes[1].get_ylabel() == "B.friction.coefficient"
 
 
+@pytest.mark.slow
 def test_long_tables_are_thinned() -> None:
     mechanism = trunnion.read(FOUR_BAR)
     _, _, shown, left = tables(trunnion.sweep(mechanism, {"AB": ("2 m", "2.1 m", 50)}, 1))[0]

@@ -52,6 +52,8 @@ def _finding(error: ErrorDetails, model: type[BaseModel], data: Mapping[str, Any
     kind = error["type"]
     if error["input"] is None and kind != "missing":
         what, remedy = "is empty", "give it a value or remove it"
+        if key[:1].isdigit():  # {mass: 1,5 kg} is read as mass: 1 and the key "5 kg"
+            what, remedy = f"the key '{key[:80]}' has no value", "write a decimal point, not a comma, as 1.5 kg"
     elif kind in ("quantity", "stated"):
         what, remedy = context["what"], context["remedy"]
     elif kind == "extra_forbidden":

@@ -92,7 +92,7 @@ _JOINTS = (
 _GROUPS = (
     Fault(
         "dead-centre-tolerance",
-        "groups/planar.py",
+        "algebra/plane.py",
         "ROUNDING = 1e-15",
         "ROUNDING = 1e-6",
         ("tests/invariants/test_groups.py", "-k", "meet"),
@@ -120,7 +120,7 @@ _GROUPS = (
     ),
     Fault(
         "coriolis-halved",
-        "groups/planar.py",
+        "algebra/plane.py",
         "coriolis = 2 * w * speed",
         "coriolis = w * speed",
         ("tests/invariants/test_groups.py::test_every_entry_equals_the_general_group",),

@@ -12,7 +12,7 @@ from spatial_numbers import apart, random_directions, random_rotations, rows, st
 from trunnion.algebra import line as lines
 from trunnion.algebra import pose as poses
 from trunnion.algebra.dual import Dual, derivative, parts, primal, seed, spatial
-from trunnion.algebra.space import apply, cross, dot, skew, vector_parts
+from trunnion.algebra.vector import apply, cross, dot, skew, vector_parts
 
 COUNT = 500
 RNG = np.random.default_rng(7)

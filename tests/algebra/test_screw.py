@@ -14,7 +14,7 @@ from trunnion.algebra import pose as poses
 from trunnion.algebra import screw as screws
 from trunnion.algebra.dual import Dual, derivative, primal, seed
 from trunnion.algebra.line import line
-from trunnion.algebra.space import product, scaled, spatial_vector
+from trunnion.algebra.vector import product, scaled, spatial_vector
 
 COUNT = 300
 RNG = np.random.default_rng(11)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from trunnion.algebra.rigid import ORIGIN
+from trunnion.algebra.space import ORIGIN
 from trunnion.joints.pairs import Load
 from trunnion.joints.spatial_load import BearingLoad
 

@@ -10,7 +10,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from trunnion.algebra.dual import Dual, derivative
-from trunnion.algebra.rigid import ORIGIN, Frame, compose, relative, turned
+from trunnion.algebra.space import ORIGIN, Frame, compose, relative, turned
 from trunnion.joints.clearance import (
     CLEARANCE_MODELS,
     described,

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from mechanisms import KIND, Array, dyad
 from trunnion.algebra.dual import Dual, derivative, primal
+from trunnion.algebra.plane import Acceleration, Frame, Twist, Wrench, compose
 from trunnion.groups import GROUPS, rrr
 from trunnion.groups.general import OUTER, General, GroupJoint
-from trunnion.groups.planar import Acceleration, Frame, Twist, Wrench, compose
 
 LANES = 10_000
 

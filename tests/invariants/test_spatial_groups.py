@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from trunnion import Mechanism, analyse
 from trunnion.algebra.dual import derivative, seed
 from trunnion.algebra.nested import flat
-from trunnion.algebra.rigid import ORIGIN, Frame, Screw, added, compose, element, minus, moment_at, power, relative
+from trunnion.algebra.space import ORIGIN, Frame, Screw, added, compose, element, minus, moment_at, power, relative
 from trunnion.groups.cylindrical_dyad import CylindricalDyad
 from trunnion.groups.spatial import Pose, SpatialGroup
 from trunnion.groups.spatial_tree import Element

@@ -12,7 +12,7 @@ from spatial_numbers import apart
 from trunnion.algebra.dual import Dual, derivative, functions, parts, primal, seed, spatial
 from trunnion.algebra.line import line
 from trunnion.algebra.pose import compose, inverse, link
-from trunnion.algebra.space import cross, dot
+from trunnion.algebra.vector import cross, dot
 from trunnion.groups import GROUPS, ccc
 
 COUNT = 4000

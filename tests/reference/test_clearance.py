@@ -15,7 +15,7 @@ from scipy import optimize
 
 from reference.maximal_space import Array
 from trunnion.algebra.dual import Dual, derivative, primal
-from trunnion.algebra.rigid import Frame as RigidFrame
+from trunnion.algebra.space import Frame as RigidFrame
 from trunnion.joints.clearance import (
     CLEARANCE_MODELS,
     described,

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 import trunnion
 from mechanisms import Data, analyse, build, findings, five_bar, four_bar, model, slider_crank
 from trunnion import Mechanism, Status, locking
+from trunnion.algebra.plane import Wrench
 from trunnion.cycle.near_locking import _count
-from trunnion.groups.planar import Wrench
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.joints.pairs import Load
 from trunnion.solve.friction import Contact, Problem

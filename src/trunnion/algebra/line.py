@@ -16,7 +16,18 @@ import numpy as np
 
 from trunnion.algebra.dual import Dual, parts, primal
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.algebra.space import Vector3, cross, divided, dot, plus, scaled, spatial_vector, unit, vector_parts, where
+from trunnion.algebra.vector import (
+    Vector3,
+    cross,
+    divided,
+    dot,
+    plus,
+    scaled,
+    spatial_vector,
+    unit,
+    vector_parts,
+    where,
+)
 
 __all__ = ["PARALLEL", "Perpendicular", "angle_about", "dual_angle", "foot", "line", "perpendicular", "reciprocal"]
 

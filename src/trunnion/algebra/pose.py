@@ -1,6 +1,6 @@
 """Poses as dual orthogonal matrices Â = R + ε [p]× R: the frame at p turned by R.  [P 3-7, 9, 10]
 
-A pose is a matrix of `algebra.space`: the product of two is one after the other, the transpose the inverse, and
+A pose is a matrix of `algebra.vector`: the product of two is one after the other, the transpose the inverse, and
 `apply(pose, line)` gives a line of the moved frame in the frame it was moved from. With plain angles the same
 functions are rotations.
 """
@@ -12,7 +12,7 @@ from typing import cast
 from trunnion.algebra.dual import parts
 from trunnion.algebra.line import line
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.algebra.space import (
+from trunnion.algebra.vector import (
     IDENTITY,
     Matrix3,
     Vector3,
@@ -66,7 +66,7 @@ def frame(point: Vector3, x: Vector3, z: Vector3) -> Matrix3:
     """Pose of the frame at a point P with its z axis along z and its x axis in the plane of x and z.
 
     [P 3] î = i + ε [P]× i, [P 4] k̂ = k + ε [P]× k, [P 5] ĵ = k̂ × î; [P 7] î, ĵ, k̂ are the columns.
-    point: m; x, z: of any length, x not along z (NaN there). [P 6], [P]×, is `algebra.space.skew`.
+    point: m; x, z: of any length, x not along z (NaN there). [P 6], [P]×, is `algebra.vector.skew`.
     """
     k = unit(z)
     i = unit(plus(x, scaled(-dot(x, k), k)))

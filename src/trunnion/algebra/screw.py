@@ -14,7 +14,7 @@ import numpy as np
 from trunnion.algebra.dual import primal
 from trunnion.algebra.line import reciprocal
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.algebra.space import Matrix3, Vector3, cross, dot, scaled, transpose, where
+from trunnion.algebra.vector import Matrix3, Vector3, cross, dot, scaled, transpose, where
 
 __all__ = ["bracket", "exp", "log", "power"]
 

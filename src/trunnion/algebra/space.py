@@ -1,167 +1,206 @@
-"""Vectors and matrices of three numbers, each written once: of plain numbers directions, of dual numbers lines.
+"""Frames and screws in space by their real parts: what a pose R + ε [p]× R and a dual vector u + ε m are made of.
 
-A vector is (x, y, z), a matrix three rows of three; every entry broadcasts over the whole batch. With dual entries
-a unit vector is a line, an orthogonal matrix a pose, and the product of two is one pose after the other: nothing
-here tells the two apart.  [P 1, 5, 7]
+The general group of space works on these: a frame composed with another costs a third of the product of two dual
+matrices. A screw is a twist ω + ε v or a wrench F + ε M, always about the origin of the global frame, so that twists
+of one link against the next, and wrenches on one link, simply add up.  [P 1, 7, 20]
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import cast
+from typing import NamedTuple
 
-from trunnion.algebra.dual import parts, primal, spatial
+import numpy as np
+
+from trunnion.algebra import vector
+from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
+from trunnion.algebra.vector import IDENTITY, Vector3, cross, dot, plus, scaled, transpose
 
 __all__ = [
-    "IDENTITY",
-    "Matrix3",
-    "Vector3",
-    "apply",
-    "cross",
-    "divided",
-    "dot",
-    "length",
+    "ORIGIN",
+    "ZERO",
+    "Frame",
+    "Screw",
+    "about",
+    "added",
+    "bracket",
+    "compose",
+    "element",
+    "line_of",
     "minus",
-    "plus",
-    "product",
-    "scaled",
-    "skew",
-    "spatial_vector",
-    "transpose",
-    "unit",
-    "vector_parts",
-    "where",
+    "moment_at",
+    "point_of",
+    "power",
+    "quaternion",
+    "relative",
+    "rotated",
+    "slid",
+    "times",
+    "turned",
+    "vector_minus",
 ]
 
-Vector3 = tuple[Number, Number, Number]
-Matrix3 = tuple[Vector3, Vector3, Vector3]
 
-IDENTITY: Matrix3 = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+class Frame(NamedTuple):
+    """A frame: its axes as the columns of R, and its origin p, m."""
 
+    x: Vector3
+    y: Vector3
+    z: Vector3
+    place: Vector3
 
-def _times(a: Number, b: Number) -> Number:
-    """a b; a literal 0 or 1, as most coordinates in a link's own frame are, saves a pass over an array."""
-    if isinstance(a, float):
-        if a == 0.0:
-            return 0.0
-        if a == 1.0:
-            return b
-    if isinstance(b, float):
-        if b == 0.0:
-            return 0.0
-        if b == 1.0:
-            return a
-    return a * b
+    def normalised(self) -> Frame:
+        """The nearest frame with axes of length one at right angles, for axes that nearly are so; z keeps its place."""
+        z = _unit(self.z)
+        x = vector_minus(self.x, scaled(dot(self.x, z), z))
+        x = _unit(x)
+        return Frame(x, cross(z, x), z, self.place)
 
 
-def _sum(a: Number, b: Number) -> Number:
-    """a + b; a literal 0 costs nothing."""
-    if isinstance(a, float) and a == 0.0:
-        return b
-    if isinstance(b, float) and b == 0.0:
-        return a
-    return a + b
+class Screw(NamedTuple):
+    """u + ε m: a twist ω + ε v, with v of the point at the origin, or a wrench F + ε M, with M about the origin."""
+
+    u: Vector3
+    m: Vector3
 
 
-def _less(a: Number, b: Number) -> Number:
-    """a − b; a literal 0 costs nothing."""
-    if isinstance(b, float) and b == 0.0:
-        return a
-    if isinstance(a, float) and a == 0.0:
-        return -b
-    return a - b
+NULL: Vector3 = (0.0, 0.0, 0.0)
+ORIGIN = Frame(*IDENTITY, NULL)
+ZERO = Screw(NULL, NULL)
 
 
-def dot(a: Vector3, b: Vector3) -> Number:
-    """a · b; of two lines û · v̂ = cos θ̂."""
-    return _sum(_sum(_times(a[0], b[0]), _times(a[1], b[1])), _times(a[2], b[2]))
+def _unit(a: Vector3) -> Vector3:
+    size = dot(a, a)
+    return scaled(1 / namespace(size).sqrt(size), a)
 
 
-def cross(a: Vector3, b: Vector3) -> Vector3:
-    """a × b; of two lines û × v̂ = sin θ̂ n̂, n̂ their common perpendicular."""
-    return (
-        _less(_times(a[1], b[2]), _times(a[2], b[1])),
-        _less(_times(a[2], b[0]), _times(a[0], b[2])),
-        _less(_times(a[0], b[1]), _times(a[1], b[0])),
+vector_minus = vector.minus  # `minus` is that of screws
+
+
+# ---- frames ---------------------------------------------------------------------------------------------------
+
+
+def rotated(frame: Frame, v: Vector3) -> Vector3:
+    """R v: a direction given in a frame."""
+    return plus(plus(scaled(v[0], frame.x), scaled(v[1], frame.y)), scaled(v[2], frame.z))
+
+
+def point_of(frame: Frame, v: Vector3) -> Vector3:
+    """p + R v: a point given in a frame."""
+    return plus(frame.place, rotated(frame, v))
+
+
+def compose(frame: Frame, local: Frame) -> Frame:
+    """A frame that is given in another."""
+    return Frame(
+        rotated(frame, local.x), rotated(frame, local.y), rotated(frame, local.z), point_of(frame, local.place)
     )
 
 
-def plus(a: Vector3, b: Vector3) -> Vector3:
+def relative(far: Frame, local: Frame) -> Frame:
+    """The frame in which `local` is where `far` is: far ∘ local⁻¹."""
+    columns = transpose((local.x, local.y, local.z))  # rows of Rᵀ, that is: columns of the inverse's rotation
+    x, y, z = (rotated(far, column) for column in columns)
+    found = Frame(x, y, z, NULL)
+    return found._replace(place=vector_minus(far.place, rotated(found, local.place)))
+
+
+def turned(frame: Frame, angle: Number) -> Frame:
+    """The frame turned about its own z."""
+    xp = namespace(angle)
+    c, s = xp.cos(angle), xp.sin(angle)
+    x, y = frame.x, frame.y
+    return frame._replace(x=plus(scaled(c, x), scaled(s, y)), y=vector_minus(scaled(c, y), scaled(s, x)))
+
+
+def slid(frame: Frame, way: Number) -> Frame:
+    """The frame moved along its own z."""
+    return frame._replace(place=plus(frame.place, scaled(way, frame.z)))
+
+
+def element(place: Vector3, axis: Vector3, x: Vector3 | None) -> Frame:
+    """The frame at a point with z along an axis and x in the plane of z and `x`; both of any length.
+
+    Without x the frame's x axis is taken, or its y axis where the axis is within 2.6° of that (|cos| > 0.999).
+    """
+    z = _unit(axis)
+    if x is None:
+        beside = np.asarray(np.abs(primal(z[0])) > 0.999)
+        if np.all(beside == np.ravel(beside)[0]):
+            x = (0.0, 1.0, 0.0) if np.ravel(beside)[0] else (1.0, 0.0, 0.0)
+        else:
+            x = (np.where(beside, 0.0, 1.0), np.where(beside, 1.0, 0.0), 0.0)
+    x = vector_minus(x, scaled(dot(x, z), z))
+    x = _unit(x)
+    return Frame(x, cross(z, x), z, place)
+
+
+def quaternion(frame: Frame) -> tuple[Number, Number, Number, Number]:
+    """Unit quaternion (w, x, y, z) of the axes, w ≥ 0; of the four formulas that with the largest divisor."""
+    rotation = np.array([[primal(entry) + 0.0 for entry in np.broadcast_arrays(*axis)] for axis in _broadcast(frame)])
+    xx, yx, zx = rotation[0]  # x axis: R_xx, R_yx, R_zx
+    xy, yy, zy = rotation[1]
+    xz, yz, zz = rotation[2]
+    squares = np.array([1 + xx + yy + zz, 1 + xx - yy - zz, 1 - xx + yy - zz, 1 - xx - yy + zz])
+    rows = np.array(
+        [
+            [squares[0], zy - yz, xz - zx, yx - xy],
+            [zy - yz, squares[1], yx + xy, xz + zx],
+            [xz - zx, yx + xy, squares[2], zy + yz],
+            [yx - xy, xz + zx, zy + yz, squares[3]],
+        ]
+    )
+    best = np.argmax(np.nan_to_num(squares), axis=0)
+    picked = np.take_along_axis(rows, best[None, None, ...], axis=0)[0]
+    with np.errstate(invalid="ignore"):
+        picked = picked / np.sqrt(np.sum(picked * picked, axis=0))
+    w, x, y, z = np.where(picked[0] < 0, -picked, picked)
+    return w, x, y, z
+
+
+def _broadcast(frame: Frame) -> list[tuple[Number, ...]]:
+    flat = np.broadcast_arrays(*(primal(entry) for axis in frame[:3] for entry in axis))
+    return [tuple(flat[3 * k : 3 * k + 3]) for k in range(3)]
+
+
+def line_of(frame: Frame) -> Screw:
+    """The z axis as a line u + ε p × u."""
+    return Screw(frame.z, cross(frame.place, frame.z))
+
+
+# ---- screws ---------------------------------------------------------------------------------------------------
+
+
+def added(a: Screw, b: Screw) -> Screw:
     """a + b."""
-    return _sum(a[0], b[0]), _sum(a[1], b[1]), _sum(a[2], b[2])
+    return Screw(plus(a.u, b.u), plus(a.m, b.m))
 
 
-def minus(a: Vector3, b: Vector3) -> Vector3:
+def minus(a: Screw, b: Screw) -> Screw:
     """a − b."""
-    return _less(a[0], b[0]), _less(a[1], b[1]), _less(a[2], b[2])
+    return Screw(vector_minus(a.u, b.u), vector_minus(a.m, b.m))
 
 
-def scaled(factor: Number, a: Vector3) -> Vector3:
+def times(factor: Number, a: Screw) -> Screw:
     """factor · a."""
-    return _times(factor, a[0]), _times(factor, a[1]), _times(factor, a[2])
+    return Screw(scaled(factor, a.u), scaled(factor, a.m))
 
 
-def length(a: Vector3) -> Number:
-    """|a|; of dual vectors √(â · â), NaN where the real part of a is 0."""
-    xp = namespace(*a)
-    return xp.sqrt(dot(a, a))
+def bracket(a: Screw, b: Screw) -> Screw:
+    """Lie bracket a × b, the dual cross product: the rate of a screw b that is carried along with the twist a."""
+    return Screw(cross(a.u, b.u), plus(cross(a.u, b.m), cross(a.m, b.u)))
 
 
-def unit(a: Vector3) -> Vector3:
-    """a/|a|; NaN where a (its real part) is 0. Of a dual vector: the line of the screw, whatever its pitch."""
-    size = length(a)
-    xp = namespace(size)
-    return divided(a, xp.where(primal(size) == 0, float("nan"), size))
+def power(wrench: Screw, twist: Screw) -> Number:
+    """F · v + M · ω, W."""
+    return dot(wrench.u, twist.m) + dot(wrench.m, twist.u)
 
 
-def divided(a: Vector3, divisor: Number) -> Vector3:
-    """a/divisor; NaN in every component where the divisor is NaN, literal zeros included."""
-    factor = 1 / divisor
-    return factor * a[0], factor * a[1], factor * a[2]
+def about(force: Vector3, moment: Vector3, place: Vector3) -> Screw:
+    """The wrench of a force at a place and a moment, about the origin."""
+    return Screw(force, plus(moment, cross(place, force)))
 
 
-def where(condition: Number, a: Vector3, b: Vector3) -> Vector3:
-    """a in the lanes where the condition holds, b in the others."""
-    xp = namespace(*a, *b)
-    return cast(Vector3, tuple(xp.where(condition, x, y) for x, y in zip(a, b, strict=True)))
-
-
-def spatial_vector(real: Vector3, moment: Vector3) -> Vector3:
-    """real + ε moment."""
-    return spatial(real[0], moment[0]), spatial(real[1], moment[1]), spatial(real[2], moment[2])
-
-
-def vector_parts(a: Vector3) -> tuple[Vector3, Vector3]:
-    """Real part and moment of a dual vector, each with the derivatives it carries."""
-    (x, mx), (y, my), (z, mz) = (parts(entry) for entry in a)
-    return (x, y, z), (mx, my, mz)
-
-
-def skew(a: Vector3) -> Matrix3:
-    """[a]×, so that [a]× b = a × b.  [P 6]"""
-    x, y, z = a
-    return (0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)
-
-
-def transpose(a: Matrix3) -> Matrix3:
-    """Aᵀ; of a pose its inverse."""
-    return cast(Matrix3, tuple(zip(*a, strict=True)))
-
-
-def apply(a: Matrix3, v: Vector3) -> Vector3:
-    """A v; of a pose and a line: the line given in the moved frame, in the frame it was moved from."""
-    return dot(a[0], v), dot(a[1], v), dot(a[2], v)
-
-
-def product(first: Matrix3, *others: Matrix3) -> Matrix3:
-    """A B …; of poses one after the other, each in the frame reached so far."""
-    found = first
-    for other in others:
-        columns = transpose(other)
-        found = cast(Matrix3, tuple(_row(row, columns) for row in found))
-    return found
-
-
-def _row(row: Vector3, columns: Sequence[Vector3]) -> Vector3:
-    return dot(row, columns[0]), dot(row, columns[1]), dot(row, columns[2])
+def moment_at(a: Screw, place: Vector3) -> Vector3:
+    """Moment of a wrench about a place, or velocity of a twist at it: m − p × u = m + u × p."""
+    return plus(a.m, cross(a.u, place))

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.namespace import Number
-from trunnion.algebra.rigid import point_of
-from trunnion.groups.planar import point
+from trunnion.algebra.plane import point
+from trunnion.algebra.space import point_of
 from trunnion.joints.clearance import describing
 from trunnion.model.contact import clearance
 from trunnion.solve.forward import Forward

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.namespace import Number
-from trunnion.groups.planar import accelerated
+from trunnion.algebra.plane import accelerated
 from trunnion.solve.backward import Backward
 from trunnion.solve.system import System, Values
 

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.namespace import Number
-from trunnion.algebra.rigid import moment_at, quaternion
-from trunnion.algebra.space import cross, dot, plus, scaled
+from trunnion.algebra.space import moment_at, quaternion
+from trunnion.algebra.vector import cross, dot, plus, scaled
 from trunnion.cycle import fill
 from trunnion.solve.backward import Backward
 from trunnion.solve.space.contacts import bearing_middle

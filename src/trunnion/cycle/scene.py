@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
-from trunnion.algebra.rigid import Frame
+from trunnion.algebra.space import Frame
 from trunnion.solve.forward import start
 from trunnion.solve.loads import Stated
 from trunnion.solve.shifts import hole, play_of

@@ -11,8 +11,8 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from trunnion.algebra.namespace import Number, namespace
+from trunnion.algebra.plane import Acceleration, Frame, Twist, Wrench, accelerated, moved, turned
 from trunnion.groups.gear import NUMBERS, ONE, Gear, GearRow
-from trunnion.groups.planar import Acceleration, Frame, Twist, Wrench, accelerated, moved, turned
 from trunnion.groups.tree import OUTER, GroupJoint, Step
 
 __all__ = ["Row", "rows"]

@@ -14,8 +14,8 @@ import numpy as np
 
 from trunnion.algebra.line import dual_angle, line
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.algebra.rigid import Frame, compose, relative, vector_minus
-from trunnion.algebra.space import Vector3, cross, dot, plus, scaled, unit, vector_parts
+from trunnion.algebra.space import Frame, compose, relative, vector_minus
+from trunnion.algebra.vector import Vector3, cross, dot, plus, scaled, unit, vector_parts
 from trunnion.groups import ccc
 from trunnion.groups.spatial import Pose, SpatialGroup
 from trunnion.groups.spatial_tree import Element

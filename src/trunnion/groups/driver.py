@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.groups.planar import Acceleration, Frame, Twist, Wrench, about, accelerated, moved, relative, turned
+from trunnion.algebra.plane import Acceleration, Frame, Twist, Wrench, about, accelerated, moved, relative, turned
 from trunnion.groups.protocol import Elements
 
 __all__ = ["PRISMATIC", "REVOLUTE", "Driver", "Pose"]

@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.groups.planar import Acceleration, Frame, Twist, Wrench, scaled
+from trunnion.algebra.plane import Acceleration, Frame, Twist, Wrench, scaled
 
 __all__ = ["NUMBERS", "ONE", "Action", "Gear", "GearRow", "Mesh", "actions", "apart", "mesh", "rotation"]
 

@@ -25,11 +25,7 @@ from trunnion.algebra import linalg
 from trunnion.algebra.dual import depth, primal
 from trunnion.algebra.namespace import Number, apart, compiled, namespace
 from trunnion.algebra.nested import each, flat, replaced
-from trunnion.algebra.traced import looped
-from trunnion.groups import tree as spanning
-from trunnion.groups.cuts import Row, rows
-from trunnion.groups.gear import NUMBERS, ONE, Gear, GearRow, actions
-from trunnion.groups.planar import (
+from trunnion.algebra.plane import (
     ZERO_LOAD,
     Acceleration,
     Frame,
@@ -43,6 +39,10 @@ from trunnion.groups.planar import (
     relative,
     scaled,
 )
+from trunnion.algebra.traced import looped
+from trunnion.groups import tree as spanning
+from trunnion.groups.cuts import Row, rows
+from trunnion.groups.gear import NUMBERS, ONE, Gear, GearRow, actions
 from trunnion.groups.protocol import Elements
 from trunnion.groups.tree import FEW, OUTER, GroupJoint, Step, across, size_of
 

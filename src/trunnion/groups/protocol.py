@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from typing import Any, Protocol
 
 from trunnion.algebra.namespace import Number
-from trunnion.groups.planar import Acceleration, Frame, Twist, Wrench
+from trunnion.algebra.plane import Acceleration, Frame, Twist, Wrench
 
 __all__ = ["Elements", "Group"]
 

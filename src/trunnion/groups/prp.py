@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from trunnion.algebra.linalg import Vector, cross
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.groups.planar import (
+from trunnion.algebra.plane import (
     Acceleration,
     Frame,
     Twist,

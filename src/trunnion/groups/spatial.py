@@ -28,9 +28,9 @@ from trunnion.algebra import linalg
 from trunnion.algebra.dual import depth, primal
 from trunnion.algebra.namespace import Number, apart, compiled, namespace
 from trunnion.algebra.nested import each, flat, replaced
-from trunnion.algebra.rigid import ZERO, Frame, Screw, added, bracket, minus, moment_at, power, times
-from trunnion.algebra.space import cross, dot, plus, scaled
+from trunnion.algebra.space import ZERO, Frame, Screw, added, bracket, minus, moment_at, power, times
 from trunnion.algebra.traced import looped
+from trunnion.algebra.vector import cross, dot, plus, scaled
 from trunnion.groups import redundant
 from trunnion.groups.spatial_tree import Element, SpatialTree, entries
 from trunnion.groups.tree import FEW, OUTER

@@ -12,8 +12,8 @@ import numpy as np
 
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.algebra.rigid import Frame, Screw, compose, moment_at, relative, vector_minus
-from trunnion.algebra.space import Vector3, cross, dot, plus, scaled
+from trunnion.algebra.space import Frame, Screw, compose, moment_at, relative, vector_minus
+from trunnion.algebra.vector import Vector3, cross, dot, plus, scaled
 from trunnion.groups import tree as spanning
 from trunnion.groups.tree import OUTER, GroupJoint, Step
 from trunnion.joints.spatial import MOTIONS

@@ -9,7 +9,7 @@ import numpy as np
 
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.groups.planar import Frame, turned
+from trunnion.algebra.plane import Frame, turned
 from trunnion.groups.protocol import Elements
 
 __all__ = ["FEW", "OUTER", "GroupJoint", "Step", "across", "grow", "size_of"]

@@ -27,8 +27,8 @@ from typing import Any
 import numpy as np
 
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.algebra.rigid import Frame
-from trunnion.algebra.space import Vector3, cross, dot
+from trunnion.algebra.space import Frame
+from trunnion.algebra.vector import Vector3, cross, dot
 
 __all__ = [
     "CLEARANCE_MODELS",
@@ -55,7 +55,7 @@ class ClearanceModel:
     ends: for each end the names of its components, "end.axis" in the hole's frame. axial: which ends are held by the
     end float alone, not by the radial clearance. loads: `(force, moment, length)` → load at each end, from the force
     (N) and the moment (N m) about mid-length of the pin on the hole, in the hole's frame; shift: `(offsets, length)`
-    → the pin's frame in the hole's: a `rigid.Frame`, in the plane (x, y, cos, sin); size: the part and its key whose
+    → the pin's frame in the hole's: a `space.Frame`, in the plane (x, y, cos, sin); size: the part and its key whose
     number is the length H; turns: whether the pair does nothing but turn, so that a seat that stays on the link of the
     pin is another than one that stays on that of the hole.
     """

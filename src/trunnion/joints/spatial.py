@@ -11,8 +11,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.algebra.rigid import Frame, Screw, line_of, slid, turned
-from trunnion.algebra.space import Vector3, cross, dot, plus, scaled
+from trunnion.algebra.space import Frame, Screw, line_of, slid, turned
+from trunnion.algebra.vector import Vector3, cross, dot, plus, scaled
 
 __all__ = ["MOTIONS", "PairMotion"]
 

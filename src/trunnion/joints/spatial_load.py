@@ -23,8 +23,8 @@ import numpy as np
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.nested import each
-from trunnion.algebra.rigid import Frame
-from trunnion.algebra.space import Vector3, cross, dot, minus
+from trunnion.algebra.space import Frame
+from trunnion.algebra.vector import Vector3, cross, dot, minus
 from trunnion.joints.pairs import Reaction
 
 __all__ = ["BallLoad", "BearingLoad", "halves"]

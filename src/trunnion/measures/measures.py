@@ -15,14 +15,13 @@ from typing import Any, cast
 import numpy as np
 from pydantic import ValidationError
 
-from trunnion.algebra import rigid
+from trunnion.algebra import plane, space
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.algebra.rigid import Screw
-from trunnion.algebra.space import Vector3, cross, dot
+from trunnion.algebra.plane import Wrench
+from trunnion.algebra.space import Screw
+from trunnion.algebra.vector import Vector3, cross, dot
 from trunnion.errors import Finding, MechanismError
-from trunnion.groups import planar
-from trunnion.groups.planar import Wrench
 from trunnion.measures import courses
 from trunnion.model.checks.measures import SUBJECTS, check_measure
 from trunnion.model.contact import motions
@@ -177,7 +176,7 @@ class Measure:
         for link, load in self.loads(walk).items():
             twist = walk.motions[link].twist
             if isinstance(walk, SpatialWalk):
-                total = total + rigid.power(load, twist)
+                total = total + space.power(load, twist)
             else:
                 total = total + (load.x * twist.x + load.y * twist.y + load.m * twist.w)
         return total
@@ -232,7 +231,7 @@ def _push(measure: Measure, walk: Forward) -> dict[str, Any]:
 def _at(walk: Forward, link: str, wrench: Wrench, x: Number, y: Number) -> Wrench:
     """A load at a place, about the origin of a link."""
     frame = walk.motions[link].frame
-    return planar.about(wrench, frame.x - x, frame.y - y)
+    return plane.about(wrench, frame.x - x, frame.y - y)
 
 
 def _angle(measure: Measure, walk: Forward) -> Number:
@@ -246,7 +245,7 @@ def _turn(measure: Measure, walk: Forward) -> dict[str, Any]:
 
 def _rotation(measure: Measure, walk: Forward) -> Number:
     first, second = (walk.motions[link].frame for link in walk.system.joints[measure.subject][1])
-    c, s = planar.turned(first.c, -first.s, second.c, second.s)
+    c, s = plane.turned(first.c, -first.s, second.c, second.s)
     return namespace(c, s).arctan2(s, c)
 
 
@@ -278,7 +277,7 @@ def _unit(axis: str) -> Vector3:
 
 def _push_in_space(measure: Measure, walk: SpatialWalk) -> dict[str, Any]:
     link, point = measure.subject.split(".")
-    return {link: rigid.about(_unit(measure.axis), NULL, walk.point(link, point).place)}
+    return {link: space.about(_unit(measure.axis), NULL, walk.point(link, point).place)}
 
 
 def _angle_in_space(measure: Measure, walk: SpatialWalk) -> Number:
@@ -298,7 +297,7 @@ def _turn_in_space(measure: Measure, walk: SpatialWalk) -> dict[str, Any]:
 def _both(walk: SpatialWalk, joint: str, load: Screw) -> dict[str, Any]:
     """A load on the second link of a joint and its opposite on the first."""
     first, second = walk.system.joints[joint][1]
-    return {first: rigid.times(-1.0, load), second: load}
+    return {first: space.times(-1.0, load), second: load}
 
 
 def _rotation_in_space(measure: Measure, walk: SpatialWalk) -> Number:
@@ -317,7 +316,7 @@ def _slide_in_space(measure: Measure, walk: SpatialWalk) -> Number:
 def _pull_in_space(measure: Measure, walk: SpatialWalk) -> dict[str, Any]:
     joint = measure.subject
     second = walk.element(walk.system.joints[joint][1][1], joint)
-    return _both(walk, joint, rigid.about(second.z, NULL, second.place))
+    return _both(walk, joint, space.about(second.z, NULL, second.place))
 
 
 MOTIONS: dict[str, MotionKind] = {

@@ -11,10 +11,10 @@ import numpy as np
 
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
+from trunnion.algebra.plane import ZERO_LOAD, Wrench, about, added, moved
 from trunnion.groups.gear import Action as GearAction
 from trunnion.groups.gear import Gear, Mesh, actions, apart, mesh
 from trunnion.groups.general import General
-from trunnion.groups.planar import ZERO_LOAD, Wrench, about, added, moved
 from trunnion.groups.protocol import Group
 from trunnion.joints.friction import FrictionLaw, LawFunction
 from trunnion.joints.pairs import Load

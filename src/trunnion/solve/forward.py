@@ -13,7 +13,7 @@ import numpy as np
 from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.nested import zipped
-from trunnion.groups.planar import Acceleration, Frame, Twist, accelerated, compose, moved, point
+from trunnion.algebra.plane import Acceleration, Frame, Twist, accelerated, compose, moved, point
 from trunnion.solve.system import Place, System, Values, driven_coordinates
 
 __all__ = ["Assembly", "Forward", "Motion", "PointMotion", "Travel", "forward", "pose_of", "posed", "rate_of", "start"]

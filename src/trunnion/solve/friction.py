@@ -23,8 +23,8 @@ from trunnion.algebra import linalg
 from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.nested import replaced
+from trunnion.algebra.plane import is_zero
 from trunnion.algebra.traced import looped
-from trunnion.groups.planar import is_zero
 from trunnion.joints.pairs import Reaction
 from trunnion.solve import continuation
 from trunnion.solve.friction_method import FrictionMethod, method_named, peak

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, compiled
-from trunnion.groups.planar import is_zero, less
+from trunnion.algebra.plane import is_zero, less
 from trunnion.joints.friction import FrictionLaw
 from trunnion.joints.pairs import ContactLoad, Reaction
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
+from trunnion.algebra.plane import Wrench, turned
 from trunnion.algebra.table import look_up
-from trunnion.groups.planar import Wrench, turned
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.parts import Load
 from trunnion.solve.forward import Forward, PointMotion

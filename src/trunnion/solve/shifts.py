@@ -13,12 +13,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from trunnion.algebra import rigid
+from trunnion.algebra import plane, space
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.algebra.space import plus, scaled
+from trunnion.algebra.vector import plus, scaled
 from trunnion.errors import Finding
-from trunnion.groups import planar
 from trunnion.joints.clearance import CLEARANCE_MODELS, ClearanceModel, leaning
 from trunnion.model.contact import clearance
 
@@ -86,68 +85,68 @@ def unstated_length(joint: str, play: Play) -> list[Finding]:
     return [Finding(what, f"joints.{joint}.{part}", f"state joints.{joint}.{part}.{keys[0]}")]
 
 
-def hole(frame: rigid.Frame, values: Values, joint: str) -> rigid.Frame:
+def hole(frame: space.Frame, values: Values, joint: str) -> space.Frame:
     """The frame of the hole in space: the second element, moved along its axis by the offset of the pin."""
     offset = values.get(f"joints.{joint}.pin.offset")
     return frame if offset is None else frame._replace(place=plus(frame.place, scaled(offset, frame.z)))
 
 
-def misaligned(frame: rigid.Frame, values: Values, joint: str) -> rigid.Frame:
+def misaligned(frame: space.Frame, values: Values, joint: str) -> space.Frame:
     """The second element of a joint in space with the misalignment of its axis."""
     if not _leans(values, joint):
         return frame
-    leant = rigid.compose(hole(frame, values, joint), _misalignment(values, joint))
+    leant = space.compose(hole(frame, values, joint), _misalignment(values, joint))
     back = values.get(f"joints.{joint}.pin.offset")
     return leant if back is None else leant._replace(place=plus(leant.place, scaled(-back, leant.z)))
 
 
-def misaligned_planar(frame: planar.Frame, values: Values, joint: str) -> planar.Frame:
+def misaligned_planar(frame: plane.Frame, values: Values, joint: str) -> plane.Frame:
     """The second element of a joint in the plane, moved by its misalignment."""
     if not _leans(values, joint):
         return frame
     place = _misalignment(values, joint).place
-    return planar.compose(frame, planar.Frame(place[0], place[1]))
+    return plane.compose(frame, plane.Frame(place[0], place[1]))
 
 
-def seated(frame: rigid.Frame, kind: str, values: Values, joint: str) -> rigid.Frame:
+def seated(frame: space.Frame, kind: str, values: Values, joint: str) -> space.Frame:
     """The second element of a joint in space where its pin lies in the hole."""
     model = CLEARANCE_MODELS["spatial"].get(kind)
     offsets = model.offsets(values, f"{HOLE}.{joint}") if model else None
     if model is None or offsets is None:
         return frame
     middle = hole(frame, values, joint)
-    lain = rigid.compose(middle, model.shift(offsets, length_of(model, values, joint)))
+    lain = space.compose(middle, model.shift(offsets, length_of(model, values, joint)))
     back = values.get(f"joints.{joint}.pin.offset")
     return lain if back is None else lain._replace(place=plus(lain.place, scaled(-back, lain.z)))
 
 
-def seated_planar(frame: planar.Frame, kind: str, values: Values, joint: str) -> planar.Frame:
+def seated_planar(frame: plane.Frame, kind: str, values: Values, joint: str) -> plane.Frame:
     """The second element of a joint in the plane where its pin lies in the hole."""
     model = CLEARANCE_MODELS["planar"].get(kind)
     offsets = model.offsets(values, f"{HOLE}.{joint}") if model else None
     if model is None or offsets is None:
         return frame
-    return planar.compose(frame, planar.Frame(*model.shift(offsets, length_of(model, values, joint))))
+    return plane.compose(frame, plane.Frame(*model.shift(offsets, length_of(model, values, joint))))
 
 
-def journaled(frame: rigid.Frame, kind: str, values: Values, joint: str) -> rigid.Frame:
+def journaled(frame: space.Frame, kind: str, values: Values, joint: str) -> space.Frame:
     """The first element of a joint in space whose pin carries the seat: the hole lies off it the other way."""
     model = CLEARANCE_MODELS["spatial"].get(kind)
     offsets = model.offsets(values, f"{PIN}.{joint}") if model else None
     if model is None or offsets is None:
         return frame
-    lain = rigid.relative(hole(frame, values, joint), model.shift(offsets, length_of(model, values, joint)))
+    lain = space.relative(hole(frame, values, joint), model.shift(offsets, length_of(model, values, joint)))
     back = values.get(f"joints.{joint}.pin.offset")
     return lain if back is None else lain._replace(place=plus(lain.place, scaled(-back, lain.z)))
 
 
-def journaled_planar(frame: planar.Frame, kind: str, values: Values, joint: str) -> planar.Frame:
+def journaled_planar(frame: plane.Frame, kind: str, values: Values, joint: str) -> plane.Frame:
     """The first element of a joint in the plane whose pin carries the seat."""
     model = CLEARANCE_MODELS["planar"].get(kind)
     offsets = model.offsets(values, f"{PIN}.{joint}") if model else None
     if model is None or offsets is None:
         return frame
-    return planar.relative(frame, planar.Frame(*model.shift(offsets, length_of(model, values, joint))))
+    return plane.relative(frame, plane.Frame(*model.shift(offsets, length_of(model, values, joint))))
 
 
 def _leans(values: Values, joint: str) -> bool:
@@ -157,7 +156,7 @@ def _leans(values: Values, joint: str) -> bool:
     return any(not (isinstance(number, int | float) and number == 0) for number in numbers)
 
 
-def _misalignment(values: Values, joint: str) -> rigid.Frame:
+def _misalignment(values: Values, joint: str) -> space.Frame:
     """Leaned by `tilt` towards the direction `towards`, moved by `offset` along `offset_towards`, in the hole's
     frame.
     """

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
+from trunnion.algebra.plane import Frame
 from trunnion.errors import Finding, MechanismError
 from trunnion.groups import GROUPS, Group
 from trunnion.groups.gear import Gear
 from trunnion.groups.general import OUTER, General, GroupJoint
-from trunnion.groups.planar import Frame
 from trunnion.joints.friction import FRICTION_LAWS, FrictionLaw
 from trunnion.joints.motion import Span
 from trunnion.joints.pairs import PAIRS

@@ -16,8 +16,8 @@ import numpy as np
 
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.algebra.rigid import Frame, Screw, about
-from trunnion.algebra.space import Vector3, dot, plus, scaled
+from trunnion.algebra.space import Frame, Screw, about
+from trunnion.algebra.vector import Vector3, dot, plus, scaled
 from trunnion.joints.pairs import ContactLoad
 from trunnion.joints.spatial_load import BallLoad, BearingLoad
 from trunnion.solve.backward import ZERO_SLIP

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
 from trunnion.algebra.nested import each
-from trunnion.algebra.rigid import ZERO, Screw, moment_at
-from trunnion.algebra.space import dot, minus
+from trunnion.algebra.space import ZERO, Screw, moment_at
+from trunnion.algebra.vector import dot, minus
 from trunnion.errors import Finding, MechanismError, Severity, agreeing, counted
 from trunnion.groups.redundant import RANK, stacked
 from trunnion.groups.spatial import Pose, SpatialGroup

@@ -16,8 +16,8 @@ import numpy as np
 
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.algebra.rigid import ZERO, Frame, Screw, about, added, minus, moment_at, power, rotated, times
-from trunnion.algebra.space import Vector3, cross, dot, plus, scaled, transpose
+from trunnion.algebra.space import ZERO, Frame, Screw, about, added, minus, moment_at, power, rotated, times
+from trunnion.algebra.vector import Vector3, cross, dot, plus, scaled, transpose
 from trunnion.groups.spatial import SpatialGroup
 from trunnion.joints.pairs import Reaction
 from trunnion.joints.spatial_load import halves

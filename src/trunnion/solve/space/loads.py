@@ -9,8 +9,8 @@ import numpy as np
 
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.algebra.rigid import Screw, about, power, rotated, times, vector_minus
-from trunnion.algebra.space import Vector3, dot, scaled
+from trunnion.algebra.space import Screw, about, power, rotated, times, vector_minus
+from trunnion.algebra.vector import Vector3, dot, scaled
 from trunnion.model.parts import Load
 from trunnion.solve.backward import ZERO_SLIP
 from trunnion.solve.loads import Share, SpringState, Stated, spring_state

@@ -12,8 +12,8 @@ import numpy as np
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.nested import each
-from trunnion.algebra.rigid import ORIGIN, ZERO, Frame, Screw, compose, minus, moment_at, point_of, times, vector_minus
-from trunnion.algebra.space import Vector3, cross, dot, plus, scaled
+from trunnion.algebra.space import ORIGIN, ZERO, Frame, Screw, compose, minus, moment_at, point_of, times, vector_minus
+from trunnion.algebra.vector import Vector3, cross, dot, plus, scaled
 from trunnion.groups.spatial_tree import Element
 from trunnion.solve.forward import Forward, Motion, rate_of
 from trunnion.solve.shifts import hole

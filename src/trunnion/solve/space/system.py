@@ -11,8 +11,8 @@ import numpy as np
 
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.algebra.rigid import ORIGIN, Frame, element, relative, slid, turned, vector_minus
-from trunnion.algebra.space import Vector3, dot
+from trunnion.algebra.space import ORIGIN, Frame, element, relative, slid, turned, vector_minus
+from trunnion.algebra.vector import Vector3, dot
 from trunnion.groups.cylindrical_dyad import CylindricalDyad
 from trunnion.groups.spatial import SpatialGroup
 from trunnion.groups.tree import OUTER, GroupJoint

@@ -6,7 +6,7 @@ arXiv:2405.12762
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import clarabel
@@ -17,13 +17,13 @@ from scipy import sparse
 from trunnion.statistics.costs import COST_MODELS
 from trunnion.studies.allocation.task import Task
 
-__all__ = ["settled", "solved"]
+__all__ = ["Point", "settled"]
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
 SOUND = ("Solved", "AlmostSolved", "InsufficientProgress")
-FINE = 1e-9
-CLOSE = 1e-4  # an answer that goes into Newton's method; the proof is of what comes out
+FINE = 1e-11
+CLOSE = 1e-4  # residuals of an answer that is taken; what is beyond a limit is brought back
 BROKEN = 1e-7  # of a limit: a row to add
 AT_ONCE = 16  # rows added in one round
 
@@ -49,24 +49,38 @@ class _Cones:
         return self.rows - len(right)
 
 
-def settled(task: Task, relaxed: bool = False) -> tuple[Array, Rows, Array, int] | None:
-    """Unknowns u, the sides that were needed, their multipliers, rounds; None if the solver did not come to an end.
+@dataclass(frozen=True)
+class Point:
+    """What the solver found: unknowns u, the sides that were needed with their multipliers, and the dual objective.
+
+    bound: no cost is lower, to the solver's precision; wider: by what share of themselves all limits are widened.
+    """
+
+    u: Array
+    rows: Rows
+    weights: Array
+    bound: float
+    wider: float = 0.0
+    rounds: int = 0
+
+
+def settled(task: Task, relaxed: bool = False) -> Point | None:
+    """The point of least cost; None if the solver did not come to an end.
 
     Sides that the answer breaks are added until there is none: thousands of rows cost little.
     relaxed: the least share by which all limits have to be widened, in place of the least cost.
     """
     rows, rounds = _first(task), 0
     while True:
-        found = solved(task, rows, relaxed)
+        point = _solved(task, rows, relaxed)
         rounds += 1
-        if found is None:
+        if point is None:
             return None
-        u, weights, wider = found
-        value = task.sides.value(task.tolerances(u)) - wider
+        value = task.sides.value(task.tolerances(point.u)) - point.wider
         value[rows] = 0.0
         broken = np.flatnonzero(value > 1 + BROKEN)
         if not len(broken):
-            return u, rows, weights, rounds
+            return replace(point, rounds=rounds)
         rows = np.concatenate([rows, broken[np.argsort(-value[broken], kind="stable")[:AT_ONCE]]])
 
 
@@ -79,8 +93,8 @@ def _first(task: Task) -> Rows:
     return np.array(sorted(picked), np.intp)
 
 
-def solved(task: Task, rows: Rows, relaxed: bool) -> tuple[Array, Array, float] | None:
-    """Unknowns u, multipliers of these sides, and how much wider the limits are taken (0 if not relaxed)."""
+def _solved(task: Task, rows: Rows, relaxed: bool) -> Point | None:
+    """The point of least cost with these sides alone."""
     count, priced = len(task.unit), [] if relaxed else task.costs
     cones = _Cones(count + len(priced) + int(relaxed))
     bounds, right = np.concatenate([-np.eye(count), np.eye(count)]), np.concatenate([-task.low, task.high])
@@ -101,8 +115,9 @@ def solved(task: Task, rows: Rows, relaxed: bool) -> tuple[Array, Array, float] 
     found = clarabel.DefaultSolver(nothing, aim, whole, b, cones.cones, _settings()).solve()
     if str(found.status) not in SOUND or found.r_prim > CLOSE or found.r_dual > CLOSE:
         return None
-    x = np.asarray(found.x)
-    return x[:count], scale * np.maximum(np.asarray(found.z)[firsts], 0.0), float(x[-1]) if relaxed else 0.0
+    prices, kept = scale * np.maximum(np.asarray(found.z)[firsts], 0.0), np.clip(found.x[:count], task.low, task.high)
+    bound = sum(cost.values()["A"] for _, cost in priced) + scale * found.obj_val_dual
+    return Point(kept, rows, prices, bound, float(found.x[-1]) if relaxed else 0.0)
 
 
 def _side(task: Task, k: int, cones: _Cones, relaxed: bool) -> int:
@@ -127,18 +142,18 @@ def _side(task: Task, k: int, cones: _Cones, relaxed: bool) -> int:
 def _epigraph(task: Task, place: int, cones: _Cones) -> float:
     """The cone of one cost, z ≥ u^−k or z ≥ exp(−k u), and what z costs."""
     g, cost = task.costs[place]
-    given = {name: one.default for name, one in COST_MODELS[cost.model].parameters.items()} | dict(cost.parameters)
-    k, ratio = float(given["k"] or 0.0), float(task.unit[g] / (given["unit"] or 1.0))
+    given = cost.values()
+    k, ratio = given["k"], float(task.unit[g] / given["unit"])
     column = len(task.unit) + place
     block, right = np.zeros((3, cones.columns)), np.zeros(3)
     if COST_MODELS[cost.model].cone == "power":  # z^α u^(1−α) ≥ 1 with α = 1/(1 + k)
         block[0, column] = block[1, g] = -1.0
         right[2] = 1.0
         cones.add(clarabel.PowerConeT(1 / (1 + k)), block, right)
-        return float((given["B"] or 0.0) * ratio**-k)
+        return float(given["B"] * ratio**-k)
     block[0, g], block[2, column], right[1] = k * ratio, -1.0, 1.0  # 1 · exp(−k u / 1) ≤ z
     cones.add(clarabel.ExponentialConeT(), block, right)
-    return float(given["B"] or 0.0)
+    return given["B"]
 
 
 def _settings() -> clarabel.DefaultSettings:

@@ -1,7 +1,6 @@
 """Least cost over half widths that may be anything between bounds: a convex problem, solved and proven.
 
-Clarabel solves it as a conic program, Newton's method takes the answer to rounding, and a lower bound of the cost over
-the box of the bounds proves it.
+Clarabel solves it as a conic program; its dual objective, a lower bound of the cost, proves the answer.
 """
 
 from __future__ import annotations
@@ -12,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.errors import Finding, Severity
-from trunnion.studies.allocation.cones import settled
-from trunnion.studies.allocation.interior import Point, polished
+from trunnion.studies.allocation.cones import Point, settled
 from trunnion.studies.allocation.problem import PROVEN, Answer, Problem, none, shortfalls
 from trunnion.studies.allocation.sides import sides
 from trunnion.studies.allocation.task import Task, task_of
@@ -21,7 +19,7 @@ from trunnion.studies.allocation.task import Task, task_of
 __all__ = ["allocate_continuous", "minimise"]
 
 Array = NDArray[np.float64]
-ACTIVE = 1e-6  # of the largest multiplier: a side to begin Newton's method with
+ACTIVE = 1e-6  # of the largest multiplier: a side that limits
 NEAR = 1e-3  # of the first units: the least unit to try again with
 
 
@@ -49,7 +47,7 @@ def answer_of(problem: Problem, task: Task, point: Point) -> Answer:
     tolerances = task.tolerances(point.u)
     pairs = zip(problem.contributions, tolerances, strict=True)
     costs = np.array([one.cost.value(float(t)) if one.cost else 0.0 for one, t in pairs])
-    cost, gap = float(np.sum(costs)), max(point.gap, 0.0)
+    cost, gap = float(np.sum(costs)), gap_of(task, point)
     price = np.zeros(len(problem.effects.worst))
     np.add.at(price, task.sides.row[point.rows], point.weights / task.sides.room[point.rows])
     what = f"the optimum is proven only to {gap:.1e} of what the tolerances cost"
@@ -59,10 +57,9 @@ def answer_of(problem: Problem, task: Task, point: Point) -> Answer:
         tolerances,
         costs,
         cost,
-        bound=cost - gap * point.scale,
+        bound=cost - gap * task.scale(point.u),
         gap=gap,
         proven=gap <= PROVEN,
-        residual=point.residual,
         price=price,
         findings=() if gap <= PROVEN else (doubt,),
         rounds=point.rounds,
@@ -84,35 +81,39 @@ def unmet(problem: Problem, task: Task) -> list[Finding]:
     if np.all(task.sides.value(least) <= 1):
         return []
     found = settled(task, relaxed=True)
-    return shortfalls(problem, task.tolerances(found[0])) if found else []
+    return shortfalls(problem, task.tolerances(found.u)) if found else []
 
 
 def minimise(task: Task) -> Point | None:
-    """The point of least cost of a task whose limits can be kept; None if it was not found."""
-    found = settled(task) or _inside(task)
-    if found is None:
+    """The point of least cost of a task whose limits can be kept; None if it was not found.
+
+    It is found twice: first to know how large the unknowns are, then with all of them near 1.
+    """
+    first = _within(task, settled(task))
+    if first is None:
         return None
-    point = _polished(task, *found)
-    if point.gap > PROVEN:  # again, with all unknowns near 1
-        unit = task.unit * np.maximum(point.u, NEAR)
-        again = replace(task, unit=unit)
-        found = settled(again)
-        if found is not None:
-            other = _polished(again, *found)
-            point = min(point, replace(other, u=other.u * unit / task.unit), key=lambda one: one.gap)
-    return point
+    unit = task.unit * np.maximum(first.u, NEAR)
+    again = replace(task, unit=unit)
+    second = _within(again, settled(again))
+    if second is None or gap_of(again, second) > max(gap_of(task, first), PROVEN):
+        return first
+    return replace(second, u=second.u * unit / task.unit)
 
 
-def _inside(task: Task) -> tuple[Array, NDArray[np.intp], Array, int] | None:
-    """A point within the limits to begin with, should the solver of cones not come to an end."""
-    for halved in range(60):
-        u = np.clip(task.low + 0.5**halved, task.low, task.high)
-        value = task.sides.value(task.tolerances(u))
-        if np.max(value, initial=0.0) < 1:
-            return u, np.argsort(-value)[:1], np.zeros(1), 0
-    return None
+def gap_of(task: Task, point: Point) -> float:
+    """Cost from its lower bound, either way, in units of what tolerances change."""
+    return abs(task.cost(point.u) - point.bound) / task.scale(point.u)
 
 
-def _polished(task: Task, u: Array, rows: NDArray[np.intp], weights: Array, rounds: int) -> Point:
-    active = weights > ACTIVE * np.max(weights, initial=0.0)
-    return replace(polished(task, u, rows[active], weights[active]), rounds=rounds)
+def _within(task: Task, point: Point | None) -> Point | None:
+    """The same brought back within the limits, where it is beyond them by the solver's tolerance."""
+    if point is None:
+        return None
+    active = point.weights > ACTIVE * np.max(point.weights, initial=0.0)
+    point = replace(point, rows=point.rows[active], weights=point.weights[active])
+    over = float(np.max(task.sides.value(task.tolerances(point.u)), initial=0.0))
+    if over <= 1:
+        return point
+    least = float(np.max(task.sides.value(task.tolerances(task.low)), initial=0.0))
+    share = (1 - least) / (over - least) if least < 1 else 1.0  # on a line to the least the sides are convex
+    return replace(point, u=task.low + share * (point.u - task.low))

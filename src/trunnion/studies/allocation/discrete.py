@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 from scipy.optimize import Bounds, LinearConstraint, milp
 
 from trunnion.errors import Finding, Severity
-from trunnion.studies.allocation.continuous import allocate_continuous, minimise, unbounded
-from trunnion.studies.allocation.interior import Point
+from trunnion.studies.allocation.cones import Point
+from trunnion.studies.allocation.continuous import allocate_continuous, gap_of, minimise, unbounded
 from trunnion.studies.allocation.problem import ALLOWED, PROVEN, Answer, Contribution, Problem, none, shortfalls
 from trunnion.studies.allocation.sides import Sides, sides
 from trunnion.studies.allocation.task import Task, task_of
@@ -56,6 +56,7 @@ class _Best:
     cost: float = np.inf
     taken: Flags = field(default_factory=lambda: np.zeros(0, bool))
     point: Point | None = None
+    gap: float = 0.0
 
 
 class _Search:
@@ -209,7 +210,7 @@ class _Search:
 
     def _complete(self, taken: Flags, u: Array, best: _Best) -> None:
         """With these options: the best half widths of the others; the options are settled and not asked for again."""
-        price, point = float(np.sum(self.prices @ taken)), None
+        price, point, gap = float(np.sum(self.prices @ taken)), None, 0.0
         self._forbid(taken)
         if len(self.task.unit):
             self._price_tangents(u)
@@ -221,14 +222,14 @@ class _Search:
             point = minimise(part)
             if point is None:
                 return
-            price += part.cost(point.u)
+            price, gap = price + part.cost(point.u), gap_of(part, point)
             self._price_tangents(point.u)
             for k in point.rows:
                 self._limit(int(k), part.tolerances(point.u), point.u)
         elif np.any(self.limits.value(self._tolerances(taken, u)) > 1 + ALLOWED):
             return
         if price < best.cost:
-            best.cost, best.taken, best.point = price, taken, point
+            best.cost, best.taken, best.point, best.gap = price, taken, point, gap
 
     def _forbid(self, taken: Flags) -> None:
         row = np.zeros(self.columns)
@@ -242,7 +243,7 @@ class _Search:
             doubt = Finding(what, "processes", "widen a limit or add a finer process")
             return none(problem, shortfalls(problem, self.narrowest()) or [doubt])
         u = best.point.u if best.point else np.zeros(0)
-        gap = max(best.cost - bound, 0.0) / self.scale + (best.point.gap if best.point else 0.0)
+        gap = max(best.cost - bound, 0.0) / self.scale + best.gap
         costs = self.prices @ best.taken
         t = self._tolerances(best.taken, u)
         costs += [one.cost.value(float(t[i])) if one.cost else 0.0 for i, one in enumerate(problem.contributions)]
@@ -263,7 +264,6 @@ class _Search:
             min(bound, best.cost),
             gap,
             proven,
-            residual=best.point.residual if best.point else 0.0,
             choices=choices,
             price=nothing,
             findings=() if proven else (doubt,),

@@ -48,13 +48,6 @@ class Task:
             total[g] += self.unit[g] * cost.slope(float(self.unit[g] * u[g]))
         return total
 
-    def curvature(self, u: Array) -> Array:
-        """∂²cost/∂u², (unknown,)."""
-        total = np.zeros(len(u))
-        for g, cost in self.costs:
-            total[g] += self.unit[g] ** 2 * cost.curvature(float(self.unit[g] * u[g]))
-        return total
-
     def scale(self, u: Array) -> float:
         """The part of the cost that tolerances change at u, but for what is lost in the rounding of the whole."""
         return max(float(np.sum(np.abs(self.slope(u) * u))), 1e-9 * abs(self.cost(u))) or 1.0

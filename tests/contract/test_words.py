@@ -9,6 +9,7 @@ import yaml
 
 from trunnion import Mechanism, MechanismError, analyse, check, sweep
 from trunnion.errors import agreeing, counted
+from trunnion.results.attributes import summary_of
 from trunnion.views.cycle.as_built import continued
 
 ENGINE = """
@@ -94,9 +95,8 @@ def test_no_locking_margin_where_nothing_can_be_assembled():
     mechanism = model(FOUR_BAR).with_values({"links.coupler.points.C.x": "5 mm", "links.rocker.points.C.x": "5 mm"})
     result = analyse(mechanism, 24)
     assert np.isnan(result["locking_margin"].values).all()
-    (row,) = [one for one in json.loads(result.attrs["summary"]) if "locking margin" in one["label"]]
-    assert "more than" not in row["label"]
-    assert row["value"] is None or np.isnan(row["value"])
+    (figure,) = [one for one in summary_of(result) if one.name == "locking_margin"]
+    assert (figure.value, figure.aspect) == (None, "")
 
 
 def test_one_point_of_a_sweep_has_no_figures():

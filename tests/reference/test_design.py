@@ -151,20 +151,19 @@ def test_two_drivers_and_no_driver() -> None:
 def test_design_with_gaps_returns_and_no_mass() -> None:
     """What has no answer is left out: a drive that turns back has no flywheel, a link without mass no balance."""
     gaps = Mechanism(**model(four_bar(2.0, 1.5, 1.5, 4.0)))
-    labels = [row["label"] for row in figures.report_rows(gaps, 90)]
-    assert any(label.startswith("counterweight") for label in labels)
+    assert any("counterweight" in row.name for row in figures.report_figures(gaps, 90))
     data = model(four_bar())
     data["drivers"] = {"A": {"law": "harmonic", "mean": 1.0, "amplitude": 0.7, "period": 0.5}}
     swinging = Mechanism(**data)
     found = figures.design(swinging, 90)
     np.testing.assert_allclose(found.limits, [(0.3, 1.7)], rtol=1e-9)
     assert np.isnan(found.flywheel(0.05))
-    assert not any("flywheel" in row["label"] for row in figures.report_rows(swinging, 90))
+    assert "flywheel" not in [row.name for row in figures.report_figures(swinging, 90)]
     bare = model(four_bar(), friction=None)
     for link in bare["links"].values():
         for key in ("mass", "centre", "inertia"):
             link.pop(key, None)
-    assert not any("counterweight" in row["label"] for row in figures.report_rows(Mechanism(**bare), 90))
+    assert not any("counterweight" in row.name for row in figures.report_figures(Mechanism(**bare), 90))
 
 
 def test_work_that_cancels_gives_no_efficiency() -> None:

@@ -14,6 +14,7 @@ from trunnion import Mechanism
 from trunnion.algebra.quadrature import Effort, integrals
 from trunnion.cycle.account import balance
 from trunnion.errors import Status
+from trunnion.results.attributes import summary_of
 from trunnion.solve.loads import useful_loads
 from trunnion.solve.run import Run, prepare
 from trunnion.solve.switches import Mechanisms, edges
@@ -133,15 +134,15 @@ def test_a_load_that_no_position_meets_is_told_of() -> None:
 
 def test_a_load_that_gives_back_what_it_takes_does_no_net_work() -> None:
     result = trunnion.analyse(trunnion.read(EXAMPLES / "toggle-press.yaml"), 100)
-    labels = [row["label"] for row in json.loads(result.attrs["summary"])]
+    (figure,) = [one for one in summary_of(result) if one.name == "efficiency"]
     assert float(result["efficiency"]) == 0
-    assert "efficiency of the cycle (the useful loads do no net work)" in labels
+    assert (figure.value, figure.note) == (0, "the useful loads do no net work")
 
 
 def test_friction_of_nothing_is_no_power() -> None:
     result = trunnion.analyse(press("1 kN", joint_defaults={"pin": {"radius": "12 mm"}, "friction": 0.0}), 60)
-    rows = {row["label"]: row["value"] for row in json.loads(result.attrs["summary"])}
-    assert rows["friction power, mean"] == 0
+    rows = {row.name: row.value for row in summary_of(result)}
+    assert rows["friction_power_mean"] == 0
 
 
 @pytest.mark.slow
@@ -192,13 +193,12 @@ def test_extremes_are_of_positions_that_are_valid(model: str) -> None:
     lost = result["status"].values == Status.CONTACT_LOST
     assert np.any(lost)
     sizes = np.sqrt((result["reaction_force"].values ** 2).sum(axis=1))
-    rows = {row["label"]: row["value"] for row in json.loads(result.attrs["summary"])}
+    rows = {row.name: row.value for row in summary_of(result)}
     kept = result["status"].values == Status.SOLVED
     for size, joint in zip(sizes, result["joint"].values, strict=True):
-        (value,) = (value for label, value in rows.items() if label.startswith(f"reaction of {joint}, largest"))
-        assert value == pytest.approx(np.max(size[kept]), rel=1e-12)
-    assert rows["positions not valid, for a pin loses contact"] == np.count_nonzero(lost)
-    assert rows["positions solved, of 360"] == 360 - np.count_nonzero(lost)
+        assert rows[f"{joint}.reaction_max"] == pytest.approx(np.max(size[kept]), rel=1e-12)
+    assert rows["positions_lost"] == np.count_nonzero(lost)
+    assert rows["positions_solved"] == 360 - np.count_nonzero(lost)
     swept = trunnion.sweep(mechanism, {"A.speed": ["300 rpm"]}, 360)
     np.testing.assert_allclose(swept["reaction_max"].values[:, 0], np.max(sizes[:, kept], axis=1), rtol=1e-12)
     assert int(swept["not_valid"][0]) == np.count_nonzero(lost)
@@ -280,5 +280,5 @@ def test_root_mean_square_of_an_effort() -> None:
     crank = Mechanism(trunnion=1, space="planar", links=links, joints=joints, drivers={"A": {"speed": 2.0}},
                       gravity=[0, -9.81])  # fmt: skip
     result = trunnion.analyse(crank, 12)
-    (row,) = (row for row in json.loads(result.attrs["summary"]) if row["label"].endswith("RMS"))
-    assert row["value"] == pytest.approx(2.0 * 9.81 * 0.3 / np.sqrt(2), rel=1e-9)
+    (row,) = (row for row in summary_of(result) if row.aspect == "RMS")
+    assert row.value == pytest.approx(2.0 * 9.81 * 0.3 / np.sqrt(2), rel=1e-9)

@@ -20,6 +20,7 @@ from trunnion.algebra.dual import Dual, derivative, primal
 from trunnion.measures.figures import figure, kept, known, shown, span
 from trunnion.measures.measures import MEASURES, STATISTICS, Measure, coordinate_unit, named
 from trunnion.measures.positions import plan
+from trunnion.results.attributes import summary_of
 from trunnion.solve.friction_method import MARGIN
 from trunnion.solve.run import Run, prepare
 
@@ -305,8 +306,8 @@ def test_forces_are_those_of_the_analysis() -> None:
                                           rel=1e-5)  # fmt: skip
     for name, curve in {"most": effort, "size": size, "across": np.abs(reaction[1])}.items():
         assert 0 <= found[name] - np.max(curve) < 2e-3 * np.ptp(curve)
-    rows = {row["label"]: row["value"] for row in json.loads(result.attrs["summary"])}
-    assert found["efficiency"] == pytest.approx(rows["efficiency of the cycle"], rel=1e-7)
+    rows = {row.name: row.value for row in summary_of(result)}
+    assert found["efficiency"] == pytest.approx(rows["efficiency"], rel=1e-7)
     least = np.nanmin(result["locking_margin"].values)
     assert found["margin"] <= min(least, MARGIN) + 1e-12
     assert found["now"] == pytest.approx(float(result["efficiency_instant"].values[40]), rel=1e-9, nan_ok=True)

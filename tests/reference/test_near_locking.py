@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -16,6 +14,7 @@ from trunnion.algebra.plane import Wrench
 from trunnion.cycle.near_locking import _count
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.joints.pairs import Load
+from trunnion.results.attributes import summary_of
 from trunnion.solve.friction import Contact, Problem
 from trunnion.solve.friction_method import FrictionMethod
 
@@ -49,15 +48,9 @@ def test_drawer_driven_backward(arm: float, coefficient: float) -> None:
     assert float(result["efficiency"]) == pytest.approx(1 / (1 + loss), rel=1e-12)
     found = locking(mechanism, 20)
     np.testing.assert_allclose(found["drive_effort_reverse"], 50.0 * (1 - loss), rtol=1e-12, atol=1e-12)
-    (row,) = [row for row in summary(result) if row["label"].startswith("efficiency driven backward")]
-    assert row["value"] == pytest.approx(1 - loss, rel=1e-12)
-    assert ("holds itself" in row["label"]) == (loss >= 1)
-
-
-def summary(result: Any) -> list[dict[str, Any]]:
-    import json
-
-    return list(json.loads(result.attrs["summary"]))
+    (row,) = [row for row in summary_of(result) if row.name == "efficiency_reverse"]
+    assert row.value == pytest.approx(1 - loss, rel=1e-12)
+    assert (row.note == "it holds itself") == (loss >= 1)
 
 
 CASES = {
@@ -139,13 +132,10 @@ def test_there_is_nothing_to_lock_without_friction() -> None:
 def test_coefficient_only_where_the_law_is_proportional_to_it() -> None:
     data, options = CASES["slider-crank"]
     stribeck = {"law": "stribeck", "coefficient": 0.2, "static": 0.35, "stribeck_speed": 0.5}
-    rows = summary(analyse(data(), 24, **{**options, "friction": stribeck}))
-    labels = " / ".join(row["label"] for row in rows)
-    assert "critical multiple of the friction of" in labels
-    assert "critical friction coefficient" not in labels
-    assert "critical friction coefficient of" in " / ".join(
-        row["label"] for row in summary(analyse(data(), 24, **options))
-    )
+    curved = summary_of(analyse(data(), 24, **{**options, "friction": stribeck}))
+    plain = summary_of(analyse(data(), 24, **options))
+    ends = [{row.name.partition(".critical_")[2] for row in rows} - {""} for rows in (curved, plain)]
+    assert ends == [{"multiple"}, {"coefficient"}]
 
 
 def test_successive_approximation_has_the_same_margin() -> None:

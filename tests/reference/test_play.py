@@ -19,6 +19,7 @@ from played import changes, four_bar, measures_of, offsets_of, pressed_to, rssr,
 from trunnion import MechanismError, Status
 from trunnion.joints.clearance import worst_case
 from trunnion.measures.measures import named, outputs
+from trunnion.results.attributes import summary_of
 from trunnion.solve.forward import forward
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
@@ -228,7 +229,7 @@ def test_totals_and_attributes() -> None:
     place = ideal["point_position"].sel(point="piston.Q", axis="x")
     np.testing.assert_allclose(result["value"].values[0], place.values, rtol=0, atol=1e-12)
     np.testing.assert_allclose(result["value"].values[1], ideal["drive_effort"].values[0], rtol=1e-9)
-    assert any("stroke-position, worst case" in row["label"] for row in json.loads(result.attrs["summary"]))
+    assert "stroke-position.worst_case" in [figure.name for figure in summary_of(result)]
 
 
 def test_angles_gain_whole_turns() -> None:
@@ -265,7 +266,7 @@ def test_dead_centres_have_no_answer_and_say_so() -> None:
     assert any("cannot be assembled" in row["what"] for row in json.loads(result.attrs["findings"]))
     result = trunnion.play(trunnion.Mechanism(**data), steps=36000)
     sound = result["status"].values < Status.NEAR_SINGULAR
-    told = json.loads(result.attrs["summary"])[0]["value"]  # close to a dead centre first order says little
+    told = summary_of(result)[0].value  # close to a dead centre first order says little
     assert told == np.max(result["worst_case_total"].values[0, sound])
     assert told < 0.5 * np.nanmax(result["worst_case_total"].values)
 

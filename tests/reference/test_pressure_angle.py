@@ -105,9 +105,7 @@ def test_it_is_between_the_force_and_the_velocity_of_the_analysis(name: str, loa
 
 
 def test_rows_name_the_positions() -> None:
-    rows = {row["label"]: row for row in figures.report_rows(build(forwards(0.3, 1.0, 0.0)))}
-    (label,) = [one for one in rows if one.startswith("pressure angle")]
-    assert label.endswith(", at 90° and 270°")
-    assert rows[label]["value"] == "-17.4576 … 17.4576"
-    yoke = figures.report_rows(build(MODELS["Scotch yoke"]()))
-    assert any(row["label"].startswith("pressure angle") and "everywhere" in row["label"] for row in yoke)
+    (row,) = [one for one in figures.report_figures(build(forwards(0.3, 1.0, 0.0))) if "pressure_angle" in one.name]
+    assert (row.value, row.place) == ("-17.4576 … 17.4576", "at 90° and 270°")
+    yoke = figures.report_figures(build(MODELS["Scotch yoke"]()))
+    assert [one.place for one in yoke if "pressure_angle" in one.name] == ["everywhere"]

@@ -13,6 +13,7 @@ import xarray as xr
 import trunnion
 from toleranced import FOURBAR, fourbar, fourbar_angle, slider_crank
 from trunnion import Mechanism
+from trunnion.results.attributes import summary_of
 from trunnion.views.tolerance.figure import figure
 from trunnion.views.tolerance.tables import tables
 from trunnion.views.tolerance.toleranced import readings
@@ -80,7 +81,7 @@ def test_rss_says_that_it_leaves_correlation_out() -> None:
     found = study(0.85)
     table = tables(found)[0]
     assert any(row[0] == "RSS, uncorrelated" for row in table.rows)
-    assert any("RSS, without correlation" in row["label"] for row in json.loads(found.attrs["summary"]))
+    assert any("RSS, without correlation" in figure.label for figure in summary_of(found))
     assert any("leave the correlations out" in row["what"] for row in json.loads(found.attrs["findings"]))
     plain = study(0.0)
     assert not any("uncorrelated" in row[0] for row in tables(plain)[0].rows)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
+import math
 import re
 from html.parser import HTMLParser
 
@@ -12,6 +13,8 @@ import pytest
 from stand_in import NASTY, four_bar
 
 from trunnion.errors import Status
+from trunnion.results.attributes import figure_rows, summary_of
+from trunnion.results.figure import MORE_THAN, Figure
 from trunnion.views.common.bundle import bundle, web_text
 from trunnion.views.cycle.report import _summary, embedded, report
 
@@ -109,26 +112,33 @@ def test_contents(plain, ideal):
 
 
 @pytest.mark.parametrize(
-    ("label", "subject", "remark"),
+    ("figure", "label", "told"),
     [
-        ("drive torque of A, least, at 350°", "drive torque of A", "least, at 350°"),
-        ("drive torque of crank (left), RMS", "drive torque of crank (left)", "RMS"),
-        ("power residual, largest, of peak drive power", "power residual", "largest, of peak drive power"),
-        ("efficiency of the cycle (the useful loads do no net work)", "efficiency of the cycle",
-         "the useful loads do no net work"),
-        ("locking margin (times the friction), least, at 3°", "locking margin", "times the friction, least, at 3°"),
-        ("positions solved, of 360", "positions solved", "of 360"),
-        ("Anything else", "Anything else", ""),
+        (Figure("A.effort_min", "drive torque of A", 7.0, "W", "least", "at 350°"), "drive torque of A, least, at 350°",
+         ("7.000\u00a0W", "least, at 350°")),
+        (Figure("efficiency", "efficiency", 0, note="no net work"), "efficiency (no net work)",
+         ("0", "no net work")),
+        (Figure("locking_margin", "locking margin", 10, aspect=MORE_THAN, note="times the friction"),
+         "locking margin (times the friction), more than", ("> 10", "times the friction")),
+        (Figure("efficiency", "efficiency", math.nan), "efficiency", ("—", "")),
+        (Figure("grashof", "type", "crank-rocker"), "type", ("crank-rocker", "")),
     ],
 )  # fmt: skip
-def test_a_summary_label_is_a_subject_and_a_remark(plain, label, subject, remark):
-    plain.attrs["summary"] = json.dumps([{"label": label, "value": 7.0, "unit": "W"}])
-    assert _summary(plain) == [(subject, [("7.000\u00a0W", remark)])]
+def test_a_figure_is_told_by_its_subject_its_value_and_a_remark(plain, figure, label, told):
+    plain.attrs["summary"] = json.dumps(figure_rows([figure]))
+    assert figure.label == label
+    assert summary_of(plain) == [figure]
+    assert _summary(plain) == [(figure.subject, [told])]
+
+
+def test_a_figure_of_an_older_file_is_all_subject(plain):
+    plain.attrs["summary"] = json.dumps([{"label": "force, least", "value": 1.0, "unit": "1"}])
+    assert _summary(plain) == [("force, least", [("1", "")])]
 
 
 def test_figures_of_one_subject_stand_together(plain):
-    rows = [{"label": f"force, {which}", "value": 1.0, "unit": "1"} for which in ("least", "largest", "more than")]
-    plain.attrs["summary"] = json.dumps(rows)
+    rows = [Figure("f", "force", 1.0, "1", aspect) for aspect in ("least", "largest", MORE_THAN)]
+    plain.attrs["summary"] = json.dumps(figure_rows(rows))
     assert _summary(plain) == [("force", [("1", "least"), ("1", "largest"), ("> 1", "")])]
 
 

@@ -177,12 +177,12 @@ def design(
     fluctuation: Annotated[float, typer.Option("--fluctuation", help="Of the drive speed, for the flywheel.")] = 0.05,
 ) -> None:
     """Transmission angles, dead centres, range, Grashof type, shaking force, balance, flywheel, motor."""
-    from trunnion.studies.design import report_rows
+    from trunnion.studies.design import report_figures
 
     mechanism = stated(file, set_, table, friction)
     with lines_of(file):
-        rows = report_rows(mechanism, steps, fluctuation)
-    show_figures(mechanism.name or str(file), rows)
+        figures = report_figures(mechanism, steps, fluctuation)
+    show_figures(mechanism.name or str(file), figures)
 
 
 @verb
@@ -190,14 +190,14 @@ def locking(
     file: File, steps: Steps = 360, set_: Set = None, table: TableFile = None, friction: FrictionLaw = None
 ) -> None:
     """How close to locking, by all friction and by each joint's; other solutions; whether it can be driven backward."""
-    from trunnion.cycle.locking import look, report_rows
+    from trunnion.cycle.locking import look, report_figures
     from trunnion.solve.run import prepare
 
     mechanism = stated(file, set_, table, friction)
     with lines_of(file):
         run = prepare(mechanism)
         found = look(run, steps)
-    show_figures(mechanism.name or str(file), report_rows(run, found))
+    show_figures(mechanism.name or str(file), report_figures(run, found))
     say(placed(findings_of(found), file, ["assembly"]))
     raise typer.Exit(exit_status(findings_of(found)))
 

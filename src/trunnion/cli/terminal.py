@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,6 +13,8 @@ from trunnion.results.attributes import attribute
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from trunnion.results.figure import Figure
 
 __all__ = ["bar", "console", "say", "say_missed", "show_figures", "show_rows", "wrote"]
 
@@ -29,19 +31,18 @@ def wrote(path: Path) -> None:
     console().print(f"wrote {path}", markup=False, highlight=False, soft_wrap=True)
 
 
-def show_figures(title: str, rows: list[dict[str, Any]]) -> None:
-    """Figures with label, value and unit; a value may be a text."""
+def show_figures(title: str, figures: Sequence[Figure]) -> None:
+    """Figures with label, value and unit."""
     from rich.table import Table
 
     table = Table(title=title, title_justify="left", show_edge=False)
     table.add_column("")
     table.add_column("value", justify="right")
     table.add_column("unit")
-    for row in rows:
-        value = row["value"]
-        if not isinstance(value, str):
-            value = "no answer" if value is None else f"{value + 0.0:.6g}"  # + 0.0: no negative zero
-        table.add_row(row["label"], value, "" if row["unit"] == "1" else row["unit"])
+    for one in figures:
+        value = "no answer" if one.value is None else one.value
+        told = value if isinstance(value, str) else f"{value + 0.0:.6g}"  # + 0.0: no negative zero
+        table.add_row(one.label, told, "" if one.unit == "1" else one.unit)
     console().print(table, markup=False, highlight=False)
 
 

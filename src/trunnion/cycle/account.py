@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.cycle import contact_loss, diagnosis, near_locking
-from trunnion.cycle.asbuilt import summary_rows
+from trunnion.cycle.asbuilt import error_figures
 from trunnion.cycle.means import Means
 from trunnion.cycle.scene import DRAWN
 from trunnion.errors import Finding, Severity, Status
@@ -20,7 +20,8 @@ from trunnion.model.mechanism import Mechanism
 from trunnion.model.quantity import Quantity
 from trunnion.model.units import KINDS, Dimension, si_unit
 from trunnion.results import variables as results
-from trunnion.results.attributes import cited, finding_rows, origin
+from trunnion.results.attributes import cited, figure_rows, finding_rows, origin
+from trunnion.results.figure import Figure
 from trunnion.solve.forward import start
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.loads import Stated
@@ -33,7 +34,6 @@ if TYPE_CHECKING:
     from trunnion.solve.run import Run
 
 from trunnion.cycle.variables import fill_of
-from trunnion.solve.friction_method import MARGIN
 from trunnion.solve.loads import useful_loads
 
 __all__ = [
@@ -47,6 +47,7 @@ __all__ = [
 
 
 Arrays = Mapping[str, NDArray[np.float64]]
+TIMES = "times the friction"  # what a locking margin is
 ZERO_INERTIA = Quantity(0, KINDS["moment of inertia"])
 
 DURANGO = (
@@ -72,7 +73,7 @@ def finish(run: Run, found_positions: Positions) -> xr.Dataset:
         "driver_units": effort_units(run.system),
         "spring_units": spring_units(run.system),
         "findings": finding_rows(found),
-        "summary": _summary(run, found_positions, near),
+        "summary": figure_rows(_summary(run, found_positions, near)),
         "inputs": inputs(mechanism),
         "scene": _scene(run),
         "periodic": int(run.cycle.periodic),
@@ -214,62 +215,58 @@ def references(mechanism: Mechanism) -> list[str]:
     return [method, *(f"{law}: {FRICTION_LAWS[law].source}" for law in sorted(laws)), *mechanism.references]
 
 
-def _summary(run: Run, found: Positions, near: near_locking.Locking | None) -> list[dict[str, Any]]:
+def _summary(run: Run, found: Positions, near: near_locking.Locking | None) -> Iterator[Figure]:
     """The figures one looks at first."""
-    rows: list[dict[str, Any]] = []
-    arrays, time, means = found.arrays, found.time, found.means
-    dial = run.system.dial(run.values, time)
+    arrays, status, means = found.arrays, found.arrays["status"], found.means
+    dial, counted = run.system.dial(run.values, found.time), status < Status.NOT_CONVERGED
     # extremes are of positions that can be relied on: beside a dead centre they depend on the sampling
-    sound = sound_positions(arrays["status"])
+    sound = sound_positions(status)
     with np.errstate(all="ignore"):
-        for i, (name, unit) in enumerate(zip(run.system.mechanism.drivers, effort_units(run.system), strict=True)):
-            effort = arrays["drive_effort"][i]
-            kind = "torque" if unit == "N m" else "force"
-            if len(sound):
-                low, high = (int(sound[pick(effort[sound])]) for pick in (np.argmin, np.argmax))
-                rows += [
-                    {"label": f"drive {kind} of {name}, least, at {dial.at(low)}", "value": effort[low], "unit": unit},
-                    {
-                        "label": f"drive {kind} of {name}, largest, at {dial.at(high)}",
-                        "value": effort[high],
-                        "unit": unit,
-                    },
-                ]
-            rows.append({"label": f"drive {kind} of {name}, RMS", "value": means.drive_effort_rms[i], "unit": unit})
-        rows += _reaction_rows(run.system, arrays, dial, sound)
-        lost = np.sum(arrays["friction_power"], axis=0)
+        yield from _effort_figures(run.system, found, dial, sound)
+        yield from _reaction_figures(run.system, arrays, dial, sound)
         if rubbing(run.system):
-            valid = arrays["status"] != Status.CONTACT_LOST
-            rows.append(_margin(np.where(valid, arrays["locking_margin"], np.nan), dial))
-            rows += near.rows(run, dial) if near else []
-            rows.append({"label": "friction power, mean", "value": means.friction_power.net, "unit": "W"})
-            if len(sound):
-                top = int(sound[np.argmax(lost[sound])])
-                rows.append({"label": f"friction power, largest, at {dial.at(top)}", "value": lost[top], "unit": "W"})
-        efficiency = {"label": f"efficiency of the cycle{_why(means, arrays)}", "value": means.efficiency, "unit": "1"}
-        rows.append(efficiency)
-        rows.append({"label": "efficiency, error of its integrals", "value": means.efficiency_error, "unit": "1"})
+            yield from _friction_figures(run, found, near, dial, sound)
+        yield Figure("efficiency", "efficiency of the cycle", means.efficiency, note=_why(means, arrays))
+        yield Figure("efficiency_error", "efficiency, error of its integrals", means.efficiency_error)
         if found.ideal is not None:
-            ideal = found.ideal.efficiency
-            rows.append({"label": "efficiency of the cycle without errors", "value": ideal, "unit": "1"})
-            rows += summary_rows(run, arrays, dial, arrays["status"] != Status.CONTACT_LOST)
-        back = near_locking.reverse_row(run, near.back, useful_loads(run.system.mechanism)) if near else None
-        rows += [back] if back else []
-        solved = int(np.count_nonzero(arrays["status"] < Status.NOT_CONVERGED))
-        residual = balance(arrays) if solved else None
-        rows.append({"label": "power residual, largest, of peak drive power", "value": residual, "unit": "1"})
-    rows.append(
-        {"label": "friction iterations, most", "value": int(np.max(arrays["friction_iterations"])), "unit": "1"}
-    )
-    lost = int(np.count_nonzero(arrays["status"] == Status.CONTACT_LOST))
-    rows.append({"label": f"positions solved, of {len(time)}", "value": solved - lost, "unit": "1"})
+            yield Figure("efficiency_ideal", "efficiency of the cycle without errors", found.ideal.efficiency)
+            yield from error_figures(run, arrays, dial, status != Status.CONTACT_LOST)
+        if near and (back := near_locking.reverse_figure(run, near.back, useful_loads(run.system.mechanism))):
+            yield back
+        residual = balance(arrays) if np.any(counted) else None
+        yield Figure("power_residual", "power residual", residual, aspect="largest, of peak drive power")
+    rounds = int(np.max(arrays["friction_iterations"]))
+    yield Figure("friction_iterations", "friction iterations", rounds, aspect="most")
+    lost = int(np.count_nonzero(status == Status.CONTACT_LOST))
+    solved = int(np.count_nonzero(counted)) - lost
+    yield Figure("positions_solved", "positions solved", solved, aspect=f"of {len(found.time)}")
     if lost:
-        rows.append({"label": "positions not valid, for a pin loses contact", "value": lost, "unit": "1"})
-    return [{**row, "value": _finite(row["value"])} for row in rows]
+        yield Figure("positions_lost", "positions not valid, for a pin loses contact", lost)
 
 
-def _finite(value: float | None) -> float | None:
-    return None if value is None or not np.isfinite(value) else float(value)
+def _effort_figures(system: System, found: Positions, dial: Dial, sound: NDArray[np.intp]) -> Iterator[Figure]:
+    for i, (name, unit) in enumerate(zip(system.mechanism.drivers, effort_units(system), strict=True)):
+        effort, subject = found.arrays["drive_effort"][i], f"drive {'torque' if unit == 'N m' else 'force'} of {name}"
+        for end, aspect, pick in (("min", "least", np.argmin), ("max", "largest", np.argmax)) if len(sound) else ():
+            k = int(sound[pick(effort[sound])])
+            yield Figure(f"{name}.effort_{end}", subject, effort[k], unit, aspect, f"at {dial.at(k)}")
+        yield Figure(f"{name}.effort_rms", subject, found.means.drive_effort_rms[i], unit, "RMS")
+
+
+def _friction_figures(
+    run: Run, found: Positions, near: near_locking.Locking | None, dial: Dial, sound: NDArray[np.intp]
+) -> Iterator[Figure]:
+    """How near to locking it is, and what friction takes."""
+    valid = found.arrays["status"] != Status.CONTACT_LOST
+    yield near_locking.least_margin(
+        "locking_margin", "locking margin", np.where(valid, found.arrays["locking_margin"], np.nan), dial, TIMES
+    )
+    yield from near.figures(run, dial) if near else ()
+    yield Figure("friction_power_mean", "friction power", found.means.friction_power.net, "W", "mean")
+    if len(sound):
+        lost = np.sum(found.arrays["friction_power"], axis=0)
+        top = int(sound[np.argmax(lost[sound])])
+        yield Figure("friction_power_max", "friction power", lost[top], "W", "largest", f"at {dial.at(top)}")
 
 
 def sound_positions(status: NDArray[Any]) -> NDArray[np.intp]:
@@ -281,9 +278,8 @@ def sound_positions(status: NDArray[Any]) -> NDArray[np.intp]:
     return best if len(best) else np.flatnonzero(status == Status.ZERO_SLIP)
 
 
-def _reaction_rows(system: System, arrays: Arrays, dial: Dial, sound: NDArray[np.intp]) -> list[dict[str, Any]]:
+def _reaction_figures(system: System, arrays: Arrays, dial: Dial, sound: NDArray[np.intp]) -> Iterator[Figure]:
     """Largest reaction of every joint, in space its moment too; stroke of every slide."""
-    rows: list[dict[str, Any]] = []
     loads = [("reaction", "reaction_force", "N")]
     if system.mechanism.space == "spatial":
         loads.append(("reaction moment", "reaction_moment", "N m"))
@@ -292,31 +288,17 @@ def _reaction_rows(system: System, arrays: Arrays, dial: Dial, sound: NDArray[np
             size = np.sqrt(np.sum(arrays[variable][i] ** 2, axis=0))
             top = int(sound[np.argmax(size[sound])])
             if system.mechanism.space == "planar" or size[top] > _rounding(arrays, variable):
-                rows.append(
-                    {"label": f"{what} of {name}, largest, at {dial.at(top)}", "value": size[top], "unit": unit}
-                )
+                key = f"{name}.{what.replace(' ', '_')}_max"
+                yield Figure(key, f"{what} of {name}", size[top], unit, "largest", f"at {dial.at(top)}")
         slide = arrays["joint_slide"][i]
         slide = slide[arrays["status"] != Status.CONTACT_LOST]
         if kind == "prismatic" and np.any(np.isfinite(slide)):
-            stroke = np.nanmax(slide) - np.nanmin(slide)
-            rows.append({"label": f"stroke of {name}", "value": stroke, "unit": "m"})
-    return rows
+            yield Figure(f"{name}.stroke", f"stroke of {name}", np.nanmax(slide) - np.nanmin(slide), "m")
 
 
 def _rounding(arrays: Arrays, variable: str) -> float:
     """What is no more than rounding of the reactions or of the drive."""
     return 1e-11 * max(_peak(arrays[variable]), _peak(arrays["drive_effort"]), 1e-300)
-
-
-def _margin(margin: NDArray[np.float64], dial: Dial) -> dict[str, Any]:
-    """The least multiple of the friction at which the mechanism locks."""
-    if np.all(np.isnan(margin)):
-        return {"label": "locking margin (times the friction)", "value": float("nan"), "unit": "1"}
-    least = np.nanmin(margin, initial=np.inf)
-    if not np.isfinite(least):
-        return {"label": "locking margin (times the friction), more than", "value": MARGIN, "unit": "1"}
-    at = dial.at(int(np.nanargmin(margin)))
-    return {"label": f"locking margin (times the friction), least, at {at}", "value": least, "unit": "1"}
 
 
 def _near_locking(
@@ -333,16 +315,16 @@ def _why(means: Means, arrays: Arrays) -> str:
     """What an efficiency of 0, or none, means."""
     value = means.efficiency
     if value == 0:
-        return " (the useful loads do no net work)"
+        return "the useful loads do no net work"
     if np.isfinite(value):
         return ""
     if np.any(arrays["status"] >= Status.NOT_CONVERGED):
-        return " (not every position has an answer)"
+        return "not every position has an answer"
     if not np.isfinite(means.drive_power.value):
-        return " (there is no answer between some positions)"
+        return "there is no answer between some positions"
     if means.drive_power.net < 0:
-        return " (the loads drive: the driver takes work)"
-    return " (the driver does no net work)"
+        return "the loads drive: the driver takes work"
+    return "the driver does no net work"
 
 
 def balance(arrays: Arrays) -> float:

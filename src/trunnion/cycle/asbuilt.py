@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from trunnion.algebra.plane import point
 from trunnion.algebra.space import point_of
 from trunnion.joints.clearance import describing
 from trunnion.model.contact import clearance
+from trunnion.results.figure import Figure
 from trunnion.solve.forward import Forward
 from trunnion.solve.seating import Seated
 from trunnion.solve.seats import Seat
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     from trunnion.solve.run import Run
     from trunnion.solve.system import Dial
 
-__all__ = ["COMPARED", "fill_errors", "fill_seats", "summary_rows"]
+__all__ = ["COMPARED", "error_figures", "fill_errors", "fill_seats"]
 
 Arrays = dict[str, NDArray[np.float64]]
 Vector = Sequence[Number]
@@ -148,30 +149,29 @@ def _rotation_vector(built: NDArray[np.float64], meant: NDArray[np.float64]) -> 
     return np.asarray(sign * share * vector)
 
 
-def summary_rows(
+def error_figures(
     run: Run, arrays: Mapping[str, NDArray[np.float64]], dial: Dial, valid: NDArray[np.bool_]
-) -> Iterator[dict[str, Any]]:
+) -> Iterator[Figure]:
     """What the errors do, in the figures one looks at first; of valid positions."""
     size = np.where(valid, np.sqrt(np.sum(arrays["point_error"] ** 2, axis=1)), np.nan)
     if np.any(np.isfinite(size)):
         top, at = divmod(int(np.nanargmax(size)), size.shape[1])
-        label = f"error of place, largest: {'.'.join(run.system.points[top])}, at {dial.at(at)}"
-        yield {"label": label, "value": float(size[top, at]), "unit": "m"}
+        most = f"largest: {'.'.join(run.system.points[top])}"
+        yield Figure("point_error_max", "error of place", size[top, at], "m", most, f"at {dial.at(at)}")
     for i, (joint, (kind, links)) in enumerate(run.system.joints.items()):
         if run.system.mechanism.fixed_link not in links or joint in run.system.mechanism.drivers:
             continue
         for what, unit in (("rotation", "rad"), ("slide", "m")):
             error = np.where(valid, np.abs(arrays[f"joint_{what}_error"][i]), np.nan)
             if (what == "rotation") == (kind != "prismatic") and np.any(np.isfinite(error)):
-                at = int(np.nanargmax(error))
-                label = f"transmission error of {joint}, largest, at {dial.at(at)}"
-                yield {"label": label, "value": float(error[at]), "unit": unit}
+                at, name = int(np.nanargmax(error)), f"{joint}.{what}_error_max"
+                yield Figure(name, f"transmission error of {joint}", error[at], unit, "largest", f"at {dial.at(at)}")
     for i, joint in enumerate(run.system.mechanism.drivers):
         change = np.where(valid, arrays["drive_effort_change"][i], np.nan)
         if np.any(np.isfinite(change)):
-            at = int(np.nanargmax(np.abs(change)))
+            at, name = int(np.nanargmax(np.abs(change))), f"{joint}.effort_change_max"
             kind, unit = ("torque", "N m") if run.system.turns(joint) else ("force", "N")
-            label = f"change of the drive {kind} of {joint} by the errors, largest, at {dial.at(at)}"
-            yield {"label": label, "value": float(change[at]), "unit": unit}
+            subject = f"change of the drive {kind} of {joint} by the errors"
+            yield Figure(name, subject, change[at], unit, "largest", f"at {dial.at(at)}")
     if run.seats:
-        yield {"label": "seat iterations, most", "value": int(np.max(arrays["seat_rounds"])), "unit": "1"}
+        yield Figure("seat_rounds", "seat iterations", np.max(arrays["seat_rounds"]), aspect="most")

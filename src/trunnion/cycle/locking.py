@@ -8,10 +8,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.cycle.analyse import analyse_run
-from trunnion.cycle.near_locking import Reverse, critical_multiples, critical_row, others, reverse, reverse_row
+from trunnion.cycle.near_locking import (
+    Reverse,
+    critical_figure,
+    critical_multiples,
+    least_margin,
+    others,
+    reverse,
+    reverse_figure,
+)
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.dataset import Variable, described
+from trunnion.results.figure import Figure
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.loads import useful_loads
 from trunnion.solve.run import Run, prepare
@@ -20,7 +29,7 @@ from trunnion.solve.system import Dial, rubbing
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["MOST_STEPS", "locking", "look", "report_rows"]
+__all__ = ["MOST_STEPS", "locking", "look", "report_figures"]
 
 MOST_STEPS = 8192
 
@@ -82,39 +91,34 @@ def look(run: Run, steps: int = 360) -> xr.Dataset:
     return result.assign(described(arrays, VARIABLES))
 
 
-def report_rows(run: Run, found: xr.Dataset) -> list[dict[str, Any]]:
-    """The figures of a result of `look` that one looks at first, as label, value and unit."""
+def report_figures(run: Run, found: xr.Dataset) -> list[Figure]:
+    """The figures of a result of `look` that one looks at first."""
     dial = run.system.dial(run.values, found["time"].values)
     if not rubbing(run.system):
-        return [{"label": "there is no friction: nothing locks", "value": None, "unit": "1"}]
-    rows = [_least("locking margin, all friction together", found["locking_margin"].values, dial)]
+        return [Figure("locking_margin", "there is no friction: nothing locks", None)]
+    margin = found["locking_margin"].values
+    figures = [least_margin("locking_margin", "locking margin, all friction together", margin, dial)]
     for joint in rubbing(run.system):
-        rows += _joint(run, joint, found["critical_multiple"].sel(joint=joint).values, dial)
+        figures += _of_joint(run, joint, found["critical_multiple"].sel(joint=joint).values, dial)
     more = found["other_solutions"].values
     if np.any(more > 0):
-        label = f"other solutions at full friction, {dial.intervals(np.flatnonzero(more > 0))}, most"
-        rows.append({"label": label, "value": float(np.nanmax(more)), "unit": "1"})
-    backward = reverse_row(run, _reverse(found), useful_loads(run.system.mechanism))
-    stays = {"label": "the useful loads do not drive it backward over the cycle", "value": None, "unit": "1"}
-    return [*rows, backward or stays]
+        subject = f"other solutions at full friction, {dial.intervals(np.flatnonzero(more > 0))}"
+        figures.append(Figure("other_solutions", subject, np.nanmax(more), aspect="most"))
+    backward = reverse_figure(run, _reverse(found), useful_loads(run.system.mechanism))
+    stays = Figure("efficiency_reverse", "the useful loads do not drive it backward over the cycle", None)
+    return [*figures, backward or stays]
 
 
-def _least(label: str, values: NDArray[np.float64], dial: Dial) -> dict[str, Any]:
-    if not np.any(np.isfinite(values)):
-        nowhere = np.all(np.isnan(values))
-        return {"label": label if nowhere else f"{label}, more than", "value": None if nowhere else MARGIN, "unit": "1"}
-    at = int(np.nanargmin(values))
-    return {"label": f"{label}, least, at {dial.at(at)}", "value": float(values[at]), "unit": "1"}
-
-
-def _joint(run: Run, joint: str, multiple: NDArray[np.float64], dial: Dial) -> list[dict[str, Any]]:
+def _of_joint(run: Run, joint: str, multiple: NDArray[np.float64], dial: Dial) -> list[Figure]:
     """The least critical multiple of a joint, and its friction there."""
-    rows = [_least(f"critical multiple of {joint} alone", multiple, dial)]
-    if np.any(np.isfinite(multiple)):
-        at = int(np.nanargmin(multiple))
-        row = critical_row(run, joint, float(multiple[at]), f"at {dial.at(at)}")
-        rows = rows if "multiple" in row["label"] else [row] if multiple[at] == 0 else [*rows, row]
-    return rows
+    least = least_margin(f"{joint}.critical_multiple", f"critical multiple of {joint} alone", multiple, dial)
+    if not np.any(np.isfinite(multiple)):
+        return [least]
+    at = int(np.nanargmin(multiple))
+    own = critical_figure(run, joint, float(multiple[at]), f"at {dial.at(at)}")
+    if own.name != least.name:
+        return [least, own]
+    return [own] if multiple[at] == 0 else [least]
 
 
 def _reverse(found: xr.Dataset) -> Reverse:

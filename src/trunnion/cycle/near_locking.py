@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,12 +17,13 @@ from trunnion.algebra.dual import primal
 from trunnion.algebra.quadrature import integrals
 from trunnion.cycle.means import ROUNDING
 from trunnion.errors import Finding, Severity, counted
+from trunnion.results.figure import MORE_THAN, Figure
 from trunnion.solve import continuation
 from trunnion.solve.backward import Backward, Given
 from trunnion.solve.bristles import histories
 from trunnion.solve.forward import Forward
 from trunnion.solve.friction import Problem, frictionless, identity_minus, scaled
-from trunnion.solve.friction_method import FrictionMethod
+from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.system import Dial, law_of
 
 if TYPE_CHECKING:
@@ -31,13 +32,14 @@ if TYPE_CHECKING:
 __all__ = [
     "Locking",
     "Reverse",
+    "critical_figure",
     "critical_multiples",
-    "critical_row",
     "findings",
+    "least_margin",
     "look",
     "others",
     "reverse",
-    "reverse_row",
+    "reverse_figure",
 ]
 
 Array = NDArray[np.float64]
@@ -157,38 +159,47 @@ def _distinct(found: Array, known: Array, scale: float) -> float:
 # ---- the way back ---------------------------------------------------------------------------------------------
 
 
-def critical_row(run: Run, joint: str, multiple: float, where: str) -> dict[str, Any]:
+def least_margin(name: str, subject: str, values: Array, dial: Dial, note: str = "") -> Figure:
+    """The least of multiples of friction over the cycle; MARGIN is as far as they are looked for."""
+    if np.all(np.isnan(values)):
+        return Figure(name, subject, None, note=note)
+    if not np.any(np.isfinite(values)):
+        return Figure(name, subject, MARGIN, aspect=MORE_THAN, note=note)
+    at = int(np.nanargmin(values))
+    return Figure(name, subject, values[at], aspect="least", place=f"at {dial.at(at)}", note=note)
+
+
+def critical_figure(run: Run, joint: str, multiple: float, place: str) -> Figure:
     """The critical friction of a joint alone: its coefficient if its law is proportional to one, else the multiple."""
     parameter = law_of(run.system, joint).scale
     if not multiple > 0:
-        return {"label": f"it locks even without friction in {joint}, {where}", "value": 0.0, "unit": "1"}
+        return Figure(f"{joint}.critical_multiple", f"it locks even without friction in {joint}", 0.0, place=place)
     if not parameter:
-        return {"label": f"critical multiple of the friction of {joint} alone, {where}", "value": multiple, "unit": "1"}
+        subject = f"critical multiple of the friction of {joint} alone"
+        return Figure(f"{joint}.critical_multiple", subject, multiple, place=place)
     value = float(np.ravel(primal(run.values[f"joints.{joint}.friction.{parameter}"]))[0])
-    return {"label": f"critical friction {parameter} of {joint} alone, {where}", "value": multiple * value, "unit": "1"}
+    subject = f"critical friction {parameter} of {joint} alone"
+    return Figure(f"{joint}.critical_{parameter}", subject, multiple * value, place=place)
 
 
-def reverse_row(run: Run, back: Reverse, useful: Sequence[str]) -> dict[str, Any] | None:
+def reverse_figure(run: Run, back: Reverse, useful: Sequence[str]) -> Figure | None:
     """Power that reaches the drivers over that which the useful loads give, backward; None if these do not drive.
 
     It locks, or is 0 or less: then it holds itself.
     """
-    text, value = "efficiency driven backward by the useful loads", float("nan")
+    name, subject = "efficiency_reverse", "efficiency driven backward by the useful loads"
     delivered, given = _reversed_means(run, back, useful)
     if np.all(np.isfinite(back.given)) and not given > 0:
         return None
     if np.any(back.locked):
         places = counted(int(np.count_nonzero(back.locked)), "position")
-        text = f"driven backward by the useful loads it locks, at {places}"
-    elif not np.isfinite(delivered + given) or not np.all(np.isfinite(back.given + back.delivered)):
-        text += " (not every position has an answer)"
-    else:
-        value = delivered / given
-        text += "" if value > 0 else " (it holds itself)"
-        if value > 1:  # over a range what masses and springs have stored comes on top
-            text += " (masses and springs give work too)"
-            value = float("nan")
-    return {"label": text, "value": value if np.isfinite(value) else None, "unit": "1"}
+        return Figure(name, "driven backward by the useful loads it locks", None, place=f"at {places}")
+    if not np.isfinite(delivered + given) or not np.all(np.isfinite(back.given + back.delivered)):
+        return Figure(name, subject, None, note="not every position has an answer")
+    value = delivered / given
+    if value > 1:  # over a range what masses and springs have stored comes on top
+        return Figure(name, subject, None, note="masses and springs give work too")
+    return Figure(name, subject, value, note="" if value > 0 else "it holds itself")
 
 
 def _reversed_means(run: Run, back: Reverse, useful: Sequence[str]) -> tuple[float, float]:
@@ -270,12 +281,12 @@ class Locking:
         joint = min(sound, key=sound.__getitem__, default="")
         return (joint, sound[joint]) if joint else None
 
-    def rows(self, run: Run, dial: Dial) -> list[dict[str, Any]]:
-        """The joint that decides, as a row of a summary. dial: names the position of `first`."""
+    def figures(self, run: Run, dial: Dial) -> list[Figure]:
+        """The joint that decides. dial: names the position of `first`."""
         decides = self.responsible()
         if decides is None or self.first is None:
             return []
-        return [critical_row(run, *decides, f"at {dial.at(self.first)}")]
+        return [critical_figure(run, *decides, f"at {dial.at(self.first)}")]
 
 
 def look(run: Run, time: Array, margin: Array, method: FrictionMethod, useful: Sequence[str]) -> Locking:

@@ -8,6 +8,7 @@ from enum import IntEnum
 from typing import TYPE_CHECKING, Any
 
 from trunnion.errors import Finding, Severity, Status
+from trunnion.results.figure import Figure
 from trunnion.version import __version__
 
 if TYPE_CHECKING:
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from trunnion.model.mechanism import Mechanism
 
 __all__ = [
-    "attribute", "cited", "codes", "encoded", "finding_rows", "findings_of", "origin", "summary_of",
+    "attribute", "cited", "codes", "encoded", "figure_rows", "finding_rows", "findings_of", "origin", "summary_of",
 ]  # fmt: skip
 
 
@@ -65,7 +66,11 @@ def findings_of(result: xr.Dataset) -> list[Finding]:
     return [Finding(row["what"], row["where"], row["remedy"], Severity(row["severity"])) for row in rows]
 
 
-def summary_of(result: xr.Dataset) -> list[dict[str, Any]]:
-    """The figures that one looks at first: label, value and unit."""
-    rows: list[dict[str, Any]] = attribute(result, "summary")
-    return rows
+def figure_rows(figures: Iterable[Figure]) -> list[dict[str, Any]]:
+    """The figures of a summary for JSON."""
+    return [one.row() for one in figures]
+
+
+def summary_of(result: xr.Dataset) -> list[Figure]:
+    """The figures that one looks at first."""
+    return [Figure.read(row) for row in attribute(result, "summary")]

@@ -5,10 +5,10 @@ Everything is read off one run over the cycle: the poses of the dyads, the twist
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ from trunnion.algebra.linalg import cross, dot
 from trunnion.errors import Finding, MechanismError
 from trunnion.groups import prp, rpp, rpr, rrp, rrr
 from trunnion.model.mechanism import Mechanism
+from trunnion.results.figure import Figure
 from trunnion.solve.backward import Backward
 from trunnion.solve.forward import Forward, forward
 from trunnion.solve.run import Run, prepare
@@ -34,7 +35,7 @@ __all__ = [
     "instant_centre",
     "limits",
     "pressure_angles",
-    "report_rows",
+    "report_figures",
     "shaking",
     "transmission_angles",
 ]
@@ -430,53 +431,57 @@ def all_instant_centres(walk: Forward) -> dict[tuple[str, str], tuple[Array, Arr
     return {(a, b): instant_centre(walk, a, b) for a, b in combinations(walk.system.mechanism.links, 2)}
 
 
-def _told(label: str, extremes: Extremes, scale: float, unit: str) -> tuple[str, float | str]:
-    """Label with the places and value with the extremes of an angle, in degrees; scale, unit: of the places."""
-    low, high = np.degrees(extremes.least), np.degrees(extremes.largest)
-    if not high - low > 1e-9:
-        return f"{label}, everywhere", low
-    gap = "" if unit == "°" else " "
-    places = " and ".join(f"{place * scale:.5g}{gap}{unit}" for place in (extremes.at_least, extremes.at_largest))
-    return f"{label}, at {places}", f"{low:.6g} … {high:.6g}"
-
-
-def report_rows(mechanism: Mechanism, steps: int = 720, fluctuation: float = 0.05) -> list[dict[str, Any]]:
-    """The figures as rows with label, value (number, text or None) and unit, as a table shows them."""
+def report_figures(mechanism: Mechanism, steps: int = 720, fluctuation: float = 0.05) -> list[Figure]:
+    """The figures that one looks at first."""
     run = _planar(mechanism)
     found = design(mechanism, steps)
     driver = next(iter(mechanism.drivers), "")
     turns = not driver or run.system.joints[driver][0] == "revolute"
     unit, scale = ("°", 180 / np.pi) if turns else ("mm", 1e3)
-    rows: list[dict[str, Any]] = []
-
-    def row(label: str, value: float | str, unit: str = "1") -> None:
-        told = value if isinstance(value, str) or np.isfinite(value) else None
-        rows.append({"label": label, "value": told, "unit": unit})
-
-    if found.grashof:
-        row("four-bar type (Grashof)", found.grashof)
+    figures = [Figure("grashof", "four-bar type (Grashof)", found.grashof)] if found.grashof else []
     for name, angle in found.transmission_angle.items():
-        row(f"transmission angle of {name}, least", angle * 180 / np.pi, "°")
-    for name, extremes in found.pressure_angle.items():
-        row(*_told(f"pressure angle of {name}", extremes, scale, unit), "°")
+        subject = f"transmission angle of {name}"
+        figures.append(Figure(f"{name}.transmission_angle", subject, angle * 180 / np.pi, "°", "least"))
+    figures += [_pressure(name, extremes, scale, unit) for name, extremes in found.pressure_angle.items()]
     for name, places in found.dead_centres.items():
         if places:
-            row(f"{name} turns back at", ", ".join(f"{place * scale:.8g}" for place in places), f"{unit} of {driver}")
-    told = ", ".join(f"{low * scale:.8g} … {high * scale:.8g}" for low, high in found.limits)
-    row("can be assembled over", told or "no position", f"{unit} of {driver}" if driver else "")
-    row("shaking force, largest", found.shaking_force, "N")
-    row("shaking moment about the ground's origin, largest", found.shaking_moment, "N m")
-    row("drive effort, RMS", found.rms_effort, "N m" if turns else "N")
-    row("drive power, largest", found.peak_power, "W")
-    row("drive power, mean", found.mean_power, "W")
-    row("energy swing about the mean", found.energy_swing, "J")
+            told = ", ".join(f"{place * scale:.8g}" for place in places)
+            figures.append(Figure(f"{name}.dead_centres", f"{name} turns back at", told, f"{unit} of {driver}"))
+    told = ", ".join(f"{low * scale:.8g} … {high * scale:.8g}" for low, high in found.limits) or "no position"
+    figures += [
+        Figure("limits", "can be assembled over", told, f"{unit} of {driver}" if driver else ""),
+        Figure("shaking_force", "shaking force", found.shaking_force, "N", "largest"),
+        Figure("shaking_moment", "shaking moment about the ground's origin", found.shaking_moment, "N m", "largest"),
+        Figure("effort_rms", "drive effort", found.rms_effort, "N m" if turns else "N", "RMS"),
+        Figure("peak_power", "drive power", found.peak_power, "W", "largest"),
+        Figure("mean_power", "drive power", found.mean_power, "W", "mean"),
+        Figure("energy_swing", "energy swing about the mean", found.energy_swing, "J"),
+    ]
     if turns and driver and run.cycle.periodic and found.mean_speed:
-        row(f"flywheel for a fluctuation of {fluctuation:g}", found.flywheel(fluctuation), "kg m^2")
+        subject = f"flywheel for a fluctuation of {fluctuation:g}"
+        figures.append(Figure("flywheel", subject, found.flywheel(fluctuation), "kg m^2"))
     if any(kind == "revolute" and mechanism.fixed_link in links for kind, links in run.system.joints.values()):
-        weights, left = counterweights(run)
-        for weight in weights if np.isfinite(left) else ():  # without mass there is nothing to balance
-            place = f"({weight.x:.5g}, {weight.y:.5g})"
-            row(f"counterweight on {weight.link}, mass × place in its frame", place, "kg m")
-        if np.isfinite(left):
-            row("shaking force left with these", left if left > 1e-12 else 0.0, "of its RMS")
-    return rows
+        figures += _balanced(run)
+    return figures
+
+
+def _pressure(name: str, extremes: Extremes, scale: float, unit: str) -> Figure:
+    """The extremes of a pressure angle, in degrees, with their places; scale, unit: of the places."""
+    low, high = np.degrees(extremes.least), np.degrees(extremes.largest)
+    key, subject = f"{name}.pressure_angle", f"pressure angle of {name}"
+    if not high - low > 1e-9:
+        return Figure(key, subject, low, "°", place="everywhere")
+    gap = "" if unit == "°" else " "
+    places = " and ".join(f"{place * scale:.5g}{gap}{unit}" for place in (extremes.at_least, extremes.at_largest))
+    return Figure(key, subject, f"{low:.6g} … {high:.6g}", "°", place=f"at {places}")
+
+
+def _balanced(run: Run) -> Iterator[Figure]:
+    """The counterweights; without mass there is nothing to balance."""
+    weights, left = counterweights(run)
+    for weight in weights if np.isfinite(left) else ():
+        place = f"({weight.x:.5g}, {weight.y:.5g})"
+        subject = f"counterweight on {weight.link}, mass × place in its frame"
+        yield Figure(f"{weight.link}.counterweight", subject, place, "kg m")
+    if np.isfinite(left):
+        yield Figure("shaking_left", "shaking force left with these", left if left > 1e-12 else 0.0, "of its RMS")

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from trunnion.errors import Severity
 from trunnion.model.prices import Price
-from trunnion.results.attributes import attribute, encoded, finding_rows, findings_of, summary_of
+from trunnion.results.attributes import attribute, encoded, figure_rows, finding_rows, findings_of, summary_of
 from trunnion.results.dataset import Variable, described
 from trunnion.statistics.costs import Cost
 from trunnion.studies.allocation import said
@@ -79,7 +79,7 @@ def dataset(found: Allocated, known: xr.Dataset) -> xr.Dataset:
         "choices": found.way,
         "proven": int(found.answer.proven),
         "prices": [_plain(price) for price in found.prices.values()],
-        "summary": [*said.summary(found, known, arrays), *summary_of(known)],
+        "summary": figure_rows([*said.summary(found, known, arrays), *summary_of(known)]),
         "findings": finding_rows([*own, *kept]),
         "missed": [f"{one.where}: {one.what}".lstrip(": ") for one in own if one.severity is Severity.ERROR],
     }

@@ -9,6 +9,7 @@ import numpy as np
 
 from trunnion.errors import Finding, Severity
 from trunnion.results.attributes import attribute
+from trunnion.results.figure import Figure
 from trunnion.studies.allocation.allocated import CLOSE, DEFAULT_YIELD, share_of
 from trunnion.studies.allocation.problem import SHOWN
 from trunnion.studies.tolerance.targets import limits
@@ -24,26 +25,20 @@ TWICE = 2.0  # so many rejects as an RSS stands for are an error
 ROUGH, SLIGHT = 0.01, 0.001  # of a limit: what first order may leave out before it is an error, and a warning
 
 
-def summary(found: Allocated, known: xr.Dataset, arrays: Mapping[str, Any]) -> list[dict[str, Any]]:
+def summary(found: Allocated, known: xr.Dataset, arrays: Mapping[str, Any]) -> Iterator[Figure]:
     """What all costs, and before; what of the room is taken."""
     answer = found.answer
-    rows = [("cost, least", answer.cost if answer.found else None)]
+    yield Figure("cost", "cost", answer.cost if answer.found else None, aspect="least")
     if np.isfinite(arrays["cost_total_before"]):
-        rows.append(("cost as stated", float(arrays["cost_total_before"])))
+        yield Figure("cost_before", "cost as stated", arrays["cost_total_before"])
     if answer.found:
-        rows.append(("lower bound of the cost", answer.bound))
+        yield Figure("cost_bound", "lower bound of the cost", answer.bound)
     if answer.sampled is not None:
-        rows += [("yield asked for", found.asked.target), ("yield of the samples", answer.sampled.share)]
-    names = [str(name) for name in known["measure"].values]
-    for name, used in zip(names, arrays["used"].tolist(), strict=True):
+        yield Figure("yield_asked", "yield asked for", found.asked.target)
+        yield Figure("yield", "yield of the samples", answer.sampled.share)
+    for name, used in zip(known["measure"].values.tolist(), arrays["used"].tolist(), strict=True):
         if answer.found and np.isfinite(used):
-            rows.append((f"{name}, share of its room that is taken", used))
-    return [{"label": label, "value": _plain(value), "unit": "1"} for label, value in rows]
-
-
-def _plain(value: Any) -> float | None:
-    number = None if value is None else float(value)
-    return number if number is not None and np.isfinite(number) else None
+            yield Figure(f"{name}.used", f"{name}, share of its room that is taken", used)
 
 
 def findings_of(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:

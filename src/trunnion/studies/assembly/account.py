@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
 from trunnion.errors import Finding, Severity
-from trunnion.results.attributes import cited, finding_rows, origin
+from trunnion.results.attributes import cited, figure_rows, finding_rows, origin
 from trunnion.results.dataset import TIME, Variable, dataset_of, described
+from trunnion.results.figure import Figure
 from trunnion.solve.system import System, Values
 
 if TYPE_CHECKING:
@@ -114,17 +115,17 @@ class Result:
         dial = self.system.dial(self.values, np.array([time]))
         return f"{dial.at(0)} of {dial.of}" if dial.of else dial.at(0)
 
-    def _place(self, most: tuple[float, float], needs: NDArray[Any]) -> str:
+    def _place(self, most: tuple[float, float], name: str) -> str:
         """Where the largest need, with its time, is among those of the positions: everywhere, if it is one number."""
-        need, time = most
+        (need, time), needs = most, self.arrays[name]
         same = len(needs) > 1 and bool(np.all(np.isfinite(needs))) and need - float(np.min(needs)) <= SAME * need
-        return EVERYWHERE if same else f"at {self.where(time)}"
+        return EVERYWHERE if same else self.where(time)
 
     def _share_place(self) -> str:
-        return self._place(self.share, self.arrays["needed_share"])
+        return _at(self._place(self.share, "needed_share"))
 
     def _need_place(self) -> str:
-        return self._place(self.clearance, self.arrays["needed_clearance"])
+        return _at(self._place(self.clearance, "needed_clearance"))
 
     # ---- what there is to say -------------------------------------------------------------------------------
 
@@ -193,28 +194,31 @@ class Result:
 
     # ---- figures --------------------------------------------------------------------------------------------
 
-    def summary(self) -> list[dict[str, Any]]:
+    def summary(self) -> list[Figure]:
         """The figures one looks at first."""
         share, need = self.share[0], self.clearance[0]
         if not self.of:
-            return [_row("smallest clearance that is needed", 0.0, "mm")]
+            return [Figure("smallest_clearance", "smallest clearance that is needed", 0.0, "mm")]
         angle, length = (float(np.nanmax(self.arrays[name], initial=0.0)) for name in ("open_angle", "open_length"))
-        rows = [
-            _row("loops open without play, angle", float(np.degrees(angle)), "deg"),
-            _row("loops open without play, length", 1e3 * length, "mm"),
+        figures = [
+            Figure("open_angle", "loops open without play, angle", np.degrees(angle), "deg"),
+            Figure("open_length", "loops open without play, length", 1e3 * length, "mm"),
         ]
         if angle > 0 or length > 0:
-            rows = [row for row in rows if row["value"] > 0]
+            figures = [figure for figure, size in zip(figures, (angle, length), strict=True) if size > 0]
         if self.played:
             # what six digits show as 1 is told by as many as it takes
-            told = _share(share) if f"{share:.6g}" == "1" or np.isinf(share) else _number(share)
-            rows.append(_row("needed share of the stated clearances", told, "1"))
-            rows += [_row("  at", self._share_place().removeprefix("at "), "")] if 0 < share < np.inf else []
-        rows.append(_row(f"smallest clearance, the same in {self.of}", _number(1e3 * need), "mm"))
+            told = _share(share) if f"{share:.6g}" == "1" or np.isinf(share) else share
+            figures.append(Figure("largest_share", "needed share of the stated clearances", told))
+            if 0 < share < np.inf:
+                figures.append(Figure("largest_share.place", "  at", self._place(self.share, "needed_share"), ""))
+        subject = f"smallest clearance, the same in {self.of}"
+        figures.append(Figure("smallest_clearance", subject, 1e3 * need, "mm"))
         if 0 < need < np.inf:
-            rows.append(_row("  at", self._need_place().removeprefix("at "), ""))
-            rows.append(_row("  part of each joint's clearance", self._parts(), ""))
-        return rows
+            at = self._place(self.clearance, "needed_clearance")
+            figures.append(Figure("smallest_clearance.place", "  at", at, ""))
+            figures.append(Figure("smallest_clearance.parts", "  part of each joint's clearance", self._parts(), ""))
+        return figures
 
     def _parts(self) -> str:
         """Joints by their part in the largest need."""
@@ -232,7 +236,7 @@ class Result:
             mechanism,
             self.system.plan.formula,
             assembling=self.of,
-            summary=self.summary(),
+            summary=figure_rows(self.summary()),
             findings=finding_rows(self.findings),
             coordinate_units=["rad" if self.system.turns(name) else "m" for name in mechanism.drivers],
             periodic=int(self.system.cycle(self.values).periodic),
@@ -242,8 +246,8 @@ class Result:
         return dataset_of(variables, labels(self.system), attributes, time)
 
 
-def _row(label: str, value: float | str | None, unit: str) -> dict[str, Any]:
-    return {"label": label, "value": value, "unit": unit}
+def _at(place: str) -> str:
+    return place if place == EVERYWHERE else f"at {place}"
 
 
 def _share(share: float) -> str:
@@ -258,7 +262,3 @@ def _enough(size: float) -> str:
     """Five digits, rounded up: the number that is written suffices."""
     step = 10.0 ** (np.floor(np.log10(size)) - 4)
     return f"{np.ceil(size / step * (1 - 1e-12)) * step:.5g}" if size > 0 else "0"
-
-
-def _number(value: float) -> float | None:
-    return value if np.isfinite(value) else None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -12,8 +12,9 @@ from trunnion.algebra.dual import primal
 from trunnion.cycle.account import references
 from trunnion.errors import Finding, Severity, Status
 from trunnion.measures.measures import Measure
-from trunnion.results.attributes import cited, finding_rows, origin
+from trunnion.results.attributes import cited, figure_rows, finding_rows, origin
 from trunnion.results.dataset import Variable, dataset_of, described, driven
+from trunnion.results.figure import Figure
 from trunnion.solve.shifts import Play
 
 if TYPE_CHECKING:
@@ -102,7 +103,7 @@ def dataset(found: Found, findings: Sequence[Finding]) -> xr.Dataset:
         "drive": dial.of,
         "drive_unit": dial.unit.strip(),
         "periodic": int(found.run.cycle.periodic),
-        "summary": _summary(found, units, dial),
+        "summary": figure_rows(_summary(found, units, dial)),
         "findings": finding_rows(findings),
         "missed": [
             f"{one.where}: {one.what}"
@@ -127,22 +128,18 @@ def _radii(plays: Mapping[str, Play], ends: int) -> Array:
     return found
 
 
-def _summary(found: Found, units: Sequence[str], dial: Any) -> list[dict[str, Any]]:
+def _summary(found: Found, units: Sequence[str], dial: Any) -> Iterator[Figure]:
     """Of each measure the largest worst case, what each joint has in it, RSS and deviation there."""
-    rows: list[dict[str, Any]] = []
     for i, (measure, unit) in enumerate(zip(found.measures, units, strict=True)):
-        total = relied_on(found.total[i], found.status)
+        name, total = measure.name, relied_on(found.total[i], found.status)
+        worst = f"{name}.worst_case", f"{name}, worst case"
         if not np.any(np.isfinite(total)):
-            rows.append({"label": f"{measure.name}, worst case", "value": None, "unit": unit})
+            yield Figure(*worst, None, unit)
             continue
         top = int(np.nanargmax(total))
-        rows.append(
-            {"label": f"{measure.name}, worst case, largest, at {dial.at(top)}", "value": total[top], "unit": unit}
-        )
-        rss, deviation = (float(np.sqrt(np.sum(part[i, :, top] ** 2))) for part in (found.worst_case, found.deviation))
-        rows.append({"label": f"{measure.name}, RSS there", "value": rss, "unit": unit})
-        rows.append({"label": f"{measure.name}, standard deviation there", "value": deviation, "unit": unit})
+        yield Figure(*worst, total[top], unit, "largest", f"at {dial.at(top)}")
+        rss, deviation = (np.sqrt(np.sum(part[i, :, top] ** 2)) for part in (found.worst_case, found.deviation))
+        yield Figure(f"{name}.rss", f"{name}, RSS there", rss, unit)
+        yield Figure(f"{name}.deviation", f"{name}, standard deviation there", deviation, unit)
         for j, joint in enumerate(found.plays):
-            value = float(found.worst_case[i, j, top])
-            rows.append({"label": f"{measure.name}, of which {joint}", "value": value, "unit": unit})
-    return [{**row, "value": None if row["value"] is None else float(row["value"])} for row in rows]
+            yield Figure(f"{name}.{joint}.worst_case", f"{name}, of which {joint}", found.worst_case[i, j, top], unit)

@@ -12,7 +12,7 @@ from trunnion.cycle.account import references
 from trunnion.errors import Finding, Status
 from trunnion.measures.figures import moment
 from trunnion.model.parameters import dimension_kinds
-from trunnion.results.attributes import cited, finding_rows, origin
+from trunnion.results.attributes import cited, figure_rows, finding_rows, origin
 from trunnion.results.dataset import Variable, dataset_of, described, driven
 from trunnion.studies.tolerance.first_order import Study
 from trunnion.studies.tolerance.said import findings_of, summary
@@ -155,7 +155,7 @@ def dataset(outcome: Outcome, told: Sequence[Finding]) -> xr.Dataset:
         "periodic": int(found.run.cycle.periodic),
         "steps": found.steps,
         "stopped": int(outcome.stopped),
-        "summary": summary(outcome, counted, units, dial),
+        "summary": figure_rows(summary(outcome, counted, units, dial)),
         "findings": finding_rows(stated),
         "missed": [f"{one.where}: {one.what}" for one in stated if one.what.startswith(MISSED)],
     }

@@ -6,11 +6,13 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from trunnion.cycle.account import model_notes
 from trunnion.errors import Finding, Severity, Status, agreeing
 from trunnion.errors import counted as number_of
 from trunnion.model.checks.values import NOT_NEGATIVE
+from trunnion.results.figure import Figure
 from trunnion.studies.tolerance.linear import by_position
 from trunnion.studies.tolerance.sampling import CAUSES
 from trunnion.studies.tolerance.targets import limited, missed
@@ -22,64 +24,67 @@ if TYPE_CHECKING:
 
 __all__ = ["findings_of", "summary"]
 
+Array = NDArray[np.float64]
 OTHERWISE, ENOUGH = 1.5, 100  # ratio of standard deviations that is told, and samples from which it is
 CARRIED = 0.02  # of the standard deviation: what it may change with the link that carries a seat before it is told
 FAR_OFF = 0.2  # between first order and what is found, of which it is said
 
 
-def summary(outcome: Outcome, counted: Sampled | None, units: Sequence[str], dial: Any) -> list[dict[str, Any]]:
+def summary(outcome: Outcome, counted: Sampled | None, units: Sequence[str], dial: Any) -> Iterator[Figure]:
     """Of each measure: nominal figure, worst case, RSS, scatter, yield, and what contributes most."""
-    rows: list[dict[str, Any]] = []
     for i, (of, unit) in enumerate(zip(outcome.study.linear.measures, units, strict=True)):
-        rows += _of_measure(outcome, counted, i, of, unit, dial)
-    if counted is not None and len(units) > 1:
-        rows.append({"label": "yield, all measures", "value": counted.arrays["yield_all"], "unit": "1"})
-    if counted is not None:
-        rows.append({"label": "samples", "value": counted.done, "unit": "1"})
-        rows.append({"label": "samples without an answer", "value": int(np.sum(counted.arrays["failed"])), "unit": "1"})
-    return [{**row, "value": _plain(row["value"])} for row in rows]
+        yield from _of_measure(outcome, of, i, unit, dial)
+        if counted is not None:
+            yield from _of_samples(counted, of, i, unit)
+        yield from _contributions(outcome, of)
+    if counted is None:
+        return
+    if len(units) > 1:
+        yield Figure("yield", "yield, all measures", counted.arrays["yield_all"])
+    yield Figure("samples", "samples", counted.done)
+    yield Figure("samples_failed", "samples without an answer", np.sum(counted.arrays["failed"]))
 
 
-def _of_measure(
-    outcome: Outcome, counted: Sampled | None, i: int, of: Of, unit: str, dial: Any
-) -> Iterator[dict[str, Any]]:
+def _of_measure(outcome: Outcome, of: Of, i: int, unit: str, dial: Any) -> Iterator[Figure]:
     name = of.measure.name
     if of.measure.rule != "deviation":
-        yield {"label": f"{name}, nominal", "value": of.reference.figure, "unit": unit}
+        yield Figure(f"{name}.nominal", f"{name}, nominal", of.reference.figure, unit)
     placed = of.place >= 0 and outcome.study.run.cycle.duration > 0
-    at = f", at {dial.at(of.reference.window.index[of.place])}" if placed else ""
+    at = f"at {dial.at(of.reference.window.index[of.place])}" if placed else ""
     lower, upper, rss, _, deviation = (float(part) for part in of.total)
-    yield {"label": f"{name}, worst case, linear{at}", "value": max(-lower, upper), "unit": unit}
+    yield Figure(f"{name}.worst_case", f"{name}, worst case, linear", max(-lower, upper), unit, place=at)
     if outcome.worst is not None:
-        for key, corner in zip(("least", "largest"), outcome.worst[i], strict=True):
-            yield {"label": f"{name}, {key} deviation found", "value": corner.value, "unit": unit}
+        for end, key, corner in zip(("lower", "upper"), ("least", "largest"), outcome.worst[i], strict=True):
+            yield Figure(f"{name}.searched_{end}", f"{name}, {key} deviation found", corner.value, unit)
     alone = ", without correlation" if outcome.study.effects.correlated else ""
-    yield {"label": f"{name}, RSS{alone}{at}", "value": rss, "unit": unit}
-    yield {"label": f"{name}, standard deviation, linear{at}", "value": deviation, "unit": unit}
-    if counted is not None:
-        arrays = counted.arrays
-        yield {"label": f"{name}, mean of samples", "value": arrays["mean"][i], "unit": unit}
-        yield {"label": f"{name}, standard deviation of samples", "value": arrays["deviation"][i], "unit": unit}
-        if limited(of.measure):
-            yield {"label": f"{name}, yield", "value": arrays["yield"][i], "unit": "1"}
-            yield {"label": f"{name}, yield, least by the 95 % interval", "value": arrays["yield_low"][i], "unit": "1"}
-            yield {"label": f"{name}, C_pk", "value": arrays["cpk"][i], "unit": "1"}
-    halves = np.nan_to_num(of.spread.half)
-    if np.sum(halves**2) > 0:
-        top = int(np.argmax(halves))
-        share = float(halves[top] ** 2 / np.sum(halves**2))
-        label = f"{name}, largest contribution, {outcome.study.inputs.names[top]}, share of RSS²"
-        yield {"label": label, "value": share, "unit": "1"}
-    if alone and deviation > 0:
+    yield Figure(f"{name}.rss", f"{name}, RSS{alone}", rss, unit, place=at)
+    yield Figure(f"{name}.deviation_linear", f"{name}, standard deviation, linear", deviation, unit, place=at)
+
+
+def _of_samples(counted: Sampled, of: Of, i: int, unit: str) -> Iterator[Figure]:
+    name = of.measure.name
+    told = [("mean", "mean of samples", unit), ("deviation", "standard deviation of samples", unit)]
+    if limited(of.measure):
+        told += [("yield", "yield", "1"), ("yield_low", "yield, least by the 95 % interval", "1"), ("cpk", "C_pk", "1")]
+    for key, text, own in told:
+        yield Figure(f"{name}.{key}", f"{name}, {text}", counted.arrays[key][i], own)
+
+
+def _contributions(outcome: Outcome, of: Of) -> Iterator[Figure]:
+    """The number that contributes most, by RSS and by variance."""
+    halves = np.nan_to_num(of.spread.half) ** 2
+    if np.sum(halves) > 0:
+        yield _most(outcome, of, "rss", halves / np.sum(halves), "share of RSS²")
+    deviation = float(of.total[4])
+    if outcome.study.effects.correlated and deviation > 0:
         parts = outcome.study.effects.covariances(of.spread, of.slope) / deviation**2
-        top = int(np.argmax(parts))
-        label = f"{name}, largest contribution, {outcome.study.inputs.names[top]}, share of the variance"
-        yield {"label": label, "value": float(parts[top]), "unit": "1"}
+        yield _most(outcome, of, "variance", parts, "share of the variance")
 
 
-def _plain(value: Any) -> float | None:
-    number = None if value is None else float(value)
-    return number if number is not None and np.isfinite(number) else None
+def _most(outcome: Outcome, of: Of, key: str, parts: Array, what: str) -> Figure:
+    name, top = of.measure.name, int(np.argmax(parts))
+    subject = f"{name}, largest contribution, {outcome.study.inputs.names[top]}, {what}"
+    return Figure(f"{name}.contribution_{key}", subject, parts[top])
 
 
 def findings_of(outcome: Outcome, counted: Sampled | None) -> Iterator[Finding]:

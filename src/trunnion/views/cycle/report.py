@@ -10,16 +10,15 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
-import re
 from collections.abc import Sequence
 from functools import cache
 from itertools import groupby
-from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from trunnion.results.attributes import attribute, summary_of
+from trunnion.results.figure import MORE_THAN, Figure
 from trunnion.views.common.bundle import bundle, web_text
 from trunnion.views.common.cycle import abscissa, column, intervals, names
 from trunnion.views.common.quantities import number, quantity
@@ -31,11 +30,6 @@ if TYPE_CHECKING:
     from jinja2 import Template
 
 __all__ = ["embedded", "hashed", "inputs_of", "report", "said"]
-
-# A label of the summary: the subject with its unit in words, which of its figures, or in brackets why it is so.
-ASPECT = re.compile(
-    r"(.*?)(?: \((times [^)]*)\))?(?:, ((?:least|largest|mean|RMS|most|more than|of)\b.*)| \((.*)\))?", re.DOTALL
-)
 
 # Variable, label, unit, what a reader may make of it.
 BALANCE = (
@@ -118,16 +112,15 @@ def _ordinal(shown: dict[str, Any]) -> str:
 
 def _summary(result: xr.Dataset) -> list[tuple[str, list[tuple[str, str]]]]:
     """Subjects, each with its figures and what they are: ("drive torque of A", [("9.3 kN m", "largest, at 24°")])."""
-    rows = []
-    for row in summary_of(result):
-        subject, *remarks = ASPECT.fullmatch(str(row["label"])).groups()  # type: ignore[union-attr]
-        value = quantity(row["value"], str(row.get("unit") or "")) or "—"
-        if "more than" in remarks:
-            remarks.remove("more than")
-            value = f"> {value}"
-        rows.append((subject, value, ", ".join(filter(None, remarks))))
-    grouped = groupby(rows, key=itemgetter(0))
-    return [(subject, [(value, remark) for _, value, remark in members]) for subject, members in grouped]
+    found = []
+    for subject, members in groupby(summary_of(result), key=lambda one: one.subject):
+        found.append((subject, [(_value(one), one.remark) for one in members]))
+    return found
+
+
+def _value(one: Figure) -> str:
+    text = one.value if isinstance(one.value, str) else quantity(one.value, one.unit) or "—"
+    return f"> {text}" if one.aspect == MORE_THAN else text
 
 
 def _findings(result: xr.Dataset) -> list[dict[str, str]]:

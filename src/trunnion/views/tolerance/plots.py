@@ -13,7 +13,7 @@ from trunnion.statistics import intervals
 from trunnion.views.common.cycle import Abscissa, Array
 from trunnion.views.common.figures import INK, MUTED, PALETTE, SHADE, along, curve, dress, legend
 from trunnion.views.common.lettering import plain
-from trunnion.views.tolerance.toleranced import OUTER, Reading, failures, share, share_interval
+from trunnion.views.tolerance.toleranced import OUTER, Reading, failures, share, share_interval, share_parts
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -70,8 +70,7 @@ def _lost(read: Reading) -> str:
 
 def _beyond(passed: float, low: float, high: float) -> str:
     """The share that the limits leave out, with the digits of the yield."""
-    digits = share_interval(passed, low, high).split("\u00a0")[0].partition(".")[2]
-    return share(1 - passed, len(digits) or None)
+    return share(1 - passed, share_parts(passed, low, high)[2])
 
 
 def _core(counts: Array, edges: Array) -> tuple[float, float]:

@@ -20,6 +20,7 @@ from trunnion.views.tolerance.toleranced import (
     scaled,
     share,
     share_interval,
+    share_parts,
 )
 from trunnion.views.tolerance.toleranced import with_unit as limits_of
 
@@ -179,9 +180,8 @@ def _yield(read: Reading) -> Cells:
     value, low, high = read.interval
     if math.isnan(value) or not read.limited:
         return {}
-    text = share_interval(value, low, high)
-    told, _, ends = text.partition(" (")
-    return {"sampled": told, "interval": ends.rstrip(")")}
+    told, ends, _ = share_parts(value, low, high)
+    return {"sampled": told, "interval": ends}
 
 
 def _capability(key: str) -> Callable[[Reading], Cells]:
@@ -321,8 +321,8 @@ def headline(result: xr.Dataset) -> list[tuple[str, list[tuple[str, str]]]]:
         told += [(worst, "worst case"), (cells["Cpk"].get("sampled", ""), "Cpk")]
         kept = [pair for pair in told if pair[0]]
         found += [(read.name, kept)] if kept else []
-    whole = [(text.partition(" (")[0], "yield") for table in overall(result) for text in table.rows[0][1:]]
-    return [*found, *([("All limits together", whole)] if whole else [])]
+    whole = _overall(result)
+    return [*found, *([("All limits together", [(share_parts(*whole)[0], "yield")])] if whole else [])]
 
 
 def failed(result: xr.Dataset) -> list[Table]:
@@ -337,12 +337,16 @@ def failed(result: xr.Dataset) -> list[Table]:
 
 def overall(result: xr.Dataset) -> list[Table]:
     """The yield of all limits together, where there is more than one measure with limits."""
+    whole = _overall(result)
+    return [Table("all limits together", ["", "yield"], [["kept", share_interval(*whole)]])] if whole else []
+
+
+def _overall(result: xr.Dataset) -> tuple[float, float, float] | None:
+    """The yield of all limits and its interval."""
     if "yield_all" not in result or sum(read.limited for read in readings(result)) < 2:
-        return []
-    ends = [float(result[f"yield_all{end}"].values) for end in ("", "_low", "_high")]
-    if math.isnan(ends[0]):
-        return []
-    return [Table("all limits together", ["", "yield"], [["kept", share_interval(*ends)]])]
+        return None
+    value, low, high = (float(result[f"yield_all{end}"].values) for end in ("", "_low", "_high"))
+    return None if math.isnan(value) else (value, low, high)
 
 
 def inputs(result: xr.Dataset) -> Table:

@@ -32,6 +32,7 @@ __all__ = [
     "scaled",
     "share",
     "share_interval",
+    "share_parts",
     "with_unit",
 ]
 
@@ -361,11 +362,17 @@ def share(value: float, decimals: int | None = None) -> str:
 
 def share_interval(value: float, low: float, high: float) -> str:
     """A share with its interval: "99.62 % (99.41 to 99.76 %)"."""
+    told, ends, _ = share_parts(value, low, high)
+    return f"{told} ({ends})" if ends else told
+
+
+def share_parts(value: float, low: float, high: float) -> tuple[str, str, int | None]:
+    """A share, its interval, empty if there is none, and to how many decimals of a per cent they are told."""
     if math.isnan(low) or math.isnan(high):
-        return share(value)
+        return share(value), "", None
     decimals = _decimals(high - low)
-    ends = [share(one, decimals) for one in (low, high)]
-    return f"{share(value, decimals)} ({ends[0].removesuffix(chr(0xA0) + '%')} to {ends[1]})"
+    least = share(low, decimals).removesuffix("\u00a0%")
+    return share(value, decimals), f"{least} to {share(high, decimals)}", decimals
 
 
 def _decimals(small: float) -> int:

@@ -1,0 +1,59 @@
+"""A number that a result is told by: what it is called, of what it is, its unit and its place; made once, then read."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from math import isfinite
+from typing import Any
+
+__all__ = ["MORE_THAN", "Figure"]
+
+MORE_THAN = "more than"  # the aspect of a figure that is known from below only
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One number of the summary of a result.
+
+    name: what a program asks for, such as `A.effort_max`; subject: in words; value: in `unit`, None if there is none,
+    or words; aspect: which of the subject's figures, as "largest"; place: where in the cycle, as "at 24°"; note: what
+    is to be known of the subject.
+    """
+
+    name: str
+    subject: str
+    value: float | str | None
+    unit: str = "1"
+    aspect: str = ""
+    place: str = ""
+    note: str = ""
+
+    def __post_init__(self) -> None:
+        """A number is a float; one that is not finite is none."""
+        if self.value is not None and not isinstance(self.value, str):
+            object.__setattr__(self, "value", float(self.value) if isfinite(self.value) else None)
+
+    @property
+    def label(self) -> str:
+        """What it is, in words: "drive torque of A, largest, at 24°"."""
+        note = f" ({self.note})" if self.note else ""
+        return ", ".join(part for part in (f"{self.subject}{note}", self.aspect, self.place) if part)
+
+    @property
+    def remark(self) -> str:
+        """The label without its subject, and without that the figure is a bound."""
+        aspect = "" if self.aspect == MORE_THAN else self.aspect
+        return ", ".join(part for part in (self.note, aspect, self.place) if part)
+
+    def row(self) -> dict[str, Any]:
+        """The figure for JSON."""
+        own = asdict(self)
+        row = {"label": self.label, "value": own.pop("value"), "unit": own.pop("unit")}
+        return row | {key: text for key, text in own.items() if text}
+
+    @classmethod
+    def read(cls, row: Mapping[str, Any]) -> Figure:
+        """The figure of a row; of a file by an older version it is all subject."""
+        parts = {key: str(row.get(key) or "") for key in ("name", "aspect", "place", "note")}
+        return cls(subject=str(row.get("subject") or row["label"]), value=row["value"], unit=row["unit"], **parts)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 from collections import defaultdict
 
 import pytest
@@ -12,6 +13,10 @@ from hypothesis import HealthCheck, settings
 # NumPy is loaded; processes started by a test take it over.
 for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
+
+# A shell starts what it puts in the background with Ctrl-C ignored, and programs that tests start would take that over.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # Every run the same cases, no database on disk, no deadline that a loaded machine could miss.
 settings.register_profile(

@@ -322,7 +322,7 @@ def _toleranced(variables: Mapping[str, Any]) -> str:
 
 def measures_table() -> str:
     """Every kind of measure."""
-    from trunnion.measures.measures import MEASURES
+    from trunnion.model.measure_table import MEASURES
 
     figures = {
         "deviation": "largest deviation from nominal",

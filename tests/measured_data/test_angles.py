@@ -53,6 +53,7 @@ SOURCES: dict[str, tuple[dict[str, Any], float]] = {
 }
 
 
+@pytest.mark.spread(4)
 @pytest.mark.parametrize("source", SOURCES)
 def test_sources(clean: Columns, tmp_path: Path, source: str) -> None:
     angle, within = SOURCES[source]
@@ -97,6 +98,7 @@ def test_cycles_of_other_lengths(clean: Columns, tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.spread(4)
 @pytest.mark.parametrize("positions", [36, 90, 360, 500])
 @pytest.mark.parametrize("harmonic", [1, 3, 8])
 def test_resampling_of_a_known_sinus(clean: Columns, tmp_path: Path, harmonic: int, positions: int) -> None:
@@ -228,6 +230,7 @@ def test_units_of_what_is_set_stay_with_it(clean: Columns, tmp_path: Path) -> No
         read(columns, tmp_path, {"set": {"misalignment": "15 ± 1 deg"}})
 
 
+@pytest.mark.spread(3)
 @pytest.mark.parametrize("wrap", [50, 60, 61, 100, 250, 256, 300, 360])
 @pytest.mark.parametrize("per_turn", [60, 1440])
 @pytest.mark.parametrize("way", [1, -1])
@@ -298,6 +301,7 @@ def test_the_angle_beside_the_speed_of_its_driver(clean: Columns, tmp_path: Path
     ]
 
 
+@pytest.mark.slow
 def test_an_index_that_does_not_fit_the_pulses_of_a_turn(clean: Columns, tmp_path: Path) -> None:
     for stated in (30, 59, 15, 61):
         try:

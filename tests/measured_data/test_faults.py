@@ -106,6 +106,7 @@ def test_a_narrow_peak_of_the_signal_is_no_spike(run: Columns, tmp_path: Path) -
     assert not [one for one in found.findings if "spikes" in one.what]
 
 
+@pytest.mark.spread(7)
 @pytest.mark.parametrize(("spoil", "where", "told", "remedy"), FAULTS, ids=[one[0].__name__ for one in FAULTS])
 def test_faults_are_named(
     run: Columns, tmp_path: Path, spoil: Any, where: str, told: tuple[str, ...], remedy: str

@@ -64,6 +64,7 @@ FORMS: dict[str, Callable[[float], str]] = {
 }
 
 
+@pytest.mark.spread(4)
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("unit", ["", " [hh:mm:ss]"])
 def test_time_stamps(columns: Columns, tmp_path: Path, form: str, unit: str) -> None:
@@ -162,6 +163,7 @@ def test_rows_of_words_below_the_names(tmp_path: Path) -> None:
     assert read_table(path, ["t", "x"]).columns["x"].texts == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("encoding", ["utf-8", "cp1252", "utf-16"])
 def test_header_of_any_length(columns: Columns, tmp_path: Path, encoding: str) -> None:
     wide = {key: one[:2500] for key, one in columns.items()}
@@ -181,6 +183,7 @@ def test_file_without_an_end_of_line(tmp_path: Path) -> None:
     assert "no end of a line in its first 16 MiB" in finding.what
 
 
+@pytest.mark.slow
 def test_parquet_that_unfolds(tmp_path: Path) -> None:
     path, zeros = tmp_path / "a.parquet", pa.array(np.zeros(2_500_000))
     table = pa.table(dict.fromkeys("abcdef", zeros))

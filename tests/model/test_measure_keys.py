@@ -11,7 +11,8 @@ import pytest
 from varied import VARIED
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.model.measure_parts import STATISTICS, SUBJECTS, Measure
+from trunnion.model.measure_parts import STATISTICS, Measure
+from trunnion.model.measure_table import MEASURES
 from trunnion.model.mechanism import Mechanism, read_mechanism
 
 FindingsOf = Callable[..., tuple[Finding, ...]]
@@ -63,12 +64,12 @@ def test_a_position_is_a_time_if_it_is_stated_as_one(varied: Mechanism) -> None:
 
 
 def test_the_subject_of_a_measure() -> None:
-    assert set(SUBJECTS) < {field.alias or key for key, field in Measure.model_fields.items()}
+    assert set(MEASURES) < {field.alias or key for key, field in Measure.model_fields.items()}
     one = Measure(**{"effort": "A", "as": "maximum"})  # type: ignore[arg-type]
-    assert (one.subject, one.statistic, one.reduced) == ("effort", "maximum", False)
+    assert (one.kind, one.subject, one.statistic, one.reduced) == ("effort", "A", "maximum", False)
     assert Measure(efficiency="cycle").reduced
     assert not Measure(efficiency="instant").reduced
-    assert Measure().subject == ""
+    assert (Measure().kind, Measure().subject, Measure().reduced) == ("", "", False)
 
 
 @pytest.mark.parametrize("suffix", ["yaml", "json"])
@@ -158,6 +159,7 @@ def test_a_slide_is_a_length(slides: dict[str, str]) -> None:
 @pytest.mark.parametrize("statistic", STATISTICS)
 def test_every_figure_can_be_asked_for(varied: Mechanism, statistic: str) -> None:
     at = {"at": "60 deg"} if statistic == "value" else {"over": ["0 deg", "90 deg"]}
+    at |= {"within": ["0 N m", "1 N m"]} if statistic == "dwell" else {}
     assert with_measure(varied, effort="A", **{"as": statistic}, **at).measures["one"].statistic == statistic
 
 

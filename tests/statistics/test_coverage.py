@@ -45,6 +45,7 @@ def counts_of(limit: float, count: int) -> np.ndarray:
     return np.array([[passed(SobolStream(s, r, 3).points(0, count), limit) for r in replicates] for s in range(1, 201)])
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize(("limit", "count"), [(1.0, 128), (2.0, 256), (3.0, 1024)])
 def test_sobol_by_replicates(limit: float, count: int) -> None:
     counts, true = counts_of(limit, count), yield_of(limit)
@@ -56,6 +57,7 @@ def test_sobol_by_replicates(limit: float, count: int) -> None:
     assert np.mean(high - low) < 0.8 * np.mean(plain_high - plain_low)
 
 
+@pytest.mark.slow
 def test_hardly_any_failure() -> None:
     """One failure expected in all: the counts of replicates are 0 or 1, and t alone would cover in 2 of 3 studies."""
     counts, true = counts_of(4.0, 1024), yield_of(4.0)

@@ -23,6 +23,7 @@ pytest.importorskip("distributed")
 EXPECTED = run(ToyJob()).tally.bits()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("jobs", "chunk"), [(1, None), (2, 1), (3, 3500)])
 def test_same_bits_on_a_local_cluster(jobs: int, chunk: int | None, capfd: pytest.CaptureFixture[str]) -> None:
     told: list[int] = []
@@ -35,6 +36,7 @@ def test_same_bits_on_a_local_cluster(jobs: int, chunk: int | None, capfd: pytes
     assert logging.getLogger("distributed").level == level
 
 
+@pytest.mark.slow
 @POSIX
 def test_a_killed_worker_costs_time_only(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     done = run(ToyJob(fatal=17, folder=tmp_path), jobs=2, chunk=1500, cluster="local")
@@ -43,6 +45,7 @@ def test_a_killed_worker_costs_time_only(tmp_path: Path, capfd: pytest.CaptureFi
     assert capfd.readouterr() == ("", "")
 
 
+@pytest.mark.slow
 @POSIX
 def test_blocks_that_kill_every_worker_are_an_error(capfd: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(MechanismError, match=r"blocks \d+ to \d+ ended 3 workers in turn"):
@@ -50,6 +53,7 @@ def test_blocks_that_kill_every_worker_are_an_error(capfd: pytest.CaptureFixture
     assert capfd.readouterr() == ("", "")
 
 
+@pytest.mark.slow
 def test_what_a_job_raises_arrives(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(MechanismError, match=r"links\.x: no such link"):
         run(ToyJob(fault="prepare"), cluster="local")
@@ -60,6 +64,7 @@ def test_what_a_job_raises_arrives(tmp_path: Path, capfd: pytest.CaptureFixture[
     assert capfd.readouterr() == ("", "")
 
 
+@pytest.mark.slow
 @POSIX
 def test_ctrl_c_from_the_terminal_is_quiet(tmp_path: Path) -> None:
     lines, complaints = interrupted(tmp_path, 2, "local")
@@ -95,6 +100,7 @@ def cluster(folder: Path, threads: int) -> Iterator[tuple[str, subprocess.Popen[
         yield json.loads(told.read_text())["address"], scheduler
 
 
+@pytest.mark.slow
 def test_a_cluster_by_its_address(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     with cluster(tmp_path, 2) as (address, _):
         for chunk in (None, 1000):
@@ -102,6 +108,7 @@ def test_a_cluster_by_its_address(tmp_path: Path, capfd: pytest.CaptureFixture[s
     assert capfd.readouterr() == ("", "")
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_goes_away_is_an_error_and_nothing_is_lost(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -62,6 +62,7 @@ def bits(tally: Tally) -> dict[str, bytes]:
     return {name: array.tobytes() + str((array.shape, array.dtype)).encode() for name, array in arrays}
 
 
+@pytest.mark.slow
 def test_there_is_something_to_lose(known: Any) -> None:
     """Several blocks, failures of more than one kind, both passed and not."""
     one, _ = known["monte-carlo"]
@@ -77,12 +78,14 @@ CREWS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("method", "jobs", "chunk"), CREWS)
 def test_same_bits_for_workers_and_portions(known: Any, method: str, jobs: int, chunk: int) -> None:
     one, expected = known[method]
     assert bits(run(one, jobs=jobs, chunk=chunk).tally) == expected
 
 
+@pytest.mark.slow
 def test_same_bits_on_a_local_cluster(known: Any) -> None:
     pytest.importorskip("distributed")
     one, expected = known["monte-carlo"]

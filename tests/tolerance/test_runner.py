@@ -30,6 +30,7 @@ def test_one_process_gives_the_blocks_in_order() -> None:
     assert done.notes == ()
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("jobs", [1, 2, 3])
 @pytest.mark.parametrize("chunk", [None, 1, 3500])
 def test_same_bits_for_any_workers_and_portions(jobs: int, chunk: int | None) -> None:
@@ -43,6 +44,7 @@ def test_a_killed_worker_costs_time_only(tmp_path: Path) -> None:
     assert done.tally.bits() == run(ToyJob()).tally.bits()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("at", [1, 9000])
 def test_workers_killed_from_outside(at: int) -> None:
     killed = []
@@ -58,6 +60,7 @@ def test_workers_killed_from_outside(at: int) -> None:
     assert len(killed) == 2
 
 
+@pytest.mark.slow
 @POSIX
 def test_blocks_that_kill_every_worker_are_named() -> None:
     with pytest.raises(MechanismError, match=r"blocks 16 to 19 ended 3 workers in turn \(killed by SIGKILL\)"):
@@ -65,6 +68,7 @@ def test_blocks_that_kill_every_worker_are_named() -> None:
     assert not multiprocessing.active_children()
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_what_a_job_raises_arrives(jobs: int) -> None:
     with pytest.raises(MechanismError) as caught:
@@ -130,6 +134,7 @@ def test_ctrl_c_keeps_what_is_done(jobs: int, tmp_path: Path) -> None:
     assert not rest.stopped
 
 
+@pytest.mark.slow
 @POSIX
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_ctrl_c_from_the_terminal_is_quiet(jobs: int, tmp_path: Path) -> None:
@@ -140,6 +145,7 @@ def test_ctrl_c_from_the_terminal_is_quiet(jobs: int, tmp_path: Path) -> None:
     assert run(job, checkpoint=tmp_path / "run.npz", resume=True).tally.bits() == run(job).tally.bits()
 
 
+@pytest.mark.slow
 def test_a_script_without_a_guard_is_told_so(tmp_path: Path) -> None:
     script = tmp_path / "bare.py"
     script.write_text(

@@ -23,6 +23,7 @@ def interrupt(_: int) -> None:
     signal.raise_signal(signal.SIGINT)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["monte-carlo", "quasi-monte-carlo"])
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_stopped_before_the_first_portion(method: str, jobs: int, tmp_path: Path) -> None:

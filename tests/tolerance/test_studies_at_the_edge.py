@@ -102,6 +102,7 @@ def test_corner_that_does_not_go_together_is_told() -> None:
     assert result["searched_lower"].item() == pytest.approx(change, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_samples_that_lock() -> None:
     """By the same status as each mechanism analysed alone; an effort has no figure, a motion has."""
     data = mechanisms.model(mechanisms.slider_crank(offset=0.0), friction=0.35)
@@ -177,6 +178,7 @@ def test_few_samples(method: str, samples: int) -> None:
     assert 0 < result["yield_low"].item() < result["yield_high"].item() == 1
 
 
+@pytest.mark.spread(2)
 @pytest.mark.parametrize("steps", [1, 2, 3])
 def test_few_positions(steps: int) -> None:
     measures = {
@@ -217,6 +219,7 @@ def test_names_of_any_script() -> None:
     assert np.all(np.isfinite(result["cpk"].values))
 
 
+@pytest.mark.slow
 @settings(max_examples=25)
 @given(st.floats(-9, 9), st.integers(0, 100))
 def test_any_unit_of_length(power: float, seed: int) -> None:

@@ -1,70 +1,170 @@
-"""What measures of the forces, and those of points that have several numbers, are made of: their courses."""
+"""The course of every kind of measure: one number or more, position by position; SI, angles in (−π, π].
+
+`COURSES` has one function an entry of `model.measure_table.MEASURES`, of a `Backward` if that needs forces, else of a
+`Forward`. Floats, arrays or dual numbers flow through, as the values of the mechanism are.
+"""
 
 from __future__ import annotations
 
 import functools
 import operator
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.solve.backward import Backward
+from trunnion.measures.motion import MOTIONS, Asked, component
+from trunnion.measures.transmission import of_joint
+from trunnion.solve.backward import Backward, slip_of
 from trunnion.solve.forward import Forward
 from trunnion.solve.friction_method import MARGIN
 from trunnion.solve.loads import useful_loads
 from trunnion.solve.space.motion import SpatialWalk
 
-__all__ = ["efficiency", "effort", "joint_rate", "load", "locking_margin", "place", "reaction"]
+__all__ = ["COURSES", "Course"]
+
+Course = Callable[[Asked, Any], tuple[Number, ...]]
 
 
-def place(subject: str, walk: Forward) -> tuple[Number, ...]:
+# ---- of the places --------------------------------------------------------------------------------------------
+
+
+def _motion(measure: Asked, walk: Forward, of: str = "") -> Number:
+    kind = MOTIONS[of or measure.kind]
+    return kind.value_in_space(measure, walk) if isinstance(walk, SpatialWalk) else kind.value(measure, walk)
+
+
+def value(measure: Asked, walk: Forward) -> tuple[Number, ...]:
+    """The number of the motion itself."""
+    return (_motion(measure, walk),)
+
+
+def of_joint_motion(measure: Asked, walk: Forward) -> tuple[Number, ...]:
+    """The rotation of a joint, or the slide of one that does not turn."""
+    return (_motion(measure, walk, "rotation" if walk.system.turns(measure.subject) else "slide"),)
+
+
+def attitude(measure: Asked, walk: Forward) -> tuple[Number, ...]:
+    """The angle of a link; in space the axes of its frame, nine numbers."""
+    if not isinstance(walk, SpatialWalk):
+        return value(measure, walk)
+    return tuple(number for axis in walk.motions[measure.subject].frame[:3] for number in axis)
+
+
+def place(measure: Asked, walk: Forward) -> tuple[Number, ...]:
     """Coordinates of a point, m: two in the plane, three in space."""
-    link, point = subject.split(".")
+    link, point = measure.subject.split(".")
     return tuple(walk.point(link, point).place)
 
 
-def effort(subject: str, back: Backward) -> tuple[Number, ...]:
+def pressure_angle(measure: Asked, walk: Forward) -> tuple[Number, ...]:
+    """Of the dyad of a joint, rad in −π/2 … π/2."""
+    return (of_joint(walk, measure.subject),)
+
+
+def transmission_angle(measure: Asked, walk: Forward) -> tuple[Number, ...]:
+    """Of the dyad of a joint, rad in 0 … π/2: of an RRR the angle at its inner pin, folded to be acute."""
+    angle = of_joint(walk, measure.subject)
+    return (np.pi / 2 - namespace(angle).abs(angle),)
+
+
+# ---- of the motion --------------------------------------------------------------------------------------------
+
+
+def velocity(measure: Asked, walk: Forward) -> tuple[Number, ...]:
+    """Of a point, m/s."""
+    link, point = measure.subject.split(".")
+    return (component(measure, tuple(walk.point(link, point).velocity)),)
+
+
+def acceleration(measure: Asked, walk: Forward) -> tuple[Number, ...]:
+    """Of a point, m/s²."""
+    link, point = measure.subject.split(".")
+    return (component(measure, tuple(walk.point(link, point).acceleration)),)
+
+
+def angular_velocity(measure: Asked, walk: Forward) -> tuple[Number, ...]:
+    """Of a link, rad/s; in the plane counterclockwise."""
+    twist = walk.motions[measure.subject].twist
+    return (component(measure, tuple(twist.u)) if isinstance(walk, SpatialWalk) else twist.w,)
+
+
+def angular_acceleration(measure: Asked, walk: Forward) -> tuple[Number, ...]:
+    """Of a link, rad/s²; in the plane counterclockwise."""
+    second = walk.motions[measure.subject].acceleration
+    return (component(measure, tuple(second.u)) if isinstance(walk, SpatialWalk) else second.w,)
+
+
+def rate(measure: Asked, walk: Forward) -> tuple[Number, ...]:
+    """Speed of the second link of a joint against the first, rad/s about the joint's axis or m/s along it."""
+    joint = measure.subject
+    if isinstance(walk, SpatialWalk):
+        return (walk.rates(joint)[0 if walk.system.turns(joint) else 1],)
+    return (slip_of(walk, joint).speed,)
+
+
+def joint_acceleration(measure: Asked, walk: Forward) -> tuple[Number, ...]:
+    """Second derivative of the rotation of a joint, rad/s², or of the slide of one that does not turn, m/s²."""
+    joint = measure.subject
+    if isinstance(walk, SpatialWalk):
+        return (walk.second_rates(joint)[0 if walk.system.turns(joint) else 1],)
+    if walk.system.turns(joint):
+        first, second = walk.system.joints[joint][1]
+        return (walk.motions[second].acceleration.w - walk.motions[first].acceleration.w,)
+    return (walk.slip_motion(joint)[1],)
+
+
+# ---- of the forces --------------------------------------------------------------------------------------------
+
+
+def effort(measure: Asked, back: Backward) -> tuple[Number, ...]:
     """Torque or force of a driver, N m or N."""
-    return (back.efforts[subject],)
+    return (back.efforts[measure.subject],)
 
 
-def joint_rate(joint: str, back: Backward, turns: bool) -> Number:
-    """Speed of the second link against the first, rad/s about the joint's axis or m/s along it."""
-    if isinstance(back.walk, SpatialWalk):
-        return back.walk.rates(joint)[0 if turns else 1]
-    return back.slips[joint].speed
-
-
-def load(subject: str, back: Backward) -> tuple[Number, ...]:
+def load(measure: Asked, back: Backward) -> tuple[Number, ...]:
     """Torque or force of a load on a joint against the joint's positive sense, N m or N; NaN where the joint rests.
 
     Times the speed of the joint it is the power that the load takes.
     """
-    stated = back.walk.system.mechanism.loads[subject]
-    rate = joint_rate(stated.joint or "", back, stated.resisting_torque is not None)
-    moving = primal(rate) != 0
-    xp = namespace(rate)
-    return (-back.load_powers[subject] / xp.where(moving, rate, np.nan),)
+    stated, walk = back.walk.system.mechanism.loads[measure.subject], back.walk
+    joint, turns = stated.joint or "", stated.resisting_torque is not None
+    speed = walk.rates(joint)[0 if turns else 1] if isinstance(walk, SpatialWalk) else back.slips[joint].speed
+    moving = primal(speed) != 0
+    xp = namespace(speed)
+    return (-back.load_powers[measure.subject] / xp.where(moving, speed, np.nan),)
 
 
-def reaction(subject: str, axis: str, back: Backward) -> tuple[Number, ...]:
-    """Force in a joint without friction and drive effort, N: one component in global axes, or its magnitude.
-
-    Its magnitude has no derivative where it is 0.
-    """
-    found: Any = back.reactions[subject]
-    force = (found.x, found.y) if hasattr(found, "x") else found.u
-    if axis:
-        return (force["xyz".index(axis)],)
-    square: Number = 0.0
-    for part in force:
-        square = square + part * part
-    return (namespace(square).sqrt(square),)
+def reaction(measure: Asked, back: Backward) -> tuple[Number, ...]:
+    """Force in a joint without friction and drive effort, N."""
+    found: Any = back.reactions[measure.subject]
+    return (component(measure, (found.x, found.y) if hasattr(found, "x") else tuple(found.u)),)
 
 
-def efficiency(subject: str, back: Backward) -> tuple[Number, ...]:
+def power(measure: Asked, back: Backward) -> tuple[Number, ...]:
+    """What a driver, or a load, gives the mechanism, W."""
+    name = measure.subject
+    if name in back.efforts:
+        return (back.efforts[name] * back.walk.rate(name),)
+    return (back.load_powers[name],)
+
+
+def friction_power(measure: Asked, back: Backward) -> tuple[Number, ...]:
+    """Power lost to friction in a joint, W."""
+    return (back.friction_power(measure.subject),)
+
+
+def friction_energy(measure: Asked, back: Backward) -> tuple[Number, ...]:
+    """Power lost to friction in a joint, W, and how long the first driver takes for its cycle, s."""
+    walk = back.walk
+    driver = next(iter(walk.system.mechanism.drivers), "")
+    duration: Number = walk.system.span(walk.values, driver).duration if driver else 0.0
+    return back.friction_power(measure.subject), duration
+
+
+def efficiency(measure: Asked, back: Backward) -> tuple[Number, ...]:
     """Useful and drive power, W; of an instant their ratio, NaN where the drivers put no power in."""
     walk = back.walk
     useful: Number = 0.0
@@ -73,13 +173,13 @@ def efficiency(subject: str, back: Backward) -> tuple[Number, ...]:
         useful = useful - back.load_powers[name]
     for name in walk.system.mechanism.drivers:
         driven = driven + back.efforts[name] * walk.rate(name)
-    if subject == "cycle":
+    if measure.subject == "cycle":
         return useful, driven
     xp = namespace(driven)
     return (useful / xp.where(driven > 0, driven, np.nan),)
 
 
-def locking_margin(back: Backward) -> tuple[Number, ...]:
+def locking_margin(measure: Asked, back: Backward) -> tuple[Number, ...]:
     """Multiple of the friction at which a module locks, MARGIN where it does not up to there.
 
     The search for it has no derivatives: they are NaN where dual numbers ask for some below MARGIN.
@@ -89,3 +189,30 @@ def locking_margin(back: Backward) -> tuple[Number, ...]:
     if isinstance(forces, Dual):
         return (Dual(margin, np.where(margin < MARGIN, np.nan, 0.0)),)
     return (margin,)
+
+
+COURSES: dict[str, Course] = {
+    "point": value,
+    "path_error": place,
+    "straightness": place,
+    "angle": attitude,
+    "rotation": value,
+    "slide": value,
+    **dict.fromkeys(("transmission_error", "stroke", "dead_centre"), of_joint_motion),
+    "rate": rate,
+    "joint_acceleration": joint_acceleration,
+    "velocity": velocity,
+    "acceleration": acceleration,
+    "angular_velocity": angular_velocity,
+    "angular_acceleration": angular_acceleration,
+    "transmission_angle": transmission_angle,
+    "pressure_angle": pressure_angle,
+    "effort": effort,
+    "load": load,
+    "reaction": reaction,
+    "power": power,
+    "friction_power": friction_power,
+    "friction_energy": friction_energy,
+    "efficiency": efficiency,
+    "locking_margin": locking_margin,
+}

@@ -27,9 +27,10 @@ from trunnion.algebra.namespace import Number, namespace
 from trunnion.cycle.fill import unwrap_row
 from trunnion.cycle.means import ROUNDING
 from trunnion.errors import Status
+from trunnion.measures.dwell import share_within
 from trunnion.measures.extremes import Extreme, Grid, largest, shape_of
 from trunnion.measures.lines import distances, total, turn
-from trunnion.measures.measures import MEASURES, Measure
+from trunnion.measures.measures import Measure
 from trunnion.measures.positions import Window
 from trunnion.solve.system import System
 
@@ -43,13 +44,15 @@ FLAT = 1e-9  # of its size: a course that changes less has no extremes to tell t
 class Course(NamedTuple):
     """What a figure is made of: one number, (…, position), at rising times, s.
 
-    coordinate: of the first driver there, which gains so much in a period; there is no period of a range.
+    coordinate: of the first driver there, which gains so much in a period; there is no period of a range. band: of a
+    dwell.
     """
 
     number: Number
     grid: Grid
     coordinate: Array
     gain: float
+    band: tuple[float, float] = (-np.inf, np.inf)
 
     def largest(self, sign: float = 1.0) -> Extreme:
         """The largest value, or the least one with its sign changed."""
@@ -109,6 +112,7 @@ RULES: dict[str, Callable[[Course], Number]] = {
     "dead centre": _dead_centre,
     "dead centre, least": lambda course: _dead_centre(course, -1.0),
     "deviation": _largest,  # of the course less that of the nominal mechanism
+    "dwell": lambda course: share_within(course.number, course.grid, course.band),
 }
 
 
@@ -155,7 +159,14 @@ class Reference:
     @property
     def against(self) -> bool:
         """Whether the course is taken less that of the nominal mechanism."""
-        return MEASURES[self.measure.kind].against or self.attitude or self.measure.rule == "deviation"
+        return self.measure.of.against or self.attitude or self.measure.rule == "deviation"
+
+    @property
+    def share(self) -> float:
+        """Of the cycle, that of the window of an energy."""
+        window, duration = self.window, float(self.parts[1][0])
+        whole = window.period is not None or window.weights is not None or not duration
+        return 1.0 if whole else float(window.time[-1] - window.time[0]) / duration
 
     @property
     def opened(self) -> bool:
@@ -311,6 +322,10 @@ def _figure(nominal: Reference, parts: Sequence[Number]) -> Number:
         return RULES["peak-to-peak"](away) if len(parts) == 2 else 2.0 * RULES["maximum"](away)
     if rule == "ratio":
         return _ratio(parts[0], parts[1], _course(nominal, parts[0]))
+    if rule == "work":
+        course = _course(nominal, parts[0])
+        mean, duration = (total(part, course.grid.weights) for part in parts)
+        return mean * duration * nominal.share
     number = _single(nominal, parts)
     return RULES[rule](_course(nominal, number))
 
@@ -329,13 +344,13 @@ def _single(nominal: Reference, parts: Sequence[Number]) -> Number:
 
 def _course(nominal: Reference, number: Number) -> Course:
     """A course over the window; one that gains whole turns in a period with the end of the period, as a range."""
-    window = nominal.window
+    window, band = nominal.window, nominal.measure.within or (-np.inf, np.inf)
     if not nominal.opened:
-        return Course(number, nominal.grid, window.coordinate, window.gain)
+        return Course(number, nominal.grid, window.coordinate, window.gain, band)
     again = np.append(np.arange(len(window.time)), 0)
     gains = np.append(np.zeros(len(window.time)), nominal.turns)
     coordinate = np.append(window.coordinate, window.coordinate[0] + window.gain)
-    return Course(number[..., again] + gains, nominal.grid, coordinate, window.gain)
+    return Course(number[..., again] + gains, nominal.grid, coordinate, window.gain, band)
 
 
 def _parts(curve: Sequence[Number], nominal: Reference) -> tuple[Number, ...]:

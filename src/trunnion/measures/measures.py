@@ -1,14 +1,12 @@
 """Measures: numbers that follow from the motion of a mechanism, or from its forces.
 
-`MEASURES` is the vocabulary, one entry a kind. Each knows its course: the one or more numbers, position by position,
-that its figure is made of (`measure_figures`). A coordinate of a point, the angle of a link, the rotation or the slide
-of a joint also know their unit loads: what does the work 1 on a unit of them. Under these alone, the drivers at rest,
-the reactions say what every small displacement in a joint does to the measure.
+`model.measure_table.MEASURES` is the vocabulary, one entry a kind, `courses.COURSES` the course of each: the one or
+more numbers, position by position, that its figure is made of (`figures`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, cast
 
@@ -17,6 +15,7 @@ from pydantic import ValidationError
 
 from trunnion.algebra import plane, space
 from trunnion.algebra.dual import primal
+<<<<<<< HEAD
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.plane import Wrench
 from trunnion.algebra.space import Screw
@@ -24,7 +23,16 @@ from trunnion.algebra.vector import Vector3, cross, dot
 from trunnion.errors import Finding, MechanismError
 from trunnion.measures import courses
 from trunnion.model.checks.measures import SUBJECTS, check_measure
+=======
+from trunnion.algebra.namespace import Number
+from trunnion.errors import Finding, MechanismError
+from trunnion.measures.courses import COURSES
+from trunnion.measures.motion import AXES, MOTIONS
+from trunnion.model.checks.measures import check_measure
+>>>>>>> w-measures
 from trunnion.model.contact import motions
+from trunnion.model.measure_parts import STATISTICS
+from trunnion.model.measure_table import MEASURES, MeasureKind
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.parts import Measure as Stated
 from trunnion.solve.backward import Backward
@@ -32,37 +40,19 @@ from trunnion.solve.forward import Forward
 from trunnion.solve.space.motion import SpatialWalk
 from trunnion.solve.system import System, Values
 
-__all__ = [
-    "MEASURES",
-    "MOTIONS",
-    "STATISTICS",
-    "Measure",
-    "MeasureKind",
-    "MotionKind",
-    "coordinate_unit",
-    "named",
-    "outputs",
-]
-
-AXES = ("x", "y", "z")
-OF_JOINT = "of the joint"
-RATE = "of the joint, a second"
-STATISTICS = (
-    *("value", "maximum", "minimum", "peak-to-peak", "mean", "rms", "largest"),
-    *("place-of-maximum", "place-of-minimum"),
-)
-NULL: Vector3 = (0.0, 0.0, 0.0)
+__all__ = ["Measure", "coordinate_unit", "named", "outputs"]
 
 
 @dataclass(frozen=True)
 class Measure:
     """One number to watch, its figure and its limits; SI.
 
-    kind: an entry of MEASURES; subject: link.point, link, joint or driver, "cycle" or "instant" of the efficiency;
-    axis: of a coordinate or a force, or the global axis that a link in space turns about. lower, upper: allowed signed
-    deviations of the figure from that of the nominal mechanism; at_least, at_most: bounds of the figure itself.
+    kind: an entry of MEASURES; subject: link.point, link, joint, driver or load, or a word such as "cycle"; axis,
+    along: which component, by a global axis or a direction; of an angle in space the axis that the link turns about.
+    lower, upper: allowed signed deviations of the figure from that of the nominal mechanism; at_least, at_most: bounds
+    of the figure itself.
     at, over: coordinate of the first driver, or time if `timed`; statistic: `as` of the model, "" for what the kind
-    itself makes of its course (`rule`).
+    itself makes of its course (`rule`); within: the band of a dwell.
     """
 
     name: str
@@ -77,6 +67,13 @@ class Measure:
     over: tuple[float, float] | None = None
     timed: bool = False
     statistic: str = ""
+    along: tuple[float, ...] = ()
+    within: tuple[float, float] | None = None
+
+    @property
+    def of(self) -> MeasureKind:
+        """What the table says of its kind."""
+        return MEASURES[self.kind]
 
     @property
     def limit(self) -> float | None:
@@ -93,7 +90,12 @@ class Measure:
     @property
     def of_motion(self) -> bool:
         """Whether the motion alone decides it: its course takes a walk forward."""
-        return not MEASURES[self.kind].of_forces
+        return not self.of.of_forces
+
+    @property
+    def of_places(self) -> bool:
+        """Whether the places of the links decide it, without their speeds."""
+        return self.of.needs == "places"
 
     @property
     def wants_margin(self) -> bool:
@@ -102,29 +104,35 @@ class Measure:
 
     @property
     def rule(self) -> str:
-        """What makes the figure of the course: an entry of `measure_figures.RULES`."""
-        own = MEASURES[self.kind].rule
+        """What makes the figure of the course: an entry of `figures.RULES`."""
+        own = self.of.rule
         if own == "ratio" and self.subject != "cycle":
             own = "deviation"
         if own == "dead centre":
             return "dead centre, least" if self.statistic == "place-of-minimum" else own
-        if own in ("line", "ratio"):
+        if own in ("line", "ratio", "work"):
             return own
         return self.statistic or ("value" if self.at is not None else own)
 
+    def single(self, system: System) -> bool:
+        """Whether it is by itself one number at every position, of one mechanism alone: what a sensor could show."""
+        one = self.of.rule == "deviation" or (self.of.rule == "ratio" and self.subject == "instant")
+        return one and not self.of.against and not self.of_attitude(system)
+
     def unit(self, system: System) -> str:
         """SI unit of the course."""
-        unit = MEASURES[self.kind].unit
-        if self.kind == "load":
-            return "N" if system.mechanism.loads[self.subject].resisting_torque is None else "N m"
-        if unit == RATE:
-            return "rad/s" if system.turns(self.subject) else "m/s"
-        if unit == "N m":
-            return "N m" if system.turns(self.subject) else "N"
-        return ("rad" if system.turns(self.subject) else "m") if unit == OF_JOINT else unit
+        both = self.of.quantities
+        return both[0 if len(both) == 1 or self._turns(system) else 1].unit
+
+    def _turns(self, system: System) -> bool:
+        if self.of.of == "load on a joint":
+            return system.mechanism.loads[self.subject].resisting_torque is not None
+        return system.turns(self.subject)
 
     def figure_unit(self, system: System, values: Values) -> str:
         """SI unit of the figure: of a place that of the first driver's coordinate, s where this names no position."""
+        if self.rule == "dwell":
+            return "1"
         return coordinate_unit(system, values) if self.of_place else self.unit(system)
 
     @property
@@ -134,7 +142,8 @@ class Measure:
 
     def turning(self, system: System) -> bool:
         """Whether the course is an angle, which may gain whole turns."""
-        return self.unit(system) == "rad" and not self.of_attitude(system)
+        motion = self.coordinate(system)
+        return motion.kind in MOTIONS and motion.unit(system) == "rad" and not self.of_attitude(system)
 
     def of_attitude(self, system: System) -> bool:
         """Whether it is the turn of a link in space from where it lies in the nominal mechanism."""
@@ -148,12 +157,11 @@ class Measure:
         Floats, arrays or dual numbers, as the values were.
         """
         walk = back if isinstance(back, Forward) else back.walk
-        of = MEASURES[self.kind]
-        return of.curve(self, cast(Any, back if of.of_forces else walk))
+        return COURSES[self.kind](self, cast(Any, back if self.of.of_forces else walk))
 
     def coordinate(self, system: System) -> Measure:
         """The rotation or slide of a joint that a stroke, a dead centre or a transmission error is of."""
-        if MEASURES[self.kind].unit != OF_JOINT:
+        if len(self.of.quantities) == 1 or not self.of_places:
             return self
         return Measure(self.name, "rotation" if system.turns(self.subject) else "slide", self.subject)
 
@@ -186,6 +194,7 @@ class Measure:
         return self.coordinate(walk.system).rate(walk) if self.turning(walk.system) else None
 
 
+<<<<<<< HEAD
 @dataclass(frozen=True)
 class MotionKind:
     """A number of the motion with unit loads: for the plane and for space its value and the loads that go with it."""
@@ -389,6 +398,8 @@ MEASURES: dict[str, MeasureKind] = {
 }
 
 
+=======
+>>>>>>> w-measures
 def coordinate_unit(system: System, values: Values) -> str:
     """Unit of what names positions: rad or m, the coordinate of the first driver if it runs one way, else s."""
     first = next(iter(system.mechanism.drivers), None)
@@ -405,10 +416,9 @@ FORMS = "[STATISTIC:]link.point.x, angle:link, rotation:joint, slide:joint, effo
 def named(mechanism: Mechanism, names: Iterable[str], values: Values) -> list[Measure]:
     """Measures by their names in the model, or written as they are.
 
-    `link.point.x`, `angle:link` (in space `angle:link.x`), `rotation:joint`, `slide:joint`, `rate:joint`,
-    `effort:driver`, `load:name`, `reaction:joint` or `reaction:joint.x`, `efficiency:cycle`, `efficiency:instant`,
-    `locking_margin:mechanism`, `path_error:link.point`, `straightness:link.point`, `stroke:joint`, `dead_centre:joint`,
-    `transmission_error:joint`; before any of them a statistic: `maximum:effort:A`, `rms:link.point.x`.
+    `link.point.x`, or KIND:NAME of the entries of MEASURES, as `rotation:joint` or `effort:driver`; of one with a
+    component `reaction:joint` or `reaction:joint.x`, in space `angle:link.x`; before any of them a statistic:
+    `maximum:effort:A`, `rms:link.point.x`.
     Raises MechanismError for a name that means nothing.
     """
     found, findings = [], []
@@ -419,7 +429,7 @@ def named(mechanism: Mechanism, names: Iterable[str], values: Values) -> list[Me
             findings += [] if stated is None else list(check_measure(mechanism, stated, f"--measure {name}"))
         if stated is None:
             known = f"; the model's measures are {', '.join(mechanism.measures)}" if mechanism.measures else ""
-            kinds = f"; KIND: {', '.join(SUBJECTS[1:])}; STATISTIC: {', '.join(STATISTICS)}"
+            kinds = f"; KIND: {', '.join(list(MEASURES)[1:])}; STATISTIC: {', '.join(STATISTICS)}"
             findings.append(Finding(f"'{name}' is no measure", "--measure", f"write {FORMS}{known}{kinds}"))
         else:
             found.append(_measure(name, stated, values, mechanism))
@@ -436,10 +446,11 @@ def _read(text: str) -> Stated | None:
         statistic, text = {"as": head}, rest
     kind, colon, subject = text.partition(":")
     data: dict[str, Any] = {}
-    if colon and kind in SUBJECTS and kind != "point":
+    if colon and kind in MEASURES and kind != "point":
         data[kind] = subject
         owner, _, axis = subject.rpartition(".")
-        if kind in ("angle", "reaction") and owner and axis in AXES:
+        dots = 1 if MEASURES[kind].of == "point" else 0  # a point may be called x
+        if MEASURES[kind].vector and owner.count(".") == dots and owner and axis in AXES:
             data = {kind: owner, "axis": axis}
     elif not colon:
         point, _, axis = text.rpartition(".")
@@ -452,23 +463,27 @@ def _read(text: str) -> Stated | None:
 
 
 def _measure(name: str, stated: Stated, values: Values, mechanism: Mechanism) -> Measure:
-    kind = next(key for key in SUBJECTS if getattr(stated, key) is not None)
     path = f"measures.{name}"
 
     def number(key: str) -> float | None:
         found = values.get(f"{path}.{key}")
         return None if found is None else float(np.ravel(primal(found))[0])
 
-    over = number("over.from"), number("over.to")
+    def numbers(*keys: str) -> tuple[float, ...]:
+        return tuple(found for key in keys if (found := number(key)) is not None)
+
+    over, within = numbers("over.from", "over.to"), numbers("within.from", "within.to")
     places = [f"{path}.{key}" for key in ("at", "over.from") if f"{path}.{key}" in values]
     kinds = mechanism.parameter_kinds()
     return Measure(
-        name, kind, getattr(stated, kind), stated.axis or "",
+        name, stated.kind, stated.subject, stated.axis or "",
         number("limit.lower"), number("limit.upper"), number("at_least"), number("at_most"),
         at=number("at"),
-        over=None if over[0] is None or over[1] is None else (over[0], over[1]),
+        over=(over[0], over[1]) if over else None,
         timed=any(kinds[place].unit == "s" for place in places),
         statistic=stated.statistic or "",
+        along=numbers(*(f"along.{axis}" for axis in AXES)),
+        within=(within[0], within[1]) if within else None,
     )  # fmt: skip
 
 

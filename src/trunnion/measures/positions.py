@@ -134,7 +134,7 @@ def _averages(run: Run, measure: Measure) -> bool:
     Samples are taken at the nodes of the nominal mechanism: where one turns round elsewhere, its mean is off by the
     jump there times the way from the nominal place, as a share of the cycle.
     """
-    return measure.rule in ("mean", "rms", "ratio") and not measure.turning(run.system)
+    return measure.rule in ("mean", "rms", "ratio", "work") and not measure.turning(run.system)
 
 
 def _window(run: Run, ends: tuple[float, ...], times: Array, grid: Array, known: tuple[Array, float]) -> Window:

@@ -6,28 +6,16 @@ from collections.abc import Mapping
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
-from trunnion.model.contact import motions
 from trunnion.model.joint_parts import freedoms
 from trunnion.model.measure_parts import Measure
+from trunnion.model.measure_table import MEASURES
 from trunnion.model.quantity import Quantity
-from trunnion.model.units import KINDS, Dimension, Kind, UnitError
+from trunnion.model.units import ANY, KINDS, Dimension, Kind, UnitError
 
 if TYPE_CHECKING:
     from trunnion.model.fields import Fields
 
-__all__ = ["drive_kind", "figure_kind", "is_place", "place_kind"]
-
-_OF_SUBJECT = {
-    "point": "length",
-    "path_error": "length",
-    "straightness": "length",
-    "angle": "angle",
-    "rotation": "angle",
-    "slide": "length",
-    "reaction": "force",
-    "efficiency": "number",
-    "locking_margin": "number",
-}
+__all__ = ["course_kind", "drive_kind", "figure_kind", "is_place", "place_kind"]
 
 
 def drive_kind(mechanism: Fields) -> Kind:
@@ -38,7 +26,7 @@ def drive_kind(mechanism: Fields) -> Kind:
 
 def is_place(measure: Measure) -> bool:
     """Whether a measure gives a position: a dead centre, or where something is largest or smallest."""
-    return (measure.statistic or "").startswith("place-of-") or measure.subject == "dead_centre"
+    return (measure.statistic or "").startswith("place-of-") or measure.kind == "dead_centre"
 
 
 def figure_kind(mechanism: Fields, measure: Measure) -> Kind:
@@ -48,19 +36,26 @@ def figure_kind(mechanism: Fields, measure: Measure) -> Kind:
     """
     if is_place(measure):
         return drive_kind(mechanism)
-    known = _OF_SUBJECT.get(measure.subject)
-    if known:
-        return KINDS[known]
-    name = getattr(measure, measure.subject) if measure.subject else ""
-    joint = mechanism.effective_joints.get(name)
-    if measure.subject == "load":
-        load = mechanism.loads.get(name)
-        return KINDS["force" if load and load.resisting_torque is None else "moment"]
-    if measure.subject == "rate":
-        return KINDS["speed" if joint and motions(joint.type)[:1] == ("slide",) else "angular speed"]
-    if measure.subject == "effort":
-        return KINDS["force" if joint and "rotation" not in freedoms(joint.type) else "moment"]
-    return KINDS["length" if joint and motions(joint.type)[:1] == ("slide",) else "angle"]
+    if measure.statistic == "dwell":
+        return KINDS["number"]
+    return course_kind(mechanism, measure)
+
+
+def course_kind(mechanism: Fields, measure: Measure) -> Kind:
+    """What a measure is at every position; of a joint with two motions the rotation."""
+    if not measure.kind:  # a finding of its own
+        return ANY
+    both = MEASURES[measure.kind].quantities
+    return both[-1 if slides(mechanism, measure) else 0]
+
+
+def slides(mechanism: Fields, measure: Measure) -> bool:
+    """Whether the joint, driver or load that a measure is of slides and does not turn."""
+    load = mechanism.loads.get(measure.subject)
+    if MEASURES[measure.kind].of == "load on a joint":
+        return load is None or load.resisting_torque is None
+    joint = mechanism.effective_joints.get(measure.subject)
+    return joint is not None and "rotation" not in freedoms(joint.type)
 
 
 def place_kind(mechanism: Fields, quantity: Quantity, dimensions: Mapping[str, Dimension | None]) -> Kind:

@@ -352,8 +352,20 @@ class Mechanism(Numbers):
     @property
     def digest(self) -> str:
         """Hash of the content, 16 hexadecimal digits: equal mechanisms have equal digests."""
-        text = json.dumps(_canonical(self.model_dump(mode="json", by_alias=True)), sort_keys=True)
+        data = self.model_dump(mode="json", by_alias=True)
+        for measure in data["measures"].values():
+            for key in [key for key, value in measure.items() if value is None and key not in HASHED]:
+                del measure[key]
+        text = json.dumps(_canonical(data), sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+# keys of a measure that count in the hash unset too: it is not to change with what a measure may be besides
+HASHED = (
+    *("point", "axis", "path_error", "straightness", "angle", "rotation", "slide", "transmission_error", "stroke"),
+    *("dead_centre", "rate", "effort", "load", "reaction", "efficiency", "locking_margin"),
+    *("at", "as", "over", "limit", "at_least", "at_most"),
+)
 
 
 def _canonical(value: Any) -> Any:

@@ -21,7 +21,7 @@ from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.model.dimensions import evaluation_order
 from trunnion.model.expression import MOTION
 from trunnion.model.limits import Limits
-from trunnion.model.measure_kinds import drive_kind, figure_kind, is_place, place_kind
+from trunnion.model.measure_kinds import course_kind, drive_kind, figure_kind, is_place, place_kind
 from trunnion.model.merge import DEFAULT_LAW
 from trunnion.model.parameter_names import ERRORS, ParameterNames
 from trunnion.model.parts import Driver, Friction, Gear, Joint, Point, Spring, freedoms
@@ -164,7 +164,10 @@ def item_name(location: Location, index: int) -> str:
     row = len(location) > 1 and location[-2] == "points" and isinstance(location[-1], int)
     if row and location[0] == "tables":
         return ("at", "value")[index] if index < 2 else str(index)
-    names = ("time", "coordinate") if row else ("from", "to") if location[-1] in ("range", "over") else ("x", "y", "z")
+    if row:
+        names: tuple[str, ...] = ("time", "coordinate")
+    else:
+        names = ("from", "to") if location[-1] in ("range", "over", "within") else ("x", "y", "z")
     return names[index] if index < len(names) else str(index)
 
 
@@ -245,6 +248,10 @@ def _spring_kind(mechanism: Fields, spring: Spring, entry: Entry) -> Kind:
 def _measure_kind(mechanism: Fields, name: str, entry: Entry) -> Kind:
     """Of a position that of the drive or a time, else what the measure gives."""
     measure = mechanism.measures[name]
+    if entry.location[2] == "along":
+        return entry.kind
+    if entry.location[2] == "within":
+        return course_kind(mechanism, measure)
     if entry.location[2] not in ("at", "over") and not is_place(measure):
         return figure_kind(mechanism, measure)
     kinds = dimension_kinds(mechanism) if entry.quantity.names else {}

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.measures.figures import known
-from trunnion.measures.measures import MEASURES, Measure, coordinate_unit, named
+from trunnion.measures.measures import Measure, coordinate_unit, named
 from trunnion.model.mechanism import Mechanism
 from trunnion.rig.reading.measurement import Condition
 from trunnion.solve.friction_method import FrictionMethod
@@ -65,9 +65,7 @@ def measure_of(mechanism: Mechanism, run: Run, channel: str, name: str) -> Measu
         measure = named(mechanism, [name], run.values)[0]
     except MechanismError as error:
         raise MechanismError([replace(one, where=where) for one in error.findings]) from None
-    kind = MEASURES[measure.kind]
-    course = kind.rule == "deviation" or (measure.kind == "efficiency" and measure.subject == "instant")
-    if not measure.everywhere or kind.against or not course or measure.of_attitude(run.system):
+    if not measure.everywhere or not measure.single(run.system):
         what = f"'{name}' is no number of a single position" + told_at(measure)
         remedy = "a channel measures such as effort:DRIVER, rate:JOINT, load:LOAD, rotation:JOINT or link.point.x"
         raise MechanismError(Finding(what, where, remedy))

@@ -13,9 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.linalg import cross, dot
 from trunnion.errors import Finding, MechanismError
-from trunnion.groups import prp, rpp, rpr, rrp, rrr
+from trunnion.measures.transmission import pressure_angles
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.figure import Figure
 from trunnion.solve.backward import Backward
@@ -155,38 +154,6 @@ def transmission_angles(walk: Forward) -> dict[str, Array]:
     RPP: between the two guides.
     """
     return {name: np.pi / 2 - np.abs(angle) for name, angle in pressure_angles(walk).items()}
-
-
-def pressure_angles(walk: Forward) -> dict[str, Array]:
-    """Pressure angle φ of every dyad along the walk, rad in −π/2 … π/2, by its joints' names.
-
-    The angle between the force that the first link puts on the second, had the first neither friction nor loads,
-    and the velocity of the point of the second that it acts on, against the link that holds the second. But for RPP
-    it is the same the other way round. cos φ is 2 over the condition number of the dyad. With its joints B, C, D:
-
-    RRR   force along BC, velocity of C across DC: sin φ = cos(BC, DC), positive where the angle at C is acute
-    RRP   force along BC, velocity along the guide u: sin φ = p/|BC|, C being p to the left of the line along u by B
-    RPR   force across the slide, through B, velocity across BD: sin φ = e/|BD|, D being e to the left of that line
-    PRP, RPP   force across the one guide u, velocity along the other v: sin φ = cos(u, v)
-
-    Source: R. L. Norton, Design of Machinery, "Transmission angle" (π/2 less |φ|) and "Pressure angle".
-    """
-    found: dict[str, Array] = {}
-    with np.errstate(all="ignore"):
-        for module, pose in zip(walk.system.plan.modules, walk.poses, strict=True):
-            match pose:  # what is lost of the force, and what moves
-                case rrr.Pose():
-                    lost, moves = dot(pose.bc, pose.dc), 1 / pose.area
-                case rrp.Pose():
-                    lost, moves = pose.p, pose.r
-                case rpr.Pose():
-                    lost, moves = pose.offset, pose.along
-                case prp.Pose() | rpp.Pose():
-                    lost, moves = dot(pose.u, pose.v), cross(pose.u, pose.v)
-                case _:
-                    continue
-            found["-".join(module.joints)] = np.arctan2(lost, np.abs(moves))
-    return found
 
 
 def _extremes(run: Run, values: Array) -> Extremes:

@@ -9,69 +9,91 @@ import numpy as np
 
 from trunnion.errors import Finding
 from trunnion.model.contact import motions
-from trunnion.model.measure_parts import SUBJECTS, Measure
+from trunnion.model.measure_parts import Measure
+from trunnion.model.measure_table import MEASURES
 from trunnion.model.names import nearest
 from trunnion.model.parameters import ParameterSet
 
 if TYPE_CHECKING:
     from trunnion.model.numbers import Numbers
 
-__all__ = ["SUBJECTS", "check_measure", "measure_values", "point_exists"]
+__all__ = ["check_measure", "measure_values", "point_exists", "subjects"]
 
-OF_POINT = ("point", "path_error", "straightness")
-OF_JOINT = ("rotation", "slide", "transmission_error", "stroke", "dead_centre", "rate", "reaction")
 ENDS = ("from", "to")
 PLACES = ("place-of-maximum", "place-of-minimum")
 
 
+def subjects(mechanism: Numbers, of: str | tuple[str, ...]) -> list[str]:
+    """What a measure may be of in a mechanism, by `MeasureKind.of`."""
+    if isinstance(of, tuple):
+        return list(of)
+    loads = [one for one, load in mechanism.loads.items() if load.joint is not None]
+    return {
+        "point": [f"{link}.{point}" for link, points in mechanism.points.items() for point in points],
+        "link": list(mechanism.effective_links),
+        "joint": [name for name, joint in mechanism.effective_joints.items() if motions(joint.type)],
+        "any joint": list(mechanism.effective_joints),
+        "driver": list(mechanism.drivers),
+        "load on a joint": loads,
+        "driver or load": list(dict.fromkeys([*mechanism.drivers, *mechanism.loads])),
+    }[of]
+
+
 def check_measure(mechanism: Numbers, measure: Measure, where: str) -> Iterator[Finding]:
     """Whether a measure has one subject that exists, and is taken where and as it can be."""
-    subjects = [key for key in SUBJECTS if getattr(measure, key) is not None]
-    if len(subjects) != 1:
-        found = " and ".join(subjects) or "nothing"
-        yield Finding(f"measures {found}", where, f"state one of {', '.join(SUBJECTS[:-1])} or {SUBJECTS[-1]}")
-    yield from _axis(mechanism, measure, where)
-    for key in OF_POINT:
-        name = getattr(measure, key)
-        if name is not None:
-            yield from point_exists(mechanism, name, f"{where}.{key}")
-    joints = list(mechanism.effective_joints)
-    known = {
-        "angle": ("link", list(mechanism.effective_links)),
-        **dict.fromkeys(OF_JOINT, ("joint", joints)),
-        "effort": ("driver", list(mechanism.drivers)),
-        "load": ("load on a joint", [one for one, load in mechanism.loads.items() if load.joint is not None]),
-    }
-    for key, (noun, names) in known.items():
-        name = getattr(measure, key)
-        if name is not None and name not in names:
-            yield Finding(f"there is no {noun} '{name}'", f"{where}.{key}", nearest(name, names))
-        elif name is not None and noun == "joint":
-            yield from _moves(mechanism, name, key, where)
+    if len(measure.kinds) != 1:
+        found, known = " and ".join(measure.kinds) or "nothing", list(MEASURES)
+        yield Finding(f"measures {found}", where, f"state one of {', '.join(known[:-1])} or {known[-1]}")
+    for key in measure.kinds:
+        yield from _subject(mechanism, key, getattr(measure, key), where)
+    yield from _component(mechanism, measure, where)
     yield from _taken(mechanism, measure, where)
 
 
-def _axis(mechanism: Numbers, measure: Measure, where: str) -> Iterator[Finding]:
-    """Whether an axis is stated where one is needed, and there only."""
+def _subject(mechanism: Numbers, key: str, name: str, where: str) -> Iterator[Finding]:
+    """Whether what is measured exists, and has it."""
+    kind = MEASURES[key]
+    if kind.space not in ("", mechanism.space):
+        yield Finding(f"there is no {key} in space", f"{where}.{key}", "measure an angle or a rotation")
+    if kind.of == "point":
+        yield from point_exists(mechanism, name, f"{where}.{key}")
+    elif kind.of in ("joint", "any joint"):
+        if name not in mechanism.effective_joints:
+            names = list(mechanism.effective_joints)
+            yield Finding(f"there is no joint '{name}'", f"{where}.{key}", nearest(name, names))
+        elif kind.of == "joint":
+            yield from _moves(mechanism, name, key, where)
+    elif name not in (names := subjects(mechanism, kind.of)):
+        yield Finding(f"there is no {kind.of} '{name}'", f"{where}.{key}", nearest(name, names))
+
+
+def _component(mechanism: Numbers, measure: Measure, where: str) -> Iterator[Finding]:
+    """Whether an axis or a direction is stated where one is needed, once, and there only."""
     planar = mechanism.space == "planar"
-    if measure.point is not None and measure.axis is None:
-        yield Finding("a point is measured along an axis", where, "write {point: link.point, axis: x}")
-    if measure.angle is not None and measure.axis is None and not planar:
-        what = "a link in space is not turned by one angle"
-        yield Finding(what, f"{where}.angle", "measure its turn about a global axis: add axis: x, y or z")
-    turns = measure.angle is not None and not planar
-    with_axis = measure.point is not None or measure.reaction is not None or turns
-    if measure.axis is not None and not with_axis:
+    words = {MEASURES[key].vector_in(mechanism.space) for key in measure.kinds}
+    stated = [key for key in ("axis", "along") if getattr(measure, key) is not None]
+    if "must" in words and not stated:
+        if measure.kind == "point":
+            yield Finding("a point is measured along an axis", where, "write {point: link.point, axis: x}")
+        else:
+            what = "a link in space is not turned by one angle"
+            yield Finding(what, f"{where}.angle", "measure its turn about a global axis: add axis: x, y or z")
+    if stated and not words - {""}:
         what = "the axis of a coordinate is stated, but no point and no reaction"
-        yield Finding(what, f"{where}.axis", "remove it, or name a point")
+        yield Finding(what, f"{where}.{stated[0]}", "remove it, or name a point")
+    if len(stated) > 1 or ("along" in stated and measure.kind == "angle"):
+        yield Finding("has an axis and a direction", f"{where}.along", "keep one of them; an angle takes an axis")
     if measure.axis == "z" and planar:
         yield Finding("there is no z in the plane", f"{where}.axis", "write x or y")
+    if measure.along is not None and len(measure.along) != mechanism.coordinates:
+        what = f"a direction in {'the plane' if planar else 'space'} has {mechanism.coordinates} components"
+        yield Finding(what, f"{where}.along", f"write [{', '.join(['1', '0', '0'][: mechanism.coordinates])}]")
 
 
 def _moves(mechanism: Numbers, joint: str, key: str, where: str) -> Iterator[Finding]:
     """Whether a joint has the motion that is measured."""
     kind = mechanism.effective_joints[joint].type
-    if key == "reaction" or key in motions(kind) or (key not in ("rotation", "slide") and motions(kind)):
+    if key in motions(kind) or (key not in ("rotation", "slide") and motions(kind)):
         return
     others = " or ".join(motions(kind))
     remedy = f"measure its {others}" if others else "measure a point, or the angle of a link"
@@ -79,9 +101,18 @@ def _moves(mechanism: Numbers, joint: str, key: str, where: str) -> Iterator[Fin
     yield Finding(f"a {kind} joint has no {missing} about one axis", f"{where}.{key}", remedy)
 
 
+def _band(measure: Measure, where: str) -> Iterator[Finding]:
+    """Whether a dwell has a band, and nothing else has."""
+    if measure.statistic == "dwell" and measure.within is None:
+        yield Finding("a dwell is within a band", where, "add within: [10 mm, 12 mm]")
+    elif measure.statistic != "dwell" and measure.within is not None:
+        yield Finding("a band is stated, but no dwell", f"{where}.within", "add as: dwell, or remove it")
+
+
 def _taken(mechanism: Numbers, measure: Measure, where: str) -> Iterator[Finding]:
     """Whether the position, the range and the figure that are asked for go together."""
-    figure, subject = measure.statistic, measure.subject
+    figure, subject = measure.statistic, measure.kind
+    yield from _band(measure, where)
     if measure.at is not None and measure.over is not None:
         yield Finding("is taken at a position and over a range", where, "keep at: … or over: …")
     if (measure.at is not None or measure.over is not None) and not mechanism.drivers:
@@ -89,13 +120,13 @@ def _taken(mechanism: Numbers, measure: Measure, where: str) -> Iterator[Finding
         what = "there is no driver whose coordinate it could be: the mechanism has one position"
         yield Finding(what, f"{where}.{key}", "remove it")
     if measure.reduced:
-        whole = f"{subject}: {measure.efficiency}" if subject == "efficiency" else subject
+        whole = f"{subject}: {measure.subject}" if measure.subject == "cycle" else subject
         if measure.at is not None:
             yield Finding(f"the {whole} is of a range, not of a position", f"{where}.at", "remove it, or say over: […]")
         if figure is not None and not (subject == "dead_centre" and figure in PLACES):
             remedy = "remove it" if subject != "dead_centre" else f"write {' or '.join(PLACES)}"
             yield Finding(f"the {whole} is one number of a range already", f"{where}.as", remedy)
-        if measure.efficiency == "cycle" and measure.over is not None:
+        if measure.subject == "cycle" and measure.over is not None:
             yield Finding("the efficiency of the cycle is over all of it", f"{where}.over", "remove it")
     elif measure.at is not None and figure not in (None, "value"):
         what = f"the {figure} is of a range, not of a position"
@@ -119,6 +150,12 @@ def measure_values(mechanism: Numbers, numbers: ParameterSet) -> Iterator[Findin
         least, most = value("at_least"), value("at_most")
         if least > most:
             yield Finding(f"at least {least:g} and at most {most:g} (SI)", f"{where}.at_least", "exchange them")
+        low, high = value("within.from"), value("within.to")
+        if low >= high:
+            yield Finding(f"the band runs from {low:g} to {high:g} (SI)", f"{where}.within", "exchange its ends")
+        parts = [number for path, number in numbers.nominal.items() if path.startswith(f"{where}.along.")]
+        if parts and not any(parts):
+            yield Finding("the direction is zero", f"{where}.along", "give it a length, such as [1, 0]")
         start, end = value("over.from"), value("over.to")
         kinds = {one.kind.name for key, one in numbers.entries.items() if key.startswith(f"{where}.over.")}
         if len(kinds) > 1:

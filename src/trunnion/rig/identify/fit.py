@@ -254,7 +254,7 @@ class Problem:
             size = block.turns.shape[1]
             if size == 1 < len(status):  # a figure of the whole cycle
                 good = np.array([bool(np.all(status < Status.NOT_CONVERGED))])
-            elif measure.of_motion or measure.kind == "rate":  # whatever forces do
+            elif measure.of_motion:  # whatever forces do
                 good = (status < Status.SINGULAR) & (status != Status.NEAR_SINGULAR)
             else:
                 guard = -(-size // PER_GUARD) if self.guard is None else self.guard

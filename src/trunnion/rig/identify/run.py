@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from trunnion.errors import Finding, MechanismError
 from trunnion.measures.measures import Measure, named
 from trunnion.model.mechanism import Mechanism
-from trunnion.rig.identify.blocks import Block, blocks_of, channels_of, finite
+from trunnion.rig.identify.blocks import EFFICIENCY, Block, blocks_of, channels_of, finite
 from trunnion.rig.identify.courses import Model
 from trunnion.rig.identify.fit import Problem, fit, sensors_of
 from trunnion.rig.identify.held import HoldOut, held_out
@@ -199,13 +199,12 @@ def _measures(mechanism: Mechanism, run: Run, blocks: Sequence[Block]) -> dict[s
             raise MechanismError(Finding(what, f"channel {block.channel}", "give them channels of their own"))
     found = {name: named(mechanism, [text], run.values)[0] for name, text in texts.items()}
     for name, measure in found.items():
-        if not measure.everywhere or measure.kind not in COURSES or measure.of_attitude(run.system):
+        if not measure.everywhere or not (measure.single(run.system) or measure.kind == EFFICIENCY):
             what = f"measures {texts[name]}, which is no one number at each position{told_at(measure)}"
-            raise MechanismError(Finding(what, f"channel {name}", f"one of {', '.join(COURSES)} is"))
+            raise MechanismError(
+                Finding(what, f"channel {name}", "effort:DRIVER, load:LOAD, rate:JOINT or link.point.x is")
+            )
     return found
-
-
-COURSES = ("effort", "load", "rate", "efficiency", "reaction", "rotation", "slide", "angle", "point")
 
 
 def with_estimates(mechanism: Mechanism, result: xr.Dataset) -> Mechanism:

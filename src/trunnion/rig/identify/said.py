@@ -23,7 +23,6 @@ MOSTLY = 0.5  # of the variance
 POOR = 2.0  # times what is expected, of predictions
 MOST_NAMED = 3
 FEW = 5.0  # degrees of freedom
-FORCES = ("effort", "load", "reaction", "efficiency")
 NUMBERS = ("no", "one", "two", "three", "four", "five", "six")
 
 
@@ -273,7 +272,7 @@ def _exact(judged: Judged) -> Iterator[Finding]:
             stated = bool(one.effects or shared_zero(accuracy) or accuracy.gain)
             known[one.channel] = known.get(one.channel, False) or stated
     bare = [channel for channel, told in known.items() if not told]
-    forces = [channel for channel in bare if measures[channel].kind in FORCES]
+    forces = [channel for channel in bare if not measures[channel].of_motion]
     for channels, severity in ((forces, Severity.WARNING), ([one for one in bare if one not in forces], Severity.NOTE)):
         if channels:
             what = f"no accuracy is stated of {_joined(channels)}: zero and gain are taken as exact"

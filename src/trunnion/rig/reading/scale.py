@@ -9,6 +9,7 @@ from typing import Annotated
 
 from pydantic import AfterValidator
 
+from trunnion.model.measure_table import MEASURES
 from trunnion.model.names import nearest
 from trunnion.model.part import problem
 from trunnion.model.units import UnitError
@@ -18,19 +19,7 @@ __all__ = ["QUANTITIES", "MeasureText", "Scale", "default_unit", "scale"]
 
 NONE = Fraction(0)
 # SI units that a kind of measure may have, the first being what a plain number is taken for
-QUANTITIES: dict[str, tuple[str, ...]] = {
-    "effort": ("N m", "N"),
-    "rate": ("rad/s", "m/s"),
-    "load": ("N m", "N"),
-    "rotation": ("rad",),
-    "slide": ("m",),
-    "angle": ("rad",),
-    "point": ("m",),
-    "reaction": ("N",),
-    "path_error": ("m",),
-    "transmission_error": ("rad", "m"),
-    "efficiency": ("1",),
-}
+QUANTITIES = {name: tuple(one.unit for one in kind.quantities) for name, kind in MEASURES.items()}
 
 
 def _kind(measures: str) -> str:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from trunnion.errors import Finding, MechanismError, Severity, Status, counted
-from trunnion.measures.measures import MEASURES, Measure, named
+from trunnion.measures.measures import Measure, named
 from trunnion.rig.modelled import told_at
 from trunnion.rig.reading.rig_file import Rig, Value
 from trunnion.rig.virtual.courses import Sampled, cycle_efficiency, sampled
@@ -23,7 +23,6 @@ __all__ = ["Case", "case_names", "case_of", "channels_of", "findings_of", "measu
 MOST_ROWS = 20_000_000
 BEYOND = 0.1  # of a cycle that is recorded before the first and past the last, so that their ends are there
 MOST_NAMED = 20  # conditions in one finding
-SINGLE = ("point", "angle", "rotation", "slide", "rate", "effort", "reaction", "load")
 
 
 @dataclass(frozen=True)
@@ -117,14 +116,14 @@ def measures_of(rig: Rig, run: Run) -> list[Measure]:
         except MechanismError as error:
             findings += [replace(one, where=where) for one in error.findings]
             continue
-        if not measure.everywhere or measure.kind not in SINGLE or measure.of_attitude(run.system):
+        if not measure.everywhere or not measure.single(run.system):
             what = f"'{sensor.measures}' is no number that a sensor shows at every instant{told_at(measure)}"
             remedy = "write effort:DRIVER, rate:JOINT, load:LOAD, rotation:JOINT, slide:JOINT or link.point.x"
             findings.append(Finding(what, where, remedy))
         found.append(measure)
     if findings:
         raise MechanismError(findings)
-    if run.determinacy is not None and any(MEASURES[one.kind].of_forces for one in found):
+    if run.determinacy is not None and not all(one.of_motion for one in found):
         run.determinacy.refuse()
     return found
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy import signal
 
 from trunnion.errors import Finding, MechanismError
+from trunnion.model.measure_table import MEASURES
 from trunnion.model.units import UnitError
 from trunnion.rig.reading.amounts import Amount, Dimensions, alike, dimensions
 from trunnion.rig.reading.rig_file import Sensor
@@ -58,7 +59,8 @@ class Channel:
     @property
     def at_rest(self) -> bool:
         """Whether it reads zero in an idle machine: what it measures is a force, a torque or a speed."""
-        return self.measures.partition(":")[0] in ("effort", "load", "reaction", "rate")
+        kind = MEASURES.get(self.measures.partition(":")[0])
+        return kind is not None and kind.at_rest
 
     @property
     def zeroed(self) -> bool:

@@ -1,8 +1,8 @@
 """What the play of every joint does to a measure: worst case and scatter, one number for each clearance.
 
-A small offset cᵢ of the pin in the end i of its hole changes a measure y by Qᵢ · cᵢ. Of a measure of the motion, Qᵢ
+A small offset cᵢ of the pin in the end i of its hole changes a measure y by Qᵢ · cᵢ. Of a coordinate or an angle, Qᵢ
 is what the pin presses on that end under the measure's unit load alone, without friction and with the drivers at
-rest: virtual work. So one walk backward through the modules serves all joints. Of an effort no load stands for it,
+rest: virtual work. So one walk backward through the modules serves all joints. For a speed or a force no load stands,
 and Qᵢ is its derivative by the offset, friction included: dual numbers through the whole analysis.
 
 With the offset anywhere in a disc of radius ρ (an interval, a ball, n components):
@@ -30,7 +30,8 @@ from trunnion.cycle.fill import unwrap_row
 from trunnion.cycle.positions import check_steps
 from trunnion.errors import Finding, MechanismError, Severity, Status
 from trunnion.joints.clearance import CLEARANCE_MODELS, Vector, worst_case
-from trunnion.measures.measures import MOTIONS, Measure, named, outputs
+from trunnion.measures.measures import Measure, named, outputs
+from trunnion.measures.motion import MOTIONS
 from trunnion.model.contact import clearance
 from trunnion.model.mechanism import Mechanism
 from trunnion.solve import backward as kinetostatics
@@ -79,7 +80,7 @@ def by_virtual_load(walk: Forward, measure: Measure, known: Mapping[str, Play]) 
 def by_duals(
     run: Run, measure: Measure, known: Mapping[str, Play], time: Array, method: FrictionMethod, carrier: str = HOLE
 ) -> Loads:
-    """The same by derivatives through the whole analysis, of measures of the motion or of an effort.
+    """The same by derivatives through the whole analysis, of any measure that is one number at each position.
 
     carrier: of `shifts.CARRIERS`, the link on which seats stay: pins that turn with one or the other move otherwise.
     """
@@ -87,10 +88,12 @@ def by_duals(
     rows = np.eye(len(paths))[:, :, None]  # (offset, sample, 1): each sample moves one offset
     offsets = {path: Dual(0.0, row) for path, row in zip(paths, rows, strict=True)}
     with np.errstate(all="ignore"):
-        if measure.of_motion:
+        if measure.kind in MOTIONS:
             number = measure.value(forward(run.system, {**run.values, **offsets}, run.chosen.assembly, time))
+        elif measure.of_motion:
+            number = measure.curve(forward(run.system, {**run.values, **offsets}, run.chosen.assembly, time))[0]
         else:
-            number = run.at(time, offsets, method).efforts[measure.subject]
+            number = measure.curve(run.at(time, offsets, method))[0]
     slopes = iter(np.broadcast_to(derivative(number), (len(paths), len(time))))
     return {name: [tuple(next(slopes) for _ in end) for end in play.model.ends] for name, play in known.items()}
 
@@ -136,11 +139,11 @@ class Effect:
 def play(mechanism: Mechanism, measures: Sequence[str] | None = None, steps: int = 360) -> xr.Dataset:
     """What the play of every joint does to measures over the cycle: worst case and standard deviation.
 
-    measures: names of the model's, or `link.point.x`, `angle:link` (in space `angle:link.x`, about a global axis),
-    `rotation:joint`, `slide:joint`, `effort:driver`; all of the model if not given, or, where it states none, rotation
-    and slide of every joint to the ground that is not driven. Returns a Dataset over (measure, joint, position) of
-    `play_result.VARIABLES`: SI, each measure in its own unit. NaN where a position has no answer.
-    Method: virtual work for measures of the motion, derivatives by dual numbers for efforts; first order in the play,
+    measures: names of the model's, or written as `named` reads them, of what has one number at every position:
+    `link.point.x`, `angle:link`, `effort:driver`, `velocity:link.point` …; all of the model if not given, or, where it
+    states none, rotation and slide of every joint to the ground that is not driven. Returns a Dataset over (measure,
+    joint, position) of `result.VARIABLES`: SI, each measure in its own unit. NaN where a position has no answer.
+    Method: virtual work for coordinates and angles, derivatives by dual numbers for others; first order in the play,
     about the mechanism with every pin in the middle of its hole.
     Raises MechanismError if no joint states a clearance, for an unknown measure, or as `analyse` does.
     """
@@ -159,8 +162,8 @@ def _measures(run: Run, names: Sequence[str] | None) -> tuple[list[Measure], lis
     """The measures asked for; notes where they are chosen because none is stated, or some are left out."""
     mechanism = run.system.mechanism
     found = named(mechanism, mechanism.measures if names is None else names, run.values)
-    others = [one.name for one in found if one.kind not in (*MOTIONS, "effort")]
-    what = f"play is known of measures {', '.join(MOTIONS)} and effort, which {', '.join(others)} is none of"
+    others = [one.name for one in found if one.kind not in MOTIONS and not one.single(run.system)]
+    what = f"play is known of what has one number at every position, which {', '.join(others)} has not"
     remedy = "`trunnion tolerance` knows the others"
     if others and names is not None:
         raise MechanismError(Finding(what, "measures", remedy))
@@ -222,14 +225,14 @@ def _fill(effect: Effect, rates: Array, window: slice) -> None:
         acting = status < Status.NOT_CONVERGED
     effect.status[window] = status
     for i, measure in enumerate(effect.measures):
-        if back is None or measure.of_motion:
+        if measure.kind in MOTIONS:
             value, known, rates[i, window] = measure.value(walk), posed, measure.rate(walk)
             loads, others = by_virtual_load(walk, measure, effect.plays), None
             placed = status < Status.NOT_ASSEMBLED
         else:
-            value, known = back.efforts[measure.subject], acting
+            value = measure.curve(walk if back is None or measure.of_motion else back)[0]
+            known = placed = posed if measure.of_motion else acting
             loads, others = _both(run, measure, effect.plays, time, method)
-            placed = acting
         effect.value[i, window] = np.where(placed, value, np.nan)
         _put(effect, i, loads, window, known, others or {})
 
@@ -237,7 +240,7 @@ def _fill(effect: Effect, rates: Array, window: slice) -> None:
 def _both(
     run: Run, measure: Measure, known: Mapping[str, Play], time: Array, method: FrictionMethod
 ) -> tuple[Loads, Loads]:
-    """Loads of an effort with every seat on the link that carries it, and on the other where the model does not say."""
+    """Loads of a speed or a force: seats on the links that carry them, and the others if the model does not say."""
     carriers = {name: shifts.carriers_of(run.system.mechanism, name) for name in known}
     found = []
     for place in range(2):

@@ -9,7 +9,7 @@ import numpy as np
 
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.measures.figures import known, reference
-from trunnion.measures.measures import MEASURES, Measure, named
+from trunnion.measures.measures import Measure, named
 from trunnion.measures.positions import plan
 from trunnion.model.mechanism import Mechanism
 from trunnion.solve.forward import forward
@@ -33,7 +33,7 @@ def measures_of(run: Run, names: Sequence[str]) -> list[Measure]:
         if measure.name in FIGURES:
             what = f"the measure '{measure.name}' has the name of a figure of the sweep"
             findings.append(Finding(what, where, "call it otherwise in the model"))
-        elif MEASURES[measure.kind].against or measure.of_attitude(run.system):
+        elif measure.of.against or measure.of_attitude(run.system):
             what = f"the measure '{measure.name}' is a deviation from the nominal mechanism, and each point is its own"
             findings.append(Finding(what, where, "sweep another; `trunnion tolerance` tells what tolerances do to it"))
         elif measure.rule == "deviation":

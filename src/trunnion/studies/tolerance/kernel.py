@@ -63,7 +63,8 @@ class NumpyKernel:
         with np.errstate(all="ignore"):
             if self.forces:
                 return self.run.solve(time, values, self.method)
-            return posed(self.run.system, values, self.run.chosen.assembly, time)
+            walk = posed if all(measure.of_places for measure in self.measures) else forward
+            return walk(self.run.system, values, self.run.chosen.assembly, time)
 
     def courses(self, values: Mapping[str, Number], time: Number) -> tuple[Courses, NDArray[np.int8]]:
         """Course of each measure by name, parts that broadcast to (sample, position), and the status of each.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from trunnion.measures.measures import MEASURES, Measure
+from trunnion.measures.measures import Measure
 from trunnion.solve.system import System
 
 __all__ = ["course_text", "text_of"]
@@ -12,15 +12,15 @@ __all__ = ["course_text", "text_of"]
 
 def text_of(measure: Measure, system: System) -> str:
     """What a measure is: "coordinate of point ram.Q, y at 270° of O"."""
-    kind = MEASURES[measure.kind].long_name.replace(" a ", " ")
+    kind = measure.of.long_name.replace(" a ", " ")
     whole = measure.subject in ("mechanism", "cycle", "instant")
     subject = f" ({measure.subject})" if whole else f" {measure.subject}"
     axis = f", {measure.axis}" if measure.axis else ""
     rule = {
-        "deviation": ", largest deviation from nominal", "value": "", "line": "", "ratio": "",
+        "deviation": ", largest deviation from nominal", "value": "", "line": "", "ratio": "", "work": "",
         "dead centre": "", "dead centre, least": " (least)",
     }.get(measure.rule, f", {measure.rule.replace('-', ' ')}")  # fmt: skip
-    own = MEASURES[measure.kind].rule == measure.rule and measure.rule != "deviation"
+    own = measure.of.rule == measure.rule and measure.rule != "deviation"
     return f"{kind}{subject}{axis}{'' if own else rule}{_where(measure, system)}"
 
 

@@ -1,0 +1,168 @@
+"""What a measure may be of: the one table that the file, its checks, every study and the documentation read.
+
+Its course, the numbers position by position, is the function of the same name in `measures.courses.COURSES`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from trunnion.model.units import KINDS, Kind, unit
+
+__all__ = ["MEASURES", "MeasureKind"]
+
+
+@dataclass(frozen=True)
+class MeasureKind:
+    """One kind of measure.
+
+    text: of its key in the file; long_name: for tables; quantity: what the course is, or both that it may be, where
+    the joint, driver or load turns and where it slides. of: what the key names (see `checks.measures`), or the words
+    that it takes. needs: `places` of the links, their `motion` too, or `forces`; only then friction is solved.
+    rule: what makes the figure of the course if no statistic is stated, an entry of `measures.figures.RULES`;
+    reduced: it is one number of a whole range already. against: whether the course is taken less that of the nominal
+    mechanism, position by position. vector: whether `axis` or `along` picks one component: it `must` or `may`; in
+    space alone: `must in space`, `may in space`. space: the only one, if it is not of both.
+    """
+
+    text: str
+    long_name: str
+    quantity: Kind | tuple[Kind, Kind]
+    of: str | tuple[str, ...]
+    needs: Literal["places", "motion", "forces"] = "places"
+    rule: str = "deviation"
+    against: bool = False
+    reduced: bool = False
+    vector: Literal["", "must", "may", "must in space", "may in space"] = ""
+    space: str = ""
+
+    @property
+    def quantities(self) -> tuple[Kind, ...]:
+        """What the course may be."""
+        return self.quantity if isinstance(self.quantity, tuple) else (self.quantity,)
+
+    @property
+    def of_forces(self) -> bool:
+        """Whether it needs more than the motion."""
+        return self.needs == "forces"
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether it is zero in an idle machine: a force or a rate, no place and no ratio."""
+        return self.needs != "places" and self.quantity is not NUMBER
+
+    def vector_in(self, space: str) -> str:
+        """Whether a component must or may be picked in a space; empty if there is none."""
+        word, inside, _ = self.vector.partition(" in ")
+        return word if not inside or space == "spatial" else ""
+
+
+LENGTH, ANGLE, FORCE, NUMBER = (KINDS[name] for name in ("length", "angle", "force", "number"))
+SPEED, SPIN, ACCELERATION = (KINDS[name] for name in ("speed", "angular speed", "acceleration"))
+MOTION, RATE, EFFORT = (ANGLE, LENGTH), (SPIN, SPEED), (KINDS["moment"], FORCE)
+
+
+def _of_results(name: str, si: str) -> Kind:
+    """What no number of a model is, but a measure may be."""
+    return Kind(name, si, f"10 {si}", (unit(si)[1],))
+
+
+SPIN_RATE = _of_results("angular acceleration", "rad/s^2")
+POWER, ENERGY = _of_results("power", "W"), _of_results("energy", "J")
+
+# in the order of the file's keys
+MEASURES: dict[str, MeasureKind] = {
+    "point": MeasureKind(
+        "link.point whose coordinate is watched", "coordinate of a point", LENGTH, "point", vector="must"
+    ),
+    "path_error": MeasureKind(
+        "link.point whose distance from its nominal place is watched", "distance of a point from its nominal place",
+        LENGTH, "point", rule="maximum", against=True,
+    ),
+    "straightness": MeasureKind(
+        "link.point whose path is watched, how far it is from a straight line", "straightness of the path of a point",
+        LENGTH, "point", rule="line", reduced=True,
+    ),
+    "angle": MeasureKind(
+        "link whose angle is watched; in space its turn about a global axis, from where it lies without errors",
+        "angle of a link", ANGLE, "link", vector="must in space",
+    ),
+    "rotation": MeasureKind(
+        "joint whose rotation is watched, second link against first", "rotation of a joint", ANGLE, "joint"
+    ),
+    "slide": MeasureKind("joint whose slide is watched", "slide of a joint", LENGTH, "joint"),
+    "transmission_error": MeasureKind(
+        "joint whose motion is watched, less the nominal one", "transmission error of a joint", MOTION, "joint",
+        against=True,
+    ),
+    "stroke": MeasureKind(
+        "joint whose stroke is watched, from end to end of its motion", "stroke of a joint", MOTION, "joint",
+        rule="peak-to-peak", reduced=True,
+    ),
+    "dead_centre": MeasureKind(
+        "joint whose dead centre is watched, as the coordinate of the first driver at which its own is largest; with "
+        "`as` place-of-minimum, smallest", "dead centre of a joint", MOTION, "joint", rule="dead centre", reduced=True,
+    ),
+    "rate": MeasureKind(
+        "joint whose speed is watched: of its rotation, of a prismatic one of its slide", "speed of a joint", RATE,
+        "joint", "motion",
+    ),
+    "joint_acceleration": MeasureKind(
+        "joint whose acceleration is watched: of its rotation, of a prismatic one of its slide",
+        "acceleration of a joint", (SPIN_RATE, ACCELERATION), "joint", "motion",
+    ),
+    "velocity": MeasureKind(
+        "link.point whose velocity is watched, its magnitude or, with `axis` or `along`, a component",
+        "velocity of a point", SPEED, "point", "motion", vector="may",
+    ),
+    "acceleration": MeasureKind(
+        "link.point whose acceleration is watched, its magnitude or, with `axis` or `along`, a component",
+        "acceleration of a point", ACCELERATION, "point", "motion", vector="may",
+    ),
+    "angular_velocity": MeasureKind(
+        "link whose angular velocity is watched; in space its magnitude or, with `axis` or `along`, a component",
+        "angular velocity of a link", SPIN, "link", "motion", vector="may in space",
+    ),
+    "angular_acceleration": MeasureKind(
+        "link whose angular acceleration is watched; in space its magnitude or, with `axis` or `along`, a component",
+        "angular acceleration of a link", SPIN_RATE, "link", "motion", vector="may in space",
+    ),
+    "transmission_angle": MeasureKind(
+        "joint of a dyad whose transmission angle is watched, from 0, where it locks, to 90 deg, where it drives best; "
+        "in the plane", "transmission angle at a joint", ANGLE, "any joint", space="planar",
+    ),
+    "pressure_angle": MeasureKind(
+        "joint of a dyad whose pressure angle is watched, from -90 to 90 deg, 0 being best; in the plane",
+        "pressure angle at a joint", ANGLE, "any joint", space="planar",
+    ),
+    "effort": MeasureKind("driver whose effort is watched", "effort of a driver", EFFORT, "driver", "forces"),
+    "load": MeasureKind(
+        "load on a joint, whose torque or force against the joint's positive sense is watched",
+        "torque or force of a load on a joint", EFFORT, "load on a joint", "forces",
+    ),
+    "reaction": MeasureKind(
+        "joint whose reaction is watched, its magnitude or, with `axis` or `along`, a component",
+        "reaction in a joint", FORCE, "any joint", "forces", vector="may",
+    ),
+    "power": MeasureKind(
+        "driver or load whose power is watched, positive where it gives the mechanism power",
+        "power of a driver or load", POWER, "driver or load", "forces",
+    ),
+    "friction_power": MeasureKind(
+        "joint whose friction is watched, as the power lost to it", "power lost to friction in a joint", POWER,
+        "any joint", "forces",
+    ),
+    "friction_energy": MeasureKind(
+        "joint whose friction is watched, as the energy lost to it over the cycle or range",
+        "energy lost to friction in a joint", ENERGY, "any joint", "forces", rule="work", reduced=True,
+    ),
+    "efficiency": MeasureKind(
+        "that of the whole `cycle`, or at each `instant`", "efficiency", NUMBER, ("cycle", "instant"), "forces",
+        rule="ratio",
+    ),
+    "locking_margin": MeasureKind(
+        "of the `mechanism`: the multiple of its friction at which it locks", "locking margin", NUMBER,
+        ("mechanism",), "forces", rule="minimum",
+    ),
+}  # fmt: skip

@@ -20,12 +20,9 @@ from trunnion.algebra.dual import Dual, derivative, primal
 from trunnion.measures.figures import figure, kept, known, shown, span
 from trunnion.measures.measures import Measure, coordinate_unit, named
 from trunnion.measures.positions import plan
-<<<<<<< HEAD
-from trunnion.results.attributes import summary_of
-=======
 from trunnion.model.measure_parts import STATISTICS
 from trunnion.model.measure_table import MEASURES
->>>>>>> w-measures
+from trunnion.results.attributes import summary_of
 from trunnion.solve.friction_method import MARGIN
 from trunnion.solve.run import Run, prepare
 

@@ -10,13 +10,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol, cast
 
-from trunnion.algebra import rigid
+from trunnion.algebra import plane, space
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.algebra.rigid import Screw
-from trunnion.algebra.space import Vector3, cross, dot
-from trunnion.groups import planar
-from trunnion.groups.planar import Wrench
+from trunnion.algebra.plane import Wrench
+from trunnion.algebra.space import Screw
+from trunnion.algebra.vector import Vector3, cross, dot
 from trunnion.solve.forward import Forward
 from trunnion.solve.space.motion import SpatialWalk
 
@@ -90,7 +89,7 @@ def _push(measure: Asked, walk: Forward) -> dict[str, Any]:
 def _at(walk: Forward, link: str, wrench: Wrench, x: Number, y: Number) -> Wrench:
     """A load at a place, about the origin of a link."""
     frame = walk.motions[link].frame
-    return planar.about(wrench, frame.x - x, frame.y - y)
+    return plane.about(wrench, frame.x - x, frame.y - y)
 
 
 def _angle(measure: Asked, walk: Forward) -> Number:
@@ -104,7 +103,7 @@ def _turn(measure: Asked, walk: Forward) -> dict[str, Any]:
 
 def _rotation(measure: Asked, walk: Forward) -> Number:
     first, second = (walk.motions[link].frame for link in walk.system.joints[measure.subject][1])
-    c, s = planar.turned(first.c, -first.s, second.c, second.s)
+    c, s = plane.turned(first.c, -first.s, second.c, second.s)
     return namespace(c, s).arctan2(s, c)
 
 
@@ -132,7 +131,7 @@ def _pull(measure: Asked, walk: Forward) -> dict[str, Any]:
 
 def _push_in_space(measure: Asked, walk: SpatialWalk) -> dict[str, Any]:
     link, point = measure.subject.split(".")
-    return {link: rigid.about(cast(Vector3, direction(measure, 3)), NULL, walk.point(link, point).place)}
+    return {link: space.about(cast(Vector3, direction(measure, 3)), NULL, walk.point(link, point).place)}
 
 
 def _angle_in_space(measure: Asked, walk: SpatialWalk) -> Number:
@@ -152,7 +151,7 @@ def _turn_in_space(measure: Asked, walk: SpatialWalk) -> dict[str, Any]:
 def _both(walk: SpatialWalk, joint: str, load: Screw) -> dict[str, Any]:
     """A load on the second link of a joint and its opposite on the first."""
     first, second = walk.system.joints[joint][1]
-    return {first: rigid.times(-1.0, load), second: load}
+    return {first: space.times(-1.0, load), second: load}
 
 
 def _rotation_in_space(measure: Asked, walk: SpatialWalk) -> Number:
@@ -171,7 +170,7 @@ def _slide_in_space(measure: Asked, walk: SpatialWalk) -> Number:
 def _pull_in_space(measure: Asked, walk: SpatialWalk) -> dict[str, Any]:
     joint = measure.subject
     second = walk.element(walk.system.joints[joint][1][1], joint)
-    return _both(walk, joint, rigid.about(second.z, NULL, second.place))
+    return _both(walk, joint, space.about(second.z, NULL, second.place))
 
 
 MOTIONS: dict[str, MotionKind] = {

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from trunnion.solve.run import Run
 
 from trunnion.cycle.variables import fill_of
+from trunnion.cycle.watched import watched
 from trunnion.solve.friction_method import MARGIN
 from trunnion.solve.loads import useful_loads
 
@@ -65,21 +66,23 @@ def finish(run: Run, found_positions: Positions) -> xr.Dataset:
     mechanism, arrays, time = run.system.mechanism, found_positions.arrays, found_positions.time
     method = found_positions.method
     found, near = findings(run, found_positions)
+    measured = watched(run, time, method)
     attributes: dict[str, Any] = {
         **origin(mechanism, run.system.plan.formula, mobility=run.system.plan.mobility),
         "method": method.name,
         **cited(references(mechanism)),
         "driver_units": effort_units(run.system),
         "spring_units": spring_units(run.system),
-        "findings": finding_rows(found),
-        "summary": _summary(run, found_positions, near),
+        "findings": finding_rows([*found, *measured.findings]),
+        "summary": [*_summary(run, found_positions, near), *_finite_rows(measured.rows())],
         "inputs": inputs(mechanism),
         "scene": _scene(run),
         "periodic": int(run.cycle.periodic),
     }
-    return results.dataset(
+    result = results.dataset(
         arrays, found_positions.labels, time, found_positions.means, attributes, found_positions.ideal
     )
+    return measured.joined(result)
 
 
 def findings(run: Run, at: Positions) -> tuple[list[Finding], near_locking.Locking | None]:
@@ -265,6 +268,10 @@ def _summary(run: Run, found: Positions, near: near_locking.Locking | None) -> l
     rows.append({"label": f"positions solved, of {len(time)}", "value": solved - lost, "unit": "1"})
     if lost:
         rows.append({"label": "positions not valid, for a pin loses contact", "value": lost, "unit": "1"})
+    return _finite_rows(rows)
+
+
+def _finite_rows(rows: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
     return [{**row, "value": _finite(row["value"])} for row in rows]
 
 

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
 import trunnion
+from trunnion.measures.kernel import NumpyKernel
 from trunnion.measures.measures import named
 from trunnion.rig.reading.measurement import Accuracy, Condition, Course, Measurement
 from trunnion.solve.friction_method import FrictionMethod
-from trunnion.studies.tolerance.kernel import NumpyKernel
 
 __all__ = ["Sensors", "True_", "truth"]
 

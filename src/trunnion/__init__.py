@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from trunnion.cycle.analyse import analyse
     from trunnion.cycle.inspect import Check, check
     from trunnion.cycle.locking import locking
+    from trunnion.cycle.vocabulary import vocabulary
     from trunnion.errors import Finding, MechanismError, Status
     from trunnion.model.mechanism import Mechanism
     from trunnion.model.mechanism import read_mechanism as read
@@ -57,6 +58,7 @@ _PLACES = {
     "save": "trunnion.results.export",
     "sweep": "trunnion.studies.sweep.study",
     "tolerance": "trunnion.studies.tolerance.study",
+    "vocabulary": "trunnion.cycle.vocabulary",
 }
 _ELSEWHERE = {"read": "read_mechanism"}
 _MODULES = {"dual": "trunnion.dual"}
@@ -85,6 +87,7 @@ __all__ = [
     "save",
     "sweep",
     "tolerance",
+    "vocabulary",
 ]
 
 

@@ -91,8 +91,19 @@ def check(
             show_default=False,
         ),
     ] = None,
+    list_: Annotated[
+        bool, typer.Option("--list", help="Instead, list what can be set, swept and measured, with units and values.")
+    ] = False,
+    names: Annotated[
+        Path | None, typer.Option("--out", help="Write that list: a .json file.", show_default=False)
+    ] = None,
 ) -> None:
     """Findings, mobility, structural formula and plan of a mechanism, and the ways it can be assembled in."""
+    if list_ or names:
+        from trunnion.cli.vocabulary import show
+
+        show(file, stated(file, set_, table, friction), names)
+        raise typer.Exit
     from trunnion.cycle.inspect import check as inspect
     from trunnion.views.assembly.ways import gear_line, lines
 

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from trunnion.solve.run import Run
 
 from trunnion.cycle.variables import fill_of
+from trunnion.cycle.watched import watched
 from trunnion.solve.loads import useful_loads
 
 __all__ = [
@@ -66,21 +67,23 @@ def finish(run: Run, found_positions: Positions) -> xr.Dataset:
     mechanism, arrays, time = run.system.mechanism, found_positions.arrays, found_positions.time
     method = found_positions.method
     found, near = findings(run, found_positions)
+    measured = watched(run, time, method)
     attributes: dict[str, Any] = {
         **origin(mechanism, run.system.plan.formula, mobility=run.system.plan.mobility),
         "method": method.name,
         **cited(references(mechanism)),
         "driver_units": effort_units(run.system),
         "spring_units": spring_units(run.system),
-        "findings": finding_rows(found),
-        "summary": figure_rows(_summary(run, found_positions, near)),
+        "findings": finding_rows([*found, *measured.findings]),
+        "summary": figure_rows([*_summary(run, found_positions, near), *measured.summary()]),
         "inputs": inputs(mechanism),
         "scene": _scene(run),
         "periodic": int(run.cycle.periodic),
     }
-    return results.dataset(
+    result = results.dataset(
         arrays, found_positions.labels, time, found_positions.means, attributes, found_positions.ideal
     )
+    return measured.joined(result)
 
 
 def findings(run: Run, at: Positions) -> tuple[list[Finding], near_locking.Locking | None]:

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.space import moment_at, quaternion
+from trunnion.algebra.unwrap import unwrap_row
 from trunnion.algebra.vector import cross, dot, plus, scaled
 from trunnion.cycle import fill
 from trunnion.solve.backward import Backward
@@ -119,7 +120,7 @@ def unwrap(arrays: Arrays, system: System, values: Values, time: NDArray[np.floa
         if name in system.mechanism.drivers and system.turns(name):
             rotation[:] = np.where(np.isfinite(rotation), system.drive(values, name, time)[0], np.nan)
         elif kind in ON_ONE_AXIS and kind != "prismatic":
-            fill.unwrap_row(rotation, arrays["joint_rotation_velocity"][i], step)
+            unwrap_row(rotation, arrays["joint_rotation_velocity"][i], step)
     for i, (name, (kind, _)) in enumerate(system.joints.items()):
         if kind == "helical":  # its slide follows the whole turns
             pitch = float(np.ravel(values[f"joints.{name}.pitch"])[0])

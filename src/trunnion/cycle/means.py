@@ -14,11 +14,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.quadrature import Effort, integrals
+from trunnion.algebra.quadrature import CANCELLED, Effort, integrals
 from trunnion.errors import Status
 from trunnion.solve.switches import Mechanisms, edges
 
-__all__ = ["AVERAGED", "ROUNDING", "Mean", "Means", "Powers", "means_of", "still"]
+__all__ = ["AVERAGED", "Mean", "Means", "Powers", "means_of", "still"]
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -26,7 +26,6 @@ Powers = Callable[[Rows, Array], Mapping[str, Array]]
 
 # what `Powers` has of each lane and node, NaN where there is no answer
 AVERAGED = ("drive_power", "useful_power", "friction_power", "drive_effort", "power_residual")
-ROUNDING = 1e-12  # of a mean of magnitudes
 NEGLIGIBLE = 1e-9  # of the largest power: what is below it need not be known to many digits
 RESIDUALS = 4.0  # of the mean residual of the power balance: what rounding leaves of a power that cancels
 
@@ -111,8 +110,8 @@ def means_of(
     told = []
     for k, times in enumerate(between):
         value, error, size = (part[:, k] / (times[-1] - times[0]) for part in (found.value, found.error, found.size))
-        rounding = np.maximum(ROUNDING * size, RESIDUALS * value[3])
-        rounding[2] = max(rounding[2], ROUNDING * np.max(size[:3]))
+        rounding = np.maximum(CANCELLED * size, RESIDUALS * value[3])
+        rounding[2] = max(rounding[2], CANCELLED * np.max(size[:3]))
         driven, useful, lost = (Mean(*(float(one[i]) for one in (value, error, size, rounding))) for i in range(3))
         efforts = np.sqrt(value[4 : 4 + drivers])
         told.append(Means(driven, useful, lost, value[4 + drivers :], efforts))
@@ -125,7 +124,7 @@ def still(arrays: Mapping[str, Array]) -> Means:
 
     def of(number: Array) -> Mean:
         value = float(number[0]) if alone else float("nan")
-        return Mean(value, 0.0, abs(value), ROUNDING * abs(value))
+        return Mean(value, 0.0, abs(value), CANCELLED * abs(value))
 
     lost, efforts = arrays["friction_power"], arrays["drive_effort"]
     return Means(

@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from trunnion.algebra import linalg
 from trunnion.algebra.dual import primal
-from trunnion.algebra.quadrature import integrals
-from trunnion.cycle.means import ROUNDING
+from trunnion.algebra.quadrature import CANCELLED, integrals
 from trunnion.errors import Finding, Severity, counted
 from trunnion.results.figure import MORE_THAN, Figure
 from trunnion.solve import continuation
@@ -215,7 +214,7 @@ def _reversed_means(run: Run, back: Reverse, useful: Sequence[str]) -> tuple[flo
 
     found = integrals(powers, [run.edges])
     delivered, given = (
-        0.0 if abs(value) <= max(error, ROUNDING * size) else value / run.cycle.duration
+        0.0 if abs(value) <= max(error, CANCELLED * size) else value / run.cycle.duration
         for value, error, size in zip(found.value[:, 0], found.error[:, 0], found.size[:, 0], strict=True)
     )
     return delivered, given

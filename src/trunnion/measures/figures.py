@@ -24,8 +24,8 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.cycle.fill import unwrap_row
-from trunnion.cycle.means import ROUNDING
+from trunnion.algebra.quadrature import CANCELLED
+from trunnion.algebra.unwrap import unwrap_row
 from trunnion.errors import Status
 from trunnion.measures.dwell import share_within
 from trunnion.measures.extremes import Extreme, Grid, largest, shape_of
@@ -131,7 +131,7 @@ def _net(power: Number, course: Course) -> Number:
     value, real = total(power, course.grid.weights), primal(power)
     size = total(np.abs(real), course.grid.weights)
     off = np.abs(primal(value) - total(real, course.grid.rough)) / np.where(size > 0, size, 1.0)
-    error = size * np.maximum(ROUNDING, np.minimum(off, (200 * off) ** 1.5))
+    error = size * np.maximum(CANCELLED, np.minimum(off, (200 * off) ** 1.5))
     return namespace(value).where(np.abs(primal(value)) <= error, 0.0, value)
 
 

@@ -56,7 +56,7 @@ def columns(result: xr.Dataset, table: str = "measures") -> list[Column]:
         return [(name, unit, values.__getitem__) for name, unit, values in tables.flat(result, table)]
     if "swept" in result.attrs:
         return [(name, unit, values.__getitem__) for name, (unit, values) in figures(result).items()]
-    if "measure" in result.dims:
+    if "worst_case" in result:
         return _played(result)
     if "assembling" in result.attrs:
         return _fit(result)
@@ -88,7 +88,16 @@ def columns(result: xr.Dataset, table: str = "measures") -> list[Column]:
         found.append(_column(result, "seat_rounds", "seat_rounds", ()))
     names = np.array([status.name.lower() for status in Status])
     found.append(("status", "", lambda window: names[result["status"].values[window]]))
-    return found
+    return found + _measured(result)
+
+
+def _measured(result: xr.Dataset) -> list[Column]:
+    """The model's measures, by their names."""
+    units = attribute(result, "measure_units")
+    return [
+        (str(result["measure"].values[i]), unit, _column(result, "measure_value", "", (i,))[2])
+        for i, unit in enumerate(units)
+    ]
 
 
 def _played(result: xr.Dataset) -> list[Column]:

@@ -10,16 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError, Status
-from trunnion.measures.figures import known
+from trunnion.measures.kernel import courses_of
 from trunnion.measures.measures import Measure, coordinate_unit, named
 from trunnion.model.mechanism import Mechanism
 from trunnion.rig.reading.measurement import Condition
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
-from trunnion.solve.seating import settle
-from trunnion.solve.status import status_of
-from trunnion.solve.travel import lanes
-from trunnion.studies.tolerance.kernel import NumpyKernel
 
 __all__ = ["Modelled", "measure_of", "modelled", "prepared", "told_at"]
 
@@ -103,14 +99,15 @@ def modelled(
     if run.determinacy is not None and not all(one.of_motion for one in measures.values()):
         run.determinacy.refuse()
     time = np.asarray(condition.phase, float) * run.cycle.duration
-    courses, status = _courses(run, {one.name: one for one in measures.values()}, time, method)
+    found, status = courses_of(run, list({one.name: one for one in measures.values()}.values()), time, method)
+    courses = {name: _row(parts[0], time) for name, parts in found.items()}
     drive, unit, span = _drive(run, time)
     _same_cycle(run, condition, unit, span)
-    found = {
+    beside = {
         channel: _beside(measure.turning(run.system), courses[measure.name], condition.courses[channel].mean)
         for channel, measure in measures.items()
     }
-    return Modelled(run, drive, unit, span, status, found, measures)
+    return Modelled(run, drive, unit, span, status, beside, measures)
 
 
 def _checked(run: Run, condition: Condition, channel: str, name: str) -> Measure:
@@ -136,27 +133,6 @@ def _in(condition: Condition) -> Iterator[None]:
     except MechanismError as error:
         told = [replace(one, what=f"{one.what} (in condition {condition.name})") for one in error.findings]
         raise MechanismError(told) from None
-
-
-def _courses(
-    run: Run, measures: Mapping[str, Measure], time: Array, method: FrictionMethod
-) -> tuple[dict[str, Array], NDArray[np.int8]]:
-    """Each measure at the times, and the statuses; pins with a seat lie in it."""
-    kernel = NumpyKernel(run, tuple(measures.values()), method)
-    if not run.seats:
-        parts, status = kernel.courses(run.values, time)
-        return {name: _row(part[0], time) for name, part in parts.items()}, status
-    seen, quick = lanes(time, run.cycle), replace(method, margin_up_to=0.0)
-    with np.errstate(all="ignore"):
-        seated = settle(run, seen, method, run.ideal(seen.times, quick))
-        status = status_of(seated.back, time.shape)
-        np.maximum(status, np.where(seated.sticks, np.int8(Status.ZERO_SLIP), np.int8(0)), out=status)
-        found = {}
-        for name, measure in measures.items():
-            back = seated.back.walk if measure.of_motion else seated.back
-            course = _row(measure.curve(back)[0], time)
-            found[name] = np.where(known(measure, status), course, np.nan)
-    return found, status
 
 
 def _row(number: object, time: Array) -> Array:

@@ -3,25 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
-
-import numpy as np
 
 from trunnion.errors import Finding, MechanismError, Severity
-from trunnion.measures.figures import known, reference
 from trunnion.measures.measures import Measure, named
-from trunnion.measures.positions import plan
 from trunnion.model.mechanism import Mechanism
-from trunnion.solve.forward import forward
-from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.run import Run
-from trunnion.solve.seating import settle
-from trunnion.solve.status import status_of
-from trunnion.solve.travel import lanes
 from trunnion.studies.sweep.figures import FIGURES
-from trunnion.studies.tolerance.kernel import Courses, NumpyKernel
 
-__all__ = ["left_out", "measures_of", "of_point"]
+__all__ = ["left_out", "measures_of"]
 
 
 def measures_of(run: Run, names: Sequence[str]) -> list[Measure]:
@@ -42,41 +31,6 @@ def measures_of(run: Run, names: Sequence[str]) -> list[Measure]:
     if findings:
         raise MechanismError(findings)
     return found
-
-
-def of_point(run: Run, names: Sequence[str], steps: int, method: FrictionMethod) -> dict[str, float]:
-    """The figures of measures of one mechanism, SI, by name; NaN where a position that one needs has no answer."""
-    measures = measures_of(run, names)
-    places = plan(run, measures, steps)
-    if any(one.wants_margin for one in measures):
-        method = replace(method, margin_up_to=MARGIN)
-    courses, system = _courses(run, measures, places.times, method), run.system
-    walk = forward(system, run.values, run.chosen.assembly, places.times)
-    found = {}
-    for measure in measures:
-        turns = measure.of_motion and measure.turning(system)
-        rate = measure.coordinate(system).rate(walk) if turns else None
-        found[measure.name] = reference(
-            measure, courses[measure.name], places.windows[measure.name], system, rate
-        ).figure
-    return found
-
-
-def _courses(run: Run, measures: Sequence[Measure], time: np.ndarray, method: FrictionMethod) -> Courses:
-    """The course of each measure at the times; pins with a seat lie in it."""
-    if not run.seats:
-        return NumpyKernel(run, tuple(measures), method).courses(run.values, time)[0]
-    seen = lanes(time, run.cycle)
-    with np.errstate(all="ignore"):
-        seated = settle(run, seen, method, run.ideal(seen.times, replace(method, margin_up_to=0.0)))
-        status = status_of(seated.back, time.shape)
-        return {
-            measure.name: tuple(
-                np.where(known(measure, status), part, np.nan)
-                for part in measure.curve(seated.back.walk if measure.of_motion else seated.back)
-            )
-            for measure in measures
-        }
 
 
 def left_out(mechanism: Mechanism, names: Sequence[str]) -> list[Finding]:

@@ -24,6 +24,7 @@ from trunnion.cycle.account import model_notes
 from trunnion.cycle.means import AVERAGED, Means, means_of, still
 from trunnion.cycle.positions import check_steps, filled, positions
 from trunnion.errors import Finding, MechanismError, Severity, Status
+from trunnion.measures.kernel import figures_of
 from trunnion.model.checks.values import check_values
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.parameters import ParameterSet
@@ -37,7 +38,7 @@ from trunnion.solve.switches import Mechanisms
 from trunnion.solve.system import Cycle, law_of, rubbing
 from trunnion.studies.sweep.figures import Reduced, reduced
 from trunnion.studies.sweep.grid import Swept, named
-from trunnion.studies.sweep.measures import of_point
+from trunnion.studies.sweep.measures import measures_of
 
 __all__ = ["Points"]
 
@@ -118,7 +119,8 @@ class Points:
     def measured(self, index: Index, names: Sequence[str]) -> dict[str, float]:
         """Figures of measures at a point."""
         with named(self.swept, index):
-            return of_point(self._prepared(index) if any(index) else self.run, names, self.steps, self.method)
+            run = self._prepared(index) if any(index) else self.run
+            return figures_of(run, measures_of(run, names), self.steps, self.method)
 
     def _reduced(self, arrays: Mapping[str, Array], means: Means, ideal: Means | None) -> Reduced:
         wanted = arrays if self.margin else {key: one for key, one in arrays.items() if key != "locking_margin"}

@@ -12,6 +12,7 @@ import numpy as np
 from trunnion.cycle.positions import check_steps
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.measures.figures import Reference
+from trunnion.measures.kernel import NumpyKernel
 from trunnion.measures.measures import Measure, named, outputs
 from trunnion.measures.positions import Plan, plan
 from trunnion.model.measure_kinds import place_kind
@@ -22,7 +23,7 @@ from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
 from trunnion.studies.tolerance.effects import Effects, effects_of
 from trunnion.studies.tolerance.inputs import Inputs, inputs_of
-from trunnion.studies.tolerance.kernel import NumpyKernel, references
+from trunnion.studies.tolerance.kernel import references
 from trunnion.studies.tolerance.linear import Linear, linear, searched
 from trunnion.studies.tolerance.sampling import Sampler, Sampling, towards
 from trunnion.studies.tolerance.search import Corner

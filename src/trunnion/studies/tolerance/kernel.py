@@ -3,84 +3,38 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, MechanismError
 from trunnion.measures.figures import Reference, known, reference
+from trunnion.measures.kernel import Courses, NumpyKernel, where_known
 from trunnion.measures.measures import Measure
 from trunnion.measures.positions import Plan
 from trunnion.solve.backward import Backward
-from trunnion.solve.forward import Forward, forward, posed
-from trunnion.solve.friction_method import MARGIN, FrictionMethod
+from trunnion.solve.forward import forward
+from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run
-from trunnion.solve.status import pose_status, status_of
 from trunnion.studies.tolerance.inputs import Inputs
 
 if TYPE_CHECKING:
     from trunnion.studies.tolerance.compiled import CompiledKernel
 
-__all__ = ["Courses", "Kernel", "NumpyKernel", "batch_of", "kernel_of", "references"]
+__all__ = ["Kernel", "batch_of", "kernel_of", "references"]
 
 
 AT_ONCE = {"numpy": 10_000, "jax": 1 << 20}  # numbers in an array, by engine
-Courses = dict[str, tuple[Number, ...]]
 
 
 class Kernel(Protocol):
     """Evaluates batches: values of the mechanism, (sample, 1) where they vary, and times, s."""
 
     def courses(self, values: Mapping[str, Number], time: Number) -> tuple[Courses, NDArray[np.int8]]: ...
-
-
-@dataclass(frozen=True)
-class NumpyKernel:
-    """The analysis as it is, on arrays or dual numbers."""
-
-    run: Run
-    measures: Sequence[Measure]
-    friction: FrictionMethod
-
-    @cached_property
-    def forces(self) -> bool:
-        """Whether any measure asks for more than the motion."""
-        return not all(measure.of_motion for measure in self.measures)
-
-    @cached_property
-    def method(self) -> FrictionMethod:
-        """How friction is settled, with the margin if a measure asks for it."""
-        margin = any(measure.wants_margin for measure in self.measures)
-        return replace(self.friction, margin_up_to=MARGIN) if margin else self.friction
-
-    def solved(self, values: Mapping[str, Number], time: Number) -> Backward | Forward:
-        """Motion, and forces if any measure needs them."""
-        with np.errstate(all="ignore"):
-            if self.forces:
-                return self.run.solve(time, values, self.method)
-            walk = posed if all(measure.of_places for measure in self.measures) else forward
-            return walk(self.run.system, values, self.run.chosen.assembly, time)
-
-    def courses(self, values: Mapping[str, Number], time: Number) -> tuple[Courses, NDArray[np.int8]]:
-        """Course of each measure by name, parts that broadcast to (sample, position), and the status of each.
-
-        NaN where a status rules it out.
-        """
-        found = self.solved(values, time)
-        shape = shape_of(values, time)
-        with np.errstate(all="ignore"):
-            status = pose_status(found, shape) if isinstance(found, Forward) else status_of(found, shape)
-            courses = {measure.name: self._course(measure, found, status) for measure in self.measures}
-        return courses, status
-
-    def _course(self, measure: Measure, found: Backward | Forward, status: NDArray[np.int8]) -> tuple[Number, ...]:
-        there = known(measure, status)
-        return tuple(_where(there, part) for part in measure.curve(found))
 
 
 @dataclass(frozen=True)
@@ -112,7 +66,7 @@ class JaxKernel:
         curves, status = self._compiled.curves(values, np.asarray(time, float))
         found: Courses = {measure.name: () for measure in self.numpy.measures}
         for name, (measure, _) in self._parts.items():
-            found[measure.name] += (_where(known(measure, status), curves[name]),)
+            found[measure.name] += (where_known(known(measure, status), curves[name]),)
         return found, status
 
 
@@ -147,18 +101,3 @@ def references(kernel: NumpyKernel, plan: Plan, inputs: Inputs) -> dict[str, Ref
         )
         for measure in kernel.measures
     }  # fmt: skip
-
-
-def shape_of(values: Mapping[str, Number], time: Number) -> tuple[int, ...]:
-    """(sample, position) of a batch."""
-    shapes = {number.shape for number in values.values() if isinstance(number, (Dual, np.ndarray))}
-    return np.broadcast_shapes(np.shape(time), *shapes)
-
-
-def _where(known: NDArray[np.bool_], number: Number) -> Number:
-    """The number, NaN where it is not known."""
-    if np.all(known):
-        return number
-    hole = np.where(known, 0.0, np.nan)
-    assert np.ndim(primal(number)) <= hole.ndim
-    return number + hole

@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import Dual
 from trunnion.algebra.namespace import Number
 from trunnion.measures.figures import Reference, figure, shown, span
+from trunnion.measures.kernel import NumpyKernel
 from trunnion.measures.measures import Measure
 from trunnion.measures.positions import Plan
 from trunnion.studies.tolerance.effects import Effects
-from trunnion.studies.tolerance.kernel import NumpyKernel
 from trunnion.studies.tolerance.search import Corner, search
 from trunnion.studies.tolerance.zones import Spread
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from trunnion.errors import Status
 from trunnion.measures.figures import Reference, judged
+from trunnion.measures.kernel import Courses, NumpyKernel
 from trunnion.measures.measures import Measure
 from trunnion.measures.positions import Plan, plan
 from trunnion.model.mechanism import Mechanism
@@ -26,7 +27,7 @@ from trunnion.statistics.histogram import Bins, count
 from trunnion.statistics.streams import SobolStream, uniforms
 from trunnion.statistics.tally import Moments, Tree, moments_of
 from trunnion.studies.tolerance.inputs import Inputs, inputs_of
-from trunnion.studies.tolerance.kernel import Courses, Kernel, NumpyKernel, batch_of, kernel_of, references
+from trunnion.studies.tolerance.kernel import Kernel, batch_of, kernel_of, references
 from trunnion.version import __version__
 
 __all__ = ["METHODS", "Sampling", "Tally", "towards"]

@@ -1,0 +1,175 @@
+"""Everything of a mechanism that can be set, swept and measured: names, units and present values."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from trunnion.algebra.dual import primal
+from trunnion.cycle.watched import watched
+from trunnion.errors import Finding, MechanismError
+from trunnion.measures.kernel import courses_of
+from trunnion.measures.measures import Measure, named
+from trunnion.measures.motion import MOTIONS
+from trunnion.model.checks.measures import subjects
+from trunnion.model.measure_table import MEASURES
+from trunnion.model.mechanism import Mechanism
+from trunnion.model.parameters import measured
+from trunnion.solve.forward import forward
+from trunnion.solve.friction_method import FrictionMethod
+from trunnion.solve.run import Run, prepare
+
+__all__ = ["NamedMeasure", "NamedNumber", "Vocabulary", "vocabulary"]
+
+TIMES = ("at", "over", "within", "along")  # of a measure, and no number to sweep over: they say what is looked at
+
+
+@dataclass(frozen=True)
+class NamedNumber:
+    """A number of the model: its shortest name and its path, SI unit and value, and the text as it was written.
+
+    value: NaN of one that changes with the motion; swept: whether `--over` takes it as well as `--set`.
+    """
+
+    name: str
+    path: str
+    unit: str
+    value: float
+    written: str
+    swept: bool
+
+
+@dataclass(frozen=True)
+class NamedMeasure:
+    """A measure by its name, what it is, its SI unit and value; NaN where there is none.
+
+    stated: whether the model states it; value: its figure over the cycle, of one that has none by itself that at the
+    start; verbs: those that take it beside `analyse`, `tolerance` and `allocate`.
+    """
+
+    name: str
+    text: str
+    unit: str
+    value: float
+    stated: bool
+    verbs: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Vocabulary:
+    """What `--set` and `--over` take, and what `--measure`, `measures:` and the channels of a rig take.
+
+    findings: which measures of the model cannot be told, and why.
+    """
+
+    numbers: tuple[NamedNumber, ...]
+    measures: tuple[NamedMeasure, ...]
+    findings: tuple[Finding, ...] = ()
+
+    def data(self) -> dict[str, Any]:
+        """For JSON: null in place of a number that is none."""
+        return {
+            "numbers": [_plain(asdict(one)) for one in self.numbers],
+            "measures": [_plain(asdict(one)) for one in self.measures],
+            "findings": [str(one) for one in self.findings],
+        }
+
+
+def _plain(row: dict[str, Any]) -> dict[str, Any]:
+    return {**row, "value": row["value"] if np.isfinite(row["value"]) else None}
+
+
+@np.errstate(all="ignore")
+def vocabulary(mechanism: Mechanism, steps: int = 360) -> Vocabulary:
+    """Every number and every measure of a mechanism by name, with unit and present value.
+
+    steps: positions over which the figures of the model's own measures are taken.
+    Raises MechanismError if the structure does not determine the motion.
+    """
+    run = prepare(mechanism)
+    own = watched(run, run.cycle.times(steps if run.cycle.duration > 0 else 1), FrictionMethod())
+    known = dict(zip((one.name for one in own.measures), own.figures, strict=True))
+    found = [*named(mechanism, mechanism.measures, run.values), *_others(run)]
+    starts = _at_the_start(run, found)
+    measures = []
+    for measure in found:
+        value = float(known.get(measure.name, np.nan))
+        value = value if np.isfinite(value) else starts.get(measure.name, np.nan)
+        unit, stated = measure.figure_unit(run.system, run.values), measure.name in mechanism.measures
+        verbs = tuple(_verbs(run, measure))
+        measures.append(NamedMeasure(measure.name, measure.of.long_name, unit, value, stated, verbs))
+    return Vocabulary(tuple(_numbers(mechanism)), tuple(measures), tuple(own.findings))
+
+
+def _numbers(mechanism: Mechanism) -> Iterator[NamedNumber]:
+    values, names = mechanism.parameters(), mechanism.parameter_set.names
+    kinds, shortest = measured(mechanism, mechanism.parameter_set.entries.values()), dict[str, str]()
+    for ending, paths in names.endings.items():
+        if len(paths) == 1 and len(ending) < len(shortest.get(paths[0], paths[0])) and _means(mechanism, ending, paths):
+            shortest[paths[0]] = ending
+    for path, entry in mechanism.parameter_set.entries.items():
+        value = float(np.ravel(primal(values[path]))[0]) if path in values else float("nan")
+        place = path.split(".")
+        swept = path in values and not (place[0] == "measures" and place[2] in TIMES)
+        name = path.removeprefix("dimensions.")
+        name = shortest.get(path, path) if name == path else name
+        yield NamedNumber(name, path, kinds[path].unit, value, str(entry.quantity.source), swept)
+
+
+def _means(mechanism: Mechanism, name: str, paths: list[str]) -> bool:
+    """Whether a name means this number, and no dimension or whole path."""
+    return mechanism.path_of(name) == paths[0]
+
+
+def _others(run: Run) -> Iterator[Measure]:
+    """What can be measured beside what the model states: every kind of everything that moves or bears and has it."""
+    mechanism = run.system.mechanism
+    walk = forward(run.system, run.values, run.chosen.assembly, np.zeros(1))
+    for kind, of in MEASURES.items():
+        if of.space not in ("", mechanism.space):
+            continue
+        for subject in subjects(mechanism, of.of):
+            if subject.partition(".")[0] == mechanism.fixed_link and of.of in ("point", "link"):
+                continue
+            axes = ("x", "y", "z")[: mechanism.coordinates]
+            picked = of.vector_in(mechanism.space)
+            for axis in (*([""] if picked != "must" else []), *(axes if picked else ())):
+                whole = f"{subject}.{axis}" if axis else subject
+                text = whole if kind == "point" else f"{kind}:{whole}"
+                with suppress(MechanismError):  # such as the slide of a joint that turns
+                    measure = named(mechanism, [text], run.values)[0]
+                    if measure.of_places:
+                        measure.curve(walk)
+                    yield measure
+
+
+def _at_the_start(run: Run, measures: list[Measure]) -> dict[str, float]:
+    """Value of every measure of one number at the start of the cycle, by name; NaN where it has none there."""
+    asked = [one for one in measures if one.single(run.system) and (one.of_motion or not _undetermined(run))]
+    courses = courses_of(run, asked, np.zeros(1), FrictionMethod())[0]
+    return {name: float(np.ravel(primal(parts[0]))[0]) for name, parts in courses.items()}
+
+
+def _undetermined(run: Run) -> bool:
+    """Whether the forces are not determined."""
+    try:
+        if run.determinacy is not None:
+            run.determinacy.refuse()
+    except MechanismError:
+        return True
+    return False
+
+
+def _verbs(run: Run, measure: Measure) -> Iterator[str]:
+    """Those that take a measure, beside `analyse`, `tolerance` and `allocate`."""
+    single = measure.single(run.system)
+    if measure.kind in MOTIONS or single:
+        yield "play"
+    if measure.rule != "deviation" and not measure.of.against and not measure.of_attitude(run.system):
+        yield "sweep"
+    if single and measure.everywhere:
+        yield from ("rig", "compare", "identify")

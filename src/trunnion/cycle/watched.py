@@ -1,0 +1,120 @@
+"""The model's own measures over one cycle: their courses at its positions, and the figure of each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.algebra.unwrap import unwrap_row
+from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.measures.kernel import courses_of, figures_of
+from trunnion.measures.measures import Measure, named
+from trunnion.measures.positions import plan
+from trunnion.results.attributes import encoded
+from trunnion.results.dataset import Variable, described
+from trunnion.results.figure import Figure
+from trunnion.solve.forward import forward
+from trunnion.solve.friction_method import FrictionMethod
+from trunnion.solve.run import Run
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["VARIABLES", "Watched", "watched"]
+
+Array = NDArray[np.float64]
+# the model's measures, each in its own unit, in the attributes `measure_units` and `measure_figure_units`
+VARIABLES = {
+    "measure_value": Variable(("measure", "position"), "", "the model's measure; NaN of one that has several numbers"),
+    "measure_figure": Variable(("measure",), "", "figure of the measure over the cycle; NaN of one that states none"),
+}
+TAKEN = ("time", "drive", "power_in", "power_useful", "seat_rounds", "status")  # columns of the result
+
+
+@dataclass(frozen=True)
+class Watched:
+    """values: (measure, position), figures: (measure,), SI; findings: which measures of the model are left out, why."""
+
+    run: Run
+    measures: Sequence[Measure]
+    values: Array
+    figures: Array
+    findings: Sequence[Finding]
+
+    def joined(self, result: xr.Dataset) -> xr.Dataset:
+        """A result with them."""
+        if not self.measures:
+            return result
+        system, values = self.run.system, self.run.values
+        arrays = {"measure_value": self.values, "measure_figure": self.figures}
+        attributes = {
+            "measure_units": [one.unit(system) for one in self.measures],
+            "measure_figure_units": [one.figure_unit(system, values) for one in self.measures],
+        }
+        labelled = result.assign_coords(measure=np.asarray([one.name for one in self.measures], dtype=str))
+        return labelled.assign(described(arrays, VARIABLES)).assign_attrs(encoded(attributes))
+
+    def summary(self) -> Iterator[Figure]:
+        """The figure of each; of one that states none its extremes over the positions."""
+        for measure, values, figure in zip(self.measures, self.values, self.figures, strict=True):
+            name, subject, unit = measure.name, f"measure {measure.name}", measure.unit(self.run.system)
+            if measure.rule != "deviation":
+                own = measure.figure_unit(self.run.system, self.run.values)
+                yield Figure(name, subject, figure, own, measure.statistic.replace("-", " "))
+            elif np.any(np.isfinite(values)):
+                yield Figure(f"{name}.min", subject, np.nanmin(values), unit, "least")
+                yield Figure(f"{name}.max", subject, np.nanmax(values), unit, "largest")
+
+
+def watched(run: Run, time: Array, method: FrictionMethod) -> Watched:
+    """The model's measures over the cycle. time: positions of the result, s."""
+    steps, measures, findings = len(time), [], []
+    for name in run.system.mechanism.measures:
+        try:
+            measures.append(_had(run, name, steps))
+        except MechanismError as error:
+            told = f"the measure '{name}' is left out: {error.findings[0].what}"
+            findings.append(Finding(told, f"measures.{name}", error.findings[0].remedy, Severity.NOTE))
+    values, figures = np.full((len(measures), steps), np.nan), np.full(len(measures), np.nan)
+    if measures:
+        with np.errstate(all="ignore"):
+            _fill(run, measures, time, method, (values, figures))
+    return Watched(run, measures, values, figures, findings)
+
+
+def _had(run: Run, name: str, steps: int) -> Measure:
+    """A measure of the model; MechanismError if this cycle has none such."""
+    measure = named(run.system.mechanism, [name], run.values)[0]
+    if name in TAKEN:
+        raise MechanismError(Finding("it has the name of a column of the result", remedy="call it otherwise"))
+    if measure.of.against or measure.of_attitude(run.system):
+        what = "it is a deviation from the nominal mechanism"
+        raise MechanismError(Finding(what, remedy="`trunnion tolerance` tells what tolerances do to it"))
+    if measure.of.of_forces and run.determinacy is not None:
+        run.determinacy.refuse()
+    plan(run, [measure], steps)
+    if measure.of_places:
+        measure.curve(forward(run.system, run.values, run.chosen.assembly, np.zeros(1)))
+    return measure
+
+
+def _fill(
+    run: Run, measures: Sequence[Measure], time: Array, method: FrictionMethod, into: tuple[Array, Array]
+) -> None:
+    system, (values, figures) = run.system, into
+    courses = courses_of(run, measures, time, method)[0]
+    stated = [one for one in measures if one.rule != "deviation"]
+    found = figures_of(run, stated, len(time), method) if stated else {}
+    walk = forward(system, run.values, run.chosen.assembly, time)
+    for i, measure in enumerate(measures):
+        figures[i] = found.get(measure.name, np.nan)
+        if len(courses[measure.name]) > 1:
+            continue
+        values[i] = courses[measure.name][0]
+        if measure.turning(system):
+            rate = np.broadcast_to(np.asarray(measure.coordinate(system).rate(walk), float), time.shape)
+            unwrap_row(values[i], rate, float(time[1] - time[0]) if len(time) > 1 else 0.0)

@@ -1,0 +1,122 @@
+"""The courses of measures at the positions of a cycle, of one mechanism or of many; and their figures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.algebra.dual import Dual, primal
+from trunnion.algebra.namespace import Number
+from trunnion.errors import Status
+from trunnion.measures.figures import known, reference
+from trunnion.measures.measures import Measure
+from trunnion.measures.positions import plan
+from trunnion.solve.backward import Backward
+from trunnion.solve.forward import Forward, forward, posed
+from trunnion.solve.friction_method import MARGIN, FrictionMethod
+from trunnion.solve.run import Run
+from trunnion.solve.seating import settle
+from trunnion.solve.status import pose_status, status_of
+from trunnion.solve.travel import lanes
+
+__all__ = ["Courses", "NumpyKernel", "courses_of", "figures_of", "where_known"]
+
+Courses = dict[str, tuple[Number, ...]]
+
+
+@dataclass(frozen=True)
+class NumpyKernel:
+    """The analysis as it is, on arrays or dual numbers."""
+
+    run: Run
+    measures: Sequence[Measure]
+    friction: FrictionMethod
+
+    @cached_property
+    def forces(self) -> bool:
+        """Whether any measure asks for more than the motion."""
+        return not all(measure.of_motion for measure in self.measures)
+
+    @cached_property
+    def method(self) -> FrictionMethod:
+        """How friction is settled, with the margin if a measure asks for it."""
+        margin = any(measure.wants_margin for measure in self.measures)
+        return replace(self.friction, margin_up_to=MARGIN) if margin else self.friction
+
+    def solved(self, values: Mapping[str, Number], time: Number) -> Backward | Forward:
+        """Motion, and forces if any measure needs them."""
+        with np.errstate(all="ignore"):
+            if self.forces:
+                return self.run.solve(time, values, self.method)
+            walk = posed if all(measure.of_places for measure in self.measures) else forward
+            return walk(self.run.system, values, self.run.chosen.assembly, time)
+
+    def courses(self, values: Mapping[str, Number], time: Number) -> tuple[Courses, NDArray[np.int8]]:
+        """Course of each measure by name, parts that broadcast to (sample, position), and the status of each.
+
+        NaN where a status rules it out.
+        """
+        found = self.solved(values, time)
+        shape = shape_of(values, time)
+        with np.errstate(all="ignore"):
+            status = pose_status(found, shape) if isinstance(found, Forward) else status_of(found, shape)
+            courses = {measure.name: self._course(measure, found, status) for measure in self.measures}
+        return courses, status
+
+    def _course(self, measure: Measure, found: Backward | Forward, status: NDArray[np.int8]) -> tuple[Number, ...]:
+        there = known(measure, status)
+        return tuple(where_known(there, part) for part in measure.curve(found))
+
+
+def courses_of(
+    run: Run, measures: Sequence[Measure], time: NDArray[np.float64], method: FrictionMethod
+) -> tuple[Courses, NDArray[np.int8]]:
+    """The course of each measure of the mechanism itself at some times, s, and their statuses; pins lie in their seats.
+
+    What was asked of the method's margin is left to the measures.
+    """
+    kernel = NumpyKernel(run, tuple(measures), replace(method, margin_up_to=0.0))
+    if not run.seats:
+        return kernel.courses(run.values, time)
+    seen = lanes(time, run.cycle)
+    with np.errstate(all="ignore"):
+        seated = settle(run, seen, kernel.method, run.ideal(seen.times, kernel.friction))
+        status = status_of(seated.back, time.shape)
+        np.maximum(status, np.where(seated.sticks, np.int8(Status.ZERO_SLIP), np.int8(0)), out=status)
+        found = {
+            measure.name: tuple(where_known(known(measure, status), part) for part in measure.curve(seated.back))
+            for measure in measures
+        }
+    return found, status
+
+
+def figures_of(run: Run, measures: Sequence[Measure], steps: int, method: FrictionMethod) -> dict[str, float]:
+    """The figures of measures of one mechanism, SI, by name; NaN where a position that one needs has no answer."""
+    places = plan(run, measures, steps)
+    courses, system = courses_of(run, measures, places.times, method)[0], run.system
+    walk = forward(system, run.values, run.chosen.assembly, places.times)
+    found = {}
+    for measure in measures:
+        rate = measure.coordinate(system).rate(walk) if measure.turning(system) else None
+        window = places.windows[measure.name]
+        found[measure.name] = reference(measure, courses[measure.name], window, system, rate).figure
+    return found
+
+
+def shape_of(values: Mapping[str, Number], time: Number) -> tuple[int, ...]:
+    """(sample, position) of a batch."""
+    shapes = {number.shape for number in values.values() if isinstance(number, (Dual, np.ndarray))}
+    return np.broadcast_shapes(np.shape(time), *shapes)
+
+
+def where_known(known: NDArray[np.bool_], number: Number) -> Number:
+    """The number, NaN where it is not known."""
+    if np.all(known):
+        return number
+    hole = np.where(known, 0.0, np.nan)
+    assert np.ndim(primal(number)) <= hole.ndim
+    return number + hole

@@ -14,7 +14,6 @@ from trunnion.solve.backward import Backward
 from trunnion.solve.forward import Forward
 from trunnion.solve.friction_method import MARGIN
 from trunnion.solve.loads import useful_loads
-from trunnion.solve.space.motion import SpatialWalk
 
 __all__ = ["efficiency", "effort", "joint_rate", "load", "locking_margin", "place", "reaction"]
 
@@ -32,9 +31,7 @@ def effort(subject: str, back: Backward) -> tuple[Number, ...]:
 
 def joint_rate(joint: str, back: Backward, turns: bool) -> Number:
     """Speed of the second link against the first, rad/s about the joint's axis or m/s along it."""
-    if isinstance(back.walk, SpatialWalk):
-        return back.walk.rates(joint)[0 if turns else 1]
-    return back.slips[joint].speed
+    return back.walk.rates(joint)[0 if turns else 1]
 
 
 def load(subject: str, back: Backward) -> tuple[Number, ...]:

@@ -57,7 +57,7 @@ def given(run: Run, time: Array) -> Given:
     def rows(*numbers: Any) -> Array:
         return np.array([np.broadcast_to(n, time.shape) for n in numbers])
 
-    centres = [walk.local_point(link, *run.system.centre(values, link)) for link in links]
+    centres = [walk.at(link, run.system.centre(values, link)) for link in links]
     masses = [values[f"links.{link}.mass"] for link in links]
     weight = [values[f"gravity.{axis}"] for axis in "xy"]
     loads = np.array([rows(mass * weight[0], mass * weight[1], 0.0) for mass in masses])

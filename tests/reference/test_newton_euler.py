@@ -72,7 +72,7 @@ def bodies_at(run: Run, data: Data, back: Any, second: dict[str, tuple[Array, Ar
             at = walk.point(link, load["at"]).place if "at" in load else (0.0, 0.0)
             force = load.get("force", (0.0, 0.0))
             loads.append(newton_euler.Load((here(at[0]), here(at[1])), force, load.get("moment", 0.0)))
-        x, y = walk.local_point(link, *run.system.centre(values, link)).place
+        x, y = walk.at(link, run.system.centre(values, link)).place
         bodies[link] = newton_euler.Body(
             values[f"links.{link}.mass"],
             values[f"links.{link}.inertia"],

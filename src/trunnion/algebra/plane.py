@@ -8,9 +8,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple, TypeVar
 
+import numpy as np
+
+from trunnion.algebra import literal
+from trunnion.algebra.dual import primal
+from trunnion.algebra.literal import is_zero, less
 from trunnion.algebra.namespace import Number, namespace
 
 __all__ = [
+    "NO_MOMENT",
+    "NULL",
+    "ORIGIN",
+    "STILL",
     "ZERO_LOAD",
     "Acceleration",
     "Frame",
@@ -22,15 +31,21 @@ __all__ = [
     "along_slide",
     "both_ends",
     "compose",
-    "is_zero",
-    "less",
+    "load",
+    "minus",
     "moved",
+    "moving",
     "pinned",
     "point",
+    "point_of",
+    "power",
     "relative",
     "root",
-    "scaled",
+    "rotated",
+    "rotated_moment",
     "shifted",
+    "spin",
+    "times",
     "turned",
 ]
 
@@ -72,6 +87,7 @@ class Acceleration(NamedTuple):
 
 
 _Motion = TypeVar("_Motion", Twist, Acceleration)
+Vector2 = tuple[Number, Number]
 
 
 class Wrench(NamedTuple):
@@ -82,23 +98,18 @@ class Wrench(NamedTuple):
     m: Number
 
 
+_Triple = TypeVar("_Triple", Twist, Wrench)
 ZERO_LOAD = Wrench(0.0, 0.0, 0.0)
-
-
-def is_zero(number: Number) -> bool:
-    """A literal zero, as most local coordinates are: skipping it saves whole passes over an array."""
-    return isinstance(number, float) and number == 0.0
-
-
-def less(a: Number, b: Number) -> Number:
-    """a − b; where b is a literal zero, a itself."""
-    return a if is_zero(b) else a - b
+ORIGIN = Frame(0.0, 0.0, 1.0, 0.0)
+NULL = (0.0, 0.0)
+NO_MOMENT = 0.0
+STILL = Twist(0.0, 0.0, 0.0), Acceleration(0.0, 0.0, 0.0)  # the motion of the ground
 
 
 def turned(c: Number, s: Number, x: Number, y: Number) -> tuple[Number, Number]:
     """(x, y) turned by the angle whose cosine and sine are c, s."""
     if is_zero(y):
-        return (0.0, 0.0) if is_zero(x) else (c * x, s * x)
+        return literal.times(c, x), literal.times(s, x)
     if is_zero(x):
         return -(s * y), c * y
     return c * x - s * y, s * x + c * y
@@ -110,6 +121,21 @@ def point(frame: Frame, x: Number, y: Number) -> tuple[Number, Number]:
         return frame.x, frame.y
     dx, dy = turned(frame.c, frame.s, x, y)
     return frame.x + dx, frame.y + dy
+
+
+def point_of(frame: Frame, local: Vector2) -> Vector2:
+    """Global place of a point given in a frame."""
+    return point(frame, *local)
+
+
+def rotated(frame: Frame, v: Vector2) -> Vector2:
+    """A direction given in a frame."""
+    return turned(frame.c, frame.s, *v)
+
+
+def rotated_moment(frame: Frame, moment: Number) -> Number:
+    """A moment given in a frame: the same in all."""
+    return moment
 
 
 def compose(frame: Frame, local: Frame) -> Frame:
@@ -191,6 +217,18 @@ def accelerated(acceleration: Acceleration, w: Number, dx: Number, dy: Number) -
     )
 
 
+def moving(frame: Frame, twist: Twist, acceleration: Acceleration, local: Vector2) -> tuple[Vector2, Vector2, Vector2]:
+    """Place, velocity and acceleration of the point of a moving frame with local coordinates."""
+    place = point(frame, *local)
+    arm = place[0] - frame.x, place[1] - frame.y
+    return place, moved(twist, *arm)[:2], accelerated(acceleration, twist.w, *arm)[:2]
+
+
+def spin(twist: Twist) -> Number:
+    """Angular speed, rad/s; its real part."""
+    return np.abs(primal(twist.w))
+
+
 def about(wrench: Wrench, dx: Number, dy: Number) -> Wrench:
     """The wrench about the point that lies (dx, dy) from its present one."""
     if (is_zero(wrench.x) and is_zero(wrench.y)) or (is_zero(dx) and is_zero(dy)):  # a pure moment, or the same point
@@ -198,15 +236,27 @@ def about(wrench: Wrench, dx: Number, dy: Number) -> Wrench:
     return Wrench(wrench.x, wrench.y, wrench.m - (dx * wrench.y - dy * wrench.x))
 
 
-def added(a: Wrench, b: Wrench, sign: float) -> Wrench:
-    """a + sign · b, both about the same point; sign: ±1. A literal zero costs nothing."""
-    if sign < 0:
-        return Wrench(less(a.x, b.x), less(a.y, b.y), less(a.m, b.m))
-    return Wrench(*(p if is_zero(q) else q if is_zero(p) else p + q for p, q in zip(a, b, strict=True)))
+def load(frame: Frame, force: Vector2, moment: Number, place: Vector2) -> Wrench:
+    """What a force at a place and a moment do to the link with a frame: the wrench about its origin."""
+    return about(Wrench(*force, moment), frame.x - place[0], frame.y - place[1])
 
 
-def scaled(a: Wrench, factor: float) -> Wrench:
-    """The wrench multiplied by a number."""
-    if factor == 1.0:
-        return a
-    return Wrench(-a.x, -a.y, -a.m) if factor == -1.0 else Wrench(factor * a.x, factor * a.y, factor * a.m)
+def added(a: Wrench, b: Wrench) -> Wrench:
+    """a + b, both about the same point."""
+    return Wrench(literal.plus(a.x, b.x), literal.plus(a.y, b.y), literal.plus(a.m, b.m))
+
+
+def minus(a: Wrench, b: Wrench) -> Wrench:
+    """a − b, both about the same point."""
+    return Wrench(less(a.x, b.x), less(a.y, b.y), less(a.m, b.m))
+
+
+def times(factor: Number, a: _Triple) -> _Triple:
+    """factor · a."""
+    return type(a)(*(literal.times(factor, n) for n in a))
+
+
+def power(wrench: Wrench, twist: Twist) -> Number:
+    """F · v + M ω of a wrench about a point and the velocity of that point, W."""
+    force = literal.plus(literal.times(wrench.x, twist.x), literal.times(wrench.y, twist.y))
+    return literal.plus(force, literal.times(wrench.m, twist.w))

@@ -17,8 +17,12 @@ from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.vector import IDENTITY, Vector3, cross, dot, plus, scaled, transpose
 
 __all__ = [
+    "NO_MOMENT",
+    "NULL",
     "ORIGIN",
+    "STILL",
     "ZERO",
+    "ZERO_LOAD",
     "Frame",
     "Screw",
     "about",
@@ -27,14 +31,18 @@ __all__ = [
     "compose",
     "element",
     "line_of",
+    "load",
     "minus",
     "moment_at",
+    "moving",
     "point_of",
     "power",
     "quaternion",
     "relative",
     "rotated",
+    "rotated_moment",
     "slid",
+    "spin",
     "times",
     "turned",
     "vector_minus",
@@ -64,9 +72,10 @@ class Screw(NamedTuple):
     m: Vector3
 
 
-NULL: Vector3 = (0.0, 0.0, 0.0)
+NULL = NO_MOMENT = (0.0, 0.0, 0.0)
 ORIGIN = Frame(*IDENTITY, NULL)
-ZERO = Screw(NULL, NULL)
+ZERO = ZERO_LOAD = Screw(NULL, NULL)
+STILL = ZERO, ZERO  # the motion of the ground
 
 
 def _unit(a: Vector3) -> Vector3:
@@ -83,6 +92,9 @@ vector_minus = vector.minus  # `minus` is that of screws
 def rotated(frame: Frame, v: Vector3) -> Vector3:
     """R v: a direction given in a frame."""
     return plus(plus(scaled(v[0], frame.x), scaled(v[1], frame.y)), scaled(v[2], frame.z))
+
+
+rotated_moment = rotated  # a moment is a direction, too
 
 
 def point_of(frame: Frame, v: Vector3) -> Vector3:
@@ -204,3 +216,20 @@ def about(force: Vector3, moment: Vector3, place: Vector3) -> Screw:
 def moment_at(a: Screw, place: Vector3) -> Vector3:
     """Moment of a wrench about a place, or velocity of a twist at it: m − p × u = m + u × p."""
     return plus(a.m, cross(a.u, place))
+
+
+def load(frame: Frame, force: Vector3, moment: Vector3, place: Vector3) -> Screw:
+    """What a force at a place and a moment do to a link: the wrench about the origin, whatever its frame."""
+    return about(force, moment, place)
+
+
+def spin(twist: Screw) -> Number:
+    """Angular speed, rad/s; its real part."""
+    return np.sqrt(primal(dot(twist.u, twist.u)))
+
+
+def moving(frame: Frame, twist: Screw, acceleration: Screw, local: Vector3) -> tuple[Vector3, Vector3, Vector3]:
+    """Place, velocity, acceleration of a point of a moving frame: v = v₀ + ω × p, a = a₀ + ω̇ × p + ω × v."""
+    place = point_of(frame, local)
+    velocity = moment_at(twist, place)
+    return place, velocity, plus(moment_at(acceleration, place), cross(twist.u, velocity))

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import cast
 
+from trunnion.algebra import literal
 from trunnion.algebra.dual import parts, primal, spatial
 from trunnion.algebra.namespace import Number, namespace
 
@@ -40,66 +41,33 @@ Matrix3 = tuple[Vector3, Vector3, Vector3]
 IDENTITY: Matrix3 = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
-def _times(a: Number, b: Number) -> Number:
-    """a b; a literal 0 or 1, as most coordinates in a link's own frame are, saves a pass over an array."""
-    if isinstance(a, float):
-        if a == 0.0:
-            return 0.0
-        if a == 1.0:
-            return b
-    if isinstance(b, float):
-        if b == 0.0:
-            return 0.0
-        if b == 1.0:
-            return a
-    return a * b
-
-
-def _sum(a: Number, b: Number) -> Number:
-    """a + b; a literal 0 costs nothing."""
-    if isinstance(a, float) and a == 0.0:
-        return b
-    if isinstance(b, float) and b == 0.0:
-        return a
-    return a + b
-
-
-def _less(a: Number, b: Number) -> Number:
-    """a − b; a literal 0 costs nothing."""
-    if isinstance(b, float) and b == 0.0:
-        return a
-    if isinstance(a, float) and a == 0.0:
-        return -b
-    return a - b
-
-
 def dot(a: Vector3, b: Vector3) -> Number:
     """a · b; of two lines û · v̂ = cos θ̂."""
-    return _sum(_sum(_times(a[0], b[0]), _times(a[1], b[1])), _times(a[2], b[2]))
+    return literal.plus(literal.plus(literal.times(a[0], b[0]), literal.times(a[1], b[1])), literal.times(a[2], b[2]))
 
 
 def cross(a: Vector3, b: Vector3) -> Vector3:
     """a × b; of two lines û × v̂ = sin θ̂ n̂, n̂ their common perpendicular."""
     return (
-        _less(_times(a[1], b[2]), _times(a[2], b[1])),
-        _less(_times(a[2], b[0]), _times(a[0], b[2])),
-        _less(_times(a[0], b[1]), _times(a[1], b[0])),
+        literal.less(literal.times(a[1], b[2]), literal.times(a[2], b[1])),
+        literal.less(literal.times(a[2], b[0]), literal.times(a[0], b[2])),
+        literal.less(literal.times(a[0], b[1]), literal.times(a[1], b[0])),
     )
 
 
 def plus(a: Vector3, b: Vector3) -> Vector3:
     """a + b."""
-    return _sum(a[0], b[0]), _sum(a[1], b[1]), _sum(a[2], b[2])
+    return literal.plus(a[0], b[0]), literal.plus(a[1], b[1]), literal.plus(a[2], b[2])
 
 
 def minus(a: Vector3, b: Vector3) -> Vector3:
     """a − b."""
-    return _less(a[0], b[0]), _less(a[1], b[1]), _less(a[2], b[2])
+    return literal.less(a[0], b[0]), literal.less(a[1], b[1]), literal.less(a[2], b[2])
 
 
 def scaled(factor: Number, a: Vector3) -> Vector3:
     """factor · a."""
-    return _times(factor, a[0]), _times(factor, a[1]), _times(factor, a[2])
+    return literal.times(factor, a[0]), literal.times(factor, a[1]), literal.times(factor, a[2])
 
 
 def length(a: Vector3) -> Number:

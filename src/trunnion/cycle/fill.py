@@ -3,27 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.namespace import Number
-from trunnion.algebra.plane import accelerated
 from trunnion.algebra.unwrap import unwrap_row
 from trunnion.solve.backward import Backward
+from trunnion.solve.forward import Forward
+from trunnion.solve.loads import useful_loads
 from trunnion.solve.system import System, Values
 
-if TYPE_CHECKING:
-    pass
-from trunnion.solve.loads import useful_loads
-
-__all__ = ["absent", "fill_forces", "fill_motion", "fill_power", "labels", "unwrap"]
+__all__ = [
+    "absent", "fill_efforts", "fill_forces", "fill_motion", "fill_points", "fill_power", "labels", "put", "unwrap",
+]  # fmt: skip
 
 Arrays = dict[str, NDArray[np.float64]]
 
 
 def labels(system: System) -> dict[str, list[str]]:
+    """Names along the dims."""
     mechanism = system.mechanism
     springs = {"spring": list(mechanism.springs)} if mechanism.springs else {}
     gears = {"gear": list(mechanism.gears)} if mechanism.gears else {}
@@ -42,79 +42,69 @@ def labels(system: System) -> dict[str, list[str]]:
 
 def absent(system: System) -> list[str]:
     """Variables that this mechanism cannot have: zero without taking memory."""
-    if any(kind == "prismatic" for kind, _ in system.joints.values()):
+    if not all(system.turns(joint) for joint in system.joints):
         return []
     slides = ["joint_slide", "joint_slide_velocity", "joint_slide_acceleration", "friction_force"]
     return [*slides, "reaction_moment"]
 
 
 def fill_motion(arrays: Arrays, back: Backward, window: slice) -> None:
+    """Angles, points and joints of one chunk."""
     walk = back.walk
-    ground = walk.system.mechanism.fixed_link
     for i, link in enumerate(walk.system.mechanism.links):
-        if link == ground:
-            continue
-        motion = walk.motions[link]
-        arrays["link_angle"][i, window] = np.arctan2(motion.frame.s, motion.frame.c)
-        arrays["link_angle_velocity"][i, window] = motion.twist.w
-        arrays["link_angle_acceleration"][i, window] = motion.acceleration.w
+        if link != walk.system.mechanism.fixed_link:
+            motion = walk.motions[link]
+            arrays["link_angle"][i, window] = np.arctan2(motion.frame.s, motion.frame.c)
+            arrays["link_angle_velocity"][i, window] = motion.twist.w
+            arrays["link_angle_acceleration"][i, window] = motion.acceleration.w
+    fill_points(arrays, walk, window)
+    for i, joint in enumerate(walk.system.joints):
+        both = walk.rates(joint), walk.second_rates(joint)
+        for name, rates in zip(("joint_rotation", "joint_slide"), zip(*both, strict=True), strict=True):
+            for suffix, rate in zip(("_velocity", "_acceleration"), rates, strict=True):
+                if arrays[name + suffix].flags.writeable:
+                    arrays[name + suffix][i, window] = rate
+        if arrays["joint_slide"].flags.writeable:
+            arrays["joint_slide"][i, window] = 0.0 if walk.system.turns(joint) else walk.coordinates(joint)[1]
+
+
+def fill_points(arrays: Arrays, walk: Forward, window: slice) -> None:
+    """Named points of one chunk."""
     for i, (link, name) in enumerate(walk.system.points):
-        moved = walk.point(link, name)
-        for axis in (0, 1):
-            arrays["point_position"][i, axis, window] = moved.place[axis]
-            if link == ground:
-                continue
-            arrays["point_velocity"][i, axis, window] = moved.velocity[axis]
-            arrays["point_acceleration"][i, axis, window] = moved.acceleration[axis]
-    for i, (kind, links) in enumerate(walk.system.joints.values()):
-        first, second = (walk.motions[link] for link in links)
-        arrays["joint_rotation_velocity"][i, window] = second.twist.w - first.twist.w
-        arrays["joint_rotation_acceleration"][i, window] = second.acceleration.w - first.acceleration.w
-        if kind == "prismatic":
-            _fill_slide(arrays, back, i, window)
-        elif arrays["joint_slide"].flags.writeable:
-            for name in ("joint_slide", "joint_slide_velocity", "joint_slide_acceleration"):
-                arrays[name][i, window] = 0.0
+        for key, numbers in zip(("position", "velocity", "acceleration"), walk.point(link, name), strict=True):
+            put(arrays[f"point_{key}"], i, numbers, window)
 
 
-def _fill_slide(arrays: Arrays, back: Backward, i: int, window: slice) -> None:
-    """Slide of one joint with its derivatives, along the axis on its first link."""
-    walk = back.walk
-    name = list(walk.system.joints)[i]
-    first, second = walk.system.joints[name][1]
-    one, two = walk.element(first, name), walk.element(second, name)
-    dx, dy = two.x - one.x, two.y - one.y
-    w, base, end = walk.motions[first].twist.w, walk.acceleration(first, name), walk.acceleration(second, name)
-    carried = accelerated(base, w, dx, dy)
-    arrays["joint_slide"][i, window] = one.c * dx + one.s * dy
-    arrays["joint_slide_velocity"][i, window] = back.slips[name].speed
-    # the Coriolis part 2 ω × ṡ lies across the slide
-    arrays["joint_slide_acceleration"][i, window] = one.c * (end.x - carried.x) + one.s * (end.y - carried.y)
+def put(array: NDArray[np.float64], i: int, numbers: Sequence[Number], window: slice) -> None:
+    """The components of the i-th vector."""
+    for axis, number in enumerate(numbers):
+        array[i, axis, window] = number
 
 
 def fill_forces(arrays: Arrays, back: Backward, window: slice) -> None:
-    system = back.walk.system
-    for i, (name, (kind, _)) in enumerate(system.joints.items()):
-        reaction, friction = back.reactions[name], back.friction[name]
-        arrays["reaction_force"][i, 0, window] = reaction.x
-        arrays["reaction_force"][i, 1, window] = reaction.y
-        if arrays["reaction_moment"].flags.writeable:
-            arrays["reaction_moment"][i, window] = reaction.m
-        rotates = kind == "revolute"
-        arrays["friction_torque"][i, window] = friction if rotates else 0.0
-        if arrays["friction_force"].flags.writeable:
-            arrays["friction_force"][i, window] = 0.0 if rotates else friction
-    for i, name in enumerate(system.mechanism.drivers):
+    """Reactions, friction, and what `fill_efforts` does, of one chunk."""
+    for i, name in enumerate(back.walk.system.joints):
+        *force, moment = back.reactions[name]
+        put(arrays["reaction_force"], i, force, window)
+        turns, friction = back.walk.system.turns(name), back.friction[name]
+        arrays["friction_torque"][i, window] = friction if turns else 0.0
+        if arrays["reaction_moment"].flags.writeable:  # and so is the force
+            arrays["reaction_moment"][i, window] = moment
+            arrays["friction_force"][i, window] = 0.0 if turns else friction
+    fill_efforts(arrays, back, window)
+
+
+def fill_efforts(arrays: Arrays, back: Backward, window: slice) -> None:
+    """Drive efforts, springs and gear pairs of one chunk."""
+    mechanism = back.walk.system.mechanism
+    for i, name in enumerate(mechanism.drivers):
         arrays["drive_effort"][i, window] = back.efforts[name]
-    for i, name in enumerate(system.mechanism.springs):
-        state = back.springs[name]
-        for key, number in zip(("spring_force", "spring_elongation"), state[:2], strict=True):
+    for i, name in enumerate(mechanism.springs):
+        for key, number in zip(("spring_force", "spring_elongation"), back.springs[name][:2], strict=True):
             arrays[key][i, window] = number
-    for i, name in enumerate(system.mechanism.gears):
-        gear = back.gears[name]
-        arrays["gear_torque"][i, window] = gear.torque
-        for axis in (0, 1):
-            arrays["gear_force"][i, axis, window] = gear.force[axis]
+    for i, name in enumerate(mechanism.gears):
+        arrays["gear_torque"][i, window] = back.gears[name].torque
+        put(arrays["gear_force"], i, back.gears[name].force, window)
 
 
 def unwrap(arrays: Arrays, system: System, values: Values, time: NDArray[np.float64]) -> None:
@@ -128,10 +118,10 @@ def unwrap(arrays: Arrays, system: System, values: Values, time: NDArray[np.floa
     for link, angle, rate in zip(order, angles, arrays["link_angle_velocity"], strict=True):
         if link != system.mechanism.fixed_link:
             unwrap_row(angle, rate, step)
-    for i, (name, (kind, (first, second))) in enumerate(system.joints.items()):
+    for i, (name, (_, (first, second))) in enumerate(system.joints.items()):
         rotation = arrays["joint_rotation"][i]
         np.subtract(angles[order.index(second)], angles[order.index(first)], out=rotation)
-        if name in system.mechanism.drivers and kind == "revolute":
+        if name in system.mechanism.drivers and system.turns(name):
             rotation[:] = np.where(np.isfinite(rotation), system.drive(values, name, time)[0], np.nan)
 
 

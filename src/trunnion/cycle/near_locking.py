@@ -18,7 +18,7 @@ from trunnion.algebra.quadrature import CANCELLED, integrals
 from trunnion.errors import Finding, Severity, counted
 from trunnion.results.figure import MORE_THAN, Figure
 from trunnion.solve import continuation
-from trunnion.solve.backward import Backward, Given
+from trunnion.solve.backward import Backward, Given, backward
 from trunnion.solve.bristles import histories
 from trunnion.solve.forward import Forward
 from trunnion.solve.friction import Problem, frictionless, identity_minus, scaled
@@ -240,7 +240,7 @@ def reverse(run: Run, ahead: Forward, method: FrictionMethod, useful: Sequence[s
     past = histories(run.system, run.values, run.chosen.assembly, run.cycle, reverse=True)
     deflections = {joint: history.at(run.cycle.duration - time) for joint, history in past.items()}
     with np.errstate(all="ignore"):
-        other = walk.system.geometry.backward(walk, method, Given({}, deflections))
+        other = backward(walk, method, Given({}, deflections))
     shape = time.shape
     efforts = {name: np.broadcast_to(effort, shape) for name, effort in other.efforts.items()}
     delivered = -sum((effort * walk.rate(name) for name, effort in efforts.items()), np.zeros(shape))

@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.algebra.plane import Acceleration, Frame, Twist, Wrench, scaled
+from trunnion.algebra.plane import Acceleration, Frame, Twist, Wrench, times
 
 __all__ = ["NUMBERS", "ONE", "Action", "Gear", "GearRow", "Mesh", "actions", "apart", "mesh", "rotation"]
 
@@ -160,4 +160,4 @@ def apart(gear: Gear, touch: Mesh, size: Number) -> list[Action]:
 def _on_gears(gear: Gear, push: Wrench, at: Frame) -> list[Action]:
     """A force on the second gear at the pitch point, and its opposite on the first."""
     one, two = (1 - side for side in gear.carriers or (0, 0))
-    return [Action(gear.second, two, push, at), Action(gear.first, one, scaled(push, -1.0), at)]
+    return [Action(gear.second, two, push, at), Action(gear.first, one, times(-1.0, push), at)]

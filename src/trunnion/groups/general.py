@@ -35,9 +35,10 @@ from trunnion.algebra.plane import (
     accelerated,
     added,
     compose,
+    minus,
     moved,
     relative,
-    scaled,
+    times,
 )
 from trunnion.algebra.traced import looped
 from trunnion.groups import tree as spanning
@@ -434,25 +435,25 @@ class General:
                 torques.append(size)
             else:
                 wrench = row.wrench(pose.elements[row.joint][0], size)
-                found[row.joint] = added(found.get(row.joint, ZERO_LOAD), wrench, 1.0)
+                found[row.joint] = added(found.get(row.joint, ZERO_LOAD), wrench)
         for k, wrench in found.items():
             first, second = self.joints[k].sides
             at = pose.elements[k][1]
-            for link, sign in ((second, 1.0), (first, -1.0)):
+            for link, add in ((second, added), (first, minus)):
                 if link != OUTER:
-                    carried[link] = added(carried[link], _moved_to(pose, wrench, at), sign)
+                    carried[link] = add(carried[link], _moved_to(pose, wrench, at))
         for gear, ratio, torque in zip(self.gears, pose.ratios, torques, strict=True):
             for joint, side, wrench, place in actions(gear, pose.elements, ratio, torque):
                 link = self.joints[joint].sides[side]
                 if link != OUTER:
-                    carried[link] = added(carried[link], _moved_to(pose, wrench, place), 1.0)
+                    carried[link] = added(carried[link], _moved_to(pose, wrench, place))
         for step in reversed(self.steps):
             at = pose.elements[step.joint][1]
             total = carried[step.child]
             sign = -1.0 if step.near == 0 else 1.0
-            found[step.joint] = scaled(_moved_from(pose, total, at), sign)
+            found[step.joint] = times(sign, _moved_from(pose, total, at))
             if step.parent != OUTER:
-                carried[step.parent] = added(carried[step.parent], total, 1.0)
+                carried[step.parent] = added(carried[step.parent], total)
         return [found[k] for k in range(len(self.joints))] + [Wrench(0.0, 0.0, torque) for torque in torques]
 
     def _multipliers(self, pose: Pose, carried: dict[int, Wrench]) -> list[Number]:
@@ -463,7 +464,7 @@ class General:
             outboard = ZERO_LOAD
             for link, path in self._paths.items():
                 if i in path:
-                    outboard = added(outboard, carried[link], 1.0)
+                    outboard = added(outboard, carried[link])
             powers.append(screws[i].x * outboard.x + screws[i].y * outboard.y + screws[i].w * outboard.m)
         return [-linalg.weighted([line[j] for line in pose.inverse], powers) for j in range(len(self._rows))]
 

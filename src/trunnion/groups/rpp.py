@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from trunnion.algebra.linalg import Vector, cross, dot
+from trunnion.algebra.literal import less
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.plane import (
     Acceleration,
@@ -23,7 +24,6 @@ from trunnion.algebra.plane import (
     along_slide,
     both_ends,
     compose,
-    less,
     moved,
     relative,
     shifted,

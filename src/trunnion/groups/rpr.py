@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from trunnion.algebra.linalg import Vector
+from trunnion.algebra.literal import less
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.plane import (
     Acceleration,
@@ -21,7 +22,6 @@ from trunnion.algebra.plane import (
     about,
     accelerated,
     both_ends,
-    less,
     moved,
     relative,
     root,

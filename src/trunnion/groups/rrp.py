@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from trunnion.algebra.linalg import Vector, dot
+from trunnion.algebra.literal import is_zero, less
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.plane import (
     Acceleration,
@@ -23,8 +24,6 @@ from trunnion.algebra.plane import (
     accelerated,
     both_ends,
     compose,
-    is_zero,
-    less,
     moved,
     pinned,
     relative,

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from trunnion.algebra.linalg import Vector, cross, dot
+from trunnion.algebra.literal import is_zero, less
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.plane import (
     Acceleration,
@@ -21,8 +22,6 @@ from trunnion.algebra.plane import (
     about,
     accelerated,
     both_ends,
-    is_zero,
-    less,
     moved,
     pinned,
     root,

@@ -24,6 +24,9 @@ class Pair:
     symbol: its letter in a structural formula. freedoms: which of ("rotation", "slide") it frees: a rotation has a pin,
     a slide alone a guide, and a driver prescribes the first. count: freedoms of the relative motion in space.
     planar: whether it exists in the plane. needs_axis: the spaces in which the points on both links must state an axis.
+    one_axis: whether it does nothing but turn about and slide along one axis that both links share; angle: whether its
+    turn is one angle, about an axis that has the same direction in both links; crossed: whether it turns about two axes
+    at right angles, one in each link; threaded: whether a turn slides it along.
     """
 
     name: str
@@ -32,11 +35,35 @@ class Pair:
     count: int
     planar: bool = False
     needs_axis: tuple[str, ...] = ("spatial",)
+    one_axis: bool = False
+    angle: bool = False
+    crossed: bool = False
+    threaded: bool = False
 
     @property
     def drivable(self) -> bool:
         """Whether one number says how far it has moved, slides of a cylindrical pair apart."""
-        return self.count == 1 or self.name == "cylindrical"
+        return self.one_axis
+
+    @property
+    def turns(self) -> bool:
+        """Whether its coordinate, as drivers and loads see it, is an angle: it has a pin, else a guide."""
+        return "rotation" in self.freedoms
+
+    @property
+    def slides(self) -> bool:
+        """Whether it slides along its axis."""
+        return self.one_axis and ("slide" in self.freedoms or self.threaded)
+
+    @property
+    def meets(self) -> bool:
+        """Whether the points of its two elements are one."""
+        return "slide" not in self.freedoms and not self.threaded
+
+    @property
+    def ball(self) -> bool:
+        """Whether it turns about any axis through its point."""
+        return self.turns and self.count == 3
 
 
 Reaction = tuple[Number, ...]  # planar: force x, y (N), moment (N m) about the joint's point; in space see `loads`
@@ -144,12 +171,12 @@ class Load(NamedTuple):
 
 
 PAIRS: dict[str, Pair] = {
-    "revolute": Pair("revolute", "R", ("rotation",), 1, planar=True),
-    "prismatic": Pair("prismatic", "P", ("slide",), 1, planar=True, needs_axis=("planar", "spatial")),
-    "cylindrical": Pair("cylindrical", "C", ("rotation", "slide"), 2),
+    "revolute": Pair("revolute", "R", ("rotation",), 1, planar=True, one_axis=True, angle=True),
+    "prismatic": Pair("prismatic", "P", ("slide",), 1, planar=True, needs_axis=("planar", "spatial"), one_axis=True),
+    "cylindrical": Pair("cylindrical", "C", ("rotation", "slide"), 2, one_axis=True, angle=True),
     "spherical": Pair("spherical", "S", ("rotation",), 3, needs_axis=()),
-    "universal": Pair("universal", "U", ("rotation",), 2),
-    "helical": Pair("helical", "H", ("rotation",), 1),
-    "planar": Pair("planar", "E", ("slide",), 3),
+    "universal": Pair("universal", "U", ("rotation",), 2, crossed=True),
+    "helical": Pair("helical", "H", ("rotation",), 1, one_axis=True, angle=True, threaded=True),
+    "planar": Pair("planar", "E", ("slide",), 3, angle=True),
     "fixed": Pair("fixed", "F", (), 0, needs_axis=()),
 }

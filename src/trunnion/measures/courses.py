@@ -17,7 +17,7 @@ from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.measures.motion import MOTIONS, Asked, component
 from trunnion.measures.transmission import of_joint
-from trunnion.solve.backward import Backward, slip_of
+from trunnion.solve.backward import Backward
 from trunnion.solve.forward import Forward
 from trunnion.solve.friction_method import MARGIN
 from trunnion.solve.loads import useful_loads
@@ -99,21 +99,12 @@ def angular_acceleration(measure: Asked, walk: Forward) -> tuple[Number, ...]:
 
 def rate(measure: Asked, walk: Forward) -> tuple[Number, ...]:
     """Speed of the second link of a joint against the first, rad/s about the joint's axis or m/s along it."""
-    joint = measure.subject
-    if isinstance(walk, SpatialWalk):
-        return (walk.rates(joint)[0 if walk.system.turns(joint) else 1],)
-    return (slip_of(walk, joint).speed,)
+    return (walk.rates(measure.subject)[0 if walk.system.turns(measure.subject) else 1],)
 
 
 def joint_acceleration(measure: Asked, walk: Forward) -> tuple[Number, ...]:
     """Second derivative of the rotation of a joint, rad/s², or of the slide of one that does not turn, m/s²."""
-    joint = measure.subject
-    if isinstance(walk, SpatialWalk):
-        return (walk.second_rates(joint)[0 if walk.system.turns(joint) else 1],)
-    if walk.system.turns(joint):
-        first, second = walk.system.joints[joint][1]
-        return (walk.motions[second].acceleration.w - walk.motions[first].acceleration.w,)
-    return (walk.slip_motion(joint)[1],)
+    return (walk.second_rates(measure.subject)[0 if walk.system.turns(measure.subject) else 1],)
 
 
 # ---- of the forces --------------------------------------------------------------------------------------------
@@ -129,9 +120,9 @@ def load(measure: Asked, back: Backward) -> tuple[Number, ...]:
 
     Times the speed of the joint it is the power that the load takes.
     """
-    stated, walk = back.walk.system.mechanism.loads[measure.subject], back.walk
+    stated = back.walk.system.mechanism.loads[measure.subject]
     joint, turns = stated.joint or "", stated.resisting_torque is not None
-    speed = walk.rates(joint)[0 if turns else 1] if isinstance(walk, SpatialWalk) else back.slips[joint].speed
+    speed = back.walk.rates(joint)[0 if turns else 1]
     moving = primal(speed) != 0
     xp = namespace(speed)
     return (-back.load_powers[measure.subject] / xp.where(moving, speed, np.nan),)

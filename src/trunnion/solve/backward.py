@@ -3,30 +3,29 @@
 from __future__ import annotations
 
 import functools
+import operator
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from typing import Any, cast
 
 import numpy as np
 
+from trunnion.algebra import literal
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.algebra.plane import ZERO_LOAD, Wrench, about, added, moved
-from trunnion.groups.gear import Action as GearAction
-from trunnion.groups.gear import Gear, Mesh, actions, apart, mesh
+from trunnion.algebra.nested import flat
 from trunnion.groups.general import General
-from trunnion.groups.protocol import Group
+from trunnion.groups.spatial import SpatialGroup
 from trunnion.joints.friction import FrictionLaw, LawFunction
-from trunnion.joints.pairs import Load
 from trunnion.solve.forward import Assembly, Forward, Travel, forward
 from trunnion.solve.friction import Contact, Settled, settle
 from trunnion.solve.friction_method import FrictionMethod
-from trunnion.solve.loads import Action, Share, Slip, SpringState, springs, stated_loads
-from trunnion.solve.system import Place, System, Values, law_of
+from trunnion.solve.friction_problem import Rubbing
+from trunnion.solve.gears import GearLoad, acting, gear_load, gears_of, on_links, power_of, teeth
+from trunnion.solve.loads import Action, Share, SpringState, springs, stated_loads
+from trunnion.solve.system import Place, System, Values, law_of, rubbing
 
-__all__ = ["Backward", "Given", "Sense", "backward", "held", "sense_of", "slip_of", "solve", "under"]
-
-ZERO_SLIP = 1e-10  # of the speeds about the joint: below it the sign of a relative speed is rounding noise
+__all__ = ["Backward", "Given", "Sense", "Slip", "backward", "held", "sense_of", "solve", "under"]
 
 
 Sense = Share | tuple[Share, ...]
@@ -72,30 +71,37 @@ def _shared(function: LawFunction, normal: Number, slip: Number, *, share: Numbe
     return share * function(normal, slip, **parameters)
 
 
-class GearLoad(NamedTuple):
-    """What a gear pair does: torque in its second joint, on the second link, N m; tooth force on the second gear, N."""
+@dataclass(frozen=True)
+class Slip:
+    """Relative speed of a joint, second link against first (rad/s, m/s), and where what resists it sees it at rest."""
 
-    torque: Number
-    force: tuple[Number, Number]
+    speed: Number
+    zero: Number
 
 
 @dataclass
 class Backward:
     """What one walk backward found, by joint and driver as the file names them.
 
-    reactions: on the second link by the first, about the joint's point on the second, friction and drive effort
-    not included; friction: torque (N m) or force along the slide (N) on the second link; settled: per module;
-    undefined: where each load or spring (by path) has no value; turning: of joints that rub and turn, the contact and
-    the share of its friction that acts about the axis; travels: whether seats do, so that a joint also loses what its
-    load does on the way of its pin; passed: power that each joint passes on to its links in all;
-    gear_power: of all gear pairs, whose wheels then move apart.
+    loads: on each link, the wrenches of joints passed so far included; reactions: on the second link by the first,
+    friction and drive effort not included, in the plane about the joint's point on the second, in space about the
+    origin; friction: torque about the axis, N m, of a ball or a cross about the relative angular velocity, or force
+    along the slide, N, on the second link; friction_wrenches: all that friction does to it, about what the reaction is;
+    losses: power of friction, W; contacts: those of each joint that rubs; settled: per module; undefined: where each
+    load or spring (by path) has no value; turning: of joints that rub and turn, the contact and the share of its
+    friction that acts about the axis; spins: torque that each link with a free spin would need to keep from spinning,
+    N m; travels: whether seats do, so that a joint also loses what its load does on the way of its pin; passed: power
+    that each joint passes on to its links in all; gear_power: of all gear pairs, whose wheels then move apart.
     """
 
     walk: Forward
     loads: dict[str, Any]
     slips: dict[str, Slip] = field(default_factory=dict)
+    contacts: dict[str, list[Rubbing]] = field(default_factory=dict)
     reactions: dict[str, Any] = field(default_factory=dict)
     friction: dict[str, Number] = field(default_factory=dict)
+    friction_wrenches: dict[str, Any] = field(default_factory=dict)
+    losses: dict[str, Number] = field(default_factory=dict)
     efforts: dict[str, Number] = field(default_factory=dict)
     settled: list[Settled] = field(default_factory=list)
     load_powers: dict[str, Number] = field(default_factory=dict)
@@ -104,15 +110,14 @@ class Backward:
     gears: dict[str, GearLoad] = field(default_factory=dict)
     undefined: dict[str, Number] = field(default_factory=dict)
     turning: dict[str, tuple[Contact, Number]] = field(default_factory=dict)
+    spins: dict[str, Number] = field(default_factory=dict)
     travels: bool = False
     passed: dict[str, Number] = field(default_factory=dict)
     gear_power: Number = 0.0
 
     def friction_power(self, joint: str) -> Number:
         """Power lost in a joint, W."""
-        if self.travels:
-            return self.lost(joint)
-        return -(self.friction[joint] * self.slips[joint].speed)
+        return self.lost(joint) if self.travels else self.losses[joint]
 
     def lost(self, joint: str) -> Number:
         """What a joint takes out and its driver does not put in, W: friction, and the load on its seat's way."""
@@ -121,10 +126,12 @@ class Backward:
 
     def on_hole(self, joint: str) -> tuple[tuple[Number, ...], tuple[Number, ...]]:
         """Force, N, and moment about its middle, N m, of the pin on the hole of a joint, in the hole's frame."""
-        hole = self.walk.hole(joint)
-        at = self.walk.element(self.walk.system.joints[joint][1][1], joint)
-        x, y, moment = about(self.reactions[joint], hole.x - at.x, hole.y - at.y)
-        return (x * hole.c + y * hole.s, y * hole.c - x * hole.s), (moment,)
+        return self.walk.in_hole(joint, self.reactions[joint])
+
+    def add(self, link: str, load: Any) -> None:
+        """Add a load to those of a link; the ground bears any."""
+        if link != self.walk.system.mechanism.fixed_link:
+            self.loads[link] = self.walk.algebra.added(self.loads[link], load)
 
 
 def solve(
@@ -143,16 +150,15 @@ def solve(
     given = given or Given()
     walk = forward(system, values, assembly, time, given.travel)
     with np.errstate(all="ignore"):
-        found: Backward = system.geometry.backward(walk, method or FrictionMethod(), given)
-    return found
+        return backward(walk, method or FrictionMethod(), given)
 
 
 def backward(walk: Forward, method: FrictionMethod, given: Given) -> Backward:
     """Reactions and friction of every module, last module first."""
     system = walk.system
-    back = Backward(walk, dict.fromkeys(system.mechanism.links, ZERO_LOAD), travels=bool(given.travel))
-    for name in system.joints:
-        back.slips[name] = slip_of(walk, name)
+    back = Backward(walk, _unloaded(walk), travels=bool(given.travel))
+    back.contacts.update((joint, list(system.geometry.contacts(walk, joint))) for joint in rubbing(system))
+    back.slips.update((joint, _slip(back, joint)) for joint in system.joints)
     _add_body_loads(back)
     _add_stated_loads(back, given.zero_slip)
     for number in reversed(range(len(system.plan.modules))):
@@ -160,274 +166,157 @@ def backward(walk: Forward, method: FrictionMethod, given: Given) -> Backward:
     return back
 
 
-def under(walk: Forward, loads: Mapping[str, Wrench]) -> Backward:
-    """Reactions to these loads alone, each about the origin of its link, without friction; the drivers hold still.
+def under(walk: Forward, loads: Mapping[str, Any]) -> Backward:
+    """Reactions to these loads alone, each about what those of its link are, without friction; the drivers hold still.
 
-    They are what moves with the play of joints, so gear pairs pass torques alone: their ratio holds between rotations,
-    which no offset of a pin changes.
+    They are what moves with the play of joints, so gear pairs pass torques alone.
     """
     system = walk.system
-    back = Backward(walk, dict.fromkeys(system.mechanism.links, ZERO_LOAD) | dict(loads))
+    back = Backward(walk, _unloaded(walk) | dict(loads))
     for number in reversed(range(len(system.plan.modules))):
         module, places, group = system.plan.modules[number], system.places[number], system.groups[number]
-        pose, gears = walk.poses[number], tuple(gear._replace(carriers=None) for gear in _gears(group))
         if isinstance(group, General):
-            group = replace(group, gears=gears)
-        reactions = group.reactions(pose, [back.loads[link] for link in module.links])
-        for k, place in enumerate(places):
+            group = replace(group, gears=tuple(gear._replace(carriers=None) for gear in gears_of(group)))
+        reactions = walk.reacting(group).reactions(walk.poses[number], [back.loads[link] for link in module.links])
+        for place, reaction in zip(places, reactions, strict=False):  # then come those of gear pairs
             if not place.witness:
-                _record(back, place, Wrench(*reactions[k]), 0.0, driven=place.joint in module.driven)
-        for i, gear in enumerate(gears):
-            torque = Wrench(*reactions[len(places) + i]).m
-            _push(back, number, actions(gear, pose.elements, pose.ratios[i], torque))
+                _record(back, place, walk.wrench(place, reaction), [], place.joint in module.driven)
+        for i, (*_, torque) in enumerate(reactions[len(places) :]):
+            _push(back, number, acting(walk, number, i, torque, parting=False))
     return back
+
+
+def _unloaded(walk: Forward) -> dict[str, Any]:
+    return dict.fromkeys(walk.system.mechanism.effective_links, walk.algebra.ZERO_LOAD)
+
+
+def _slip(back: Backward, joint: str) -> Slip:
+    """Slip of a joint, and where a contact of it rests, or the turn or slide that a load resists."""
+    walk = back.walk
+    if not walk.pair(joint).count:
+        return Slip(0.0, False)
+    zeros = [one.zero for one in back.contacts.get(joint, [])]
+    zeros += [walk.still(joint, turns) for turns in walk.system.resisted.get(joint, ())]
+    return Slip(walk.speed(joint), functools.reduce(operator.or_, zeros) if zeros else False)
 
 
 # ---- loads ----------------------------------------------------------------------------------------------------
 
 
 def _add_body_loads(back: Backward) -> None:
-    """Gravity and inertia of every link: d'Alembert, −m a at the mass centre and −J α.  [D 2-5]"""
-    walk, values = back.walk, back.walk.values
-    gx, gy = values["gravity.x"], values["gravity.y"]
-    for link, body in walk.system.mechanism.links.items():
-        if link == walk.system.mechanism.fixed_link:
+    """Gravity and inertia of every link: d'Alembert, −m a at the mass centre and the moment of its spin.  [D 2-5]"""
+    walk, system, algebra = back.walk, back.walk.system, back.walk.algebra
+    gravity = system.vector(walk.values, "gravity")
+    for link in system.mechanism.effective_links:
+        if link == system.mechanism.fixed_link:
             continue
-        mass, inertia = values[f"links.{link}.mass"], values[f"links.{link}.inertia"]
-        if _absent(mass) and _absent(inertia):
+        mass, moment = walk.values[f"links.{link}.mass"], walk.inertia_moment(link)
+        if moment is None and literal.is_zero(mass):
             continue
-        local = walk.system.centre(values, link)
-        if body.inertia_about == "origin":
-            inertia = inertia - mass * (local[0] * local[0] + local[1] * local[1])
-        centre = walk.local_point(link, *local)
-        motion = walk.motions[link]
-        force = (mass * (gx - centre.acceleration[0]), mass * (gy - centre.acceleration[1]))
-        moment = -inertia * motion.acceleration.w
-        back.body_power = back.body_power + (
-            force[0] * centre.velocity[0] + force[1] * centre.velocity[1] + moment * motion.twist.w
-        )
-        _add(back, link, Wrench(*force, moment), centre.place)
+        centre, (frame, twist, _) = walk.at(link, system.centre(walk.values, link)), walk.motions[link]
+        force = tuple(literal.times(mass, g - a) for g, a in zip(gravity, centre.acceleration, strict=True))
+        load = algebra.load(frame, force, algebra.NO_MOMENT if moment is None else moment, centre.place)
+        back.body_power = back.body_power + algebra.power(load, twist)
+        back.add(link, load)
 
 
 def _add_stated_loads(back: Backward, zero_slip: Mapping[str, Sense]) -> None:
     """The loads and springs of the model, with the power each gives the mechanism."""
-    mechanism = back.walk.system.mechanism
     senses = {joint: sense_of(zero_slip, joint) for joint in zero_slip}
-    for name, action in stated_loads(back.walk, back.slips, senses):
+    for name, action in stated_loads(back.walk, senses):
         back.load_powers[name] = action.power
         _act(back, f"loads.{name}", action)
-    for name, action, state in springs(back.walk, back.slips) if mechanism.springs else ():
+    for name, action, state in springs(back.walk):
         back.springs[name] = state
         _act(back, f"springs.{name}", action)
 
 
 def _act(back: Backward, path: str, action: Action) -> None:
     back.undefined[path] = action.undefined
-    for link, wrench, at in action.on:
-        _add(back, link, wrench, at)
-
-
-def _add(back: Backward, link: str, load: Wrench, at: tuple[Number, Number] | None) -> None:
-    """Add a load, about the place `at` (global, m), to a link's total about its origin."""
-    frame, total = back.walk.motions[link].frame, back.loads[link]
-    x, y, m = load if at is None else about(load, frame.x - at[0], frame.y - at[1])
-    back.loads[link] = Wrench(total.x + x, total.y + y, total.m + m)
-
-
-def _absent(number: Number) -> bool:
-    return isinstance(number, (int, float)) and number == 0
+    for link, wrench in action.on:
+        back.add(link, wrench)
 
 
 # ---- one module -----------------------------------------------------------------------------------------------
 
 
-def slip_of(walk: Forward, joint: str) -> Slip:
-    """Relative speed along the freedom of a joint, and whether it is zero but for rounding."""
-    kind, (first, second) = walk.system.joints[joint]
-    w1, w2 = walk.motions[first].twist.w, walk.motions[second].twist.w
-    if kind == "revolute":
-        speed = w2 - w1
-        return Slip(speed, np.abs(primal(speed)) <= ZERO_SLIP * (np.abs(primal(w1)) + np.abs(primal(w2)) + walk.pace))
-    one, two = walk.element(first, joint), walk.element(second, joint)
-    v1, v2 = walk.twist(first, joint), walk.twist(second, joint)
-    dx, dy = two.x - one.x, two.y - one.y
-    speed = one.c * (v2.x - v1.x + w1 * dy) + one.s * (v2.y - v1.y - w1 * dx)
-    scale = walk.pace * walk.extent + np.hypot(primal(v2.x), primal(v2.y))
-    return Slip(speed, np.abs(primal(speed)) <= ZERO_SLIP * scale)
-
-
 def _settle_module(back: Backward, number: int, method: FrictionMethod, given: Given) -> None:
     walk, system = back.walk, back.walk.system
     module, group, places = system.plan.modules[number], system.groups[number], system.places[number]
-    loads = [back.loads[link] for link in module.links]
-    contacts, levers = [], {}
+    pose, loads = walk.poses[number], [back.loads[link] for link in module.links]
+    contacts: list[Contact] = []
+    rubbed: list[Rubbing] = []
     for k, place in enumerate(places):
-        if system.mechanism.effective_joints[place.joint].friction is not None and not place.witness:
-            contact, levers[k] = _contact(back, module.links, k, place, given)
-            contacts.append(contact)
-            if place.kind == "revolute":
-                back.turning[place.joint] = contact, 1.0
-    contacts += [_teeth(back, number, i) for i, gear in enumerate(_gears(group)) if gear.carriers]
-    settled = settle(group, walk.poses[number], loads, contacts, method)
+        for i, one in enumerate(() if place.witness else back.contacts.get(place.joint, ())):
+            contacts.append(_contact(back, module.links, k, place.joint, one, given, i))
+            rubbed.append(one)
+            if one.turning is not None:
+                back.turning[place.joint] = contacts[-1], one.turning
+    contacts += teeth(walk, number)
+    settled = settle(walk.reacting(group), pose, loads, contacts, method)
     back.settled.append(settled)
-    forces = {contact.joint: force for contact, force in zip(contacts, settled.forces, strict=True)}
+    if module.spinning:
+        torques = cast(SpatialGroup, group).spin_torques(pose, loads)
+        back.spins.update((link, torque) for (link, _, _), torque in zip(module.spinning, torques, strict=True))
+    parts = list(zip(contacts, rubbed, settled.forces, strict=False))
     for k, place in enumerate(places):
         if not place.witness:
-            friction = forces[k] * levers[k] if k in forces else 0.0
-            _record(back, place, Wrench(*settled.reactions[k]), friction, driven=place.joint in module.driven)
+            own = [part for part in parts if part[0].joint == k]
+            _record(back, place, walk.wrench(place, settled.reactions[k]), own, place.joint in module.driven)
+    forces = {contact.joint: force for contact, force in zip(contacts, settled.forces, strict=True)}
     for i, name in enumerate(module.gears):
         k = len(places) + i
-        _record_gear(back, number, i, name, Wrench(*settled.reactions[k]).m, forces.get(k, 0.0))
+        back.gears[name], done = gear_load(walk, number, i, settled.reactions[k][-1], forces.get(k, 0.0))
+        if back.travels:
+            back.gear_power = back.gear_power + power_of(walk, number, done)
+        _push(back, number, done)
 
 
-def _contact(back: Backward, links: tuple[str, ...], k: int, place: Place, given: Given) -> tuple[Contact, Number]:
-    """A joint with friction as its module sees it, and its lever arm (radius of a pin, 1 of a slide)."""
-    walk, values = back.walk, back.walk.values
-    law = law_of(walk.system, place.joint)
-    parameters = {name: values[f"joints.{place.joint}.friction.{name}"] for name in law.parameters}
-    slip = back.slips[place.joint]
-    sign = -1.0 if place.reversed_ else 1.0
-    if place.kind == "revolute":
-        lever = values[f"joints.{place.joint}.pin.radius"]
-        load = Load()
-        units = [_signed(link, place.links, Wrench(0.0, 0.0, lever)) for link in links]
-    else:
-        lever = 1.0
-        axis = walk.element(place.links[0], place.joint)
-        at = walk.element(place.links[1], place.joint)
-        # the guide has its middle at the point of the link that the file names second
-        middle = walk.element(walk.system.joints[place.joint][1][1], place.joint)
-        arm = (middle.x - at.x, middle.y - at.y) if place.reversed_ else None
-        load = Load((-axis.s, axis.c), values[f"joints.{place.joint}.guide.length"], arm)
-        units = []
-        for link in links:
-            frame = walk.motions[link].frame
-            push = about(Wrench(axis.c, axis.s, 0.0), frame.x - at.x, frame.y - at.y)
-            units.append(_signed(link, place.links, push))
-    law, parameters, speed = held(law, parameters, slip.speed, slip.zero, sense_of(given.zero_slip, place.joint))
-    speed = sign * lever * speed
-    if place.joint in given.deflections:
-        parameters["deflection"] = sign * given.deflections[place.joint]
-    return Contact(k, units, load, law, parameters, speed), sign * lever
+def _contact(back: Backward, links: tuple[str, ...], k: int, joint: str, one: Rubbing, given: Given, i: int) -> Contact:
+    """One contact of a joint, its i-th, as `friction` sees it."""
+    walk, law = back.walk, law_of(back.walk.system, joint)
+    parameters = {name: walk.values[f"joints.{joint}.friction.{name}"] for name in law.parameters}
+    law, parameters, speed = held(law, parameters, one.slip, one.zero, sense_of(given.zero_slip, joint, i))
+    if joint in given.deflections:
+        parameters["deflection"] = given.deflections[joint]
+    first, second = walk.system.joints[joint][1]
+    units = []
+    for link in links:
+        if link in (first, second):
+            unit = walk.on_link(link, one.unit, joint)
+            units.append(unit if link == second else walk.algebra.times(-1.0, unit))
+        else:
+            units.append(walk.algebra.ZERO_LOAD)
+    return Contact(k, units, one.load, law, parameters, speed, own=tuple(flat(one.unit)) if one.felt else None)
 
 
-def _signed(link: str, sides: tuple[str, str], load: Wrench) -> Wrench:
-    """The load on the second side, its opposite on the first, nothing on other links."""
-    if link == sides[1]:
-        return load
-    return Wrench(*(-n for n in load)) if link == sides[0] else ZERO_LOAD
-
-
-def _record(back: Backward, place: Place, reaction: Wrench, friction: Number, driven: bool) -> None:
-    """Keep a joint's reaction, friction and drive effort in the file's sense; load its outer link with all three."""
-    walk = back.walk
-    first, second = (place.links[1], place.links[0]) if place.reversed_ else place.links
-    if place.reversed_:
-        reaction = Wrench(*(-n for n in reaction))
-        if place.kind != "revolute":  # the module's second point is the file's first: carry the moment over
-            here, there = walk.element(first, place.joint), walk.element(second, place.joint)
-            reaction = about(reaction, there.x - here.x, there.y - here.y)
-    at = walk.element(second, place.joint)
-    if place.kind == "revolute":
-        whole = Wrench(reaction.x, reaction.y, reaction.m + friction)
-        effort, bare = reaction.m, Wrench(reaction.x, reaction.y, 0.0)
-    else:
-        axis = walk.element(first, place.joint)
-        whole = Wrench(reaction.x + friction * axis.c, reaction.y + friction * axis.s, reaction.m)
-        effort = reaction.x * axis.c + reaction.y * axis.s
-        bare = Wrench(reaction.x - effort * axis.c, reaction.y - effort * axis.s, reaction.m)
-    back.reactions[place.joint] = bare
-    back.friction[place.joint] = friction
-    if back.travels:
-        back.passed[place.joint] = _passed(walk, place.joint, first, second, whole)
+def _record(
+    back: Backward, place: Place, wrench: Any, rubbed: Sequence[tuple[Contact, Rubbing, Number]], driven: bool
+) -> None:
+    """Keep a joint's reaction, friction and drive effort; load its known link with all three."""
+    walk, algebra, joint = back.walk, back.walk.algebra, place.joint
+    friction, amount, loss = algebra.ZERO_LOAD, 0.0, 0.0
+    for contact, one, force in rubbed:
+        part = algebra.times(force, one.unit)
+        friction, amount = algebra.added(friction, part), literal.plus(amount, literal.times(force, one.amount))
+        loss = literal.less(loss, force * contact.slip)
+        if contact.own is not None:
+            wrench = algebra.minus(wrench, part)
+    back.friction_wrenches[joint], back.friction[joint], back.losses[joint] = friction, amount, loss
+    whole, back.reactions[joint] = algebra.added(wrench, friction), wrench
     if driven:
-        back.efforts[place.joint] = effort
-    for link, outer in zip(place.links, place.outer, strict=True):
-        if outer and link != walk.system.mechanism.fixed_link:
-            sign = 1.0 if link == second else -1.0
-            _add(back, link, Wrench(*(sign * n for n in whole)), (at.x, at.y))
-
-
-def _passed(walk: Forward, joint: str, first: str, second: str, whole: Wrench) -> Number:
-    """Power of all that a joint does to its second link and, reversed, to its first, W."""
-    at, frame = walk.element(second, joint), walk.motions[first].frame
-    one, two = moved(walk.motions[first].twist, at.x - frame.x, at.y - frame.y), walk.twist(second, joint)
-    return whole.x * (two.x - one.x) + whole.y * (two.y - one.y) + whole.m * (two.w - one.w)
-
-
-# ---- gear pairs -----------------------------------------------------------------------------------------------
-
-
-def _gears(group: Group) -> tuple[Gear, ...]:
-    return group.gears if isinstance(group, General) else ()
-
-
-def _mesh(back: Backward, number: int, i: int) -> tuple[Gear, Mesh]:
-    """A gear pair of a module and where its gears touch."""
-    pose = back.walk.poses[number]
-    gear = _gears(back.walk.system.groups[number])[i]
-    return gear, mesh(gear, (pose.elements[gear.first], pose.elements[gear.second]), pose.ratios[i])
-
-
-def _teeth(back: Backward, number: int, i: int) -> Contact:
-    """The force with which inclined flanks push two gears apart: tan α times the tooth force."""
-    walk = back.walk
-    module, places = walk.system.plan.modules[number], walk.system.places[number]
-    gear, touch = _mesh(back, number, i)
-    units = dict.fromkeys(module.links, ZERO_LOAD)
-    for joint, side, wrench, at in apart(gear, touch, 1.0):
-        link = places[joint].links[side]
-        if link in units:
-            frame = walk.motions[link].frame
-            units[link] = added(units[link], about(wrench, frame.x - at.x, frame.y - at.y), 1.0)
-    angle = walk.values[f"gears.{module.gears[i]}.pressure_angle"]
-    # a guide of length 2/|f/λ| under the moment λ alone presses with |f|
-    load = Load((1.0, 0.0), 2 / namespace(touch.factor).abs(touch.factor))
-    slope = namespace(angle).sin(angle) / namespace(angle).cos(angle)
-    return Contact(len(places) + i, list(units.values()), load, SEPARATION, {"slope": slope}, 0.0, rubs=False)
-
-
-def _separation(normal: Number, slip: Number, **parameters: Number) -> Number:
-    return parameters["slope"] * normal
-
-
-SEPARATION = FrictionLaw(_separation)
-
-
-def _record_gear(back: Backward, number: int, i: int, name: str, torque: Number, separation: Number) -> None:
-    """Keep what a gear pair does, and load the known links with it."""
-    walk = back.walk
-    pose = walk.poses[number]
-    gear = _gears(walk.system.groups[number])[i]
-    done = actions(gear, pose.elements, pose.ratios[i], torque)
-    force: tuple[Number, Number] = (0.0, 0.0)
-    if gear.carriers:
-        pushes = apart(gear, _mesh(back, number, i)[1], separation)
-        force = done[0].wrench.x + pushes[0].wrench.x, done[0].wrench.y + pushes[0].wrench.y
-        done += pushes
-    if name in walk.system.turned_round:  # found in the joint and on the gear that the file names first
-        back.gears[name] = GearLoad(-torque * pose.ratios[i], (-force[0], -force[1]))
-    else:
-        back.gears[name] = GearLoad(torque, force)
+        motion, unit = walk.freedom(joint, walk.system.turns(joint))
+        effort = back.efforts[joint] = algebra.power(wrench, motion)
+        back.reactions[joint] = algebra.minus(wrench, algebra.times(effort, unit))
     if back.travels:
-        back.gear_power = back.gear_power + _power_of(back, number, done)
-    _push(back, number, done)
+        back.passed[joint] = algebra.power(whole, walk.against(joint))
+    second = walk.system.joints[joint][1][1]
+    for link, outer in zip(place.links, place.outer, strict=True):
+        if outer:
+            back.add(link, walk.on_link(link, whole if link == second else algebra.times(-1.0, whole), joint))
 
 
-def _power_of(back: Backward, number: int, done: Sequence[GearAction]) -> Number:
-    """Power of a gear pair on the way of its wheels' centres, W; without travel of their pins there is none."""
-    walk, power = back.walk, 0.0
-    for joint, side, wrench, at in done:
-        frame, twist, _ = walk.motions[walk.system.places[number][joint].links[side]]
-        v = moved(twist, at.x - frame.x, at.y - frame.y)
-        power = power + wrench.x * v.x + wrench.y * v.y + wrench.m * v.w
-    return power
-
-
-def _push(back: Backward, number: int, done: Sequence[GearAction]) -> None:
-    """Load the known links of a module with what a gear pair does."""
-    system = back.walk.system
-    for joint, side, wrench, at in done:
-        place = system.places[number][joint]
-        if place.outer[side] and place.links[side] != system.mechanism.fixed_link:
-            _add(back, place.links[side], wrench, (at.x, at.y))
+def _push(back: Backward, number: int, done: Sequence[Any]) -> None:
+    """Load the known links of a module with what its gear pairs do."""
+    for link, wrench in on_links(back.walk, number, done):
+        back.add(link, wrench)

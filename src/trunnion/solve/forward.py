@@ -3,30 +3,49 @@
 from __future__ import annotations
 
 import operator
-from collections.abc import Mapping, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.nested import zipped
-from trunnion.algebra.plane import Acceleration, Frame, Twist, accelerated, compose, moved, point
+from trunnion.joints.pairs import PAIRS, Pair, Reaction
 from trunnion.solve.system import Place, System, Values, driven_coordinates
 
-__all__ = ["Assembly", "Forward", "Motion", "PointMotion", "Travel", "forward", "pose_of", "posed", "rate_of", "start"]
+__all__ = [
+    "Assembly",
+    "Forward",
+    "Motion",
+    "PointMotion",
+    "Travel",
+    "Vector",
+    "forward",
+    "pose_of",
+    "posed",
+    "quiet",
+    "rate_of",
+    "start",
+]
 
+ZERO_SLIP = 1e-10  # of the speeds about a joint: below it the sign of a relative speed is rounding noise
 Assembly = Sequence[Any]  # per module: ±1 for a closed form, a `branches.Track` for a general group, None for a driver
+Vector = tuple[Number, ...]  # of two components in the plane, of three in space
 
 
 class Motion(NamedTuple):
-    """Frame of a link with the velocity and acceleration of its origin."""
+    """Frame of a link, its twist and the derivative of that: in the plane of the link's origin, in space of the global.
 
-    frame: Frame
-    twist: Twist
-    acceleration: Acceleration
+    The types are those of `algebra.plane` or `algebra.space`.
+    """
+
+    frame: Any
+    twist: Any
+    acceleration: Any
 
 
 class Travel(NamedTuple):
@@ -37,43 +56,33 @@ class Travel(NamedTuple):
 
 
 class PointMotion(NamedTuple):
-    """Place, velocity, acceleration of a point of a link, each (x, y)."""
+    """Place, velocity, acceleration of a point of a link."""
 
-    place: tuple[Number, Number]
-    velocity: tuple[Number, Number]
-    acceleration: tuple[Number, Number]
-
-
-GROUND = Motion(Frame(0.0, 0.0, 1.0, 0.0), Twist(0.0, 0.0, 0.0), Acceleration(0.0, 0.0, 0.0))
+    place: Any
+    velocity: Any
+    acceleration: Any
 
 
 @dataclass
-class Forward:
+class Forward(ABC):
     """What one walk forward found at the times (s) it was asked for; element frames are worked out once and kept.
 
-    In the plane; `solve.space.motion` has the same of space.
+    `solve.plane` and `solve.space.motion` say what a joint does there; all else is here. algebra: of the frames, twists
+    and wrenches.
     """
 
     system: System
     values: Values
     local: dict[tuple[str, str], Any]
-    motions: dict[str, Any]
+    motions: dict[str, Motion]
     time: Number = 0.0
     direction: float = 1.0  # −1: the same way run backward
     poses: list[Any] = field(default_factory=list)
     assembly: list[Any] = field(default_factory=list)
     _elements: dict[tuple[str, str], Any] = field(default_factory=dict)
+    algebra: ClassVar[Any]
 
-    def element(self, link: str, joint: str) -> Any:
-        """Global frame of a joint's element on a link."""
-        key = (link, joint)
-        if key not in self._elements:
-            frame, local = self.motions[link].frame, self.local[key]
-            if self.system.joints[joint][0] == "revolute":  # its direction is the link's own
-                self._elements[key] = Frame(*point(frame, local.x, local.y), frame.c, frame.s)
-            else:
-                self._elements[key] = compose(frame, local)
-        return self._elements[key]
+    # ---- what is typical --------------------------------------------------------------------------------------
 
     @cached_property
     def pace(self) -> Number:
@@ -81,93 +90,96 @@ class Forward:
         return self.system.pace(self.values)
 
     @cached_property
-    def extent(self) -> Number:
+    def size(self) -> Number:
         """Length typical of the mechanism, m."""
         return self.system.size(self.values)
+
+    @cached_property
+    def spins(self) -> dict[str, Number]:
+        """Angular speed of every link, rad/s; real parts."""
+        return {link: self.algebra.spin(motion.twist) for link, motion in self.motions.items()}
+
+    # ---- joints -----------------------------------------------------------------------------------------------
+
+    def pair(self, joint: str) -> Pair:
+        """The kind of a joint."""
+        return PAIRS[self.system.joints[joint][0]]
+
+    def element(self, link: str, joint: str) -> Any:
+        """Global frame of a joint's element on a link."""
+        key = (link, joint)
+        if key not in self._elements:
+            self._elements[key] = self.algebra.compose(self.motions[link].frame, self.local[key])
+        return self._elements[key]
+
+    def ends(self, joint: str) -> tuple[Any, Any]:
+        """Global frames of the two elements of a joint."""
+        first, second = self.system.joints[joint][1]
+        return self.element(first, joint), self.element(second, joint)
+
+    def composed(self, frame: Any, link: str, joint: str) -> Any:
+        """Element of a joint on a link that lies in a frame."""
+        return self.algebra.compose(frame, self.local[link, joint])
+
+    def speed(self, joint: str) -> Number:
+        """Relative speed of a joint, second link against first, along its first freedom; rad/s, m/s."""
+        return self.rates(joint)[0 if self.system.turns(joint) else 1]
+
+    def noise(self, joint: str, turns: bool) -> Number:
+        """Rate of turn or slide of a joint, rad/s or m/s, below which its sign is rounding noise."""
+        first, second = self.system.joints[joint][1]
+        turn = ZERO_SLIP * (self.spins[first] + self.spins[second] + self.pace)
+        return turn if turns else turn * self.size
+
+    def signed_rates(self, joint: str) -> Iterator[Number]:
+        """Rates of a joint that turn round, 0 where they are noise: that of a ball has no sign."""
+        pair = self.pair(joint)
+        for freedom, rate in zip(("rotation", "slide"), self.rates(joint) if pair.one_axis else (), strict=False):
+            if freedom in pair.freedoms:
+                yield quiet(rate, self.noise(joint, turns=freedom == "rotation"))
+
+    def still(self, joint: str, turns: bool) -> Number:
+        """Where a joint does not turn or slide."""
+        return np.abs(primal(self.rates(joint)[0 if turns else 1])) <= self.noise(joint, turns)
+
+    # ---- points -----------------------------------------------------------------------------------------------
+
+    def point(self, link: str, name: str) -> PointMotion:
+        """Motion of a named point of a link, in space also of its element of a joint."""
+        return self.at(link, self.local_place(link, name))
+
+    def at(self, link: str, local: Vector) -> PointMotion:
+        """Motion of the point of a link with local coordinates, m."""
+        return PointMotion(*self.algebra.moving(*self.motions[link], local))
+
+    def placed(self, frame: Any, link: str, name: str) -> Vector:
+        """Place of a named point of a link that lies in a frame."""
+        found: Vector = self.algebra.point_of(frame, self.local_place(link, name))
+        return found
+
+    def local_place(self, link: str, name: str) -> Vector:
+        """A named point of a link in its own frame, m."""
+        return self.system.vector(self.values, f"links.{link}.points.{name}")
+
+    # ---- holes ------------------------------------------------------------------------------------------------
 
     @cached_property
     def holes(self) -> dict[tuple[str, str], Any]:
         """Local frame of every joint's element where its pin lies in the middle of its hole."""
         return self.system.holes(self.values)
 
-    def hole(self, joint: str) -> Any:
-        """Global frame of the hole of a joint: in its second link, axes of the link, of a guide along its slide."""
-        second = self.system.joints[joint][1][1]
-        return compose(self.motions[second].frame, self.holes[second, joint])
-
-    def hole_spin(self, joint: str) -> tuple[Number, ...]:
-        """Angular velocity of the hole of a joint against its pin, rad/s."""
-        first, second = self.system.joints[joint][1]
-        return (self.motions[second].twist.w - self.motions[first].twist.w,)
+    # ---- the walk ---------------------------------------------------------------------------------------------
 
     def backward(self) -> Forward:
         """The same positions passed the other way: velocities turned round, accelerations as they are."""
         turned = {
-            link: motion._replace(twist=Twist(*(-1.0 * n for n in motion.twist)))
-            for link, motion in self.motions.items()
+            link: motion._replace(twist=self.algebra.times(-1.0, motion.twist)) for link, motion in self.motions.items()
         }
         return replace(self, motions=turned, direction=-self.direction)
 
     def rate(self, driver: str) -> Number:
         """Rate of a driver, rad/s or m/s."""
         return self.direction * self.system.drive(self.values, driver, self.time)[1]
-
-    def arm(self, link: str, joint: str) -> tuple[Number, Number]:
-        """From the link's origin to its element of a joint, global axes."""
-        frame, element = self.motions[link].frame, self.element(link, joint)
-        return element.x - frame.x, element.y - frame.y
-
-    def twist(self, link: str, joint: str) -> Twist:
-        """Velocity of the element."""
-        return moved(self.motions[link].twist, *self.arm(link, joint))
-
-    def acceleration(self, link: str, joint: str) -> Acceleration:
-        """Acceleration of the element."""
-        motion = self.motions[link]
-        return accelerated(motion.acceleration, motion.twist.w, *self.arm(link, joint))
-
-    def point(self, link: str, name: str) -> PointMotion:
-        """Motion of a named point of a link."""
-        path = f"links.{link}.points.{name}"
-        return self.local_point(link, self.values[f"{path}.x"], self.values[f"{path}.y"])
-
-    def local_point(self, link: str, x: Number, y: Number) -> PointMotion:
-        """Motion of the point of a link with the local coordinates x, y (m)."""
-        frame, twist, acceleration = self.motions[link]
-        place = point(frame, x, y)
-        arm = place[0] - frame.x, place[1] - frame.y
-        velocity = moved(twist, *arm)
-        second = accelerated(acceleration, twist.w, *arm)
-        return PointMotion(place, (velocity.x, velocity.y), (second.x, second.y))
-
-    def placed(self, frame: Any, link: str, name: str) -> tuple[Number, ...]:
-        """Place of a named point of a link that lies in a frame."""
-        path = f"links.{link}.points.{name}"
-        return point(frame, self.values[f"{path}.x"], self.values[f"{path}.y"])
-
-    def composed(self, frame: Any, link: str, joint: str) -> Any:
-        """Element of a joint on a link that lies in a frame."""
-        return compose(frame, self.local[link, joint])
-
-    def coordinate(self, joint: str, first: Any, second: Any) -> Number:
-        """Slide or turn of a joint from its elements."""
-        if self.system.turns(joint):
-            return np.arctan2(second.s, second.c) - np.arctan2(first.s, first.c)
-        return first.c * (second.x - first.x) + first.s * (second.y - first.y)
-
-    def slip_motion(self, joint: str) -> tuple[Number, Number]:
-        """Slip of a joint's contact, second link against first, and its rate; m/s, m/s²."""
-        kind, (first, second) = self.system.joints[joint]
-        one, two = self.motions[first], self.motions[second]
-        if kind == "revolute":
-            lever = self.values[f"joints.{joint}.pin.radius"]
-            return lever * (two.twist.w - one.twist.w), lever * (two.acceleration.w - one.acceleration.w)
-        a, b = self.element(first, joint), self.element(second, joint)
-        dx, dy = b.x - a.x, b.y - a.y
-        v1, v2 = moved(self.twist(first, joint), dx, dy), self.twist(second, joint)
-        a1, a2 = accelerated(self.acceleration(first, joint), v1.w, dx, dy), self.acceleration(second, joint)
-        speed = a.c * (v2.x - v1.x) + a.s * (v2.y - v1.y)
-        return speed, a.c * (a2.x - a1.x) + a.s * (a2.y - a1.y)
 
     def pairs(self, places: Sequence[Place]) -> list[Any]:
         """Elements of a module's joints: global on known links, local on its own."""
@@ -188,47 +200,105 @@ class Forward:
             acceleration = motion.acceleration if own.acceleration is None else own.acceleration
             self.motions[link] = motion._replace(twist=twist, acceleration=acceleration)
 
-    def frame_rate(self, frame: Any) -> Any:
-        """Twist of a link whose frame has the rates of its numbers as ε parts."""
-        spin = primal(frame.c) * rate_of(frame.s) - primal(frame.s) * rate_of(frame.c)
-        return Twist(rate_of(frame.x), rate_of(frame.y), spin)
-
     def unspun(self, number: int, pose: Any, twists: Mapping[str, Any]) -> dict[str, Any]:
-        """Twists of a module's links with a free spin, without what they spin: none in the plane."""
+        """Twists of a module's links with a free spin, without what they spin; none have one in the plane."""
         return {}
 
     def take(self, number: int, pose: Any, time: Number) -> None:
         """Add the motion of one module, whose pose is known."""
         system = self.system
-        module, group, places = system.plan.modules[number], system.groups[number], system.places[number]
-        drives = driven_coordinates(system, module, places, self.values, time)
-        twists_out: list[Twist | None] = []
-        accelerations_out: list[Acceleration | None] = []
-        for place in places:
-            if place.witness:  # its relative motion is what a gear pair sees
-                one, two = (self.motions[link] for link in place.links)
-                twists_out.append(Twist(0.0, 0.0, two.twist.w - one.twist.w))
-                accelerations_out.append(Acceleration(0.0, 0.0, two.acceleration.w - one.acceleration.w))
-                continue
-            outside = next((link for link, outer in zip(place.links, place.outer, strict=True) if outer), None)
-            twists_out.append(self.twist(outside, place.joint) if outside else None)
-            accelerations_out.append(self.acceleration(outside, place.joint) if outside else None)
-        twists = group.velocity(pose, twists_out, drives[1])
-        seconds = group.acceleration(pose, twists, twists_out, accelerations_out, drives[2], drives[1])
-        for link, frame, twist, second in zip(module.links, pose.frames, twists, seconds, strict=True):
+        module, places = system.plan.modules[number], system.places[number]
+        _, rates, seconds = driven_coordinates(system, module, places, self.values, time)
+        outer = [self.outside(place) for place in places]
+        twists, accelerations = self.moved(
+            system.groups[number], pose, [twist for twist, _ in outer], [second for _, second in outer], rates, seconds
+        )
+        for link, frame, twist, second in zip(module.links, pose.frames, twists, accelerations, strict=True):
             self.motions[link] = Motion(frame, twist, second)
         self.poses.append(pose)
 
+    # ---- what the plane and space say of a joint, a module, a link ---------------------------------------------
 
-def on_the_ground(system: System, values: Values) -> Forward:
-    """A walk in the plane before its first module: only the ground is known."""
-    return Forward(system, values, system.elements(values), {system.mechanism.fixed_link: GROUND})
+    @abstractmethod
+    def coordinates(self, joint: str) -> tuple[Number, Number]:
+        """Turn in (−π, π] rad and slide, m, of a joint on one axis, as far as it has them."""
+
+    @abstractmethod
+    def rates(self, joint: str) -> tuple[Number, Number]:
+        """Their rates, rad/s and m/s."""
+
+    @abstractmethod
+    def second_rates(self, joint: str) -> tuple[Number, Number]:
+        """Their second derivatives, rad/s² and m/s²."""
+
+    @abstractmethod
+    def coordinate(self, joint: str, first: Any, second: Any) -> Number:
+        """Turn or slide of a joint, whichever a driver moves, from its elements."""
+
+    @abstractmethod
+    def against(self, joint: str) -> Any:
+        """Twist of the second link of a joint against the first; in the plane of the joint's point on the second."""
+
+    @abstractmethod
+    def slip_motion(self, joint: str) -> tuple[Number, Number]:
+        """Slip of the contact of a joint that moves one way only, and its rate; m/s, m/s²."""
+
+    @abstractmethod
+    def hole(self, joint: str) -> Any:
+        """Global frame of the hole of a joint: in its second link."""
+
+    @abstractmethod
+    def hole_spin(self, joint: str) -> Vector:
+        """Angular velocity of the hole of a joint against its pin, in the hole's frame, rad/s."""
+
+    @abstractmethod
+    def in_hole(self, joint: str, wrench: Any) -> tuple[Vector, Vector]:
+        """Force, N, and moment about its middle, N m, of a joint's wrench, in the frame of its hole."""
+
+    @abstractmethod
+    def outside(self, place: Place) -> tuple[Any, Any]:
+        """Motion on the known side of a module's joint, as its group wants it; None if it has none."""
+
+    @abstractmethod
+    def moved(
+        self, group: Any, pose: Any, twists: list[Any], accelerations: list[Any], rates: list[Any], seconds: list[Any]
+    ) -> tuple[Sequence[Any], Sequence[Any]]:
+        """Twists of a module's links and their derivatives, from those outside and of its drivers."""
+
+    @abstractmethod
+    def frame_rate(self, frame: Any) -> Any:
+        """Twist of a link whose frame has the rates of its numbers as ε parts."""
+
+    @abstractmethod
+    def axis(self, joint: str, turns: bool) -> tuple[Any, Any]:
+        """A joint's motion at unit rate of its turn or slide, and the wrench of a unit effort in it."""
+
+    def freedom(self, joint: str, turns: bool) -> tuple[Any, Any]:
+        """The same of the freedom that a driver moves."""
+        return self.axis(joint, turns)
+
+    @abstractmethod
+    def on_link(self, link: str, wrench: Any, joint: str) -> Any:
+        """A joint's wrench, about what the loads of a link are about."""
+
+    @abstractmethod
+    def reacting(self, group: Any) -> Any:
+        """A module whose reactions are flat tuples."""
+
+    @abstractmethod
+    def wrench(self, place: Place, reaction: Reaction) -> Any:
+        """The reaction of a joint on its second link as the file names it, from what its module found."""
+
+    @abstractmethod
+    def inertia_moment(self, link: str) -> Any:
+        """What a link's own inertia does about its mass centre, N m; None of a link without."""
 
 
 def start(system: System, values: Values) -> Forward:
     """A walk before its first module: only the ground is known."""
-    walk: Forward = system.geometry.start(system, values)
-    return walk
+    made: type[Forward] = system.geometry.walk
+    ground = Motion(made.algebra.ORIGIN, *made.algebra.STILL)
+    return made(system, values, system.elements(values), {system.mechanism.fixed_link: ground})
 
 
 def pose_of(walk: Forward, number: int, assembly: Any, time: Number) -> Any:
@@ -271,6 +341,11 @@ def posed(system: System, values: Values, assembly: Assembly, time: Number) -> F
                 walk.motions[link] = ground._replace(frame=frame)
             walk.poses.append(pose)
     return walk
+
+
+def quiet(rate: Number, noise: Number) -> Number:
+    """A rate, its real part, 0 where it is noise."""
+    return np.where(np.abs(primal(rate)) <= noise, 0.0, primal(rate))
 
 
 def rate_of(number: Number) -> Number:

@@ -17,12 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
+from trunnion.algebra.literal import is_zero, less, plus
 from trunnion.algebra.namespace import Number, compiled
-from trunnion.algebra.plane import is_zero, less
 from trunnion.joints.friction import FrictionLaw
 from trunnion.joints.pairs import ContactLoad, Reaction
 
-__all__ = ["Contact", "Problem", "State", "added", "largest", "total"]
+__all__ = ["Contact", "Problem", "Rubbing", "State", "added", "largest", "total"]
 
 
 class Contact(NamedTuple):
@@ -49,6 +49,24 @@ class Contact(NamedTuple):
         parameters = {name: change(value) for name, value in self.parameters.items()}
         load: ContactLoad = self.load.mapped(change)
         return self._replace(load=load, parameters=parameters, slip=change(self.slip))
+
+
+class Rubbing(NamedTuple):
+    """One contact of a joint, before its law is asked: load, slip speed, m/s, wrench of a unit friction along the slip
+    on the second link, about what the joint's own wrench is about, and where the speed is zero but for rounding.
+
+    amount: what a unit friction is of the joint's friction torque, m, or force; felt: whether the joint itself feels
+    its friction; turning: the share of the friction that acts about the joint's own axis and so turns the pin's seat,
+    None if it does not.
+    """
+
+    load: ContactLoad
+    slip: Number
+    unit: Any
+    zero: Number
+    amount: Number = 1.0
+    felt: bool = False
+    turning: Number | None = None
 
 
 class Felt(NamedTuple):
@@ -223,7 +241,7 @@ def _along(gradient: Reaction, column: Reaction) -> Number:
 
 def added(a: Reaction, b: Reaction) -> Reaction:
     """a + b; a literal zero costs nothing."""
-    return tuple(p if is_zero(q) else q if is_zero(p) else p + q for p, q in zip(a, b, strict=True))
+    return tuple(plus(p, q) for p, q in zip(a, b, strict=True))
 
 
 def total(parts: Sequence[Number]) -> Number:

@@ -5,7 +5,7 @@ Everything else - the cycle, the choice of an assembly, friction, locking, power
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,9 +13,10 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.mechanism import Mechanism
-from trunnion.solve import backward as kinetostatics
-from trunnion.solve import forward as kinematics
-from trunnion.solve.space import determinacy, forces, motion
+from trunnion.solve import plane
+from trunnion.solve.forward import Forward
+from trunnion.solve.friction_problem import Rubbing
+from trunnion.solve.space import contacts, determinacy, motion
 from trunnion.solve.space.system import SpatialSystem
 from trunnion.solve.system import System
 from trunnion.structure.decompose import decompose
@@ -25,29 +26,19 @@ __all__ = ["GEOMETRIES", "Geometry", "build"]
 
 @dataclass(frozen=True)
 class Geometry:
-    """system: makes a mechanism with its plan ready; start: a walk that knows the ground alone; backward: reactions and
-    friction of a walk; determinacy: what the rank says of a run, None where the structure decides.
+    """system: makes a mechanism with its plan ready; walk: the walk forward; contacts: with friction, of a joint;
+    determinacy: what the rank says of a run, None where the structure decides.
     """
 
-    system: Callable[..., System]
-    start: Callable[..., kinematics.Forward]
-    backward: Callable[..., kinetostatics.Backward]
+    system: type[System]
+    walk: type[Forward]
+    contacts: Callable[..., Iterator[Rubbing]]
     determinacy: Callable[..., Any]
 
 
 GEOMETRIES = {
-    "planar": Geometry(
-        System,
-        kinematics.on_the_ground,
-        kinetostatics.backward,
-        lambda *run: None,  # decided by the structure alone
-    ),
-    "spatial": Geometry(
-        SpatialSystem,
-        motion.on_the_ground,
-        forces.backward,
-        determinacy.look,
-    ),
+    "planar": Geometry(System, plane.PlaneWalk, plane.contacts, lambda *run: None),  # decided by the structure alone
+    "spatial": Geometry(SpatialSystem, motion.SpatialWalk, contacts.contacts, determinacy.look),
 }
 
 

@@ -3,26 +3,24 @@
 from __future__ import annotations
 
 import functools
+import operator
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.algebra.plane import Wrench, turned
+from trunnion.algebra.nested import flat
 from trunnion.algebra.table import look_up
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.parts import Load
-from trunnion.solve.forward import Forward, PointMotion
+from trunnion.solve.forward import Forward, Vector
 
-if TYPE_CHECKING:
-    pass
 __all__ = [
     "Action",
     "Share",
-    "Slip",
     "SpringState",
     "Stated",
     "Switch",
@@ -38,25 +36,19 @@ SPLINED = 3  # of a spline every so many points: it bends at none, but may be an
 Share = float | NDArray[np.float64]  # of what resists a joint at rest, with the sign of the slip about to begin
 
 
-class Slip(NamedTuple):
-    """Relative speed of a joint, second link against first (rad/s, m/s), and where it is zero to rounding."""
-
-    speed: Number
-    zero: Number
-
-
 class Action(NamedTuple):
-    """What one load or spring does: wrenches on links about global places (None: a pure moment), power given, W."""
+    """What one load or spring does: the wrench on each link, about what all on it are, and the power it gives, W."""
 
-    on: list[tuple[str, Wrench, tuple[Number, Number] | None]]
+    on: list[tuple[str, Any]]
     power: Number
 
     @property
     def undefined(self) -> Number:
         """Where it has no value."""
         size: Number = 0.0
-        for _, wrench, _ in self.on:
-            size = size + primal(wrench.x) + primal(wrench.y) + primal(wrench.m)
+        for _, wrench in self.on:
+            for number in flat(wrench):
+                size = size + primal(number)
         return ~np.isfinite(size)
 
 
@@ -96,10 +88,10 @@ class Stated:
             return None
         return entry.quantity.evaluate({name: self._named(name) for name in entry.quantity.names})
 
-    def vector(self, path: str) -> tuple[Number, Number] | None:
-        """A force in the plane; None if it is not stated."""
-        x, y = self.get(f"{path}.x"), self.get(f"{path}.y")
-        return None if x is None or y is None else (x, y)
+    def vector(self, path: str) -> Vector | None:
+        """A force, or in space a moment; None if it is not stated."""
+        found = tuple(self.get(f"{path}.{axis}") for axis in self.walk.system.axes)
+        return None if any(number is None for number in found) else found
 
     def switches(self) -> Iterator[Switch]:
         """What decides where numbers that vary with the motion jump or bend: ends of `between` …, points of tables."""
@@ -154,10 +146,8 @@ class Stated:
 # ---- loads ----------------------------------------------------------------------------------------------------
 
 
-def stated_loads(
-    walk: Forward, slips: Mapping[str, Slip], zero_slip: Mapping[str, Share]
-) -> Iterator[tuple[str, Action]]:
-    """The loads of the model, by name. zero_slip: see `kinetostatics.solve`."""
+def stated_loads(walk: Forward, zero_slip: Mapping[str, Share]) -> Iterator[tuple[str, Action]]:
+    """The loads of the model, by name. zero_slip: see `backward.Given`."""
     stated = Stated(walk)
     for name, load in walk.system.mechanism.loads.items():
         path = f"loads.{name}"
@@ -166,54 +156,48 @@ def stated_loads(
         else:
             torque, force = stated.get(f"{path}.resisting_torque"), stated.get(f"{path}.resisting_force")
             size = force if torque is None else torque
-            yield name, _resist(walk, load, size, slips[load.joint], zero_slip.get(load.joint, 0.0))
+            yield name, _resist(walk, load, size, torque is not None, zero_slip.get(load.joint, 0.0))
 
 
 def _push(stated: Stated, load: Load, path: str) -> Action:
     """A force at a point of a link and a moment, in global axes or the link's."""
-    walk, link = stated.walk, load.link or ""
-    on: list[tuple[str, Wrench, tuple[Number, Number] | None]] = []
-    power: Number = 0.0
-    force, moment = stated.vector(f"{path}.force"), stated.get(f"{path}.moment")
-    if force is not None:
-        at = walk.point(link, load.at) if load.at else walk.local_point(link, 0.0, 0.0)
-        if load.frame == "link":
-            frame = walk.motions[link].frame
-            force = turned(frame.c, frame.s, *force)
-        on.append((link, Wrench(*force, 0.0), at.place))
-        power = power + force[0] * at.velocity[0] + force[1] * at.velocity[1]
-    if moment is not None:
-        on.append((link, Wrench(0.0, 0.0, moment), None))
-        power = power + moment * walk.motions[link].twist.w
-    return Action(on, power)
+    walk, link, algebra = stated.walk, load.link or "", stated.walk.algebra
+    frame, twist, _ = walk.motions[link]
+    force, moment = stated.vector(f"{path}.force") or algebra.NULL, stated.get(f"{path}.moment")
+    if moment is None:
+        moment = stated.vector(f"{path}.moment") or algebra.NO_MOMENT
+    if load.frame == "link":
+        force, moment = algebra.rotated(frame, force), algebra.rotated_moment(frame, moment)
+    place = walk.placed(frame, link, load.at) if load.at else algebra.point_of(frame, algebra.NULL)
+    wrench = algebra.load(frame, force, moment, place)
+    return Action([(link, wrench)], algebra.power(wrench, twist))
 
 
-def _resist(walk: Forward, load: Load, size: Number, slip: Slip, at_rest: Share) -> Action:
+def _resist(walk: Forward, load: Load, size: Number, turns: bool, at_rest: Share) -> Action:
     """A torque or force that opposes the motion of a joint, whichever way it goes or one way only.
 
     at_rest: the share of the load where there is no motion, with the sign of that which is about to begin.
     """
-    sign = np.where(slip.zero, at_rest, np.sign(primal(slip.speed)))
+    joint = load.joint or ""
+    speed = walk.rates(joint)[0 if turns else 1]
+    sign = np.where(walk.still(joint, turns), at_rest, np.sign(primal(speed)))
     if load.only is not None:
         sign = np.where(sign * (1.0 if load.only == "positive" else -1.0) > 0.0, sign, 0.0)
-    return _in_joint(walk, load.joint or "", -sign * size, slip)
+    return _in_joint(walk, joint, -sign * size, turns, speed)
 
 
-def _in_joint(walk: Forward, joint: str, effort: Number, slip: Slip) -> Action:
-    """An effort in the freedom of a joint, on its second link by its first: N m if it turns, N along its slide."""
-    kind, (first, second) = walk.system.joints[joint]
-    power = effort * slip.speed
-    if kind == "revolute":
-        return Action([(second, Wrench(0.0, 0.0, effort), None), (first, Wrench(0.0, 0.0, -effort), None)], power)
-    axis, at = walk.element(first, joint), walk.element(second, joint)
-    x, y, place = effort * axis.c, effort * axis.s, (at.x, at.y)
-    return Action([(second, Wrench(x, y, 0.0), place), (first, Wrench(-x, -y, 0.0), place)], power)
+def _in_joint(walk: Forward, joint: str, effort: Number, turns: bool, speed: Number) -> Action:
+    """An effort in the freedom of a joint, on its second link by its first: N m about its axis, or N along it."""
+    first, second = walk.system.joints[joint][1]
+    wrench, times = walk.axis(joint, turns)[1], walk.algebra.times
+    on = [(link, walk.on_link(link, times(size, wrench), joint)) for link, size in ((second, effort), (first, -effort))]
+    return Action(on, effort * speed)
 
 
 # ---- springs --------------------------------------------------------------------------------------------------
 
 
-def springs(walk: Forward, slips: Mapping[str, Slip]) -> Iterator[tuple[str, Action, SpringState]]:
+def springs(walk: Forward) -> Iterator[tuple[str, Action, SpringState]]:
     """The springs and dampers of the model: pull = preload + stiffness · elongation + damping · rate."""
     for name, spring in walk.system.mechanism.springs.items():
         path = f"springs.{name}"
@@ -221,52 +205,50 @@ def springs(walk: Forward, slips: Mapping[str, Slip]) -> Iterator[tuple[str, Act
             yield name, *_line(walk, path, spring.between, spring.only)
             continue
         joint = spring.joint or ""
-        slip = slips[joint]
-        turns = walk.system.joints[joint][0] == "revolute"
-        elongation = _turned_by(walk, path, joint) if turns else _slid_by(walk, path, joint)
-        state = spring_state(walk, path, elongation, slip.speed, spring.only)
-        yield name, _in_joint(walk, joint, -state.force, slip), state
+        turns = walk.system.turns(joint)
+        speed = walk.rates(joint)[0 if turns else 1]
+        state = spring_state(walk, path, _elongation(walk, path, joint, turns), speed, spring.only)
+        yield name, _in_joint(walk, joint, -state.force, turns, speed), state
+
+
+def _elongation(walk: Forward, path: str, joint: str, turns: bool) -> Number:
+    """Turn or slide of a joint beyond the free one; whole turns count where it is driven, else the nearest is meant."""
+    if not turns:
+        return walk.coordinates(joint)[1] - walk.values.get(f"{path}.free_length", 0.0)
+    free = walk.values.get(f"{path}.free_angle", 0.0)
+    if joint in walk.system.mechanism.drivers:
+        return walk.system.drive(walk.values, joint, walk.time)[0] - free
+    angle = walk.coordinates(joint)[0] - free
+    xp = namespace(angle)
+    return xp.arctan2(xp.sin(angle), xp.cos(angle))
 
 
 def _line(walk: Forward, path: str, ends: tuple[str, str], only: str | None) -> tuple[Action, SpringState]:
     """A spring along the line between two points; no value where they meet, for the line has no direction there."""
-    (one, a), (other, b) = ((end.partition(".")[0], _end(walk, end)) for end in ends)
-    dx, dy = b.place[0] - a.place[0], b.place[1] - a.place[1]
-    square = dx * dx + dy * dy
+    one, other = (end.partition(".")[0] for end in ends)
+    a, b = (walk.point(link, point) for link, _, point in (end.partition(".") for end in ends))
+    apart = _difference(b.place, a.place)
+    square = _dot(apart, apart)
     xp = namespace(square)
-    apart, meeting = primal(square) > 0, 1.0 if only == "pull" else np.nan  # a slack rope needs no direction
-    length = xp.sqrt(xp.where(apart, square, meeting))
-    ux, uy = dx / length, dy / length
-    rate = (b.velocity[0] - a.velocity[0]) * ux + (b.velocity[1] - a.velocity[1]) * uy
-    elongation = xp.where(apart, length, 0.0 * length) - walk.values.get(f"{path}.free_length", 0.0)
+    there, meeting = primal(square) > 0, 1.0 if only == "pull" else np.nan  # a slack rope needs no direction
+    length = xp.sqrt(xp.where(there, square, meeting))
+    direction = tuple(part / length for part in apart)
+    rate = _dot(_difference(b.velocity, a.velocity), direction)
+    elongation = xp.where(there, length, 0.0 * length) - walk.values.get(f"{path}.free_length", 0.0)
     state = spring_state(walk, path, elongation, rate, only)
-    x, y = state.force * ux, state.force * uy
-    return Action([(one, Wrench(x, y, 0.0), a.place), (other, Wrench(-x, -y, 0.0), b.place)], state.power), state
+    on = []
+    for link, end, sign in ((one, a, 1.0), (other, b, -1.0)):
+        pull = tuple(sign * state.force * part for part in direction)
+        on.append((link, walk.algebra.load(walk.motions[link].frame, pull, walk.algebra.NO_MOMENT, end.place)))
+    return Action(on, state.power), state
 
 
-def _end(walk: Forward, end: str) -> PointMotion:
-    link, _, point = end.partition(".")
-    return walk.point(link, point)
+def _difference(a: Vector, b: Vector) -> Vector:
+    return tuple(p - q for p, q in zip(a, b, strict=True))
 
 
-def _turned_by(walk: Forward, path: str, joint: str) -> Number:
-    """Rotation of a joint beyond the free angle: of a driven one whole turns count, of others the nearest is meant."""
-    free = walk.values.get(f"{path}.free_angle", 0.0)
-    if joint in walk.system.mechanism.drivers:
-        return walk.system.drive(walk.values, joint, walk.time)[0] - free
-    first, second = (walk.motions[link].frame for link in walk.system.joints[joint][1])
-    c, s = first.c * second.c + first.s * second.s, first.c * second.s - first.s * second.c
-    xp = namespace(free)
-    c, s = turned(xp.cos(free), -xp.sin(free), c, s)
-    return namespace(s, c).arctan2(s, c)
-
-
-def _slid_by(walk: Forward, path: str, joint: str) -> Number:
-    """Slide of a joint beyond the free one."""
-    first, second = walk.system.joints[joint][1]
-    one, two = walk.element(first, joint), walk.element(second, joint)
-    slide = one.c * (two.x - one.x) + one.s * (two.y - one.y)
-    return slide - walk.values.get(f"{path}.free_length", 0.0)
+def _dot(a: Vector, b: Vector) -> Number:
+    return functools.reduce(operator.add, (p * q for p, q in zip(a, b, strict=True)))
 
 
 def spring_state(walk: Forward, path: str, elongation: Number, rate: Number, only: str | None) -> SpringState:

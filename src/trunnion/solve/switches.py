@@ -23,12 +23,8 @@ from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
 from trunnion.model.parts import Spring
 from trunnion.solve import loads
-from trunnion.solve.backward import slip_of
 from trunnion.solve.forward import Assembly, Forward, forward, start
 from trunnion.solve.loads import Stated, Switch
-from trunnion.solve.space import loads as space_loads
-from trunnion.solve.space.contacts import pin_rates, stillness
-from trunnion.solve.space.motion import SpatialWalk
 from trunnion.solve.system import Cycle, System, Values, rubbing
 
 __all__ = ["Mechanisms", "edges"]
@@ -150,12 +146,11 @@ def _moving(of: Mechanisms, rows: Rows, time: Array) -> Forward:
 def _of_motion(walk: Forward) -> Iterator[Switch]:
     """Relative speeds that friction or a load follows, and elongations of springs that switch."""
     for joint in _followed(walk.system):
-        if isinstance(walk, SpatialWalk):
-            yield from (Switch(rate) for rate in _rates(walk, joint))
-        else:
-            slip = slip_of(walk, joint)
-            yield Switch(np.where(slip.zero, 0.0, primal(slip.speed)))
-    yield from (Switch(elongation) for spring, elongation in _elongations(walk) if _lets_go(walk.system, spring))
+        yield from (Switch(rate) for rate in walk.signed_rates(joint))
+    springs = walk.system.mechanism.springs
+    if any(_lets_go(walk.system, spring) for spring in springs.values()):
+        elongations = ((springs[name], state.elongation) for name, _, state in loads.springs(walk))
+        yield from (Switch(elongation) for spring, elongation in elongations if _lets_go(walk.system, spring))
 
 
 def _varies(system: System) -> bool:
@@ -178,36 +173,6 @@ def _lets_go(system: System, spring: Spring) -> bool:
     """Whether a spring acts one way only, or jumps by a turn half a turn from its free angle."""
     turns = spring.joint is not None and system.turns(spring.joint) and spring.joint not in system.mechanism.drivers
     return turns or spring.only is not None
-
-
-def _rates(walk: SpatialWalk, joint: str) -> Iterator[Number]:
-    """Speeds of a joint in space that turn round; that of a ball, or of a pin that slides too, has no sign."""
-    kind, links = walk.system.joints[joint]
-    turn, slide = stillness(walk, joint)
-    if kind == "universal":
-        one, two = (walk.element(link, joint) for link in links)
-        yield from (_moves(rate, turn) for rate in pin_rates(walk, joint, one, two))
-    elif kind in ("revolute", "helical", "cylindrical"):
-        yield _moves(walk.rates(joint)[0], turn)
-    if kind in ("prismatic", "cylindrical"):
-        yield _moves(walk.rates(joint)[1], slide)
-
-
-def _moves(rate: Number, least: Number) -> Number:
-    return np.where(np.abs(primal(rate)) <= least, 0.0, primal(rate))
-
-
-def _elongations(walk: Forward) -> Iterator[tuple[Spring, Number]]:
-    named = walk.system.mechanism.springs
-    if not named:
-        return
-    if isinstance(walk, SpatialWalk):
-        states = [(name, state) for name, _, state in space_loads.springs(walk)]
-    else:
-        joints = [one.joint for one in named.values() if one.joint is not None]
-        slips = {joint: slip_of(walk, joint) for joint in joints}
-        states = [(name, state) for name, _, state in loads.springs(walk, slips)]
-    yield from ((named[name], state.elongation) for name, state in states)
 
 
 # ---- where they do ---------------------------------------------------------------------------------------------

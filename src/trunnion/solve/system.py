@@ -6,7 +6,7 @@ import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -109,6 +109,7 @@ class System:
     mechanism: Mechanism
     plan: Plan
     geometry: Any = None
+    axes: ClassVar[str] = "xy"
 
     @cached_property
     def groups(self) -> tuple[Group, ...]:
@@ -139,7 +140,7 @@ class System:
 
     def turns(self, joint: str) -> bool:
         """Whether a joint's coordinate, as drivers and loads see it, is an angle."""
-        return "rotation" in PAIRS[self.joints[joint][0]].freedoms
+        return PAIRS[self.joints[joint][0]].turns
 
     @cached_property
     def points(self) -> tuple[tuple[str, str], ...]:
@@ -231,14 +232,32 @@ class System:
                     found[link, name] = Frame(x, y)
         return found
 
-    def centre(self, values: Values, link: str) -> tuple[Number, Number]:
+    def vector(self, values: Values, path: str) -> tuple[Number, ...]:
+        """The components with a path."""
+        return tuple(values[f"{path}.{axis}"] for axis in self.axes)
+
+    @cached_property
+    def reversed(self) -> frozenset[str]:
+        """Joints that their module sees from their second link."""
+        return frozenset(place.joint for places in self.places for place in places if place.reversed_)
+
+    @cached_property
+    def resisted(self) -> dict[str, set[bool]]:
+        """Of every joint that loads resist, whether its turn (True) or its slide is."""
+        found: dict[str, set[bool]] = {}
+        for load in self.mechanism.loads.values():
+            if load.joint is not None:
+                found.setdefault(load.joint, set()).add(load.resisting_torque is not None)
+        return found
+
+    def centre(self, values: Values, link: str) -> tuple[Number, ...]:
         """Local place of a link's mass centre, m."""
         path = f"links.{link}.centre"
         if f"{path}.distance" in values:
             distance, angle = values[f"{path}.distance"], values[f"{path}.angle"]
             xp = namespace(distance, angle)
             return distance * xp.cos(angle), distance * xp.sin(angle)
-        return values[f"{path}.x"], values[f"{path}.y"]
+        return self.vector(values, path)
 
     def drive(self, values: Values, name: str, time: Number) -> tuple[Number, Number, Number]:
         """Coordinate, rate and second derivative of a driver at `time` (s) from the start, by its motion law."""
@@ -401,6 +420,5 @@ def law_of(system: System, joint: str) -> FrictionLaw:
 
 def sticking(system: System) -> list[str]:
     """Joints whose friction, or a load that resists them, is an interval where their relative speed is zero."""
-    resisted = {load.joint for load in system.mechanism.loads.values() if load.joint is not None}
     rubbed = {name for name in rubbing(system) if law_of(system, name).interval_at_rest}
-    return [name for name in system.joints if name in resisted | rubbed]
+    return [name for name in system.joints if name in system.resisted or name in rubbed]

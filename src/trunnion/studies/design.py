@@ -180,7 +180,7 @@ def shaking(back: Backward) -> tuple[tuple[Array, Array], Array]:
         local = walk.system.centre(values, name)
         if link.inertia_about == "origin":
             inertia = inertia - mass * (local[0] ** 2 + local[1] ** 2)
-        centre = walk.local_point(name, *local)
+        centre = walk.at(name, local)
         fx, fy = -mass * centre.acceleration[0], -mass * centre.acceleration[1]
         x, y = x + fx, y + fy
         alpha = walk.motions[name].acceleration.w
@@ -259,18 +259,12 @@ def dead_centres(run: Run, steps: int = 720) -> dict[str, tuple[float, ...]]:
     system = run.system
     time = np.append(run.cycle.times(steps), run.cycle.duration) if run.cycle.periodic else run.cycle.times(steps)
     found: dict[str, tuple[float, ...]] = {}
-    for name, (kind, links) in system.joints.items():
+    for name, (_, links) in system.joints.items():
         if system.mechanism.fixed_link not in links or name in system.mechanism.drivers:
             continue
 
-        def speed(moment: Array, joint: str = name, slides: bool = kind == "prismatic") -> Array:
-            motion = forward(system, run.values, run.chosen.assembly, moment)
-            first, second = system.joints[joint][1]
-            if not slides:
-                return np.asarray(motion.motions[second].twist.w - motion.motions[first].twist.w, float)
-            axis = motion.element(first, joint)
-            one, two = motion.twist(first, joint), motion.twist(second, joint)
-            return np.asarray(axis.c * (two.x - one.x) + axis.s * (two.y - one.y), float)
+        def speed(moment: Array, joint: str = name) -> Array:
+            return np.asarray(forward(system, run.values, run.chosen.assembly, moment).speed(joint), float)
 
         values = np.broadcast_to(speed(time), time.shape)
         turning = np.flatnonzero(values[:-1] * values[1:] < 0)

@@ -10,7 +10,6 @@ bears on its great circle across that velocity, and the most for any other place
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
 
 import numpy as np
 
@@ -20,54 +19,31 @@ from trunnion.algebra.space import Frame, Screw, about
 from trunnion.algebra.vector import Vector3, dot, plus, scaled
 from trunnion.joints.pairs import ContactLoad
 from trunnion.joints.spatial_load import BallLoad, BearingLoad
-from trunnion.solve.backward import ZERO_SLIP
+from trunnion.solve.friction_problem import Rubbing
 from trunnion.solve.space.motion import SpatialWalk
 
-__all__ = ["Rubbing", "at_rest", "bearing_middle", "contacts", "stillness"]
+__all__ = ["at_rest", "bearing_middle", "contacts"]
 
 NULL: Vector3 = (0.0, 0.0, 0.0)
 
 
-class Rubbing(NamedTuple):
-    """One contact: load, slip speed, m/s, unit friction on the second link, where the speed is zero but for rounding,
-    and whether the joint itself feels its friction; turning: the share of the friction that acts about the joint's own
-    axis and so turns the pin's seat, None if it does not.
-    """
-
-    load: ContactLoad
-    slip: Number
-    unit: Screw
-    zero: Number
-    felt: bool = False
-    turning: Number | None = None
-
-
 def bearing_middle(walk: SpatialWalk, joint: str) -> Vector3:
     """Middle of a joint's bearing: its point on the second link, moved along the axis by the offset of the pin, m."""
-    second = walk.element(walk.system.joints[joint][1][1], joint)
+    second = walk.ends(joint)[1]
     offset = walk.values.get(f"joints.{joint}.pin.offset")
     return second.place if offset is None else plus(second.place, scaled(offset, second.z))
 
 
-def stillness(walk: SpatialWalk, joint: str) -> tuple[Number, Number]:
-    """Rates of turn and slide of a joint below which their sign is rounding noise, rad/s and m/s."""
-    first, second = walk.system.joints[joint][1]
-    turn = ZERO_SLIP * (walk.spins[first] + walk.spins[second] + walk.pace)
-    return turn, turn * walk.size
-
-
 def at_rest(walk: SpatialWalk, joint: str) -> list[Number]:
     """Where each contact of a joint does not slip, in the order of `contacts`."""
-    kind, links = walk.system.joints[joint]
-    turn_scale, slide_scale = stillness(walk, joint)
+    kind = walk.system.joints[joint][0]
+    turn_scale = walk.noise(joint, turns=True)
     if kind == "universal":
-        one, two = (walk.element(link, joint) for link in links)
-        return [np.abs(primal(rate)) <= turn_scale for rate in pin_rates(walk, joint, one, two)]
-    if kind in ("spherical", "planar"):
-        spin = walk.against(joint).u
-        return [np.sqrt(primal(dot(spin, spin))) <= turn_scale]
+        return [np.abs(primal(rate)) <= turn_scale for rate in walk.pin_rates(joint)]
+    if kind == "spherical":
+        return [walk.speed(joint) <= turn_scale]
     turn, slide = (primal(rate) for rate in walk.rates(joint))
-    still = [np.abs(turn) <= turn_scale, np.abs(slide) <= slide_scale]
+    still = [np.abs(turn) <= turn_scale, np.abs(slide) <= walk.noise(joint, turns=False)]
     if kind == "cylindrical":
         return still if _summed(walk, joint) else [still[0] & still[1]]
     return still[1:] if kind == "prismatic" else still[:1]
@@ -78,7 +54,7 @@ def contacts(walk: SpatialWalk, joint: str) -> Iterator[Rubbing]:
     zero = at_rest(walk, joint)
     kind = walk.system.joints[joint][0]
     middle = bearing_middle(walk, joint)
-    second = walk.element(walk.system.joints[joint][1][1], joint)
+    second = walk.ends(joint)[1]
     axis = second.z
     if kind == "spherical":
         yield _ball(walk, joint, middle, zero[0])
@@ -94,14 +70,15 @@ def contacts(walk: SpatialWalk, joint: str) -> Iterator[Rubbing]:
     lever = walk.values[f"joints.{joint}.pin.radius"]
     moment = Screw(NULL, scaled(lever, axis))
     if kind == "revolute":
-        yield Rubbing(load, lever * turn, moment, zero[0], turning=1.0)
+        yield Rubbing(load, lever * turn, moment, zero[0], amount=lever, turning=1.0)
     elif kind == "helical":
         lead = walk.space.lead(walk.values, joint)
         way = namespace(lead, lever).sqrt(lever * lever + lead * lead)
-        yield Rubbing(load, way * turn, _mixed(axis, middle, lever, lever / way, lead / way), zero[0])
+        unit = _mixed(axis, middle, lever, lever / way, lead / way)
+        yield Rubbing(load, way * turn, unit, zero[0], amount=lever * lever / way)
     elif _summed(walk, joint):
-        yield Rubbing(load, lever * turn, moment, zero[0], turning=1.0)
-        yield Rubbing(load, slide, about(axis, NULL, middle), zero[1])
+        yield Rubbing(load, lever * turn, moment, zero[0], amount=lever, turning=1.0)
+        yield Rubbing(load, slide, about(axis, NULL, middle), zero[1], amount=0.0)
     else:
         yield _resultant(load, axis, middle, lever, (lever * turn, slide), zero[0])
 
@@ -116,7 +93,8 @@ def _resultant(
     speed = xp.where(moves, xp.sqrt(xp.where(moves, square, 1.0)), 0.0)
     share = 1 / xp.where(moves, speed, 1.0)
     cosine, sine = xp.where(moves, slip[0] * share, 1.0), xp.where(moves, slip[1] * share, 0.0)
-    return Rubbing(load, speed, _mixed(axis, middle, lever, cosine, sine), zero, turning=xp.abs(cosine))
+    unit = _mixed(axis, middle, lever, cosine, sine)
+    return Rubbing(load, speed, unit, zero, amount=lever * cosine, turning=xp.abs(cosine))
 
 
 def _mixed(axis: Vector3, middle: Vector3, lever: Number, cosine: Number, sine: Number) -> Screw:
@@ -149,20 +127,17 @@ def _ball(walk: SpatialWalk, joint: str, middle: Vector3, zero: Number) -> Rubbi
     moves = primal(square) > 0
     speed = xp.where(moves, xp.sqrt(xp.where(moves, square, 1.0)), 0.0)
     direction = scaled(1 / xp.where(moves, speed, 1.0), turn)
-    return Rubbing(BallLoad(), radius * speed, Screw(NULL, scaled(radius, direction)), zero, turning=1.0)
+    unit = Screw(NULL, scaled(radius, direction))
+    return Rubbing(BallLoad(), radius * speed, unit, zero, amount=radius, turning=1.0)
 
 
 def _two_pins(walk: SpatialWalk, joint: str, middle: Vector3, zero: Sequence[Number]) -> Iterator[Rubbing]:
     """Each pin of the cross is a revolute bearing; friction of one is carried by the other as a moment across it."""
     values, path = walk.values, f"joints.{joint}"
-    first, second = (walk.element(link, joint) for link in walk.system.joints[joint][1])
     lever = values[f"{path}.pin.radius"]
-    for pin, rate, still in zip((first, second), pin_rates(walk, joint, first, second), zero, strict=True):
+    spin = walk.speed(joint)
+    share = lever / np.where(spin > 0, spin, np.inf)  # its friction is told as a torque about the relative spin
+    for pin, rate, still in zip(walk.ends(joint), walk.pin_rates(joint), zero, strict=True):
         load = BearingLoad(pin._replace(place=middle), values[f"{path}.pin.bearing"], _summed(walk, joint))
-        yield Rubbing(load, lever * rate, Screw(NULL, scaled(lever, pin.z)), still, felt=True)
-
-
-def pin_rates(walk: SpatialWalk, joint: str, first: Frame, second: Frame) -> tuple[Number, Number]:
-    """Rates about the two pins of a universal pair, at right angles, rad/s."""
-    turn = walk.against(joint).u
-    return dot(turn, first.z), dot(turn, second.z)
+        unit = Screw(NULL, scaled(lever, pin.z))
+        yield Rubbing(load, lever * rate, unit, still, amount=share * rate, felt=True)

@@ -22,7 +22,7 @@ from trunnion.algebra.vector import dot, minus
 from trunnion.errors import Finding, MechanismError, Severity, agreeing, counted
 from trunnion.groups.redundant import RANK, stacked
 from trunnion.groups.spatial import Pose, SpatialGroup
-from trunnion.solve.backward import Given
+from trunnion.solve.backward import Given, backward
 from trunnion.solve.branch_tracking import SEED, at, extent, guess_reaches, lane_of
 from trunnion.solve.branches import Chosen
 from trunnion.solve.forward import forward
@@ -93,7 +93,7 @@ def _spins(walk: Any) -> tuple[dict[str, float], dict[str, float]]:
     if not walk.system.plan.passive:
         return {}, {}
     with np.errstate(all="ignore"):
-        back = walk.system.geometry.backward(walk, FrictionMethod(), Given())
+        back = backward(walk, FrictionMethod(), Given())
     found, dragged = {}, {}
     for link, torque in back.spins.items():
         joints = [name for name, (_, links) in walk.system.joints.items() if link in links]

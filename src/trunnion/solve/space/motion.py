@@ -1,50 +1,39 @@
-"""Motion in space, forward through the row of modules: frames, twists and their derivatives of all links."""
+"""What a joint does in space: its rates, its wrench; the rest is in `solve.forward`.
+
+The load of a link's own inertia is minus the derivative of its dual momentum [P 20, 21], taken at the mass centre and
+carried to the origin: −m a_C and −(J ω̇ + ω × J ω), gyroscopic terms included.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple, cast
+from typing import Any, ClassVar, cast
 
-import numpy as np
-
+from trunnion.algebra import space as algebra
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.nested import each
-from trunnion.algebra.space import ORIGIN, ZERO, Frame, Screw, compose, minus, moment_at, point_of, times, vector_minus
-from trunnion.algebra.vector import Vector3, cross, dot, plus, scaled
+from trunnion.algebra.space import Frame, Screw, compose, line_of, minus, moment_at, rotated, times, vector_minus
+from trunnion.algebra.vector import Matrix3, Vector3, apply, cross, dot, plus, scaled, transpose
+from trunnion.groups.spatial import SpatialGroup
 from trunnion.groups.spatial_tree import Element
-from trunnion.solve.forward import Forward, Motion, rate_of
+from trunnion.joints.pairs import Reaction
+from trunnion.joints.spatial_load import halves
+from trunnion.model.parts import InertiaTensor
+from trunnion.solve.forward import Forward, quiet, rate_of
 from trunnion.solve.shifts import hole
 from trunnion.solve.space.system import SpatialSystem
-from trunnion.solve.system import Place, Values, driven_coordinates
+from trunnion.solve.system import Place
 
-__all__ = ["SpatialMotion", "SpatialPoint", "SpatialWalk", "on_the_ground"]
-
-
-class SpatialMotion(NamedTuple):
-    """Frame of a link, its twist ω + ε v of the point at the origin, and the derivative of the twist."""
-
-    frame: Frame
-    twist: Screw
-    acceleration: Screw
+__all__ = ["SpatialWalk"]
 
 
-class SpatialPoint(NamedTuple):
-    """Place, velocity, acceleration of a point of a link."""
-
-    place: Vector3
-    velocity: Vector3
-    acceleration: Vector3
-
-
-GROUND = SpatialMotion(ORIGIN, ZERO, ZERO)
-
-
-@dataclass
 class SpatialWalk(Forward):
-    """What one walk forward found in space."""
+    """What one walk forward found in space; twists and wrenches are about the origin of the global frame."""
+
+    algebra: ClassVar[Any] = algebra
 
     @property
     def space(self) -> SpatialSystem:
@@ -61,22 +50,6 @@ class SpatialWalk(Forward):
         """Elements without errors: the points of a loop's links do not move with what lies in them."""
         return self.space.stated_elements(self.values)
 
-    @cached_property
-    def spins(self) -> dict[str, Number]:
-        """Angular speed of every link, rad/s; real parts."""
-        found = {}
-        for link, motion in self.motions.items():
-            square = primal(dot(motion.twist.u, motion.twist.u))
-            found[link] = np.sqrt(square)
-        return found
-
-    def element(self, link: str, joint: str) -> Frame:
-        """Global frame of a joint's element on a link."""
-        key = (link, joint)
-        if key not in self._elements:
-            self._elements[key] = compose(self.motions[link].frame, self.local[key])
-        return cast(Frame, self._elements[key])
-
     def hole(self, joint: str) -> Frame:
         """Global frame of the hole of a joint: in its second link, z along the axis, in the middle of the bearing."""
         second = self.system.joints[joint][1][1]
@@ -85,44 +58,27 @@ class SpatialWalk(Forward):
     def hole_spin(self, joint: str) -> Vector3:
         """Angular velocity of the hole of a joint against its pin in the hole's frame, rad/s."""
         spin, frame = self.against(joint).u, self.hole(joint)
-        return dot(spin, frame.x), dot(spin, frame.y), dot(spin, frame.z)
+        return apply((frame.x, frame.y, frame.z), spin)
 
-    def backward(self) -> SpatialWalk:
-        """The same positions passed the other way: velocities turned round, accelerations as they are."""
-        turned = {link: motion._replace(twist=times(-1.0, motion.twist)) for link, motion in self.motions.items()}
-        return replace(self, motions=turned, direction=-self.direction)
-
-    def point(self, link: str, name: str) -> SpatialPoint:  # type: ignore[override]
-        """Motion of a named point of a link, or of its element of a joint."""
-        return self.at(link, self._local_place(link, name))
-
-    def at(self, link: str, local: Vector3) -> SpatialPoint:
-        """Motion of the point of a link with local coordinates, m: v = v₀ + ω × p, a = a₀ + ω̇ × p + ω × v."""
-        frame, twist, second = self.motions[link]
-        place = point_of(frame, local)
-        velocity = moment_at(twist, place)
-        return SpatialPoint(place, velocity, plus(moment_at(second, place), cross(twist.u, velocity)))
-
-    def placed(self, frame: Any, link: str, name: str) -> tuple[Number, ...]:
-        """Place of a named point of a link, or of its element of a joint, if the link lies in a frame."""
-        return point_of(frame, self._local_place(link, name))
-
-    def composed(self, frame: Any, link: str, joint: str) -> Frame:
-        """Element of a joint on a link that lies in a frame."""
-        return compose(frame, self.local[link, joint])
+    def in_hole(self, joint: str, wrench: Screw) -> tuple[Vector3, Vector3]:
+        """Force, N, and moment about its middle, N m, of a joint's wrench, in the frame of its hole."""
+        frame = self.hole(joint)
+        moment = moment_at(wrench, frame.place)
+        axes = (frame.x, frame.y, frame.z)
+        return apply(axes, wrench.u), apply(axes, moment)
 
     def coordinate(self, joint: str, first: Any, second: Any) -> Number:
         """Turn of a joint from its elements, of a cross that of its first pin, or slide if that is all it does."""
-        if self.system.joints[joint][0] == "universal":  # its second pin lies at (sin θ₁, −cos θ₁, 0)
+        if self.pair(joint).crossed:  # its second pin lies at (sin θ₁, −cos θ₁, 0)
             sine, cosine = dot(second.z, first.x), -dot(second.z, first.y)
             return namespace(sine, cosine).arctan2(sine, cosine)
         return _dual_angle(first, second)[0 if self.system.turns(joint) else 1]
 
-    def _local_place(self, link: str, name: str) -> Vector3:
-        path = f"links.{link}.points.{name}"
-        if f"{path}.z" not in self.values:
+    def local_place(self, link: str, name: str) -> Vector3:
+        """A named point of a link, or its element of a joint, in its own frame, m."""
+        if f"links.{link}.points.{name}.z" not in self.values:
             return self._stated[link, name].place
-        return cast(Vector3, tuple(self.values[f"{path}.{axis}"] for axis in "xyz"))
+        return cast(Vector3, super().local_place(link, name))
 
     def against(self, joint: str) -> Screw:
         """Twist of the second link of a joint against the first."""
@@ -131,20 +87,22 @@ class SpatialWalk(Forward):
 
     def coordinates(self, joint: str) -> tuple[Number, Number]:
         """Turn in (−π, π] rad and slide, m, of a joint on one axis: θ and s of its dual angle."""
-        first, second = self.system.joints[joint][1]
-        turn, slide = _dual_angle(self.element(first, joint), self.element(second, joint))
+        turn, slide = _dual_angle(*self.ends(joint))
         path = f"loop.{joint}"  # the constant slide of a revolute row, the constant rotation of a prismatic one
         return turn + self.values.get(f"{path}.rotation", 0.0), slide + self.values.get(f"{path}.slide", 0.0)
 
     def rates(self, joint: str) -> tuple[Number, Number]:
         """θ̇ and ṡ of a joint on one axis, rad/s and m/s."""
-        second = self.element(self.system.joints[joint][1][1], joint)
-        twist = self.against(joint)
+        second, twist = self.ends(joint)[1], self.against(joint)
         return dot(twist.u, second.z), dot(moment_at(twist, second.place), second.z)
+
+    def speed(self, joint: str) -> Number:
+        """Relative speed of a joint along its first freedom, of one that is not on one axis |ω|; rad/s, m/s."""
+        return super().speed(joint) if self.pair(joint).one_axis else algebra.spin(self.against(joint))
 
     def second_rates(self, joint: str) -> tuple[Number, Number]:
         """θ̈ and s̈ of a joint on one axis: with ẑ carried by the first link, (ẑ · V)˙ = ẑ · V̇ + (Ω × ẑ) · V."""
-        (first, second_link), two = self.system.joints[joint][1], self.element(self.system.joints[joint][1][1], joint)
+        (first, second_link), two = self.system.joints[joint][1], self.ends(joint)[1]
         one, other = self.motions[first], self.motions[second_link]
         base = one.twist
         relative, rate = self.against(joint), minus(other.acceleration, one.acceleration)
@@ -154,10 +112,21 @@ class SpatialWalk(Forward):
         change = plus(moment_at(rate, two.place), cross(relative.u, speed))
         return dot(rate.u, two.z) + dot(relative.u, carried), dot(change, two.z) + dot(at, carried)
 
+    def pin_rates(self, joint: str) -> tuple[Number, Number]:
+        """Rates about the two pins of a cross, at right angles, rad/s."""
+        turn, (first, second) = self.against(joint).u, self.ends(joint)
+        return dot(turn, first.z), dot(turn, second.z)
+
+    def signed_rates(self, joint: str) -> Iterator[Number]:
+        """Rates of a joint, of a cross of its two pins, that turn round, 0 where they are noise."""
+        if self.pair(joint).crossed:
+            return (quiet(rate, self.noise(joint, turns=True)) for rate in self.pin_rates(joint))
+        return super().signed_rates(joint)
+
     def slip_motion(self, joint: str) -> tuple[Number, Number]:
         """Slip of the contact of a joint that moves one way only, along its thread if it has one; m/s, m/s²."""
         (turn, slide), (turn_rate, slide_rate) = self.rates(joint), self.second_rates(joint)
-        if self.system.joints[joint][0] == "prismatic":
+        if not self.system.turns(joint):
             return slide, slide_rate
         lever, lead = self.values[f"joints.{joint}.pin.radius"], self.space.lead(self.values, joint)
         way = namespace(lever, lead).sqrt(lever * lever + lead * lead)
@@ -183,29 +152,76 @@ class SpatialWalk(Forward):
     def _pair(self, place: Place) -> Any:
         return Element(self._side(place, 0), self._side(place, 1), self.space.lead(self.values, place.joint))
 
-    def take(self, number: int, pose: Any, time: Number) -> None:
-        """Add the motion of one module, whose pose is known."""
-        system = self.space
-        module, group, places = system.plan.modules[number], system.groups[number], system.places[number]
-        _, rates, seconds = driven_coordinates(system, module, places, self.values, time)
-        outside = [
-            next((link for link, outer in zip(place.links, place.outer, strict=True) if outer), None)
-            for place in places
-        ]
-        twists_out = [self.motions[link].twist if link else None for link in outside]
-        accelerations_out = [self.motions[link].acceleration if link else None for link in outside]
-        speeds = group.rates(pose, twists_out, rates)
-        twists = group.twists(pose, twists_out, speeds)
-        accelerations = group.acceleration(pose, twists, twists_out, accelerations_out, seconds, speeds)
-        for link, frame, twist, second in zip(module.links, pose.frames, twists, accelerations, strict=True):
-            self.motions[link] = SpatialMotion(frame, twist, second)
-        self.poses.append(pose)
+    def outside(self, place: Place) -> tuple[Screw | None, Screw | None]:
+        """Twist of the known link of a joint and its derivative."""
+        link = next((link for link, outer in zip(place.links, place.outer, strict=True) if outer), None)
+        return (None, None) if link is None else self.motions[link][1:]
+
+    def moved(
+        self, group: Any, pose: Any, twists: list[Any], accelerations: list[Any], rates: list[Any], seconds: list[Any]
+    ) -> tuple[Sequence[Screw], Sequence[Screw]]:
+        """Twists of a module's links and their derivatives."""
+        speeds = group.rates(pose, twists, rates)
+        found = group.twists(pose, twists, speeds)
+        return found, group.acceleration(pose, found, twists, accelerations, seconds, speeds)
+
+    # ---- forces -----------------------------------------------------------------------------------------------
+
+    def axis(self, joint: str, turns: bool) -> tuple[Screw, Screw]:
+        """A joint's motion at unit rate of its turn or slide, and the wrench of a unit effort in it."""
+        line = line_of(self.ends(joint)[1])
+        along = Screw(algebra.NULL, line.u)
+        return (line, along) if turns else (along, line)
+
+    def freedom(self, joint: str, turns: bool) -> tuple[Screw, Screw]:
+        """What a driver moves: with the slide along the thread, if it has one."""
+        twist, effort = self.axis(joint, turns)
+        lead = self.space.lead(self.values, joint)
+        return Screw(twist.u, plus(twist.m, scaled(lead, twist.u))), effort
+
+    def on_link(self, link: str, wrench: Screw, joint: str) -> Screw:
+        """A joint's wrench about the origin: the same."""
+        return wrench
+
+    def reacting(self, group: SpatialGroup) -> Any:
+        """A module whose reactions are flat tuples."""
+        return _Flat(group)
+
+    def wrench(self, place: Place, reaction: Reaction) -> Screw:
+        """The reaction of a joint."""
+        return Screw(*halves(reaction))
+
+    def inertia_moment(self, link: str) -> Vector3 | None:
+        """−(J ω̇ + ω × J ω) about the mass centre, N m; None of a link without inertia.  [P 21]"""
+        tensor = self._tensor(link)
+        if tensor is None:
+            return None
+        frame, twist, second = self.motions[link]
+        back = Frame(*transpose((frame.x, frame.y, frame.z)), algebra.NULL)
+        w, change = rotated(back, twist.u), rotated(back, second.u)
+        return scaled(-1.0, rotated(frame, plus(apply(tensor, change), cross(w, apply(tensor, w)))))
+
+    def _tensor(self, link: str) -> Matrix3 | None:
+        """Inertia of a link about its mass centre in its own axes, kg m²; None if it has none."""
+        stated, values = self.system.mechanism.effective_links[link], self.values
+        if not isinstance(stated.inertia, InertiaTensor):
+            return None
+        xx, yy, zz, xy, xz, yz = (values[f"links.{link}.inertia.{key}"] for key in ("xx", "yy", "zz", "xy", "xz", "yz"))
+        if stated.inertia_about == "origin":  # Steiner: J_C = J_O − m (c² 1 − c cᵀ)
+            mass, (x, y, z) = values[f"links.{link}.mass"], self.system.centre(values, link)
+            xx, yy, zz = xx - mass * (y * y + z * z), yy - mass * (x * x + z * z), zz - mass * (x * x + y * y)
+            xy, xz, yz = xy + mass * x * y, xz + mass * x * z, yz + mass * y * z
+        return (xx, xy, xz), (xy, yy, yz), (xz, yz, zz)
 
 
-def on_the_ground(system: SpatialSystem, values: Values) -> SpatialWalk:
-    """A walk in space before its first module: only the ground is known."""
-    ground: dict[str, Motion | SpatialMotion] = {system.mechanism.fixed_link: GROUND}
-    return SpatialWalk(system, values, system.elements(values), ground)
+@dataclass(frozen=True)
+class _Flat:
+    """A module whose reactions are flat tuples, as `friction` wants them."""
+
+    group: SpatialGroup
+
+    def reactions(self, pose: Any, loads: Sequence[Screw]) -> list[Reaction]:
+        return [(*wrench.u, *wrench.m) for wrench in self.group.reactions(pose, loads)]
 
 
 def _dual_angle(first: Frame, second: Frame) -> tuple[Number, Number]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Mapping
 from functools import cached_property
-from typing import cast
+from typing import ClassVar, cast
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from trunnion.algebra.vector import Vector3, dot
 from trunnion.groups.cylindrical_dyad import CylindricalDyad
 from trunnion.groups.spatial import SpatialGroup
 from trunnion.groups.tree import OUTER, GroupJoint
+from trunnion.joints.pairs import PAIRS
 from trunnion.solve import shifts
 from trunnion.solve.system import Place, System, Values
 from trunnion.structure.decompose import Module
@@ -27,6 +28,8 @@ AXIS: Vector3 = (0.0, 0.0, 1.0)
 
 class SpatialSystem(System):
     """A mechanism in space, its plan and its modules."""
+
+    axes: ClassVar[str] = "xyz"
 
     @cached_property
     def groups(self) -> tuple[SpatialGroup, ...]:  # type: ignore[override]
@@ -101,10 +104,13 @@ class SpatialSystem(System):
             for link in links:
                 stated = self.mechanism.links[link].points[name]
                 path = f"links.{link}.points.{name}"
-                axis = vector(values, f"{path}.axis") if stated.axis is not None else AXIS
-                x = vector(values, f"{path}.x") if stated.x is not None else None
-                found[link, name] = element(vector(values, path), axis, x)
+                axis = self._vector(values, f"{path}.axis") if stated.axis is not None else AXIS
+                x = self._vector(values, f"{path}.x") if stated.x is not None else None
+                found[link, name] = element(self._vector(values, path), axis, x)
         return found
+
+    def _vector(self, values: Values, path: str) -> Vector3:
+        return cast(Vector3, self.vector(values, path))
 
     def _loop_elements(self, values: Values) -> dict[tuple[str, str], Frame]:
         """Elements from the dual Denavit–Hartenberg table: joint k is Z(θ̂), the link after it X(α̂) to joint k + 1."""
@@ -132,13 +138,9 @@ class SpatialSystem(System):
             frame = turned(frame, values[f"{path}.rotation"])
         return frame
 
-    def centre(self, values: Values, link: str) -> Vector3:  # type: ignore[override]
-        """Local place of a link's mass centre, m."""
-        return vector(values, f"links.{link}.centre")
-
     def lead(self, values: Values, joint: str) -> Number:
         """Slide for one radian of a helical pair, m; 0 of others."""
-        return values[f"joints.{joint}.pitch"] / (2 * np.pi) if self.joints[joint][0] == "helical" else 0.0
+        return values[f"joints.{joint}.pitch"] / (2 * np.pi) if PAIRS[self.joints[joint][0]].threaded else 0.0
 
     def size(self, values: Values, elements: Mapping[tuple[str, str], Frame] | None = None) -> Number:
         """Length typical of the mechanism, m: the widest spread of two joints on one link; elements: if known."""
@@ -156,11 +158,6 @@ class SpatialSystem(System):
         lengths = [primal(value) for path, value in values.items() if path.endswith((".pin.bearing", ".pin.radius"))]
         largest = functools.reduce(np.maximum, lengths, 0.0)
         return np.where(largest > 0, largest, 1.0)
-
-
-def vector(values: Values, path: str) -> Vector3:
-    """Three components by path."""
-    return cast(Vector3, tuple(values[f"{path}.{axis}"] for axis in "xyz"))
 
 
 def _twisted(twist: Number, distance: Number) -> Frame:

@@ -34,14 +34,12 @@ from trunnion.measures.measures import Measure, named, outputs
 from trunnion.measures.motion import MOTIONS
 from trunnion.model.contact import clearance
 from trunnion.model.mechanism import Mechanism
-from trunnion.solve import backward as kinetostatics
 from trunnion.solve import shifts
+from trunnion.solve.backward import under
 from trunnion.solve.forward import Forward, forward
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
 from trunnion.solve.shifts import HOLE, Play
-from trunnion.solve.space import forces
-from trunnion.solve.space.motion import SpatialWalk
 from trunnion.solve.status import pose_status, status_of
 from trunnion.solve.system import System, Values
 from trunnion.studies.play.result import dataset, relied_on
@@ -73,7 +71,7 @@ def plays(system: System, values: Values) -> dict[str, Play]:
 def by_virtual_load(walk: Forward, measure: Measure, known: Mapping[str, Play]) -> Loads:
     """Qᵢ of a measure of the motion at each end of each joint: ∂y/∂cᵢ, in its unit a metre, hole's frame."""
     loads = measure.loads(walk)
-    back = forces.under(walk, loads) if isinstance(walk, SpatialWalk) else kinetostatics.under(walk, loads)
+    back = under(walk, loads)
     return {name: play.model.loads(*back.on_hole(name), play.length) for name, play in known.items()}
 
 

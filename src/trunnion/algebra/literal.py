@@ -1,0 +1,41 @@
+"""Products and sums in which a literal 0 or 1, as most local coordinates are one, costs no pass over an array."""
+
+from __future__ import annotations
+
+from trunnion.algebra.namespace import Number
+
+__all__ = ["is_zero", "less", "plus", "times"]
+
+
+def is_zero(number: Number) -> bool:
+    """A literal zero."""
+    return isinstance(number, float) and number == 0.0
+
+
+def times(a: Number, b: Number) -> Number:
+    """a b."""
+    if isinstance(a, float):
+        if a == 0.0:
+            return 0.0
+        if a == 1.0:
+            return b
+    if isinstance(b, float):
+        if b == 0.0:
+            return 0.0
+        if b == 1.0:
+            return a
+    return a * b
+
+
+def plus(a: Number, b: Number) -> Number:
+    """a + b."""
+    if is_zero(a):
+        return b
+    return a if is_zero(b) else a + b
+
+
+def less(a: Number, b: Number) -> Number:
+    """a − b."""
+    if is_zero(b):
+        return a
+    return -b if is_zero(a) else a - b

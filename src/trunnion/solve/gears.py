@@ -1,0 +1,105 @@
+"""Forces of gear pairs on the links of a module: tooth force, the force that parts the gears, and their power."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+from trunnion.algebra.namespace import Number, namespace
+from trunnion.algebra.plane import ZERO_LOAD, Wrench, about, added, moved, power
+from trunnion.groups.gear import Action, Gear, Mesh, actions, apart, mesh
+from trunnion.groups.general import General
+from trunnion.joints.friction import FrictionLaw
+from trunnion.joints.pairs import Load
+from trunnion.solve.forward import Forward
+from trunnion.solve.friction_problem import Contact
+
+__all__ = ["GearLoad", "acting", "gear_load", "gears_of", "on_links", "power_of", "teeth"]
+
+
+class GearLoad(NamedTuple):
+    """What a gear pair does: torque in its second joint, on the second link, N m; tooth force on the second gear, N."""
+
+    torque: Number
+    force: tuple[Number, Number]
+
+
+def gears_of(group: object) -> tuple[Gear, ...]:
+    """The gear pairs of a module."""
+    return group.gears if isinstance(group, General) else ()
+
+
+def _mesh(walk: Forward, number: int, i: int) -> tuple[Gear, Mesh]:
+    """A gear pair of a module and where its gears touch."""
+    pose = walk.poses[number]
+    gear = gears_of(walk.system.groups[number])[i]
+    return gear, mesh(gear, (pose.elements[gear.first], pose.elements[gear.second]), pose.ratios[i])
+
+
+def teeth(walk: Forward, number: int) -> Iterator[Contact]:
+    """The forces with which inclined flanks push the gears of a module apart: tan α times the tooth force."""
+    module, places = walk.system.plan.modules[number], walk.system.places[number]
+    for i, name in enumerate(module.gears):
+        if not gears_of(walk.system.groups[number])[i].carriers:
+            continue
+        gear, touch = _mesh(walk, number, i)
+        units = dict.fromkeys(module.links, ZERO_LOAD)
+        for joint, side, wrench, at in apart(gear, touch, 1.0):
+            link = places[joint].links[side]
+            if link in units:
+                frame = walk.motions[link].frame
+                units[link] = added(units[link], about(wrench, frame.x - at.x, frame.y - at.y))
+        angle = walk.values[f"gears.{name}.pressure_angle"]
+        # a guide of length 2/|f/λ| under the moment λ alone presses with |f|
+        load = Load((1.0, 0.0), 2 / namespace(touch.factor).abs(touch.factor))
+        slope = namespace(angle).sin(angle) / namespace(angle).cos(angle)
+        yield Contact(len(places) + i, list(units.values()), load, SEPARATION, {"slope": slope}, 0.0, rubs=False)
+
+
+def _separation(normal: Number, slip: Number, **parameters: Number) -> Number:
+    return parameters["slope"] * normal
+
+
+SEPARATION = FrictionLaw(_separation)
+
+
+def acting(walk: Forward, number: int, i: int, torque: Number, parting: bool = True) -> list[Action]:
+    """What a gear pair of a module does with a torque in its second joint; parting: by tooth forces, not torques alone.
+
+    Torques alone are what moves with the play of joints: the ratio holds between rotations, which no offset of a pin
+    changes.
+    """
+    pose, gear = walk.poses[number], gears_of(walk.system.groups[number])[i]
+    return actions(gear if parting else gear._replace(carriers=None), pose.elements, pose.ratios[i], torque)
+
+
+def gear_load(walk: Forward, number: int, i: int, torque: Number, separation: Number) -> tuple[GearLoad, list[Action]]:
+    """What a gear pair does in the file's sense, and to which links. separation: the force that parts its gears, N."""
+    done = acting(walk, number, i, torque)
+    force: tuple[Number, Number] = (0.0, 0.0)
+    if gears_of(walk.system.groups[number])[i].carriers:
+        pushes = apart(*_mesh(walk, number, i), separation)
+        force = done[0].wrench.x + pushes[0].wrench.x, done[0].wrench.y + pushes[0].wrench.y
+        done += pushes
+    if walk.system.plan.modules[number].gears[i] not in walk.system.turned_round:
+        return GearLoad(torque, force), done
+    # found in the joint and on the gear that the file names first
+    return GearLoad(-torque * walk.poses[number].ratios[i], (-force[0], -force[1])), done
+
+
+def power_of(walk: Forward, number: int, done: Sequence[Action]) -> Number:
+    """Power of a gear pair on the way of its wheels' centres, W; without travel of their pins there is none."""
+    total: Number = 0.0
+    for joint, side, wrench, at in done:
+        frame, twist, _ = walk.motions[walk.system.places[number][joint].links[side]]
+        total = total + power(wrench, moved(twist, at.x - frame.x, at.y - frame.y))
+    return total
+
+
+def on_links(walk: Forward, number: int, done: Sequence[Action]) -> Iterator[tuple[str, Wrench]]:
+    """What gear pairs do to the known links of a module, about their origins."""
+    for joint, side, wrench, at in done:
+        place = walk.system.places[number][joint]
+        if place.outer[side]:
+            frame = walk.motions[place.links[side]].frame
+            yield place.links[side], about(wrench, frame.x - at.x, frame.y - at.y)

@@ -1,0 +1,183 @@
+"""What a joint does in the plane: its rates, its contact with friction, its wrench; the rest is in `solve.forward`.
+
+Twists, accelerations and wrenches of a link are about its origin, those of a joint about its point on its second link.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+
+from trunnion.algebra import plane
+from trunnion.algebra.dual import primal
+from trunnion.algebra.literal import is_zero
+from trunnion.algebra.namespace import Number, namespace
+from trunnion.algebra.plane import Acceleration, Frame, Twist, Wrench, about, accelerated, moved
+from trunnion.joints.pairs import Load, Reaction
+from trunnion.solve.forward import Forward, rate_of
+from trunnion.solve.friction_problem import Rubbing
+from trunnion.solve.system import Place
+
+__all__ = ["PlaneWalk", "contacts"]
+
+
+class PlaneWalk(Forward):
+    """What one walk forward found in the plane."""
+
+    algebra: ClassVar[Any] = plane
+
+    # ---- joints -----------------------------------------------------------------------------------------------
+
+    def coordinates(self, joint: str) -> tuple[Number, Number]:
+        """Turn in (−π, π] rad, or slide, m, of a joint."""
+        first, second = self.ends(joint)
+        if self.system.turns(joint):
+            c, s = plane.turned(first.c, -first.s, second.c, second.s)
+            return namespace(s, c).arctan2(s, c), 0.0
+        return 0.0, first.c * (second.x - first.x) + first.s * (second.y - first.y)
+
+    def coordinate(self, joint: str, first: Frame, second: Frame) -> Number:
+        """Slide or turn of a joint from its elements."""
+        if self.system.turns(joint):
+            return np.arctan2(second.s, second.c) - np.arctan2(first.s, first.c)
+        return first.c * (second.x - first.x) + first.s * (second.y - first.y)
+
+    def against(self, joint: str) -> Twist:
+        """Velocity of a joint's point on its second link and spin of that link, against the first."""
+        one, two = (self._at(link, joint) for link in self.system.joints[joint][1])
+        return Twist(two[0].x - one[0].x, two[0].y - one[0].y, two[0].w - one[0].w)
+
+    def _at(self, link: str, joint: str) -> tuple[Twist, Acceleration]:
+        """Motion of the point of a link that lies at a joint's point on its second link."""
+        at, (frame, twist, acceleration) = self.element(self.system.joints[joint][1][1], joint), self.motions[link]
+        arm = at.x - frame.x, at.y - frame.y
+        return moved(twist, *arm), accelerated(acceleration, twist.w, *arm)
+
+    def rates(self, joint: str) -> tuple[Number, Number]:
+        """Rate of the turn or of the slide."""
+        first, second = self.system.joints[joint][1]
+        if self.system.turns(joint):
+            return self.motions[second].twist.w - self.motions[first].twist.w, 0.0
+        return 0.0, self._along(joint, self.against(joint))
+
+    def second_rates(self, joint: str) -> tuple[Number, Number]:
+        """Its derivative; the Coriolis part 2 ω × ṡ lies across the slide."""
+        first, second = self.system.joints[joint][1]
+        if self.system.turns(joint):
+            return self.motions[second].acceleration.w - self.motions[first].acceleration.w, 0.0
+        (_, one), (_, two) = self._at(first, joint), self._at(second, joint)
+        return 0.0, self._along(joint, Twist(two.x - one.x, two.y - one.y, 0.0))
+
+    def _along(self, joint: str, change: Twist) -> Number:
+        axis = self.ends(joint)[0]
+        return axis.c * change.x + axis.s * change.y
+
+    def slip_motion(self, joint: str) -> tuple[Number, Number]:
+        """Slip of a joint's contact, second link against first, and its rate; m/s, m/s²."""
+        if not self.system.turns(joint):
+            return self.rates(joint)[1], self.second_rates(joint)[1]
+        lever = self.values[f"joints.{joint}.pin.radius"]
+        return lever * self.rates(joint)[0], lever * self.second_rates(joint)[0]
+
+    # ---- holes ------------------------------------------------------------------------------------------------
+
+    def hole(self, joint: str) -> Frame:
+        """Global frame of the hole of a joint: in its second link, axes of the link, of a guide along its slide."""
+        second = self.system.joints[joint][1][1]
+        return plane.compose(self.motions[second].frame, self.holes[second, joint])
+
+    def hole_spin(self, joint: str) -> tuple[Number, ...]:
+        """Angular velocity of the hole of a joint against its pin, rad/s."""
+        first, second = self.system.joints[joint][1]
+        return (self.motions[second].twist.w - self.motions[first].twist.w,)
+
+    def in_hole(self, joint: str, wrench: Wrench) -> tuple[tuple[Number, ...], tuple[Number, ...]]:
+        """Force, N, and moment about its middle, N m, of a joint's wrench, in the frame of its hole."""
+        hole, at = self.hole(joint), self.ends(joint)[1]
+        x, y, moment = about(wrench, hole.x - at.x, hole.y - at.y)
+        return (x * hole.c + y * hole.s, y * hole.c - x * hole.s), (moment,)
+
+    # ---- the walk ---------------------------------------------------------------------------------------------
+
+    def frame_rate(self, frame: Frame) -> Twist:
+        """Twist of a link whose frame has the rates of its numbers as ε parts."""
+        spin = primal(frame.c) * rate_of(frame.s) - primal(frame.s) * rate_of(frame.c)
+        return Twist(rate_of(frame.x), rate_of(frame.y), spin)
+
+    def outside(self, place: Place) -> tuple[Twist | None, Acceleration | None]:
+        """Motion of a joint's element on its known link; of a witness its relative motion, which gear pairs see."""
+        if place.witness:
+            one, two = (self.motions[link] for link in place.links)
+            twist = Twist(0.0, 0.0, two.twist.w - one.twist.w)
+            return twist, Acceleration(0.0, 0.0, two.acceleration.w - one.acceleration.w)
+        link = next((link for link, outer in zip(place.links, place.outer, strict=True) if outer), None)
+        if link is None:
+            return None, None
+        (frame, twist, acceleration), element = self.motions[link], self.element(link, place.joint)
+        arm = element.x - frame.x, element.y - frame.y
+        return moved(twist, *arm), accelerated(acceleration, twist.w, *arm)
+
+    def moved(
+        self, group: Any, pose: Any, twists: list[Any], accelerations: list[Any], rates: list[Any], seconds: list[Any]
+    ) -> tuple[Sequence[Twist], Sequence[Acceleration]]:
+        """Velocities and accelerations of a module's links."""
+        found = group.velocity(pose, twists, rates)
+        return found, group.acceleration(pose, found, twists, accelerations, seconds, rates)
+
+    # ---- forces -----------------------------------------------------------------------------------------------
+
+    def axis(self, joint: str, turns: bool) -> tuple[Twist, Wrench]:
+        """A joint's motion at unit rate of its turn or slide, and the wrench of a unit effort in it."""
+        if turns:
+            return Twist(0.0, 0.0, 1.0), Wrench(0.0, 0.0, 1.0)
+        along = self.ends(joint)[0]
+        return Twist(along.c, along.s, 0.0), Wrench(along.c, along.s, 0.0)
+
+    def on_link(self, link: str, wrench: Wrench, joint: str) -> Wrench:
+        """A joint's wrench about the origin of a link."""
+        frame, at = self.motions[link].frame, self.ends(joint)[1]
+        return about(wrench, frame.x - at.x, frame.y - at.y)
+
+    def reacting(self, group: Any) -> Any:
+        """A module whose reactions are flat tuples."""
+        return group
+
+    def wrench(self, place: Place, reaction: Reaction) -> Wrench:
+        """The reaction of a joint in the file's sense; its module may see the joint from its second link."""
+        found = Wrench(*reaction)
+        if not place.reversed_:
+            return found
+        found = plane.times(-1.0, found)
+        if self.system.turns(place.joint):
+            return found
+        here, there = self.ends(place.joint)  # the module's second point is the file's first
+        return about(found, there.x - here.x, there.y - here.y)
+
+    def inertia_moment(self, link: str) -> Number | None:
+        """−J α about the mass centre, N m; None of a link without inertia.  [D 2-5]"""
+        about_origin = self.system.mechanism.links[link].inertia_about == "origin"
+        mass, inertia = self.values[f"links.{link}.mass"], self.values[f"links.{link}.inertia"]
+        if is_zero(inertia) and (not about_origin or is_zero(mass)):
+            return None
+        if about_origin:
+            x, y = self.system.centre(self.values, link)
+            inertia = inertia - mass * (x * x + y * y)
+        return -inertia * self.motions[link].acceleration.w
+
+
+def contacts(walk: PlaneWalk, joint: str) -> Iterator[Rubbing]:
+    """The one contact of a joint: a pin in its hole, or a guide, whose middle is at its point on the second link."""
+    turns, path = walk.system.turns(joint), f"joints.{joint}"
+    speed = walk.speed(joint)
+    zero = np.abs(primal(speed)) <= walk.noise(joint, turns)
+    if turns:
+        lever = walk.values[f"{path}.pin.radius"]
+        yield Rubbing(Load(), lever * speed, Wrench(0.0, 0.0, lever), zero, amount=lever, turning=1.0)
+        return
+    axis, middle = walk.ends(joint)
+    at = axis if joint in walk.system.reversed else middle  # what the module's reaction is about
+    arm = None if at is middle else (middle.x - at.x, middle.y - at.y)
+    load = Load((-axis.s, axis.c), walk.values[f"{path}.guide.length"], arm)
+    yield Rubbing(load, speed, Wrench(axis.c, axis.s, 0.0), zero)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
 import pickle
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -143,6 +145,36 @@ def test_ctrl_c_from_the_terminal_is_quiet(jobs: int, tmp_path: Path) -> None:
     assert complaints == ""
     job = ToyJob(blocks=400)
     assert run(job, checkpoint=tmp_path / "run.npz", resume=True).tally.bits() == run(job).tally.bits()
+
+
+@POSIX
+def test_workers_end_with_a_main_process_that_is_killed(tmp_path: Path) -> None:
+    script = tmp_path / "script.py"
+    script.write_text(
+        "import multiprocessing, sys\nfrom toy_job import ToyJob\n"
+        "from trunnion.studies.tolerance.runner import run\n"
+        "def tell(samples):\n"
+        "    if samples: print(*[one.pid for one in multiprocessing.active_children()], flush=True)\n"
+        "if __name__ == '__main__':\n    run(ToyJob(blocks=4000, pause=0.02), jobs=2, chunk=500, progress=tell)\n"
+    )
+    with subprocess.Popen([sys.executable, str(script)], stdout=subprocess.PIPE, text=True, env=ENVIRONMENT) as program:
+        assert program.stdout is not None
+        workers = [int(word) for word in program.stdout.readline().split()]
+        program.kill()
+    assert workers
+    until = time.monotonic() + 20
+    while any(_lives(worker) for worker in workers) and time.monotonic() < until:
+        time.sleep(0.05)
+    assert not any(_lives(worker) for worker in workers)
+
+
+def _lives(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    state = Path(f"/proc/{process}/stat")
+    return not (state.exists() and state.read_text().rpartition(")")[2].split()[0] == "Z")
 
 
 @pytest.mark.slow

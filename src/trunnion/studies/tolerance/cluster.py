@@ -1,7 +1,7 @@
 """Workers beyond this machine, by Dask distributed (extra `cluster`); a local cluster of processes works the same.
 
-The job travels once to every worker, as a worker plugin: a worker that joins late, or takes a dead one's place, gets
-it on joining. Tasks carry two numbers. Nothing but the tallies comes back, and they are dropped there at once.
+The executor of its client does the blocks. The job travels once to every worker, a task of its own that all others
+need. Nothing but the tallies comes back, and they are dropped there at once.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import uuid
 import warnings
 import zlib
 from collections.abc import Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from contextlib import ExitStack, contextmanager, suppress
 from time import perf_counter
 from typing import Any, Generic
@@ -21,25 +22,26 @@ from typing import Any, Generic
 import numpy as np
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.studies.tolerance.arithmetic import fingerprint
 from trunnion.studies.tolerance.interruption import unheard
-from trunnion.studies.tolerance.processes import DEATHS, deadly
-from trunnion.studies.tolerance.protocol import Blocks, Job, Part, T
+from trunnion.studies.tolerance.processes import DEATHS, PAUSE, deadly
+from trunnion.studies.tolerance.protocol import Blocks, Job, Part, T, part_of
 from trunnion.version import __version__
 
 try:
     import dask
-    from distributed import Client, Future, KilledWorker, LocalCluster, WorkerPlugin, as_completed, get_worker
+    from distributed import Client, KilledWorker, LocalCluster
 except ImportError:
     what, remedy = "a cluster needs the package distributed", "pip install 'trunnion[cluster]'"
     raise MechanismError(Finding(what, "cluster", remedy)) from None
 
 __all__ = ["Cluster"]
 
-AHEAD = 2  # ranges under way for every thread of the cluster
 CONNECT = 10  # s to reach the scheduler
 ARRIVE = 60  # s for the first worker to be there
 COUNTED = 5.0  # s between two counts of the workers
+
+
+_here = threading.local()  # of each thread of a worker: the job that it has prepared
 
 
 def _versions() -> dict[str, str]:
@@ -47,40 +49,21 @@ def _versions() -> dict[str, str]:
     return {"trunnion": __version__, "numpy": np.__version__}
 
 
-class Task(WorkerPlugin):
-    """The job on a worker: sent as it is, prepared by each thread when it first does a range."""
-
-    def __init__(self, job: bytes, local: bool) -> None:
-        self._job = job
-        self._local = local
-        self._versions = _versions()
-        self._prepared: Any = None
-
-    def setup(self, worker: Any) -> None:
-        self._prepared = threading.local()
-        if self._local and threading.current_thread() is threading.main_thread():
-            signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the main process
-
-    def prepared(self) -> Any:
-        """What evaluates blocks in this thread; MechanismError if this worker would compute other bits."""
-        if not hasattr(self._prepared, "job"):
-            here = _versions()
-            if here != self._versions:
-                texts = [f"{name} {here[name]}, not {theirs}" for name, theirs in self._versions.items()]
-                what = f"a worker of the cluster has other versions: {'; '.join(texts)}"
-                raise MechanismError(Finding(what, "cluster", "install the same on all machines"))
-            self._prepared.job = pickle.loads(self._job).prepare()
-        return self._prepared.job
+def _evaluated(job: bytes, name: str, versions: dict[str, str], blocks: Blocks) -> bytes:
+    """On a worker: a part, packed: histograms are mostly zeros, the network is slow."""
+    if getattr(_here, "name", None) != name:
+        here = _versions()
+        if here != versions:
+            texts = [f"{package} {here[package]}, not {theirs}" for package, theirs in versions.items()]
+            what = f"a worker of the cluster has other versions: {'; '.join(texts)}"
+            raise MechanismError(Finding(what, "cluster", "install the same on all machines"))
+        _here.prepared, _here.name = pickle.loads(job).prepare(), name
+    return zlib.compress(pickle.dumps(part_of(_here.prepared, blocks), pickle.HIGHEST_PROTOCOL), 1)
 
 
-def _evaluate(name: str, first: int, last: int) -> bytes:
-    """On a worker: the part of blocks first … last - 1, packed: histograms are mostly zeros, the network is slow."""
-    task: Any = get_worker().plugins[name]
-    prepared = task.prepared()
-    start = perf_counter()
-    tally = prepared.evaluate(first, last)
-    part = Part((first, last), perf_counter() - start, tally, fingerprint())
-    return zlib.compress(pickle.dumps(part, pickle.HIGHEST_PROTOCOL), 1)
+def dask_setup(_worker: Any) -> None:
+    """Dask calls it in every worker of a local cluster: Ctrl-C is for the main process."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 @contextmanager
@@ -103,17 +86,18 @@ class Cluster(Generic[T]):
     def __init__(self, job: Job[T], address: str, jobs: int) -> None:
         self._address = address
         self._name = f"trunnion-{uuid.uuid4().hex[:12]}"
-        self._under_way: dict[Future[Any], Blocks] = {}
+        self._under_way: dict[Future[bytes], Blocks] = {}
         self._stack = ExitStack()
         self._stack.enter_context(_quiet())
         try:
             self._client = self._connected(jobs)
-            self._client.register_plugin(Task(pickle.dumps(job), address == "local"), name=self._name)
             self._threads = self._counted()
         except BaseException:
             self._stack.close()
             raise
-        self._ready = as_completed(loop=self._client.loop)
+        # a task like any other: done again where its result is lost
+        self._job = self._client.submit(bytes, pickle.dumps(job), key=f"{self._name}-job")
+        self._executor = self._client.get_executor(pure=False, retries=0)
 
     def _connected(self, jobs: int) -> Client:
         with warnings.catch_warnings():
@@ -127,7 +111,8 @@ class Cluster(Generic[T]):
                 }
                 with unheard(), dask.config.set(config):
                     options: dict[str, Any] = {"threads_per_worker": 1, "dashboard_address": None, "memory_limit": 0}
-                    local = LocalCluster(n_workers=jobs, silence_logs=logging.CRITICAL + 1, **options)
+                    options |= {"silence_logs": logging.CRITICAL + 1, "preload": [__name__]}
+                    local = LocalCluster(n_workers=jobs, **options)
                     self._stack.callback(local.close)
                     client = Client(local, set_as_default=False)
                 self._stack.enter_context(client)
@@ -153,51 +138,33 @@ class Cluster(Generic[T]):
 
     @property
     def workers(self) -> int:
-        return max(1, self._threads)
-
-    @property
-    def room(self) -> int:
         if perf_counter() > self._count_at and self._client.status == "running":
             self._count_at = perf_counter() + COUNTED
             self._threads = sum(self._client.nthreads().values())
-        return AHEAD * self.workers - len(self._under_way)
+        return max(1, self._threads)
 
     def give(self, blocks: Blocks) -> None:
-        first, last = blocks
-        future = self._client.submit(
-            _evaluate, self._name, first, last, key=f"{self._name}-{first}-{last}", pure=False, retries=0
-        )
+        future = self._executor.submit(_evaluated, self._job, self._name, _versions(), blocks)
         self._under_way[future] = blocks
-        self._ready.add(future)
 
     def wait(self) -> Sequence[Part[T]]:
-        future = next(self._ready)
-        parts = [self._part(future)]
-        while self._ready.has_ready():
-            parts.append(self._part(next(self._ready)))
-        return parts
+        return [self._part(future) for future in wait(self._under_way, PAUSE, FIRST_COMPLETED).done]
 
-    def _part(self, future: Future[Any]) -> Part[T]:
+    def _part(self, future: Future[bytes]) -> Part[T]:
         blocks = self._under_way.pop(future)
-        if future.status == "error":
-            error = future.exception()
-            if isinstance(error, KilledWorker):
-                raise deadly(blocks, "workers of the cluster that died") from None
-            assert error is not None
-            raise error
-        if future.status != "finished":
+        try:
+            part: Part[T] = pickle.loads(zlib.decompress(future.result()))
+        except KilledWorker:
+            raise deadly(blocks, "workers of the cluster that died") from None
+        except CancelledError:
             what = f"the connection with the scheduler at {self._address} was lost"
             remedy = "start it again and go on with --resume, if there is a checkpoint"
-            raise MechanismError(Finding(what, "cluster", remedy))
-        part: Part[T] = pickle.loads(zlib.decompress(future.result()))
-        future.release()
+            raise MechanismError(Finding(what, "cluster", remedy)) from None
         return part
 
     def close(self, finished: bool) -> None:
         with self._stack:
             if self._client.status == "running":
                 with suppress(OSError, TimeoutError):
-                    if not finished:
-                        self._client.cancel(list(self._under_way))
-                    self._client.unregister_worker_plugin(self._name)
+                    self._executor.shutdown(wait=finished)
             self._under_way.clear()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -27,9 +27,6 @@ from trunnion.studies.tolerance.kernel import references
 from trunnion.studies.tolerance.linear import Linear, linear, searched
 from trunnion.studies.tolerance.sampling import Sampler, Sampling, towards
 from trunnion.studies.tolerance.search import Corner
-
-if TYPE_CHECKING:
-    pass
 
 __all__ = ["FEW", "Study", "placed", "study"]
 

@@ -1,33 +1,34 @@
-"""Processes of this machine, each with its own pipe, so that it is known what a dead one was doing.
+"""Processes of this machine: the pool of the standard library, put up again when a worker dies.
 
-They are started anew (`spawn`), as Windows and macOS do it everywhere; the job goes to each once, at its start.
+They are started anew (`spawn`), as Windows and macOS do it everywhere; the job goes to each once, at its start. A pool
+does not say which of its blocks ended a worker, so those that were lost are done again one range at a time.
 """
 
 from __future__ import annotations
 
 import multiprocessing
+import os
 import pickle
 import signal
-import traceback
+import threading
 from collections import Counter, deque
-from collections.abc import Sequence
-from contextlib import suppress
-from dataclasses import dataclass, field
-from multiprocessing.connection import Connection, wait
+from collections.abc import Callable, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from functools import cache
 from multiprocessing.process import BaseProcess
-from time import perf_counter
-from typing import Any, Generic
+from typing import Any, Generic, TypeVar
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.studies.tolerance.arithmetic import fingerprint
 from trunnion.studies.tolerance.interruption import unheard
-from trunnion.studies.tolerance.protocol import Blocks, Job, Part, T
+from trunnion.studies.tolerance.protocol import Blocks, Job, Part, T, part_of
 
-__all__ = ["DEATHS", "Processes", "deadly"]
+__all__ = ["DEATHS", "PAUSE", "Processes", "deadly"]
 
+A = TypeVar("A")
 DEATHS = 3  # so often a range may end its worker before it is blamed
-AHEAD = 2  # ranges a worker holds: the one under way and the next
 PAUSE = 0.5  # s; Windows hears Ctrl-C only between two waits
+_given: list[bytes] = []  # in a worker: the job
 
 
 def deadly(blocks: Blocks, how: str) -> MechanismError:
@@ -37,47 +38,103 @@ def deadly(blocks: Blocks, how: str) -> MechanismError:
     return MechanismError(Finding(what, "", "often too little memory: fewer --jobs, a smaller --chunk, fewer --steps"))
 
 
-def _report(pipe: Connection, error: Exception) -> None:
-    """Send what went wrong, with the place; in words only if it does not survive the way."""
-    text = f"in a worker process:\n{traceback.format_exc()}"
-    error.add_note(text)
-    try:
-        pickle.loads(pickle.dumps(error))
-    except Exception:
-        error = RuntimeError(text)
-    pipe.send(error)
-
-
-def _serve(job: bytes, pipe: Connection) -> None:
-    """Prepare the job, say so with a None, then do range after range until a None comes."""
+def _begin(job: bytes) -> None:
+    """In a worker: keep the job; leave Ctrl-C to the main process, and end when that ends, however it does."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    with suppress(EOFError, OSError):  # the main process is gone: nobody listens
+    _given[:] = [job]
+    threading.Thread(target=_follow, daemon=True).start()
+
+
+def _follow() -> None:
+    main = multiprocessing.parent_process()
+    if main is not None:
+        main.join()
+        os._exit(1)
+
+
+@cache
+def _prepared() -> Any:
+    return pickle.loads(_given[0]).prepare()
+
+
+def _evaluated(blocks: Blocks) -> Part[Any]:
+    return part_of(_prepared(), blocks)
+
+
+class Processes(Generic[T]):
+    """`Crew` of so many processes."""
+
+    def __init__(self, job: Job[T], workers: int) -> None:
+        self.workers = workers
+        self._job = pickle.dumps(job)
+        self._queue: deque[Blocks] = deque()
+        self._under_way: dict[Future[Part[T]], Blocks] = {}
+        self._deaths: Counter[Blocks] = Counter()
+        self._stillborn = 0
+        self._begin()
+
+    def _begin(self) -> None:
+        self._others = set(multiprocessing.active_children())
+        self._processes: set[BaseProcess] = set()
+        self._pool = ProcessPoolExecutor(self.workers, multiprocessing.get_context("spawn"), _begin, (self._job,))
+        self._born = self._submitted(int)
+
+    def _submitted(self, work: Callable[..., A], *arguments: object) -> Future[A]:
+        with unheard():  # it may start a process
+            future = self._pool.submit(work, *arguments)
+        self._processes |= set(multiprocessing.active_children()) - self._others
+        return future
+
+    def give(self, blocks: Blocks) -> None:
+        self._queue.append(blocks)
+
+    def wait(self) -> Sequence[Part[T]]:
+        parts, lost, broken = [], [], False
         try:
-            prepared = pickle.loads(job).prepare()
-        except Exception as error:
-            return _report(pipe, error)
-        pipe.send(None)
-        while (blocks := pipe.recv()) is not None:
-            start = perf_counter()
+            while self._queue and not (self._under_way and self._suspect()):
+                self._under_way[self._submitted(_evaluated, self._queue[0])] = self._queue[0]
+                self._queue.popleft()
+        except BrokenProcessPool:
+            broken = True
+        for future in wait(self._under_way, PAUSE, FIRST_COMPLETED).done:
+            blocks = self._under_way.pop(future)
             try:
-                tally = prepared.evaluate(*blocks)
-            except Exception as error:
-                return _report(pipe, error)
-            pipe.send(Part(blocks, perf_counter() - start, tally, fingerprint()))
+                parts.append(future.result())
+            except BrokenProcessPool:
+                lost.append(blocks)
+        if parts:
+            self._stillborn = 0
+        if lost or broken:
+            self._replace([*lost, *self._under_way.values()])
+        return parts
 
+    def _suspect(self) -> bool:
+        """Whether the next blocks, or those under way, have been there when a worker died."""
+        return any(self._deaths[blocks] for blocks in (self._queue[0], *self._under_way.values()))
 
-@dataclass
-class _Worker:
-    process: BaseProcess
-    pipe: Connection
-    given: deque[Blocks] = field(default_factory=deque)
-    ready: bool = False
+    def _replace(self, lost: Sequence[Blocks]) -> None:
+        """Another pool for one whose worker died; the blocks that it had are remembered and done again."""
+        self._pool.shutdown()
+        self._under_way.clear()
+        how = self._end()
+        if self._born.exception() is not None:
+            self._stillborn += 1
+            if self._stillborn >= DEATHS:
+                what = f"worker processes end before they have begun ({how})"
+                remedy = "a script calls it under `if __name__ == '__main__':`; or use one job"
+                raise MechanismError(Finding(what, "", remedy))
+        else:
+            self._deaths.update(lost)
+        self._queue.extendleft(sorted(lost, reverse=True))
+        for blocks in lost:
+            if self._deaths[blocks] >= DEATHS:
+                raise deadly(blocks, how)
+        self._begin()
 
-    @property
-    def end(self) -> str:
-        """How it ended."""
-        self.process.join(5)
-        code = self.process.exitcode
+    def _end(self) -> str:
+        """How the worker ended that ended the pool; the pool then terminates the others."""
+        codes = [one.exitcode for one in self._processes if one.exitcode]
+        code = next((code for code in codes if code != -signal.SIGTERM), codes[0] if codes else None)
         if code is None or code >= 0:
             return f"exit status {code}"
         try:
@@ -85,104 +142,8 @@ class _Worker:
         except ValueError:
             return f"killed by signal {-code}"
 
-
-class Processes(Generic[T]):
-    """`Crew` of so many processes."""
-
-    def __init__(self, job: Job[T], workers: int) -> None:
-        self._job = pickle.dumps(job)
-        self._context = multiprocessing.get_context("spawn")
-        self._deaths: Counter[Blocks] = Counter()
-        self._stillborn = 0
-        self._crew: list[_Worker] = []
-        for _ in range(workers):
-            self._crew.append(self._hired())
-
-    def _hired(self) -> _Worker:
-        ours, theirs = self._context.Pipe()
-        # daemon: ended with this process, however that ends
-        process = self._context.Process(target=_serve, args=(self._job, theirs), daemon=True)
-        with unheard():
-            process.start()
-        theirs.close()  # else the end of the process would not end the pipe
-        return _Worker(process, ours)
-
-    @property
-    def workers(self) -> int:
-        return len(self._crew)
-
-    @property
-    def room(self) -> int:
-        return sum(AHEAD - len(worker.given) for worker in self._crew)
-
-    def give(self, blocks: Blocks) -> None:
-        worker = min(self._crew, key=lambda worker: len(worker.given))
-        worker.given.append(blocks)
-        with suppress(OSError):  # it is dead: found out, and mended, at the next `wait`
-            worker.pipe.send(blocks)
-
-    def wait(self) -> Sequence[Part[T]]:
-        waited: list[Any] = [end for worker in self._crew for end in (worker.pipe, worker.process.sentinel)]
-        woken = set(wait(waited, PAUSE))
-        parts = []
-        for place, worker in enumerate(self._crew):
-            if worker.pipe in woken:
-                part = self._heard(worker)
-                if part is not None:
-                    parts.append(part)
-                    continue
-            dead = worker.process.sentinel in woken or worker.pipe.closed
-            if dead and (worker.pipe.closed or not worker.pipe.poll()):  # what it said before it died comes first
-                self._crew[place] = self._replaced(worker)
-        return parts
-
-    def _heard(self, worker: _Worker) -> Part[T] | None:
-        try:
-            message = worker.pipe.recv()
-        except (EOFError, OSError):  # dead, perhaps in mid-sentence
-            worker.pipe.close()
-            return None
-        if isinstance(message, Exception):
-            raise message
-        worker.ready, self._stillborn = True, 0
-        if message is None:
-            return None
-        worker.given.remove(message.blocks)
-        part: Part[T] = message
-        return part
-
-    def _replaced(self, worker: _Worker) -> _Worker:
-        """A new worker that does again what the dead one had; the range it was at is remembered."""
-        worker.pipe.close()
-        if worker.ready and worker.given:
-            blamed = worker.given[0]
-            self._deaths[blamed] += 1
-            if self._deaths[blamed] >= DEATHS:
-                raise deadly(blamed, worker.end)
-        elif not worker.ready:
-            self._stillborn += 1
-            if self._stillborn >= DEATHS:
-                what = f"worker processes end before they have begun ({worker.end})"
-                remedy = "a script calls it under `if __name__ == '__main__':`; or use one job"
-                raise MechanismError(Finding(what, "", remedy))
-        hired = self._hired()
-        hired.given = worker.given
-        with suppress(OSError):
-            for blocks in hired.given:
-                hired.pipe.send(blocks)
-        return hired
-
     def close(self, finished: bool) -> None:
-        for worker in self._crew:
-            if finished and not worker.pipe.closed:
-                with suppress(OSError):
-                    worker.pipe.send(None)
-            else:
-                worker.process.kill()
-        for worker in self._crew:
-            worker.process.join(5)
-            if worker.process.is_alive():
-                worker.process.kill()
-                worker.process.join()
-            worker.process.close()
-            worker.pipe.close()
+        if not finished:
+            for one in self._processes:
+                one.kill()
+        self._pool.shutdown(cancel_futures=True)

@@ -9,11 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from time import perf_counter
 from typing import Any, Generic, Protocol, Self, TypeVar
 
 from numpy.typing import NDArray
 
-__all__ = ["Blocks", "Crew", "Job", "Part", "Prepared", "Tally"]
+from trunnion.studies.tolerance.arithmetic import fingerprint
+
+__all__ = ["Blocks", "Crew", "Job", "Part", "Prepared", "Tally", "part_of"]
 
 Blocks = tuple[int, int]  # blocks first, first + 1, …, last - 1
 
@@ -82,16 +85,19 @@ class Part(Generic[T_co]):
     arithmetic: str
 
 
+def part_of(prepared: Prepared[T], blocks: Blocks) -> Part[T]:
+    """These blocks, done here."""
+    start = perf_counter()
+    tally = prepared.evaluate(*blocks)
+    return Part(blocks, perf_counter() - start, tally, fingerprint())
+
+
 class Crew(Protocol[T_co]):
     """Who does the blocks: this process, processes of this machine, or a cluster."""
 
     @property
     def workers(self) -> int:
         """How many blocks can be under way at the same time."""
-
-    @property
-    def room(self) -> int:
-        """How many more ranges may be given now: bounded, whatever the length of the run."""
 
     def give(self, blocks: Blocks) -> None:
         """Have these blocks done; again if who does them dies."""

@@ -9,21 +9,22 @@ from __future__ import annotations
 
 import math
 import os
+from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from time import perf_counter
 from typing import Generic
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.studies.tolerance.arithmetic import fingerprint, mixed
+from trunnion.studies.tolerance.arithmetic import mixed
 from trunnion.studies.tolerance.checkpoint import Checkpoint
 from trunnion.studies.tolerance.interruption import Interruption
 from trunnion.studies.tolerance.processes import Processes
-from trunnion.studies.tolerance.protocol import Blocks, Crew, Job, Part, Prepared, T, Tally
+from trunnion.studies.tolerance.protocol import Blocks, Crew, Job, Part, Prepared, T, Tally, part_of
 from trunnion.studies.tolerance.ranges import Pace, Plan, count
 
 __all__ = ["Crew", "Job", "Part", "Prepared", "Run", "Tally", "run"]
 
+AHEAD = 2  # portions given to every worker: the one under way and the next
 NEAR, FAR = 1.0, 10.0  # s: what a portion takes on this machine, and on a cluster, unless `chunk` says otherwise
 
 
@@ -46,21 +47,13 @@ class Here(Generic[T]):
 
     def __init__(self, job: Job[T]) -> None:
         self._prepared = job.prepare()
-        self._given: list[Blocks] = []
-
-    @property
-    def room(self) -> int:
-        return 1 - len(self._given)
+        self._given: deque[Blocks] = deque()
 
     def give(self, blocks: Blocks) -> None:
         self._given.append(blocks)
 
     def wait(self) -> Sequence[Part[T]]:
-        start = perf_counter()
-        blocks = self._given[0]
-        tally = self._prepared.evaluate(*blocks)
-        self._given.clear()
-        return [Part(blocks, perf_counter() - start, tally, fingerprint())]
+        return [part_of(self._prepared, self._given.popleft())]
 
     def close(self, finished: bool) -> None:
         pass
@@ -158,7 +151,7 @@ class _Spread(Generic[T]):
         under_way = 0
         self._tell()
         while not interruption.asked:
-            while self.plan.left and self.crew.room > 0:
+            while self.plan.left and under_way < AHEAD * self.crew.workers:
                 size = self.pace.blocks(self.plan.left, self.crew.workers)
                 self.crew.give(self.plan.take(size, self.pace.aligned))
                 under_way += 1

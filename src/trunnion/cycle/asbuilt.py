@@ -12,6 +12,7 @@ from trunnion.algebra.namespace import Number
 from trunnion.algebra.plane import point
 from trunnion.algebra.space import point_of
 from trunnion.joints.clearance import describing
+from trunnion.joints.pairs import PAIRS
 from trunnion.model.contact import clearance
 from trunnion.solve.forward import Forward
 from trunnion.solve.seating import Seated
@@ -162,7 +163,7 @@ def summary_rows(
             continue
         for what, unit in (("rotation", "rad"), ("slide", "m")):
             error = np.where(valid, np.abs(arrays[f"joint_{what}_error"][i]), np.nan)
-            if (what == "rotation") == (kind != "prismatic") and np.any(np.isfinite(error)):
+            if (what == "rotation") == (not PAIRS[kind].guided) and np.any(np.isfinite(error)):
                 at = int(np.nanargmax(error))
                 label = f"transmission error of {joint}, largest, at {dial.at(at)}"
                 yield {"label": label, "value": float(error[at]), "unit": unit}

@@ -14,6 +14,7 @@ from trunnion.cycle.means import Means
 from trunnion.cycle.scene import DRAWN
 from trunnion.errors import Finding, Severity, Status
 from trunnion.joints.friction import FRICTION_LAWS
+from trunnion.joints.pairs import PAIRS
 from trunnion.model.checks.check import check_model
 from trunnion.model.contact import clearance
 from trunnion.model.mechanism import Mechanism
@@ -125,7 +126,7 @@ def model_notes(mechanism: Mechanism, system: System) -> list[Finding]:
         what = f"gravity is not stated and taken as none, though {', '.join(heavy)} have mass"
         down, none = ("[0, -9.81]", "[0, 0]") if mechanism.space == "planar" else ("[0, 0, -9.81]", "[0, 0, 0]")
         notes.append(Finding(what, "gravity", f"state gravity: {down}, or {none} to say so", Severity.NOTE))
-    sliding = {link for joint in mechanism.joints.values() if joint.type == "prismatic" for link in joint.links}
+    sliding = {link for joint in mechanism.joints.values() if PAIRS[joint.type].guided for link in joint.links}
     points = [name for name in heavy if bodies[name].inertia == ZERO_INERTIA and name not in sliding]
     if points:
         what = f"{', '.join(points)} have a mass but no inertia: they are taken as point masses at their centres"
@@ -295,7 +296,7 @@ def _reaction_figures(system: System, arrays: Arrays, dial: Dial, sound: NDArray
                 yield Figure(key, f"{what} of {name}", size[top], unit, "largest", f"at {dial.at(top)}")
         slide = arrays["joint_slide"][i]
         slide = slide[arrays["status"] != Status.CONTACT_LOST]
-        if kind == "prismatic" and np.any(np.isfinite(slide)):
+        if PAIRS[kind].guided and np.any(np.isfinite(slide)):
             yield Figure(f"{name}.stroke", f"stroke of {name}", np.nanmax(slide) - np.nanmin(slide), "m")
 
 

@@ -12,6 +12,7 @@ from trunnion.algebra.namespace import Number
 from trunnion.algebra.plane import point
 from trunnion.algebra.space import point_of
 from trunnion.joints.clearance import describing
+from trunnion.joints.pairs import PAIRS
 from trunnion.model.contact import clearance
 from trunnion.results.figure import Figure
 from trunnion.solve.forward import Forward
@@ -163,7 +164,7 @@ def error_figures(
             continue
         for what, unit in (("rotation", "rad"), ("slide", "m")):
             error = np.where(valid, np.abs(arrays[f"joint_{what}_error"][i]), np.nan)
-            if (what == "rotation") == (kind != "prismatic") and np.any(np.isfinite(error)):
+            if (what == "rotation") == (not PAIRS[kind].guided) and np.any(np.isfinite(error)):
                 at, name = int(np.nanargmax(error)), f"{joint}.{what}_error_max"
                 yield Figure(name, f"transmission error of {joint}", error[at], unit, "largest", f"at {dial.at(at)}")
     for i, joint in enumerate(run.system.mechanism.drivers):

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.space import Frame
+from trunnion.joints.pairs import PAIRS
 from trunnion.solve.forward import start
 from trunnion.solve.loads import Stated
 from trunnion.solve.shifts import hole, play_of
@@ -26,7 +27,7 @@ def planar(system: System, values: Values, times: NDArray[np.float64], useful: S
     joints = _joints(system)
     elements = system.elements(values)
     for name, (kind, links) in system.joints.items():
-        if kind == "prismatic":
+        if "planar" in PAIRS[kind].needs_axis:
             axis = elements[links[0], name]
             joints[name]["axis"] = [float(axis.c), float(axis.s)]
     gears = {name: pitch_circles(system, values, name) for name, gear in system.mechanism.gears.items() if gear.teeth}

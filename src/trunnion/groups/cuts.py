@@ -118,10 +118,10 @@ def rows(
     for k, joint in enumerate(joints):
         if k in place or joint.sides == (OUTER, OUTER):
             continue
-        revolute = joint.kind == "revolute"
-        found += [Row(k, kind, -1) for kind in (("x", "y") if revolute else ("across", "turn"))]
+        turns = joint.pair.turns
+        found += [Row(k, kind, -1) for kind in (("x", "y") if turns else ("across", "turn"))]
         if k in driven:
-            found.append(Row(k, "turn" if revolute else "along", driven.index(k)))
+            found.append(Row(k, "turn" if turns else "along", driven.index(k)))
     for i, gear in enumerate(gears):
         found.append(GearRow(gear, len(driven) + NUMBERS * i, place.get(gear.first, -1)))
     return tuple(found)

@@ -103,8 +103,8 @@ class General:
     @cached_property
     def kept_kinds(self) -> tuple[str, ...]:
         """What each of them is, "turn" or "slide"."""
-        kinds = [self.joints[self.steps[i].joint].kind for i in self.free]
-        return tuple("turn" if kind == "revolute" else "slide" for kind in kinds)
+        pairs = [self.joints[self.steps[i].joint].pair for i in self.free]
+        return tuple("turn" if pair.turns else "slide" for pair in pairs)
 
     def size(self, elements: Elements) -> Number:
         """A length typical of each lane, m."""
@@ -262,7 +262,7 @@ class General:
         for step in self.steps:
             pivot = placed[step.joint][0]
             sign = 1.0 if step.near == 0 else -1.0
-            if self.joints[step.joint].kind == "revolute":
+            if self.joints[step.joint].pair.turns:
                 screws.append(Twist(-sign * (at.y - pivot.y), sign * (at.x - pivot.x), sign))
             else:
                 screws.append(Twist(sign * pivot.c, sign * pivot.s, 0.0))
@@ -292,7 +292,7 @@ class General:
         if not jacobian:
             return 1.0
         rows = [1.0 / size if row.is_length else 1.0 for row in self._rows]
-        columns = [1.0 if self.joints[self.steps[i].joint].kind == "revolute" else size for i in self.free]
+        columns = [1.0 if self.joints[self.steps[i].joint].pair.turns else size for i in self.free]
         direct = sum(
             (primal(v) * r * c) ** 2
             for line, r in zip(jacobian, rows, strict=True)
@@ -332,7 +332,7 @@ class General:
             near, far = pose.elements[step.joint][step.near], pose.elements[step.joint][1 - step.near]
             base = self._at(pose, twists, outer, step.joint, step.near)
             signed = rate if step.near == 0 else -rate
-            if self.joints[step.joint].kind == "revolute":
+            if self.joints[step.joint].pair.turns:
                 at = Twist(base.x, base.y, base.w + signed)
             else:
                 at = moved(base, far.x - near.x, far.y - near.y)
@@ -384,7 +384,7 @@ class General:
             base = self._acceleration_at(known, found, step.joint, step.near)
             sign = 1.0 if step.near == 0 else -1.0
             w = known.twists[step.child].w
-            if self.joints[step.joint].kind == "revolute":
+            if self.joints[step.joint].pair.turns:
                 at = Acceleration(base.x, base.y, base.w + sign * value)
             else:
                 at = accelerated(base, w, far.x - near.x, far.y - near.y)

@@ -195,7 +195,7 @@ class SpatialTree:
     def spin_axis(self, placed: Sequence[Element], a: int, b: int) -> Vector3:
         """Unit vector of the line about which a link can spin: from ball to ball, or the axis of its other joint."""
         for k in (a, b):
-            if self.joints[k].kind != "spherical":
+            if not self.joints[k].pair.ball:
                 return placed[k].second.z
         apart = vector_minus(placed[b].second.place, placed[a].second.place)
         square = dot(apart, apart)

@@ -39,7 +39,7 @@ def unspun(group: SpatialGroup, elements: Sequence[Element], rows: Array, drive:
             first = pose.elements[k].first
             sense = -1.0 if group.joints[k].sides[1] == link else 1.0  # back by what it has spun
             begin = group.starts[k]
-            if group.joints[k].kind == "spherical":
+            if group.joints[k].pair.ball:
                 local = np.array([np.sum(axis * _full(one, grid), axis=0) for one in (first.x, first.y, first.z)])
                 where = [place[begin + i] for i in range(4)]
                 rows[where] = _turned(rows[where], local, sense * spun)

@@ -11,6 +11,7 @@ from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.plane import Frame, turned
 from trunnion.groups.protocol import Elements
+from trunnion.joints.pairs import PAIRS, Pair
 
 __all__ = ["FEW", "OUTER", "GroupJoint", "Step", "across", "grow", "size_of"]
 
@@ -23,6 +24,11 @@ class GroupJoint(NamedTuple):
 
     kind: str
     sides: tuple[int, int]
+
+    @property
+    def pair(self) -> Pair:
+        """Its row of the table."""
+        return PAIRS[self.kind]
 
 
 class Step(NamedTuple):
@@ -69,7 +75,7 @@ def grow(links: int, joints: Sequence[GroupJoint], first: Sequence[int]) -> tupl
 
 def across(kind: str, near: Frame, value: Number) -> Frame:
     """The far element of a joint from its near one and the coordinate, seen from the near side."""
-    if kind == "revolute":
+    if PAIRS[kind].turns:
         xp = namespace(value)
         c, s = turned(xp.cos(value), xp.sin(value), near.c, near.s)
         return Frame(near.x, near.y, c, s)

@@ -56,6 +56,17 @@ class Pair:
         return self.one_axis and ("slide" in self.freedoms or self.threaded)
 
     @property
+    def guided(self) -> bool:
+        """Whether it slides along its axis and does nothing else."""
+        return self.one_axis and not self.turns
+
+    @property
+    def motions(self) -> tuple[str, ...]:
+        """Which of rotation and slide it makes about and along the one axis that both links share."""
+        both = (("rotation", self.one_axis and self.turns), ("slide", self.slides))
+        return tuple(motion for motion, makes in both if makes)
+
+    @property
     def meets(self) -> bool:
         """Whether the points of its two elements are one."""
         return "slide" not in self.freedoms and not self.threaded

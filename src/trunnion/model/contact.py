@@ -5,36 +5,32 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from trunnion.algebra.namespace import Number
-from trunnion.model.joint_parts import Joint, freedoms
+from trunnion.joints.clearance import CLEARANCE_MODELS
+from trunnion.joints.pairs import PAIRS
+from trunnion.model.joint_parts import Joint
 
 __all__ = [
     "PLAY_PAIRS", "TURNING_PAIRS", "clearance", "contact_lacks", "has_guide", "has_pin", "has_play", "motions", "play",
 ]  # fmt: skip
 
-PLAY_PAIRS = ("revolute", "prismatic", "cylindrical", "spherical")  # those whose play is modelled
-TURNING_PAIRS = ("revolute", "spherical")  # of these those in which nothing slides
-
-_MOTIONS = {
-    "revolute": ("rotation",),
-    "prismatic": ("slide",),
-    "cylindrical": ("rotation", "slide"),
-    "helical": ("rotation", "slide"),
-}
+_PLAYS = {kind: model for models in CLEARANCE_MODELS.values() for kind, model in models.items()}
+PLAY_PAIRS = tuple(_PLAYS)  # those whose play is modelled
+TURNING_PAIRS = tuple(kind for kind, model in _PLAYS.items() if model.turns)  # of these those in which nothing slides
 
 
 def motions(joint_type: str) -> tuple[str, ...]:
     """Which of rotation and slide a joint of this type makes about and along the one axis that both links share."""
-    return _MOTIONS.get(joint_type, ())
+    return PAIRS[joint_type].motions
 
 
 def has_pin(joint_type: str) -> bool:
     """Whether a joint of this type has a pin (or ball) in a hole."""
-    return "rotation" in freedoms(joint_type)
+    return PAIRS[joint_type].turns
 
 
 def has_guide(joint_type: str) -> bool:
     """Whether a joint of this type has a slider in a guide."""
-    return motions(joint_type) == ("slide",)
+    return PAIRS[joint_type].guided
 
 
 def contact_lacks(joint: Joint, spatial: bool) -> tuple[str, ...]:
@@ -42,7 +38,7 @@ def contact_lacks(joint: Joint, spatial: bool) -> tuple[str, ...]:
     if has_guide(joint.type):
         return () if joint.guide and joint.guide.length else ("length",)
     radius = () if joint.pin and joint.pin.radius else ("radius",)
-    if not spatial or joint.type == "spherical":
+    if not spatial or PAIRS[joint.type].ball:
         return radius
     return radius if joint.pin and (joint.pin.bearing or joint.pin.length) else (*radius, "bearing")
 

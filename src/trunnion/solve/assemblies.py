@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
 from trunnion.algebra.nested import each
+from trunnion.joints.pairs import PAIRS
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.names import as_key
 from trunnion.solve.branches import Track
@@ -25,7 +26,6 @@ __all__ = ["Choice", "Way", "choices", "put_together"]
 Array = NDArray[np.float64]
 
 STEPS = 360  # positions among which one is looked for where the ways are apart
-TURNING = ("revolute", "cylindrical", "helical", "universal")
 APART = 1e-3  # of the largest coordinate: nearer ways read alike
 
 
@@ -163,7 +163,7 @@ def _joints(walk: Forward, module: Module, frames: Sequence[Any], lane: int | No
         kind, links = walk.system.joints[name]
         if not (all(link in place for link in links) or name in turned):
             continue
-        if kind == "prismatic" or name in turned:
+        if PAIRS[kind].guided or name in turned:
             found[name] = np.array([primal(walk.coordinate(name, *(element(link, name) for link in links)))])
         else:
             found[name] = np.array([primal(n) for n in walk.placed(place[links[0]], links[0], name)])
@@ -174,7 +174,7 @@ def turning(system: System) -> list[str]:
     """Joints that are told by their turn: those about an axis in space."""
     if system.mechanism.space == "planar":
         return []
-    return [name for name, (kind, _) in system.joints.items() if kind in TURNING]
+    return [name for name, (kind, _) in system.joints.items() if PAIRS[kind].turns and not PAIRS[kind].ball]
 
 
 def _ways(rows: Mapping[str, Array], count: int, taken: int, turned: Sequence[str]) -> tuple[Way, ...]:

@@ -24,11 +24,12 @@ from trunnion.groups.general import OUTER
 from trunnion.groups.protocol import Elements
 from trunnion.groups.spatial import SpatialGroup
 from trunnion.groups.spins import unspun
+from trunnion.joints.pairs import PAIRS
 from trunnion.model.names import as_key
 from trunnion.solve import change_points
 from trunnion.solve.branch_tracking import Follower, assemblies, at, closing, lane_of, limits
 from trunnion.solve.forward import Forward, pose_of, start
-from trunnion.solve.hints import MEETING, distance, first, hints, misnamed, named_way, nth, told_twice
+from trunnion.solve.hints import distance, first, hints, misnamed, named_way, nth, told_twice
 from trunnion.solve.system import Cycle, Dial, Positions, System, Values, driven_coordinates
 from trunnion.structure.decompose import Module
 
@@ -221,7 +222,7 @@ def _unstated(walk: Forward, module: Module, count: int) -> Finding:
     key = as_key(joint)
     place, hint = "where a point is", f"{{{key}: [x, y]}}"
     if system.mechanism.space == "spatial":
-        met = system.joints[joint][0] in MEETING and not system.mechanism.loop
+        met = PAIRS[system.joints[joint][0]].meets and not system.mechanism.loop
         place, hint = (place, f"{{{key}: [x, y, z]}}") if met else ("how far a joint has turned", f"{{{key}: 60 deg}}")
     remedy = f"say roughly {place} at the start, e.g. assembly: {hint}, or name one as `check` does"
     if given:

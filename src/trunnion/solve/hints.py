@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.nested import each
 from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.joints.pairs import PAIRS
 from trunnion.solve.forward import Forward
 from trunnion.solve.system import System
 from trunnion.structure.decompose import Module
@@ -19,9 +20,6 @@ __all__ = ["Pick", "distance", "first", "hints", "misnamed", "named_way", "nth",
 
 Array = NDArray[np.float64]
 Pick = Callable[[Number], Any]
-
-
-MEETING = ("revolute", "spherical", "universal", "fixed")  # whose two points are one
 
 
 def way_name(index: int) -> str:
@@ -104,7 +102,7 @@ def _point_of(system: System, module: Module, key: str) -> tuple[str, str]:
     if key in system.joints:
         links = system.joints[key][1]
         inside = [link for link in links if link in module.links]
-        known = key in module.joints and system.joints[key][0] in MEETING and len(inside) == 1
+        known = key in module.joints and PAIRS[system.joints[key][0]].meets and len(inside) == 1
         return ("", "") if not inside or known else (inside[-1], key)
     link, _, name = key.partition(".")
     return (link, name) if link in module.links else ("", "")

@@ -46,14 +46,13 @@ class PlaneWalk(Forward):
 
     def against(self, joint: str) -> Twist:
         """Velocity of a joint's point on its second link and spin of that link, against the first."""
-        one, two = (self._at(link, joint) for link in self.system.joints[joint][1])
-        return Twist(two[0].x - one[0].x, two[0].y - one[0].y, two[0].w - one[0].w)
+        one, two = (moved(self.motions[link].twist, *self._arm(link, joint)) for link in self.system.joints[joint][1])
+        return Twist(two.x - one.x, two.y - one.y, two.w - one.w)
 
-    def _at(self, link: str, joint: str) -> tuple[Twist, Acceleration]:
-        """Motion of the point of a link that lies at a joint's point on its second link."""
-        at, (frame, twist, acceleration) = self.element(self.system.joints[joint][1][1], joint), self.motions[link]
-        arm = at.x - frame.x, at.y - frame.y
-        return moved(twist, *arm), accelerated(acceleration, twist.w, *arm)
+    def _arm(self, link: str, joint: str) -> tuple[Number, Number]:
+        """From the origin of a link to a joint's point on its second link."""
+        at, frame = self.ends(joint)[1], self.motions[link].frame
+        return at.x - frame.x, at.y - frame.y
 
     def rates(self, joint: str) -> tuple[Number, Number]:
         """Rate of the turn or of the slide."""
@@ -67,10 +66,13 @@ class PlaneWalk(Forward):
         first, second = self.system.joints[joint][1]
         if self.system.turns(joint):
             return self.motions[second].acceleration.w - self.motions[first].acceleration.w, 0.0
-        (_, one), (_, two) = self._at(first, joint), self._at(second, joint)
-        return 0.0, self._along(joint, Twist(two.x - one.x, two.y - one.y, 0.0))
+        one, two = (
+            accelerated(self.motions[link].acceleration, self.motions[link].twist.w, *self._arm(link, joint))
+            for link in (first, second)
+        )
+        return 0.0, self._along(joint, Acceleration(two.x - one.x, two.y - one.y, 0.0))
 
-    def _along(self, joint: str, change: Twist) -> Number:
+    def _along(self, joint: str, change: Twist | Acceleration) -> Number:
         axis = self.ends(joint)[0]
         return axis.c * change.x + axis.s * change.y
 
@@ -137,8 +139,8 @@ class PlaneWalk(Forward):
 
     def on_link(self, link: str, wrench: Wrench, joint: str) -> Wrench:
         """A joint's wrench about the origin of a link."""
-        frame, at = self.motions[link].frame, self.ends(joint)[1]
-        return about(wrench, frame.x - at.x, frame.y - at.y)
+        dx, dy = self._arm(link, joint)
+        return about(wrench, -dx, -dy)
 
     def reacting(self, group: Any) -> Any:
         """A module whose reactions are flat tuples."""

@@ -100,7 +100,7 @@ def passive(mechanism: Mechanism) -> dict[str, tuple[str, str]]:
     table = Table(mechanism)
     for link in mechanism.links:
         joints = table.joints_of.get(link, [])
-        balls = [name for name in joints if mechanism.joints[name].type == "spherical"]
+        balls = [name for name in joints if PAIRS[mechanism.joints[name].type].ball]
         if link == mechanism.fixed_link or len(joints) != 2 or not balls:
             continue
         if len(balls) == 2 or _through(mechanism, link, balls[0], *(name for name in joints if name not in balls)):
@@ -110,7 +110,8 @@ def passive(mechanism: Mechanism) -> dict[str, tuple[str, str]]:
 
 def _through(mechanism: Mechanism, link: str, ball: str, other: str) -> bool:
     """Whether the axis of a joint that turns goes through the centre of a ball on the same link."""
-    if mechanism.joints[other].type not in ("revolute", "cylindrical") or other in mechanism.drivers:
+    pair = PAIRS[mechanism.joints[other].type]
+    if "rotation" not in pair.motions or pair.threaded or other in mechanism.drivers:
         return False
     values = mechanism.parameters()
     centre, place, axis = (

@@ -8,6 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.joints.pairs import PAIRS
+
 __all__ = ["Gears", "Joints", "Part", "Places", "constraints", "mobility_by_rank", "rank"]
 
 RANK_TOLERANCE = 1e-9  # of the largest singular value
@@ -42,9 +44,9 @@ def constraints(
         c, s = places[name][2:]
         at_x, at_y, turn = np.array([1.0, 0.0, -y]), np.array([0.0, 1.0, x]), np.array([0.0, 0.0, 1.0])
         across, along = c * at_y - s * at_x, c * at_x + s * at_y
-        held = [at_x, at_y] if kind == "revolute" else [across, turn]
+        held = [at_x, at_y] if PAIRS[kind].turns else [across, turn]
         if name in drivers:
-            held.append(turn if kind == "revolute" else along)
+            held.append(turn if PAIRS[kind].turns else along)
         for constraint in held:
             row = np.zeros(3 * len(number))
             for link, sign in zip(sides, (-1.0, 1.0), strict=True):

@@ -36,46 +36,44 @@ def bearing_middle(walk: SpatialWalk, joint: str) -> Vector3:
 
 def at_rest(walk: SpatialWalk, joint: str) -> list[Number]:
     """Where each contact of a joint does not slip, in the order of `contacts`."""
-    kind = walk.system.joints[joint][0]
-    turn_scale = walk.noise(joint, turns=True)
-    if kind == "universal":
+    pair, turn_scale = walk.pair(joint), walk.noise(joint, turns=True)
+    if pair.crossed:
         return [np.abs(primal(rate)) <= turn_scale for rate in walk.pin_rates(joint)]
-    if kind == "spherical":
+    if not pair.one_axis:
         return [walk.speed(joint) <= turn_scale]
     turn, slide = (primal(rate) for rate in walk.rates(joint))
     still = [np.abs(turn) <= turn_scale, np.abs(slide) <= walk.noise(joint, turns=False)]
-    if kind == "cylindrical":
+    if len(pair.freedoms) == 2:
         return still if _summed(walk, joint) else [still[0] & still[1]]
-    return still[1:] if kind == "prismatic" else still[:1]
+    return still[:1] if pair.turns else still[1:]
 
 
 def contacts(walk: SpatialWalk, joint: str) -> Iterator[Rubbing]:
     """The contacts of a joint."""
     zero = at_rest(walk, joint)
-    kind = walk.system.joints[joint][0]
-    middle = bearing_middle(walk, joint)
+    pair, middle = walk.pair(joint), bearing_middle(walk, joint)
     second = walk.ends(joint)[1]
     axis = second.z
-    if kind == "spherical":
+    if pair.ball:
         yield _ball(walk, joint, middle, zero[0])
         return
-    if kind == "universal":
+    if pair.crossed:
         yield from _two_pins(walk, joint, middle, zero)
         return
-    load = _bearing(walk, joint, kind, second._replace(place=middle))
+    load = _bearing(walk, joint, second._replace(place=middle))
     turn, slide = walk.rates(joint)
-    if kind == "prismatic":
+    if pair.guided:
         yield Rubbing(load, slide, about(axis, NULL, middle), zero[0])
         return
     lever = walk.values[f"joints.{joint}.pin.radius"]
     moment = Screw(NULL, scaled(lever, axis))
-    if kind == "revolute":
-        yield Rubbing(load, lever * turn, moment, zero[0], amount=lever, turning=1.0)
-    elif kind == "helical":
+    if pair.threaded:
         lead = walk.space.lead(walk.values, joint)
         way = namespace(lead, lever).sqrt(lever * lever + lead * lead)
         unit = _mixed(axis, middle, lever, lever / way, lead / way)
         yield Rubbing(load, way * turn, unit, zero[0], amount=lever * lever / way)
+    elif not pair.slides:
+        yield Rubbing(load, lever * turn, moment, zero[0], amount=lever, turning=1.0)
     elif _summed(walk, joint):
         yield Rubbing(load, lever * turn, moment, zero[0], amount=lever, turning=1.0)
         yield Rubbing(load, slide, about(axis, NULL, middle), zero[1], amount=0.0)
@@ -107,13 +105,13 @@ def _summed(walk: SpatialWalk, joint: str) -> bool:
     return friction is not None and friction.model == "pezzuti"
 
 
-def _bearing(walk: SpatialWalk, joint: str, kind: str, frame: Frame) -> BearingLoad:
-    values, path = walk.values, f"joints.{joint}"
-    if kind == "prismatic":
+def _bearing(walk: SpatialWalk, joint: str, frame: Frame) -> BearingLoad:
+    values, path, pair = walk.values, f"joints.{joint}", walk.pair(joint)
+    if pair.guided:
         length = values[f"{path}.guide.length"]
         return BearingLoad(frame, length, _summed(walk, joint), values.get(f"{path}.guide.width"))
     flank = None
-    if kind == "helical":
+    if pair.threaded:
         slope = walk.space.lead(values, joint) / values[f"{path}.pin.radius"]
         flank = namespace(slope).sqrt(1 + slope * slope)
     return BearingLoad(frame, values[f"{path}.pin.bearing"], _summed(walk, joint), flank=flank)

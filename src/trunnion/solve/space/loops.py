@@ -25,6 +25,7 @@ from trunnion.groups.redundant import stacked
 from trunnion.groups.spatial import SpatialGroup
 from trunnion.groups.spatial_tree import Element
 from trunnion.joints.clearance import CLEARANCE_MODELS
+from trunnion.joints.pairs import PAIRS
 from trunnion.joints.spatial import MOTIONS
 from trunnion.solve import shifts
 from trunnion.solve.space.system import SpatialSystem
@@ -66,7 +67,7 @@ def ends_of(system: SpatialSystem, values: Values, every_pin: bool) -> list[End]
         if model is None:
             continue
         play = shifts.play_of("spatial", kind, values, name)
-        pin = kind in ("revolute", "cylindrical")
+        pin = "rotation" in PAIRS[kind].motions
         for k, keys in enumerate(model.ends):
             radius = float(np.ravel(primal(play.radii[k]))[0]) if play else 0.0
             radial = pin and k not in model.axial

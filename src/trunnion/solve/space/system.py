@@ -54,9 +54,9 @@ class SpatialSystem(System):
 
     def resting(self, joint: str) -> int:
         """A cross has two pins, by `pezzuti` a cylinder turns and slides."""
-        kind, friction = self.joints[joint][0], self.mechanism.effective_joints[joint].friction
+        pair, friction = PAIRS[self.joints[joint][0]], self.mechanism.effective_joints[joint].friction
         summed = friction is not None and friction.model == "pezzuti"
-        return 2 if kind == "universal" or (kind == "cylindrical" and summed) else 1
+        return 2 if pair.crossed or (len(pair.freedoms) == 2 and summed) else 1
 
     def _parallel(self, module: Module) -> bool:
         """Whether the two axes of a link of a cylindrical dyad are parallel: it has no closed form then."""

@@ -305,7 +305,7 @@ def judged(curve: Sequence[Number], nominal: Reference) -> tuple[Number, NDArray
 def known(measure: Measure, status: NDArray[np.int8]) -> NDArray[np.bool_]:
     """Where a course has an answer, by the status of the positions; it is to be NaN elsewhere."""
     if measure.of_motion:
-        return status < Status.NOT_ASSEMBLED
+        return status < (Status.NOT_ASSEMBLED if measure.of_places else Status.SINGULAR)
     if measure.wants_margin:
         return status < Status.LOAD_UNDEFINED
     return status < Status.NOT_CONVERGED

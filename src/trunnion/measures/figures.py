@@ -1,6 +1,6 @@
 """The figure of a measure: one number a sample, made of its course over the positions.
 
-A course is what `Measure.curve` gives at the positions of a `measure_positions.Plan`; `reference` keeps that of the
+A course is what `Measure.curve` gives at the positions of a `positions.Plan`; `reference` keeps that of the
 nominal mechanism once, `figure` makes the numbers of many samples. Angles follow those of the nominal mechanism, from
 which they are less than half a turn away. Extremes lie between positions too (`extremes`: value off by O(h⁷), place by
 O(h⁶), h the step, where the course is smooth); means over the cycle are integrals between the places where the nominal

@@ -329,12 +329,13 @@ def measures_table() -> str:
         "line": "width about its least-squares line",
         "ratio": "over the cycle; of `instant` the largest deviation",
         "dead centre": "place where the joint turns back",
+        "work": "over the cycle or range",
     }  # fmt: skip
     rows = [
         (
             _code(name),
-            {"N m": "N m or N", "of the joint": "rad or m"}.get(one.unit, one.unit),
-            "motion and forces" if one.of_forces else "motion",
+            " or ".join(quantity.unit for quantity in one.quantities),
+            "places" if one.needs == "places" else "motion and forces" if one.of_forces else "motion",
             figures.get(one.rule, one.rule),
             one.long_name,
         )

@@ -260,6 +260,20 @@ _MEASURES = (
         "slope = slope * at - value",
         ("tests/invariants/test_extremes.py",),
     ),
+    Fault(
+        "dwell-counts-the-other-part",
+        "measures/dwell.py",
+        "np.where(falls, spot, 1 - spot)",
+        "np.where(falls, 1 - spot, spot)",
+        ("tests/reference/test_kinematic_measures.py", "-k", "dwell"),
+    ),
+    Fault(
+        "transmission-angle-not-folded",
+        "measures/courses.py",
+        "np.pi / 2 - namespace(angle).abs(angle)",
+        "np.pi / 2 - angle",
+        ("tests/reference/test_kinematic_measures.py", "-k", "cosines"),
+    ),
 )
 
 FAULTS = (*_ALGEBRA, *_JOINTS, *_GROUPS, *_SOLVE, *_CYCLE, *_MEASURES)

@@ -40,7 +40,7 @@ __all__ = [
 ]
 
 IMAGES = (".png", ".svg", ".pdf")
-PLOT_KINDS = "torque, friction-power, reactions, polar, power, mechanism, motion, error, seat or beta"  # of views.plots
+PLOT_KINDS = "torque, friction-power, reactions, polar, power, mechanism, motion, error, seat, beta or measures"
 
 File = Annotated[Path, typer.Argument(help="Model file: YAML, JSON or TOML.", show_default=False)]
 Steps = Annotated[int, typer.Option("--steps", help="Equally spaced positions over the turn or range.")]
@@ -102,7 +102,7 @@ Measures = Annotated[
     list[str] | None,
     typer.Option(
         "--measure",
-        help="A measure of the model, or rocker.C.x, angle:rocker, rotation:D, slide:S, effort:A. Repeatable.",
+        help="A measure of the model, or rocker.C.x, angle:rocker, effort:A … (check --list). Repeatable.",
         show_default=False,
     ),
 ]

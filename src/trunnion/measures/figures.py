@@ -1,6 +1,6 @@
 """The figure of a measure: one number a sample, made of its course over the positions.
 
-A course is what `Measure.curve` gives at the positions of a `measure_positions.Plan`; `reference` keeps that of the
+A course is what `Measure.curve` gives at the positions of a `positions.Plan`; `reference` keeps that of the
 nominal mechanism once, `figure` makes the numbers of many samples. Angles follow those of the nominal mechanism, from
 which they are less than half a turn away. Extremes lie between positions too (`extremes`: value off by O(h⁷), place by
 O(h⁶), h the step, where the course is smooth); means over the cycle are integrals between the places where the nominal
@@ -305,7 +305,7 @@ def judged(curve: Sequence[Number], nominal: Reference) -> tuple[Number, NDArray
 def known(measure: Measure, status: NDArray[np.int8]) -> NDArray[np.bool_]:
     """Where a course has an answer, by the status of the positions; it is to be NaN elsewhere."""
     if measure.of_motion:
-        return status < Status.NOT_ASSEMBLED
+        return status < (Status.NOT_ASSEMBLED if measure.of_places else Status.SINGULAR)
     if measure.wants_margin:
         return status < Status.LOAD_UNDEFINED
     return status < Status.NOT_CONVERGED

@@ -48,10 +48,10 @@ class Modelled:
     def comparable(self, channel: str) -> NDArray[np.bool_]:
         """Positions at which the model has one number for a channel.
 
-        A force is an interval where a relative speed is zero, and no number to rely on beside a dead centre.
+        A force is an interval where a relative speed is zero, and as a speed no number to rely on beside a dead centre.
         """
         there = np.isfinite(self.courses[channel])
-        return there if self.measures[channel].of_motion else there & self.sound
+        return there if self.measures[channel].of_places else there & self.sound
 
 
 def measure_of(mechanism: Mechanism, run: Run, channel: str, name: str) -> Measure:

@@ -49,6 +49,7 @@ from trunnion.views.common.peaks import ease, peak, usual_peak
 from trunnion.views.common.quantities import prefixed, quantity
 from trunnion.views.cycle.as_built import has
 from trunnion.views.cycle.error_plot import error
+from trunnion.views.cycle.measures_plot import drawn, measures
 from trunnion.views.cycle.seat_curves import beta, described
 from trunnion.views.cycle.seat_plot import seat
 from trunnion.views.space import figure as space_figure
@@ -388,12 +389,14 @@ PLOTS: dict[str, Callable[[xr.Dataset, xr.Dataset | None], Figure]] = {
     "error": error,
     "seat": seat,
     "beta": beta,
+    "measures": measures,
 }
 # whether a result has what a figure needs that not all results have
 READY: dict[str, Callable[[xr.Dataset], bool]] = {
     "error": lambda result: has(result, "errors"),
     "seat": lambda result: has(result, "seats"),
     "beta": described,
+    "measures": lambda result: bool(drawn(result)),
 }
 
 

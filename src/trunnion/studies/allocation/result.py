@@ -70,7 +70,7 @@ def dataset(found: Allocated, known: xr.Dataset) -> xr.Dataset:
     units = attribute(known, "parameter_units")
     variables = described(arrays, VARIABLES, {"parameter": units[0] if len(set(units)) == 1 else "", "1/": ""})
     # the criterion says what is to be kept
-    kept = [one for one in findings_of(known) if not one.what.startswith(MISSED)]
+    kept = [one for one in findings_of(known) if not one.code.startswith(MISSED)]
     own = list(said.findings_of(found, known))
     attributes: dict[str, Any] = {
         "found": int(found.answer.found),

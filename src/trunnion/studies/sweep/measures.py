@@ -7,11 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.errors import Finding, MechanismError
 from trunnion.measures.figures import known, reference
 from trunnion.measures.measures import MEASURES, Measure, named
 from trunnion.measures.positions import plan
 from trunnion.model.mechanism import Mechanism
+from trunnion.results.sentences import told
 from trunnion.solve.forward import forward
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.run import Run
@@ -82,8 +83,4 @@ def _courses(run: Run, measures: Sequence[Measure], time: np.ndarray, method: Fr
 def left_out(mechanism: Mechanism, names: Sequence[str]) -> list[Finding]:
     """A note that names the measures of the model that a sweep does not have."""
     others = [name for name in mechanism.measures if name not in names]
-    if not others:
-        return []
-    one = len(others) == 1
-    what = f"the model's measure{'' if one else 's'} {', '.join(others)} {'is' if one else 'are'} not in this sweep"
-    return [Finding(what, "measures", "name it by --measure, in Python by measures=[…]", Severity.NOTE)]
+    return [told("sweep.measures_left_out", "measures", measures=others)] if others else []

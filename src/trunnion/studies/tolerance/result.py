@@ -157,7 +157,7 @@ def dataset(outcome: Outcome, told: Sequence[Finding]) -> xr.Dataset:
         "stopped": int(outcome.stopped),
         "summary": figure_rows(summary(outcome, counted, units, dial)),
         "findings": finding_rows(stated),
-        "missed": [f"{one.where}: {one.what}" for one in stated if one.what.startswith(MISSED)],
+        "missed": [f"{one.where}: {one.what}" for one in stated if one.code.startswith(MISSED)],
     }
     return dataset_of(variables, labels, attributes, {**quantiles, **driven(found.plan.times, *dial)})
 

@@ -253,11 +253,9 @@ def plot(
     """Figures: drive torque, friction power, reactions, polar diagram, mechanism with coupler curve."""
     from trunnion.views.common.peaks import whole_peaks
     from trunnion.views.cycle.error_plot import with_worst_case
-    from trunnion.views.cycle.plots import PLOTS, drawable, save
+    from trunnion.views.cycle.plots import PLOTS, check_kinds, drawable, save
 
-    unknown = [name for name in kind or [] if name not in PLOTS]
-    if unknown:
-        raise MechanismError(Finding(f"there is no plot '{unknown[0]}'", "--kind", f"use one of {', '.join(PLOTS)}"))
+    check_kinds(kind or [])
     single = out.suffix.lower() in IMAGES
     if single and len(kind or PLOTS) > 1:
         what = f"{len(kind or PLOTS)} plots do not fit one file"

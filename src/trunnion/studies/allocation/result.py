@@ -73,6 +73,7 @@ def dataset(found: Allocated, known: xr.Dataset) -> xr.Dataset:
     kept = [one for one in findings_of(known) if not one.code.startswith(MISSED)]
     own = list(said.findings_of(found, known))
     attributes: dict[str, Any] = {
+        "kind": "allocation",
         "found": int(found.answer.found),
         "criterion": found.asked.criterion,
         "target": found.asked.target,

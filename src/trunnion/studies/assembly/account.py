@@ -246,7 +246,7 @@ class Result:
         ) | cited([SOURCE, *mechanism.references], Fit)
         time = described({"time": self.time}, {"time": replace(TIME, long_name="time")})
         variables = described({name: self.arrays[name] for name in FIGURES}, FIGURES)
-        return dataset_of(variables, labels(self.system), attributes, time)
+        return dataset_of("assembly", variables, labels(self.system), attributes, time)
 
 
 def _at(place: str) -> str:

@@ -107,7 +107,7 @@ def dataset(found: Found, findings: Sequence[Finding]) -> xr.Dataset:
         "findings": finding_rows(findings),
         "missed": [f"{one.where}: {one.what}" for one in findings if one.code == "limit.exceeded"],
     }
-    return dataset_of(variables, labels, attributes, driven(found.time, *dial))
+    return dataset_of("play", variables, labels, attributes, driven(found.time, *dial))
 
 
 def relied_on(numbers: Array, status: NDArray[np.int8]) -> Array:

@@ -145,4 +145,4 @@ def _dataset(
         "driver_units": effort_units(run.system),
         "findings": finding_rows(findings),
     }
-    return dataset_of(variables, labels, attributes, along)
+    return dataset_of("sweep", variables, labels, attributes, along)

@@ -159,7 +159,7 @@ def dataset(outcome: Outcome, told: Sequence[Finding]) -> xr.Dataset:
         "findings": finding_rows(stated),
         "missed": [f"{one.where}: {one.what}" for one in stated if one.code.startswith(MISSED)],
     }
-    return dataset_of(variables, labels, attributes, {**quantiles, **driven(found.plan.times, *dial)})
+    return dataset_of("tolerance", variables, labels, attributes, {**quantiles, **driven(found.plan.times, *dial)})
 
 
 def _of_measures(found: Study, units: Sequence[str], curve_units: Sequence[str]) -> dict[str, list[Any]]:

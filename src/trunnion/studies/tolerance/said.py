@@ -181,8 +181,8 @@ def _carried(outcome: Outcome, of: Of) -> Iterator[Finding]:
     if others:
         joints = study.run.system.mechanism.effective_joints
         links = {name: list(joints[name].links) for name, _ in others}
-        ratios, where = dict(others), f"measures.{of.measure.name}"
-        yield told("play.carried", where, ratios=ratios, links=links, joint=others[0][0])
+        where, first = f"measures.{of.measure.name}", others[0][0]
+        yield told("play.carried", where, ratios=dict(others), links=links, joint=first)
 
 
 def _scatter(outcome: Outcome, counted: Sampled) -> Iterator[Finding]:

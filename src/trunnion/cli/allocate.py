@@ -99,12 +99,8 @@ def allocate(
     from trunnion.studies.allocation.allocate import allocate as run
     from trunnion.studies.allocation.allocated import DEFAULT_YIELD
 
-    check_files(out or [], report)
+    check_files(out or [], report, of="allocation", kind=kind)
     check_model(write, file, force)
-    if kind is not None:
-        from trunnion.views.allocation.allocation import check_kind
-
-        check_kind(kind)
     mechanism = stated(file, set_, table, friction)
     by = Criterion.YIELD if target is not None else criterion
     if jobs is None:
@@ -121,7 +117,7 @@ def allocate(
         return figure_of(result, kind) if result.attrs["found"] else None
 
     show = partial(_show, result)
-    shown = Shown(result, file, SECTIONS, out or [], report, units_row, draw, show=show)
+    shown = Shown(result, file, SECTIONS, out or [], report, units_row, draw=draw, show=show)
     shown.write()
     findings = findings_of(result)
     if write is not None:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -53,27 +52,17 @@ def compare(
     from trunnion.rig.compare.study import compare as run
     from trunnion.rig.reading.read import read_measured
 
-    check_files(out or [], report)
-    if kind is not None:
-        from trunnion.views.compare.figure import check_kind
-
-        check_kind(kind)
+    check_files(out or [], report, of="comparison", kind=kind)
     spare_data(mapping, data, out, report, file, table)
     mechanism = stated(file, set_, table, friction, seat)
     measurement = read_measured(mapping, [str(path) for path in data] if data else None)
     with lines_of(file), bar("conditions", len(measurement.conditions)) as progress:
         result = run(mechanism, measurement, channel, progress=progress)
-    named = channel[0] if channel and len(channel) == 1 else None
-
-    def draw(_: Path) -> Any:
-        from trunnion.views.shown import figure_of
-
-        return figure_of(result, kind, channel=named, condition=condition)
-
+    drawn = {"kind": kind, "condition": condition, "channel": channel[0] if channel and len(channel) == 1 else None}
     found = gathered(measurement.findings)
     errors = exit_status([*measurement.findings, *findings_of(result)])
     Shown(
-        result, file, ["assembly", "measures"], out or [], report, units_row, draw, show=partial(_show, result),
+        result, file, ["assembly", "measures"], out or [], report, units_row, drawn, show=partial(_show, result),
         others=found,
     ).finish(0 if bool(result.attrs["all_within"]) and not errors else 1)  # fmt: skip
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -120,12 +120,8 @@ def identify(
     from trunnion.rig.identify import identify as run
     from trunnion.rig.reading.read import read_measured
 
-    check_files(out or [], report)
+    check_files(out or [], report, of="identification", kind=kind)
     check_model(write, file, force)
-    if kind is not None:
-        from trunnion.views.identify.figure import check_kind
-
-        check_kind(kind)
     spare_data(mapping, data, out, report, file, table, write)
     mechanism = stated(file, set_, table, friction, seat)
     with lines_of(file):
@@ -137,13 +133,8 @@ def identify(
         one for one in measurement.findings if one.severity is not Severity.NOTE or one.where == "files"
     )
 
-    def draw(_: Path) -> Any:
-        from trunnion.views.shown import figure_of
-
-        return figure_of(result, kind)
-
     show, sections = partial(_show, result), ["assembly", "measures"]
-    shown = Shown(result, file, sections, out or [], report, units_row, draw, show=show, others=found)
+    shown = Shown(result, file, sections, out or [], report, units_row, {"kind": kind}, show=show, others=found)
     shown.write()
     findings = findings_of(result)
     if write is not None:

@@ -46,4 +46,4 @@ def play(
 
         show_tables(mechanism.name, tables(result), apart=False)
 
-    Shown(result, file, ["measures", "joints"], out or [], None, units_row, draw, show=show).finish()
+    Shown(result, file, ["measures", "joints"], out or [], None, units_row, draw=draw, show=show).finish()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -27,8 +27,13 @@ MODELS = (".yaml", ".yml", ".json")
 # ---- before anything is computed ------------------------------------------------------------------------------
 
 
-def check_files(out: Sequence[Path], report: Path | None = None, drawn: bool = True) -> None:
-    """MechanismError for a file that cannot be written; drawn: whether figures can be."""
+def check_files(
+    out: Sequence[Path], report: Path | None = None, drawn: bool = True, of: str = "", kind: str | None = None
+) -> None:
+    """MechanismError for a file that cannot be written, or a kind of figure that a result of some kind (`of`) has not.
+
+    drawn: whether figures can be written.
+    """
     from trunnion.results.export import check_format
 
     others = IMAGES if drawn else ()
@@ -36,6 +41,10 @@ def check_files(out: Sequence[Path], report: Path | None = None, drawn: bool = T
         if path.suffix.lower() not in others:
             check_format(path, others)
     check_page(report, "--report")
+    if kind is not None:
+        from trunnion.views.shown import check_kind
+
+        check_kind(of, kind)
 
 
 def check_page(path: Path | None, option: str) -> None:
@@ -63,8 +72,9 @@ class Shown:
     """A result and what is done with it.
 
     file: of the model, whose lines the findings get, in these sections where they name no place. out, report: files to
-    write. draw: the figure of a file, by its path, None if there is none; page: the report as HTML; show: prints the
-    tables, the summary if not given; others: findings beside those of the result, which are said as they are.
+    write. drawn: options of the figure, such as its kind; draw: another figure, by the path of its file, or None; page:
+    the report as HTML; show: prints the tables, the summary if not given; others: findings beside those of the result,
+    which are said as they are.
     """
 
     result: xr.Dataset
@@ -73,6 +83,7 @@ class Shown:
     out: Sequence[Path] = ()
     report: Path | None = None
     units_row: bool = False
+    drawn: Mapping[str, Any] = field(default_factory=dict)
     draw: Callable[[Path], Any] | None = None
     page: Callable[[], str] | None = None
     show: Callable[[], None] | None = None
@@ -90,24 +101,20 @@ class Shown:
                 continue
             self.written.append(path)
         if self.report is not None:
-            write_text(self.page() if self.page else self.result_page(), self.report)
+            from trunnion.views.shown import report_of
+
+            write_text(self.page() if self.page else report_of(self.result), self.report)
             self.written.append(self.report)
 
     def _drawn(self, path: Path) -> bool:
         from trunnion.views.cycle.plots import save
         from trunnion.views.shown import figure_of
 
-        figure = self.draw(path) if self.draw else figure_of(self.result)
+        figure = self.draw(path) if self.draw else figure_of(self.result, **self.drawn)
         if figure is None:
             return False
         save(figure, path)
         return True
-
-    def result_page(self) -> str:
-        """The report that a result of its kind has."""
-        from trunnion.views.shown import report_of
-
-        return report_of(self.result)
 
     def end(self, findings: Sequence[Finding] | None = None, status: int | None = None) -> NoReturn:
         """Tables and files on the output, findings on the error stream, and the exit status: 1 with any error.

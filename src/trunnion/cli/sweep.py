@@ -111,7 +111,7 @@ def sweep(
         return figure(whole_peaks(result, uncut), files[path], x or "", family or "", kind)
 
     show = partial(_show, result, mechanism, file, measures, x or "", family or "")
-    Shown(result, file, ["assembly"], list(files), None, units_row, draw, show=show).finish()
+    Shown(result, file, ["assembly"], list(files), None, units_row, draw=draw, show=show).finish()
 
 
 def _check_figures(grid: Mapping[str, Any], x: str, family: str, kind: str) -> None:

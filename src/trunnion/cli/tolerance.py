@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -96,11 +96,7 @@ def tolerance(
     from trunnion.studies.tolerance.study import DEFAULT_METHODS
     from trunnion.studies.tolerance.study import tolerance as run
 
-    check_files(out or [], report)
-    if kind is not None:
-        from trunnion.views.tolerance.figure import check_kind
-
-        check_kind(kind)
+    check_files(out or [], report, of="tolerance", kind=kind)
     mechanism = stated(file, set_, table, friction)
     for text in sample or []:
         mechanism = mechanism.with_samples(*named_file(text, "--sample"))
@@ -122,11 +118,6 @@ def shown_of(
 ) -> Shown:  # fmt: skip
     """What is done with the result. kind: of figure; all on one sheet if None."""
 
-    def draw(_: Path) -> Any:
-        from trunnion.views.shown import figure_of
-
-        return figure_of(result, kind)
-
     def show() -> None:
         from trunnion.views.tolerance.tables import tables
 
@@ -135,4 +126,4 @@ def shown_of(
         if not shown:
             show_figures(name, summary_of(result))
 
-    return Shown(result, file, SECTIONS, out, report, units_row, draw, show=show)
+    return Shown(result, file, SECTIONS, out, report, units_row, {"kind": kind}, show=show)

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-__all__ = ["figure_of", "report_of"]
+__all__ = ["check_kind", "figure_of", "report_of"]
 
 # kind of result: the module of its view, in which `report` or `figure` stands; loaded when it is asked for, for
 # matplotlib is slow to import
@@ -29,20 +29,24 @@ FIGURES = {
 
 def report_of(result: xr.Dataset, **options: Any) -> str:
     """The report of a result as HTML. options: those of its view, such as ideal= of a cycle."""
-    return str(_view(result, REPORTS, "report").report(result, **options))
+    return str(_view(kind_of(result), REPORTS, "report").report(result, **options))
 
 
 def figure_of(result: xr.Dataset, kind: str | None = None, **options: Any) -> Figure:
     """A figure of a result; kind: of those of its view, the main one if not given; options: those of its view."""
-    view = _view(result, FIGURES, "figure")
+    view = _view(kind_of(result), FIGURES, "figure")
     if kind is None:
         main = getattr(view, "sheet", view.figure)
         return main(result, **options)  # type: ignore[no-any-return]
     return view.figure(result, kind=kind, **options)  # type: ignore[no-any-return]
 
 
-def _view(result: xr.Dataset, views: dict[str, str], what: str) -> Any:
-    kind = kind_of(result)
+def check_kind(of: str, kind: str) -> None:
+    """MechanismError if a result of some kind (`of`) has no such kind of figure."""
+    _view(of, FIGURES, "figure").check_kind(kind)
+
+
+def _view(kind: str, views: dict[str, str], what: str) -> Any:
     if kind not in views:
         remedy = f"there are {what}s of {', '.join(views)}"
         raise MechanismError(Finding(f"there is no {what} of a {kind}", "kind", remedy))

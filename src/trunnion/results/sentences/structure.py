@@ -82,6 +82,12 @@ STRUCTURE: dict[str, Sentence] = {
         "taken",
         "remove one of them",
     ),
+    "assembly.change_point": Sentence(
+        ERROR,
+        "passes a change point at {places}: two assemblies of the links {links} meet there",
+        "which way it goes on is not determined; here {joint} stays on its side. Change a length, or drive it over a "
+        "range that ends before",
+    ),
     "assembly.misfit": Sentence(
         NOTE,
         "the axes and lengths as stated do not fit, and neither do they without the errors",

@@ -532,6 +532,15 @@ def formats_table() -> str:
     return _rows(("extension", "needs"), rows)
 
 
+def codes_table() -> str:
+    """The codes of findings about results, with the sentence where it is a plain text."""
+    from trunnion.results.sentences.told import SENTENCES
+
+    rows = [(_code(code), str(one.severity), one.what if isinstance(one.what, str) else "")
+            for code, one in sorted(SENTENCES.items())]  # fmt: skip
+    return _rows(("code", "is", "says"), rows)
+
+
 def units_table() -> str:
     """Every kind of quantity."""
     from trunnion.model.units import KINDS
@@ -692,6 +701,7 @@ TABLES: dict[str, Callable[..., str]] = {
     "groups": groups_table,
     "plots": plots_table,
     "formats": formats_table,
+    "codes": codes_table,
     "units": units_table,
     "command-line": command_line,
     "public-names": public_names,

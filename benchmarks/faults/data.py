@@ -224,7 +224,7 @@ _MODEL = (
 _RESULTS = (
     Fault(
         "power-in-not-written",
-        "results/export.py",
+        "results/columns/cycle.py",
         'found.append(("power_in", "W", lambda window: drive[:, window].sum(axis=0)))',
         'found.append(("power_in", "W", lambda window: drive[:1, window].mean(axis=0) * 0.0))',
         ("tests/invariants/test_written_results.py", "-k", "csv"),

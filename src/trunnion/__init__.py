@@ -60,6 +60,7 @@ _PLACES = {
     "tolerance": "trunnion.studies.tolerance.study",
     "vocabulary": "trunnion.cycle.vocabulary",
 }
+_RESULTS = {"analyse", "assemble", "allocate", "compare", "identify", "locking", "play", "sweep", "tolerance"}
 _ELSEWHERE = {"read": "read_mechanism"}
 _MODULES = {"dual": "trunnion.dual"}
 
@@ -99,6 +100,8 @@ def __getattr__(name: str) -> Any:
         return import_module(_MODULES[name])
     if name not in _PLACES:
         raise AttributeError(f"module 'trunnion' has no attribute '{name}'")
+    if name in _RESULTS:
+        import_module("trunnion.accessor")  # result.trunnion
     return getattr(import_module(_PLACES[name]), _ELSEWHERE.get(name, name))
 
 

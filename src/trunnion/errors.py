@@ -7,9 +7,10 @@ result and a `Status` for each position.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from enum import IntEnum, StrEnum
+from typing import Any
 
 __all__ = ["Finding", "MechanismError", "Severity", "Status", "agreeing", "counted"]
 
@@ -39,6 +40,8 @@ class Finding:
     what: the fact with its figure and the limit it breaks, a sentence without a full stop.
     where: path inside the model such as `links.crank.mass`; empty if it concerns the whole.
     remedy: what to do about it; line, file: where it stands in the model file, if it was read from one.
+    code: what a program asks for, such as `friction.locked`; of something that was put in, `input.` and its section.
+    figures: the numbers of the sentence by name, with the names and places that it speaks of; see `results.sentences`.
     """
 
     what: str
@@ -47,6 +50,13 @@ class Finding:
     severity: Severity = Severity.ERROR
     line: int | None = None
     file: str = ""
+    code: str = ""
+    figures: Mapping[str, Any] = field(default_factory=dict, hash=False)
+
+    def __post_init__(self) -> None:
+        if not self.code:
+            section = self.where.lstrip("-").replace(" ", ".").partition(".")[0]
+            object.__setattr__(self, "code", f"input.{section or 'file'}")
 
     def at(self, file: str, line: int | None) -> Finding:
         """The same finding with its place in a file."""

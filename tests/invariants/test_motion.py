@@ -268,7 +268,7 @@ def test_in_a_dwell_every_joint_rests_and_the_effort_is_an_interval() -> None:
     lower, upper = result.drive_effort_lower[0].values, result.drive_effort_upper[0].values
     assert np.all(np.isfinite([lower, upper]))
     assert np.all(upper[resting] - lower[resting] > 1e-3)
-    told = [row for row in json.loads(result.attrs["findings"]) if "relative speed zero" in row["what"]]
+    told = [row for row in json.loads(result.attrs["findings"]) if row["code"] == "friction.interval"]
     assert any(row["where"] == "joints.A, B, P, C" for row in told)  # once for all
 
 

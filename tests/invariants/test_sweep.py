@@ -15,7 +15,7 @@ import xarray as xr
 
 import trunnion
 from trunnion import Mechanism, MechanismError, Status
-from trunnion.results.export import figures as figures_of
+from trunnion.results.columns.studies import swept as figures_of
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.studies.sweep.grid import grid as grid_of
 from trunnion.studies.sweep.points import Points
@@ -246,7 +246,7 @@ def test_efficiency_falls_with_misalignment_by_their_own_friction(tmp_path: Path
     assert float(swept["locking_margin"][-1]) < 1 < float(swept["locking_margin"][-2])
     said = json.loads(swept.attrs["findings"])[0]
     assert said["severity"] == "error"
-    assert "1 of 4 points" in said["what"]
+    assert (said["code"], said["figures"]["points"], said["figures"]["of"]) == ("sweep.no_answer", 1, 4)
     assert "misalignment = 30 deg" in said["what"]
     assert "locked" in said["what"]
 

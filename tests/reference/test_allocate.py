@@ -323,8 +323,8 @@ def test_the_least_limits_of_a_curve_that_can_be_kept() -> None:
     model = trunnion.read(EXAMPLES / "fourbar-by-grades.yaml")
     result = trunnion.allocate(model, steps=24, samples=0, curve=25)
     kept = result["trade_off_factor"].values[np.isfinite(result["trade_off_cost"].values)]
-    (said,) = [one for one in json.loads(result.attrs["findings"]) if "points of the curve" in one["what"]]
+    (said,) = [one for one in json.loads(result.attrs["findings"]) if one["code"] == "allocation.curve_short"]
     missing = 25 - len(kept)
     assert missing > 0
-    assert said["what"].startswith(f"{missing} of the 25 points of the curve {'has' if missing == 1 else 'have'} no")
+    assert (said["figures"]["lost"], said["figures"]["points"]) == (missing, 25)
     assert f"at least {kept.min():.3g} times" in said["remedy"]

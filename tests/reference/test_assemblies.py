@@ -270,9 +270,9 @@ def test_both_ranges_are_closed_and_of_one_sense(islands: Any) -> None:
 
 
 def test_the_finding_tells_the_range_that_was_found_again(islands: Any) -> None:
-    (found,) = [one for one in findings(islands) if "put together anew" in one["what"]]
+    (found,) = [one for one in findings(islands) if one["code"] == "assembly.anew"]
     assert found["severity"] == "warning"
-    low, high = (float(text.split("°")[0]) for text in found["what"].split("between ")[1].split(" and "))
+    low, high = (float(text.split("°")[0]) for text in found["figures"]["at"].split("between ")[1].split(" and "))
     solved = np.flatnonzero(np.isfinite(islands.closure_residual.values))
     second = solved[(solved > 60) & (solved < 240)]
     assert (low, high) == pytest.approx((second[0], second[-1]), abs=1.0)

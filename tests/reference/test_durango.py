@@ -99,7 +99,7 @@ def test_zero_slip_is_an_interval(results: dict[str, Any]) -> None:
     assert np.all(effort[here] < upper[here])
     np.testing.assert_array_equal(lower[~here], effort[~here])
     np.testing.assert_array_equal(upper[~here], effort[~here])
-    assert any(row["where"] == "joints.C" and "zero" in row["what"] for row in findings(result))
+    assert any((row["where"], row["code"]) == ("joints.C", "friction.interval") for row in findings(result))
 
 
 @pytest.mark.parametrize("position", [0.0, np.pi])

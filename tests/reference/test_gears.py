@@ -152,7 +152,7 @@ def test_turns_that_never_come_back() -> None:
     data["gears"]["mesh"]["ratio"] = 0.5123
     result = analyse(data, 36)
     assert not result.attrs["periodic"]
-    assert any("do not come back" in finding["what"] for finding in findings(result))
+    assert any(finding["code"] == "cycle.not_common" for finding in findings(result))
 
 
 def cycle_of(data: Data) -> float:

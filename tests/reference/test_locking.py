@@ -62,8 +62,8 @@ def test_above_the_critical_coefficient(excess: float) -> None:
     assert np.all(np.isfinite(result["point_position"]))
     assert np.all(np.isfinite(result["point_velocity"]))
     (error,) = (row for row in findings(result) if row["severity"] == "error")
-    assert "locked" in error["what"]
-    assert "every position" in error["what"]
+    assert error["code"] == "friction.locked"
+    assert error["figures"]["at"] == "at every position"
 
 
 @pytest.mark.parametrize("coefficient", [0.3 * CRITICAL, 3 * CRITICAL])
@@ -214,4 +214,4 @@ def test_some_positions_lock_and_the_others_keep_their_numbers() -> None:
     assert np.isnan(float(result["efficiency"]))
     residual, peak = np.nanmax(np.abs(result["power_residual"])), np.nanmax(np.abs(result["drive_power"]))
     assert residual < 1e-12 * peak
-    assert any("locked by friction" in row["what"] for row in findings(result))
+    assert any(row["code"] == "friction.locked" for row in findings(result))

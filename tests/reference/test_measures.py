@@ -652,6 +652,6 @@ def test_play_is_of_some_measures_only() -> None:
     mechanism = Mechanism(**data)
     result = trunnion.play(mechanism, steps=12)
     assert list(result["measure"].values) == ["turn"]
-    assert any("which swing has not: left out" in one["what"] for one in json.loads(result.attrs["findings"]))
+    assert any(one["figures"].get("measures") == ["swing"] for one in json.loads(result.attrs["findings"]))
     with pytest.raises(MechanismError, match="which swing has not"):
         trunnion.play(mechanism, ["swing"], steps=12)

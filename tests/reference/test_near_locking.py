@@ -118,9 +118,9 @@ def test_locked_findings_name_the_joint_that_decides() -> None:
     data, options = CASES["slider-crank"]
     result = analyse(data(), 36, **{**options, "friction": 0.9})
     assert np.any(result["status"] == Status.LOCKED)
-    (finding,) = [one for one in findings(result) if "locked by friction" in one["what"]]
+    (finding,) = [one for one in findings(result) if one["code"] == "friction.locked"]
     assert "decides" in finding["remedy"] or "lower these" in finding["remedy"]
-    assert "jammed" in finding["what"] or "reverse" not in finding["what"]
+    assert ("jammed" in finding["what"]) == bool(finding["figures"]["reverse"])
 
 
 def test_there_is_nothing_to_lock_without_friction() -> None:

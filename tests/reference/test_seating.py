@@ -203,9 +203,9 @@ def test_crank_whose_bearing_is_relieved_at_one_angle(steps: int) -> None:
     load = (-np.cos(theta) + 1j * (1 - np.sin(theta))) * np.exp(-1j * theta)
     seat = result.seat_offset.sel(joint="A").values[0]
     np.testing.assert_allclose((seat[0] + 1j * seat[1])[away], (1e-5 * load / np.abs(load))[away], rtol=0, atol=2e-11)
-    finding = next(f for f in json.loads(result.attrs["findings"]) if "loses contact" in f["what"])
+    finding = next(f for f in json.loads(result.attrs["findings"]) if f["code"] == "contact.lost")
     assert finding["severity"] == "warning"
-    assert "at 90" in finding["what"] or f"at {angle[where[0]]:.4g}" in finding["what"]
+    assert "at 90" in finding["figures"]["at"] or f"at {angle[where[0]]:.4g}" in finding["figures"]["at"]
 
 
 def test_guide_whose_ends_change_sides() -> None:

@@ -455,7 +455,7 @@ def test_at_moves_measures_without_a_place() -> None:
 def test_without_measures_outputs_are_taken() -> None:
     found = trunnion.tolerance(fourbar(measures={}), methods=["linear"], at=np.pi / 3)
     assert [str(name) for name in found["measure"].values] == ["rotation:D"]
-    assert "no measure is stated" in json.loads(found.attrs["findings"])[-1]["what"]
+    assert json.loads(found.attrs["findings"])[-1]["code"] == "measure.none_stated"
     steep = slopes(fourbar_angle, FOURBAR, 3e-5)
     np.testing.assert_allclose(found["sensitivity"].values[0], steep, rtol=1e-8)
 

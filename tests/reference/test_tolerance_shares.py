@@ -82,10 +82,10 @@ def test_rss_says_that_it_leaves_correlation_out() -> None:
     table = tables(found)[0]
     assert any(row[0] == "RSS, uncorrelated" for row in table.rows)
     assert any("RSS, without correlation" in figure.label for figure in summary_of(found))
-    assert any("leave the correlations out" in row["what"] for row in json.loads(found.attrs["findings"]))
+    assert any(row["code"] == "tolerance.correlations_left_out" for row in json.loads(found.attrs["findings"]))
     plain = study(0.0)
     assert not any("uncorrelated" in row[0] for row in tables(plain)[0].rows)
-    assert not any("correlations" in row["what"] for row in json.loads(plain.attrs["findings"]))
+    assert not any("correlations" in row["code"] for row in json.loads(plain.attrs["findings"]))
 
 
 def test_table_and_chart_show_the_same_shares() -> None:
@@ -121,5 +121,5 @@ def test_an_allocation_says_when_it_leaves_correlation_out(criterion: str) -> No
     rows = [{"of": ["l2", "l3"], "coefficient": 0.5}]
     mechanism = fourbar(correlations=rows, costs=costs, measures=measures)
     found = trunnion.allocate(mechanism, criterion=criterion, samples=0)  # type: ignore[arg-type]
-    said = any("leaves the correlations out" in row["what"] for row in json.loads(found.attrs["findings"]))
+    said = any(row["code"] == "allocation.correlations_left_out" for row in json.loads(found.attrs["findings"]))
     assert said == (criterion != "yield")

@@ -107,7 +107,7 @@ def test_rss_whose_yield_is_short_is_an_error() -> None:
     found = trunnion.allocate(mechanism, criterion="rss", samples=4000)
     assert found["yield"].item() < 0.99
     rows = missed(found)
-    assert "stands for 0.9973" in rows[0]["what"]
+    assert (rows[0]["code"], rows[0]["figures"]["target"]) == ("yield.below_rss", 0.9973)
     better = trunnion.allocate(mechanism, criterion="yield", target=0.9973, samples=4000)
     assert not missed(better)
 

@@ -464,7 +464,9 @@ def test_seats_are_those_of_analyse():
 
 def test_findings_of_files_that_differ_in_numbers_are_told_once():
     rows = [
-        Finding(f"reads {k} in every row", "channels.T", "look", Severity.WARNING, file=f"run-{k}.csv")
+        Finding(
+            f"reads {k} in every row", "channels.T", "look", Severity.WARNING, file=f"run-{k}.csv", code="data.constant"
+        )
         for k in range(6)
     ]
     told = gathered([*rows, Finding("is missing", "channels.w")])

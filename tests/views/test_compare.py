@@ -21,7 +21,7 @@ import trunnion
 from rig_measurements import measured, rocker
 from trunnion import MechanismError
 from trunnion.cli.app import main
-from trunnion.results.columns.comparison import flat
+from trunnion.results.columns.comparison import TABLES
 from trunnion.rig.reading.measurement import Measurement
 from trunnion.views.common.bundle import web_text
 from trunnion.views.compare.compared import drive, label, levels, varied
@@ -195,7 +195,7 @@ def test_difference_of_efficiencies_is_measured_less_model():
 
 def test_what_was_set_stands_beside_the_courses_of_its_condition():
     result = case("family")
-    columns = {name: values for name, _, values in flat(result, "courses")}
+    columns = {name: values for name, _, values in TABLES["courses"](result)}
     for name in ("brake.resisting_torque", "A.speed"):
         own = dict(zip(result["condition"].values, result["value"].sel({"set": name}).values, strict=True))
         assert len(set(own.values())) > 1

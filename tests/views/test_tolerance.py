@@ -4,23 +4,24 @@ from __future__ import annotations
 
 import json
 import re
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import typer
 import xarray as xr
 from matplotlib.axis import Tick
 from matplotlib.colors import to_hex
 from matplotlib.text import Text
 from stand_in_tolerances import CASES, LIMIT, QUANTILES, at_one_position, gap, odd_names, toleranced
 
-from trunnion.cli.tolerance import check_files, show
+from trunnion.cli.result import check_files
+from trunnion.cli.tolerance import shown_of
 from trunnion.errors import MechanismError
 from trunnion.results.export import save as export
 from trunnion.views.allocation.cost import Offer, Price, tolerance_cost, trade_off
 from trunnion.views.common.figures import PALETTE
 from trunnion.views.cycle.plots import save
-from trunnion.views.tolerance.figure import KINDS, MOST_PANELS, drawable, figure, sheet
+from trunnion.views.tolerance.figure import KINDS, MOST_PANELS, check_kind, drawable, figure, sheet
 from trunnion.views.tolerance.tables import corners, figures, indices, inputs, overview, tables
 from trunnion.views.tolerance.toleranced import fixed, limits_text, readings, scaled, share, share_interval
 
@@ -336,21 +337,24 @@ def test_corners_indices_and_failures_are_told():
 
 
 def test_files_are_refused_before_anything_is_computed(tmp_path):
-    check_files([tmp_path / "a.csv", tmp_path / "a.svg"], tmp_path / "a.html", "histogram")
-    for arguments, what in (
-        (([tmp_path / "a.xyz"],), "cannot write a result as '.xyz'"),
-        (([], tmp_path / "a.txt"), "a report is HTML"),
-        (([], None, "pie"), "there is no figure 'pie'"),
+    check_files([tmp_path / "a.csv", tmp_path / "a.svg"], tmp_path / "a.html")
+    check_kind("histogram")
+    for check, what in (
+        (lambda: check_files([tmp_path / "a.xyz"]), "cannot write a result as '.xyz'"),
+        (lambda: check_files([tmp_path / "a.svg"], drawn=False), "cannot write a result as '.svg'"),
+        (lambda: check_files([], tmp_path / "a.txt"), "a report is HTML"),
+        (lambda: check_kind("pie"), "there is no figure 'pie'"),
     ):
         with pytest.raises(MechanismError, match=what):
-            check_files(*arguments)
+            check()
 
 
 @pytest.mark.slow
 def test_the_verb_writes_what_is_asked_for(tmp_path, capsys):
     out = [tmp_path / name for name in ("t.csv", "t.parameters.csv", "t.nc", "t.json", "t.svg", "t.pdf")]
-    mechanism = SimpleNamespace(name="Four-bar")
-    show(mechanism, toleranced(24, 500), out, units_row=True, kind="histogram", report=tmp_path / "t.html")
+    result, page = toleranced(24, 500), tmp_path / "t.html"
+    with pytest.raises(typer.Exit):
+        shown_of(result, "Four-bar", tmp_path / "none.yaml", out, True, "histogram", page).finish()
     assert {path.name for path in tmp_path.iterdir()} == {*(path.name for path in out), "t.html"}
     told = capsys.readouterr().out
     assert told.startswith("Four-bar\nangle-error: angle of rocker")

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import os
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from trunnion.cli.model import exit_status, lines_of, placed, stated
+from trunnion.cli.model import exit_status, lines_of, stated
 from trunnion.cli.options import (
-    IMAGES,
     At,
     File,
     Force,
@@ -25,9 +25,13 @@ from trunnion.cli.options import (
     Steps,
     TableFile,
     UnitsRow,
+    Write,
 )
-from trunnion.cli.terminal import bar, console, say, say_missed, show_rows, wrote
-from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.cli.result import Shown, check_files, check_model, show_tables
+from trunnion.cli.terminal import bar, console
+from trunnion.cli.tolerance import SECTIONS as OF_TOLERANCES
+from trunnion.cli.tolerance import STOPPED
+from trunnion.errors import Finding, Severity
 from trunnion.results.attributes import findings_of
 
 if TYPE_CHECKING:
@@ -38,7 +42,7 @@ if TYPE_CHECKING:
 __all__ = ["allocate"]
 
 FEW = 2_000_000  # configurations up to which further processes cost more than they save
-STOPPED = 130
+SECTIONS = (*OF_TOLERANCES, "costs")
 WRITTEN = 5  # significant digits of a tolerance in the model that is written
 
 
@@ -82,10 +86,7 @@ def allocate(
     set_: Set = None,
     table: TableFile = None,
     friction: FrictionLaw = None,
-    write: Annotated[
-        Path | None,
-        typer.Option("--write", help="Write the model with the tolerances found: .yaml or .json.", show_default=False),
-    ] = None,
+    write: Write = None,
     force: Force = False,
     kind: Annotated[
         str | None, typer.Option("--kind", help="Which figure: cost, trade-off, or one of `tolerance`.")
@@ -98,7 +99,8 @@ def allocate(
     from trunnion.studies.allocation.allocate import allocate as run
     from trunnion.studies.allocation.allocated import DEFAULT_YIELD
 
-    _check(file, write, force, out or [], report, kind)
+    check_files(out or [], report, of="allocation", kind=kind)
+    check_model(write, file, force)
     mechanism = stated(file, set_, table, friction)
     by = Criterion.YIELD if target is not None else criterion
     if jobs is None:
@@ -108,16 +110,21 @@ def allocate(
             mechanism, measure, by.value, DEFAULT_YIELD if target is None else target, choice.value, steps, at, samples,
             seed, curve, exact=exact, jobs=jobs, progress=progress,
         )  # fmt: skip
-    written = _show(result, out or [], units_row, kind, report)
+
+    def draw(_: Path) -> Any:
+        from trunnion.views.shown import figure_of
+
+        return figure_of(result, kind) if result.attrs["found"] else None
+
+    show = partial(_show, result)
+    shown = Shown(result, file, SECTIONS, out or [], report, units_row, draw=draw, show=show)
+    shown.write()
     findings = findings_of(result)
     if write is not None:
         lost = _write_model(mechanism, result, file, write, force, bool(exit_status(findings)))
         findings += lost
-        written += [] if lost else [write]
-    for path in written:
-        wrote(path)
-    say(placed(_named(findings, mechanism), file, ["measures", "joints", "tolerances", "costs"]))
-    raise typer.Exit(STOPPED if result.attrs["stopped"] else exit_status(findings))
+        shown.written += [] if lost else [write]
+    shown.end(_named(findings, mechanism), STOPPED if result.attrs["stopped"] else None)
 
 
 def _write_model(
@@ -145,55 +152,13 @@ def _bought(mechanism: Mechanism, result: xr.Dataset) -> Mechanism:
     return mechanism.with_tolerances(options).with_tolerances(others, WRITTEN)
 
 
-def _check(file: Path, write: Path | None, force: bool, out: list[Path], report: Path | None, kind: str | None) -> None:
-    """MechanismError for what cannot be written, before anything is computed."""
-    from trunnion.cli.tolerance import check_files
+def _show(result: xr.Dataset) -> None:
+    from trunnion.views.allocation.allocation import tables
 
-    check_files(out, report)
-    if kind is not None:
-        from trunnion.views.allocation.allocation import check_kind
-
-        check_kind(kind)
-    if write is None:
-        return
-    if write.suffix.lower() not in (".yaml", ".yml", ".json"):
-        raise MechanismError(Finding(f"a model is not written as '{write.suffix}'", "--write", "write .yaml or .json"))
-    if not force and write.exists() and file.exists() and write.samefile(file):
-        raise MechanismError(Finding(f"'{write}' is the model itself", "--write", "name another file, or add --force"))
-
-
-def _show(result: xr.Dataset, out: list[Path], units_row: bool, kind: str | None, report: Path | None) -> list[Path]:
-    """Write the files, print the tables; the files that were written."""
-    from trunnion.results.export import save
-    from trunnion.views.allocation import allocation
-    from trunnion.views.cycle import plots
-
-    written = []
-    for path in out:
-        if path.suffix.lower() not in IMAGES:
-            save(result, path, units_row)
-        elif result.attrs["found"]:
-            plots.save(allocation.figure(result, kind), path)
-        else:
-            continue
-        written.append(path)
-    if report is not None:
-        from trunnion.files import whole
-
-        text = allocation.report(result)
-        with whole(report) as temporary:
-            temporary.write_text(text, encoding="utf-8")
-        written.append(report)
-    say_missed(result)
-    name = str(result.attrs.get("name", ""))
-    shown = allocation.tables(result)
+    name, shown = str(result.attrs.get("name", "")), tables(result)
+    show_tables(name, shown)
     if not shown:
         console().print(f"{name}\nno allocation keeps the limits".lstrip(), markup=False, highlight=False)
-    for i, one in enumerate(shown):
-        if i:
-            console().print()
-        show_rows(f"{name}\n{one.title}" if i == 0 and name else one.title, *one[1:])
-    return written
 
 
 def _named(findings: list[Finding], mechanism: Mechanism) -> list[Finding]:

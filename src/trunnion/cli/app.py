@@ -8,6 +8,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -24,12 +25,11 @@ from trunnion.cli.model import exit_status, lines_of, placed, stated
 from trunnion.cli.options import (
     IMAGES,
     Criterion,
+    Data,
     File,
     FrictionLaw,
     Kinds,
-    Measures,
     Method,
-    Out,
     Report,
     Rounds,
     Seats,
@@ -39,13 +39,15 @@ from trunnion.cli.options import (
     Uncut,
     UnitsRow,
 )
+from trunnion.cli.play import play
+from trunnion.cli.result import Shown, check_files, check_page, write_text
 from trunnion.cli.rig import rig
-from trunnion.cli.study import tolerance
 from trunnion.cli.sweep import sweep
 from trunnion.cli.terminal import bar, console, say, show_figures, wrote
+from trunnion.cli.tolerance import tolerance
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.files import folder
-from trunnion.results.attributes import findings_of, summary_of
+from trunnion.results.attributes import findings_of
 from trunnion.version import __version__
 
 if TYPE_CHECKING:
@@ -153,29 +155,18 @@ def analyse(
     method: Method = "newton",
     criterion: Criterion = None,
     iterations: Rounds = 200,
-    out: Annotated[
-        list[Path] | None, typer.Option("--out", help="Write the result: .csv .json .nc .zarr .parquet. Repeatable.")
-    ] = None,
+    out: Data = None,
     report: Report = None,
     units_row: UnitsRow = False,
     uncut: Uncut = False,
 ) -> None:
     """Motion, reactions with friction, drive effort and power over the cycle."""
-    from trunnion.results.export import check_format, save
-
-    for path in out or []:
-        check_format(path)
+    check_files(out or [], report, drawn=False)
     mechanism = stated(file, set_, table, friction, seat)
     with lines_of(file):
         result = _run(mechanism, steps, _method(method, criterion, iterations))
-    for path in out or []:
-        save(result, path, units_row)
-    if report:
-        _write_report(mechanism, result, report, uncut)
-    _summary(result, file)
-    for path in [*(out or []), *([report] if report else [])]:
-        wrote(path)
-    raise typer.Exit(exit_status(findings_of(result)))
+    page = partial(_page, mechanism, result, uncut)
+    Shown(result, file, ["assembly"], out or [], report, units_row, page=page).finish()
 
 
 @verb
@@ -208,9 +199,8 @@ def locking(
     with lines_of(file):
         run = prepare(mechanism)
         found = look(run, steps)
-    show_figures(mechanism.name or str(file), report_figures(run, found))
-    say(placed(findings_of(found), file, ["assembly"]))
-    raise typer.Exit(exit_status(findings_of(found)))
+    figures = report_figures(run, found)
+    Shown(found, file, ["assembly"], show=lambda: show_figures(mechanism.name or str(file), figures)).finish()
 
 
 verb(assemble)
@@ -221,31 +211,7 @@ verb(rig)
 verb(compare)
 verb(identify)
 verb(sweep)
-
-
-@verb
-def play(
-    file: File,
-    measure: Measures = None,
-    steps: Steps = 360,
-    set_: Set = None,
-    table: TableFile = None,
-    friction: FrictionLaw = None,
-    out: Out = None,
-    units_row: UnitsRow = False,
-    uncut: Uncut = False,
-) -> None:
-    """What the play of every joint does to measures: worst case, share of each joint, standard deviation."""
-    from trunnion.cli.play import check_files, show
-    from trunnion.studies.play.study import play as run
-
-    check_files(out or [])
-    mechanism = stated(file, set_, table, friction)
-    with lines_of(file):
-        result = run(mechanism, measure, steps)
-    show(mechanism, result, out or [], units_row, uncut)
-    say(placed(findings_of(result), file, ["measures", "joints"]))
-    raise typer.Exit(exit_status(findings_of(result)))
+verb(play)
 
 
 @verb
@@ -264,11 +230,9 @@ def plot(
     """Figures: drive torque, friction power, reactions, polar diagram, mechanism with coupler curve."""
     from trunnion.views.common.peaks import whole_peaks
     from trunnion.views.cycle.error_plot import with_worst_case
-    from trunnion.views.cycle.plots import PLOTS, drawable, save
+    from trunnion.views.cycle.plots import PLOTS, check_kinds, drawable, save
 
-    unknown = [name for name in kind or [] if name not in PLOTS]
-    if unknown:
-        raise MechanismError(Finding(f"there is no plot '{unknown[0]}'", "--kind", f"use one of {', '.join(PLOTS)}"))
+    check_kinds(kind or [])
     single = out.suffix.lower() in IMAGES
     if single and len(kind or PLOTS) > 1:
         what = f"{len(kind or PLOTS)} plots do not fit one file"
@@ -304,13 +268,11 @@ def report(
     uncut: Uncut = False,
 ) -> None:
     """One self-contained HTML file: animation, plots, findings, balance, input data."""
-    if out.suffix.lower() not in (".html", ".htm"):
-        what = f"a report is HTML, '{out.name}' is not"
-        raise MechanismError(Finding(what, "--out", "write a .html file and print it"))
+    check_page(out, "--out")
     mechanism = stated(file, set_, table, friction, seat)
     with lines_of(file):
         result = _run(mechanism, steps, _method(method, criterion, iterations))
-    _write_report(mechanism, result, out, uncut)
+    write_text(_page(mechanism, result, uncut), out)
     wrote(out)
     raise typer.Exit(exit_status(findings_of(result)))
 
@@ -363,10 +325,7 @@ def schema(
     if out is None:
         print(text, end="")
         return
-    from trunnion.files import whole
-
-    with whole(out) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    write_text(text, out)
 
 
 def _version(show: bool) -> None:
@@ -423,22 +382,14 @@ def _ideal(mechanism: Mechanism, steps: int, method: FrictionMethod | None) -> x
     return _run(mechanism.with_friction("off"), steps, method)
 
 
-def _write_report(mechanism: Mechanism, result: xr.Dataset, path: Path, uncut: bool) -> None:
-    from trunnion.files import whole
+def _page(mechanism: Mechanism, result: xr.Dataset, uncut: bool) -> str:
+    """The report of a cycle as HTML."""
     from trunnion.views.common.peaks import whole_peaks
     from trunnion.views.cycle.error_plot import with_worst_case
     from trunnion.views.cycle.report import report as page
 
     shown = whole_peaks(with_worst_case(result, mechanism), uncut)
-    text = page(shown, _ideal(mechanism, result.sizes["position"], None))
-    with whole(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
-
-
-def _summary(result: xr.Dataset, file: Path) -> None:
-    """The short table of an analysis, and its findings."""
-    show_figures(f"{result.attrs['name']}\n{result.attrs['formula']}", summary_of(result))
-    say(placed(findings_of(result), file, ["assembly"]))
+    return page(shown, _ideal(mechanism, result.sizes["position"], None))
 
 
 def _examples() -> dict[str, Path]:

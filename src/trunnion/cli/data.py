@@ -8,8 +8,9 @@ from typing import Annotated
 import typer
 
 from trunnion.cli.inputs import spare_data
-from trunnion.cli.options import UnitsRow
-from trunnion.cli.terminal import console, say, show_rows, wrote
+from trunnion.cli.options import Data, UnitsRow
+from trunnion.cli.result import check_files, show_tables
+from trunnion.cli.terminal import console, say, wrote
 from trunnion.errors import Severity
 
 __all__ = ["data"]
@@ -21,26 +22,19 @@ def data(
         list[Path] | None,
         typer.Argument(help="Data files instead of those it names: .csv .parquet .tdms.", show_default=False),
     ] = None,
-    out: Annotated[
-        list[Path] | None,
-        typer.Option("--out", help="Write the mean courses: .csv .json .nc .zarr .parquet. Repeatable."),
-    ] = None,
+    out: Data = None,
     units_row: UnitsRow = False,
 ) -> None:
     """Measured files, read by a mapping: conditions, channels, scatter and uncertainty, and faults by name."""
-    from trunnion.results.export import check_format, save
+    from trunnion.results.export import save
     from trunnion.rig.reading.read import read_measured
     from trunnion.rig.reading.table import dataset
     from trunnion.views.rig.measured import tables
 
-    for path in out or []:
-        check_format(path)
+    check_files(out or [], drawn=False)
     spare_data(mapping, files, out)
     measurement = read_measured(mapping, files)
-    for i, one in enumerate(tables(measurement)):
-        if i:
-            console().print()
-        show_rows(*one)
+    show_tables("", tables(measurement))
     if measurement.done:
         console().print()
     for sentence in measurement.done:

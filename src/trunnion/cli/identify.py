@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from trunnion.cli.inputs import spare_data
-from trunnion.cli.model import exit_status, lines_of, placed, stated
+from trunnion.cli.model import lines_of, stated
 from trunnion.cli.options import (
-    IMAGES,
     DataFiles,
     File,
     Force,
@@ -22,11 +22,11 @@ from trunnion.cli.options import (
     Set,
     TableFile,
     UnitsRow,
+    Write,
     setting,
 )
-from trunnion.cli.terminal import console, say, show_rows, wrote
-from trunnion.cli.tolerance import PAGES
-from trunnion.errors import Finding, MechanismError, Severity, counted
+from trunnion.cli.result import Shown, check_files, check_model, show_tables
+from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.results.attributes import findings_of
 
 if TYPE_CHECKING:
@@ -86,10 +86,6 @@ Starts = Annotated[
     int | None,
     typer.Option("--starts", help="Places to begin at; more than one if the model does not fit.", show_default=False),
 ]
-Write = Annotated[
-    Path | None,
-    typer.Option("--write", help="Write the model with the estimates: .yaml or .json.", show_default=False),
-]
 Kind = Annotated[
     str | None,
     typer.Option("--kind", help="Which figure: intervals, correlation or residuals.", show_default=False),
@@ -124,7 +120,8 @@ def identify(
     from trunnion.rig.identify import identify as run
     from trunnion.rig.reading.read import read_measured
 
-    _check(file, write, force, out or [], report, kind)
+    check_files(out or [], report, of="identification", kind=kind)
+    check_model(write, file, force)
     spare_data(mapping, data, out, report, file, table, write)
     mechanism = stated(file, set_, table, friction, seat)
     with lines_of(file):
@@ -132,19 +129,17 @@ def identify(
         held, late = held_out(hold_out or []), seconds(delay)
         measurement = read_measured(mapping, [str(path) for path in data] if data else None)
         result = run(mechanism, measurement, wanted, channel, begin, held, sensors, late, guard, starts)  # type: ignore[arg-type]
-    written = _write(result, out or [], report, kind, units_row)
-    _tables(result)
-    findings = findings_of(result)
     found = gathered(  # of the notes those that tell what was set
         one for one in measurement.findings if one.severity is not Severity.NOTE or one.where == "files"
     )
+
+    show, sections = partial(_show, result), ["assembly", "measures"]
+    shown = Shown(result, file, sections, out or [], report, units_row, {"kind": kind}, show=show, others=found)
+    shown.write()
+    findings = findings_of(result)
     if write is not None:
-        findings += _write_model(mechanism, result, file, write, force, written)
-    for path in written:
-        wrote(path)
-    say(found)
-    say(placed(findings, file, ["assembly", "measures"]))
-    raise typer.Exit(exit_status([*found, *findings]))
+        findings += _write_model(mechanism, result, file, write, force, shown.written)
+    shown.end(findings)
 
 
 def parameters(texts: list[str]) -> dict[str, list[str]]:
@@ -198,61 +193,11 @@ def held_out(texts: list[str]) -> float | list[str] | None:
     return texts or None
 
 
-def _check(file: Path, write: Path | None, force: bool, out: list[Path], report: Path | None, kind: str | None) -> None:
-    """MechanismError for what cannot be written, before anything is read."""
-    from trunnion.results.export import check_format
-    from trunnion.views.identify.figure import check_kind
-
-    for path in out:
-        if path.suffix.lower() not in IMAGES:
-            check_format(path, IMAGES)
-    if kind is not None:
-        check_kind(kind)
-    if report is not None and report.suffix.lower() not in PAGES:
-        what = f"a report is HTML, '{report.name}' is not"
-        raise MechanismError(Finding(what, "--report", "write a .html file and print it"))
-    if write is None:
-        return
-    if write.suffix.lower() not in (".yaml", ".yml", ".json"):
-        raise MechanismError(Finding(f"a model is not written as '{write.suffix}'", "--write", "write .yaml or .json"))
-    if not force and write.exists() and file.exists() and write.samefile(file):
-        raise MechanismError(Finding(f"'{write}' is the model itself", "--write", "name another file, or add --force"))
-
-
-def _write(result: xr.Dataset, out: list[Path], report: Path | None, kind: str | None, units_row: bool) -> list[Path]:
-    """Write the files; which were written."""
-    from trunnion.files import whole
-    from trunnion.results.export import save
-    from trunnion.views.cycle import plots
-    from trunnion.views.identify.figure import figure
-
-    for path in out:
-        if path.suffix.lower() in IMAGES:
-            plots.save(figure(result, kind), path)
-        else:
-            save(result, path, units_row)
-    if report is None:
-        return list(out)
-    from trunnion.views.identify.report import report as page
-
-    text = page(result)
-    with whole(report) as temporary:
-        temporary.write_text(text, encoding="utf-8")
-    return [*out, report]
-
-
-def _tables(result: xr.Dataset) -> None:
+def _show(result: xr.Dataset) -> None:
     """What was found; of long tables the first rows."""
     from trunnion.views.identify.tables import tables
 
-    for i, table in enumerate(tables(result)):
-        if i:
-            console().print()
-        name = str(result.attrs["name"])
-        show_rows(f"{name}\n{table.title}" if i == 0 and name else table.title, table.head, table.rows[:MOST_ROWS])
-        if len(table.rows) > MOST_ROWS:
-            told = f"{counted(len(table.rows) - MOST_ROWS, 'row')} more; --out FILE.residuals.csv has all"
-            console().print(told, markup=False, highlight=False)
+    show_tables(str(result.attrs["name"]), tables(result), most=MOST_ROWS, rest="FILE.residuals.csv")
 
 
 def _write_model(

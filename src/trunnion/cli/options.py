@@ -15,6 +15,7 @@ __all__ = [
     "IMAGES",
     "At",
     "Criterion",
+    "Data",
     "DataFiles",
     "File",
     "Force",
@@ -33,6 +34,7 @@ __all__ = [
     "Steps",
     "TableFile",
     "UnitsRow",
+    "Write",
     "named_file",
     "over",
     "points",
@@ -83,6 +85,10 @@ DataFiles = Annotated[
     list[Path] | None,
     typer.Argument(help="Data files in place of the mapping's: CSV, Parquet, TDMS.", show_default=False),
 ]
+Write = Annotated[
+    Path | None,
+    typer.Option("--write", help="Write the model with what was found: .yaml or .json.", show_default=False),
+]
 Force = Annotated[bool, typer.Option("--force", help="With --write: also over the model itself.")]
 Report = Annotated[
     Path | None, typer.Option("--report", help="Also write the report, one HTML file.", show_default=False)
@@ -90,6 +96,9 @@ Report = Annotated[
 Out = Annotated[
     list[Path] | None,
     typer.Option("--out", help="Write it: .csv .json .nc .zarr .parquet, or a figure: .png .svg .pdf. Repeatable."),
+]
+Data = Annotated[
+    list[Path] | None, typer.Option("--out", help="Write the result: .csv .json .nc .zarr .parquet. Repeatable.")
 ]
 Uncut = Annotated[
     bool, typer.Option("--uncut", help="Figures show peaks near dead centres whole; else the frame cuts them there.")

@@ -1,49 +1,49 @@
-"""The verb `play`: tables on the output, files as they are asked for."""
+"""`trunnion play`: what the play of every joint does to measures."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
-from trunnion.cli.options import IMAGES
-from trunnion.cli.terminal import say_missed, show_rows, wrote
+from trunnion.cli.model import lines_of, stated
+from trunnion.cli.options import File, FrictionLaw, Measures, Out, Set, Steps, TableFile, Uncut, UnitsRow
+from trunnion.cli.result import Shown, check_files, show_tables
 from trunnion.errors import Finding, MechanismError
 
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from trunnion.model.mechanism import Mechanism
-
-__all__ = ["check_files", "show"]
+__all__ = ["play"]
 
 
-def check_files(out: Sequence[Path]) -> None:
-    """MechanismError for a file that cannot be written, before anything is computed."""
-    from trunnion.results.export import check_format
+def play(
+    file: File,
+    measure: Measures = None,
+    steps: Steps = 360,
+    set_: Set = None,
+    table: TableFile = None,
+    friction: FrictionLaw = None,
+    out: Out = None,
+    units_row: UnitsRow = False,
+    uncut: Uncut = False,
+) -> None:
+    """What the play of every joint does to measures: worst case, share of each joint, standard deviation."""
+    from trunnion.studies.play.study import play as run
 
-    for path in out:
-        if path.suffix.lower() not in IMAGES:
-            check_format(path, IMAGES)
+    check_files(out or [])
+    mechanism = stated(file, set_, table, friction)
+    with lines_of(file):
+        result = run(mechanism, measure, steps)
 
+    def draw(path: Path) -> Any:
+        from trunnion.views.common.peaks import whole_peaks
+        from trunnion.views.play.figure import MOST_PANELS, figure
 
-def show(mechanism: Mechanism, result: xr.Dataset, out: Sequence[Path], units_row: bool, uncut: bool = False) -> None:
-    """Write the files, print a table for each measure."""
-    from trunnion.results.export import save
-    from trunnion.views.common.peaks import whole_peaks
-    from trunnion.views.cycle import plots
-    from trunnion.views.play.figure import MOST_PANELS, figure, tables
-
-    for path in out:
-        if path.suffix.lower() not in IMAGES:
-            save(result, path, units_row)
-        elif result.sizes["measure"] > MOST_PANELS:
+        if result.sizes["measure"] > MOST_PANELS:
             what = f"{result.sizes['measure']} measures do not fit one figure"
             raise MechanismError(Finding(what, str(path), f"name at most {MOST_PANELS} by --measure"))
-        else:
-            plots.save(figure(whole_peaks(result, uncut)), path)
-    say_missed(result)
-    for i, table in enumerate(tables(result)):
-        show_rows(f"{mechanism.name}\n{table.title}" if i == 0 and mechanism.name else table.title, *table[1:])
-    for path in out:
-        wrote(path)
+        return figure(whole_peaks(result, uncut))
+
+    def show() -> None:
+        from trunnion.views.play.figure import tables
+
+        show_tables(mechanism.name, tables(result), apart=False)
+
+    Shown(result, file, ["measures", "joints"], out or [], None, units_row, draw=draw, show=show).finish()

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from trunnion.cli.model import exit_status, lines_of, placed, stated
+from trunnion.cli.model import lines_of, stated
 from trunnion.cli.options import (
     IMAGES,
     File,
@@ -23,10 +24,10 @@ from trunnion.cli.options import (
     over,
     points,
 )
-from trunnion.cli.terminal import bar, console, say, show_rows, wrote
+from trunnion.cli.result import Shown, show_tables
+from trunnion.cli.terminal import bar, console
 from trunnion.errors import Finding, MechanismError, counted
 from trunnion.files import folder
-from trunnion.results.attributes import findings_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -99,12 +100,18 @@ def sweep(
     with lines_of(file), bar("points", points(grid)) as progress:
         margin = margin or "locking_margin" in measures
         result = run(mechanism, grid, steps, progress=progress, margin=margin, measures=own)
-    _write(result, out or [], files, (x or "", family or "", kind), units_row, uncut)
-    _show(result, mechanism, file, measures, x or "", family or "")
-    say(placed(findings_of(result), file, ["assembly"]))
-    for path in files:
-        wrote(path)
-    raise typer.Exit(exit_status(findings_of(result)))
+    folders = {path.parent for path in files if path not in (out or [])}
+    for one in sorted(folders):
+        folder(one)
+
+    def draw(path: Path) -> Any:
+        from trunnion.views.common.peaks import whole_peaks
+        from trunnion.views.sweep.figure import figure
+
+        return figure(whole_peaks(result, uncut), files[path], x or "", family or "", kind)
+
+    show = partial(_show, result, mechanism, file, measures, x or "", family or "")
+    Shown(result, file, ["assembly"], list(files), None, units_row, draw=draw, show=show).finish()
 
 
 def _check_figures(grid: Mapping[str, Any], x: str, family: str, kind: str) -> None:
@@ -151,32 +158,12 @@ def _plain(name: str) -> str:
     return "".join("_" if sign in '/\\:*?"<>| ' else sign for sign in name)
 
 
-def _write(
-    result: xr.Dataset, out: Sequence[Path], files: Mapping[Path, str], drawn: tuple[str, str, str], units_row: bool,
-    uncut: bool,
-) -> None:  # fmt: skip
-    from trunnion.results.export import save
-
-    for path, measure in files.items():
-        if not measure:
-            save(result, path, units_row)
-            continue
-        from trunnion.views.common.peaks import whole_peaks
-        from trunnion.views.cycle import plots
-        from trunnion.views.sweep.figure import figure
-
-        if path not in out:  # but in a folder of figures
-            folder(path.parent)
-        plots.save(figure(whole_peaks(result, uncut), measure, *drawn), path)
-
-
 def _show(result: xr.Dataset, mechanism: Mechanism, file: Path, measures: Sequence[str], x: str, family: str) -> None:
     """The tables, and how many points they leave out."""
     from trunnion.views.sweep.tables import tables
 
     shown = tables(result, measures, x, family, console().width)
-    for k, one in enumerate(shown):
-        show_rows(f"{mechanism.name or file}\n{one.title}" if k == 0 else one.title, one.head, one.rows)
+    show_tables(mechanism.name or str(file), shown, apart=False)
     left_out = sum(one.left_out for one in shown) // (len(measures) if len(shown) > 1 else 1)
     if left_out:
         console().print(f"{counted(left_out, 'point')} more; --out FILE.csv has all", markup=False, highlight=False)

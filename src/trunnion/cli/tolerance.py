@@ -1,79 +1,129 @@
-"""The verb `tolerance`: tables on the output, files, figures and report as they are asked for."""
+"""`trunnion tolerance`: what tolerances and plays do to measures, and which of them does it."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-from trunnion.cli.options import IMAGES
-from trunnion.cli.terminal import console, say_missed, show_figures, show_rows, wrote
-from trunnion.errors import Finding, MechanismError
+import typer
+
+from trunnion.cli.model import lines_of, stated
+from trunnion.cli.options import (
+    At,
+    File,
+    FrictionLaw,
+    Jobs,
+    Measures,
+    Out,
+    Report,
+    Seed,
+    Set,
+    Steps,
+    TableFile,
+    UnitsRow,
+    named_file,
+)
+from trunnion.cli.result import Shown, check_files, show_tables
+from trunnion.cli.terminal import bar, show_figures
 from trunnion.results.attributes import summary_of
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from trunnion.model.mechanism import Mechanism
+__all__ = ["STOPPED", "shown_of", "tolerance"]
 
-__all__ = ["PAGES", "check_files", "show"]
+STOPPED = 130
+SECTIONS = ("measures", "joints", "tolerances")
 
-PAGES = (".html", ".htm")
+Methods = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--method",
+        help="linear, worst-case, monte-carlo, quasi-monte-carlo, sobol. Repeatable; the first three if not given.",
+        show_default=False,
+    ),
+]
+Samples = Annotated[
+    list[str] | None,
+    typer.Option("--sample", help="NAME=FILE.csv: measured deviations of a number, one column. Repeatable."),
+]
+Cluster = Annotated[
+    str | None,
+    typer.Option("--cluster", help="Address of a Dask scheduler, or local.", show_default=False),
+]
+Kind = Annotated[
+    str | None,
+    typer.Option("--kind", help="One figure alone: histogram, contributions, envelope, convergence or sobol."),
+]
 
 
-def check_files(out: Sequence[Path], report: Path | None = None, kind: str | None = None) -> None:
-    """MechanismError for a file that cannot be written, or no such kind of figure, before anything is computed."""
-    from trunnion.results.export import check_format
-
-    for path in out:
-        if path.suffix.lower() not in IMAGES:
-            check_format(path, IMAGES)
-    if report is not None and report.suffix.lower() not in PAGES:
-        what = f"a report is HTML, '{report.name}' is not"
-        raise MechanismError(Finding(what, "--report", "write a .html file and print it"))
-    if kind is not None:
-        from trunnion.views.tolerance.figure import check_kind
-
-        check_kind(kind)
-
-
-def show(
-    mechanism: Mechanism,
-    result: xr.Dataset,
-    out: Sequence[Path],
-    units_row: bool = False,
-    kind: str | None = None,
-    report: Path | None = None,
+def tolerance(
+    file: File,
+    measure: Measures = None,
+    at: At = None,
+    method: Methods = None,
+    target: Annotated[
+        float | None,
+        typer.Option(
+            "--yield", help="Share within limits that is asked for; none: the worst case too.", show_default=False
+        ),
+    ] = None,
+    samples: Annotated[int, typer.Option("--samples", help="Random mechanisms.")] = 10_000,
+    seed: Seed = 1,
+    steps: Steps = 360,
+    jobs: Jobs = None,
+    chunk: Annotated[
+        int | None, typer.Option("--chunk", help="Samples handed out at a time; about a second's.", show_default=False)
+    ] = None,
+    engine: Annotated[str, typer.Option("--engine", help="numpy, or jax: compiled, for large batches.")] = "numpy",
+    cluster: Cluster = None,
+    checkpoint: Annotated[
+        Path | None, typer.Option("--checkpoint", help="File that keeps what is done.", show_default=False)
+    ] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on from the checkpoint.")] = False,
+    set_: Set = None,
+    table: TableFile = None,
+    friction: FrictionLaw = None,
+    sample: Samples = None,
+    kind: Kind = None,
+    out: Out = None,
+    report: Report = None,
+    units_row: UnitsRow = False,
 ) -> None:
-    """Write the files, print the summary and the tables of each measure. kind: of figure; all on one sheet if None."""
-    from trunnion.results.export import save
-    from trunnion.views.cycle import plots
-    from trunnion.views.tolerance.figure import figure, sheet
-    from trunnion.views.tolerance.tables import tables
+    """What tolerances and plays do to measures: worst case, RSS, scatter, yield, contributions."""
+    from trunnion.studies.tolerance.sampling import METHODS as SAMPLINGS
+    from trunnion.studies.tolerance.study import DEFAULT_METHODS
+    from trunnion.studies.tolerance.study import tolerance as run
 
-    for path in out:
-        if path.suffix.lower() in IMAGES:
-            plots.save(sheet(result) if kind is None else figure(result, kind), path)
-        else:
-            save(result, path, units_row)
-    if report is not None:
-        _write_report(result, report)
-    say_missed(result)
-    shown = tables(result)
-    if not shown:
-        show_figures(mechanism.name, summary_of(result))
-    for i, table in enumerate(shown):
-        if i:
-            console().print()
-        show_rows(f"{mechanism.name}\n{table.title}" if i == 0 and mechanism.name else table.title, *table[1:])
-    for path in [*out, *([report] if report else [])]:
-        wrote(path)
+    check_files(out or [], report, of="tolerance", kind=kind)
+    mechanism = stated(file, set_, table, friction)
+    for text in sample or []:
+        mechanism = mechanism.with_samples(*named_file(text, "--sample"))
+    methods = tuple(method or DEFAULT_METHODS)
+    counted = samples if any(one in SAMPLINGS for one in methods) else 0
+    with lines_of(file), bar("samples", counted, least=1000) as progress:
+        result = run(
+            mechanism, measure, methods, samples, seed, steps, at, jobs=jobs, chunk=chunk, engine=engine,
+            cluster=cluster, checkpoint=checkpoint, resume=resume, progress=progress, target=target,
+        )  # fmt: skip
+    shown_of(result, mechanism.name, file, out or [], units_row, kind, report).finish(
+        STOPPED if result.attrs["stopped"] else None
+    )
 
 
-def _write_report(result: xr.Dataset, path: Path) -> None:
-    from trunnion.files import whole
-    from trunnion.views.tolerance.report import report as page
+def shown_of(
+    result: xr.Dataset, name: str, file: Path, out: Sequence[Path], units_row: bool, kind: str | None,
+    report: Path | None,
+) -> Shown:  # fmt: skip
+    """What is done with the result. kind: of figure; all on one sheet if None."""
 
-    text = page(result)
-    with whole(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    def show() -> None:
+        from trunnion.views.tolerance.tables import tables
+
+        shown = tables(result)
+        show_tables(name, shown)
+        if not shown:
+            show_figures(name, summary_of(result))
+
+    return Shown(result, file, SECTIONS, out, report, units_row, {"kind": kind}, show=show)

@@ -23,6 +23,7 @@ from trunnion.model.units import KINDS, Dimension, si_unit
 from trunnion.results import variables as results
 from trunnion.results.attributes import cited, figure_rows, finding_rows, origin
 from trunnion.results.figure import Figure
+from trunnion.results.sentences import told
 from trunnion.solve.forward import start
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.loads import Stated
@@ -123,31 +124,24 @@ def model_notes(mechanism: Mechanism, system: System) -> list[Finding]:
     bodies = {name: link for name, link in mechanism.effective_links.items() if name != mechanism.fixed_link}
     heavy = [name for name, link in bodies.items() if link.mass.source != 0]
     if heavy and mechanism.gravity is None:
-        what = f"gravity is not stated and taken as none, though {', '.join(heavy)} have mass"
         down, none = ("[0, -9.81]", "[0, 0]") if mechanism.space == "planar" else ("[0, 0, -9.81]", "[0, 0, 0]")
-        notes.append(Finding(what, "gravity", f"state gravity: {down}, or {none} to say so", Severity.NOTE))
+        notes.append(told("model.gravity", "gravity", links=heavy, phrases={"down": down, "none": none}))
     sliding = {link for joint in mechanism.joints.values() if PAIRS[joint.type].guided for link in joint.links}
     points = [name for name in heavy if bodies[name].inertia == ZERO_INERTIA and name not in sliding]
     if points:
-        what = f"{', '.join(points)} have a mass but no inertia: they are taken as point masses at their centres"
-        notes.append(Finding(what, "links", "state inertia: …", Severity.NOTE))
+        notes.append(told("model.point_mass", "links", links=points))
     tight = [
         name
         for name, joint in mechanism.effective_joints.items()
         if joint.seat not in (None, "free") and name not in mechanism.seated and clearance(name, values) is not None
     ]
     if tight:
-        what = f"{', '.join(tight)} have a seat but no play at their nominal sizes: the joints are ideal"
-        notes.append(Finding(what, "joints", "analyse with --set fits=maximum for the widest", Severity.NOTE))
+        notes.append(told("model.seat_without_play", "joints", joints=tight))
     if playing:
-        what = f"the pins of {', '.join(playing)} are taken to lie in the middle of their play"
         # no seats are taken where links are over-constrained
         held = {name for module in system.plan.modules if module.redundant for name in module.joints}
-        remedy = "the play verb tells what the play can do; `trunnion assemble FILE` whether the links go together"
-        if seatable := [name for name in playing if name not in held]:
-            of = f" of {', '.join(seatable)}" if len(seatable) < len(playing) else ", or analyse with --seat loaded"
-            remedy = f"state seat: loaded{of}; the play verb tells what the play can do"
-        notes.append(Finding(what, "joints", remedy, Severity.NOTE))
+        seatable = [name for name in playing if name not in held]
+        notes.append(told("model.play_centred", "joints", joints=playing, seatable=seatable))
     return notes
 
 
@@ -171,9 +165,7 @@ def _over_the_cycle(
     several = len(spans) > 1 or run.system.mechanism.gears
     if several and not run.cycle.periodic and spans and all(span.periodic for span in spans):
         whom = "drivers" if len(spans) > 1 else "driver and the gears"
-        what = f"the {whom} do not come back together; the cycle is the slowest period, {run.cycle.duration:g} s"
-        remedy = "means and efficiency are of that time; choose speeds with a common period, or ranges"
-        found.append(Finding(what, "drivers", remedy, Severity.WARNING))
+        found.append(told("cycle.not_common", "drivers", duration=run.cycle.duration, phrases={"whom": whom}))
     return [*found, *_loads_over_the_cycle(run, arrays, time)]
 
 
@@ -185,11 +177,7 @@ def _missed_peaks(system: System, at: Positions) -> Iterator[Finding]:
     for i, (name, unit) in enumerate(zip(system.mechanism.drivers, effort_units(system), strict=True)):
         largest, rms = float(np.max(np.abs(at.arrays["drive_effort"][i][sound]))), float(at.means.drive_effort_rms[i])
         if rms > (1 + 1e-6) * largest:
-            what = (
-                f"its RMS over the cycle, {rms:.4g} {unit}, is above the largest at any position, {largest:.4g} {unit}"
-            )
-            remedy = "use more --steps: what acts between two positions is in the means, not in the extremes"
-            yield Finding(what, f"drivers.{name}", remedy, Severity.WARNING)
+            yield told("effort.peak_missed", f"drivers.{name}", rms=rms, largest=largest, unit=unit)
 
 
 def _loads_over_the_cycle(run: Run, arrays: Arrays, time: NDArray[np.float64]) -> Iterator[Finding]:
@@ -201,14 +189,12 @@ def _loads_over_the_cycle(run: Run, arrays: Arrays, time: NDArray[np.float64]) -
         if entry.varies and entry.location[-1] in ("resisting_torque", "resisting_force"):
             negative = np.flatnonzero(np.broadcast_to(np.asarray(stated.get(path)), time.shape) < 0)
             if len(negative):
-                what = f"is negative {dial.intervals(negative)}: it drives the joint there"
-                yield Finding(what, path, "use max(0 N, …), or a load with a sign", Severity.WARNING)
+                yield told("load.drives", path, at=dial.intervals(negative))
     for i, (name, spring) in enumerate(run.system.mechanism.springs.items()):
         if spring.joint is not None and spring_units(run.system)[i][1] == "rad":
             jumps = np.flatnonzero(np.abs(np.diff(arrays["spring_elongation"][i])) > np.pi)
             if len(jumps):
-                what = f"turns through half a turn from its free angle at {dial.at(int(jumps[0]))} and jumps there"
-                yield Finding(what, f"springs.{name}", "no whole turns are counted in this joint", Severity.WARNING)
+                yield told("spring.jump", f"springs.{name}", at=dial.at(int(jumps[0])))
 
 
 def references(mechanism: Mechanism) -> list[str]:

@@ -18,7 +18,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.errors import Finding, Severity, Status
+from trunnion.errors import Finding, Status
+from trunnion.results.sentences import told
 from trunnion.solve.seating import NO_LOAD, ROUNDS, TOLERANCE, Seated, loads_of
 from trunnion.solve.seats import Seat
 from trunnion.solve.system import Dial
@@ -289,46 +290,37 @@ def _passages(
         yield (float(k), float(_size(load)[k])) if nothing[k] else (float(k + share[k]), float(nearest[k]))
 
 
-def findings(found: Sequence[Loss], arrays: Arrays, joints: Sequence[str], dial: Dial) -> list[Finding]:
+def findings(found: Sequence[Loss], arrays: Arrays, joints: Sequence[str], dial: Dial) -> Iterator[Finding]:
     """One finding for each joint that loses contact, and for each that nothing presses."""
-    told: list[Finding] = []
     if "seat_change" not in arrays:
-        return told
+        return
     held = np.flatnonzero((arrays["seat_travel"] == 0) & (arrays["status"] < Status.CONTACT_LOST))
     if len(held):
-        what = f"the seats turn too fast to tell how they travel {dial.intervals(held)}: velocities and accelerations "
-        what += "there are those of pins held in their seats"
-        told.append(Finding(what, "joints", severity=Severity.NOTE))
+        yield told("seat.held", "joints", at=dial.intervals(held))
     for loss in found:
         where = f"joints.{loss.joint}"
         if not loss.loaded:
-            what = f"no load presses its {loss.part}: it is taken to lie in the middle of its hole"
-            told.append(Finding(what, where, "give the seat, or leave it free", Severity.NOTE))
+            yield told("seat.unloaded", where, part=loss.part)
             continue
         if loss.places:
-            remedy = _number(arrays, joints.index(loss.joint), dial) if loss.turns else "expect impact there"
-            told.append(Finding(_lost(loss, dial), where, remedy, Severity.WARNING))
+            yield _lost(loss, arrays["contact_loss_number"][joints.index(loss.joint)], dial)
         if len(loss.lifted):
-            what = (
-                f"its {loss.part} lifts off the wall {dial.intervals(loss.lifted)}: the inertia of its travel across "
-            )
-            what += "the hole outweighs the load"
-            told.append(Finding(what, where, "forces there are those of one that stays", Severity.WARNING))
+            yield told("contact.lifted", where, part=loss.part, at=dial.intervals(loss.lifted))
         if len(loss.unsettled):
-            worst = float(np.nanmax(arrays["seat_change"][loss.unsettled]))
-            what = f"its seat did not settle in {ROUNDS} rounds {dial.intervals(loss.unsettled)}: it still changes by "
-            what += f"{worst:.2g} of its clearance, as the load there changes more with the seat than it presses"
-            told.append(Finding(what, where, "there the pin floats: contact is lost", Severity.WARNING))
-    return told
+            worst = np.nanmax(arrays["seat_change"][loss.unsettled])
+            yield told("seat.unsettled", where, rounds=ROUNDS, at=dial.intervals(loss.unsettled), change=worst)
 
 
-def _lost(loss: Loss, dial: Dial) -> str:
+def _lost(loss: Loss, numbers: NDArray[np.float64], dial: Dial) -> Finding:
     shown = [text for _, text in sorted(_told(loss.places, dial))]
     more = len(shown) - MOST_PLACES
-    text = ", ".join(shown[:MOST_PLACES]) + (f" and {more} more" if more > 0 else "")
+    at = ", ".join(shown[:MOST_PLACES]) + (f" and {more} more" if more > 0 else "")
     least = loss.least if loss.least > NO_LOAD * loss.peak else 0.0  # less than that is rounding
-    head = f"its {loss.part} loses contact {text}: the load comes down to {least:.3g} of {loss.peak:.4g} N, turns"
-    return f"{head} round and the seat would jump"
+    top = int(np.nanargmax(numbers)) if loss.turns and np.any(np.isfinite(numbers)) else None
+    return told(
+        "contact.lost", f"joints.{loss.joint}", part=loss.part, least=least, peak=loss.peak, at=at, likely=EARLES_WU,
+        number=None if top is None else numbers[top], turning="" if top is None else f"at {dial.at(top)}",
+    )  # fmt: skip
 
 
 def _told(places: Sequence[tuple[float, int]], dial: Dial) -> Iterator[tuple[float, str]]:
@@ -340,15 +332,6 @@ def _told(places: Sequence[tuple[float, int]], dial: Dial) -> Iterator[tuple[flo
                 yield run[0], f"between {_at(dial, run[0])} and {_at(dial, run[-1])}{name}"
             else:
                 yield from ((place, f"at {_at(dial, place)}{name}") for place in run)
-
-
-def _number(arrays: Arrays, i: int, dial: Dial) -> str:
-    numbers = arrays["contact_loss_number"][i]
-    if not np.any(np.isfinite(numbers)):
-        return "expect impact there"
-    top = int(np.nanargmax(numbers))
-    rest = f"elsewhere its reaction turns at up to {numbers[top]:.3g} rad/(N s), at {dial.at(top)}"
-    return f"expect impact there; {rest} (impact is likely from {EARLES_WU:g}: Earles and Wu)"
 
 
 def _at(dial: Dial, place: float) -> str:

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.namespace import Number
-from trunnion.errors import Finding, Severity, Status
+from trunnion.errors import Finding, Status
 from trunnion.groups import rpr, rrp, rrr
+from trunnion.results.sentences import told
 from trunnion.solve.backward import Backward
 from trunnion.solve.forward import Forward
 from trunnion.solve.system import Dial, Positions, System, rubbing, sticking
@@ -157,30 +158,27 @@ def findings(
     stuck = causes.stuck()
     stuck = stuck[status[stuck] == Status.ZERO_SLIP]
     if len(stuck):
-        what = f"a joint with friction turns round while its pin travels {dial.intervals(stuck)}: its friction may act "
-        found.append(Finding(f"{what}either way, and its seat with it", "joints", severity=Severity.NOTE))
+        found.append(told("friction.sense", "joints", at=dial.intervals(stuck)))
     for number, singular in causes.singular().items():
         module = causes.system.plan.modules[number]
         kind = "dead centre (singular position)" if module.rank == CLASS_TWO else "singular position"
-        what = f"{kind} {dial.intervals(singular)}: condition {_most(condition[singular])}"
-        remedy = "speeds and forces have no finite value there; keep out of it"
-        found.append(Finding(what, f"links {', '.join(module.links)}", remedy))
+        where, most = f"links {', '.join(module.links)}", _most(condition[singular])
+        found.append(
+            told("position.singular", where, at=dial.intervals(singular), condition=most, phrases={"kind": kind})
+        )
     for path, positions in causes.undefined().items():
-        what = f"has no value {dial.intervals(positions)}"
-        remedy = "its line has no direction where its ends meet: move one"
-        if path.startswith("loads."):
-            remedy = "let its tables reach over the whole cycle, or be periodic; check divisions and roots"
-        found.append(Finding(what, path, remedy))
+        code = "load.undefined" if path.startswith("loads.") else "spring.undefined"
+        found.append(told(code, path, at=dial.intervals(positions)))
     for number, (positions, share) in causes.locked().items():
         found.append(_locked(causes.system, dial, number, positions, share, near))
     late = np.flatnonzero(status == Status.NOT_CONVERGED)
     if len(late):
-        what = f"the friction iteration did not converge {dial.intervals(late)}"
-        found.append(Finding(what, "joints", "use the Newton method, a larger criterion or more iterations"))
+        found.append(told("friction.not_converged", "joints", at=dial.intervals(late)))
     close = np.flatnonzero(status == Status.NEAR_SINGULAR)
     if len(close):
-        what = f"close to a dead centre {dial.intervals(close)}: condition up to {_most(condition[close])}"
-        found.append(Finding(what, "links", "forces there are very sensitive to the dimensions", Severity.WARNING))
+        found.append(
+            told("position.near_singular", "links", at=dial.intervals(close), condition=_most(condition[close]))
+        )
     for joints, positions in _together(causes.zero_slip()):
         widths = [upper[positions] - lower[positions] for lower, upper, _ in efforts.values()]
         if not widths or np.any(np.array(widths) != 0):  # a coefficient of 0 leaves no interval
@@ -197,27 +195,14 @@ def _together(zero: dict[str, Positions]) -> list[tuple[str, Positions]]:
 
 
 def _not_assembled(causes: Causes, dial: Dial, part: _Open) -> Finding:
-    module = causes.system.plan.modules[part.module]
+    mechanism, module = causes.system.mechanism, causes.system.plan.modules[part.module]
     everywhere = len(part.positions) == len(dial.values) > 1
-    head = f"cannot be assembled {'at any position' if everywhere else dial.intervals(part.positions)}"
-    where = f"links {', '.join(module.links)}"
-    remedy = "change the lengths or the range of the driver"
+    where, at = f"links {', '.join(module.links)}", dial.intervals(part.positions)
     if not part.reasons:
-        why = "do not close" if everywhere else "do not get there from their start without being taken apart"
-        if everywhere and module.redundant:
-            remedy = "its joints constrain more than they free, so it closes with special dimensions only: check them, "
-            remedy += "or let joints slide or tilt (cylindrical, spherical)"
-            if causes.system.mechanism.has_errors:
-                why = "are over-constrained, and with their errors they go together only by their play, if at all: "
-                why += "they cannot be analysed as rigid parts"
-                remedy = "`trunnion assemble FILE` tells whether they go together, and how much play that takes"
-        return Finding(f"{head}: these links {why}", where, remedy)
-    told = [
-        f"{text} by up to {_length(float(np.nanmax(figure)))}"
-        for text, figure in part.reasons.items()
-        if np.any(figure > 0)
-    ]
-    return Finding(f"{head}: {'; '.join(told) or 'an earlier module has no position'}", where, remedy)
+        errors, redundant = mechanism.has_errors, bool(module.redundant)
+        return told("assembly.open", where, at=at, everywhere=everywhere, redundant=redundant, errors=errors)
+    gaps = {name: np.nanmax(sizes) for name, sizes in part.reasons.items() if np.any(sizes > 0)}
+    return told("assembly.gap", where, at=at, everywhere=everywhere, gaps=gaps)
 
 
 def _shortfalls(walk: Forward, number: int) -> dict[str, Number]:
@@ -251,22 +236,18 @@ def _locked(
 ) -> Finding:
     """How far it is from running, the joint that decides, and whether it locks the other way too."""
     module = system.plan.modules[number]
-    joints = ", ".join(name for name in module.joints if name in rubbing(system))
-    worst = float(np.min(share))
-    what = (
-        f"locked by friction {dial.intervals(positions)}: no solution beyond {worst:.4g} of the friction "
-        f"in joints {joints}"
-    )
-    remedy = f"lower these coefficients below {worst:.3g} of their values, shorten the arms or lengthen the guides"
+    joints = [name for name in module.joints if name in rubbing(system)]
+    reverse, decides, multiple = "", "", None
     if near is not None:
         both = near.locked & near.back.locked
-        if np.any(both):
-            everywhere = np.array_equal(both, near.locked)
-            what += "; it locks in reverse too: jammed" + ("" if everywhere else " at some of them")
-        decides = near.responsible()
-        if decides and decides[0] in module.joints:
-            remedy = f"{decides[0]} decides: below {decides[1]:.3g} of its coefficient alone it runs; or {remedy}"
-    return Finding(what, f"links {', '.join(module.links)}", remedy)
+        reverse = "" if not np.any(both) else "all" if np.array_equal(both, near.locked) else "some"
+        responsible = near.responsible()
+        if responsible and responsible[0] in module.joints:
+            decides, multiple = responsible
+    return told(
+        "friction.locked", f"links {', '.join(module.links)}", at=dial.intervals(positions), share=np.min(share),
+        joints=joints, reverse=reverse, decides=decides, multiple=multiple,
+    )  # fmt: skip
 
 
 def _zero_slip(
@@ -275,29 +256,17 @@ def _zero_slip(
     positions: Positions,
     efforts: dict[str, tuple[NDArray[np.float64], NDArray[np.float64], str]],
 ) -> Finding:
-    parts = []
+    widest: dict[str, dict[str, float | str]] = {}
     for driver, (lower, upper, unit) in efforts.items():
         widths = upper[positions] - lower[positions]
         if np.any(np.isfinite(widths)):
-            worst = int(np.nanargmax(widths))
-            place = positions[worst]
-            parts.append(f"effort of {driver} {lower[place]:.6g} … {upper[place]:.6g} {unit} at {dial.at(place)}")
-    bounds = ", ".join(parts) or ("with one sign it locks, so the effort has no bounds" if efforts else "")
-    what = f"relative speed zero {dial.intervals(positions)}: what resists it is an interval"
-    what += f"; {bounds}" if bounds else ""
-    return Finding(
-        what, f"joints.{joints}", "the bounds are in drive_effort_lower and drive_effort_upper", Severity.NOTE
-    )
+            k = positions[int(np.nanargmax(widths))]
+            widest[driver] = {"from": lower[k], "to": upper[k], "unit": unit, "at": f"at {dial.at(k)}"}
+    where, at = f"joints.{joints}", dial.intervals(positions)
+    return told("friction.interval", where, at=at, efforts=widest, locks=bool(efforts))
 
 
-def _length(metres: float) -> str:
-    """A length in the unit a drawing would use."""
-    size = abs(metres)
-    if size >= 1:
-        return f"{metres:.4g} m"
-    return f"{metres * 1e3:.4g} mm" if size >= 1e-4 else f"{metres * 1e6:.4g} µm"
-
-
-def _most(values: NDArray[np.float64]) -> str:
+def _most(values: NDArray[np.float64]) -> float:
+    """The largest; ∞ if any has no value."""
     finite = values[np.isfinite(values)]
-    return f"{np.max(finite):.3g}" if len(finite) == len(values) and len(finite) else "∞"
+    return float(np.max(finite)) if len(finite) == len(values) and len(finite) else np.inf

@@ -13,6 +13,7 @@ from trunnion.cycle.positions import positions
 from trunnion.cycle.scene import pitch_circles
 from trunnion.errors import Finding, Severity
 from trunnion.model.mechanism import Mechanism
+from trunnion.results.sentences import told
 from trunnion.solve.assemblies import Choice, choices
 from trunnion.solve.forward import Forward, forward
 from trunnion.solve.run import Run, prepare
@@ -68,12 +69,7 @@ def check(mechanism: Mechanism, steps: int = 360) -> Check:
     walk = forward(run.system, run.values, run.chosen.assembly, run.cycle.times(steps))
     rank = run.determinacy.mobility if run.determinacy else _rank(walk)
     if run.determinacy is None and rank is not None and rank != run.system.plan.mobility:
-        what = (
-            f"the mobility is {run.system.plan.mobility} by Grübler's formula and {rank} by the rank of the constraints"
-        )
-        found.append(
-            Finding(what, "joints", "a special geometry: reactions or motion are not determined", Severity.WARNING)
-        )
+        found.append(told("mobility.special", "joints", formula=run.system.plan.mobility, rank=rank))
     order = list(Severity)
     found.sort(key=lambda finding: order.index(finding.severity))
     return Check(run.system.plan, rank, run.chosen.found, choices(run), tuple(found), _gears(run))

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from trunnion.algebra import linalg
 from trunnion.algebra.dual import primal
 from trunnion.algebra.quadrature import CANCELLED, integrals
-from trunnion.errors import Finding, Severity, counted
+from trunnion.errors import Finding, counted
 from trunnion.results.figure import MORE_THAN, Figure
+from trunnion.results.sentences import told
 from trunnion.solve import continuation
 from trunnion.solve.backward import Backward, Given, backward
 from trunnion.solve.bristles import histories
@@ -310,9 +311,7 @@ def findings(near: Locking, dial: Dial) -> Iterator[Finding]:
     more = np.flatnonzero((near.others > 0) & ~near.locked)
     if len(more):
         count = int(np.max(near.others[more]))
-        what = f"friction allows up to {count} other solution{'s' if count > 1 else ''} {dial.intervals(more)}"
-        remedy = "the one that grows from no friction is given; started otherwise it may wedge"
-        yield Finding(what, "joints", remedy, Severity.NOTE)
+        yield told("friction.other_solutions", "joints", count=count, at=dial.intervals(more))
 
 
 def _locks(back: Backward) -> NDArray[np.bool_]:

@@ -40,11 +40,10 @@ def codes(what: str, of: type[IntEnum]) -> dict[str, str]:
     }
 
 
-def finding_rows(findings: Iterable[Finding]) -> list[dict[str, str]]:
+def finding_rows(findings: Iterable[Finding]) -> list[dict[str, Any]]:
     """Findings for JSON."""
-    return [
-        {"severity": str(one.severity), "where": one.where, "what": one.what, "remedy": one.remedy} for one in findings
-    ]
+    keys = ("severity", "where", "what", "remedy", "code")
+    return [{key: str(getattr(one, key)) for key in keys} | {"figures": dict(one.figures)} for one in findings]
 
 
 def encoded(attributes: Mapping[str, Any]) -> dict[str, Any]:
@@ -62,8 +61,13 @@ def attribute(result: xr.Dataset | xr.DataArray, name: str, default: str = "[]")
 
 def findings_of(result: xr.Dataset) -> list[Finding]:
     """The findings that a result carries."""
-    rows = attribute(result, "findings")
-    return [Finding(row["what"], row["where"], row["remedy"], Severity(row["severity"])) for row in rows]
+    return [
+        Finding(
+            row["what"], row["where"], row["remedy"], Severity(row["severity"]),
+            code=row.get("code", ""), figures=row.get("figures", {}),
+        )
+        for row in attribute(result, "findings")
+    ]  # fmt: skip
 
 
 def figure_rows(figures: Iterable[Figure]) -> list[dict[str, Any]]:

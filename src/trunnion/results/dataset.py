@@ -68,15 +68,18 @@ def driven(time: NDArray[np.float64], values: ArrayLike, unit: str, of: str) -> 
 
 
 def dataset_of(
+    kind: str,
     variables: Mapping[str, xr.Variable],
     labels: Mapping[str, Sequence[str]],
     attributes: Mapping[str, Any],
     along: Mapping[str, Any] | None = None,
 ) -> xr.Dataset:
-    """A result. labels: names along its dimensions; attributes: lists and dicts become JSON; along: other coordinates,
-    as xarray takes them.
+    """A result of a kind, see `results.columns`.
+
+    labels: names along its dimensions; attributes: lists and dicts become JSON; along: other coordinates, as xarray
+    takes them.
     """
     import xarray as xr
 
     names = {dim: (dim, np.asarray(members, dtype=str)) for dim, members in labels.items()}
-    return xr.Dataset(variables, {**names, **(along or {})}, encoded(attributes))
+    return xr.Dataset(variables, {**names, **(along or {})}, {"kind": kind, **encoded(attributes)})

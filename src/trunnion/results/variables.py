@@ -214,4 +214,4 @@ def dataset(
     found = described(arrays, known) | described({name: getattr(means, name) for name in CYCLE}, CYCLE)
     if ideal is not None:
         found |= described({name: getattr(ideal, name.removesuffix("_ideal")) for name in IDEAL}, IDEAL)
-    return dataset_of(found, labels, attributes, described({"time": time}, {"time": TIME}))
+    return dataset_of("cycle", found, labels, attributes, described({"time": time}, {"time": TIME}))

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.nested import each
-from trunnion.errors import Finding, MechanismError, Severity, agreeing
+from trunnion.errors import Finding, MechanismError, agreeing
 from trunnion.groups.gear import NUMBERS, rotation
 from trunnion.groups.general import OUTER
 from trunnion.groups.protocol import Elements
@@ -26,6 +26,7 @@ from trunnion.groups.spatial import SpatialGroup
 from trunnion.groups.spins import unspun
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.names import as_key
+from trunnion.results.sentences import told
 from trunnion.solve import change_points
 from trunnion.solve.branch_tracking import Follower, assemblies, at, closing, lane_of, limits
 from trunnion.solve.forward import Forward, pose_of, start
@@ -207,7 +208,7 @@ def _misnamed(system: System) -> list[Finding]:
 
 def _unstated(walk: Forward, module: Module, count: int) -> Finding:
     """Where neither a name nor a place decides: there is no hint, or one that does not tell the assemblies apart."""
-    system, links = walk.system, ", ".join(module.links)
+    system = walk.system
     given = list(dict.fromkeys(name for _, name, _ in hints(walk, module)))
     known = [key for key in system.mechanism.assembly if key in module.joints and key not in given]
     why, names = "no hint says which", given or known
@@ -215,7 +216,6 @@ def _unstated(walk: Forward, module: Module, count: int) -> Finding:
         why = f"the {agreeing(len(names), 'hint', 'hints')} of {' and '.join(names)} "
         why += agreeing(len(names), "does", "do") + " not tell them apart"
         why += "" if given else f", for {agreeing(len(names), 'its place is', 'their places are')} the same in all"
-    what = f"links {links} can be assembled in {count} ways and {why}; one was taken"
     free = [joint for joint in module.joints if joint not in known] or list(module.joints)
     joint = module.joints[len(module.joints) // 2]
     joint = joint if joint in free else free[0]
@@ -227,28 +227,26 @@ def _unstated(walk: Forward, module: Module, count: int) -> Finding:
     remedy = f"say roughly {place} at the start, e.g. assembly: {hint}, or name one as `check` does"
     if given:
         remedy = "give a hint that is nearer to one of them, or name one as `check` does"
-    return Finding(what, "assembly", remedy, Severity.WARNING)
+    phrases = {"why": why, "remedy": remedy}
+    return told("assembly.choice", "assembly", links=list(module.links), ways=count, phrases=phrases)
 
 
 def _anew(module: Module, dial: Dial, positions: Positions) -> Finding:
-    links = ", ".join(module.links)
-    what = f"links {links} come apart on the way and are put together anew {dial.intervals(positions)}"
-    remedy = "there the assembly of the same sense nearest to the one before is shown; limit the range of the driver"
-    return Finding(what, "links", remedy, Severity.WARNING)
+    return told("assembly.anew", "links", links=list(module.links), at=dial.intervals(positions))
 
 
 def _never(system: System, module: Module) -> Finding:
-    what = f"links {', '.join(module.links)} cannot be assembled anywhere along the cycle"
-    remedy = "check the lengths, or give a better assembly hint"
-    if module.redundant and system.mechanism.has_errors:
-        what = f"links {', '.join(module.links)} with their errors do not close as rigid parts anywhere along the cycle"
-        remedy = "if they go together it is by their play only: `trunnion assemble FILE` tells how much that takes"
-    elif module.redundant:
-        plan, drivers = system.plan, len(system.mechanism.drivers)
-        spins = f" ({len(plan.passive)} of it spins of a link alone)" if plan.passive else ""
-        what += f"; the mobility is {plan.mobility} by Grübler's formula{spins} and the number of drivers {drivers}"
-        remedy += "; only special dimensions let so many constraints agree: remove a driver or free a joint"
-    return Finding(what, "links", remedy, Severity.WARNING)
+    links = list(module.links)
+    if not module.redundant:
+        return told("assembly.never", "links", links=links)
+    if system.mechanism.has_errors:
+        return told("assembly.never_rigid", "links", links=links)
+    plan, drivers = system.plan, len(system.mechanism.drivers)
+    spinning = f" ({len(plan.passive)} of it spins of a link alone)" if plan.passive else ""
+    return told(
+        "assembly.over_constrained", "links", links=links, formula=plan.mobility, drivers=drivers,
+        phrases={"spinning": spinning},
+    )  # fmt: skip
 
 
 # ---- closed forms ---------------------------------------------------------------------------------------------

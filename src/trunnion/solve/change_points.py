@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.errors import Finding
+from trunnion.results.sentences import told
 from trunnion.solve.forward import Forward, pose_of, start
 from trunnion.solve.system import System, Values
 from trunnion.structure.decompose import Module
@@ -22,13 +23,9 @@ TOUCHING = 1e-6  # of 1/condition: below it two assemblies meet
 
 def finding(system: System, values: Values, module: Module, at: Sequence[float]) -> Finding:
     """What to say of change points at these times."""
-    where = ", ".join(system.dial(values, np.array([moment])).at(0) for moment in at)
-    what = f"passes a change point at {where}: two assemblies of the links {', '.join(module.links)} meet there"
-    remedy = (
-        f"which way it goes on is not determined; here {module.joints[1]} stays on its side. Change a length, or "
-        "drive it over a range that ends before"
-    )
-    return Finding(what, f"links {', '.join(module.links)}", remedy)
+    places = [system.dial(values, np.array([moment])).at(0) for moment in at]
+    links, joint = list(module.links), module.joints[1]
+    return told("assembly.change_point", f"links {', '.join(links)}", places=places, links=links, joint=joint)
 
 
 def suspects(margin: Array) -> NDArray[np.bool_]:

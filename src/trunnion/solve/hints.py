@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.nested import each
-from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.errors import Finding, MechanismError
 from trunnion.joints.pairs import PAIRS
+from trunnion.results.sentences import told
 from trunnion.solve.forward import Forward
 from trunnion.solve.system import System
 from trunnion.structure.decompose import Module
@@ -73,12 +74,11 @@ def told_twice(walk: Forward, module: Module, named: int, placed: int | None) ->
     places = [name for _, name, _ in hints(walk, module)]
     if not places:
         return []
-    key, name = _names(walk.system, module)[0]
-    what = f"the links {', '.join(module.links)} are chosen by name and by where {', '.join(places)} is"
+    links, (key, name) = list(module.links), _names(walk.system, module)[0]
     if placed is not None and placed != named:
-        what += f", which would be {way_name(placed)}; the name, {name}, is taken"
-        return [Finding(what, f"assembly.{key}", "remove one of them", Severity.WARNING)]
-    return [Finding(what, f"assembly.{key}", "one of them is enough", Severity.NOTE)]
+        way = way_name(placed)
+        return [told("assembly.contradiction", f"assembly.{key}", links=links, places=places, way=way, name=name)]
+    return [told("assembly.told_twice", f"assembly.{key}", links=links, places=places)]
 
 
 def hints(walk: Forward, module: Module) -> list[tuple[str, str, tuple[Number, ...]]]:

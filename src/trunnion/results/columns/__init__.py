@@ -1,21 +1,65 @@
-"""Results that have several tables: which module knows the columns of each."""
+"""The flat columns of every kind of result, chosen from one table."""
 
 from __future__ import annotations
 
+import os
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from trunnion.results.columns import comparison, identification, tolerances
+from trunnion.results.columns import comparison, cycle, identification, studies, tolerances
+from trunnion.results.columns.column import Column, whole
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["tables_of"]
+__all__ = ["KINDS", "Column", "columns", "kind_of", "table_of"]
+
+Tables = Mapping[str, Callable[[Any], list[Column]]]
 
 
-def tables_of(result: xr.Dataset) -> Any:
-    """The module that knows the tables of a result; None of one that has a single table."""
-    if tolerances.is_tolerance(result):
-        return tolerances
-    if comparison.is_comparison(result):
-        return comparison
-    return identification if identification.is_identification(result) else None
+def _whole(flat: Callable[[Any], Any]) -> Callable[[Any], list[Column]]:
+    return lambda result: whole(flat(result))
+
+
+def _swept(result: xr.Dataset) -> Iterator[tuple[str, str, Any]]:
+    return ((name, unit, values) for name, (unit, values) in studies.swept(result).items())
+
+
+_OF_TOLERANCES = {name: _whole(flat) for name, flat in tolerances.TABLES.items()}
+# the kinds of results: of each its tables by name, the one that a file holds first if its name says nothing else
+KINDS: dict[str, Tables] = {
+    "cycle": {"positions": cycle.positions},
+    "sweep": {"points": _whole(_swept)},
+    "play": {"positions": studies.played},
+    "assembly": {"positions": studies.fitted},
+    "measurement": {"courses": _whole(studies.courses)},
+    "comparison": {name: _whole(flat) for name, flat in comparison.TABLES.items()},
+    "identification": {name: _whole(flat) for name, flat in identification.TABLES.items()},
+    "tolerance": _OF_TOLERANCES,
+    "allocation": {"parameters": _OF_TOLERANCES["parameters"], **_OF_TOLERANCES},
+}
+# by what a result is known that names no kind, of an older version: an attribute, a dimension or a variable
+_MARKS = {
+    "identified": "identification", "comparing": "comparison", "swept": "sweep", "bought": "allocation",
+    "parameter": "tolerance", "measure": "play", "assembling": "assembly", "setting": "measurement",
+}  # fmt: skip
+
+
+def kind_of(result: xr.Dataset) -> str:
+    """The kind of a result, of KINDS."""
+    known = {str(name) for name in (*result.attrs, *result.dims, *result.variables)}
+    return str(result.attrs.get("kind", "")) or next((_MARKS[mark] for mark in _MARKS if mark in known), "cycle")
+
+
+def columns(result: xr.Dataset, table: str = "") -> list[Column]:
+    """(name, unit, values of a window of rows) of every flat column of a table, the first if none is named."""
+    tables = KINDS[kind_of(result)]
+    return tables[table or next(iter(tables))](result)
+
+
+def table_of(path: str | os.PathLike[str], result: xr.Dataset) -> str:
+    """The table that a file of this name holds: of `x.positions.csv` the positions, if there is such a table."""
+    tables = KINDS[kind_of(result)]
+    inner = Path(Path(path).stem).suffix.lstrip(".").lower()
+    return inner if inner in tables else next(iter(tables))

@@ -8,7 +8,6 @@ efficiency. SI.
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,29 +16,12 @@ from numpy.typing import NDArray
 from trunnion.results.attributes import attribute
 
 if TYPE_CHECKING:
-    import os
-
     import xarray as xr
 
-__all__ = ["flat", "is_comparison", "table_of"]
+__all__ = ["TABLES"]
 
 Flat = list[tuple[str, str, NDArray[Any]]]
 COURSES = ("measured", "scatter", "uncertainty", "expanded", "model", "residual", "compared")
-
-
-def is_comparison(result: xr.Dataset) -> bool:
-    """Whether it is a result of `compare`."""
-    return "comparing" in result.attrs
-
-
-def table_of(path: str | os.PathLike[str], result: xr.Dataset) -> str:
-    """The table that a file of this name holds: of `x.figures.csv` the figures, else the courses."""
-    return "figures" if Path(Path(path).stem).suffix.lower() == ".figures" else "courses"
-
-
-def flat(result: xr.Dataset, table: str) -> Flat:
-    """(name, unit, values) of every column of a table."""
-    return _figures(result) if table == "figures" else _courses(result)
 
 
 def _named(result: xr.Dataset, what: str, codes: NDArray[Any]) -> NDArray[Any]:
@@ -94,3 +76,6 @@ def _figures(result: xr.Dataset) -> Flat:
         elif one.dims == ("condition",):
             found.append((str(name), str(one.attrs["units"]), np.repeat(one.values, channels)))
     return found
+
+
+TABLES = {"courses": _courses, "figures": _figures}

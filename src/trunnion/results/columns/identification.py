@@ -6,7 +6,6 @@ in SI; a unit that is not one for a whole column is in the column `unit`.
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,35 +14,15 @@ from numpy.typing import NDArray
 from trunnion.results.attributes import attribute
 
 if TYPE_CHECKING:
-    import os
-
     import xarray as xr
 
-__all__ = ["flat", "is_identification", "table_of"]
+__all__ = ["TABLES"]
 
 Flat = list[tuple[str, str, NDArray[Any]]]
 FIGURES = ("start", "estimate", "standard_uncertainty", "lower", "upper")
 FITS = ("rms_before", "rms_after", "rms_expected", "held_out_before", "held_out_after", "held_out_expected")
 COUNTS = ("turns", "used", "left_out", "held_out_turns")
 CURVES = ("measured", "residual_before", "residual_after", "residual_uncertainty")
-
-
-def is_identification(result: xr.Dataset) -> bool:
-    """Whether it is a result of `identify`."""
-    return "identified" in result.attrs
-
-
-def table_of(path: str | os.PathLike[str], result: xr.Dataset) -> str:
-    """The table that a file of this name holds: of `x.fit.csv` fit, else parameters."""
-    inner = Path(Path(path).stem).suffix.lstrip(".").lower()
-    return inner if inner in ("fit", "residuals") else "parameters"
-
-
-def flat(result: xr.Dataset, table: str) -> Flat:
-    """(name, unit, values) of every column of a table."""
-    if table == "fit":
-        return _fits(result)
-    return _residuals(result) if table == "residuals" else _parameters(result)
 
 
 def _texts(values: Any) -> NDArray[Any]:
@@ -95,3 +74,6 @@ def _residuals(result: xr.Dataset) -> Flat:
     found = _subjects(result, index)
     found.append(("phase", "1", result["phase"].values[index[:, 1], index[:, 2]]))
     return found + [(key, "", result[key].values[tuple(index.T)]) for key in CURVES]
+
+
+TABLES = {"parameters": _parameters, "fit": _fits, "residuals": _residuals}

@@ -9,7 +9,6 @@ the drive is at: degrees, mm or s. A unit that is not one for a whole column is 
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,11 +17,9 @@ from numpy.typing import NDArray
 from trunnion.results.attributes import attribute
 
 if TYPE_CHECKING:
-    import os
-
     import xarray as xr
 
-__all__ = ["TABLES", "flat", "is_tolerance", "table_of"]
+__all__ = ["TABLES"]
 
 Values = NDArray[Any]
 Flat = list[tuple[str, str, Values]]
@@ -41,22 +38,6 @@ SHARES = (
     "skewness",
     "kurtosis",
 )
-
-
-def is_tolerance(result: xr.Dataset) -> bool:
-    """Whether it is a result of `tolerance`."""
-    return {"measure", "parameter"} <= set(result.dims)
-
-
-def table_of(path: str | os.PathLike[str], result: xr.Dataset) -> str:
-    """The table that a file of this name holds: of `x.positions.csv` positions, else measures or what is bought."""
-    inner = Path(Path(path).stem).suffix.lstrip(".").lower()
-    return inner if inner in TABLES else ("parameters" if "bought" in result else "measures")
-
-
-def flat(result: xr.Dataset, table: str) -> Flat:
-    """(name, unit, values) of every column of a table."""
-    return TABLES[table](result)
 
 
 def _units(result: xr.Dataset) -> list[str]:

@@ -96,7 +96,7 @@ def dataset(
         arrays = {name: array for name, array in arrays.items() if name not in EFFICIENCY}
     labels = {"channel": list(channels), "condition": [one.condition.name for one in found], "set": sets}
     attributes = _attributes(mechanism, measurement, channels, found, coverage, method)
-    return dataset_of(described(arrays, VARIABLES), labels, attributes)
+    return dataset_of("comparison", described(arrays, VARIABLES), labels, attributes)
 
 
 def _fill(
@@ -188,7 +188,7 @@ def _all_within(found: Sequence[Compared]) -> bool:
     return courses and all(one.efficiency.within for one in found if one.efficiency is not None)
 
 
-def data_findings(measurement: Measurement) -> list[dict[str, str]]:
+def data_findings(measurement: Measurement) -> list[dict[str, Any]]:
     """What was found while the data were read, with the file."""
     told = gathered(measurement.findings)
     return [{**row, "file": one.file} for row, one in zip(finding_rows(told), told, strict=True)]

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,6 +17,7 @@ from trunnion.model.expression import LITERAL
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.names import as_key
 from trunnion.model.units import unit as unit_of
+from trunnion.results.sentences import told
 from trunnion.rig.compare.causes import KINDS, Cause
 from trunnion.rig.compare.judge import Verdict, going_on
 
@@ -60,11 +60,11 @@ def units_set(
     That of the names of the conditions, such as `input.speed 250 rpm`, else the one that the model states it in.
     """
     known = {row["path"]: row for row in inputs(mechanism)}
-    told = dict(part.partition(" ")[::2] for name in conditions for part in name.split(", "))
+    stated = dict(part.partition(" ")[::2] for name in conditions for part in name.split(", "))
     units, written = [], []
     for name in names:
         row = known.get(mechanism.path_of(name), {"unit": "", "text": ""})
-        literals = (LITERAL.fullmatch(one.strip().removeprefix("-")) for one in (told.get(name, ""), row["text"]))
+        literals = (LITERAL.fullmatch(one.strip().removeprefix("-")) for one in (stated.get(name, ""), row["text"]))
         text = next((one["unit"] or one["per"] or "" for one in literals if one and (one["unit"] or one["per"])), "")
         text = text or {"rad": "deg"}.get(row["unit"], row["unit"])
         units.append(row["unit"])
@@ -73,12 +73,11 @@ def units_set(
 
 
 def gathered(findings: Iterable[Finding]) -> list[Finding]:
-    """Findings about data files, those that differ in numbers only told once, with the files they are of."""
+    """Findings about data files, those of one code and place only told once, with the files they are of."""
     alike: dict[tuple[str, ...], list[Finding]] = {}
     for one in findings:
-        what = re.sub(r"[-−+]?\d[\d.,e+-]*", "#", one.what)
-        alike.setdefault((one.severity, one.where.partition(" ")[0], what, one.remedy), []).append(one)
-    told = []
+        alike.setdefault((one.severity, one.where.partition(" ")[0], one.code, one.remedy), []).append(one)
+    found = []
     for rows in alike.values():
         first, files = rows[0], list(dict.fromkeys(Path(one.file).name for one in rows if one.file))
         if len(rows) > 1:
@@ -86,8 +85,8 @@ def gathered(findings: Iterable[Finding]) -> list[Finding]:
             some = ", ".join(files[:4]) + (", …" if len(files) > 4 else "")
             what = f"{first.what} — and so {len(rows)} times in all" + (f": {some}" if files else "")
             first = replace(first, what=what, where=where, file="", line=None)
-        told.append(first)
-    return told
+        found.append(first)
+    return found
 
 
 def said(value: float, unit: str, signed: bool = False) -> str:
@@ -138,17 +137,14 @@ def _of_channel(name: str, measures: str, found: Sequence[Compared]) -> Iterator
     once = "was measured in one turn only"
     if max(unknown, default=1) > 1:
         once = f"has values of no more than one turn at a position, of up to {max(unknown)} that were measured"
-    for verdict, what, remedy in (
-        (
-            Verdict.UNKNOWN,
-            f"{once}: without scatter its uncertainty is not known",
-            "look at the gaps that `trunnion data` reports" if max(unknown, default=1) > 1 else "measure more turns",
-        ),
-        (Verdict.NOTHING, "has nothing to compare: nothing measured, or no answer of the model", ""),
-    ):
+    turns = max(unknown, default=1)
+    for verdict, code, figures in (
+        (Verdict.UNKNOWN, "compare.turns_few", {"turns": turns}), (Verdict.NOTHING, "compare.nothing", {})
+    ):  # fmt: skip
         names = [one.condition.name for one, pair in cases if pair.judged.verdict is verdict]
         if names:
-            yield Finding(f"{what}, {_in(names, len(cases))}", f"channels.{name}", remedy, Severity.WARNING)
+            phrases = {"cases": _in(names, len(cases)), "once": once}
+            yield told(code, f"channels.{name}", severity=None, phrases=phrases, **figures)
 
 
 def _explained(name: str, measures: str, kind: str, members: Sequence[tuple[Compared, Pair]], of: int) -> Finding:
@@ -160,22 +156,20 @@ def _explained(name: str, measures: str, kind: str, members: Sequence[tuple[Comp
     offset = all(pair.judged.verdict is Verdict.OFFSET for _, pair in members)
     if offset and kind == "zero":
         story, remedy = _story(name, measures, kind, [_size(pair, kind) for _, pair in members], members)
-        what = f"is within U {where} apart from {story}: {_share(worst)} of the positions are within with it"
-        return Finding(what, f"channels.{name}", remedy)
-    several = len(members) > 1
-    what = (
-        f"is not within U {where}: {'down to ' if several else ''}{_share(worst)} of the positions are within, RMS of "
-        f"the residual {'up to ' if several else ''}{said(rms, unit)}"
-    )
-    if not kind:
-        remedy = "look at the residual along the cycle; `trunnion identify` fits numbers of the model to it"
-        return Finding(what, f"channels.{name}", remedy)
-    sizes = [_size(pair, kind) for _, pair in members]
-    least = min(cause.explains for cause in sizes)
-    story, remedy = _story(name, measures, kind, sizes, members)
-    alike = {other.kind for _, pair in members for other in pair.others} - {kind}
-    also = f"; {' or '.join(KINDS[one] for one in KINDS if one in alike)} would explain as much" if alike else ""
-    return Finding(f"{what}; {story} explains {_share(least)} of its mean square{also}", f"channels.{name}", remedy)
+        phrases = {"cases": where, "story": story, "remedy": remedy}
+        return told("compare.offset", f"channels.{name}", phrases=phrases, within_percent=100 * worst)
+    remedy = "look at the residual along the cycle; `trunnion identify` fits numbers of the model to it"
+    phrases = {"cases": where, "rms_told": said(rms, unit), "explained": "", "remedy": remedy}
+    figures: dict[str, Any] = {"within_percent": 100 * worst, "rms": rms, "several": len(members) > 1, "cause": kind}
+    if kind:
+        sizes = [_size(pair, kind) for _, pair in members]
+        least = min(cause.explains for cause in sizes)
+        story, phrases["remedy"] = _story(name, measures, kind, sizes, members)
+        alike = {other.kind for _, pair in members for other in pair.others} - {kind}
+        also = f"; {' or '.join(KINDS[one] for one in KINDS if one in alike)} would explain as much" if alike else ""
+        phrases["explained"] = f"; {story} explains {_share(least)} of its mean square{also}"
+        figures["explains"] = least
+    return told("compare.not_within", f"channels.{name}", severity=None, phrases=phrases, **figures)
 
 
 def _size(pair: Pair, kind: str) -> Cause:
@@ -207,25 +201,25 @@ def _story(
     driver = first.model.run.system.mechanism.drivers.get(subject)
     if driver is not None and driver.speed is not None and kind in ("zero", "gain"):  # not one that swings
         speed = float(np.nanmean(pair.course.mean))
-        told = _range(values, unit) if kind == "zero" else _percent(values)
+        story = _range(values, unit) if kind == "zero" else _percent(values)
         remedy = f"set: {{{subject}.speed: {{mean: {name}}}}} in the mapping takes the speed that was"
-        return f"another speed of the driver, measured {said(speed, unit)} ({KINDS[kind]} of {told})", remedy
+        return f"another speed of the driver, measured {said(speed, unit)} ({KINDS[kind]} of {story})", remedy
     if kind == "sign":
         alike = pair.judged.correlation
-        told = "a wrong sign" + (f", correlation {alike:+.3f}," if np.isfinite(alike) else "")
+        story = "a wrong sign" + (f", correlation {alike:+.3f}," if np.isfinite(alike) else "")
     elif kind == "zero":
-        told = f"a constant offset of {_range(values, unit)}"
+        story = f"a constant offset of {_range(values, unit)}"
     elif kind == "gain":
-        told = f"a gain that is {_times(values) or f'off by {_percent(values)}'}"
+        story = f"a gain that is {_times(values) or f'off by {_percent(values)}'}"
     elif kind == "flat":
-        told = f"a reading that stays at {_range(values, unit, False)} whatever the crank angle"
+        story = f"a reading that stays at {_range(values, unit, False)} whatever the crank angle"
     elif kind == "shift":
-        told = _ahead(values, [one for one, _ in members])
+        story = _ahead(values, [one for one, _ in members])
     elif kind == "mirror":
-        told = KINDS[kind]
+        story = KINDS[kind]
     else:
-        told = f"an offset of {_range(values, unit)} and a gain off by {_percent([one.gain for one in sizes])}"
-    return told, MODEL if kind in ("zero", "gain") and _differ(kind, sizes, members) else REMEDIES[kind]
+        story = f"an offset of {_range(values, unit)} and a gain off by {_percent([one.gain for one in sizes])}"
+    return story, MODEL if kind in ("zero", "gain") and _differ(kind, sizes, members) else REMEDIES[kind]
 
 
 def _differ(kind: str, sizes: Sequence[Cause], members: Sequence[tuple[Compared, Pair]]) -> bool:
@@ -289,11 +283,9 @@ def _shifts(found: Sequence[Compared]) -> Iterator[Finding]:
     unit, mean = cases[0][1].model.unit, float(np.mean(ahead))
     names = ", ".join(dict.fromkeys(name for name, _, _ in cases))
     where = _in(list(dict.fromkeys(one.condition.name for _, one, _ in cases)), len(found))
-    what = (
-        f"{names} are not within U {where}; the crank angle read off by {_range(ahead, unit)} explains "
-        f"{_share(min(cause.explains for _, _, cause in cases))} of the mean square of the residuals"
-    )
-    yield Finding(what, "angle.zero", f"add {said(mean, unit, signed=True)} to the zero of the angle in the mapping")
+    least = min(cause.explains for _, _, cause in cases)
+    phrases = {"cases": where, "channels": names, "range": _range(ahead, unit), "mean_told": said(mean, unit, True)}
+    yield told("compare.angle_shifted", "angle.zero", phrases=phrases, explains_percent=100 * least, mean=mean)
 
 
 # ---- efficiency, the model, the sensors -----------------------------------------------------------------------
@@ -301,24 +293,22 @@ def _shifts(found: Sequence[Compared]) -> Iterator[Finding]:
 
 def _efficiencies(found: Sequence[Compared]) -> Iterator[Finding]:
     known = [(one, one.efficiency) for one in found if one.efficiency is not None]
-    told = [(one, of) for one, of in known if np.isfinite([of.measured, of.expanded, of.model]).all()]
-    off = [(one, of) for one, of in told if not of.within]
+    finite = [(one, of) for one, of in known if np.isfinite([of.measured, of.expanded, of.model]).all()]
+    off = [(one, of) for one, of in finite if not of.within]
     if off:
         one, of = max(off, key=lambda case: abs(case[1].measured - case[1].model))
         most = f"; the most in {one.condition.name}" if len(off) > 1 else ""
-        what = (
-            f"the model's is not within U {_in([case.condition.name for case, _ in off], len(known))}{most}: "
-            f"measured {of.measured:.4f} ± {of.expanded:.2g}, model {of.model:.4f}"
-        )
-        yield Finding(what, "efficiency", "look at the channels; `trunnion identify` fits friction to them")
+        phrases = {"cases": _in([case.condition.name for case, _ in off], len(known)), "most": most}
+        figures = {"measured": of.measured, "expanded": of.expanded, "model": of.model}
+        yield told("compare.efficiency", "efficiency", severity=None, phrases=phrases, **figures)
     for missing in dict.fromkeys(one.unmeasured for one in found if one.unmeasured):
         where = _in([one.condition.name for one in found if one.unmeasured == missing], len(found))
-        what = f"is not compared {where}: the power of {', '.join(missing)} is not measured"
-        remedy = "measure effort: of every driver and load: of every useful load, each with its rate:"
-        yield Finding(what, "efficiency", remedy, Severity.WARNING)
+        phrases = {"cases": where}
+        yield told("compare.efficiency_unmeasured", "efficiency", phrases=phrases, missing=list(missing))
     for reason in dict.fromkeys(of.reason for _, of in known if of.reason[0]):
         where = _in([one.condition.name for one, of in known if of.reason == reason], len(known))
-        yield Finding(f"is not known {where}: {reason[0]}", "efficiency", reason[1], Severity.WARNING)
+        phrases = {"cases": where, "reason": reason[0], "remedy": reason[1]}
+        yield told("compare.efficiency_unknown", "efficiency", phrases=phrases)
 
 
 def _speeds(found: Sequence[Compared]) -> Iterator[Finding]:
@@ -338,13 +328,12 @@ def other_speed(driver: str, rows: Sequence[tuple[str, float, float]], of: int) 
     off = [row for row in rows if np.isfinite(row[1]) and abs(row[1] - row[2]) > SLOWER * abs(row[2])]
     if off:
         _, measured, theirs = off[0]
-        what = (
-            f"the driver did not turn at the model's speed {_in([row[0] for row in off], of)}: "
-            f"{said(measured, 'rad/s')} measured, {said(theirs, 'rad/s')} in the model"
-        )
-        key, where = as_key(f"{driver}.speed"), f"drivers.{driver}"
-        remedy = f"state set: {{{key}: {{mean: …}}}} in the mapping, of a channel that measures rate:{driver}"
-        yield Finding(what, where, remedy, Severity.WARNING)
+        phrases = {
+            "cases": _in([row[0] for row in off], of), "key": as_key(f"{driver}.speed"),
+            "measured_told": said(measured, "rad/s"), "model_told": said(theirs, "rad/s"),
+        }  # fmt: skip
+        figures = {"measured": measured, "model": theirs, "driver": driver}
+        yield told("compare.speed", f"drivers.{driver}", severity=None, phrases=phrases, **figures)
 
 
 def _answers(found: Sequence[Compared]) -> Iterator[Finding]:
@@ -356,11 +345,11 @@ def _answers(found: Sequence[Compared]) -> Iterator[Finding]:
         cases = [(one, count) for one, count in cases if count]
         if cases:
             first, count = cases[0]
-            where = _in([one.condition.name for one, _ in cases], len(found))
-            size = len(first.condition.phase)
-            what = f"the model has no answer {where}, first at {count:,} of {counted(size, 'position')}: {code.text}"
             values = " ".join(f"--set {name}={value:.6g}" for name, value in first.condition.values.items())
-            yield Finding(what, "", f"run analyse {values}".rstrip() + ": it says where in the cycle, and why")
+            where = _in([one.condition.name for one, _ in cases], len(found))
+            phrases = {"cases": where, "analyse": f"run analyse {values}".rstrip()}
+            size = len(first.condition.phase)
+            yield told("compare.no_answer", phrases=phrases, count=count, positions=size, status=code.text)
 
 
 def _of_the_model(found: Sequence[Compared]) -> Iterator[Finding]:
@@ -383,26 +372,19 @@ def _left_out(found: Sequence[Compared]) -> Iterator[Finding]:
             counts[name] += int(np.count_nonzero(np.isfinite(pair.model) & ~pair.comparable))
     left = {name: count for name, count in counts.items() if count}
     if left:
-        told = ", ".join(f"{name} {count:,}" for name, count in left.items())
-        what = f"positions left out of the figures: {told}; a relative speed is zero there, or a dead centre near"
-        yield Finding(what, "", "the model has an interval there and not one number", Severity.NOTE)
+        yield told("compare.left_out", counts=left)
 
 
 def _going_on(channels: Mapping[str, str], found: Sequence[Compared]) -> Iterator[Finding]:
     """Channels whose errors go on from turn to turn, in all conditions together."""
     for name in channels:
-        told = [going_on(pair.course) for _, pair in _cases(name, found)]
-        count = sum(turns for _, turns in told)
+        alike = [going_on(pair.course) for _, pair in _cases(name, found)]
+        count = sum(turns for _, turns in alike)
         if not count:
             continue
-        mean = sum(value * turns for value, turns in told if turns) / count
+        mean = sum(value * turns for value, turns in alike if turns) / count
         if mean * math.sqrt(count) > SIGNIFICANT:
-            what = (
-                f"the errors of neighbouring turns are alike, correlation {mean:+.2f}: U, which takes turns as "
-                "independent, is too small, and so is that of the efficiency"
-            )
-            remedy = "measure many more turns, or apart from each other; state a zero that wanders in accuracy:"
-            yield Finding(what, f"channels.{name}", remedy, Severity.WARNING)
+            yield told("compare.turns_alike", f"channels.{name}", correlation=mean)
 
 
 def _accuracies(channels: Mapping[str, str], found: Sequence[Compared]) -> Iterator[Finding]:
@@ -411,11 +393,8 @@ def _accuracies(channels: Mapping[str, str], found: Sequence[Compared]) -> Itera
         if all(pair.course.accuracy.zero == pair.course.accuracy.gain == 0 for _, pair in _cases(name, found))
     ]  # fmt: skip
     if bare:
-        what = f"no accuracy of zero and gain is stated of {', '.join(bare)}: U has only the scatter between turns"
-        yield Finding(what, "channels", "state accuracy: {gain: …, zero: …} in the mapping", Severity.NOTE)
+        yield told("compare.no_accuracy", "channels", channels=bare)
 
 
 def _exact(mechanism: Mechanism) -> Finding:
-    what = "the model is taken as exact: the verdicts have the uncertainty of the measurement only"
-    remedy = "`trunnion tolerance` tells what the tolerances do to a measure" if mechanism.tolerances() else ""
-    return Finding(what, "", remedy, Severity.NOTE)
+    return told("compare.model_exact", toleranced=bool(mechanism.tolerances()))

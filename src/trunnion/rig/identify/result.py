@@ -66,7 +66,7 @@ def dataset(found: Identified) -> xr.Dataset:
         "references": "\n".join([*SOURCES, *references(found.mechanism)]),
         "findings": finding_rows(sentences(judged)),
     }
-    return dataset_of(variables, labels, attributes)
+    return dataset_of("identification", variables, labels, attributes)
 
 
 def _drive(found: Identified) -> str:

@@ -6,7 +6,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from trunnion.errors import Finding, Severity, Status, agreeing, counted
+from trunnion.errors import Finding, Severity, Status
+from trunnion.results.sentences import told
 from trunnion.rig.compare.said import other_speed
 from trunnion.rig.identify.amounts import amount, share
 from trunnion.rig.identify.blocks import OWN, shared_zero
@@ -46,26 +47,19 @@ def _search(judged: Judged) -> Iterator[Finding]:
     """How the search went."""
     search, problem = judged.found.search, judged.problem
     if search.shared < 1:
-        what = f"the start has no answer at some positions: the search began with {search.shared:g} of its friction"
-        yield Finding(what, "start", severity=Severity.NOTE)
+        yield told("search.start", "start", share=search.shared)
     if problem.refused:
-        were = "was" if problem.refused == 1 else "were"
-        what = f"{_count(problem.refused, 'step')} to where the model locks or cannot be assembled {were} taken back"
-        yield Finding(what, "search", severity=Severity.NOTE)
+        phrases = {"told": _count(problem.refused, "step")}
+        yield told("search.refused", "search", phrases=phrases, count=problem.refused)
     if not search.fit.converged:
-        what = f"the search did not end within {search.fit.evaluations} evaluations"
-        yield Finding(what, "search", "give a start that is nearer, or fewer parameters")
+        yield told("search.not_ended", "search", evaluations=search.fit.evaluations)
     elif not search.settled:
-        what = "which positions are used changes back and forth with the estimates"
-        yield Finding(what, "search", "give a guard of 2 or more", Severity.WARNING)
+        yield told("search.unsettled", "search")
     lost = judged.lost[: problem.count]
     if search.other is not None and not np.any(lost):
-        values = (
-            f"{one.name} = {amount(value, None, one.unit)}"
-            for one, value in zip(problem.model.unknowns, search.other, strict=False)
-        )
-        what = f"other values fit as well: {', '.join(values)}"
-        yield Finding(what, "search", "hold out a condition, or measure in more of them", Severity.WARNING)
+        pairs = list(zip(problem.model.unknowns, (float(value) for value in search.other), strict=False))
+        phrases = {"told": ", ".join(f"{one.name} = {amount(value, None, one.unit)}" for one, value in pairs)}
+        yield told("search.other", "search", phrases=phrases, values={one.name: value for one, value in pairs})
 
 
 def _fit(judged: Judged) -> Iterator[Finding]:
@@ -73,38 +67,23 @@ def _fit(judged: Judged) -> Iterator[Finding]:
     test, problem = judged.found.spread.test, judged.problem
     if test.misfit:
         chance = "less than 0.01 %" if test.chance < 1e-4 else f"{100 * test.chance:.2g} %"
-        what = (
-            f"the model does not fit: its residuals are {test.reduced:.3g} times (reduced χ²) what the scatter between "
-            f"turns explains, chance {chance}; the intervals contain what is left over"
-        )
-        yield Finding(what, "fit", "look at the residuals; free another number, or take another friction law",
-                      Severity.WARNING)  # fmt: skip
+        phrases = {"chance_told": chance}
+        yield told("fit.misfit", "fit", phrases=phrases, reduced=test.reduced, chance=test.chance)
     apart = judged.found.spread.apart
     for p in np.flatnonzero((apart > 1) & ~judged.lost[: problem.count]):
-        what = (
-            f"the conditions disagree: what each says of it varies by {np.sqrt(apart[p]):.2g} times what the scatter "
-            "between turns explains; the interval is wider for it"
-        )
-        where = f"parameter {problem.model.unknowns[p].name}"
-        remedy = "look for what differs between them: settings, speed, temperature, the zero of each file"
-        yield Finding(what, where, remedy, Severity.WARNING if apart[p] > MUCH**2 else Severity.NOTE)
+        where, times = f"parameter {problem.model.unknowns[p].name}", np.sqrt(apart[p])
+        yield told("fit.conditions_disagree", where, severity=Severity.WARNING if times > MUCH else None, times=times)
     single = [block for block in problem.blocks if block.fitted and not block.repeats]
     if single and len(single) == sum(block.fitted for block in problem.blocks):
-        what = (
-            "no turn is repeated: the scatter is taken from the residuals, nothing tests the model, and of filtered "
-            "data the intervals are too narrow"
-        )
-        yield Finding(what, "data", "record several turns", Severity.WARNING)
+        yield told("fit.not_repeated", "data")
     freedom = judged.found.spread.freedom[: problem.count][~judged.lost[: problem.count]]
     if freedom.size and np.min(freedom) < FEW:
-        degrees = _count(round(float(np.min(freedom))), "degree")
-        what = f"the scatter is known from {degrees} of freedom: the intervals are wide for that"
-        yield Finding(what, "data", "record more turns", Severity.NOTE)
+        least = round(float(np.min(freedom)))
+        yield told("fit.freedom", "data", phrases={"told": _count(least, "degree")}, degrees=least)
     follows = judged.found.spread.follows
     pairs = sum(len(block.turns) - 1 for block in problem.blocks if block.fitted)
     if follows > 2 / np.sqrt(max(pairs, 1)):
-        what = f"each turn resembles the one before it (correlation {follows:.2f}): the intervals are wider for it"
-        yield Finding(what, "data", "look for a drift; warm the rig up", Severity.WARNING)
+        yield told("fit.turns_alike", "data", correlation=follows)
 
 
 def _speeds(judged: Judged) -> Iterator[Finding]:
@@ -126,14 +105,13 @@ def _groups(judged: Judged) -> Iterator[Finding]:
         channels = _joined(list(dict.fromkeys(block.channel for block in judged.problem.blocks if block.fitted)))
         where = f"parameter {names[0]}"
         if len(group.members) == 1:
-            what = f"{names[0]} has no effect on {channels}: the data say nothing of it"
-            yield Finding(what, where, "fix it, or measure what it acts on", Severity.WARNING)
+            yield told("parameter.no_effect", where, name=names[0], phrases={"channels": channels})
             continue
         verb = "act on" if group.exact else "act nearly alike on"
         alike = f"{_joined(names)} {verb} {channels}{' in the same way' if group.exact else ''}"
-        what = f"{alike}: {_known(judged, group, names)}"
-        remedy = f"fix {'one' if len(names) == 2 else 'some'} of them, or measure what tells them apart"
-        yield Finding(what, where, remedy, Severity.WARNING)
+        some = "one" if len(names) == 2 else "some"
+        phrases = {"alike": alike, "known": _known(judged, group, names), "some": some}
+        yield told("parameter.not_told_apart", where, phrases=phrases, names=names)
 
 
 def _near(judged: Judged) -> Iterator[Finding]:
@@ -148,11 +126,13 @@ def _near(judged: Judged) -> Iterator[Finding]:
             known = known_of(judged.problem, judged.found.x, judged.found.spread, pair, size)
             names = [_name(judged, i) for i in pair]
             together = f"{judged.correlation[p, q]:.3f}".replace("-", "−")
-            what = f"is hardly told from {names[0]} (correlation {together})"
-            if known:
-                what += f": {_known(judged, Group(pair, known, exact=False), names, short=True)}"
-            remedy = "fix one of them, or measure what tells them apart"
-            yield Finding(what, f"parameter {names[1]}", remedy, Severity.NOTE)
+            said = f": {_known(judged, Group(pair, known, exact=False), names, short=True)}" if known else ""
+            phrases = {"known": said, "correlation_told": together}
+            correlation = judged.correlation[p, q]
+            yield told(
+                "parameter.hardly_told_apart", f"parameter {names[1]}", phrases=phrases, other=names[0],
+                correlation=correlation,
+            )  # fmt: skip
 
 
 def _name(judged: Judged, i: int) -> str:
@@ -182,12 +162,12 @@ def _known(judged: Judged, group: Group, names: Sequence[str], short: bool = Fal
         if one.form != "sum":
             return f"their {one.form} is known, {said}, neither alone"
         return f"{_formula(one, names, units)} = {said} is known, neither alone"
-    told = "; ".join(
+    listed = "; ".join(
         f"{_formula(one, names, units)} = {amount(one.value, one.uncertainty, _leading(one, units))}"
         for one in group.known
     )
     many = f"{_count(len(group.known), 'combination')} of them {'is' if len(group.known) == 1 else 'are'} known"
-    return f"{many}, none alone: {told}"
+    return f"{many}, none alone: {listed}"
 
 
 def _unit(judged: Judged, i: int) -> str:
@@ -232,15 +212,15 @@ def _limits(judged: Judged) -> Iterator[Finding]:
             far = high[p] if judged.limit[p] < 0 else low[p]
             side = "at most" if judged.limit[p] < 0 else "at least"
             ends = [amount(one, None, unknown.unit) for one in (end, far)]
-            what = f"is on its limit {ends[0]}: {side} {ends[1]} (95 %, one-sided)"
-            yield Finding(what, where, severity=Severity.NOTE)
+            phrases = {"limit_told": ends[0], "side": side, "far_told": ends[1]}
+            yield told("parameter.limit", where, phrases=phrases, limit=end, far=far)
             continue
         size = max(abs(judged.estimate[p]), unknown.size)
         half = quantile(judged.found.spread.freedom[p]) * judged.deviation[p]
         if size > 0 and half > size:
-            said = amount(judged.estimate[p], half, unknown.unit)
-            what = f"is hardly known: {said}, an interval wider than the number itself"
-            yield Finding(what, where, "record more turns, or conditions in which it does more", Severity.NOTE)
+            value = judged.estimate[p]
+            phrases = {"told": amount(value, half, unknown.unit)}
+            yield told("parameter.hardly_known", where, phrases=phrases, value=value, half=half)
 
 
 def _sensors(judged: Judged) -> Iterator[Finding]:
@@ -250,16 +230,14 @@ def _sensors(judged: Judged) -> Iterator[Finding]:
     for p, unknown in enumerate(problem.model.unknowns):
         for source, part in zip(names, shares[p], strict=True):
             if source not in (*RANDOM, "resolution") and part > MOSTLY:
-                what = f"{share(part)} of its variance is the {source}: more turns do not help"
                 remedy = "calibrate that sensor better"
                 if source.startswith(OWN):
                     remedy = "record a longer unloaded stretch in each file, or more files"
-                yield Finding(what, f"parameter {unknown.name}", remedy, Severity.NOTE)
+                phrases = {"share_told": share(part), "remedy": remedy}
+                yield told("parameter.sensor", f"parameter {unknown.name}", phrases=phrases, share=part, source=source)
     for s, sensor in enumerate(problem.sensors, problem.count):
         if sensor.stated and abs(judged.found.x[s]) > FAR:
-            what = f"comes out {abs(judged.found.x[s]):.1f} standard uncertainties from what is stated of it"
-            remedy = "check the sensor, its stated accuracy, and the loads of the model"
-            yield Finding(what, sensor.name, remedy, Severity.WARNING)
+            yield told("sensor.off", sensor.name, times=abs(judged.found.x[s]))
 
 
 def _exact(judged: Judged) -> Iterator[Finding]:
@@ -271,13 +249,13 @@ def _exact(judged: Judged) -> Iterator[Finding]:
         if one.fitted:
             stated = bool(one.effects or shared_zero(accuracy) or accuracy.gain)
             known[one.channel] = known.get(one.channel, False) or stated
-    bare = [channel for channel, told in known.items() if not told]
+    bare = [channel for channel, stated in known.items() if not stated]
     forces = [channel for channel in bare if not measures[channel].of_motion]
     for channels, severity in ((forces, Severity.WARNING), ([one for one in bare if one not in forces], Severity.NOTE)):
         if channels:
-            what = f"no accuracy is stated of {_joined(channels)}: zero and gain are taken as exact"
-            what += ", and the intervals are too narrow by that" if severity is Severity.WARNING else ""
-            yield Finding(what, "sensors", "state accuracy: {zero: …, gain: …} in the mapping", severity)
+            narrow = ", and the intervals are too narrow by that" if severity is Severity.WARNING else ""
+            phrases = {"channels": _joined(channels), "too_narrow": narrow}
+            yield told("sensor.no_accuracy", "sensors", severity=severity, phrases=phrases)
 
 
 def _data(judged: Judged) -> Iterator[Finding]:
@@ -286,21 +264,12 @@ def _data(judged: Judged) -> Iterator[Finding]:
     courses = problem.courses(judged.found.x)
     used, out = (sum(getattr(one, key) for one in judged.misses) for key in ("used", "out"))
     if out:
-        what = (
-            f"{out:,} of {counted(used + out, 'position')} {agreeing(out, 'is', 'are')} left out: "
-            "a friction turns round or the speed is zero there, the position is close to singular, or the model has no "
-            "answer"
-        )
-        yield Finding(what, "data", severity=Severity.NOTE)
+        yield told("data.left_out", "data", count=out, positions=used + out)
     locked = sum(int(np.count_nonzero(status == Status.LOCKED)) for status in courses.status)
     lost = sum(int(np.count_nonzero(status >= Status.NOT_CONVERGED)) for status in courses.status) - locked
     for number, why in ((locked, "locked by friction"), (lost, "without an answer")):
         if number:
-            are = agreeing(number, "that was measured is", "that were measured are")
-            what = f"with the estimates {counted(number, 'position')} {are} {why} in the model"
-            yield Finding(
-                what, "fit", "look at it with analyse, and at the setting of the conditions", Severity.WARNING
-            )
+            yield told("fit.no_answer", "fit", phrases={"why": why}, count=number)
 
 
 def _held(judged: Judged) -> Iterator[Finding]:
@@ -312,12 +281,9 @@ def _held(judged: Judged) -> Iterator[Finding]:
     conditions = judged.found.measurement.conditions
     held = list(dict.fromkeys(conditions[judged.problem.blocks[one.block].condition].name for one in rows))
     names = "; ".join(held) if len(held) <= MOST_NAMED else f"of {len(held)} conditions"
+    phrases = {"names": names}
     if not np.isfinite(trust):
-        what = f"nothing tells how well {names} should be predicted"
-        yield Finding(what, "hold_out", severity=Severity.NOTE)
-    elif trust > POOR:
-        what = f"what was held out ({names}) is missed by {trust:.1f} times what its scatter and the estimates explain"
-        yield Finding(what, "hold_out", "it lacks something that differs there", Severity.WARNING)
+        yield told("held_out.untested", "hold_out", phrases=phrases)
     else:
-        what = f"what was held out ({names}) is missed by {trust:.2f} times what its scatter and the estimates explain"
-        yield Finding(what, "hold_out", severity=Severity.NOTE)
+        code = "held_out.missed" if trust > POOR else "held_out.predicted"
+        yield told(code, "hold_out", phrases=phrases, times=trust)

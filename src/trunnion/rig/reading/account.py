@@ -25,17 +25,17 @@ class Account:
     done: dict[str, list[float]] = field(default_factory=dict)
     recorded: float = 0.0
 
-    def warn(self, where: str, what: str, remedy: str, severity: Severity = Severity.WARNING) -> None:
+    def warn(self, code: str, where: str, what: str, remedy: str, severity: Severity = Severity.WARNING) -> None:
         """A fault of the data."""
-        self.findings.append(Finding(what, where, remedy, severity, file=self.file))
+        self.findings.append(Finding(what, where, remedy, severity, file=self.file, code=code))
 
-    def note(self, where: str, what: str, remedy: str = "") -> None:
+    def note(self, code: str, where: str, what: str, remedy: str = "") -> None:
         """Something to know."""
-        self.warn(where, what, remedy, Severity.NOTE)
+        self.warn(code, where, what, remedy, Severity.NOTE)
 
-    def error(self, where: str, what: str, remedy: str) -> None:
+    def error(self, code: str, where: str, what: str, remedy: str) -> None:
         """Why there is no result of this part."""
-        self.warn(where, what, remedy, Severity.ERROR)
+        self.warn(code, where, what, remedy, Severity.ERROR)
 
     def say(self, sentence: str, value: float | None = None) -> None:
         """Something that was done; `{}` in the sentence stands for a value, which may differ from file to file."""

@@ -68,7 +68,12 @@ def _of_column(source: AngleSource, table: Table, line: Timeline, account: Accou
     column = table.columns[str(source.column)]
     unit = source.unit or column.unit
     if not unit:
-        account.note("angle", f"the column '{source.column}' has no unit and is taken for rad", "state angle.unit")
+        account.note(
+            "data.angle.no_unit",
+            "angle",
+            f"the column '{source.column}' has no unit and is taken for rad",
+            "state angle.unit",
+        )
     try:
         factor, found = dimensions(unit or "rad")
     except UnitError as error:
@@ -82,7 +87,9 @@ def _of_column(source: AngleSource, table: Table, line: Timeline, account: Accou
     finite = np.flatnonzero(np.isfinite(values))
     if finite.size < values.size:
         what = f"{counted(values.size - finite.size, 'cell')} of '{source.column}' of {values.size:,} are no number"
-        account.warn("angle", f"{what}; these rows are left out", "check the angle sensor and its cable")
+        account.warn(
+            "data.angle.missing", "angle", f"{what}; these rows are left out", "check the angle sensor and its cable"
+        )
     if finite.size < 3:
         return np.full(values.size, np.nan)
     told = np.unwrap(values[finite])
@@ -90,7 +97,7 @@ def _of_column(source: AngleSource, table: Table, line: Timeline, account: Accou
     moving = steps[steps > 0]
     if moving.size and np.median(moving) > TURN / 4:
         what = f"a turn has {TURN / float(np.median(moving)):.3g} samples: which way it turns cannot be told"
-        account.warn("angle", what, "sample at least 8 times a turn")
+        account.warn("data.angle.few_samples", "angle", what, "sample at least 8 times a turn")
     values[finite] = told
     return values
 
@@ -110,7 +117,12 @@ def _without_jumps(source: AngleSource, values: Array, line: Timeline, account: 
     what = (
         f"{counted(out.size, 'cell')} of '{source.column}' of {values.size:,}{zeros} far off the ones before and after"
     )
-    account.warn("angle", f"{what}, {times(line.seconds[out])}; left out", "check the angle sensor and its cable")
+    account.warn(
+        "data.angle.wild",
+        "angle",
+        f"{what}, {times(line.seconds[out])}; left out",
+        "check the angle sensor and its cable",
+    )
     mended = values.copy()
     mended[out] = np.nan
     return mended
@@ -136,7 +148,7 @@ def _tied(values: Array, index: Array, line: Timeline, account: Account) -> tupl
     if spoilt.size:
         told = counted(len(spoilt), "interval")
         what = f"{told} of the index, {times(spoilt[:, 0])}, are not one turn of the angle; left out"
-        account.warn("angle.index", what, "check index pulse and speed")
+        account.warn("data.index.not_one_turn", "angle.index", what, "check index pulse and speed")
     exact = way * TURN * np.concatenate([[0.0], np.cumsum(np.maximum(turns, 1))])
     account.say("the angle is tied to the index pulse once a turn")
     inside = (line.seconds >= index[0]) & (line.seconds <= index[-1])
@@ -152,12 +164,17 @@ def _check_index(values: Array, index: Array, line: Timeline, account: Account) 
     usual = float(np.nanmedian(np.abs(np.diff(at)))) / TURN if np.isfinite(np.diff(at)).any() else 1.0
     if abs(usual - 1) > 0.5:
         what = f"from one index pulse to the next the angle goes {usual:.3g} turns"
-        account.warn("angle.index", what, "check the unit of the angle, and whether both turn with the driver")
+        account.warn(
+            "data.index.turns",
+            "angle.index",
+            what,
+            "check the unit of the angle, and whether both turn with the driver",
+        )
     offsets = np.angle(np.exp(1j * (at - at[0])))
     far = np.flatnonzero(np.abs(offsets) > np.radians(5.0))
     if far.size:
         what = f"{counted(far.size, 'index pulse')} of {index.size} more than 5 deg off the first, {times(index[far])}"
-        account.warn("angle.index", what, "check the angle sensor: it slips, or its readings jump")
+        account.warn("data.index.off", "angle.index", what, "check the angle sensor: it slips, or its readings jump")
 
 
 def _of_pulses(

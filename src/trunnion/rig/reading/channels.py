@@ -69,7 +69,10 @@ def reading(name: str, channel: Channel, column: Column, account: Account) -> Re
     if not unit and (channel.gain is None or channel.gain.plain):
         unit = default_unit(channel.measures)
         account.note(
-            where, f"has no unit in the mapping or the file and is taken for SI ({unit or '1'})", f"state {where}.unit"
+            "data.unit.none",
+            where,
+            f"has no unit in the mapping or the file and is taken for SI ({unit or '1'})",
+            f"state {where}.unit",
         )
     try:
         found = scale(channel.measures, unit, channel.gain)
@@ -98,7 +101,7 @@ def _compare(where: str, channel: Channel, column: Column, account: Account) -> 
         return  # 1/min where the mapping says rpm, as it has to
     if not alike(own[1], stated[1]) or own[0] != stated[0]:
         what = f"the file has the unit '{column.unit}' for '{channel.column}', the mapping '{channel.unit}'"
-        account.warn(where, f"{what}, which is taken", f"correct {where}.unit, or remove it")
+        account.warn("data.unit.differs", where, f"{what}, which is taken", f"correct {where}.unit, or remove it")
 
 
 def zeroed(
@@ -126,10 +129,17 @@ def zeroed(
     by = f"{raw.factor * change * channel.sign:.3g} {unit} in {span:.4g} s"
     told = f"the zero drifts by {by}, between the unloaded stretches"
     if drifts and remove:
-        account.warn(where.removesuffix(".zero"), f"{told}; a straight line is taken off", "let the sensor warm up")
+        account.warn(
+            "data.zero.drift_removed",
+            where.removesuffix(".zero"),
+            f"{told}; a straight line is taken off",
+            "let the sensor warm up",
+        )
         return Zeroed(float(np.mean(means)), error, slope, float(np.mean(middles)))
     if drifts:
-        account.warn(where.removesuffix(".zero"), told, "let the sensor warm up, or state drift: remove")
+        account.warn(
+            "data.zero.drift", where.removesuffix(".zero"), told, "let the sensor warm up, or state drift: remove"
+        )
     account.say(f"zero of {name}: mean over {means.size} unloaded stretches, ± {{}} {unit}", abs(raw.factor) * error)
     return Zeroed(mean, error, since=float(np.average(middles, weights=weights)))
 
@@ -148,7 +158,13 @@ def _stretches(where: str, zero: Zero, readings: Array, line: Timeline, account:
                 f"there are no readings from {begin.value:g} to {end.value:g} s; the file runs from {line.seconds[0]:g}"
             )
             what = f"{what} to {line.seconds[-1]:g} s"
-            account.warn(where, what, "state a stretch in which the sensor is not loaded", Severity.ERROR)
+            account.warn(
+                "data.zero.no_readings",
+                where,
+                what,
+                "state a stretch in which the sensor is not loaded",
+                Severity.ERROR,
+            )
     if not rows:
         raise MechanismError(account.findings[-1:])
     middles, means, errors = np.array(rows).T
@@ -215,7 +231,7 @@ def filtered(values: Array, line: Timeline, low_pass: Filter, account: Account, 
                 raise MechanismError(Finding(what, "filter", "lower the order", file=account.file)) from None
     if lost:
         what = f"{counted(lost, 'sample')} between gaps too close together for the filter; left out"
-        account.warn(where, what, "raise the cut-off, or mend what makes the gaps")
+        account.warn("data.filter.gaps", where, what, "raise the cut-off, or mend what makes the gaps")
     result[~finite] = np.nan
     return result
 

@@ -48,7 +48,7 @@ def unwrapped(source: AngleSource, readings: Array, seconds: Array, account: Acc
     first = falls[0]
     what = f"the count of '{source.column}' is set back {counted(falls.size, 'time')}, {times(seconds[falls])}"
     what = f"{what}, first from {readings[first]:,.0f} to {readings[first + 1]:,.0f}"
-    account.warn(
+    account.warn("data.counter.set_back",
         "angle", f"{what}; without an index the turns from there on are left out",
         "name the parts in files: over:, each by itself, or add an index; state wrap: if the counter is full there",
     )  # fmt: skip
@@ -75,7 +75,7 @@ def _without_wild(source: AngleSource, readings: Array, seconds: Array, account:
         return readings
     what = f"{counted(wild.size, 'count')} of '{source.column}' of {readings.size:,} far off the ones before and after"
     what = f"{what}, {times(seconds[wild])}, such as {readings[wild[0]]:,.6g}; the one before holds there"
-    account.warn("angle", what, "check the counter and its cable")
+    account.warn("data.counter.wild", "angle", what, "check the counter and its cable")
     mended = readings.copy()
     mended[wild] = mended[wild - 1]
     return mended

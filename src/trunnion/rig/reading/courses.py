@@ -79,7 +79,9 @@ def steady(turns: Turns, step: float, where: str, account: Account) -> None:
     if spread > STEADY + 2 * step / float(np.mean(lengths)):
         slow, fast = 60 / float(lengths.max()), 60 / float(lengths.min())
         what = f"the speed is not steady: {slow:.4g} to {fast:.4g} cycles a minute, {100 * spread:.3g} % between turns"
-        account.warn(where, what, "state files: over: to use the steady part, or mend the speed control")
+        account.warn(
+            "data.speed.unsteady", where, what, "state files: over: to use the steady part, or mend the speed control"
+        )
 
 
 def signs(
@@ -109,7 +111,10 @@ def signs(
             other = "the angle turns the other way" if opposed else "or it drives the motor: then nothing is wrong"
             what = f"sign: the power into {driver} is below zero in {_of(power)}"
             account.warn(
-                f"channels.{likely}", f"{what} ({power.mean():.4g} W), {other}", f"write sign: {-channels[likely].sign}"
+                "data.power.sign",
+                f"channels.{likely}",
+                f"{what} ({power.mean():.4g} W), {other}",
+                f"write sign: {-channels[likely].sign}",
             )
             suspects.append(likely)
         gives = gives or bool(power.size and np.mean(power > 0) > MOST) or effort in suspects
@@ -123,8 +128,9 @@ def signs(
         power = power[np.isfinite(power)]
         if _against(power):
             what = f"sign: the power that {load} takes is below zero in {_of(power)}"
-            account.warn(f"channels.{key}", f"{what} ({power.mean():.4g} W) while the drive gives power",
-                         f"write sign: {-channels[key].sign} (or turn that of {rate})")  # fmt: skip
+            what = f"{what} ({power.mean():.4g} W) while the drive gives power"
+            remedy = f"write sign: {-channels[key].sign} (or turn that of {rate})"
+            account.warn("data.power.sign", f"channels.{key}", what, remedy)
             suspects.append(key)
     return suspects
 
@@ -152,10 +158,15 @@ def speeds(
         return
     where, both = f"channels.{names[0]}", f"the angle turns at {turning:.4g} rad/s, '{names[0]}' reads {read:.4g} rad/s"
     if abs(ratio + 1) <= APART:
-        account.warn(where, f"sign: {both}", f"write sign: {-channels[names[0]].sign}, or turn angle.sign")
+        account.warn(
+            "data.rate.sign", where, f"sign: {both}", f"write sign: {-channels[names[0]].sign}, or turn angle.sign"
+        )
         return
     account.warn(
-        where, f"{both}, {ratio:.4g} times", "check unit and gain of the channel, and per_turn or unit of angle"
+        "data.rate.ratio",
+        where,
+        f"{both}, {ratio:.4g} times",
+        "check unit and gain of the channel, and per_turn or unit of angle",
     )
 
 

@@ -64,7 +64,7 @@ def cells(where: str, column: Column, readings: Array, seconds: Array, account: 
     kinds += [f"{empty:,} empty or NaN"] * (empty > 0 and bool(kinds))
     told = f" ({', '.join(kinds)})" if kinds else ""
     what = f"dropouts: {counted(count, 'cell')} of {readings.size:,} without a number{told}, {places(missing, seconds)}"
-    account.warn(where, f"{what}; left out", "check cable and logger")
+    account.warn("data.readings.missing", where, f"{what}; left out", "check cable and logger")
 
 
 def signal(
@@ -89,7 +89,13 @@ def signal(
     if known.min() == known.max():
         what = f"reads {known[0]:.6g} in every one of {known.size:,} rows"
         severity = Severity.NOTE if steady else Severity.WARNING
-        account.warn(where, what, "check that the sensor is connected and the column the right one", severity)
+        account.warn(
+            "data.readings.constant",
+            where,
+            what,
+            "check that the sensor is connected and the column the right one",
+            severity,
+        )
         return
     wide = max(high - low, 1e-300)
     if limit is not None:
@@ -141,7 +147,7 @@ def _clipped(where: str, part: Array, time: Array, limit: float, account: Accoun
     if count := int(np.count_nonzero(mask)):
         what = f"clipped: {counted(count, 'reading')} of {part.size:,} at the end of the range, {places(mask, time)}"
         what = f"{what}; left out, so that means there are too small"
-        account.warn(where, what, "use a larger range or a smaller load")
+        account.warn("data.readings.clipped", where, what, "use a larger range or a smaller load")
         _leave_out(part, mask)
 
 
@@ -164,7 +170,12 @@ def _plateaus(where: str, part: Array, time: Array, account: Account) -> None:
             what = (
                 f"seems clipped at {end:.6g} in the unit of the readings: {at:,} of {part.size:,}, {places(mask, time)}"
             )
-            account.warn(where, what, "state range: if it is the end of the sensor's, and use a larger one")
+            account.warn(
+                "data.readings.plateau",
+                where,
+                what,
+                "state range: if it is the end of the sensor's, and use a larger one",
+            )
 
 
 def _zeros(where: str, part: Array, time: Array, wide: float, span: Span, account: Account) -> None:
@@ -188,7 +199,7 @@ def _zeros(where: str, part: Array, time: Array, wide: float, span: Span, accoun
         bad[begin : begin + length] = True
     what = f"dropouts: {counted(int(bad.sum()), 'reading')} of {part.size:,} zero in the middle of the signal"
     done = _doubtful(part, bad, span)
-    account.warn(where, f"{what}, {places(bad, time)}; {done}", "check cable and connector")
+    account.warn("data.readings.zero", where, f"{what}, {places(bad, time)}; {done}", "check cable and connector")
 
 
 def _stuck(where: str, part: Array, time: Array, span: Span, account: Account) -> None:
@@ -208,7 +219,7 @@ def _stuck(where: str, part: Array, time: Array, span: Span, account: Account) -
     for begin, length in zip(starts[long], lengths[long], strict=True):
         bad[begin + 1 : begin + length + 1] = True
     what = f"stuck: the reading does not change for {counted(held, 'sample')}, {places(bad, time)}"
-    account.warn(where, f"{what}; {_doubtful(part, bad, span)}", "check sensor and logger")
+    account.warn("data.readings.stuck", where, f"{what}; {_doubtful(part, bad, span)}", "check sensor and logger")
 
 
 def _spikes(where: str, part: Array, time: Array, wide: float, span: Span, account: Account) -> None:
@@ -231,4 +242,4 @@ def _spikes(where: str, part: Array, time: Array, wide: float, span: Span, accou
         return
     what = f"spikes: {counted(int(far.sum()), 'reading')} of {part.size:,} up to {off[far].max() / wide:.2g} times the "
     what += f"usual span off their neighbours, {places(bad, time)}"
-    account.warn(where, f"{what}; {_doubtful(part, bad, span)}", "check shielding and earth")
+    account.warn("data.readings.spikes", where, f"{what}; {_doubtful(part, bad, span)}", "check shielding and earth")

@@ -44,7 +44,12 @@ def pulses_of(source: AngleSource, readings: Array, line: Timeline, indexed: boo
     bad = readings.size - int(np.count_nonzero(finite))
     if bad:
         what = f"{counted(bad, 'cell')} of '{source.column}' of {readings.size:,} are no number"
-        account.warn("angle", f"{what}; the reading before holds there", "check the counter and its cable")
+        account.warn(
+            "data.counter.missing",
+            "angle",
+            f"{what}; the reading before holds there",
+            "check the counter and its cable",
+        )
     if source.kind == "level":
         found = _edges(readings, line)
         if found.times.size > 2:
@@ -116,12 +121,17 @@ def _of_level(source: AngleSource, found: Pulses, line: Timeline, indexed: bool,
     usual = float(np.median(np.diff(found.times))) / line.step
     if usual < 2.5:
         what = f"a pulse of the encoder has {usual:.3g} samples: edges are missed"
-        account.warn("angle", what, "sample at least 4 times a pulse, or record a count")
+        account.warn("data.pulses.few_samples", "angle", what, "sample at least 4 times a pulse, or record a count")
     inside = line.breaks[line.seconds[line.breaks] < found.times[-1]] if line.breaks.size else line.breaks
     if inside.size and not indexed:
         until = float(line.seconds[inside[0] - 1])
         what = f"no pulses are counted in gaps of time: the angle is not known after {until:.5g} s"
-        account.warn("angle", f"{what}; the turns from there on are left out", "record a count, or add an index")
+        account.warn(
+            "data.pulses.gap",
+            "angle",
+            f"{what}; the turns from there on are left out",
+            "record a count, or add an index",
+        )
         return replace(found, until=until)
     return found
 
@@ -156,7 +166,7 @@ def _missed(found: Pulses, step: float, most: float, account: Account) -> Pulses
     if np.any(pairs):
         told.append(f"{counted(int(-pairs.sum()), 'pulse')} too many")
     what = f"the encoder: {' and '.join(told)}, {times(at)}; the count is set right, these turns are left out"
-    account.warn("angle", what, "check encoder, cable and counter")
+    account.warn("data.pulses.wrong", "angle", what, "check encoder, cable and counter")
     way = np.sign(found.counts[-1] - found.counts[0]) or 1.0
     mended = found.counts + way * np.concatenate([[0.0], np.cumsum(change)])
     return replace(found, counts=mended, spoilt=np.column_stack([at, found.times[1:][change != 0]]))
@@ -166,7 +176,9 @@ def index_times(readings: Array, line: Timeline, name: str, account: Account) ->
     """Times of the pulses of an index."""
     found = _edges(line.rows(readings), line).times
     if found.size == 0:
-        account.warn("angle.index", f"the column '{name}' has no pulse", "check the column, or remove index")
+        account.warn(
+            "data.index.none", "angle.index", f"the column '{name}' has no pulse", "check the column, or remove index"
+        )
     return found
 
 
@@ -192,7 +204,7 @@ def by_index(found: Pulses, index: Array, per_turn: int, step: float, account: A
         told = [f"{counted(lost, 'pulse')} lost"] * (lost > 0) + [f"{counted(more, 'pulse')} too many"] * (more > 0)
         where = f"in {counted(int(np.count_nonzero(wrong)), 'turn')} of {change.size}, {times(index[:-1][wrong])}"
         what = f"the encoder: {' and '.join(told)} {where}; set right at the index, these turns are left out"
-        account.warn("angle", what, "check encoder, cable and counter")
+        account.warn("data.pulses.wrong_index", "angle", what, "check encoder, cable and counter")
     place = np.clip(np.searchsorted(index, found.times, side="right") - 1, 0, index.size - 1)
     return found.counts - at[0] - way * usual - way * level[place], np.column_stack(
         [index[:-1][wrong], index[1:][wrong]]
@@ -210,4 +222,6 @@ def _check_per_turn(between: Array, per_turn: int, account: Account) -> None:
         return
     found = float(np.mean(between[alike]))
     what = f"from one index pulse to the next the encoder counts {found:.4g}, angle.per_turn is {per_turn:,}"
-    account.warn("angle.per_turn", what, f"state per_turn: {found:.0f}, if the index comes once a turn")
+    account.warn(
+        "data.pulses.per_turn", "angle.per_turn", what, f"state per_turn: {found:.0f}, if the index comes once a turn"
+    )

@@ -121,11 +121,13 @@ def _files(
     notes = []
     if kept:
         what = f"{_some(kept)} read with the `set` of the file of that name in the mapping"
-        notes.append(Finding(what, "files", "rename the file if something else was set", Severity.NOTE))
+        notes.append(
+            Finding(what, "files", "rename the file if something else was set", Severity.NOTE, code="data.files.set")
+        )
     for missing, paths in lost.items():
         what = f"{_some(paths)} read without {missing}, which the mapping states for other files"
         remedy = f"add {{file: {paths[0].name}, {missing.split('`')[1]}: …}} to `files`" if missing else ""
-        notes += [Finding(what, "files", remedy, Severity.NOTE)] if missing else []
+        notes += [Finding(what, "files", remedy, Severity.NOTE, code="data.files.less")] if missing else []
     return found, notes
 
 
@@ -206,10 +208,10 @@ class _File:
                 cuts.append((setting, turns))
                 if turns.numbers.size < UNUSED * gone - 2:
                     what = f"{counted(turns.numbers.size, 'turn')} of {gone:,.0f} recorded can be used"
-                    account.warn(f"condition {name}", what, "mend what the other findings name")
+                    account.warn("data.turns.lost", f"condition {name}", what, "mend what the other findings name")
             else:
                 what = self._no_turn(share[setting.window], allowed)
-                account.error(f"condition {name}", what, "check angle, or record for longer")
+                account.error("data.turns.none", f"condition {name}", what, "check angle, or record for longer")
         if not cuts:
             return []
         self._check_rows(cuts)
@@ -273,8 +275,8 @@ class _File:
             what = f"the cut-off of {cut_off:g} Hz is slower than the recording of {np.ptp(self.line.seconds):.4g} s"
             raise MechanismError(Finding(what, "filter.cut_off", "state a higher one", file=str(self.path)))
         if not self.line.even:
-            self.account.warn("filter", "the samples are not evenly spaced in time, as a filter needs them",
-                              "record at a fixed rate, or leave out the filter")  # fmt: skip
+            what = "the samples are not evenly spaced in time, as a filter needs them"
+            self.account.warn("data.filter.uneven", "filter", what, "record at a fixed rate, or leave out the filter")
         order = self.mapping.filter.order
         self.account.say(
             f"low-pass filter: Butterworth of order {order}, forward and backward, together 3 dB down at {cut_off:g} Hz"
@@ -287,17 +289,22 @@ class _File:
         for setting, turns in cuts:
             where = f"condition {self._named(setting)}"
             if turns.numbers.size < 2:
-                account.warn(where, "has one turn: there is no scatter, so no uncertainty", "record two turns or more")
+                account.warn(
+                    "data.turns.one",
+                    where,
+                    "has one turn: there is no scatter, so no uncertainty",
+                    "record two turns or more",
+                )
             steady(turns, self.line.step, where, account)
             if turns.density < 1:
                 samples = f"{turns.density * mapping.positions:.4g} samples a turn for {mapping.positions} positions"
                 what = f"the sampling is slow: {samples}; between them it is interpolated"
-                account.warn(where, what, "state fewer positions, or sample faster")
+                account.warn("data.sampling.slow", where, what, "state fewer positions, or sample faster")
             length = float(np.mean(turns.end - turns.begin))
             passed = mapping.filter.cut_off.value * length if mapping.filter else np.inf
             if passed < FEW_HARMONICS:
                 what = f"the filter leaves the first {passed:.2g} harmonics of a turn"
-                account.note(where, what, "state a higher cut-off")
+                account.note("data.filter.harmonics", where, what, "state a higher cut-off")
         dense = all(turns.density >= DENSE for _, turns in cuts)
         account.say(
             "values at a position: mean of the samples within half a position to either side"
@@ -310,7 +317,12 @@ class _File:
                     what = (
                         f"the unloaded stretch {low.value:g} to {high.value:g} s reaches into {counted(inside, 'turn')}"
                     )
-                    account.warn(f"channels.{name}.zero", what, "state a stretch in which the sensor is not loaded")
+                    account.warn(
+                        "data.zero.in_turns",
+                        f"channels.{name}.zero",
+                        what,
+                        "state a stretch in which the sensor is not loaded",
+                    )
 
     def _channel(self, name: str, zero: Zeroed, parts: Sequence[_Part]) -> Drift | None:
         """The courses of a channel, put into the parts; the drift that is left in them."""
@@ -337,10 +349,15 @@ class _File:
         times = f"{abs(found.change) / max(found.scatter, 1e-300):.3g} times what turns scatter about the line"
         what, remedy = f"drift: the mean of a turn changes by {by}, {times}", "let sensor and bearings warm up"
         if mapping.drift == "report":
-            account.warn(where, what, f"{remedy}, or state drift: remove")
+            account.warn("data.zero.drift_files", where, what, f"{remedy}, or state drift: remove")
             return None
         since = float(line.seconds[0]) if np.isnan(zero.since) else zero.since
-        account.warn(where, f"{what}; a straight line is taken off, zero at {since:.4g} s", remedy)
+        account.warn(
+            "data.zero.drift_files_removed",
+            where,
+            f"{what}; a straight line is taken off, zero at {since:.4g} s",
+            remedy,
+        )
         for part in parts:
             part.courses[name] = resampled(part.turns, values - found.slope * (line.seconds - since))
         return found

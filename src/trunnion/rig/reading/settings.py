@@ -78,7 +78,7 @@ def settings(mapping: DataMapping, entry: File, table: Table, line: Timeline, ac
         what = (
             f"{lost:,} of {counted(known.size, 'row')} {agreeing(lost, 'does', 'do')} not state the condition; left out"
         )
-        account.warn("set", what, "check the column")
+        account.warn("data.setting.missing", "set", what, "check the column")
     rounded = _rounded(raw)
     at = np.flatnonzero(known)
     unique, first, which = np.unique(rounded[known], axis=0, return_index=True, return_inverse=True)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from trunnion.results.attributes import encoded
+from trunnion.results.attributes import encoded, finding_rows
 from trunnion.results.dataset import Variable, dataset_of, described
 from trunnion.rig.reading.measurement import Measurement
 
@@ -53,9 +53,6 @@ def dataset(measurement: Measurement) -> xr.Dataset:
         "name": measurement.name,
         "measured": [first.courses[name].measures for name in channels],
         "done": list(measurement.done),
-        "findings": [
-            {"what": one.what, "where": one.where, "remedy": one.remedy, "severity": str(one.severity)}
-            for one in measurement.findings
-        ],
+        "findings": finding_rows(measurement.findings),
     }
-    return dataset_of(variables, labels, attributes, described({"phase": first.phase}, VARIABLES))
+    return dataset_of("measurement", variables, labels, attributes, described({"phase": first.phase}, VARIABLES))

@@ -91,7 +91,12 @@ def _factor(base: TimeBase, column: Column, account: Account) -> float:
     if base.unit:
         return dimensions(base.unit)[0]
     if not column.unit:
-        account.note("time", f"the column '{base.column}' has no unit and is taken for seconds", "state time.unit")
+        account.note(
+            "data.time.no_unit",
+            "time",
+            f"the column '{base.column}' has no unit and is taken for seconds",
+            "state time.unit",
+        )
         return 1.0
     try:
         factor, found = dimensions(column.unit)
@@ -113,7 +118,7 @@ def _stated(seconds: Array, account: Account) -> Timeline:
     lost, total = int(np.count_nonzero(~finite)), seconds.size
     if lost:
         what = f"{counted(lost, 'row')} of {total:,} {'has' if lost == 1 else 'have'} no time"
-        account.warn("time", f"{what}; left out", "check the logger, or state time: {rate: …}")
+        account.warn("data.time.missing", "time", f"{what}; left out", "check the logger, or state time: {rate: …}")
     kept = np.flatnonzero(rising)
     if kept.size < 3:
         what = f"the time rises in {kept.size} of {counted(total, 'row')}"
@@ -138,14 +143,16 @@ def _backward(seconds: Array, finite: NDArray[np.bool_], rising: NDArray[np.bool
         share = repeated.size / stated.size
         remedy = "the column is rounded: state time: {rate: …} instead" if share > 0.05 else "check the logger"
         what = f"the time repeats in {counted(repeated.size, 'row')} of {stated.size:,}, {times(stated[repeated])}"
-        account.warn("time", f"{what}; these rows are left out", remedy)
+        account.warn("data.time.repeats", "time", f"{what}; these rows are left out", remedy)
     if back.size:
         out = int(np.count_nonzero(finite & ~rising)) - repeated.size
         what = (
             f"the time runs backward {counted(back.size, 'time')}, {times(stated[back])}, by up to {-steps.min():.4g} s"
         )
         remedy = "split the file where a new recording begins, or check the logger's clock"
-        account.warn("time", f"{what}; {counted(max(out, 1), 'row')} left out until it has passed", remedy)
+        account.warn(
+            "data.time.backward", "time", f"{what}; {counted(max(out, 1), 'row')} left out until it has passed", remedy
+        )
     return np.asarray(stated[back])
 
 
@@ -157,4 +164,9 @@ def _tell_gaps(seconds: Array, steps: Array, step: float, account: Account) -> N
     longest = int(wide[np.argmax(steps[wide])])
     what = f"{counted(wide.size, 'gap')} in time, {missing:,.0f} {'sample' if missing == 1 else 'samples'} missing"
     where = f"the longest {steps[longest]:.4g} s at {seconds[longest]:.5g} s"
-    account.warn("time", f"{what}, {where}", "the positions in them have fewer turns; check the logger's buffer")
+    account.warn(
+        "data.time.gaps",
+        "time",
+        f"{what}, {where}",
+        "the positions in them have fewer turns; check the logger's buffer",
+    )

@@ -76,7 +76,12 @@ def cut(
             span = f"{low:.4g} to {high:.4g} s" if count > 1 else f"{low:.4g} s"
             what = f"{counted(count, 'turn')} of {numbers.size} {'lasts' if count == 1 else 'last'} {span}"
             what = f"{what} where {usual:.4g} s is usual, and {'is' if count == 1 else 'are'} left out"
-            account.note(where, what, "the drive starts, stops or stands there; files: over: can name what counts")
+            account.note(
+                "data.turns.unusual",
+                where,
+                what,
+                "the drive starts, stops or stands there; files: over: can name what counts",
+            )
         keep &= ~odd
     if len(spoilt):
         hit = np.zeros(numbers.size, dtype=np.bool_)

@@ -9,8 +9,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from trunnion.errors import Finding, MechanismError, Severity, Status, counted
+from trunnion.errors import Finding, MechanismError, Status
 from trunnion.measures.measures import Measure, named
+from trunnion.results.sentences import told
 from trunnion.rig.modelled import told_at
 from trunnion.rig.reading.rig_file import Rig, Value
 from trunnion.rig.virtual.courses import Sampled, cycle_efficiency, sampled
@@ -212,37 +213,29 @@ def findings_of(cases: Sequence[Case], channels: Mapping[str, Channel], rig: Rig
             one = stopped[0]
             places = np.flatnonzero(one.true.status >= Status.NOT_CONVERGED)
             first = 360 * one.true.time[places[0]] / one.run.cycle.duration
-            what = (
-                f"{_named(stopped)} left out: {status.text}; in condition {one.number} at {len(places)} of "
-                f"{counted(len(one.true.status), 'position')}, first at {first:.4g}° of the cycle"
-            )
-            remedy = "run analyse with these values: it says where in the cycle, and why; or do without"
-            yield Finding(what, where, remedy, Severity.WARNING)
+            yield told(
+                "rig.no_answer", where, phrases={"cases": _named(stopped)}, status=status.text, condition=one.number,
+                count=len(places), positions=len(one.true.status), first_deg=first,
+            )  # fmt: skip
     sound = [case for case in cases if case.worst.solved]
     if mended := [case for case in sound if case.true.mended]:
         most = max(case.true.mended for case in mended)
-        what = (
-            f"{_named(mended)}: a load has no single value at up to {counted(most, 'position')}, its joint being at "
-            "rest there; sensors are given 0 in a rest, the mean of the neighbours at a single position"
-        )
-        yield Finding(what, where, "", Severity.NOTE)
+        yield told("rig.load_at_rest", where, phrases={"cases": _named(mended)}, positions=most)
     yield from _lost_pulses(sound, rig)
     yield from _both_ways(sound, rig)
     driver = next(iter(cases[0].run.system.mechanism.drivers))
-    told = rig.encoder or any(one.measures == f"rate:{driver}" for one in channels.values())
-    if sound and not told and speed_differs(sound):
-        what = f"the conditions differ in speed, and nothing measured tells where {driver} is"
-        yield Finding(what, "encoder", f"state an encoder, or a sensor of rate:{driver}")
+    placed = rig.encoder or any(one.measures == f"rate:{driver}" for one in channels.values())
+    if sound and not placed and speed_differs(sound):
+        yield told("rig.no_angle", "encoder", driver=driver)
     for i, (name, channel) in enumerate(channels.items()):
         peaks = {case.number: float(np.max(np.abs(case.true.values[i]))) for case in sound}
         clipped = [case for case in sound if peaks[case.number] > channel.limit]
         if clipped:
-            what = (
-                f"{_named(clipped)}: {channel.measures} reaches {max(peaks.values()):.4g} {channel.unit}, beyond the "
-                f"range of {channel.limit:.4g} {channel.unit}: readings are clipped"
-            )
             key = "range" if channel.limit == channel.range else "span"
-            yield Finding(what, f"sensors.{name}.{key}", "take a sensor with a larger range", Severity.WARNING)
+            yield told(
+                "rig.clipped", f"sensors.{name}.{key}", phrases={"cases": _named(clipped)}, measures=channel.measures,
+                peak=max(peaks.values()), unit=channel.unit, limit=channel.limit,
+            )  # fmt: skip
 
 
 def _both_ways(cases: Sequence[Case], rig: Rig) -> Iterator[Finding]:
@@ -251,11 +244,9 @@ def _both_ways(cases: Sequence[Case], rig: Rig) -> Iterator[Finding]:
     if len({case.drive(rig.rate.value)[1] > 0 for case in one_way}) < 2:
         return
     if rig.encoder is None:
-        what = "the conditions turn both ways, and nothing measured tells where the driver is"
-        yield Finding(what, "encoder", "state an encoder of kind: count, or a rig for each way")
+        yield told("rig.both_ways", "encoder")
     elif rig.encoder.kind == "level":
-        what = "the conditions turn both ways, and the level of an encoder does not tell which"
-        yield Finding(what, "encoder.kind", "record kind: count")
+        yield told("rig.both_ways_level", "encoder.kind")
 
 
 def speed_differs(cases: Sequence[Case]) -> bool:
@@ -288,9 +279,4 @@ def _lost_pulses(cases: Sequence[Case], rig: Rig) -> Iterator[Finding]:
     lost = [case for case in cases if 4 * peaks[case.number] * rig.encoder.per_turn > rig.rate.value * (1 + 1e-9)]
     if lost:
         most = max(peaks.values()) * rig.encoder.per_turn
-        what = (
-            f"{_named(lost)}: the encoder gives up to {most:.4g} pulses a second; sampled {rig.rate.value:.4g} times a "
-            "second, some are lost"
-        )
-        remedy = "sample four times as fast as there are pulses, or record kind: count"
-        yield Finding(what, "encoder.kind", remedy, Severity.WARNING)
+        yield told("rig.pulses_lost", "encoder.kind", phrases={"cases": _named(lost)}, pulses=most, rate=rig.rate.value)

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.errors import Finding, Severity, counted
+from trunnion.errors import Finding
+from trunnion.results.sentences import told
 from trunnion.rig.reading.efficiency import Efficiency, efficiency_of, load_joints, pairs_of
 from trunnion.rig.reading.measurement import Accuracy, Condition, Course
 from trunnion.rig.virtual.cases import Case
@@ -143,26 +144,15 @@ def _said(observation: Observation, sensors: tuple[Expected, ...], forecasts: li
     found = []
     for one in sensors:
         if one.share < SMALL_RANGE:
-            what = f"the readings take {100 * one.share:.2g} % of the range: its errors in % of full scale count"
-            remedy = "take a sensor of a smaller range"
-            found.append(Finding(what, f"sensors.{one.sensor}.range", remedy, Severity.NOTE))
+            found.append(told("rig.range_wide", f"sensors.{one.sensor}.range", percent=100 * one.share))
         if 0 < one.steps < FEW_STEPS:
-            what = f"the readings go through {one.steps:.3g} steps of the converter"
-            remedy = "take more bits, or a smaller span"
-            found.append(Finding(what, f"sensors.{one.sensor}.bits", remedy, Severity.NOTE))
-    told = [one for one in forecasts if one.measured]
-    off = [one for one in told if one.measured and abs(one.bias) > one.measured.uncertainty]
+            found.append(told("rig.steps_few", f"sensors.{one.sensor}.bits", steps=one.steps))
+    measured = [one for one in forecasts if one.measured]
+    off = [one for one in measured if one.measured and abs(one.bias) > one.measured.uncertainty]
     if off:
         worst = max(off, key=lambda one: abs(one.bias))
-        what = (
-            f"in {len(off)} of {counted(len(told), 'condition')} the efficiency is off by more than its standard "
-            f"uncertainty even without random errors, most in condition {worst.case.number} by {worst.bias:+.2g}: the "
-            "sensors are too slow for the cycle, or clipped"
-        )
-        remedy = "take sensors of a larger bandwidth or range, more pulses, or a lower speed"
-        found.append(Finding(what, "sensors", remedy, Severity.WARNING))
-    if not told:
-        what = "the sensors do not tell the power in and out, so there is no efficiency to expect"
-        remedy = "measure effort: and rate: of the driver, load: of a load on a joint and rate: of that joint"
-        found.append(Finding(what, "sensors", remedy, Severity.NOTE))
+        figures = {"count": len(off), "of": len(measured), "condition": worst.case.number, "bias": worst.bias}
+        found.append(told("rig.biased", "sensors", severity=None, phrases=None, **figures))
+    if not measured:
+        found.append(told("rig.no_efficiency", "sensors"))
     return found

@@ -19,9 +19,10 @@ from trunnion.algebra.dual import primal
 from trunnion.algebra.nested import each
 from trunnion.algebra.space import ZERO, Screw, moment_at
 from trunnion.algebra.vector import dot, minus
-from trunnion.errors import Finding, MechanismError, Severity, agreeing, counted
+from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.groups.redundant import RANK, stacked
 from trunnion.groups.spatial import Pose, SpatialGroup
+from trunnion.results.sentences import told
 from trunnion.solve.backward import Given, backward
 from trunnion.solve.branch_tracking import SEED, at, extent, guess_reaches, lane_of
 from trunnion.solve.branches import Chosen
@@ -221,52 +222,32 @@ class Determinacy:
 
     def findings(self) -> list[Finding]:
         """What there is to say of redundant constraints, undetermined freedoms and free spins."""
-        told: list[Finding] = []
+        found: list[Finding] = []
         for one in self.parts:
-            told += [self._overdriven()] if one.surplus else []
-            told += [self._undetermined(one)] if one.undetermined else []
-            told += [self._redundant(one)] if one.redundant else []
+            found += [self._overdriven()] if one.surplus else []
+            found += [self._undetermined(one)] if one.undetermined else []
+            found += [self._redundant(one)] if one.redundant else []
         for module in self.system.plan.modules:
-            for link, a, b in module.spinning:
-                what = f"the link '{link}' can spin about the line of {a} and {b} (a passive freedom)"
-                remedy = "it is taken not to spin"
-                if link in self.dragged:
-                    remedy += f"; friction of its joints would drag it round with up to {self.dragged[link]:.3g} N m"
-                told.append(Finding(what, f"links.{link}", remedy, Severity.NOTE))
+            for link, *points in module.spinning:
+                where, drag = f"links.{link}", self.dragged.get(link)
+                found.append(told("mobility.spin", where, link=link, points=points, torque=drag))
                 if link in self.spins:
-                    what = f"nothing keeps the link '{link}' from spinning about {a}-{b}: it would take up to "
-                    what += f"{self.spins[link]:.3g} N m"
-                    remedy = "make it symmetric about that line, or hold its spin by a universal joint at one end"
-                    told.append(Finding(what, f"links.{link}", remedy, Severity.WARNING))
-        return told
+                    found.append(told("mobility.spin_loaded", where, link=link, points=points, torque=self.spins[link]))
+        return found
 
     @property
-    def _count(self) -> str:
-        return f"the mobility is {self.system.plan.mobility} by Grübler's formula and {self.mobility} by rank"
+    def _counts(self) -> dict[str, Any]:
+        return {"formula": self.system.plan.mobility, "rank": self.mobility}
 
     def _overdriven(self) -> Finding:
-        spins = len(self.system.plan.passive)
-        beside = f", {spins} of it spins of a link alone" if spins else ""
-        drivers = len(self.system.mechanism.drivers)
-        what = f"{self._count}{beside}, but there {agreeing(drivers, 'is', 'are')} {counted(drivers, 'driver')}"
-        return Finding(what, "drivers", "remove a driver")
+        spins, drivers = len(self.system.plan.passive), len(self.system.mechanism.drivers)
+        return told("mobility.overdriven", "drivers", **self._counts, spins=spins, drivers=drivers)
 
     def _undetermined(self, one: Part) -> Finding:
-        what = (
-            f"{self._count}: {_many(one.undetermined, 'freedom')} not determined, of the links {', '.join(one.links)}"
+        return told(
+            "mobility.undetermined", "drivers", **self._counts, freedoms=one.undetermined, links=list(one.links)
         )
-        return Finding(what, "drivers", "drive them, or give these links joints that hold them")
 
     def _redundant(self, one: Part) -> Finding:
-        what = f"{self._count}: {_many(one.redundant, 'constraint')} redundant, in the joints {', '.join(one.joints)}"
-        if self.system.mechanism.over_constraint == "refuse":
-            what += "; statics does not determine their reactions"
-            remedy = "free a joint (cylindrical, spherical), or state over_constraint: minimum-norm for the smallest"
-            return Finding(what, "joints", remedy)
-        what += "; their reactions are the smallest that hold the balance"
-        remedy = "misfit and preload come on top: they depend on errors and stiffness"
-        return Finding(what, "joints", remedy, Severity.WARNING)
-
-
-def _many(count: int, what: str) -> str:
-    return f"{count} {what} is" if count == 1 else f"{count} {what}s are"
+        code = "redundant" if self.system.mechanism.over_constraint == "refuse" else "redundant_least"
+        return told(f"mobility.{code}", "joints", **self._counts, constraints=one.redundant, joints=list(one.joints))

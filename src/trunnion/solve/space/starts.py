@@ -8,8 +8,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.errors import Finding, MechanismError
 from trunnion.groups.redundant import RANK
+from trunnion.results.sentences import told
 from trunnion.solve.branch_tracking import GUESSES, SEED, guess_reaches
 from trunnion.solve.branches import Chosen, choose
 from trunnion.solve.forward import forward, start
@@ -66,17 +67,17 @@ def start_of(system: SpatialSystem, values: Values, ideal: Values, cycle: Cycle)
     Raises MechanismError where the mechanism leaves a freedom undetermined, or is nowhere even nearly closed.
     """
     chosen = choose(system, ideal, cycle)
-    told = [one for one in look(system, ideal, chosen, cycle).findings() if one.where == "drivers"]
-    if told:
-        raise MechanismError(told)
+    wrong = [one for one in look(system, ideal, chosen, cycle).findings() if one.where == "drivers"]
+    if wrong:
+        raise MechanismError(wrong)
     if chosen.found[0]:
         return _Ideal(system, ideal, chosen), list(chosen.findings)
     nearly = _followed(system, values, cycle)
-    what = "the axes and lengths as stated do not fit, and neither do they without the errors"
+    misfit = told("assembly.misfit", "links")
     if nearly is None:
-        raise MechanismError(Finding(f"{what}: nowhere is every loop nearly closed", "links", "check the lengths"))
-    remedy = "what is off counts from where the loops are open least; it may be stated as misalignment or errors"
-    return nearly, [Finding(what, "links", remedy, Severity.NOTE)]
+        what = f"{misfit.what}: nowhere is every loop nearly closed"
+        raise MechanismError(Finding(what, "links", "check the lengths"))
+    return nearly, [misfit]
 
 
 def _followed(system: SpatialSystem, values: Values, cycle: Cycle) -> _Nearly | None:

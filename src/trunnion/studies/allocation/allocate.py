@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import Dual, derivative
-from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.errors import Finding, MechanismError
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.prices import Price
+from trunnion.results.sentences import told
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.statistics.costs import Cost
 from trunnion.studies.allocation.problem import CRITERIA, SHOWN, Answer, Contribution, Criterion, Option, Problem, none
@@ -137,11 +138,11 @@ def _found(mechanism: Mechanism, measures: Sequence[str], asked: Asked) -> Alloc
         raise MechanismError(Finding("no tolerance has a cost", "costs", remedy))
     absent = {one.path: _start(one) for one in mechanism.prices() if one.play and not _clearance(mechanism, one.path)}
     now = _studied(mechanism.with_tolerances(absent) if absent else mechanism, measures, asked)
-    prices, told = _prices(now)
+    prices, notes = _prices(now)
     before = {**_stated(now, prices), **{path: 0.0 for path in absent if path in prices}}
     way: Way = asked.choice if asked.choice != "auto" else _way(prices)
     first = rows_of(now, _stated(now, prices), asked.criterion)
-    told += [_unknown(name) for name in first.unknown]
+    notes += [_unknown(name) for name in first.unknown]
     search = _Search(mechanism, measures, asked, prices, way)
     answer, now, rows, more = search.run(now)
     if asked.exact and asked.criterion == "worst-case" and answer.found:
@@ -150,7 +151,7 @@ def _found(mechanism: Mechanism, measures: Sequence[str], asked: Asked) -> Alloc
     if asked.curve and answer.found:
         factors = np.geomspace(*RANGE, asked.curve).tolist()
         offers = list(zip(factors, trade_off(answer.problem, factors, way, _target(asked)), strict=True))
-    findings = (*told, *more)
+    findings = (*notes, *more)
     return Allocated(asked, now, rows, answer, way, prices, before, findings, search.tight, tuple(offers))
 
 
@@ -202,8 +203,7 @@ def _prices(found: Study) -> tuple[dict[str, Price], list[Finding]]:
                 f"it changes the play of {', '.join(plays)}: state pin.clearance and buy {plays[0]}.clearance instead"
             )
         if what:
-            remedy = "remove the cost; the tolerance stays as it is"
-            findings.append(Finding(f"cannot be bought, {what}", f"costs.{one.path}", remedy, Severity.WARNING))
+            findings.append(told("allocation.not_for_sale", f"costs.{one.path}", phrases={"why": what}))
         else:
             prices[one.path] = one
     if not prices:
@@ -278,11 +278,10 @@ class _Search:
                 kept = moving if kept is None else joined(moving, kept)
                 rows, now = ahead, after
         else:
-            what = f"what the tolerances do depends on themselves, and has not settled after {ROUNDS} rounds"
-            return answer, now, whole, [Finding(what, "costs", "rely on the verification", Severity.WARNING)]
+            return answer, now, whole, [told("allocation.unsettled", "costs", rounds=ROUNDS)]
         return answer, now, whole, []
 
-    def tightened(self, answer: Answer, now: Study, rows: Rows, told: list[Finding]) -> Found:
+    def tightened(self, answer: Answer, now: Study, rows: Rows, found: list[Finding]) -> Found:
         """The same with limits narrowed until the worst case found on the mechanism keeps the stated ones."""
         for _ in range(ROUNDS):
             beyond = {of.measure.name: share for of, share in zip(now.linear.measures, _beyond(now), strict=True)}
@@ -291,10 +290,10 @@ class _Search:
             for name, share in beyond.items():
                 if share > 1:
                     self.tight[name] = self.tight.get(name, 1.0) / (share * (1 + CLOSE / 2))
-            answer, now, rows, told = self.run(now)
+            answer, now, rows, found = self.run(now)
             if not answer.found:
                 break
-        return answer, now, rows, told
+        return answer, now, rows, found
 
     def _rows(self, now: Study, bought: Mapping[str, float]) -> Rows:
         return rows_of(now, bought, self.asked.criterion, self.tight)
@@ -348,12 +347,14 @@ def _off(now: Study) -> list[Finding]:
             word, bound = ("at_least", nominal + lower) if lower > 0 else ("at_most", nominal + upper)
             unit = measure.figure_unit(now.run.system, now.run.values)
             factor, shown = SHOWN.get(unit, (1.0, "" if unit == "1" else unit))
-            told, limit = (f"{factor * value:.6g} {shown}".rstrip() for value in (nominal, bound))
-            what = f"the nominal figure is {told}, {word} is {limit}: no tolerance mends that"
-            found.append(Finding(what, f"measures.{measure.name}", "change the mechanism or the bound"))
+            texts = (f"{factor * value:.6g} {shown}".rstrip() for value in (nominal, bound))
+            phrases = dict(zip(("told", "limit"), texts, strict=True))
+            where = f"measures.{measure.name}"
+            found.append(
+                told("allocation.nominal_outside", where, phrases=phrases, nominal=nominal, bound=bound, word=word)
+            )
     return found
 
 
 def _unknown(name: str) -> Finding:
-    what = "first order says nothing of it: no tolerances were chosen for its limits"
-    return Finding(what, f"measures.{name}", "see whether the samples keep them", Severity.WARNING)
+    return told("allocation.unknown", f"measures.{name}")

@@ -10,7 +10,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.errors import Finding, Severity
+from trunnion.errors import Finding
+from trunnion.results.sentences import told
 from trunnion.studies.allocation.cones import Point, settled
 from trunnion.studies.allocation.problem import PROVEN, Answer, Problem, none, shortfalls
 from trunnion.studies.allocation.sides import sides
@@ -37,8 +38,7 @@ def allocate_continuous(problem: Problem) -> Answer:
         return none(problem, trouble)
     point = minimise(task)
     if point is None:
-        what = "the solver found no allocation, though nothing says that the limits cannot be kept"
-        return none(problem, [Finding(what, "costs", "check the orders of magnitude of costs and bounds")])
+        return none(problem, [told("allocation.not_found", "costs")])
     return answer_of(problem, task, point)
 
 
@@ -50,8 +50,7 @@ def answer_of(problem: Problem, task: Task, point: Point) -> Answer:
     cost, gap = float(np.sum(costs)), gap_of(task, point)
     price = np.zeros(len(problem.effects.worst))
     np.add.at(price, task.sides.row[point.rows], point.weights / task.sides.room[point.rows])
-    what = f"the optimum is proven only to {gap:.1e} of what the tolerances cost"
-    doubt = Finding(what, "costs", "check the orders of magnitude of costs and bounds", Severity.WARNING)
+    doubt = told("allocation.proven_roughly", "costs", gap=gap)
     return Answer(
         problem,
         tolerances,
@@ -69,8 +68,7 @@ def answer_of(problem: Problem, task: Task, point: Point) -> Answer:
 def unbounded(task: Task) -> list[Finding]:
     """What no limit and no bound holds."""
     free = np.flatnonzero(~np.isfinite(task.most))
-    what = "no limit bounds this tolerance: the wider, the cheaper"
-    return [Finding(what, f"costs.{task.names[one]}", "state `most`") for one in free]
+    return [told("allocation.unbounded", f"costs.{task.names[one]}") for one in free]
 
 
 def unmet(problem: Problem, task: Task) -> list[Finding]:

@@ -21,7 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import Bounds, LinearConstraint, milp
 
-from trunnion.errors import Finding, Severity
+from trunnion.errors import Finding
+from trunnion.results.sentences import told
 from trunnion.studies.allocation.cones import Point
 from trunnion.studies.allocation.continuous import allocate_continuous, gap_of, minimise, unbounded
 from trunnion.studies.allocation.problem import ALLOWED, PROVEN, Answer, Contribution, Problem, none, shortfalls
@@ -101,7 +102,7 @@ class _Search:
         if any(not names for names in self.names):
             which = next(k for k, names in enumerate(self.names) if not names)
             one = self.problem.contributions[self.members[which][0]]
-            return [Finding("no option of the group lies between the bounds of all", f"costs.{one.name}", "widen them")]
+            return [told("allocation.no_common_option", f"costs.{one.name}")]
         if not self.limits.rising and np.all(self.limits.room > 0):
             return []
         return shortfalls(self.problem, self.narrowest())
@@ -239,8 +240,7 @@ class _Search:
     def _answer(self, best: _Best, bound: float, rounds: int) -> Answer:
         problem = self.problem
         if not np.isfinite(best.cost):
-            what = "no choice of processes keeps the limits"
-            doubt = Finding(what, "processes", "widen a limit or add a finer process")
+            doubt = told("allocation.no_choice", "processes")
             return none(problem, shortfalls(problem, self.narrowest()) or [doubt])
         u = best.point.u if best.point else np.zeros(0)
         gap = max(best.cost - bound, 0.0) / self.scale + best.gap
@@ -254,7 +254,7 @@ class _Search:
             for i in members
         }
         proven = gap <= PROVEN
-        doubt = Finding(f"the optimum is proven only to {gap:.1e} of the cost", "processes", "", Severity.WARNING)
+        doubt = told("allocation.choice_proven_roughly", "processes", gap=gap)
         nothing = np.full(len(problem.effects.worst), np.nan)
         return Answer(
             problem,

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError, agreeing
+from trunnion.results.sentences import told
 from trunnion.statistics.costs import Cost
 
 __all__ = ["CRITERIA", "Answer", "Contribution", "Criterion", "Effects", "Option", "Problem", "Sampled", "Trial"]
@@ -297,11 +298,10 @@ def _shortfall(problem: Problem, least: Array, row: int, more: str) -> Finding:
     largest = problem.contributions[int(np.argmax(parts))]
     kept = "which has no cost and stays as it is" if largest.fixed else "which is at its least"
     ratio = f", {over / limit:.3g} times the limit" if over * limit > 0 else ""
-    return Finding(
-        f"no tolerances keep the limit {effects.say(row, limit)}: with all at their least it takes "
-        f"{effects.say(row, over)}{effects.place(row)}{ratio}{more}",
-        effects.label(row),
-        f"widen the limit, or narrow first '{largest.name}', {kept} and has the largest part",
+    takes = f"{effects.say(row, over)}{effects.place(row)}"
+    phrases = {"limit_told": effects.say(row, limit), "takes_told": takes, "ratio": ratio, "more": more, "kept": kept}
+    return told(
+        "allocation.impossible", effects.label(row), phrases=phrases, limit=limit, takes=over, largest=largest.name
     )
 
 

@@ -70,9 +70,10 @@ def dataset(found: Allocated, known: xr.Dataset) -> xr.Dataset:
     units = attribute(known, "parameter_units")
     variables = described(arrays, VARIABLES, {"parameter": units[0] if len(set(units)) == 1 else "", "1/": ""})
     # the criterion says what is to be kept
-    kept = [one for one in findings_of(known) if not one.what.startswith(MISSED)]
+    kept = [one for one in findings_of(known) if not one.code.startswith(MISSED)]
     own = list(said.findings_of(found, known))
     attributes: dict[str, Any] = {
+        "kind": "allocation",
         "found": int(found.answer.found),
         "criterion": found.asked.criterion,
         "target": found.asked.target,

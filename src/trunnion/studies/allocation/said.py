@@ -10,6 +10,7 @@ import numpy as np
 from trunnion.errors import Finding, Severity
 from trunnion.results.attributes import attribute
 from trunnion.results.figure import Figure
+from trunnion.results.sentences import told
 from trunnion.studies.allocation.allocated import CLOSE, DEFAULT_YIELD, share_of
 from trunnion.studies.allocation.problem import SHOWN
 from trunnion.studies.tolerance.targets import limits
@@ -48,31 +49,24 @@ def findings_of(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:
     yield from answer.findings
     if not answer.found:
         return
-    if answer.proven:
-        what = f"no tolerances cost less, to first order: proven to {max(answer.gap, 0.0):.1e} of what they change"
-        if found.asked.criterion == "yield":
-            what = "no tolerances with the same margin at every limit cost less, to first order"
-        yield Finding(what, "", "", Severity.NOTE)
+    if answer.proven and found.asked.criterion == "yield":
+        yield told("allocation.proven_margin")
+    elif answer.proven:
+        yield told("allocation.proven", gap=max(answer.gap, 0.0))
     for name, share in found.tight.items():
-        what = f"its limits were taken {100 * (1 - share):.2g} % narrower, so that the mechanism itself keeps them"
-        yield Finding(what, f"measures.{name}", "", Severity.NOTE)
+        yield told("allocation.narrowed", f"measures.{name}", percent=100 * (1 - share))
     if found.asked.criterion != "yield" and found.study.effects.correlated:
-        what = f"the criterion {found.asked.criterion} leaves the correlations out"
-        yield Finding(what, "correlations", "ask for a yield, which has them", Severity.WARNING)
+        yield told("allocation.correlations_left_out", "correlations", criterion=found.asked.criterion)
     if found.asked.criterion == "worst-case":
         yield from _searched(found, known)
     if found.asked.criterion == "rss" and "yield" in known:
         yield from _promised(known)
     if found.asked.criterion == "yield" and "yield_all" in known and answer.sampled is not None:
         yield from _yielded(found, known)
-    missing = [factor for factor, one in found.offers if not one.found]
-    if missing:
-        least = min((factor for factor, one in found.offers if one.found), default=np.nan)
-        points = f"1 of the {len(found.offers)} points of the curve has"
-        if len(missing) > 1:
-            points = f"{len(missing)} of the {len(found.offers)} points of the curve have"
-        remedy = f"limits of at least {least:.3g} times the stated ones can be kept" if np.isfinite(least) else ""
-        yield Finding(f"{points} no tolerances that keep the limits", "", remedy, Severity.NOTE)
+    kept = [factor for factor, one in found.offers if one.found]
+    if len(kept) < len(found.offers):
+        points, least = len(found.offers), min(kept, default=None)
+        yield told("allocation.curve_short", points=points, lost=points - len(kept), least=least)
 
 
 def _yielded(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:
@@ -80,12 +74,9 @@ def _yielded(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:
     target, any_other = found.asked.target, any(one.where == "yield" for one in found.answer.findings)
     share, low, high = (float(known[f"yield_all{end}"]) for end in ("", "_low", "_high"))
     if high < target and not any_other:
-        what = f"the yield of the samples is {share:.6g}, {target:g} was asked for"
-        yield Finding(what, "yield", "ask for more, or allow narrower tolerances")
+        yield told("yield.short", "yield", share=share, target=target)
     elif share < target <= high:
-        what = f"the yield of the samples is {share:.6g}, less than {target:g}, which lies in its interval "
-        remedy = "take more samples, or ask for more, to be surer"
-        yield Finding(f"{what}{low:.6g} to {high:.6g}", "yield", remedy, Severity.NOTE)
+        yield told("yield.uncertain", "yield", share=share, target=target, low=low, high=high)
 
 
 def _promised(known: xr.Dataset) -> Iterator[Finding]:
@@ -99,10 +90,8 @@ def _promised(known: xr.Dataset) -> Iterator[Finding]:
     ):
         if not high < DEFAULT_YIELD:
             continue
-        what = f"the yield of the samples is {share:.6g}, an RSS within the limits stands for {DEFAULT_YIELD:g}"
-        remedy = "ask for that yield, which takes distributions, means and correlations as they are"
         severity = Severity.ERROR if 1 - high > TWICE * (1 - DEFAULT_YIELD) else Severity.WARNING
-        yield Finding(what, f"measures.{name}", remedy, severity)
+        yield told("yield.below_rss", f"measures.{name}", severity=severity, share=share, target=DEFAULT_YIELD)
 
 
 def _searched(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:
@@ -117,7 +106,8 @@ def _searched(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:
             continue
         factor, unit = SHOWN.get(units[k], (1.0, units[k]))
         value, limit = (high, upper) if shares[1] >= shares[0] else (low, lower)
-        what = f"the worst case found on the mechanism is {factor * value:+.6g} {unit}, {100 * beyond:.2g} % beyond "
-        what += f"the limit {factor * limit:+.6g} {unit} that first order keeps"
         severity = Severity.ERROR if beyond > ROUGH else Severity.WARNING if beyond > SLIGHT else Severity.NOTE
-        yield Finding(what, f"measures.{of.measure.name}", "ask for `exact`, which takes them narrower", severity)
+        yield told(
+            "allocation.worst_case_beyond", f"measures.{of.measure.name}", severity=severity, worst=factor * value,
+            unit=unit, percent=100 * beyond, limit=factor * limit,
+        )  # fmt: skip

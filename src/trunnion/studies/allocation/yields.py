@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.special import chdtr, ndtr, ndtri
 
-from trunnion.errors import Finding, Severity
+from trunnion.results.sentences import told
 from trunnion.statistics.streams import SobolStream, factor
 from trunnion.studies.allocation.problem import Answer, Problem, Sampled, Trial
 
@@ -122,8 +122,7 @@ def _expected(problem: Problem, target: float, solve: Callable[[Problem], Answer
     if enough:
         return min(enough, key=lambda one: one.cost)
     best = max(tried, key=lambda one: one.expected)
-    what = f"with all tolerances as narrow as they can be the yield is {best.expected:.6g}, not {target:g}"
-    doubt = Finding(what, "yield", "allow narrower tolerances, widen a limit or ask for less", Severity.ERROR)
+    doubt = told("yield.narrowest", "yield", share=best.expected, target=target)
     return replace(best, findings=(*best.findings, doubt))
 
 
@@ -160,8 +159,7 @@ def _sampled(answer: Answer, target: float, solve: Callable[[Problem], Answer], 
     if met:
         return replace(best, trials=tuple(trials))
     share = best.sampled.share if best.sampled else np.nan
-    what = f"the best yield that was sampled is {share:.6g}, not {target:g}"
-    doubt = Finding(what, "yield", "allow narrower tolerances, widen a limit or ask for less", Severity.ERROR)
+    doubt = told("yield.best", "yield", share=share, target=target)
     return replace(best, trials=tuple(trials), findings=(*best.findings, doubt))
 
 

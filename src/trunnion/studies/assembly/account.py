@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
-from trunnion.errors import Finding, Severity
+from trunnion.errors import Finding
 from trunnion.results.attributes import cited, figure_rows, finding_rows, origin
 from trunnion.results.dataset import TIME, Variable, dataset_of, described
 from trunnion.results.figure import Figure
+from trunnion.results.sentences import told
 from trunnion.solve.system import System, Values
 
 if TYPE_CHECKING:
@@ -137,18 +138,18 @@ class Result:
         self._rigid()
         unsettled = np.flatnonzero(self.arrays["status"] == Fit.UNSETTLED)
         if len(unsettled):
-            remedy = "pins that share an axis hold each other along it: give one an end float, or make it cylindrical"
-            self._say(f"{Fit.UNSETTLED.text} {self._intervals(unsettled)}", "joints", remedy)
+            self._say("unsettled", "joints", status=Fit.UNSETTLED.text, at=self._intervals(unsettled))
         if len(self.findings) > count or not self.of:
             return
         share = self.share[0]
-        what = "the axes fit: the loops close without any clearance"
         if share > 0:
-            what = f"the stated clearances take up the errors: {_share(share)} of them is needed, {self._share_place()}"
-        self._say(what, "joints", "", Severity.NOTE)
+            phrases = {"told": _share(share)}
+            self._say("clearance_enough", "joints", phrases, share=share, at=self._share_place())
+        else:
+            self._say("fits", "joints")
 
-    def _say(self, what: str, where: str, remedy: str, severity: Severity = Severity.ERROR) -> None:
-        self.findings.append(Finding(what, where, remedy, severity))
+    def _say(self, code: str, where: str, phrases: dict[str, str] | None = None, **figures: Any) -> None:
+        self.findings.append(told(f"assembly.{code}", where, phrases=phrases, **figures))
 
     def _intervals(self, places: NDArray[np.intp]) -> str:
         return self.system.dial(self.values, self.time).intervals(places)
@@ -156,20 +157,21 @@ class Result:
     def _apart(self) -> None:
         places = np.flatnonzero(self.arrays["status"] == Fit.APART)
         if len(places):
-            remedy = "check the lengths, or limit the range of the driver"
-            self._say(f"{Fit.APART.text} {self._intervals(places)}", "links", remedy)
+            self._say("apart", "links", status=Fit.APART.text, at=self._intervals(places))
 
     def _short(self) -> None:
         (share, at), short = self.share, np.flatnonzero(self.arrays["status"] == Fit.SHORT)
-        what = "the stated clearances do not close the loops"
+        times = f"it takes {_share(share)} times as much"
         if len(short):
-            place, takes = self._share_place(), f"it takes {_share(share)} times as much"
-            takes = f"{takes} {place}" if place == EVERYWHERE else f"{place} {takes}"
-            what = f"{what} {self._intervals(short)}: {takes}"
-            self._say(what, "joints", self._remedy())
+            place = self._share_place()
+            takes = f"{times} {place}" if place == EVERYWHERE else f"{place} {times}"
+            takes = f"{self._intervals(short)}: {takes}"
         elif np.isfinite(share) and share > ENOUGH:  # between the positions
-            what = f"{what} near {self.where(at)}: it takes {_share(share)} times as much"
-            self._say(what, "joints", self._remedy())
+            takes = f"near {self.where(at)}: {times}"
+        else:
+            return
+        self._say("clearance_short", "joints", {"takes": takes, "remedy": self._remedy()}, share=share,
+                  clearance=self.clearance[0])  # fmt: skip
 
     def _rigid(self) -> None:
         places = np.flatnonzero(self.arrays["status"] == Fit.RIGID)
@@ -182,7 +184,8 @@ class Result:
         if self.played:
             zero = " (a clearance of 0 is none)" if self.nil else ""
             none = f"the stated play cannot close the loops, however large{zero}: they"
-        self._say(f"{none} stay open by up to {by}", "joints", self._remedy())
+        phrases = {"none": none, "by": by, "remedy": self._remedy()}
+        self._say("no_play", "joints", phrases, angle=angle, length=length, clearance=self.clearance[0])
 
     def _remedy(self) -> str:
         need = self.clearance[0]
@@ -243,7 +246,7 @@ class Result:
         ) | cited([SOURCE, *mechanism.references], Fit)
         time = described({"time": self.time}, {"time": replace(TIME, long_name="time")})
         variables = described({name: self.arrays[name] for name in FIGURES}, FIGURES)
-        return dataset_of(variables, labels(self.system), attributes, time)
+        return dataset_of("assembly", variables, labels(self.system), attributes, time)
 
 
 def _at(place: str) -> str:

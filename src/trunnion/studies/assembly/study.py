@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import primal
 from trunnion.algebra.nested import flat
 from trunnion.cycle.positions import check_steps
-from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.errors import Finding, MechanismError
 from trunnion.joints.clearance import CLEARANCE_MODELS
 from trunnion.model.contact import clearance
 from trunnion.model.mechanism import Mechanism
+from trunnion.results.sentences import told
 from trunnion.solve import shifts
 from trunnion.solve.branches import choose
 from trunnion.solve.forward import forward
@@ -99,8 +100,7 @@ def _regular(system: System, values: Values, cycle: Cycle, time: Array) -> Resul
     result.arrays["status"] = np.where(there, Fit.FITS, Fit.APART).astype(np.int8)
     plane = "in the plane no joint constrains twice" if system.mechanism.space == "planar" else ""
     what = plane or "its joints constrain no more than its links have freedoms"
-    what = f"{what}: errors shift its links, and it needs no clearance"
-    result.findings.append(Finding(what, "joints", severity=Severity.NOTE))
+    result.findings.append(told("assembly.no_need", "joints", phrases={"why": what}))
     result.tell()
     return result
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
 from trunnion.cycle.account import references
-from trunnion.errors import Finding, Severity, Status
+from trunnion.errors import Finding, Status
 from trunnion.measures.measures import Measure
 from trunnion.results.attributes import cited, figure_rows, finding_rows, origin
 from trunnion.results.dataset import Variable, dataset_of, described, driven
@@ -105,13 +105,9 @@ def dataset(found: Found, findings: Sequence[Finding]) -> xr.Dataset:
         "periodic": int(found.run.cycle.periodic),
         "summary": figure_rows(_summary(found, units, dial)),
         "findings": finding_rows(findings),
-        "missed": [
-            f"{one.where}: {one.what}"
-            for one in findings
-            if one.where.endswith(".limit") and one.severity is Severity.ERROR
-        ],
+        "missed": [f"{one.where}: {one.what}" for one in findings if one.code == "limit.exceeded"],
     }
-    return dataset_of(variables, labels, attributes, driven(found.time, *dial))
+    return dataset_of("play", variables, labels, attributes, driven(found.time, *dial))
 
 
 def relied_on(numbers: Array, status: NDArray[np.int8]) -> Array:

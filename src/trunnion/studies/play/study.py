@@ -34,6 +34,7 @@ from trunnion.measures.measures import Measure, named, outputs
 from trunnion.measures.motion import MOTIONS
 from trunnion.model.contact import clearance
 from trunnion.model.mechanism import Mechanism
+from trunnion.results.sentences import told
 from trunnion.solve import shifts
 from trunnion.solve.backward import under
 from trunnion.solve.forward import Forward, forward
@@ -165,18 +166,17 @@ def _measures(run: Run, names: Sequence[str] | None) -> tuple[list[Measure], lis
     remedy = "`trunnion tolerance` knows the others"
     if others and names is not None:
         raise MechanismError(Finding(what, "measures", remedy))
-    told = [Finding(f"{what}: left out", "measures", remedy, Severity.NOTE)] if others else []
+    notes = [told("play.measures_left_out", "measures", known=list(MOTIONS), measures=others)] if others else []
     found = [one for one in found if one.name not in others]
     if found:
-        return found, told
+        return found, notes
     found = outputs(run.system)
     remedy = "state measures: in the model, or give --measure link.point.x"
     if not found:
         raise MechanismError(
             Finding("no measure is stated, and no joint to the ground is an output", "measures", remedy)
         )
-    what = f"no measure is stated: {', '.join(one.name for one in found)} taken, joints to the ground without a driver"
-    return found, [Finding(what, "measures", remedy, Severity.NOTE), *told]
+    return found, [told("measure.none_stated", "measures", measures=[one.name for one in found]), *notes]
 
 
 def _check(known: Mapping[str, Play]) -> None:
@@ -273,19 +273,17 @@ def _model_findings(run: Run, effect: Effect) -> Iterator[Finding]:
     if run.determinacy is not None:
         yield from run.determinacy.findings()
         if any(part.redundant for part in run.determinacy.parts):
-            what = "constraints are redundant: the worst case is an upper bound, for pins that must fit one another"
-            yield Finding(what, "joints", "the deviation supposes that each may lie anywhere", Severity.WARNING)
+            yield told("play.redundant", "joints")
     yield from _left_out(run, effect.plays)
     yield from _spinning(run, effect.measures)
     if run.seats:
-        what = f"play is counted from the middle of the holes: the seats of {', '.join(one.joint for one in run.seats)}"
-        yield Finding(f"{what} are not taken", "joints", "analyse takes them", Severity.NOTE)
+        yield told("play.seats_not_taken", "joints", joints=[one.joint for one in run.seats])
     yield from _limits(run, effect)
     dial = run.system.dial(run.values, effect.time)
     for code in Status:
         where = np.flatnonzero(effect.status == code)
         if code >= Status.NOT_CONVERGED and len(where):
-            yield Finding(f"{code.text} {dial.intervals(where)}", "", "no effect of play is known there")
+            yield told("play.no_answer", at=dial.intervals(where), status=code.text)
 
 
 def _left_out(run: Run, known: Mapping[str, Play]) -> Iterator[Finding]:
@@ -298,16 +296,13 @@ def _left_out(run: Run, known: Mapping[str, Play]) -> Iterator[Finding]:
         if kind not in models and clearance(name, run.values) is not None
     ]
     if stated:
-        kinds = ", ".join(f"{name} is {run.system.joints[name][0]}" for name in stated)
-        what = f"the play of {', '.join(stated)} is left out ({kinds})"
-        yield Finding(what, "joints", f"play is modelled in {', '.join(models)} joints", Severity.WARNING)
+        kinds = [f"{name} is {run.system.joints[name][0]}" for name in stated]
+        yield told("play.left_out", "joints", joints=list(stated), kinds=kinds, modelled=list(models))
     toothed = sorted({
         joint for gear in mechanism.gears.values() if gear.teeth for joint in gear.joints if joint in known
     })  # fmt: skip
     if toothed:
-        what = f"gears turn in {', '.join(toothed)}: what their play does between the teeth is left out"
-        remedy = "a gear's centre off by e across the line of centres turns it by e over its pitch radius more"
-        yield Finding(what, "gears", remedy, Severity.WARNING)
+        yield told("play.gears", "gears", joints=toothed)
 
 
 def _spinning(run: Run, measures: Sequence[Measure]) -> Iterator[Finding]:
@@ -316,10 +311,7 @@ def _spinning(run: Run, measures: Sequence[Measure]) -> Iterator[Finding]:
         for measure in measures:
             owner, _, point = measure.subject.partition(".")
             if owner == link and (measure.kind == "angle" or (measure.kind == "point" and point not in ends)):
-                what = (
-                    f"'{link}' can spin about the line of {' and '.join(ends)}: it is taken not to, whatever the play"
-                )
-                yield Finding(what, f"measures.{measure.name}", "measure one of these points", Severity.WARNING)
+                yield told("play.spin", f"measures.{measure.name}", link=link, points=list(ends))
 
 
 def _limits(run: Run, effect: Effect) -> Iterator[Finding]:
@@ -332,10 +324,8 @@ def _limits(run: Run, effect: Effect) -> Iterator[Finding]:
         unit = measure.unit(run.system)
         factor, shown = (180 / np.pi, "deg") if unit == "rad" else (1e3, "mm") if unit == "m" else (1.0, unit)
         top = int(np.nanargmax(total))
-        what = f"the worst case is {factor * total[top]:.4g} {shown} at {dial.at(top)}, the limit is "
-        what += f"{factor * measure.limit:.4g} {shown}"
+        figures = {"worst": factor * total[top], "limit": factor * measure.limit, "unit": shown, "at": dial.at(top)}
         if len(over):
-            what += f"; it is above {dial.intervals(over)}"
-            yield Finding(what, where, "tighten the joints with the largest share")
+            yield told("limit.exceeded", where, **figures, over=dial.intervals(over))
         else:
-            yield Finding(f"{what}: it is kept", where, severity=Severity.NOTE)
+            yield told("limit.kept", where, **figures)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.errors import Finding, MechanismError
 from trunnion.measures.measures import Measure, named
 from trunnion.model.mechanism import Mechanism
+from trunnion.results.sentences import told
 from trunnion.solve.run import Run
 from trunnion.studies.sweep.figures import FIGURES
 
@@ -36,8 +37,4 @@ def measures_of(run: Run, names: Sequence[str]) -> list[Measure]:
 def left_out(mechanism: Mechanism, names: Sequence[str]) -> list[Finding]:
     """A note that names the measures of the model that a sweep does not have."""
     others = [name for name in mechanism.measures if name not in names]
-    if not others:
-        return []
-    one = len(others) == 1
-    what = f"the model's measure{'' if one else 's'} {', '.join(others)} {'is' if one else 'are'} not in this sweep"
-    return [Finding(what, "measures", "name it by --measure, in Python by measures=[…]", Severity.NOTE)]
+    return [told("sweep.measures_left_out", "measures", measures=others)] if others else []

@@ -15,10 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.cycle.account import effort_units, references
-from trunnion.errors import Finding, Severity, Status, agreeing, counted
+from trunnion.errors import Finding, Severity, Status, counted
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.attributes import cited, encoded, finding_rows, origin
 from trunnion.results.dataset import Variable, dataset_of, described
+from trunnion.results.sentences import told
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.studies.sweep.figures import FIGURES
 from trunnion.studies.sweep.grid import MOST_POINTS, Over, Swept, grid, say
@@ -68,10 +69,10 @@ def sweep(
     }
     watched = {one.name: one for one in measures_of(points.run, measures)} if measures else {}
     arrays |= {name: np.full(points.shape, np.nan) for name in watched}
-    for done, (index, told) in enumerate(points.solved(), 1):
+    for done, (index, row) in enumerate(points.solved(), 1):
         if watched:
-            told |= points.measured(index, list(watched))
-        for name, value in told.items():
+            row |= points.measured(index, list(watched))
+        for name, value in row.items():
             place: Any = (..., *index)
             arrays[name][place] = value
         if progress:
@@ -111,11 +112,10 @@ def _answers(swept: Sequence[Swept], arrays: Mapping[str, NDArray[Any]]) -> Iter
             continue
         first = tuple(int(i) for i in where[0])
         count = int(missing[first])
-        some_positions = f"{counted(count, 'position')} without an answer"
-        some = f"{len(where):,} of {counted(status.size, 'point')} {agreeing(len(where), 'has', 'have')} no figures"
-        what = f"{some}, first at {say(swept, first)} ({some_positions}): {code.text}"
-        names = " and ".join(one.name for one in swept)
-        yield Finding(what, names, "run analyse with these values: it says where in the cycle, and why")
+        yield told(
+            "sweep.no_answer", " and ".join(one.name for one in swept), points=len(where), of=status.size,
+            at=say(swept, first), positions=count, status=code.text,
+        )  # fmt: skip
 
 
 # ---- the result -----------------------------------------------------------------------------------------------
@@ -145,4 +145,4 @@ def _dataset(
         "driver_units": effort_units(run.system),
         "findings": finding_rows(findings),
     }
-    return dataset_of(variables, labels, attributes, along)
+    return dataset_of("sweep", variables, labels, attributes, along)

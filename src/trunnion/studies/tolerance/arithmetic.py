@@ -13,7 +13,8 @@ from functools import cache
 import numpy as np
 from scipy.special import ndtri
 
-from trunnion.errors import Finding, Severity
+from trunnion.errors import Finding
+from trunnion.results.sentences import told
 
 __all__ = ["fingerprint", "mixed"]
 
@@ -32,6 +33,4 @@ def mixed(seen: set[str]) -> tuple[Finding, ...]:
     """A note, if machines of more than one kind took part."""
     if len(seen) < 2:
         return ()
-    what = f"machines of {len(seen)} kinds took part, whose sines or logarithms differ in the last bit"
-    remedy = "as good an answer, but another mix may give other last bits; use machines of one kind"
-    return (Finding(what, "cluster", remedy, Severity.NOTE),)
+    return (told("samples.machines", "cluster", kinds=len(seen)),)

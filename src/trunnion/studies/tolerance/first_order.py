@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from trunnion.cycle.positions import check_steps
-from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.errors import Finding, MechanismError
 from trunnion.measures.figures import Reference
 from trunnion.measures.kernel import NumpyKernel
 from trunnion.measures.measures import Measure, named, outputs
@@ -19,6 +19,7 @@ from trunnion.model.measure_kinds import place_kind
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.quantity import Quantity
 from trunnion.model.units import UnitError
+from trunnion.results.sentences import told
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
 from trunnion.studies.tolerance.effects import Effects, effects_of
@@ -116,25 +117,23 @@ def study(
     run = prepare(mechanism)
     inputs = inputs_of(run)
     names = list(mechanism.measures) if measures is None else list(measures)
-    told: list[Finding] = []
+    notes: list[Finding] = []
     if names:
         found = named(mechanism, names, run.values)
     else:
         found = outputs(run.system)
-        remedy = "state measures: in the model, or give --measure link.point.x"
+        note = told("measure.none_stated", "measures", measures=[one.name for one in found])
         if not found:
             what = "no measure is stated, and no joint to the ground is an output"
-            raise MechanismError(Finding(what, "measures", remedy))
-        listed = ", ".join(one.name for one in found)
-        what = f"no measure is stated: {listed} taken, joints to the ground without a driver"
-        told.append(Finding(what, "measures", remedy, Severity.NOTE))
+            raise MechanismError(Finding(what, "measures", note.remedy))
+        notes.append(note)
     if run.determinacy is not None and not all(one.of_motion for one in found):
         run.determinacy.refuse()
     if run.cycle.duration <= 0:  # there is one position
         found = [replace(one, statistic="value") if one.rule == "deviation" else one for one in found]
     if at is not None:
         found = [placed(mechanism, one, at) for one in found]
-    return Study(run, inputs, tuple(found), steps, friction or FrictionMethod(), tuple(told))
+    return Study(run, inputs, tuple(found), steps, friction or FrictionMethod(), tuple(notes))
 
 
 def placed(mechanism: Mechanism, measure: Measure, at: float | str) -> Measure:

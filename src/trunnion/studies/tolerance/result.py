@@ -157,9 +157,9 @@ def dataset(outcome: Outcome, told: Sequence[Finding]) -> xr.Dataset:
         "stopped": int(outcome.stopped),
         "summary": figure_rows(summary(outcome, counted, units, dial)),
         "findings": finding_rows(stated),
-        "missed": [f"{one.where}: {one.what}" for one in stated if one.what.startswith(MISSED)],
+        "missed": [f"{one.where}: {one.what}" for one in stated if one.code.startswith(MISSED)],
     }
-    return dataset_of(variables, labels, attributes, {**quantiles, **driven(found.plan.times, *dial)})
+    return dataset_of("tolerance", variables, labels, attributes, {**quantiles, **driven(found.plan.times, *dial)})
 
 
 def _of_measures(found: Study, units: Sequence[str], curve_units: Sequence[str]) -> dict[str, list[Any]]:

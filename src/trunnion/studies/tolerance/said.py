@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.cycle.account import model_notes
-from trunnion.errors import Finding, Severity, Status, agreeing
-from trunnion.errors import counted as number_of
+from trunnion.errors import Finding, Severity, Status
 from trunnion.model.checks.values import NOT_NEGATIVE
 from trunnion.results.figure import Figure
+from trunnion.results.sentences import told
 from trunnion.studies.tolerance.linear import by_position
 from trunnion.studies.tolerance.sampling import CAUSES
 from trunnion.studies.tolerance.targets import limited, missed
@@ -98,11 +98,9 @@ def findings_of(outcome: Outcome, counted: Sampled | None) -> Iterator[Finding]:
         yield from study.run.determinacy.findings()
     loaded = [seat.joint for seat in study.run.seats if seat.given is None]
     if loaded:
-        what = f"pins lie anywhere in their holes: seats by loads of {', '.join(loaded)} are not taken"
-        yield Finding(what, "joints", "analyse takes them", Severity.NOTE)
+        yield told("tolerance.seats_not_taken", "joints", joints=loaded)
     if study.effects.correlated:
-        what = "RSS and worst case leave the correlations out: deviation, shares of variance and samples have them"
-        yield Finding(what, "correlations", severity=Severity.NOTE)
+        yield told("tolerance.correlations_left_out", "correlations")
     yield from _measured(outcome)
     yield from _impossible(outcome)
     yield from _nominal(outcome)
@@ -112,10 +110,7 @@ def findings_of(outcome: Outcome, counted: Sampled | None) -> Iterator[Finding]:
     if counted is not None:
         yield from _samples(outcome, counted)
     if outcome.indices is not None and outcome.indices.lost:
-        lost = outcome.indices.lost
-        some = f"{number_of(lost, 'sample')} of the variance-based indices {agreeing(lost, 'has', 'have')} no answer"
-        what = f"{some} and {agreeing(lost, 'counts', 'count')} as the mean"
-        yield Finding(what, "", "narrower tolerances, or a place where all go together", Severity.WARNING)
+        yield told("tolerance.indices_lost", count=outcome.indices.lost)
 
 
 def _measured(outcome: Outcome) -> Iterator[Finding]:
@@ -125,9 +120,8 @@ def _measured(outcome: Outcome) -> Iterator[Finding]:
         outside = np.count_nonzero((values < one.lower) | (values > one.upper))
         if one.distribution == "sample" and outside:
             far = float(values[np.argmax(np.abs(values))])
-            limits = f"{one.lower:g} to {one.upper:g}"
-            what = f"{outside:,} of {len(values):,} measured deviations are outside the limits {limits}"
-            yield Finding(f"{what}, the farthest {far:g} (SI)", one.path, "check their unit", Severity.WARNING)
+            figures: dict[str, Any] = {"lower": one.lower, "upper": one.upper, "farthest": far}
+            yield told("tolerance.measured_outside", one.path, count=int(outside), of=len(values), **figures)
 
 
 def _impossible(outcome: Outcome) -> Iterator[Finding]:
@@ -135,8 +129,7 @@ def _impossible(outcome: Outcome) -> Iterator[Finding]:
     for one in outcome.study.inputs.tolerances:
         least = one.nominal + one.lower
         if one.path.rpartition(".")[2] in NOT_NEGATIVE and least < 0:
-            what = f"its limits let it be {least:g} (SI), which is negative"
-            yield Finding(what, one.path, "narrow the limits", Severity.WARNING)
+            yield told("tolerance.negative", one.path, least=least)
 
 
 def _nominal(outcome: Outcome) -> Iterator[Finding]:
@@ -147,26 +140,23 @@ def _nominal(outcome: Outcome) -> Iterator[Finding]:
     for code in Status:
         where = np.flatnonzero(status == code)
         if code >= Status.NOT_CONVERGED and len(where):
-            yield Finding(f"nominal: {code.text} {dial.intervals(where)}", "", "nothing is known there")
+            yield told("tolerance.nominal_no_answer", status=code.text, at=dial.intervals(where))
         elif code == Status.NEAR_SINGULAR and len(where):
-            what = f"close to a dead centre {dial.intervals(where)}: first order says little there"
-            yield Finding(what, "", "rely on the samples there", Severity.WARNING)
+            yield told("tolerance.near_singular", at=dial.intervals(where))
     for of in study.linear.measures:
         if not np.isfinite(of.reference.figure):
-            name, remedy = of.measure.name, "take it at a place, or over a range, where there is one"
-            yield Finding(f"{name}: the nominal mechanism has no such figure", f"measures.{name}", remedy)
+            name = of.measure.name
+            yield told("tolerance.nominal_no_figure", f"measures.{name}", measure=name)
 
 
 def _first_order(outcome: Outcome, of: Of) -> Iterator[Finding]:
     """A measure of which first order knows nothing, or whose worst case found is another."""
     position = of.reference.window.index[of.place] if of.place >= 0 else -1
     if position >= 0 and not of.measure.of_motion and outcome.study.linear.status[position] == Status.ZERO_SLIP:
-        what = "a relative speed is zero there: friction jumps, and first order is of one side"
-        yield Finding(what, f"measures.{of.measure.name}", "rely on the samples", Severity.WARNING)
-    name, lower, upper = of.measure.name, float(of.total[0]), float(of.total[1])
+        yield told("first_order.one_sided", f"measures.{of.measure.name}")
+    where, lower, upper = f"measures.{of.measure.name}", float(of.total[0]), float(of.total[1])
     if not np.isfinite(upper):
-        what = "first order has no answer"
-        yield Finding(what, f"measures.{name}", "rely on the samples", Severity.WARNING)
+        yield told("first_order.no_answer", where)
         return
     if outcome.worst is None:
         return
@@ -174,33 +164,25 @@ def _first_order(outcome: Outcome, of: Of) -> Iterator[Finding]:
     least, most = outcome.worst[i]
     for end, corner in (("least", least), ("largest", most)):
         if not corner.assembles:
-            what = f"at the linear corner of the {end} deviation the mechanism has no answer"
-            yield Finding(what, f"measures.{name}", "the tolerances let it not go together there", Severity.WARNING)
+            yield told("first_order.corner_open", where, end=end)
     size, found = max(-lower, upper), max(-least.value, most.value)
     if np.isfinite(found) and abs(found - size) > FAR_OFF * max(size, found) and max(size, found) > 0:
-        what = f"the worst case found is {found / size if size else np.inf:.2f} times that of first order"
-        yield Finding(what, f"measures.{name}", "rely on the one found, and on samples", Severity.NOTE)
+        yield told("first_order.worst_case_differs", where, ratio=found / size if size else np.inf)
 
 
 def _carried(outcome: Outcome, of: Of) -> Iterator[Finding]:
     """Plays whose part in the scatter is another if the pin keeps its place on the other link."""
     study, whole = outcome.study, float(of.total[4])
-    others = []
+    others: list[tuple[str, float]] = []
     for joint in study.inputs.loose:
         taken, *more = (float(part) for part in study.effects.scatters(joint, of.slope))
         ratios = [np.sqrt(max(1 + (other**2 - taken**2) / whole**2, 0.0)) for other in more if whole > 0]
         others += [(joint, ratio) for ratio in ratios if abs(ratio - 1) > CARRIED]
     if others:
         joints = study.run.system.mechanism.effective_joints
-        told = ", ".join(f"'{joints[name].links[0]}' in {name}: {ratio:.3g} times" for name, ratio in others)
-        holes = ", ".join(f"'{joints[name].links[1]}' in {name}" for name, _ in others)
-        what = (
-            f"scatter and yield suppose that pins keep their places on the links of the holes ({holes}); on the other "
-        )
-        what += f"link the deviation is another ({told}); the worst case is of both"
-        name = others[0][0]
-        remedy = f"say joints.{name}.seat_on: {joints[name].links[0]} or {joints[name].links[1]}"
-        yield Finding(what, f"measures.{of.measure.name}", remedy, Severity.NOTE)
+        links = {name: list(joints[name].links) for name, _ in others}
+        where, first = f"measures.{of.measure.name}", others[0][0]
+        yield told("play.carried", where, ratios=dict(others), links=links, joint=first)
 
 
 def _scatter(outcome: Outcome, counted: Sampled) -> Iterator[Finding]:
@@ -210,9 +192,7 @@ def _scatter(outcome: Outcome, counted: Sampled) -> Iterator[Finding]:
         if by_position(of.reference) or counted.done < ENOUGH or not np.isfinite(linear + found):
             continue
         if max(linear, found) > 0 and not 1 / OTHERWISE < found / max(linear, 1e-300) < OTHERWISE:
-            what = f"the samples scatter by {found:.4g} (SI), first order says {linear:.4g}"
-            remedy = "it is not linear within the tolerances: rely on the samples"
-            yield Finding(what, f"measures.{of.measure.name}", remedy, Severity.WARNING)
+            yield told("first_order.scatter_differs", f"measures.{of.measure.name}", found=found, linear=linear)
 
 
 def _samples(outcome: Outcome, counted: Sampled) -> Iterator[Finding]:
@@ -220,7 +200,6 @@ def _samples(outcome: Outcome, counted: Sampled) -> Iterator[Finding]:
     for code in range(CAUSES):
         if failed[code]:
             text = list(Status)[code].text if code < CAUSES - 1 else "a figure does not exist"
-            some = f"{int(failed[code]):,} of {number_of(done, 'sample')} ({failed[code] / done:.2%})"
-            what = f"{some} {agreeing(int(failed[code]), 'has', 'have')} no answer: {text}"
-            yield Finding(what, "tolerances", "they count as outside every limit; moments are of the others")
+            count = int(failed[code])
+            yield told("samples.no_answer", "tolerances", count=count, samples=done, share=count / done, why=text)
     yield from _scatter(outcome, counted)

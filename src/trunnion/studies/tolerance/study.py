@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from trunnion.errors import Finding, MechanismError, Severity, counted
+from trunnion.errors import Finding, MechanismError
 from trunnion.model.mechanism import Mechanism
+from trunnion.results.sentences import told
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.studies.tolerance import runner
 from trunnion.studies.tolerance.indices import Indices, indices
@@ -88,9 +89,9 @@ def tolerance(
         tally, stopped = ran.tally, ran.stopped
         notes += ran.notes
         if stopped:
-            what = f"stopped before the end: {done_of(job, tally):,} of {counted(job.samples, 'sample')}"
             remedy = "go on with --resume" if checkpoint is not None else "with --checkpoint FILE what is done is kept"
-            notes.append(Finding(what, "samples", remedy, Severity.WARNING))
+            done, phrases = done_of(job, tally), {"remedy": remedy}
+            notes.append(told("samples.stopped", "samples", phrases=phrases, done=done, samples=job.samples))
     if "sobol" in methods:
         # Not turned: each number is to have its own coordinates of the points.
         own = replace(found.sampling("quasi-monte-carlo", samples, seed), rotation=None)

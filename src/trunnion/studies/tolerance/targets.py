@@ -7,13 +7,14 @@ C_pk below 1 miss them too; but where the worst case keeps the limits no mechani
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.errors import Finding
 from trunnion.measures.measures import Measure
+from trunnion.results.sentences import told
 
 if TYPE_CHECKING:
     from trunnion.studies.tolerance.linear import Of
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 __all__ = ["MISSED", "against", "limited", "limits", "missed"]
 
 Array = NDArray[np.float64]
-MISSED = "limits not kept"  # with which such a finding begins
+MISSED = "limit.missed"  # with which the code of such a finding begins
 CLOSE, SLIGHT = 1e-6, 1e-3  # of a limit: rounding, and what first order leaves out where it was kept
 HALF = 0.5  # of the room: a nominal figure that is further off its middle is to be brought there first
 SHOWN = {"rad": (180 / np.pi, "deg"), "m": (1e3, "mm")}
@@ -78,8 +79,9 @@ def missed(outcome: Outcome, counted: Sampled | None) -> Iterator[Finding]:
         parts = [say.range(*known)] if beyond else []
         short = _short(counted, i, sure=bool(np.all(np.isfinite(known))) and not beyond)
         if parts or short:
-            what = f"{MISSED}: {'; '.join([*parts, *short])}; {say.limits()}"
-            yield Finding(what, f"measures.{of.measure.name}", _remedy(outcome, of, say))
+            phrases = {"told": "; ".join([*parts, *short]), "limits": say.limits(), "remedy": _remedy(outcome, of, say)}
+            figures = {"worst_lower": known[0], "worst_upper": known[1], **_sampled(counted, i)}
+            yield told(MISSED, f"measures.{of.measure.name}", phrases=phrases, **figures)
 
 
 def _below(outcome: Outcome, counted: Sampled | None, target: float) -> Iterator[Finding]:
@@ -90,13 +92,20 @@ def _below(outcome: Outcome, counted: Sampled | None, target: float) -> Iterator
     for i, of in enumerate(outcome.study.linear.measures):
         if limited(of.measure) and float(counted.arrays["yield_high"][i]) < target:
             fine, say = False, _Words(outcome, of)
-            what = f"{MISSED}: {_short(counted, i, sure=True)[0]}, {100 * target:.6g} % asked for; {say.limits()}"
-            yield Finding(what, f"measures.{of.measure.name}", _remedy(outcome, of, say))
+            short = _short(counted, i, sure=True)[0]
+            phrases = {"told": short, "limits": say.limits(), "remedy": _remedy(outcome, of, say)}
+            figures = {"target_percent": 100 * target, **_sampled(counted, i)}
+            yield told(f"{MISSED}_yield", f"measures.{of.measure.name}", phrases=phrases, **figures)
     share, low, high = (float(counted.arrays[f"yield_all{end}"]) for end in ("", "_low", "_high"))
     if fine and high < target:
-        what = f"{MISSED}: yield of all measures together {100 * share:.6g} % (95 % interval {100 * low:.5g} to "
-        what += f"{100 * high:.5g} %), {100 * target:.6g} % asked for"
-        yield Finding(what, "measures", "narrower tolerances of the measure with the lowest yield first")
+        percents: dict[str, Any] = {"percent": 100 * share, "percent_low": 100 * low, "percent_high": 100 * high}
+        yield told(f"{MISSED}_together", "measures", **percents, target_percent=100 * target)
+
+
+def _sampled(counted: Sampled | None, i: int) -> dict[str, Any]:
+    """What the samples say of a measure with limits, as figures of a finding."""
+    keys = ("yield", "yield_low", "yield_high", "cpk") if counted is not None and counted.done else ()
+    return {key: float(counted.arrays[key][i]) for key in keys if counted is not None}
 
 
 def _worst(outcome: Outcome, i: int, of: Of) -> tuple[tuple[float, float], bool]:

@@ -11,9 +11,9 @@ from trunnion.results.attributes import attribute
 from trunnion.rig.compare.judge import Verdict
 from trunnion.views.common.cycle import Array, names
 from trunnion.views.common.quantities import number, prefixed
+from trunnion.views.common.table import Table
 from trunnion.views.compare.compared import coverage_of, scale_of, sets, setting, text, units, verdict
 from trunnion.views.rig.conditions import shortened
-from trunnion.views.tolerance.tables import Table
 
 if TYPE_CHECKING:
     import xarray as xr

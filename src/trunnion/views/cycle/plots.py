@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -398,6 +398,19 @@ READY: dict[str, Callable[[xr.Dataset], bool]] = {
     "beta": described,
     "measures": lambda result: bool(drawn(result)),
 }
+
+
+def figure(result: xr.Dataset, kind: str = "torque", ideal: xr.Dataset | None = None) -> Figure:
+    """One figure. kind: of PLOTS; ideal: the same run without friction, to compare with."""
+    check_kinds([kind])
+    return PLOTS[kind](result, ideal)
+
+
+def check_kinds(kinds: Sequence[str]) -> None:
+    """MechanismError if there is no such kind of figure."""
+    unknown = [name for name in kinds if name not in PLOTS]
+    if unknown:
+        raise MechanismError(Finding(f"there is no plot '{unknown[0]}'", "--kind", f"use one of {', '.join(PLOTS)}"))
 
 
 def drawable(result: xr.Dataset) -> list[str]:

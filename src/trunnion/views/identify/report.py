@@ -13,13 +13,13 @@ import numpy as np
 from trunnion.results.attributes import attribute
 from trunnion.views.common.bundle import web_text
 from trunnion.views.common.quantities import number
+from trunnion.views.common.table import Table
 from trunnion.views.compare.tables import files
 from trunnion.views.cycle.report import said
 from trunnion.views.identify.figure import figure
 from trunnion.views.identify.identified import estimates
 from trunnion.views.identify.tables import budget, correlations, estimated, fits, held_out, sensors
 from trunnion.views.tolerance.report import source, template
-from trunnion.views.tolerance.tables import Table
 
 if TYPE_CHECKING:
     import xarray as xr

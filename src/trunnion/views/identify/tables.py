@@ -9,9 +9,9 @@ import numpy as np
 
 from trunnion.views.common.cycle import names
 from trunnion.views.common.quantities import prefixed
+from trunnion.views.common.table import Table
 from trunnion.views.identify.identified import Estimate, channels, conditions, estimates, percent
 from trunnion.views.rig.conditions import shortened
-from trunnion.views.tolerance.tables import Table
 
 if TYPE_CHECKING:
     import xarray as xr

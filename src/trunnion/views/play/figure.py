@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from trunnion.views.common.figures import INK, PALETTE, along, frame_peak, legen
 from trunnion.views.common.lettering import plain
 from trunnion.views.common.peaks import ease, usual_peak
 from trunnion.views.common.quantities import prefixed, quantity
+from trunnion.views.common.table import Table
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -84,14 +85,6 @@ def _over(result: xr.Dataset) -> Abscissa:
 
 
 # ---- table ----------------------------------------------------------------------------------------------------
-
-
-class Table(NamedTuple):
-    """What the command line prints of one measure."""
-
-    title: str
-    head: list[str]
-    rows: list[list[str]]
 
 
 HEAD = ["joint", "play", "largest effect ±", "at", "share"]

@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from trunnion.rig.reading.measurement import Course, Measurement
+from trunnion.views.common.table import Table
 from trunnion.views.rig.conditions import shortened
 
-__all__ = ["Rows", "tables"]
+__all__ = ["tables"]
 
-Rows = tuple[str, list[str], list[list[str]]]
 MOST = 40  # conditions shown
 
 
-def tables(measurement: Measurement) -> list[Rows]:
+def tables(measurement: Measurement) -> list[Table]:
     """The conditions with the mean of each channel, then the channels with scatter and uncertainty over all of them."""
     conditions = measurement.conditions
     channels = list(conditions[0].courses)
@@ -30,11 +30,11 @@ def tables(measurement: Measurement) -> list[Rows]:
         rows.append([*own, f"{turns:,}", *speed, *(_figure(_overall(one.courses[key])) for key in channels)])
     if len(conditions) > MOST:
         rows.append([f"{len(conditions) - MOST} more", *[""] * (len(head) - 1)])
-    shown: list[Rows] = [(f"{measurement.name}\nconditions: mean over turns and positions", head, rows)]
+    shown = [Table(f"{measurement.name}\nconditions: mean over turns and positions", head, rows)]
     head = ["channel", "measures", "unit", "least", "largest", "scatter", "uncertainty"]
     rows = [[name, *_channel([one.courses[name] for one in conditions])] for name in channels]
-    shown.append(("channels: mean courses, what turns scatter, standard uncertainty of the mean", head, rows))
-    return shown
+    title = "channels: mean courses, what turns scatter, standard uncertainty of the mean"
+    return [*shown, Table(title, head, rows)]
 
 
 def _channel(courses: list[Course]) -> list[str]:

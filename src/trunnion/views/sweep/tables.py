@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from trunnion.errors import Status
-from trunnion.results.export import figures
+from trunnion.results.columns.studies import swept as figures
 from trunnion.views.sweep.swept import Arrangement, arrange, cause, grid, statuses, thinned
 
 if TYPE_CHECKING:

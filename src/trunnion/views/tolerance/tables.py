@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from trunnion.views.common.cycle import names
 from trunnion.views.common.quantities import number
+from trunnion.views.common.table import Table
 from trunnion.views.tolerance.plots import outer, rss_label
 from trunnion.views.tolerance.toleranced import (
     Contribution,
@@ -44,14 +45,6 @@ __all__ = [
 MOST_HEADS = 6
 LEAST, LEAST_INDEX = 1e-3, 5e-3  # shares below which a number has no row of its own in the terminal
 MOST = 20  # rows of contributions there
-
-
-class Table(NamedTuple):
-    """A title, the heads of the columns, the rows."""
-
-    title: str
-    head: list[str]
-    rows: list[list[str]]
 
 
 Cells = dict[str, str]  # text by column; a column without any text is left out

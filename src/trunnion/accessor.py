@@ -1,0 +1,70 @@
+"""`result.trunnion`: what a result says and how it is shown, on the Dataset itself.
+
+It is there as soon as a function of `trunnion` that returns a result is used; `import trunnion.accessor` brings it for
+a result that is read from a file.
+"""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING, Any
+
+import xarray as xr
+
+from trunnion.errors import Finding
+from trunnion.files import whole
+from trunnion.results.attributes import findings_of, summary_of
+from trunnion.results.columns import KINDS, kind_of
+from trunnion.results.export import frame, save
+from trunnion.results.figure import Figure as Figure
+from trunnion.views.shown import figure_of, report_of
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure as Drawing
+
+__all__ = ["Accessor"]
+
+
+@xr.register_dataset_accessor("trunnion")  # type: ignore[no-untyped-call]
+class Accessor:
+    """A result of Trunnion, read."""
+
+    def __init__(self, result: xr.Dataset) -> None:
+        self._result = result
+
+    @property
+    def kind(self) -> str:
+        """What it is a result of: cycle, sweep, play, assembly, tolerance, allocation, measurement, comparison or
+        identification."""
+        return kind_of(self._result)
+
+    @property
+    def findings(self) -> list[Finding]:
+        """What is to be known of it, by code, severity, place and figures."""
+        return findings_of(self._result)
+
+    @property
+    def summary(self) -> list[Figure]:
+        """The figures that one looks at first, by name, value and unit."""
+        return summary_of(self._result)
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """Its tables by name, with the columns of the CSV files."""
+        return {name: frame(self._result, name) for name in KINDS[self.kind]}
+
+    def save(self, path: str | os.PathLike[str], units_row: bool = False) -> None:
+        """Write it by the file's extension: .csv .json .nc .zarr .parquet."""
+        save(self._result, path, units_row)
+
+    def report(self, path: str | os.PathLike[str] | None = None, **options: Any) -> str:
+        """The report as HTML, also written if a path is given; options: those of the view, as ideal= of a cycle."""
+        text = report_of(self._result, **options)
+        if path is not None:
+            with whole(path) as temporary:
+                temporary.write_text(text, encoding="utf-8")
+        return text
+
+    def plot(self, kind: str | None = None, **options: Any) -> Drawing:
+        """A matplotlib figure: the main one of its view, or of a kind such as "reactions"."""
+        return figure_of(self._result, kind, **options)

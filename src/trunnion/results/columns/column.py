@@ -1,0 +1,45 @@
+"""A flat column of a result: its name, its unit, its values by a window of rows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.errors import Status
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["Column", "column", "status_column", "time_column", "vector", "whole"]
+
+Column = tuple[str, str, Callable[[slice], NDArray[Any]]]
+
+
+def whole(flat: Iterable[tuple[str, str, NDArray[Any]]]) -> list[Column]:
+    """Columns whose values are all at hand."""
+    return [(name, unit, values.__getitem__) for name, unit, values in flat]
+
+
+def time_column(result: xr.Dataset) -> Column:
+    """The time of every position."""
+    return "time", "s", lambda window: result["time"].values[window]
+
+
+def status_column(result: xr.Dataset) -> Column:
+    """The status of every position in words."""
+    names = np.array([status.name.lower() for status in Status])
+    return "status", "", lambda window: names[result["status"].values[window]]
+
+
+def vector(result: xr.Dataset, variable: str, name: str, i: int) -> list[Column]:
+    """The components of a vector: its name with each axis behind it."""
+    return [column(result, variable, f"{name}{axis}", (i, k)) for k, axis in enumerate(result["axis"].values)]
+
+
+def column(result: xr.Dataset, variable: str, name: str, index: tuple[int, ...]) -> Column:
+    array = result[variable]
+    values = array.values[index]
+    return name, str(array.attrs["units"]), lambda window: values[window]

@@ -1,0 +1,150 @@
+"""The flat columns of a result of `analyse` or `locking`: one row a position."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from trunnion.results.attributes import attribute
+from trunnion.results.columns.column import Column, column, status_column, time_column, vector
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["positions"]
+
+SLIDING = ("prismatic", "cylindrical", "helical")
+
+
+def positions(result: xr.Dataset) -> list[Column]:
+    """Joints, drivers, springs, gears, links and points, power and status."""
+    stated = attribute(result, "scene", "{}")
+    spatial = stated.get("space") == "spatial"
+    kinds = {name: joint["type"] for name, joint in stated["joints"].items()}
+    found: list[Column] = [time_column(result)]
+    for i, joint in enumerate(result["joint"].values):
+        of_joint = _spatial_joint if spatial else _planar_joint
+        found += of_joint(result, i, str(joint), kinds[str(joint)])
+        found.append(column(result, "friction_power", f"{joint}.friction_power", (i,)))
+        found += _errors_of_joint(result, i, str(joint), kinds[str(joint)])
+    found += _drivers(result) + _springs(result)
+    for i, gear in enumerate(result["gear"].values if "gear" in result.dims else ()):
+        found.append(column(result, "gear_torque", f"{gear}.torque", (i,)))
+        found += vector(result, "gear_force", f"{gear}.force_", i)
+    for i, link in enumerate(result["link"].values):
+        found += _spatial_link(result, i, str(link)) if spatial else _planar_link(result, i, str(link))
+    for i, point in enumerate(result["point"].values):
+        found += vector(result, "point_position", f"{point}.", i)
+        if "point_error" in result:
+            found += vector(result, "point_error", f"{point}.error_", i)
+    drive = result["drive_power"].values
+    found.append(("power_in", "W", lambda window: drive[:, window].sum(axis=0)))
+    found.append(column(result, "useful_power", "power_useful", ()))
+    if "seat_rounds" in result:
+        found.append(column(result, "seat_rounds", "seat_rounds", ()))
+    return [*found, status_column(result), *_measures(result)]
+
+
+def _measures(result: xr.Dataset) -> list[Column]:
+    """The model's measures, by their names."""
+    return [
+        (str(result["measure"].values[i]), unit, column(result, "measure_value", "", (i,))[2])
+        for i, unit in enumerate(attribute(result, "measure_units"))
+    ]
+
+
+def _planar_joint(result: xr.Dataset, i: int, joint: str, kind: str) -> list[Column]:
+    slides = kind != "revolute"
+    flat = [("joint_rotation", "rotation"), ("joint_rotation_velocity", "rotation_velocity")]
+    flat += [("joint_slide", "slide"), ("joint_slide_velocity", "slide_velocity")] if slides else []
+    found = [column(result, variable, f"{joint}.{name}", (i,)) for variable, name in flat]
+    found += vector(result, "reaction_force", f"{joint}.reaction_", i)
+    if slides:
+        found.append(column(result, "reaction_moment", f"{joint}.reaction_moment", (i,)))
+        found.append(column(result, "friction_force", f"{joint}.friction_force", (i,)))
+    else:
+        found.append(column(result, "friction_torque", f"{joint}.friction_torque", (i,)))
+    return found
+
+
+def _spatial_joint(result: xr.Dataset, i: int, joint: str, kind: str) -> list[Column]:
+    """Of a joint in space: its motion, force and moment of the reaction, friction along each freedom."""
+    moves = {"rotation": kind not in ("prismatic", "planar", "fixed"), "slide": kind in SLIDING}
+    found = [
+        column(result, f"joint_{motion}{rate}", f"{joint}.{motion}{rate}", (i,))
+        for motion, there in moves.items()
+        for rate in ("", "_velocity")
+        if there
+    ]
+    found += vector(result, "reaction_force", f"{joint}.reaction_", i)
+    found += vector(result, "reaction_moment", f"{joint}.reaction_moment_", i)
+    freedoms = {"torque": moves["rotation"], "force": moves["slide"]}
+    found += [
+        column(result, f"friction_{what}", f"{joint}.friction_{what}", (i,)) for what, is_ in freedoms.items() if is_
+    ]
+    return found
+
+
+def _errors_of_joint(result: xr.Dataset, i: int, joint: str, kind: str) -> list[Column]:
+    """Of a joint of a mechanism with errors: what moves it against the ideal one, and where its pin lies."""
+    found: list[Column] = []
+    if "joint_rotation_error" in result and kind not in ("prismatic", "fixed"):
+        found.append(column(result, "joint_rotation_error", f"{joint}.rotation_error", (i,)))
+    if "joint_slide_error" in result and kind in SLIDING:
+        found.append(column(result, "joint_slide_error", f"{joint}.slide_error", (i,)))
+    if "reaction_force_change" in result:
+        found += vector(result, "reaction_force_change", f"{joint}.reaction_change_", i)
+    if "seat_offset" not in result or not np.any(np.isfinite(result["seat_offset"].values[i])):
+        return found
+    for end, name in enumerate(result["end"].values):
+        if np.any(np.isfinite(result["seat_offset"].values[i, end])):
+            for variable, said in (
+                ("seat_offset", "seat"),
+                ("end_force", "end_force"),
+                ("contact_position", "contact"),
+            ):
+                found += [
+                    column(result, variable, f"{joint}.{said}_{name}_{axis}", (i, end, k))
+                    for k, axis in enumerate(result["axis"].values)
+                ]
+    found += [column(result, f"seat_{angle}", f"{joint}.seat_{angle}", (i,)) for angle in ("beta", "xi", "xi_pin")]
+    return [*found, column(result, "contact_lost", f"{joint}.contact_lost", (i,))]
+
+
+def _planar_link(result: xr.Dataset, i: int, link: str) -> list[Column]:
+    variables = ("link_angle", "link_angle_velocity", "link_angle_acceleration")
+    return [column(result, one, f"{link}.{one.removeprefix('link_')}", (i,)) for one in variables]
+
+
+def _spatial_link(result: xr.Dataset, i: int, link: str) -> list[Column]:
+    """Pose of a link, origin and quaternion, and how it turns."""
+    found = vector(result, "link_position", f"{link}.", i)
+    found += [column(result, "link_rotation", f"{link}.rotation_{one}", (i, k)) for k, one in enumerate("wxyz")]
+    for rate in ("velocity", "acceleration"):
+        found += vector(result, f"link_angular_{rate}", f"{link}.angular_{rate}_", i)
+    return found
+
+
+def _drivers(result: xr.Dataset) -> list[Column]:
+    """Effort of each driver with the ends of its interval, in the unit of the driver."""
+    found: list[Column] = []
+    for i, (driver, unit) in enumerate(zip(result["driver"].values, attribute(result, "driver_units"), strict=True)):
+        for end in ("", "_lower", "_upper"):
+            name, _, values = column(result, f"drive_effort{end}", f"{driver}.effort{end}", (i,))
+            found.append((name, unit, values))
+        if "drive_effort_change" in result:
+            name, _, values = column(result, "drive_effort_change", f"{driver}.effort_change", (i,))
+            found.append((name, unit, values))
+    return found
+
+
+def _springs(result: xr.Dataset) -> list[Column]:
+    found: list[Column] = []
+    for i, spring in enumerate(result["spring"].values if "spring" in result.dims else ()):
+        for variable, unit in zip(("force", "elongation"), attribute(result, "spring_units")[i], strict=True):
+            name, _, values = column(result, f"spring_{variable}", f"{spring}.{variable}", (i,))
+            found.append((name, unit, values))
+        found.append(column(result, "spring_power", f"{spring}.spring_power", (i,)))
+        found.append(column(result, "damping_power", f"{spring}.damping_power", (i,)))
+    return found

@@ -1,0 +1,48 @@
+"""One sentence with gaps for figures, and how figures are written into it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from string import Formatter
+from typing import Any, NamedTuple
+
+from trunnion.errors import Severity, agreeing, counted
+
+__all__ = ["ERROR", "NOTE", "WARNING", "Sentence", "filled", "length"]
+
+ERROR, WARNING, NOTE = Severity.ERROR, Severity.WARNING, Severity.NOTE
+
+
+class Sentence(NamedTuple):
+    """What is the case and what to do about it: texts with gaps, or functions of the figures; how much it weighs."""
+
+    severity: Severity
+    what: str | Callable[..., str]
+    remedy: str | Callable[..., str] = ""
+
+
+class _Words(Formatter):
+    """`{names}` of a list are joined by commas; `{n:#row}` is "1 row", `{n:#is/are}` the word that goes with n; ∞."""
+
+    def format_field(self, value: Any, format_spec: str) -> str:
+        if isinstance(value, (list, tuple)):
+            return ", ".join(map(str, value))
+        if format_spec.startswith("#"):
+            one, several, many = format_spec[1:].partition("/")
+            return agreeing(int(value), one, many) if several else counted(int(value), one)
+        if isinstance(value, float) and value == float("inf"):
+            return "∞"
+        return str(super().format_field(value, format_spec))
+
+
+def filled(text: str | Callable[..., str], figures: dict[str, Any]) -> str:
+    """The text with its figures."""
+    return text(**figures) if callable(text) else _Words().vformat(text, (), figures)
+
+
+def length(metres: float) -> str:
+    """A length in the unit a drawing would use."""
+    size = abs(metres)
+    if size >= 1:
+        return f"{metres:.4g} m"
+    return f"{metres * 1e3:.4g} mm" if size >= 1e-4 else f"{metres * 1e6:.4g} µm"

@@ -1,0 +1,53 @@
+"""A result of any kind as a report or a figure: which view it has."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from trunnion.errors import Finding, MechanismError
+from trunnion.results.columns import kind_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+__all__ = ["check_kind", "figure_of", "report_of"]
+
+# kind of result: the module of its view, in which `report` or `figure` stands; loaded when it is asked for, for
+# matplotlib is slow to import
+REPORTS = {
+    "cycle": "cycle.report", "tolerance": "tolerance.report", "allocation": "allocation.allocation",
+    "comparison": "compare.report", "identification": "identify.report",
+}  # fmt: skip
+FIGURES = {
+    "cycle": "cycle.plots", "sweep": "sweep.figure", "play": "play.figure", "assembly": "assembly.figure",
+    "tolerance": "tolerance.figure", "allocation": "allocation.allocation", "comparison": "compare.figure",
+    "identification": "identify.figure",
+}  # fmt: skip
+
+
+def report_of(result: xr.Dataset, **options: Any) -> str:
+    """The report of a result as HTML. options: those of its view, such as ideal= of a cycle."""
+    return str(_view(kind_of(result), REPORTS, "report").report(result, **options))
+
+
+def figure_of(result: xr.Dataset, kind: str | None = None, **options: Any) -> Figure:
+    """A figure of a result; kind: of those of its view, the main one if not given; options: those of its view."""
+    view = _view(kind_of(result), FIGURES, "figure")
+    if kind is None:
+        main = getattr(view, "sheet", view.figure)
+        return main(result, **options)  # type: ignore[no-any-return]
+    return view.figure(result, kind=kind, **options)  # type: ignore[no-any-return]
+
+
+def check_kind(of: str, kind: str) -> None:
+    """MechanismError if a result of some kind (`of`) has no such kind of figure."""
+    _view(of, FIGURES, "figure").check_kind(kind)
+
+
+def _view(kind: str, views: dict[str, str], what: str) -> Any:
+    if kind not in views:
+        remedy = f"there are {what}s of {', '.join(views)}"
+        raise MechanismError(Finding(f"there is no {what} of a {kind}", "kind", remedy))
+    return import_module(f"trunnion.views.{views[kind]}")

@@ -1,0 +1,100 @@
+"""`result.trunnion`: what a result of every kind says of itself."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+
+import trunnion
+from trunnion.results.columns import KINDS, kind_of
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+STEPS = 12
+
+
+def example(name: str) -> trunnion.Mechanism:
+    return trunnion.read(EXAMPLES / f"{name}.yaml")
+
+
+RESULTS = {
+    "cycle": lambda: trunnion.analyse(example("slider-crank"), STEPS),
+    "sweep": lambda: trunnion.sweep(example("slider-crank"), {"r": ["50 mm", "51 mm"]}, STEPS),
+    "play": lambda: trunnion.play(example("fourbar-with-play"), steps=STEPS),
+    "assembly": lambda: trunnion.assemble(example("slider-crank"), steps=STEPS),
+    "tolerance": lambda: trunnion.tolerance(
+        example("toleranced-fourbar"), methods=("linear", "monte-carlo"), samples=64, steps=STEPS, jobs=1
+    ),
+    "allocation": lambda: trunnion.allocate(example("piston-by-cost"), steps=STEPS, samples=0),
+}  # fmt: skip
+REPORTED = {"cycle", "tolerance", "allocation"}
+
+
+@pytest.fixture(scope="module", params=RESULTS)
+def result(request: Any) -> Any:
+    return RESULTS[request.param](), request.param
+
+
+def test_a_result_says_what_it_is(result: Any) -> None:
+    data, kind = result
+    read = data.trunnion
+    assert read.kind == kind == data.attrs["kind"]
+    assert all(one.code and one.what for one in read.findings)
+    assert all(one.name and one.label for one in read.summary)
+    assert list(read.tables()) == list(KINDS[kind])
+    for table in read.tables().values():
+        assert isinstance(table, pd.DataFrame)
+        assert table.shape[1] > 0
+
+
+def test_a_result_of_a_version_that_names_no_kind_is_known(result: Any) -> None:
+    data, kind = result
+    attributes = {name: value for name, value in data.attrs.items() if name != "kind"}
+    assert kind_of(xr.Dataset(data.data_vars, data.coords, attributes)) == kind
+
+
+def test_a_result_is_drawn(result: Any) -> None:
+    data, _ = result
+    assert data.trunnion.plot().get_axes()
+
+
+def test_a_result_is_written_and_read_again(result: Any, tmp_path: Path) -> None:
+    data, kind = result
+    data.trunnion.save(tmp_path / "x.nc")
+    with xr.open_dataset(tmp_path / "x.nc", decode_times=False) as again:
+        assert again.trunnion.kind == kind
+        assert again.trunnion.findings == data.trunnion.findings
+        assert again.trunnion.summary == data.trunnion.summary
+
+
+def test_a_report_is_written_where_there_is_one(result: Any, tmp_path: Path) -> None:
+    data, kind = result
+    if kind in REPORTED:
+        assert data.trunnion.report(tmp_path / "x.html") == (tmp_path / "x.html").read_text("utf-8")
+    else:
+        with pytest.raises(trunnion.MechanismError) as raised:
+            data.trunnion.report()
+        assert raised.value.findings[0].code == "input.kind"
+
+
+def test_the_summary_has_the_numbers_of_the_result() -> None:
+    cycle = RESULTS["cycle"]()
+    summary = {one.name: one for one in cycle.trunnion.summary}
+    driver = str(cycle["driver"].values[0])
+    most = summary[f"{driver}.effort_max"]
+    assert (most.value, most.unit, most.aspect) == (float(cycle["drive_effort"].max()), "N m", "largest")
+    assert summary["efficiency"].value == float(cycle["efficiency"])
+    table = cycle.trunnion.tables()["positions"]
+    np.testing.assert_array_equal(table[f"{driver}.effort"], cycle["drive_effort"].values[0])
+
+
+def test_it_is_there_only_where_a_result_is_made() -> None:
+    code = "import sys, trunnion; trunnion.read; assert 'xarray' not in sys.modules; trunnion.analyse;"
+    code += "import xarray; assert xarray.Dataset.trunnion"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -157,6 +157,7 @@ def test_bristles_are_left_to_numpy() -> None:
         compiled.CompiledKernel(run, {})
 
 
+@pytest.mark.slow
 def test_failures_are_those_of_numpy() -> None:
     """Lengths so far off that some samples do not assemble and others come near to a dead centre."""
     run = prepare(trunnion.read(DURANGO))
@@ -170,6 +171,7 @@ def test_failures_are_those_of_numpy() -> None:
     agree(curves, expected)
 
 
+@pytest.mark.slow
 def test_any_number_of_samples_and_times_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
     """Batches that do not come out even, and times that differ from sample to sample."""
     monkeypatch.setitem(compiled.BATCH, "cpu", 60)  # two samples at a time
@@ -182,6 +184,7 @@ def test_any_number_of_samples_and_times_of_their_own(monkeypatch: pytest.Monkey
     agree(curves, {"effort:A": back.efforts["A"]})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("figure", ["angle:rocker", "effort:A"])
 def test_gradients_are_those_of_dual_numbers(figure: str) -> None:
     run = prepare(trunnion.read(DURANGO))

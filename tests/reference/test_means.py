@@ -161,6 +161,7 @@ def test_one_way_springs_and_laws_part_the_integral() -> None:
     assert values[0] == pytest.approx(finely(prepare(Mechanism(**data)), 200_000), rel=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("points", "interpolation"), [(500, "linear"), (500, "spline"), (5000, "linear")])
 def test_a_peak_of_one_point_of_a_long_table_counts(points: int, interpolation: str) -> None:
     """Points close together are a smooth course only where they are: a peak of one of them is not passed over."""
@@ -187,6 +188,7 @@ def test_edges_are_where_the_model_switches() -> None:
 # ---- positions that are not valid -----------------------------------------------------------------------------
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("model", ["fourbar-with-play", "rssr-with-play"])
 def test_extremes_are_of_positions_that_are_valid(model: str) -> None:
     """Where a pin loses contact its forces are no answer: the summary, a sweep and the report leave them out."""
@@ -209,6 +211,7 @@ def test_extremes_are_of_positions_that_are_valid(model: str) -> None:
     assert tables[f"Reaction of {joint}, largest"] == quantity(float(np.max(sizes[0][~lost])), "N")
 
 
+@pytest.mark.slow
 def test_means_with_seats_do_not_depend_on_which_losses_of_contact_the_positions_show() -> None:
     """A load of two degrees turns the seats round twice, between two of 60 positions and at some of 180."""
     mechanism = Mechanism(**SHAFT)

@@ -125,6 +125,7 @@ def test_dead_centre_outside_its_window(durango: Run) -> None:
     assert np.degrees(found["place"]) == pytest.approx(220, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_grid_does_not_show(crank: Run) -> None:
     """A stroke keeps to seventh order whatever the number of positions and where they lie."""
     errors = [abs(figures(crank, [STROKE], steps)["stroke"] - stroke_of()) for steps in range(60, 80)]
@@ -285,6 +286,7 @@ def loaded() -> Run:
     return prepare(trunnion.read(EXAMPLES / "offset-slider-crank.yaml"))
 
 
+@pytest.mark.slow
 def test_forces_are_those_of_the_analysis() -> None:
     run = loaded()
     mechanism, steps = run.system.mechanism, 360
@@ -315,6 +317,7 @@ def test_forces_are_those_of_the_analysis() -> None:
     assert found["now"] == pytest.approx(float(result["efficiency_instant"].values[40]), rel=1e-9, nan_ok=True)
 
 
+@pytest.mark.slow
 def test_locking_margin() -> None:
     """The least of the analysis to where it is looked for; no derivative, rather than a silent 0."""
     run = prepare(build(slider_crank(R, L, E), friction=0.4, radius=0.08))
@@ -502,6 +505,7 @@ def test_every_kind_with_every_statistic(crank: Run) -> None:
         assert np.all((primal(least) <= primal(most)) | np.isnan(primal(most)))
 
 
+@pytest.mark.slow
 def test_limits_and_bounds(crank: Run) -> None:
     """Signed limits of the deviation at all positions; bounds of the figure; no answer keeps none."""
     raised = {"links.ground.points.C.y": E + np.array([[1e-3], [-1e-3], [3e-3], [5.0]])}

@@ -56,6 +56,7 @@ def compared(run: Any, back: Any, engine: Engine, i: int, friction: float) -> It
         yield f"drive of {driver}", [back.efforts[driver]], [effort]
 
 
+@pytest.mark.spread(5)
 @pytest.mark.parametrize("friction", [0.0, 0.15])
 @pytest.mark.parametrize("name", [name for name, data in MODELS.items() if "gears" not in data()])
 def test_agrees_with_mujoco(name: str, friction: float) -> None:

@@ -43,6 +43,7 @@ def stated(name: str) -> Data:
     return {**data, "joint_defaults": defaults}
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("name", NAMES)
 def test_agrees_with_mujoco(name: str) -> None:
     """Motion and forces to 1e-11 of the largest of their kind."""

@@ -60,6 +60,7 @@ CASES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_critical_multiples_are_where_it_locks(name: str) -> None:
     """Just below it runs, just above it is locked: one joint's coefficient changed in the model, at every position."""
@@ -79,6 +80,7 @@ def test_critical_multiples_are_where_it_locks(name: str) -> None:
     assert checked >= 6
 
 
+@pytest.mark.slow
 def test_joint_without_which_it_still_locks() -> None:
     """Where all friction together locks early, no single joint need be able to free it: then its multiple is 0."""
     data, options = CASES["slider-crank"]
@@ -114,6 +116,7 @@ def test_all_solutions_of_one_pin(coefficient: float, x: float, y: float, gain: 
         assert _count(problem, np.array([[known]])) == len(right) - 1
 
 
+@pytest.mark.slow
 def test_locked_findings_name_the_joint_that_decides() -> None:
     data, options = CASES["slider-crank"]
     result = analyse(data(), 36, **{**options, "friction": 0.9})
@@ -129,6 +132,7 @@ def test_there_is_nothing_to_lock_without_friction() -> None:
     assert np.all(np.isinf(found["locking_margin"]))
 
 
+@pytest.mark.slow
 def test_coefficient_only_where_the_law_is_proportional_to_it() -> None:
     data, options = CASES["slider-crank"]
     stribeck = {"law": "stribeck", "coefficient": 0.2, "static": 0.35, "stribeck_speed": 0.5}

@@ -50,6 +50,7 @@ def test_four_bar(joint: str) -> None:
     assert abs(brute - np.degrees(float(at["worst_case"].item()))) < 3e-4 * brute  # second order in the play
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("hole_on", ["rocker", "ground"])
 def test_rssr(hole_on: str) -> None:
     """0.044402° by the formula, 0.044448° over the exact transform of the pin in its hole (the greater side)."""
@@ -110,6 +111,7 @@ def _agree(run: Run, names: list[str], time: np.ndarray) -> None:
     assert seen > 0
 
 
+@pytest.mark.spread(12)
 @pytest.mark.parametrize("name", mechanisms.MODELS)
 def test_virtual_load_equals_derivatives_in_the_plane(name: str) -> None:
     """Dyads, general groups, gear pairs, drivers: the same to rounding for every measure."""
@@ -117,6 +119,7 @@ def test_virtual_load_equals_derivatives_in_the_plane(name: str) -> None:
     _agree(run, measures_of(run), run.cycle.times(5) + 1e-3)
 
 
+@pytest.mark.spread(3)
 @pytest.mark.parametrize("name", [name for name in mechanisms_space.MODELS if name != "platform on six legs"])
 def test_virtual_load_equals_derivatives_in_space(name: str) -> None:
     """All pairs; every seventh measure, to save time."""
@@ -152,6 +155,7 @@ BRUTE = {
 }
 
 
+@pytest.mark.spread(4)
 @pytest.mark.parametrize("name", BRUTE)
 def test_worst_case_is_reached_and_not_passed_but_by_second_order(name: str) -> None:
     """Pins pressed by Qᵢ change y by Σ ρ|Qᵢ|, anywhere else by less; what is missing falls with the square of ρ."""

@@ -169,6 +169,7 @@ def _well_conditioned(mechanism: Mechanism, pose: dict[str, tuple[float, float, 
     return len(rows) == 3 * len(links) and values_[0] / values_[-1] < 150
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
 def test_random_mechanism(seed: int) -> None:
     data, pose = grown(seed)
@@ -199,6 +200,7 @@ def test_random_mechanism(seed: int) -> None:
         np.testing.assert_allclose(a, b, rtol=0, atol=1e-8 * (1 + np.abs(b).max(initial=0.0)), err_msg=variable)
 
 
+@pytest.mark.spread(4)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_random_mechanism_against_newton_euler(seed: int) -> None:
     data, _ = grown(seed)
@@ -227,6 +229,7 @@ def test_random_mechanism_against_newton_euler(seed: int) -> None:
     assert checked > 0 or np.any(~np.isfinite(size))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
 def test_random_mechanism_elsewhere(seed: int) -> None:
     """Turned, and 1e4 m away, where four digits fewer are left of each position: the same machine."""

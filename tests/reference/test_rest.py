@@ -24,6 +24,7 @@ CASES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 def test_the_bounds_are_the_extremes_over_the_whole_interval(case):
     name, values, joint, inside = CASES[case]
@@ -53,6 +54,7 @@ def test_the_bounds_are_the_extremes_over_the_whole_interval(case):
     assert (max(beyond) > 1e-4) == inside
 
 
+@pytest.mark.slow
 def test_a_resisting_load_at_rest_is_part_of_the_interval():
     """At a dead centre the load of a slider may act either way: both one-sided limits lie within the bounds."""
     data = slider_crank()

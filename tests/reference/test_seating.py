@@ -64,6 +64,7 @@ def offsets_of(run: Run, result: xr.Dataset) -> dict[str, Array]:
 # ---- planar ---------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("friction", [0.0, 0.12, 0.3])
 @pytest.mark.parametrize("name", LINKAGES)
 def test_seats_reactions_and_places(name: str, friction: float) -> None:
@@ -102,6 +103,7 @@ def test_seats_reactions_and_places(name: str, friction: float) -> None:
         assert effort == pytest.approx(settled.solution.effort["A"], abs=1e-8 * size)
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("friction", [0.0, 0.12])
 @pytest.mark.parametrize("name", LINKAGES)
 def test_converges_linearly_to_the_ideal_mechanism(name: str, friction: float) -> None:
@@ -123,6 +125,7 @@ def test_converges_linearly_to_the_ideal_mechanism(name: str, friction: float) -
         assert np.max(gap) < 12 * rho
 
 
+@pytest.mark.spread(3)
 @pytest.mark.parametrize("rho", [1e-5, 1e-4, 1e-3])
 @pytest.mark.parametrize("name", LINKAGES)
 def test_settles_within_ten_rounds(name: str, rho: float) -> None:
@@ -279,6 +282,7 @@ def test_a_cycle_without_friction_takes_no_work(name: str) -> None:
     )
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("name", LINKAGES)
 def test_reactions_of_a_result_are_those_of_the_whole_motion(name: str) -> None:
     """Inertia by the accelerations of the settled places: as the oracle's, to what differences of 1/720 turn leave."""
@@ -311,6 +315,7 @@ def test_velocities_contain_the_way_of_the_seats() -> None:
 # ---- symmetry -------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @settings(max_examples=6)
 @given(st.sampled_from(list(LINKAGES)), st.floats(-3, 3), st.booleans(), st.sampled_from([0.0, 0.2]))
 def test_in_another_frame_and_in_a_mirror(name: str, turn: float, mirror: bool, friction: float) -> None:
@@ -325,6 +330,7 @@ def test_in_another_frame_and_in_a_mirror(name: str, turn: float, mirror: bool, 
     np.testing.assert_allclose(two.drive_effort_change.values, sign[1] * one.drive_effort_change.values, atol=1e-5)
 
 
+@pytest.mark.slow
 @settings(max_examples=6)
 @given(st.sampled_from(list(LINKAGES)), st.floats(0.05, 20), st.sampled_from([0.0, 0.2]))
 def test_scale(name: str, factor: float, friction: float) -> None:
@@ -361,6 +367,7 @@ def numbers(frame: Any) -> Frame:
     return Frame(np.array([float(np.ravel(n)[0]) for n in frame.place]), axes)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("friction", [0.0, 0.1, 0.4])
 def test_rssr_with_play_in_all_joints(friction: float) -> None:
     """Tilted pins and balls under inertia, weight and a brake: seats to 1e-6 of the clearance, forces to 1e-8."""

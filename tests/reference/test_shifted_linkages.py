@@ -196,6 +196,7 @@ def offsets_for(space: str, data: Data, size: float, seed: int) -> dict[str, flo
     return found
 
 
+@pytest.mark.spread(2)
 @pytest.mark.parametrize("name", SPACE_MODELS)
 def test_mechanisms_in_space_with_offsets_in_every_joint(name: str) -> None:
     """Frames of all links against maximal coordinates, to 1e-10: offsets up to 1 mm, bearings off their points."""
@@ -244,6 +245,7 @@ def moved_planar(data: Data, seats: dict[str, float], guide: float) -> Data:
     return {**data, "links": links, "loads": loads}
 
 
+@pytest.mark.spread(12)
 @pytest.mark.parametrize("name", MODELS)
 def test_planar_mechanisms_with_offsets_in_every_joint(name: str) -> None:
     """Seats as values and a model with its points moved are one mechanism: poses, forces and drives to 1e-9."""

@@ -39,6 +39,7 @@ def hooke(delta: float, friction: float, shafts: float = 0.0) -> Data:
     return data
 
 
+@pytest.mark.spread(3)
 @pytest.mark.parametrize("shafts", [0.0, 0.02])
 @pytest.mark.parametrize("delta", [5.0, 15.0, 30.0, 45.0])
 def test_massless_cardan(delta: float, shafts: float) -> None:
@@ -88,6 +89,7 @@ def test_nothing_is_lost_without_friction(data: Data) -> None:
     assert float(result.efficiency) == pytest.approx(1.0, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_efficiency_falls_with_angle_and_speed() -> None:
     """As in Fig. 9 of Pezzuti et al.: with misalignment (left), and with speed (right) by the inertia alone."""
     angles = [float(analysed(cardan(misalignment=angle), 45).efficiency) for angle in (5.0, 15.0, 25.0, 35.0)]
@@ -104,6 +106,7 @@ def test_efficiency_falls_with_angle_and_speed() -> None:
     assert massless[0] == pytest.approx(massless[1], abs=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", ["two-contact", "pezzuti"])
 def test_short_bearing_locks(model: str) -> None:
     """As printed, with 10 mm, it is locked at every position; the margin is where the oracle's effort goes to infinity.
@@ -136,6 +139,7 @@ def test_short_bearing_locks(model: str) -> None:
             effort(1.001)
 
 
+@pytest.mark.slow
 def test_long_bearing_runs() -> None:
     """With 60 mm at 15° it runs; Newton in at most 20 rounds, successive approximation in far more near its limit."""
     for model in ("two-contact", "pezzuti"):
@@ -151,6 +155,7 @@ def test_long_bearing_runs() -> None:
     np.testing.assert_allclose(other.drive_effort.values, result.drive_effort.values, rtol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", ["two-contact", "pezzuti"])
 def test_pin_at_rest(model: str) -> None:
     """At θ₁ = 0 a pin of the Cardan joint does not turn: its friction is an interval, and so is the torque.

@@ -173,6 +173,7 @@ def test_ideal_cardan(delta: float, general: bool) -> None:
         np.testing.assert_allclose(value(result, "joint_slide", joint), 0, rtol=0, atol=1e-14)
 
 
+@pytest.mark.spread(2)
 @pytest.mark.parametrize("general", [False, True])
 @pytest.mark.parametrize("twist", [0.01, 0.1, 0.2, 0.4, 0.5])
 @pytest.mark.parametrize("offset", [0.05e-3, 0.5e-3])
@@ -218,6 +219,7 @@ def double_cardan(bend: float, turn: float, parallel: bool) -> Data:
     }  # fmt: skip
 
 
+@pytest.mark.spread(2)
 @pytest.mark.parametrize("parallel", [True, False])
 @pytest.mark.parametrize("bend", [10.0, 30.0])
 def test_double_cardan(bend: float, parallel: bool) -> None:
@@ -286,6 +288,7 @@ def test_no_bennett() -> None:
     assert "cannot be assembled" in result.attrs["findings"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rod", [0.060, 0.160])
 def test_rod_of_a_wrong_length(rod: float) -> None:
     """The RSSR has numbers where its quadratic equation has a root, the right ones, and nowhere else."""
@@ -345,6 +348,7 @@ def test_sarrus() -> None:
     np.testing.assert_allclose(top[2], 2 * leaf * np.cos(theta) * SPEED, rtol=0, atol=1e-11)
 
 
+@pytest.mark.slow
 def test_loop_and_links_say_the_same() -> None:
     """The Cardan joint of Pezzuti et al. with friction: everything but what a loop alone has."""
     data = cardan()

@@ -351,6 +351,7 @@ def books(mechanism: Mechanism) -> Array:
     return np.array([effort[360 - 70], push[360 - 200], rms, share, np.max(effort)])
 
 
+@pytest.mark.slow
 def test_derivatives_of_efforts_with_friction() -> None:
     """Against central differences of mechanisms with other numbers, each analysed by itself."""
     mechanism = pressed()

@@ -351,6 +351,7 @@ SMALL: dict[str, tuple[Callable[[], Mechanism], list[str]]] = {
 }
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("method", ["monte-carlo", "quasi-monte-carlo"])
 @pytest.mark.parametrize("name", SMALL)
 def test_small_tolerances_against_first_order(name: str, method: str) -> None:

@@ -84,6 +84,7 @@ def measures_of(run: Run) -> list[str]:
     return found
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("name", CASES)
 def test_batches_against_mechanisms_of_their_own(name: str) -> None:
     """Every kind of measure and statistic: the same figure of each sample, or none for both."""
@@ -113,6 +114,7 @@ def test_batches_against_mechanisms_of_their_own(name: str) -> None:
 SMOOTH = ("mean", "rms", "maximum", "minimum", "efficiency", "peak-to-peak", "stroke", "straightness")
 
 
+@pytest.mark.spread(5)
 @pytest.mark.parametrize(
     "name", ["four-bar", "class III", "geared five-bar", "Cardan", "lamp", "RCCC", "lugre friction"]
 )

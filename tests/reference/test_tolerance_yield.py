@@ -125,6 +125,7 @@ def covered(rows: dict[str, Array], key: str, true: Any) -> Array:
     return np.mean((rows[f"{key}_low"] <= true) & (true <= rows[f"{key}_high"]), axis=0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("method", "samples"), [("monte-carlo", 1000), ("quasi-monte-carlo", 1024)])
 def test_intervals_are_honest(method: str, samples: int) -> None:
     """Over 200 seeds the 95 % interval covers the true yield in 95 ± 3 %: of each measure, and of all together.
@@ -142,6 +143,7 @@ def test_intervals_are_honest(method: str, samples: int) -> None:
         assert np.all(np.abs(covered(rows, key, true) - 0.95) <= 0.04)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("method", "samples"), [("monte-carlo", 1000), ("quasi-monte-carlo", 2048)])
 def test_intervals_of_the_four_bar_are_honest(method: str, samples: int) -> None:
     rows = intervals(fourbar(measures=LIMITS), method, samples)
@@ -153,6 +155,7 @@ def test_intervals_of_the_four_bar_are_honest(method: str, samples: int) -> None
     assert abs(covered(rows, "deviation", sigma)[0] - 0.95) <= 0.03
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("method", "samples"), [("monte-carlo", 1000), ("quasi-monte-carlo", 8192)])
 def test_intervals_of_quantiles(method: str, samples: int) -> None:
     """Of plain samples by order statistics, never below 95 % but for chance; of Sobol points by their replicates."""

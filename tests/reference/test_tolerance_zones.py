@@ -192,6 +192,7 @@ def swing(**change: Any) -> float:
     return float(np.ptp(np.unwrap(rssr_angle(**{k: np.full_like(crank, v) for k, v in at.items()}, crank=crank))))
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("links", BOTH)
 def test_a_ball_in_space_has_the_worse_of_two_seats(links: list[str]) -> None:
     """On the crank the ball moves along its radius or its axis, across as if driven earlier; on the rod along it."""
@@ -207,6 +208,7 @@ def test_a_ball_in_space_has_the_worse_of_two_seats(links: list[str]) -> None:
     assert found["searched_upper"].item() == pytest.approx(worse, rel=1e-2)
 
 
+@pytest.mark.slow
 def test_a_hinge_in_space_is_that_of_the_plane() -> None:
     """A pin with two ends and a float, the rocker's own: worst over both links whichever way they are listed."""
     found = []

@@ -34,6 +34,7 @@ from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.files import whole
+from trunnion.joints.pairs import PAIRS
 from trunnion.model.names import guarded
 from trunnion.results.attributes import attribute
 from trunnion.results.columns import tables_of
@@ -44,7 +45,6 @@ if TYPE_CHECKING:
 
 __all__ = ["FORMATS", "check_format", "columns", "figures", "save"]
 
-SLIDING = ("prismatic", "cylindrical", "helical")
 ROWS = 20_000  # written at a time, so that memory does not grow with the number of positions
 
 Column = tuple[str, str, Callable[[slice], NDArray[Any]]]
@@ -140,7 +140,7 @@ def _courses(result: xr.Dataset) -> Iterator[tuple[str, str, NDArray[Any]]]:
 
 
 def _planar_joint(result: xr.Dataset, i: int, joint: str, kind: str) -> list[Column]:
-    slides = kind != "revolute"
+    slides = not PAIRS[kind].turns
     flat = [("joint_rotation", "rotation"), ("joint_rotation_velocity", "rotation_velocity")]
     flat += [("joint_slide", "slide"), ("joint_slide_velocity", "slide_velocity")] if slides else []
     found = [_column(result, variable, f"{joint}.{name}", (i,)) for variable, name in flat]
@@ -155,7 +155,7 @@ def _planar_joint(result: xr.Dataset, i: int, joint: str, kind: str) -> list[Col
 
 def _spatial_joint(result: xr.Dataset, i: int, joint: str, kind: str) -> list[Column]:
     """Of a joint in space: its motion, force and moment of the reaction, friction along each freedom."""
-    moves = {"rotation": kind not in ("prismatic", "planar", "fixed"), "slide": kind in SLIDING}
+    moves = {"rotation": PAIRS[kind].turns, "slide": PAIRS[kind].slides}
     found = [
         _column(result, f"joint_{motion}{rate}", f"{joint}.{motion}{rate}", (i,))
         for motion, there in moves.items()
@@ -174,9 +174,9 @@ def _spatial_joint(result: xr.Dataset, i: int, joint: str, kind: str) -> list[Co
 def _errors_of_joint(result: xr.Dataset, i: int, joint: str, kind: str) -> list[Column]:
     """Of a joint of a mechanism with errors: what moves it against the ideal one, and where its pin lies."""
     found: list[Column] = []
-    if "joint_rotation_error" in result and kind not in ("prismatic", "fixed"):
+    if "joint_rotation_error" in result and (PAIRS[kind].turns or PAIRS[kind].angle):
         found.append(_column(result, "joint_rotation_error", f"{joint}.rotation_error", (i,)))
-    if "joint_slide_error" in result and kind in SLIDING:
+    if "joint_slide_error" in result and PAIRS[kind].slides:
         found.append(_column(result, "joint_slide_error", f"{joint}.slide_error", (i,)))
     if "reaction_force_change" in result:
         found += _vector(result, "reaction_force_change", f"{joint}.reaction_change_", i)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from trunnion.algebra.linalg import cross, dot
 from trunnion.errors import Finding, MechanismError
 from trunnion.groups import prp, rpp, rpr, rrp, rrr
+from trunnion.joints.pairs import PAIRS
 from trunnion.model.mechanism import Mechanism
 from trunnion.solve.backward import Backward
 from trunnion.solve.forward import Forward, forward
@@ -391,7 +392,7 @@ def counterweights(run: Run, steps: int = 90) -> tuple[tuple[Counterweight, ...]
     turning = [
         next(link for link in links if link != ground)
         for kind, links in system.joints.values()
-        if kind == "revolute" and ground in links
+        if PAIRS[kind].turns and ground in links
     ]
     if not turning:
         raise MechanismError(Finding("no link turns about the ground", "joints", "counterweights need one that does"))
@@ -439,7 +440,7 @@ def report_rows(mechanism: Mechanism, steps: int = 720, fluctuation: float = 0.0
     run = _planar(mechanism)
     found = design(mechanism, steps)
     driver = next(iter(mechanism.drivers), "")
-    turns = not driver or run.system.joints[driver][0] == "revolute"
+    turns = not driver or run.system.turns(driver)
     unit, scale = ("°", 180 / np.pi) if turns else ("mm", 1e3)
     rows: list[dict[str, Any]] = []
 
@@ -466,7 +467,7 @@ def report_rows(mechanism: Mechanism, steps: int = 720, fluctuation: float = 0.0
     row("energy swing about the mean", found.energy_swing, "J")
     if turns and driver and run.cycle.periodic and found.mean_speed:
         row(f"flywheel for a fluctuation of {fluctuation:g}", found.flywheel(fluctuation), "kg m^2")
-    if any(kind == "revolute" and mechanism.fixed_link in links for kind, links in run.system.joints.values()):
+    if any(PAIRS[kind].turns and mechanism.fixed_link in links for kind, links in run.system.joints.values()):
         weights, left = counterweights(run)
         for weight in weights if np.isfinite(left) else ():  # without mass there is nothing to balance
             place = f"({weight.x:.5g}, {weight.y:.5g})"

@@ -67,7 +67,7 @@ def ends_of(system: SpatialSystem, values: Values, every_pin: bool) -> list[End]
         if model is None:
             continue
         play = shifts.play_of("spatial", kind, values, name)
-        pin = "rotation" in PAIRS[kind].motions
+        pin = PAIRS[kind].bored
         for k, keys in enumerate(model.ends):
             radius = float(np.ravel(primal(play.radii[k]))[0]) if play else 0.0
             radial = pin and k not in model.axial

@@ -126,7 +126,7 @@ class Loops:
         found = []
         for place in self.system.places[0]:
             (first, second), name = place.links, place.joint
-            lain = shifts.seated(self.holes[second, name], place.kind, values, name)
+            lain = shifts.seated("spatial", self.holes[second, name], place.kind, values, name)
             found.append(Element(self.holes[first, name], lain, self.system.lead(self.values, name)))
         return found
 

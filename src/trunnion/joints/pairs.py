@@ -14,7 +14,7 @@ import numpy as np
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
 
-__all__ = ["PAIRS", "ContactLoad", "Load", "Pair", "Reaction"]
+__all__ = ["GUIDED", "PAIRS", "ContactLoad", "Load", "Pair", "Reaction"]
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class Pair:
     planar: whether it exists in the plane. needs_axis: the spaces in which the points on both links must state an axis.
     one_axis: whether it does nothing but turn about and slide along one axis that both links share; angle: whether its
     turn is one angle, about an axis that has the same direction in both links; crossed: whether it turns about two axes
-    at right angles, one in each link; threaded: whether a turn slides it along.
+    at right angles, one in each link; threaded: whether a turn slides it along; body: how it is drawn in space.
     """
 
     name: str
@@ -39,6 +39,7 @@ class Pair:
     angle: bool = False
     crossed: bool = False
     threaded: bool = False
+    body: str = "sleeve"
 
     @property
     def drivable(self) -> bool:
@@ -59,6 +60,16 @@ class Pair:
     def guided(self) -> bool:
         """Whether it slides along its axis and does nothing else."""
         return self.one_axis and not self.turns
+
+    @property
+    def pivot(self) -> bool:
+        """Whether it turns about one axis and does nothing else."""
+        return self.motions == ("rotation",)
+
+    @property
+    def bored(self) -> bool:
+        """Whether a plain pin turns in a hole about one axis, be it that it also slides."""
+        return self.one_axis and self.turns and not self.threaded
 
     @property
     def motions(self) -> tuple[str, ...]:
@@ -183,11 +194,14 @@ class Load(NamedTuple):
 
 PAIRS: dict[str, Pair] = {
     "revolute": Pair("revolute", "R", ("rotation",), 1, planar=True, one_axis=True, angle=True),
-    "prismatic": Pair("prismatic", "P", ("slide",), 1, planar=True, needs_axis=("planar", "spatial"), one_axis=True),
+    "prismatic": Pair(
+        "prismatic", "P", ("slide",), 1, planar=True, needs_axis=("planar", "spatial"), one_axis=True, body="rail"
+    ),
     "cylindrical": Pair("cylindrical", "C", ("rotation", "slide"), 2, one_axis=True, angle=True),
-    "spherical": Pair("spherical", "S", ("rotation",), 3, needs_axis=()),
-    "universal": Pair("universal", "U", ("rotation",), 2, crossed=True),
+    "spherical": Pair("spherical", "S", ("rotation",), 3, needs_axis=(), body="ball"),
+    "universal": Pair("universal", "U", ("rotation",), 2, crossed=True, body="cross"),
     "helical": Pair("helical", "H", ("rotation",), 1, one_axis=True, angle=True, threaded=True),
-    "planar": Pair("planar", "E", ("slide",), 3, angle=True),
-    "fixed": Pair("fixed", "F", (), 0, needs_axis=()),
+    "planar": Pair("planar", "E", ("slide",), 3, angle=True, body="plate"),
+    "fixed": Pair("fixed", "F", (), 0, needs_axis=(), body="cube"),
 }
+GUIDED = tuple(kind for kind, pair in PAIRS.items() if pair.guided)

@@ -62,7 +62,7 @@ def stated(part: BaseModel | None) -> Mapping[str, Any]:
 
 def _floats(joint: Joint) -> bool:
     """Whether a default end float means this joint."""
-    return joint.type == "revolute"
+    return PAIRS[joint.type].pivot
 
 
 def _pin(
@@ -117,7 +117,7 @@ def _half(size: Quantity, deviation: float, tolerance: tuple[float, float] | Non
 
 def _misalignment(joint: Joint, spatial: bool) -> Misalignment | None:
     """Complete where a joint can have one, so that its numbers can be set; as stated, for a finding, where not."""
-    if joint.type not in ("revolute", "cylindrical"):
+    if not PAIRS[joint.type].bored:
         return joint.misalignment
     return (joint.misalignment or Misalignment()).complete(spatial)
 
@@ -127,7 +127,7 @@ def _seat(joint: Joint, default: SeatChoice | None) -> SeatChoice:
     own = joint.seat
     suits = default is not None and has_play(joint)
     if isinstance(default, Seat):
-        suits = suits and (default.direction is not None) == (joint.type == "spherical")
+        suits = suits and (default.direction is not None) == PAIRS[joint.type].ball
     if own is None:
         own = default if suits else "free"
     elif isinstance(own, Seat) and isinstance(default, Seat) and suits:

@@ -8,15 +8,14 @@ the same at one position; as the joint turns, the first seat stays on the hole's
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from trunnion.algebra import plane, space
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.algebra.vector import plus, scaled
 from trunnion.errors import Finding
 from trunnion.joints.clearance import CLEARANCE_MODELS, ClearanceModel, leaning
 from trunnion.model.contact import clearance
@@ -25,11 +24,12 @@ if TYPE_CHECKING:
     from trunnion.model.mechanism import Mechanism
 
 __all__ = [
-    "CARRIERS", "HOLE", "Play", "carriers_of", "hole", "journaled", "journaled_planar", "misaligned",
-    "misaligned_planar", "play_of", "seated", "seated_planar", "unstated_length",
+    "CARRIERS", "HOLE", "Play", "carriers_of", "hole", "journaled", "misaligned", "play_of", "seated",
+    "unstated_length",
 ]  # fmt: skip
 
 Values = Mapping[str, Number]
+ALGEBRAS: dict[str, Any] = {"planar": plane, "spatial": space}
 HOLE, PIN = "seats", "journals"
 CARRIERS = (HOLE, PIN)  # under which the numbers of a seat stand: carried by the link of the hole, or of the pin
 
@@ -88,65 +88,51 @@ def unstated_length(joint: str, play: Play) -> list[Finding]:
 def hole(frame: space.Frame, values: Values, joint: str) -> space.Frame:
     """The frame of the hole in space: the second element, moved along its axis by the offset of the pin."""
     offset = values.get(f"joints.{joint}.pin.offset")
-    return frame if offset is None else frame._replace(place=plus(frame.place, scaled(offset, frame.z)))
+    return frame if offset is None else space.slid(frame, offset)
 
 
-def misaligned(frame: space.Frame, values: Values, joint: str) -> space.Frame:
-    """The second element of a joint in space with the misalignment of its axis."""
+def misaligned(of: str, frame: Any, values: Values, joint: str) -> Any:
+    """The second element of a joint with the misalignment of its axis, in the plane with its offset alone.
+
+    of: "planar" or "spatial".
+    """
     if not _leans(values, joint):
         return frame
-    leant = space.compose(hole(frame, values, joint), _misalignment(values, joint))
-    back = values.get(f"joints.{joint}.pin.offset")
-    return leant if back is None else leant._replace(place=plus(leant.place, scaled(-back, leant.z)))
+    local = _misalignment(values, joint)
+    if of == "planar":
+        return plane.compose(frame, plane.Frame(local.place[0], local.place[1]))
+    return _in_hole(of, frame, values, joint, lambda middle: space.compose(middle, local))
 
 
-def misaligned_planar(frame: plane.Frame, values: Values, joint: str) -> plane.Frame:
-    """The second element of a joint in the plane, moved by its misalignment."""
-    if not _leans(values, joint):
+def seated(of: str, frame: Any, kind: str, values: Values, joint: str) -> Any:
+    """The second element of a joint where its pin lies in the hole."""
+    local = _lain(of, kind, values, HOLE, joint)
+    if local is None:
         return frame
-    place = _misalignment(values, joint).place
-    return plane.compose(frame, plane.Frame(place[0], place[1]))
+    return _in_hole(of, frame, values, joint, lambda middle: ALGEBRAS[of].compose(middle, local))
 
 
-def seated(frame: space.Frame, kind: str, values: Values, joint: str) -> space.Frame:
-    """The second element of a joint in space where its pin lies in the hole."""
-    model = CLEARANCE_MODELS["spatial"].get(kind)
-    offsets = model.offsets(values, f"{HOLE}.{joint}") if model else None
+def journaled(of: str, frame: Any, kind: str, values: Values, joint: str) -> Any:
+    """The first element of a joint whose pin carries the seat: the hole lies off it the other way."""
+    local = _lain(of, kind, values, PIN, joint)
+    if local is None:
+        return frame
+    return _in_hole(of, frame, values, joint, lambda middle: ALGEBRAS[of].relative(middle, local))
+
+
+def _lain(of: str, kind: str, values: Values, carrier: str, joint: str) -> Any:
+    """The pin's frame in the hole's, of the seat that a link carries; None if it carries none."""
+    model = CLEARANCE_MODELS[of].get(kind)
+    offsets = model.offsets(values, f"{carrier}.{joint}") if model else None
     if model is None or offsets is None:
-        return frame
-    middle = hole(frame, values, joint)
-    lain = space.compose(middle, model.shift(offsets, length_of(model, values, joint)))
-    back = values.get(f"joints.{joint}.pin.offset")
-    return lain if back is None else lain._replace(place=plus(lain.place, scaled(-back, lain.z)))
+        return None
+    return ALGEBRAS[of].Frame(*model.shift(offsets, length_of(model, values, joint)))
 
 
-def seated_planar(frame: plane.Frame, kind: str, values: Values, joint: str) -> plane.Frame:
-    """The second element of a joint in the plane where its pin lies in the hole."""
-    model = CLEARANCE_MODELS["planar"].get(kind)
-    offsets = model.offsets(values, f"{HOLE}.{joint}") if model else None
-    if model is None or offsets is None:
-        return frame
-    return plane.compose(frame, plane.Frame(*model.shift(offsets, length_of(model, values, joint))))
-
-
-def journaled(frame: space.Frame, kind: str, values: Values, joint: str) -> space.Frame:
-    """The first element of a joint in space whose pin carries the seat: the hole lies off it the other way."""
-    model = CLEARANCE_MODELS["spatial"].get(kind)
-    offsets = model.offsets(values, f"{PIN}.{joint}") if model else None
-    if model is None or offsets is None:
-        return frame
-    lain = space.relative(hole(frame, values, joint), model.shift(offsets, length_of(model, values, joint)))
-    back = values.get(f"joints.{joint}.pin.offset")
-    return lain if back is None else lain._replace(place=plus(lain.place, scaled(-back, lain.z)))
-
-
-def journaled_planar(frame: plane.Frame, kind: str, values: Values, joint: str) -> plane.Frame:
-    """The first element of a joint in the plane whose pin carries the seat."""
-    model = CLEARANCE_MODELS["planar"].get(kind)
-    offsets = model.offsets(values, f"{PIN}.{joint}") if model else None
-    if model is None or offsets is None:
-        return frame
-    return plane.relative(frame, plane.Frame(*model.shift(offsets, length_of(model, values, joint))))
+def _in_hole(of: str, frame: Any, values: Values, joint: str, move: Callable[[Any], Any]) -> Any:
+    """An element, moved at the middle of the hole; in the plane that is at its point."""
+    offset = values.get(f"joints.{joint}.pin.offset") if of == "spatial" else None
+    return move(frame) if offset is None else space.slid(move(space.slid(frame, offset)), -offset)
 
 
 def _leans(values: Values, joint: str) -> bool:

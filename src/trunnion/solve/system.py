@@ -206,15 +206,15 @@ class System:
         """
         found = self.holes(values)
         for name, (kind, (first, second)) in self.joints.items():
-            found[first, name] = shifts.journaled_planar(found[first, name], kind, values, name)
-            found[second, name] = shifts.seated_planar(found[second, name], kind, values, name)
+            found[first, name] = shifts.journaled(self.mechanism.space, found[first, name], kind, values, name)
+            found[second, name] = shifts.seated(self.mechanism.space, found[second, name], kind, values, name)
         return found
 
     def holes(self, values: Values) -> dict[tuple[str, str], Any]:
         """The same where every pin lies in the middle of its hole."""
         found = self.stated_elements(values)
         for name, (_, (_, second)) in self.joints.items():
-            found[second, name] = shifts.misaligned_planar(found[second, name], values, name)
+            found[second, name] = shifts.misaligned(self.mechanism.space, found[second, name], values, name)
         return found
 
     def stated_elements(self, values: Values) -> dict[tuple[str, str], Any]:

@@ -111,7 +111,7 @@ def passive(mechanism: Mechanism) -> dict[str, tuple[str, str]]:
 def _through(mechanism: Mechanism, link: str, ball: str, other: str) -> bool:
     """Whether the axis of a joint that turns goes through the centre of a ball on the same link."""
     pair = PAIRS[mechanism.joints[other].type]
-    if "rotation" not in pair.motions or pair.threaded or other in mechanism.drivers:
+    if not pair.bored or other in mechanism.drivers:
         return False
     values = mechanism.parameters()
     centre, place, axis = (

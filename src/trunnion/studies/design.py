@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError
+from trunnion.joints.pairs import PAIRS
 from trunnion.measures.transmission import pressure_angles
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.figure import Figure
@@ -359,7 +360,7 @@ def counterweights(run: Run, steps: int = 90) -> tuple[tuple[Counterweight, ...]
     turning = [
         next(link for link in links if link != ground)
         for kind, links in system.joints.values()
-        if kind == "revolute" and ground in links
+        if PAIRS[kind].turns and ground in links
     ]
     if not turning:
         raise MechanismError(Finding("no link turns about the ground", "joints", "counterweights need one that does"))
@@ -397,7 +398,7 @@ def report_figures(mechanism: Mechanism, steps: int = 720, fluctuation: float = 
     run = _planar(mechanism)
     found = design(mechanism, steps)
     driver = next(iter(mechanism.drivers), "")
-    turns = not driver or run.system.joints[driver][0] == "revolute"
+    turns = not driver or run.system.turns(driver)
     unit, scale = ("°", 180 / np.pi) if turns else ("mm", 1e3)
     figures = [Figure("grashof", "four-bar type (Grashof)", found.grashof)] if found.grashof else []
     for name, angle in found.transmission_angle.items():
@@ -421,7 +422,7 @@ def report_figures(mechanism: Mechanism, steps: int = 720, fluctuation: float = 
     if turns and driver and run.cycle.periodic and found.mean_speed:
         subject = f"flywheel for a fluctuation of {fluctuation:g}"
         figures.append(Figure("flywheel", subject, found.flywheel(fluctuation), "kg m^2"))
-    if any(kind == "revolute" and mechanism.fixed_link in links for kind, links in run.system.joints.values()):
+    if any(PAIRS[kind].turns and mechanism.fixed_link in links for kind, links in run.system.joints.values()):
         figures += _balanced(run)
     return figures
 

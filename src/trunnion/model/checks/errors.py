@@ -11,6 +11,7 @@ from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.joints.clearance import ellipse_error
 from trunnion.joints.fits import FitLimits, fit
+from trunnion.joints.pairs import PAIRS
 from trunnion.model.contact import PLAY_PAIRS, TURNING_PAIRS, clearance, has_guide, has_pin, has_play, play
 from trunnion.model.dimensions import nominal_dimensions
 from trunnion.model.joint_parts import Friction, Joint, Pin, Seat
@@ -93,7 +94,7 @@ def _seat_on(joint: Joint, where: str) -> Iterator[Finding]:
 
 
 def _misalignment(joint: Joint, where: str, spatial: bool) -> Iterator[Finding]:
-    if joint.type not in ("revolute", "cylindrical"):
+    if not PAIRS[joint.type].bored:
         what = f"the misalignment of a {joint.type} joint is not modelled"
         yield Finding(what, where, "state errors: {…} of the numbers of its points, or remove it")
     elif joint.misalignment and joint.misalignment.tilt is not None and not spatial:
@@ -113,7 +114,8 @@ def _pin(mechanism: Numbers, name: str, own: Pin | None, where: str) -> Iterator
     if own and own.hole_radius is not None and merged and merged.radius is None:
         yield Finding("the hole has a radius, the pin has none", f"{where}.pin", "add radius: …, or state clearance: …")
     spatial = mechanism.space == "spatial"
-    if own and own.end_float is not None and not (spatial and mechanism.stated_joints[name].type == "revolute"):
+    pivot = spatial and PAIRS[mechanism.stated_joints[name].type].pivot
+    if own and own.end_float is not None and not pivot:
         what = "an end float is the play along the axis of a revolute joint in space"
         yield Finding(what, f"{where}.pin.end_float", "remove it")
     if merged and merged.fit and isinstance(found := _fit(mechanism, name), Finding):
@@ -146,18 +148,18 @@ def _seat(mechanism: Numbers, joint: Joint, stated_at: str, where: str) -> Itera
         play_keys = "guide: {clearance: …}" if guide else "pin: {clearance: …}, hole_radius or a fit"
         yield Finding("a seat without a play to lie in", at, f"state {play_keys}, or seat: free")
         return
-    if joint.type != "spherical" and guide and not (joint.guide and joint.guide.length):
+    if not PAIRS[joint.type].ball and guide and not (joint.guide and joint.guide.length):
         yield Finding("a seat without the length of the guide", where, "state guide: {length: …}, or seat: free")
     if (
         spatial
         and not guide
-        and joint.type != "spherical"
+        and not PAIRS[joint.type].ball
         and not (joint.pin and (joint.pin.length or joint.pin.bearing))
     ):
         yield Finding("a seat without the length of the pin", where, "state pin: {length: …}, or seat: free")
     if not isinstance(seat, Seat):
         return
-    if joint.type == "spherical":
+    if PAIRS[joint.type].ball:
         if seat.beta is not None or seat.xi is not None:
             yield Finding("a ball lies in a direction, not at angles", at, "write seat: {direction: [0, 0, 1]}")
         elif seat.direction is not None and len(seat.direction) != 3:
@@ -177,7 +179,7 @@ def _empty_seat(seat: object, where: str) -> Iterator[Finding]:
 
 def _unused(kind: str, pin: Pin | None, friction: Friction | None, where: str, spatial: bool) -> Iterator[Finding]:
     """Sizes of a pin, and a model of friction, that change nothing in a joint of a kind; "" of all in the plane."""
-    if spatial and kind != "spherical":
+    if spatial and not PAIRS[kind].ball:
         return
     body = "a ball" if spatial else "a pin in the plane"
     for key in ("length", "bearing"):
@@ -264,7 +266,7 @@ def _unmodelled(mechanism: Numbers, name: str, values: Mapping[str, Number]) -> 
     radius = f"radius: {values[f'{pin}.radius'] * 1e3:.6g} mm, " if f"{pin}.radius" in values else ""
     remedy = f"state pin: {{{radius}clearance: 0{', cylindricity: 0' * bool(further)}}} here"
     two = ", or two revolute joints in its place, whose play is modelled"
-    yield Finding(what, pin, remedy + two * (kind == "universal"))
+    yield Finding(what, pin, remedy + two * PAIRS[kind].crossed)
 
 
 def _play_sign(mechanism: Numbers, name: str, joint: Joint, numbers: ParameterSet) -> Iterator[Finding]:
@@ -317,7 +319,7 @@ def _play_size(mechanism: Numbers, name: str, joint: Joint, values: Mapping[str,
         what = f"a play of {_mm(rho)} is {100 * rho / distance:.3g} % of the {_mm(distance)} from '{name}' to '{side}'"
         remedy = f"above 1 % of a side of the link '{link}' small-play figures are rough: check its unit"
         yield Finding(what, place, remedy, Severity.WARNING)
-    if mechanism.space == "planar" or joint.type == "spherical":
+    if mechanism.space == "planar" or PAIRS[joint.type].ball:
         return
     radius = float(values.get(f"{where}.pin.radius", np.nan))
     length = float(values.get(f"{where}.pin.length", values.get(f"{where}.pin.bearing", np.nan)))

@@ -22,8 +22,10 @@ __all__ = ["contact", "coordinates", "direction_values", "driven", "loop", "pitc
 Values = Mapping[str, Number]
 # Sine of the angle below which `x` is taken to lie along `axis`: what is left of it across is rounding of the file.
 ALONG = 1e-6
-LOOP_PAIRS = ("revolute", "prismatic", "cylindrical", "helical")  # those whose motion is a dual angle about one axis
-DRIVEN_PAIRS = ("revolute", "prismatic", "cylindrical", "helical")
+LOOP_PAIRS = tuple(
+    kind for kind, pair in PAIRS.items() if pair.one_axis
+)  # those whose motion is a dual angle about one axis
+DRIVEN_PAIRS = tuple(kind for kind, pair in PAIRS.items() if pair.drivable)
 
 
 def coordinates(mechanism: Numbers) -> str:
@@ -60,7 +62,7 @@ def contact(joint: Joint, where: str, spatial: bool) -> Iterator[Finding]:
             has = f"a {other}, not a {part}" if other_suits else f"neither {other} nor {part}"
             remedy = f"state {other} instead" if other_suits else "remove it"
             yield Finding(f"a {kind} joint has {has}", f"{where}.{part}", remedy)
-    if spatial and kind == "spherical" and joint.pin and joint.pin.offset is not None:
+    if spatial and PAIRS[kind].ball and joint.pin and joint.pin.offset is not None:
         yield Finding(
             "a ball has no axis to offset its bearing along", f"{where}.pin.offset", "move the joint's points"
         )
@@ -68,12 +70,12 @@ def contact(joint: Joint, where: str, spatial: bool) -> Iterator[Finding]:
         return
     if not turns and not slides:
         what = f"friction of a {kind} joint is not modelled"
-        reason = "nothing slips in it: remove it" if kind == "fixed" else "state friction: 0 for this joint"
+        reason = "nothing slips in it: remove it" if not PAIRS[kind].count else "state friction: 0 for this joint"
         yield Finding(what, f"{where}.friction", reason)
         return
     lacks = contact_lacks(joint, spatial)
     if "radius" in lacks:
-        body = "ball" if kind == "spherical" else "pin"
+        body = "ball" if PAIRS[kind].ball else "pin"
         remedy = "state pin: {radius: …}" + " or a fit" * (body == "pin") + ", or friction: 0"
         yield Finding(f"friction without the radius of the {body}", where, remedy)
     if "bearing" in lacks:
@@ -88,10 +90,10 @@ def contact(joint: Joint, where: str, spatial: bool) -> Iterator[Finding]:
 
 def pitch(joint: Joint, where: str) -> Iterator[Finding]:
     """A pitch where there is a thread, and only there."""
-    if joint.type == "helical" and joint.pitch is None:
+    if PAIRS[joint.type].threaded and joint.pitch is None:
         remedy = "add pitch: 5 mm, the slide of one turn, negative for a left-hand thread"
         yield Finding("a helical joint without a pitch", where, remedy)
-    elif joint.type != "helical" and joint.pitch is not None:
+    elif not PAIRS[joint.type].threaded and joint.pitch is not None:
         yield Finding(f"a {joint.type} joint has no pitch", f"{where}.pitch", "remove it, or state type: helical")
 
 

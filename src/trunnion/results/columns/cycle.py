@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from trunnion.joints.pairs import PAIRS
 from trunnion.results.attributes import attribute
 from trunnion.results.columns.column import Column, column, status_column, time_column, vector
 
@@ -13,8 +14,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["positions"]
-
-SLIDING = ("prismatic", "cylindrical", "helical")
 
 
 def positions(result: xr.Dataset) -> list[Column]:
@@ -55,7 +54,7 @@ def _measures(result: xr.Dataset) -> list[Column]:
 
 
 def _planar_joint(result: xr.Dataset, i: int, joint: str, kind: str) -> list[Column]:
-    slides = kind != "revolute"
+    slides = not PAIRS[kind].turns
     flat = [("joint_rotation", "rotation"), ("joint_rotation_velocity", "rotation_velocity")]
     flat += [("joint_slide", "slide"), ("joint_slide_velocity", "slide_velocity")] if slides else []
     found = [column(result, variable, f"{joint}.{name}", (i,)) for variable, name in flat]
@@ -70,7 +69,7 @@ def _planar_joint(result: xr.Dataset, i: int, joint: str, kind: str) -> list[Col
 
 def _spatial_joint(result: xr.Dataset, i: int, joint: str, kind: str) -> list[Column]:
     """Of a joint in space: its motion, force and moment of the reaction, friction along each freedom."""
-    moves = {"rotation": kind not in ("prismatic", "planar", "fixed"), "slide": kind in SLIDING}
+    moves = {"rotation": PAIRS[kind].turns, "slide": PAIRS[kind].slides}
     found = [
         column(result, f"joint_{motion}{rate}", f"{joint}.{motion}{rate}", (i,))
         for motion, there in moves.items()
@@ -89,9 +88,9 @@ def _spatial_joint(result: xr.Dataset, i: int, joint: str, kind: str) -> list[Co
 def _errors_of_joint(result: xr.Dataset, i: int, joint: str, kind: str) -> list[Column]:
     """Of a joint of a mechanism with errors: what moves it against the ideal one, and where its pin lies."""
     found: list[Column] = []
-    if "joint_rotation_error" in result and kind not in ("prismatic", "fixed"):
+    if "joint_rotation_error" in result and (PAIRS[kind].turns or PAIRS[kind].angle):
         found.append(column(result, "joint_rotation_error", f"{joint}.rotation_error", (i,)))
-    if "joint_slide_error" in result and kind in SLIDING:
+    if "joint_slide_error" in result and PAIRS[kind].slides:
         found.append(column(result, "joint_slide_error", f"{joint}.slide_error", (i,)))
     if "reaction_force_change" in result:
         found += vector(result, "reaction_force_change", f"{joint}.reaction_change_", i)

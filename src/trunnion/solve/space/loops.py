@@ -67,7 +67,7 @@ def ends_of(system: SpatialSystem, values: Values, every_pin: bool) -> list[End]
         if model is None:
             continue
         play = shifts.play_of("spatial", kind, values, name)
-        pin = "rotation" in PAIRS[kind].motions
+        pin = PAIRS[kind].bored
         for k, keys in enumerate(model.ends):
             radius = float(np.ravel(primal(play.radii[k]))[0]) if play else 0.0
             radial = pin and k not in model.axial
@@ -126,7 +126,7 @@ class Loops:
         found = []
         for place in self.system.places[0]:
             (first, second), name = place.links, place.joint
-            lain = shifts.seated(self.holes[second, name], place.kind, values, name)
+            lain = shifts.seated("spatial", self.holes[second, name], place.kind, values, name)
             found.append(Element(self.holes[first, name], lain, self.system.lead(self.values, name)))
         return found
 

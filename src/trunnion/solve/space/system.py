@@ -17,7 +17,6 @@ from trunnion.groups.cylindrical_dyad import CylindricalDyad
 from trunnion.groups.spatial import SpatialGroup
 from trunnion.groups.tree import OUTER, GroupJoint
 from trunnion.joints.pairs import PAIRS
-from trunnion.solve import shifts
 from trunnion.solve.system import Place, System, Values
 from trunnion.structure.decompose import Module
 
@@ -76,24 +75,6 @@ class SpatialSystem(System):
         return tuple(dict.fromkeys(found))
 
     # ---- elements -------------------------------------------------------------------------------------------
-
-    def elements(self, values: Values) -> dict[tuple[str, str], Frame]:
-        """Local frame of every joint's element, by (link, joint): errors of joints are in the second ones.
-
-        Seats are in the elements of the links that carry them.
-        """
-        found = self.holes(values)
-        for name, (kind, (first, second)) in self.joints.items():
-            found[first, name] = shifts.journaled(found[first, name], kind, values, name)
-            found[second, name] = shifts.seated(found[second, name], kind, values, name)
-        return found
-
-    def holes(self, values: Values) -> dict[tuple[str, str], Frame]:
-        """The same where every pin lies in the middle of its hole."""
-        found = self.stated_elements(values)
-        for name, (_, (_, second)) in self.joints.items():
-            found[second, name] = shifts.misaligned(found[second, name], values, name)
-        return found
 
     def stated_elements(self, values: Values) -> dict[tuple[str, str], Frame]:
         """The same without errors of joints: its place, z along the axis of the joint."""

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from trunnion.cycle.account import sound_positions
 from trunnion.cycle.means import Means
 from trunnion.errors import Status
+from trunnion.joints.pairs import PAIRS
 from trunnion.results.dataset import Variable
 from trunnion.solve.system import System
 
@@ -73,7 +74,7 @@ def reduced(arrays: Arrays, means: Means, ideal: Means | None, system: System) -
     size = np.sqrt(np.sum(arrays["reaction_force"] ** 2, axis=1))
     if ideal:
         turned, slid = (np.abs(arrays[f"joint_{what}_error"][:, kept]) for what in ("rotation", "slide"))
-        slides = np.array([kind == "prismatic" for kind, _ in system.joints.values()])
+        slides = np.array([PAIRS[kind].guided for kind, _ in system.joints.values()])
         told["transmission_error_max"] = np.where(slides, np.max(slid, axis=1), np.max(turned, axis=1))
     else:  # beside points with errors
         told |= {"efficiency_ideal": means.efficiency, "transmission_error_max": 0.0}

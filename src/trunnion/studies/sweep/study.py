@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from trunnion.cycle.account import effort_units, references
 from trunnion.errors import Finding, Severity, Status, counted
+from trunnion.joints.pairs import PAIRS
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.attributes import cited, encoded, finding_rows, origin
 from trunnion.results.dataset import Variable, dataset_of, described
@@ -132,7 +133,7 @@ def _dataset(
     names = [one.name for one in swept]
     variables = described(arrays, {name: one.over(*names) for name, one in figures.items()})
     if "transmission_error_max" in variables:
-        units = ["m" if kind == "prismatic" else "rad" for kind, _ in run.system.joints.values()]
+        units = ["m" if PAIRS[kind].guided else "rad" for kind, _ in run.system.joints.values()]
         variables["transmission_error_max"].attrs |= encoded({"member_units": units})
     along: dict[str, xr.Variable] = {}
     for one in swept:

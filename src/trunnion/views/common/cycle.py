@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.errors import Status
+from trunnion.joints.pairs import GUIDED
 from trunnion.results.attributes import attribute
 from trunnion.views.common.quantities import prefixed
 
@@ -87,7 +88,7 @@ def abscissa(result: xr.Dataset) -> Abscissa:
     drivers = names(result, "driver")
     if drivers:
         first = drivers[0]
-        sliding = layout(result)["joints"].get(first, {}).get("type") == "prismatic"
+        sliding = layout(result)["joints"].get(first, {}).get("type") in GUIDED
         name, turn = ("joint_slide", 0.0) if sliding else ("joint_rotation", 2 * np.pi)
         values = _filled(result, column(result, name, joint=first), turn)
         if values is not None:

@@ -11,6 +11,7 @@ from matplotlib.patches import Circle, Polygon, Rectangle
 from matplotlib.transforms import Affine2D
 
 from trunnion.errors import Finding, MechanismError
+from trunnion.joints.pairs import GUIDED, PAIRS
 from trunnion.views.common.cycle import Array, column, layout, names
 from trunnion.views.common.figures import INK, MUTED, PALETTE
 from trunnion.views.common.lettering import plain
@@ -238,7 +239,7 @@ def _joint(axes: Axes, shown: Picture, name: str, joint: dict[str, Any], index: 
         return  # its first link has no place
     place = track[:, index]
     grounded = shown.ground in (first, second)
-    if joint["type"] == "prismatic":
+    if PAIRS[joint["type"]].guided:
         _slider(axes, shown, name, index, place, grounded)
         return
     if grounded:
@@ -318,7 +319,7 @@ def labels(axes: Axes, shown: Picture, index: int, only: Sequence[str] | None = 
         away = place - middle
         away = away / (np.hypot(*away) or 1.0)
         joints = [shown.stated["joints"].get(point, {}) for point in points]
-        if any(joint.get("type") == "prismatic" for joint in joints):
+        if any(joint.get("type") in GUIDED for joint in joints):
             away = np.array([0.0, 1.3])
         elif any(shown.ground in joint.get("links", ()) for joint in joints):
             away = np.array([-1.05 if away[0] < 0 else 1.05, -0.5])  # beside the bearing, not on the link

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError
+from trunnion.joints.pairs import PAIRS
 from trunnion.views.common.cycle import Array, column, layout, names
 
 if TYPE_CHECKING:
@@ -103,7 +104,7 @@ def outputs(result: xr.Dataset) -> list[Output]:
         one = stated["joints"].get(joint, {})
         if stated["ground"] not in one.get("links", ()) or joint in drivers:
             continue
-        slides = one["type"] == "prismatic"
+        slides = PAIRS[one["type"]].guided
         error = column(result, f"joint_{'slide' if slides else 'rotation'}_error", joint=joint)
         if error is not None and np.isfinite(error).any():
             found.append(Output(joint, "m" if slides else "rad", error))

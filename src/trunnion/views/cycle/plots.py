@@ -16,6 +16,7 @@ from matplotlib.lines import Line2D
 
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.files import whole
+from trunnion.joints.pairs import GUIDED
 from trunnion.results.attributes import attribute
 from trunnion.views.common.cycle import (
     Abscissa,
@@ -338,7 +339,7 @@ def motion(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
     over, stated = abscissa(result), layout(result)
     turning = [name for name in names(result, "link")
                if name != stated["ground"] and _turns(column(result, "link_angle", link=name))]  # fmt: skip
-    sliding = [name for name in names(result, "joint") if stated["joints"].get(name, {}).get("type") == "prismatic"]
+    sliding = [name for name in names(result, "joint") if stated["joints"].get(name, {}).get("type") in GUIDED]
     kinds = [("link", "link_angle", turning, "angle", "rad")] if turning or not sliding else []
     if sliding:
         kinds.append(("joint", "joint_slide", sliding, "slide", "m"))

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError
+from trunnion.joints.pairs import PAIRS
 from trunnion.results.attributes import attribute
 from trunnion.views.common.cycle import Array, column, layout, names
 
@@ -148,7 +149,7 @@ class Space:
         index = int(np.argmax(self.drawable))
         found = []
         for name, joint in self.joints.items():
-            if joint["type"] not in AXIAL:
+            if not PAIRS[joint["type"]].one_axis:  # else its symbol may lie anywhere on the axis
                 continue
             others = [
                 one for one, other in self.joints.items() if one != name and set(joint["links"]) & set(other["links"])
@@ -156,7 +157,7 @@ class Space:
             for other in others:
                 near = np.linalg.norm(self.at(name)[:, index] - self.at(other)[:, index]) < NEAR * self.size
                 turned = np.linalg.norm(np.cross(self.axis(name)[:, index], self.axis(other)[:, index])) > 0.02
-                if near and (turned or self.joints[other]["type"] not in AXIAL):
+                if near and (turned or not PAIRS[self.joints[other]["type"]].one_axis):
                     found.append(name)
                     break
         return found
@@ -181,9 +182,6 @@ class Space:
     def seated(self, joint: str) -> Array:
         """Track of a joint's symbol, (3, position)."""
         return self.poses[self.joints[joint]["links"][1]].place(self.seat(joint))
-
-
-AXIAL = ("revolute", "cylindrical", "helical", "prismatic")  # whose symbol may lie anywhere on the axis
 
 
 def is_spatial(result: xr.Dataset) -> bool:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from trunnion.joints.pairs import PAIRS
 from trunnion.views.common.cycle import Abscissa, Array, abscissa, column, layout, names
 from trunnion.views.common.figures import along, curve, frame_peak, legend, new, shade, style_of
 from trunnion.views.common.lettering import plain
@@ -24,9 +25,7 @@ if TYPE_CHECKING:
 __all__ = ["PLANES", "motion", "reactions", "turned_from_start"]
 
 PLANES = (("x", "y"), ("x", "z"), ("y", "z"))
-TURNING = ("revolute", "cylindrical", "helical", "spherical", "universal")
 ROOM = 44  # characters in a row of the legend of a panel that is one of several
-SLIDING = ("prismatic", "cylindrical", "helical")
 
 
 def _sizes(result: xr.Dataset, variable: str, dim: str, name: str) -> Array | None:
@@ -72,8 +71,8 @@ def motion(result: xr.Dataset) -> Figure:
     """Rotations and slides of the joints and how the links turn, with rates; a column for each that there is."""
     over, stated = abscissa(result), layout(result)
     kinds = {name: one["type"] for name, one in stated["joints"].items() if name in names(result, "joint")}
-    turning = [name for name, kind in kinds.items() if kind in TURNING and _moves(result, "joint_rotation", name)]
-    sliding = [name for name, kind in kinds.items() if kind in SLIDING and _moves(result, "joint_slide", name)]
+    turning = [name for name, kind in kinds.items() if PAIRS[kind].turns and _moves(result, "joint_rotation", name)]
+    sliding = [name for name, kind in kinds.items() if PAIRS[kind].slides and _moves(result, "joint_slide", name)]
     links = [link for link in names(result, "link") if link != stated["ground"]]
     columns = [("joint rotation", "rad", _of_joints(result, "joint_rotation", turning))] if turning else []
     columns += [("joint slide", "m", _of_joints(result, "joint_slide", sliding))] if sliding else []

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from trunnion.joints.pairs import PAIRS
 from trunnion.views.common.cycle import Array, column, names, series
 from trunnion.views.space.bodies import Space, gathered
 from trunnion.views.space.camera import best, looking
@@ -67,9 +68,9 @@ def _pose(result: xr.Dataset, link: str) -> dict[str, Any]:
 def _seat(shown: Space, name: str) -> dict[str, Any]:
     """Where a joint's symbol sits on its second link and along which axis; no axis of a ball, a cross or a weld."""
     joint = shown.joints[name]
-    turning = joint["type"] not in ("spherical", "universal", "fixed")
+    turning = PAIRS[joint["type"]].one_axis or PAIRS[joint["type"]].angle
     axes = [{"link": joint["links"][1], "along": _vector(shown.element(name, 1)[1])}] if turning else []
-    if joint["type"] == "universal":
+    if PAIRS[joint["type"]].crossed:
         axes = [
             {"link": link, "along": _vector(shown.element(name, side)[1])} for side, link in enumerate(joint["links"])
         ]

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from trunnion.joints.pairs import PAIRS
 from trunnion.views.common.cycle import Array
 from trunnion.views.space.bodies import Space
 
@@ -53,7 +54,7 @@ def solids(shown: Space) -> list[Solid]:
     """All bodies of a mechanism."""
     found = [one for link in shown.moving for one in _body(shown, link)]
     for name, joint in shown.joints.items():
-        found += SYMBOLS[joint["type"]](shown, name)
+        found += SYMBOLS[PAIRS[joint["type"]].body](shown, name)
         if shown.ground in joint["links"]:
             found += _foot(shown, name)
     return found
@@ -91,9 +92,9 @@ def _body(shown: Space, link: str) -> list[Solid]:
 
 def _clear(shown: Space, name: str, side: int, way: Array) -> Array:
     """How far a rod that leaves a joint starts from its middle, so that it meets its symbol from outside."""
-    kind, length = shown.joints[name]["type"], float(np.linalg.norm(way))
-    radius = {"spherical": 0.85 * BALL, "prismatic": 0.9 * BLOCK, "fixed": 0.02}.get(kind, 0.0)
-    if kind in ("revolute", "cylindrical", "helical"):
+    body, length = PAIRS[shown.joints[name]["type"]].body, float(np.linalg.norm(way))
+    radius = {"ball": 0.85 * BALL, "rail": 0.9 * BLOCK, "cube": 0.02}.get(body, 0.0)
+    if body == "sleeve":
         across = abs(float(way @ shown.element(name, side)[1])) < 0.5 * length
         radius = 0.85 * SLEEVE if across else 0.0
     return way * (radius * shown.size / length) if length > 3 * radius * shown.size > 0 else 0.0 * way
@@ -129,7 +130,7 @@ def _route(shown: Space, one: tuple[str, int], two: tuple[str, int]) -> list[Arr
         if np.linalg.norm(centres[0] - centres[1]) < 0.2 * shown.size:
             return _arc(start, end, *centres)
     for (name, side), here, there in ((one, start, end), (two, end, start)):
-        if shown.joints[name]["type"] in ("revolute", "cylindrical", "helical"):
+        if PAIRS[shown.joints[name]["type"]].body == "sleeve":
             axis = shown.element(name, side)[1]
             along = float((there - here) @ axis)
             across = float(np.linalg.norm(there - here - along * axis))
@@ -158,7 +159,7 @@ def _outer(shown: Space, name: str) -> int:
     joint = shown.joints[name]
     if shown.ground in joint["links"]:
         return int(joint["links"].index(shown.ground))
-    return 0 if joint["type"] in ("prismatic", "planar") else 1
+    return 0 if "slide" in PAIRS[joint["type"]].freedoms[:1] else 1
 
 
 def _reach(shown: Space, name: str) -> tuple[float, float]:
@@ -184,20 +185,20 @@ def _seats(shown: Space, name: str) -> tuple[Array, tuple[float, float], int]:
 def _turning(shown: Space, name: str) -> list[Solid]:
     """Sleeve of the outer link on the shaft of the inner one; a revolute pair has collars, a helical one a thread."""
     size, joint = shown.size, shown.joints[name]
-    middle, (low, high), outer = _seats(shown, name)
+    pair, (middle, (low, high), outer) = PAIRS[joint["type"]], _seats(shown, name)
     links, z = joint["links"], shown.element(name, outer)[1]
     inner = 1 - outer
     seat, axis = shown.seat(name, inner), shown.element(name, inner)[1]
     paint = shown.ground if links[outer] == shown.ground else ""
     found = [_rod(links[outer], middle - HALF * size * z, middle + HALF * size * z, SLEEVE * size, paint)]
-    stub = (HALF + (0.012 if joint["type"] == "revolute" else 0.03)) * size
+    stub = (HALF + (0.03 if pair.slides else 0.012)) * size
     ends = seat + (min(low, 0.0) - stub) * axis, seat + (max(high, 0.0) + stub) * axis
     found.append(_rod(links[inner], *ends, SHAFT * size, links[inner]))
-    if joint["type"] == "revolute":
+    if not pair.slides:
         for side in (-1, 1):
             near = seat + ((low if side < 0 else high) + side * (HALF + 0.002) * size) * axis
             found.append(_rod(links[inner], near, near + side * 0.008 * size * axis, COLLAR * size, links[inner]))
-    if joint["type"] == "helical":
+    if pair.threaded:
         found.append(_thread(links[inner], *ends, shown.element(name, inner)[2], SHAFT * 1.35 * size))
     return found
 
@@ -272,8 +273,7 @@ def _cube(shown: Space, name: str) -> list[Solid]:
 
 
 SYMBOLS = {
-    "revolute": _turning, "cylindrical": _turning, "helical": _turning, "prismatic": _sliding, "spherical": _ball,
-    "universal": _cross, "planar": _flat, "fixed": _cube,
+    "sleeve": _turning, "rail": _sliding, "ball": _ball, "cross": _cross, "plate": _flat, "cube": _cube,
 }  # fmt: skip
 
 
@@ -282,18 +282,17 @@ SYMBOLS = {
 
 def _foot(shown: Space, name: str) -> list[Solid]:
     """A post from the joint to a hatched plate: downwards, or along an axis that stands upright."""
-    size, ground, kind = shown.size, shown.ground, shown.joints[name]["type"]
+    size, ground, body = shown.size, shown.ground, PAIRS[shown.joints[name]["type"]].body
     side = shown.joints[name]["links"].index(ground)
-    turning = kind in ("revolute", "cylindrical", "helical")
-    seat = _seats(shown, name)[0] if turning else shown.seat(name, side)
+    seat = _seats(shown, name)[0] if body == "sleeve" else shown.seat(name, side)
     _, z, x = shown.element(name, side)
-    if kind == "prismatic":
+    if body == "rail":
         seat = seat + (np.clip(0.0, *_along(shown, name))) * z
     down = -UP + (UP @ z) * z
-    if kind in ("spherical", "fixed"):
+    if body in ("ball", "cube"):
         z, x, down = np.eye(3)[1], np.eye(3)[0], -UP
-    if kind == "planar" or np.linalg.norm(down) < 0.45:
-        down, x = -z if z[2] >= 0 or kind == "planar" else z, x
+    if body == "plate" or np.linalg.norm(down) < 0.45:
+        down, x = -z if z[2] >= 0 or body == "plate" else z, x
     else:
         down, x = down / np.linalg.norm(down), z
     y = np.cross(down, x)

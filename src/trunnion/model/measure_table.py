@@ -6,9 +6,10 @@ Its course, the numbers position by position, is the function of the same name i
 from __future__ import annotations
 
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Literal
 
-from trunnion.model.units import KINDS, Kind, unit
+from trunnion.model.units import KINDS, Kind
 
 __all__ = ["MEASURES", "MeasureKind"]
 
@@ -63,13 +64,14 @@ SPEED, SPIN, ACCELERATION = (KINDS[name] for name in ("speed", "angular speed", 
 MOTION, RATE, EFFORT = (ANGLE, LENGTH), (SPIN, SPEED), (KINDS["moment"], FORCE)
 
 
-def _of_results(name: str, si: str) -> Kind:
-    """What no number of a model is, but a measure may be."""
-    return Kind(name, si, f"10 {si}", (unit(si)[1],))
+def _of_results(name: str, si: str, *powers: int) -> Kind:
+    """What no number of a model is, but a measure may be. powers: of length, mass, time and angle."""
+    length, mass, time, angle = (Fraction(power) for power in powers)
+    return Kind(name, si, f"10 {si}", ((length, mass, time, angle),))
 
 
-SPIN_RATE = _of_results("angular acceleration", "rad/s^2")
-POWER, ENERGY = _of_results("power", "W"), _of_results("energy", "J")
+SPIN_RATE = _of_results("angular acceleration", "rad/s^2", 0, 0, -2, 1)
+POWER, ENERGY = _of_results("power", "W", 2, 1, -3, 0), _of_results("energy", "J", 2, 1, -2, 0)
 
 # in the order of the file's keys
 MEASURES: dict[str, MeasureKind] = {

@@ -88,3 +88,20 @@ def test_planar_mechanism_in_space(name: str, friction: float | None) -> None:
         np.testing.assert_allclose(two, one, rtol=0, atol=1e-8 * scale, err_msg=what)
     if friction:
         assert np.nanmax(np.abs(flat.friction_power.values)) > 1e-3
+
+
+def test_a_joint_is_at_rest_by_one_rule() -> None:
+    """In the plane as in space: below 1e-10 of both links' spins and the pace, times the size where it slides."""
+    name = next(name for name in NAMES if any(one["type"] == "prismatic" for one in MODELS[name]()["joints"].values()))
+    data = model(MODELS[name](), friction=0.1)
+    for mechanism in (build(MODELS[name](), friction=0.1), trunnion.Mechanism(trunnion=1, **raised(data))):
+        run = trunnion.prepare(mechanism)
+        walk = run.walk(run.cycle.times(STEPS))
+        for joint, (kind, links) in walk.system.joints.items():
+            turn = 1e-10 * (sum(np.abs(walk.spins[link]) for link in links) + walk.pace)
+            np.testing.assert_allclose(walk.noise(joint, turns=True), turn, rtol=1e-14)
+            np.testing.assert_allclose(walk.noise(joint, turns=False), turn * walk.size, rtol=1e-14)
+            turns = kind == "revolute"
+            rate = np.broadcast_to(walk.rates(joint)[0 if turns else 1], (STEPS,))
+            still = np.broadcast_to(walk.still(joint, turns), (STEPS,))
+            np.testing.assert_array_equal(still, np.abs(rate) <= walk.noise(joint, turns))

@@ -1,4 +1,9 @@
-"""Coordinate of the driver at every row: from a column, from time, from a speed, or from the pulses of an encoder."""
+"""Coordinate of the driver at every row: from a column, from time, from a speed, or from the pulses of an encoder.
+
+Times or angles of pulses that are known to a sample are smoothed. At a steady speed sampling and pulses are easily in a
+fixed ratio: the error of each pulse, up to half a sample, is then the same in every turn, and averaging over turns
+leaves it. What lessens it is the shaft, which cannot follow such errors.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import minimum_filter1d, uniform_filter1d
-from scipy.signal import savgol_filter
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.units import UnitError
@@ -243,6 +247,8 @@ def smoothed(values: Array, off: float, per_turn: float) -> tuple[Array, Array]:
     found, spans = values.copy(), np.zeros(values.size)
     if off <= 0:
         return found, spans
+    from scipy.signal import savgol_filter  # brings scipy.stats: longer to import than all the rest
+
     trend = np.linspace(values[0], values[-1], values.size)
     for span in SPANS:
         width = 2 * int(span * per_turn / 2) + 1

@@ -16,9 +16,9 @@ _STATISTICS = (
     ),
     Fault(
         "capability-to-the-farther-limit",
-        "statistics/capability.py",
-        "room = np.minimum(np.asarray(upper",
-        "room = np.maximum(np.asarray(upper",
+        "statistics/intervals.py",
+        "min(upper - mean, mean - lower)",
+        "max(upper - mean, mean - lower)",
         ("tests/statistics",),
     ),
     Fault(

@@ -137,7 +137,7 @@ def samples(path: Path, rng: Random) -> Iterator[None]:
 def mapping(path: Path, rng: Random) -> Iterator[None]:
     """A mapping, and the data that it names."""
     from trunnion import read_measured
-    from trunnion.rig.reading.table import dataset
+    from trunnion.rig.reading.measurement import dataset
 
     dataset(read_measured(path))
     yield
@@ -146,7 +146,7 @@ def mapping(path: Path, rng: Random) -> Iterator[None]:
 def data(path: Path, rng: Random) -> Iterator[None]:
     """Measured data, by a mapping that is sound."""
     from trunnion import read_measured
-    from trunnion.rig.reading.table import dataset
+    from trunnion.rig.reading.measurement import dataset
 
     dataset(read_measured(path.with_name("mapping.yaml"), [path]))
     yield

@@ -16,9 +16,9 @@ _STATISTICS = (
     ),
     Fault(
         "capability-to-the-farther-limit",
-        "statistics/capability.py",
-        "room = np.minimum(np.asarray(upper",
-        "room = np.maximum(np.asarray(upper",
+        "statistics/intervals.py",
+        "min(upper - mean, mean - lower)",
+        "max(upper - mean, mean - lower)",
         ("tests/statistics",),
     ),
     Fault(
@@ -68,7 +68,7 @@ _STUDIES = (
     ),
     Fault(
         "allocation-drift-forgotten-on-one-side",
-        "studies/allocation/sides.py",
+        "studies/allocation/task.py",
         "np.concatenate([(worst + drift)[keep[0]], (worst - drift)[keep[1]]])",
         "np.concatenate([(worst + drift)[keep[0]], worst[keep[1]]])",
         ("tests/reference/test_allocation_yield.py",),
@@ -162,7 +162,7 @@ _RIG = (
     ),
     Fault(
         "wild-readings-without-limit",
-        "rig/reading/counter.py",
+        "rig/reading/pulses.py",
         "if not wild.size or wild.size > 0.01 * readings.size:",
         "if not wild.size:",
         ("tests/measured_data/test_angles.py", "-k", "wild"),

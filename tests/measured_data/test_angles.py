@@ -13,8 +13,8 @@ from trunnion.errors import MechanismError
 from trunnion.model.units import KINDS
 from trunnion.rig.reading.account import Account
 from trunnion.rig.reading.channels import resolution
-from trunnion.rig.reading.counter import unwrapped
 from trunnion.rig.reading.mapping import AngleSource
+from trunnion.rig.reading.pulses import unwrapped
 from trunnion.rig.reading.read import read_measured
 
 OMEGA = RPM * np.pi / 30

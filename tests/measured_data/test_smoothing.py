@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from trunnion.rig.reading.smoothing import seen_edges, smoothed, unresolved
+from trunnion.rig.reading.angle import seen_edges, smoothed, unresolved
 
 Array = NDArray[np.float64]
 STEP = 1 / 5000

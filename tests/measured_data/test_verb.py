@@ -15,7 +15,7 @@ import trunnion
 from manual.conftest import Run, program
 from measured_data.recording import mapping, recorded
 from trunnion.errors import MechanismError
-from trunnion.rig.reading.table import dataset
+from trunnion.rig.reading.measurement import dataset
 from trunnion.rig.reading.tables import read_table
 
 __all__ = ["program"]  # a fixture

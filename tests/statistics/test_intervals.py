@@ -8,8 +8,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from trunnion.statistics.capability import normal_yield, two_sided
-from trunnion.statistics.intervals import by_replicates, of_deviation, of_mean, of_quantile, share, share_by_replicates
+from trunnion.statistics.intervals import (
+    by_replicates,
+    capability,
+    of_deviation,
+    of_mean,
+    of_quantile,
+    share,
+    share_by_replicates,
+)
 
 RUNS = 4000
 GENERATOR = np.random.default_rng(8)
@@ -105,18 +112,16 @@ def test_binomial_quantiles_as_in_scipy() -> None:
 # ---- capability -----------------------------------------------------------------------------------------------
 
 
-def test_capability() -> None:
-    cp, cpk = two_sided(-3.0, 3.0, [0.0, 1.0, -2.0, 0.0], [1.0, 1.0, 0.5, 0.0])
-    np.testing.assert_allclose(cp, [1, 1, 2, np.inf])
-    np.testing.assert_allclose(cpk, [1, 2 / 3, 2 / 3, np.inf])
-    cp, cpk = two_sided([-np.inf, -np.inf], [3.0, np.inf], 1.0, 1.0)
-    assert np.isnan(cp).all()
-    np.testing.assert_array_equal(cpk, [2 / 3, np.nan])
-
-
-def test_yield_of_a_normal_figure() -> None:
-    assert normal_yield(-3, 3, 0, 1) == pytest.approx(0.9973002039367398, rel=1e-14)
-    assert normal_yield(-np.inf, 1, 0, 1) == pytest.approx(stats.norm.cdf(1), rel=1e-14)
-    assert normal_yield(-np.inf, np.inf, 5, 1) == 1
-    assert normal_yield(10, 11, 0, 1) == pytest.approx(stats.norm.sf(10) - stats.norm.sf(11), rel=1e-12)
-    np.testing.assert_array_equal(normal_yield(-1, 1, [0.0, 2.0, 1.0], 0.0), [1, 0, 1])
+@pytest.mark.parametrize(
+    ("limits", "mean", "sigma", "expected"),
+    [
+        ((-3.0, 3.0), 0.0, 1.0, (1, 1)),
+        ((-3.0, 3.0), 1.0, 1.0, (1, 2 / 3)),
+        ((-3.0, 3.0), -2.0, 0.5, (2, 2 / 3)),
+        ((-3.0, 3.0), 0.0, 0.0, (np.nan, np.nan)),
+        ((-np.inf, 3.0), 1.0, 1.0, (np.nan, 2 / 3)),
+        ((-np.inf, np.inf), 1.0, 1.0, (np.nan, np.nan)),
+    ],
+)
+def test_capability(limits: tuple[float, float], mean: float, sigma: float, expected: tuple[float, float]) -> None:
+    np.testing.assert_allclose(capability(*limits, mean, sigma), expected)

@@ -27,8 +27,8 @@ def data(
 ) -> None:
     """Measured files, read by a mapping: conditions, channels, scatter and uncertainty, and faults by name."""
     from trunnion.results.export import save
+    from trunnion.rig.reading.measurement import dataset
     from trunnion.rig.reading.read import read_measured
-    from trunnion.rig.reading.table import dataset
     from trunnion.views.rig.measured import tables
 
     check_files(out or [], drawn=False)

@@ -13,11 +13,13 @@ from trunnion.errors import Finding, MechanismError, Status
 from trunnion.measures.kernel import courses_of
 from trunnion.measures.measures import Measure, coordinate_unit, named
 from trunnion.model.mechanism import Mechanism
-from trunnion.rig.reading.measurement import Condition
+from trunnion.model.parameters import measured
+from trunnion.model.units import Kind, dimension_text
+from trunnion.rig.reading.measurement import Condition, Measurement
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
 
-__all__ = ["Modelled", "measure_of", "modelled", "prepared", "told_at"]
+__all__ = ["Modelled", "check_settings", "measure_of", "modelled", "prepared", "told_at"]
 
 Array = NDArray[np.float64]
 SLOWER = 0.01  # of the duration of a cycle: a machine that keeps time runs no farther off
@@ -184,3 +186,44 @@ def _beside(turning: bool, course: Array, measured: Array) -> Array:
         return course
     turns = np.round((measured - course) / (2 * np.pi))
     return course + 2 * np.pi * np.nan_to_num(turns)
+
+
+def check_settings(mechanism: Mechanism, measurement: Measurement) -> None:
+    """MechanismError where a condition states a number in a unit that the model's number cannot have.
+
+    Names that the model does not have, and numbers without a unit, which are SI, are passed over.
+    """
+    findings: dict[tuple[str, str], Finding] = {}
+    stated = {name for one in measurement.conditions for name in one.dimensions}
+    kinds: dict[str, Kind | None] = {}
+    for name in stated:
+        try:
+            path = mechanism.path_of(name)
+        except MechanismError:  # told with the condition it is in
+            continue
+        entries = mechanism.parameter_set.entries
+        if path not in entries:  # a number that the model does not state yet
+            value = next(one.values[name] for one in measurement.conditions if name in one.dimensions)
+            try:
+                other = mechanism.with_values({name: value})
+            except MechanismError:
+                continue
+            kinds[name] = measured(other, other.parameter_set.entries.values()).get(path)
+        else:
+            kinds[name] = measured(mechanism, entries.values()).get(path)
+    for condition in measurement.conditions:
+        for name, dimension in condition.dimensions.items():
+            kind = kinds.get(name)
+            if kind is None or kind.accepts(dimension):
+                continue
+            what = f"{dimension_text(dimension)} is set where the model has {_needed(kind.name)}"
+            remedy = f"set {_needed(kind.name)} such as {kind.example}, or another number of the model"
+            file = str(condition.files[0]) if condition.files else ""
+            told = f"{what} (in condition {condition.name})"
+            findings.setdefault((name, what), Finding(told, f"set.{name}", remedy, file=file))
+    if findings:
+        raise MechanismError(list(findings.values()))
+
+
+def _needed(kind: str) -> str:
+    return f"{'an' if kind[0] in 'aeiou' else 'a'} {kind}"

@@ -15,7 +15,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Bins", "cdf", "count", "quantile"]
+__all__ = ["Bins", "count", "quantile"]
 
 Floats = NDArray[np.float64]
 Counts = NDArray[np.int64]
@@ -57,9 +57,9 @@ class Bins:
         """Bins of a figure."""
         return 2 * self.half
 
-    def index(self, values: Any, axis: int = -1) -> NDArray[np.int64]:
-        """Bin of each value, samples along `axis`; of NaN it has no meaning."""
-        x = np.moveaxis(np.asarray(values, dtype=np.float64), axis, -1)
+    def index(self, values: Any) -> NDArray[np.int64]:
+        """Bin of each value, samples along the last axis; of NaN it has no meaning."""
+        x = np.asarray(values, dtype=np.float64)
         t = np.ascontiguousarray((x - np.asarray(self.centre)[..., None]) / np.asarray(self.scale)[..., None])
         # The greatest float before the next octave: a clip of the float costs less than one of the index.
         far = np.minimum(np.abs(t) + 1.0, np.nextafter(2.0**self.octaves, 0.0))
@@ -135,16 +135,3 @@ def _tilted(share: Floats, values: Counts, edges: Floats, place: NDArray[np.intp
     s = np.where(np.isnan(s), 0.0, s)  # bins narrower than the rounding of their centre have no width
     root = np.sqrt(np.maximum((1 - s) ** 2 + 4 * s * share, 0.0))
     return np.clip(2 * share / np.maximum(1 - s + root, 1e-300), 0.0, 1.0)
-
-
-def cdf(counts: Counts, bins: Bins, x: Any) -> Floats:
-    """Share of the counted that lies below x, (*figures, *x): linear within a bin. NaN where nothing is counted."""
-    x = np.asarray(x, dtype=np.float64)
-    edges = np.broadcast_to(bins.edges(), (*counts.shape[:-1], bins.number + 1)).reshape(-1, bins.number + 1)
-    rows = counts.reshape(-1, bins.number)
-    found = np.full((len(rows), x.size), np.nan)
-    for row, values in enumerate(rows):
-        reached = np.concatenate([[0.0], np.cumsum(values)])
-        if reached[-1] > 0:
-            found[row] = np.interp(x.ravel(), edges[row], reached) / reached[-1]
-    return found.reshape((*counts.shape[:-1], *x.shape))

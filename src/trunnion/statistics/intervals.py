@@ -14,6 +14,7 @@ from scipy import special
 
 __all__ = [
     "by_replicates",
+    "capability",
     "of_deviation",
     "of_mean",
     "of_quantile",
@@ -136,3 +137,15 @@ def _binomial_quantile(p: float, n: Floats, q: Floats) -> Floats:
     k = np.maximum(np.ceil(special.bdtrik(p, n, q)), 0.0)
     before = np.maximum(k - 1, 0.0)
     return np.asarray(np.where((k > 0) & (special.bdtr(before, n.astype(np.int64), q) >= p), before, k))
+
+
+def capability(lower: float, upper: float, mean: float, sigma: float) -> tuple[float, float]:
+    """(C_p, C_pk) between limits that may be infinite: what they leave, and the nearer of them, against 6 σ and 3 σ.
+
+    NaN where there is no such limit or no spread. Source: V. E. Kane, Process capability indices, J. Quality Technology
+    18 (1986) 41-52, doi:10.1080/00224065.1986.11978984.
+    """
+    with np.errstate(all="ignore"):
+        found = np.array([(upper - lower) / 2, min(upper - mean, mean - lower)]) / (3 * np.float64(sigma))
+    cp, cpk = np.where(np.isfinite(found), found, np.nan).tolist()
+    return cp, cpk

@@ -6,27 +6,16 @@ two siblings are merged, left then right, as soon as both are there. What is kep
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
-from typing import Any, Generic, Protocol, Self, TypeVar
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Moments", "Payload", "Sums", "Tree", "merged", "moments_of"]
+__all__ = ["Moments", "Tree", "moments_of"]
 
 Floats = NDArray[np.float64]
-
-
-class Payload(Protocol):
-    """What a tree carries: it merges with one of its kind, to its right, and packs into one array of floats."""
-
-    def merged(self, other: Self) -> Self: ...
-
-    def packed(self) -> Floats: ...
-
-
-P = TypeVar("P", bound=Payload)
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,50 +119,25 @@ def moments_of(values: Any, axis: int = -1) -> Moments:
     )
 
 
-def merged(a: Moments, b: Moments) -> Moments:
-    """Moments of both sets of values together: `a.merged(b)`."""
-    return a.merged(b)
-
-
-@dataclass(frozen=True, eq=False)
-class Sums:
-    """Plain sums of floats of any shape, for what needs no more than a sum."""
-
-    values: Floats
-
-    def merged(self, other: Self) -> Self:
-        """The sum of both."""
-        return type(self)(self.values + other.values)
-
-    def packed(self) -> Floats:
-        """The array itself."""
-        return self.values
-
-    @classmethod
-    def unpacked(cls, array: Floats) -> Self:
-        """From `packed`."""
-        return cls(np.asarray(array, dtype=np.float64))
-
-
-class Tree(Generic[P]):
-    """Payloads of blocks in a dyadic tree: node (level, index) holds the blocks [index 2^level, (index + 1) 2^level).
+class Tree:
+    """Moments of blocks in a dyadic tree: node (level, index) holds the blocks [index 2^level, (index + 1) 2^level).
 
     `merge` gives a new tree, `add` puts into this one. nodes: the widest whose blocks are all there, by (level, index);
     prefixes: payload of the first 2^level blocks by level, kept as they come up, for how a figure converges.
     """
 
     def __init__(
-        self, nodes: Mapping[tuple[int, int], P] | None = None, prefixes: Mapping[int, P] | None = None
+        self, nodes: Mapping[tuple[int, int], Moments] | None = None, prefixes: Mapping[int, Moments] | None = None
     ) -> None:
-        self.nodes: dict[tuple[int, int], P] = dict(nodes or {})
-        self.prefixes: dict[int, P] = dict(prefixes or {})
+        self.nodes: dict[tuple[int, int], Moments] = dict(nodes or {})
+        self.prefixes: dict[int, Moments] = dict(prefixes or {})
 
     @classmethod
-    def of(cls, block: int, payload: P) -> Self:
+    def of(cls, block: int, payload: Moments) -> Self:
         """A tree of one block."""
         return cls({(0, block): payload}, {0: payload} if block == 0 else {})
 
-    def merge(self, other: Tree[P]) -> Self:
+    def merge(self, other: Tree) -> Self:
         """The blocks of both; ValueError if a block is in both."""
         tree = type(self)(self.nodes, self.prefixes)
         tree.prefixes.update(other.prefixes)
@@ -181,13 +145,13 @@ class Tree(Generic[P]):
             tree._insert(level, index, payload)
         return tree
 
-    def add(self, block: int, payload: P) -> None:
+    def add(self, block: int, payload: Moments) -> None:
         """Put one more block into this tree."""
         if block == 0:
             self.prefixes[0] = payload
         self._insert(0, block, payload)
 
-    def _insert(self, level: int, index: int, payload: P) -> None:
+    def _insert(self, level: int, index: int, payload: Moments) -> None:
         for other_level, other_index in self.nodes:
             wide = max(level, other_level)
             if index >> (wide - level) == other_index >> (wide - other_level):
@@ -199,7 +163,7 @@ class Tree(Generic[P]):
                 self.prefixes[level] = payload
         self.nodes[level, index] = payload
 
-    def in_order(self) -> Iterator[tuple[int, int, P]]:
+    def in_order(self) -> Iterator[tuple[int, int, Moments]]:
         """(first block, number of blocks, payload) of every node, from the first block on."""
         for (level, index), payload in sorted(self.nodes.items(), key=lambda item: item[0][1] << item[0][0]):
             yield index << level, 1 << level, payload
@@ -215,9 +179,9 @@ class Tree(Generic[P]):
                 ranges.append((first, first + number))
         return ranges
 
-    def total(self) -> P | None:
+    def total(self) -> Moments | None:
         """All blocks merged, from the first on; None of an empty tree."""
-        total: P | None = None
+        total: Moments | None = None
         for _, _, payload in self.in_order():
             total = payload if total is None else total.merged(payload)
         return total
@@ -236,11 +200,14 @@ class Tree(Generic[P]):
         return arrays
 
     @classmethod
-    def from_arrays(cls, arrays: Mapping[str, NDArray[Any]], unpack: Callable[[Floats], P]) -> Self:
-        """From `to_arrays`; unpack: of the payload's kind, as `Moments.unpacked`."""
+    def from_arrays(cls, arrays: Mapping[str, NDArray[Any]]) -> Self:
+        """From `to_arrays`."""
         nodes = [(int(level), int(index)) for level, index in arrays["nodes"]]
         levels = [int(level) for level in arrays["levels"]]
         return cls(
-            {key: unpack(row) for key, row in zip(nodes, arrays.get("node_payloads", ()), strict=True)},
-            {level: unpack(row) for level, row in zip(levels, arrays.get("prefix_payloads", ()), strict=True)},
+            {key: Moments.unpacked(row) for key, row in zip(nodes, arrays.get("node_payloads", ()), strict=True)},
+            {
+                level: Moments.unpacked(row)
+                for level, row in zip(levels, arrays.get("prefix_payloads", ()), strict=True)
+            },
         )

@@ -19,10 +19,9 @@ from trunnion.rig.compare.causes import best, causes
 from trunnion.rig.compare.judge import Verdict, judge, uncertainty_of
 from trunnion.rig.compare.pairs import Compared, Efficient, Pair, unmeasured
 from trunnion.rig.compare.result import dataset
-from trunnion.rig.modelled import Modelled, modelled
+from trunnion.rig.modelled import Modelled, check_settings, modelled
 from trunnion.rig.reading.efficiency import Pairs, efficiency_of, load_joints, pairs_of
 from trunnion.rig.reading.measurement import Condition, Measurement
-from trunnion.rig.settings import check_settings
 from trunnion.solve.friction_method import FrictionMethod
 
 if TYPE_CHECKING:

@@ -14,12 +14,12 @@ def scaled(unit: str) -> tuple[float, str]:
     return READ.get(unit, (1.0, unit))
 
 
-def decimals(uncertainty: float, digits: int = 2) -> int:
-    """Decimals that leave so many digits of an uncertainty; negative for tens, hundreds."""
+def decimals(uncertainty: float) -> int:
+    """Decimals that leave two digits of an uncertainty; negative for tens, hundreds."""
     if not math.isfinite(uncertainty) or uncertainty <= 0:
         return 6
-    shown = float(f"{uncertainty:.{digits - 1}e}")  # 0.0996 is 0.10
-    return digits - 1 - math.floor(math.log10(shown))
+    shown = float(f"{uncertainty:.1e}")  # 0.0996 is 0.10
+    return 1 - math.floor(math.log10(shown))
 
 
 def amount(value: float, half: float | None, unit: str) -> str:

@@ -14,24 +14,28 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import Dual, derivative, primal
 from trunnion.algebra.namespace import Number
-from trunnion.errors import Status
+from trunnion.errors import MechanismError, Status
 from trunnion.measures.measures import Measure, coordinate_unit
 from trunnion.rig.identify.unknowns import Unknown
 from trunnion.solve import shifts
 from trunnion.solve.backward import Backward
 from trunnion.solve.forward import Forward, posed
 from trunnion.solve.friction_method import FrictionMethod
-from trunnion.solve.run import Run
+from trunnion.solve.run import Run, prepare
+from trunnion.solve.seating import settle
 from trunnion.solve.seats import given_offsets
 from trunnion.solve.status import pose_status, status_of
 from trunnion.solve.system import sticking
+from trunnion.solve.travel import lanes
 
-__all__ = ["Courses", "Model", "Said"]
+__all__ = ["Courses", "Model", "Said", "SeatedModel"]
 
 Array = NDArray[np.float64]
 AT_ONCE = 20_000  # numbers in an array
 STILL = 1e-9  # of the largest speed in the cycle: rounding, whose sign says nothing
 STEP = 1e-6  # of a driver's number, for what it does to the duration of the cycle
+SEATED = 1e-4  # of an unknown, for derivatives by differences: seats are settled to some 1e-6 of their clearance
+Found = tuple[dict[str, Array], NDArray[np.int8], NDArray[np.bool_]]
 
 
 @dataclass(frozen=True)
@@ -267,3 +271,50 @@ def _said(number: Number, shape: tuple[int, ...], own: slice) -> Said:
 def solved(status: NDArray[np.int8]) -> NDArray[np.bool_]:
     """Positions with a full answer."""
     return np.asarray(status < Status.NOT_CONVERGED)
+
+
+@dataclass(frozen=True)
+class SeatedModel(Model):
+    """A Model of a mechanism whose pins lie as their loads press them: each condition by itself.
+
+    The seats follow the loads and the loads the seats, in an iteration that carries no derivatives.
+    """
+
+    def courses(self, at: Array) -> Courses:
+        """What the model says at these values of the unknowns, SI."""
+        found = [self._condition(k, at) for k in range(len(self.phases))]
+        said, status, turned = [], [], []
+        for values, codes, senses in found:
+            said.append({name: Said(row, row[None, :].repeat(len(at), 0) * np.nan) for name, row in values.items()})
+            status.append(codes)
+            turned.append(senses)
+        for p, unknown in enumerate(self.unknowns):
+            step = SEATED * (abs(at[p]) or unknown.size or 1.0)
+            low, high = (np.clip(at[p] + sign * step, unknown.lower, unknown.upper) for sign in (-1.0, 1.0))
+            for k in range(len(self.phases)):
+                ends = [self._condition(k, np.where(np.arange(len(at)) == p, end, at))[0] for end in (low, high)]
+                for name, one in said[k].items():
+                    one.slope[p] = (ends[1][name] - ends[0][name]) / (high - low)
+        return Courses(tuple(said), tuple(status), tuple(turned))
+
+    def _condition(self, k: int, at: Array) -> Found:
+        """One condition: courses, statuses, where a sense changes."""
+        values: dict[str, float | str] = dict(self.settings[k])
+        for value, unknown in zip(at, self.unknowns, strict=True):
+            values.update(dict.fromkeys(unknown.paths, float(value)))
+        size = len(self.phases[k])
+        try:
+            run = prepare(self.run.system.mechanism.with_values(values))
+        except MechanismError:
+            lost = dict.fromkeys(self.measures, np.full(size, np.nan))
+            return lost, np.full(size, Status.NOT_ASSEMBLED, np.int8), np.zeros(size, bool)
+        with np.errstate(all="ignore"):
+            seen = lanes(self.phases[k] * run.cycle.duration, run.cycle)
+            seated = settle(run, seen, self.friction, run.ideal(seen.times, self.friction))
+            status = status_of(seated.back, (size,))
+            found = {
+                name: np.array(np.broadcast_to(primal(self._course(measure, seated.back)), (size,)), float)
+                for name, measure in self.measures.items()
+            }
+            turned = self._turned(seated.back, (size,))
+        return found, np.where(seated.sticks, np.maximum(status, Status.ZERO_SLIP), status).astype(np.int8), turned

@@ -13,18 +13,16 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.measures.measures import Measure, named
 from trunnion.model.mechanism import Mechanism
 from trunnion.rig.identify.blocks import EFFICIENCY, Block, blocks_of, channels_of, finite
-from trunnion.rig.identify.courses import Model
+from trunnion.rig.identify.courses import Model, SeatedModel
 from trunnion.rig.identify.fit import Problem, fit, sensors_of
 from trunnion.rig.identify.held import HoldOut, held_out
 from trunnion.rig.identify.search import search
-from trunnion.rig.identify.seated import SeatedModel
 from trunnion.rig.identify.separate import inseparable
 from trunnion.rig.identify.uncertainty import left_over, spread_of
 from trunnion.rig.identify.unknowns import Parameters, described, unknowns
-from trunnion.rig.modelled import told_at
+from trunnion.rig.modelled import check_settings, told_at
 from trunnion.rig.reading.efficiency import load_joints
 from trunnion.rig.reading.measurement import Measurement
-from trunnion.rig.settings import check_settings
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
 

@@ -7,7 +7,6 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import butter, sosfiltfilt
 
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.model.units import UnitError
@@ -198,6 +197,8 @@ def filtered(values: Array, line: Timeline, low_pass: Filter, account: Account, 
     longer ones nothing is carried: the stretches between them are filtered each by itself, and those too short for it
     have no values.
     """
+    from scipy.signal import butter, sosfiltfilt  # brings scipy.stats: longer to import than all the rest
+
     rate = 1.0 / line.step
     cut_off = low_pass.cut_off.value
     finite = np.isfinite(values)

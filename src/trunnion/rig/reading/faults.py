@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
-from scipy.stats import binom
+from scipy.special import bdtrc
 
 from trunnion.errors import Severity
 from trunnion.rig.reading.account import Account, counted, places, runs
@@ -135,7 +135,7 @@ def _recurring(phase: Array) -> Mask:
         rest = phase[~own]
         around = np.sort(np.concatenate([rest - 1, rest, rest + 1]))
         others = np.searchsorted(around, rest + NEAR, side="right") - np.searchsorted(around, rest - NEAR) - 1
-        found = np.asarray(binom.sf(others - 1, rest.size - 1, 2 * NEAR) < CHANCE)
+        found = np.asarray(bdtrc(others - 1, rest.size - 1, 2 * NEAR) < CHANCE)
         if not found.any():
             break
         own[np.flatnonzero(~own)[found]] = True

@@ -51,25 +51,13 @@ def read_table(path: Path, wanted: Iterable[str], optional: Iterable[str] = ()) 
     return table
 
 
-def _csv(path: Path, wanted: Sequence[str], optional: Sequence[str]) -> Table:
-    return read_csv(path, wanted, optional)
-
-
-def _parquet(path: Path, wanted: Sequence[str], optional: Sequence[str]) -> Table:
-    return read_parquet(path, wanted, optional)
-
-
-def _tdms(path: Path, wanted: Sequence[str], optional: Sequence[str]) -> Table:
-    return read_tdms(path, wanted, optional)
-
-
 Reader = Callable[[Path, Sequence[str], Sequence[str]], Table]
 
 # extension: reader, the package it needs and the extra that brings it
 FORMATS: dict[str, tuple[Reader, str, str]] = {
-    ".csv": (_csv, "", ""),
-    ".txt": (_csv, "", ""),
-    ".tsv": (_csv, "", ""),
-    ".parquet": (_parquet, "pyarrow", "parquet"),
-    ".tdms": (_tdms, "nptdms", "tdms"),
+    ".csv": (read_csv, "", ""),
+    ".txt": (read_csv, "", ""),
+    ".tsv": (read_csv, "", ""),
+    ".parquet": (read_parquet, "pyarrow", "parquet"),
+    ".tdms": (read_tdms, "nptdms", "tdms"),
 }

@@ -3,6 +3,9 @@
 The separator is the first of semicolon, tab and comma that the header has; with semicolon or tab a number may have a
 decimal comma. Units stand in brackets behind the name, `T1 [V]`, or in a row of their own below the names. Lines that
 begin with # are passed over, and so is what a logger writes above the header.
+
+Pandas reads the rows. What stands above them is read by hand: clevercsv would tell the separator alone, not the header
+among a logger's lines, the units and the sign of decimals.
 """
 
 from __future__ import annotations

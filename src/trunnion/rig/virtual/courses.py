@@ -44,7 +44,7 @@ class Solved:
     mended: int = 0
 
 
-def solved(run: Run, measures: Sequence[Measure], time: Array, method: FrictionMethod | None = None) -> Solved:
+def solved(run: Run, measures: Sequence[Measure], time: Array) -> Solved:
     """The courses of measures at ascending times (s) of the cycle, with pins in their seats.
 
     Where a load or friction is an interval, at a speed of zero, a course is the mean of its neighbours; a load whose
@@ -54,7 +54,7 @@ def solved(run: Run, measures: Sequence[Measure], time: Array, method: FrictionM
     status = np.empty(len(time), np.int8)
     for low in range(0, len(time), CHUNK):
         window = slice(low, min(low + CHUNK, len(time)))
-        back, shape = _back(run, time[window], method), time[window].shape
+        back, shape = _back(run, time[window]), time[window].shape
         status[window] = status_of(back, shape)
         with np.errstate(all="ignore"):
             for i, measure in enumerate(measures):
@@ -71,11 +71,10 @@ def solved(run: Run, measures: Sequence[Measure], time: Array, method: FrictionM
     return Solved(values, status, mended)
 
 
-def _back(run: Run, time: Array, method: FrictionMethod | None) -> Backward:
+def _back(run: Run, time: Array) -> Backward:
     if not run.seats:
-        return run.solve(time, method=method)
-    seen = lanes(time, run.cycle)
-    method = method or FrictionMethod()
+        return run.solve(time)
+    seen, method = lanes(time, run.cycle), FrictionMethod()
     return settle(run, seen, method, run.ideal(seen.times, method)).back
 
 

@@ -13,7 +13,6 @@ from zlib import crc32
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import signal
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.measure_table import MEASURES
@@ -203,11 +202,13 @@ def smoothed(true: Array, bandwidth: float | None, rate: float) -> Array:
     """A first-order low-pass of this bandwidth, Hz, exact for what runs straight between samples; at rest before."""
     if bandwidth is None:
         return true
+    from scipy.signal import lfilter  # brings scipy.stats: longer to import than all the rest
+
     step = 2 * np.pi * bandwidth / rate  # h/τ
     kept = math.exp(-step)
     last = 1 - (1 - kept) / step
     start = np.array([(1 - last) * true[0]])  # as if it had always been at its first value
-    found, _ = signal.lfilter([last, 1 - kept - last], [1.0, -kept], true, zi=start)
+    found, _ = lfilter([last, 1 - kept - last], [1.0, -kept], true, zi=start)
     return np.asarray(found)
 
 

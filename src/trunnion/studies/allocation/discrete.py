@@ -23,11 +23,9 @@ from scipy.optimize import Bounds, LinearConstraint, milp
 
 from trunnion.errors import Finding
 from trunnion.results.sentences import told
-from trunnion.studies.allocation.cones import Point
-from trunnion.studies.allocation.continuous import allocate_continuous, gap_of, minimise, unbounded
+from trunnion.studies.allocation.continuous import Point, allocate_continuous, gap_of, minimise, unbounded
 from trunnion.studies.allocation.problem import ALLOWED, PROVEN, Answer, Contribution, Problem, none, shortfalls
-from trunnion.studies.allocation.sides import Sides, sides
-from trunnion.studies.allocation.task import Task, task_of
+from trunnion.studies.allocation.task import Sides, Task, sides, task_of
 
 __all__ = ["allocate_discrete"]
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -184,10 +185,17 @@ def _texts(study: Study, measure: NDArray[np.intp], position: NDArray[np.intp]) 
     return tuple(names[k] for k in measure), places, tuple(units[k] for k in measure)
 
 
+NUMBERS = ("worst", "lower", "upper", "half", "deviation", "mean", "offset")  # of effects, by row
+TEXTS = ("labels", "places", "units")
+
+
 def joined(one: Rows, more: Rows) -> Rows:
     """The rows of both."""
+    first, second = one.effects, more.effects
+    numbers: dict[str, Any] = {key: np.concatenate([getattr(first, key), getattr(second, key)]) for key in NUMBERS}
+    texts: dict[str, Any] = {key: getattr(first, key) + getattr(second, key) for key in TEXTS}
     return Rows(
-        _joined(one.effects, more.effects),
+        replace(first, **numbers, **texts),
         np.concatenate([one.measure, more.measure]),
         np.concatenate([one.position, more.position]),
         np.concatenate([one.moving, more.moving]),
@@ -195,28 +203,11 @@ def joined(one: Rows, more: Rows) -> Rows:
     )
 
 
-def _joined(first: Effects, second: Effects) -> Effects:
-    def both(key: str) -> Array:
-        return np.concatenate([getattr(first, key), getattr(second, key)])
-
-    return Effects(
-        both("worst"), both("lower"), both("upper"), both("half"), both("deviation"), both("mean"), both("offset"),
-        first.correlation, first.labels + second.labels, first.places + second.places, first.units + second.units,
-    )  # fmt: skip
-
-
 def part_of(rows: Rows, which: NDArray[np.bool_]) -> Rows:
     """Some of the rows."""
-    of = rows.effects
-
-    def some(key: str) -> Array:
-        return np.asarray(getattr(of, key)[which])
-
-    def said(texts: Texts) -> Texts:
-        return tuple(text for text, there in zip(texts, which, strict=True) if there)
-
-    effects = Effects(
-        some("worst"), some("lower"), some("upper"), some("half"), some("deviation"), some("mean"), some("offset"),
-        of.correlation, said(of.labels), said(of.places), said(of.units),
-    )  # fmt: skip
-    return Rows(effects, rows.measure[which], rows.position[which], rows.moving[which], rows.unknown)
+    of, places = rows.effects, np.flatnonzero(which).tolist()
+    numbers: dict[str, Any] = {key: getattr(of, key)[which] for key in NUMBERS}
+    texts: dict[str, Any] = {key: tuple(getattr(of, key)[k] for k in places) for key in TEXTS}
+    return Rows(
+        replace(of, **numbers, **texts), rows.measure[which], rows.position[which], rows.moving[which], rows.unknown
+    )

@@ -1,4 +1,7 @@
-"""An allocation as unknowns, bounds, costs and sides: what the solvers work on."""
+"""An allocation as unknowns, bounds, costs and sides: what the solvers work on.
+
+Sides are the limits as convex functions of the half widths, one for each that can bind.
+"""
 
 from __future__ import annotations
 
@@ -9,11 +12,97 @@ from numpy.typing import NDArray
 
 from trunnion.statistics.costs import Cost
 from trunnion.studies.allocation.problem import Problem
-from trunnion.studies.allocation.sides import Sides
 
-__all__ = ["Task", "task_of"]
+__all__ = ["Sides", "Task", "sides", "task_of"]
 
 Array = NDArray[np.float64]
+Rows = NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class Sides:
+    """g_k(t) = linear_k·t + ‖K (spread_k ∘ t)‖ ≤ 1, with the room to the limit as unit.
+
+    linear, spread: (side, contribution), 1/m or 1/rad; factor: K, Kᵀ K the correlation, None: independent;
+    row: whose side it is; room: its unit, that of the measure. most: a bound of each half width that the limits imply,
+    (contribution,), infinite where they imply none. rising: whether every g_k rises with every t.
+    """
+
+    linear: Array
+    spread: Array
+    factor: Array | None
+    row: Rows
+    room: Array
+    most: Array
+    rising: bool
+
+    def __len__(self) -> int:
+        return len(self.linear)
+
+    def value(self, t: Array, which: Rows | slice = slice(None)) -> Array:
+        """g_k(t), (side,)."""
+        return np.asarray(self.linear[which] @ t + np.sqrt(np.sum(self.parts(t, which) ** 2, axis=1)), float)
+
+    def parts(self, t: Array, which: Rows | slice = slice(None)) -> Array:
+        """K (spread ∘ t), (side, part)."""
+        own = self.spread[which] * t
+        return own if self.factor is None else own @ self.factor.T
+
+    def gradient(self, t: Array, which: Rows | slice = slice(None)) -> Array:
+        """∂g_k/∂t, (side, contribution); where ‖…‖ is 0 the derivative of its linear part alone, a subgradient."""
+        parts = self.parts(t, which)
+        norm = np.sqrt(np.sum(parts**2, axis=1))[:, None]
+        along = np.divide(parts, norm, out=np.zeros_like(parts), where=norm > 0)
+        back = along if self.factor is None else along @ self.factor
+        return np.asarray(self.linear[which] + self.spread[which] * back, float)
+
+
+def sides(problem: Problem) -> Sides:
+    """The sides of a problem's rows that can bind; of a symmetric row only the nearer one."""
+    effects = problem.effects
+    none = np.zeros_like(effects.worst)
+    middle = effects.middle()
+    room = np.stack([effects.upper - middle, middle - effects.lower])
+    worst, spread, drift = none, none, none
+    if problem.criterion == "worst-case":
+        worst = effects.worst
+    elif problem.criterion == "rss":
+        spread = effects.spread()
+    else:
+        spread, drift = problem.z * effects.sigma(), effects.drift()
+    one_sided = np.asarray(~np.any(drift, axis=1))
+    keep = np.asarray(np.isfinite(room))
+    keep &= ~(one_sided & (room > room[::-1]))
+    keep[1] &= ~(one_sided & (room[0] == room[1]))
+    factor = _root(effects.correlation) if spread.any() else None
+    least = 1.0 if factor is None else float(np.sqrt(max(np.linalg.eigvalsh(factor.T @ factor)[0], 0.0)))
+    half = worst + least * np.abs(spread)
+    linear = np.concatenate([(worst + drift)[keep[0]], (worst - drift)[keep[1]]])
+    both = np.concatenate([spread[keep[0]], spread[keep[1]]])
+    rooms = np.concatenate([room[0, keep[0]], room[1, keep[1]]])
+    rising = np.min(linear, axis=1, initial=0.0) >= 0
+    with np.errstate(divide="ignore", invalid="ignore"):  # no effect, no bound; no room is told before it is used
+        alone = np.where(rising[:, None], rooms[:, None] / (linear + least * np.abs(both)), np.inf)
+        linear, both = linear / rooms[:, None], both / rooms[:, None]
+        pair = ((effects.upper - effects.lower) / 2)[:, None] / half
+    bounds = np.concatenate([alone, pair])
+    return Sides(
+        linear,
+        both,
+        factor,
+        np.concatenate([np.flatnonzero(keep[0]), np.flatnonzero(keep[1])]),
+        rooms,
+        np.min(np.where(np.isnan(bounds), np.inf, bounds), axis=0, initial=np.inf),
+        factor is None and bool(np.all(rising)),
+    )
+
+
+def _root(correlation: Array | None) -> Array | None:
+    """K with Kᵀ K the correlation; None for independent contributions."""
+    if correlation is None or np.array_equal(correlation, np.eye(len(correlation))):
+        return None
+    values, vectors = np.linalg.eigh(correlation)
+    return np.asarray(np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T, float)
 
 
 @dataclass(frozen=True)

@@ -22,8 +22,7 @@ from typing import Any, Generic
 import numpy as np
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.studies.tolerance.interruption import unheard
-from trunnion.studies.tolerance.processes import DEATHS, PAUSE, deadly
+from trunnion.studies.tolerance.processes import DEATHS, PAUSE, deadly, unheard
 from trunnion.studies.tolerance.protocol import Blocks, Job, Part, T, part_of
 from trunnion.version import __version__
 

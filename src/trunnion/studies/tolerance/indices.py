@@ -9,7 +9,6 @@ coordinates of a pin in its hole, and the size and direction of a run-out, count
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -41,7 +40,7 @@ class Indices:
     lost: int
 
 
-def indices(sampler: Sampler, samples: int, seed: int, progress: Callable[[int], None] | None = None) -> Indices:
+def indices(sampler: Sampler, samples: int, seed: int) -> Indices:
     """Sobol' indices of every measure by about so many samples in all. Raises MechanismError where they mean nothing.
 
     Of correlated numbers there is no such share. Samples without an answer are set to the mean of the others.
@@ -55,18 +54,13 @@ def indices(sampler: Sampler, samples: int, seed: int, progress: Callable[[int],
     base = min(max(1 << (max(1, samples // (len(parts) + 2)).bit_length() - 1), LEAST), MOST)
     u = SobolStream(seed, 0, 2 * inputs.dims).points(0, base)
     one, two = u[: inputs.dims], u[inputs.dims :]
-    done = 0
 
     def analysed(points: Array) -> Array:
-        nonlocal done
         size = sampler.job.block_size
         found = np.empty((len(sampler.job.measures), points.shape[1]))
         for low in range(0, points.shape[1], size):
             with np.errstate(all="ignore"):
                 found[:, low : low + size] = sampler.figures(points[:, low : low + size])[0]
-            done += min(size, points.shape[1] - low)
-            if progress:
-                progress(done)
         return found
 
     y_one, y_two = analysed(one), analysed(two)

@@ -7,16 +7,21 @@ are kept as nodes of a fixed binary tree over the blocks.
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from time import perf_counter
 from typing import Any, Generic, Protocol, Self, TypeVar
 
+import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtri
 
-from trunnion.studies.tolerance.arithmetic import fingerprint
+from trunnion.errors import Finding
+from trunnion.results.sentences import told
 
-__all__ = ["Blocks", "Crew", "Job", "Part", "Prepared", "Tally", "part_of"]
+__all__ = ["Blocks", "Crew", "Job", "Part", "Prepared", "Tally", "fingerprint", "mixed", "part_of"]
 
 Blocks = tuple[int, int]  # blocks first, first + 1, …, last - 1
 
@@ -107,3 +112,24 @@ class Crew(Protocol[T_co]):
 
     def close(self, finished: bool) -> None:
         """Let everybody go; at once, if not everything given was finished."""
+
+
+@cache
+def fingerprint() -> str:
+    """Twelve hexadecimal digits, equal where the functions give the same bits.
+
+    Sums, products and roots are the same on every machine (IEEE 754); the code of sines and logarithms is picked by the
+    processor, and the last bit may differ. So it is not versions that are compared but what comes out.
+    """
+    x = np.arange(1, 1025) * 0.618033988749895  # exact products: the same numbers everywhere
+    u = np.arange(1, 1025) / 1025
+    tried = [np.sin(x), np.cos(x), np.tan(x), np.arcsin(u), np.arctan2(u, 1 - u), np.exp(u), np.log(x), np.log1p(u)]
+    tried += [np.hypot(x, u), np.power(x, u), np.tanh(u), np.arcsinh(x), ndtri(u)]
+    return hashlib.sha256(b"".join(values.tobytes() for values in tried)).hexdigest()[:12]
+
+
+def mixed(seen: set[str]) -> tuple[Finding, ...]:
+    """A note, if machines of more than one kind took part."""
+    if len(seen) < 2:
+        return ()
+    return (told("samples.machines", "cluster", kinds=len(seen)),)

@@ -1,7 +1,8 @@
-"""The Dataset of `tolerance`: names, units, summary and provenance."""
+"""The Dataset of `tolerance`: names, units, summary and provenance; its measures and courses in words."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -11,27 +12,25 @@ from numpy.typing import NDArray
 from trunnion.cycle.account import references
 from trunnion.errors import Finding, Status
 from trunnion.measures.figures import moment
+from trunnion.measures.measures import Measure
 from trunnion.model.parameters import dimension_kinds
 from trunnion.results.attributes import cited, figure_rows, finding_rows, origin
 from trunnion.results.dataset import Variable, dataset_of, described, driven
+from trunnion.solve.system import System
 from trunnion.studies.tolerance.first_order import Study
+from trunnion.studies.tolerance.outcome import Outcome
 from trunnion.studies.tolerance.said import findings_of, summary
 from trunnion.studies.tolerance.sampled import QUANTILES, sampled
 from trunnion.studies.tolerance.targets import MISSED
-from trunnion.studies.tolerance.words import course_text, text_of
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from trunnion.studies.tolerance.linear import Of
 
-from trunnion.studies.tolerance.outcome import Outcome
-
-__all__ = ["VARIABLES", "dataset"]
+__all__ = ["VARIABLES", "course_text", "dataset", "text_of"]
 
 Array = NDArray[np.float64]
-
-
 # units: empty: that of each measure, in the attribute `measure_units`; "parameter": that of each parameter, in
 # `parameter_units`; "ratio": measure over parameter; "course": that of each course, in `curve_units`; "course ratio":
 # course over parameter; "drive": deg, mm or s, as `drive_unit` says
@@ -259,3 +258,57 @@ def _shares(outcome: Outcome) -> dict[str, Any]:
         "first_order": one.first, "first_order_low": one.first_low, "first_order_high": one.first_high,
         "total_order": one.total, "total_order_low": one.total_low, "total_order_high": one.total_high,
     }  # fmt: skip
+
+
+def text_of(measure: Measure, system: System) -> str:
+    """What a measure is: "coordinate of point ram.Q, y at 270° of O"."""
+    kind = measure.of.long_name.replace(" a ", " ")
+    whole = measure.subject in ("mechanism", "cycle", "instant")
+    subject = f" ({measure.subject})" if whole else f" {measure.subject}"
+    axis = f", {measure.axis}" if measure.axis else ""
+    rule = {
+        "deviation": ", largest deviation from nominal", "value": "", "line": "", "ratio": "", "work": "",
+        "dead centre": "", "dead centre, least": " (least)",
+    }.get(measure.rule, f", {measure.rule.replace('-', ' ')}")  # fmt: skip
+    own = measure.of.rule == measure.rule and measure.rule != "deviation"
+    return f"{kind}{subject}{axis}{'' if own else rule}{_where(measure, system)}"
+
+
+def course_text(measure: Measure, system: System) -> str:
+    """What the course is, position by position: "slide of S", also of the stroke and of the dead centre of S."""
+    about, along = (f" {word} {measure.axis}" if measure.axis else "" for word in ("about", "along"))
+    kind = measure.coordinate(system).kind
+    return {
+        "point": f"{measure.axis} of {measure.subject}",
+        "path_error": f"distance of {measure.subject} from its nominal place",
+        "straightness": f"distance of {measure.subject} from the line through its path",
+        "angle": f"angle of {measure.subject}{about}",
+        "reaction": f"reaction in {measure.subject}{along}",
+        "efficiency": "efficiency of the instant",
+        "locking_margin": "locking margin",
+    }.get(measure.kind, f"{kind} of {measure.subject}")
+
+
+def _where(measure: Measure, system: System) -> str:
+    """The place at which, or the range over which, a measure is taken; empty if it is the whole cycle."""
+    if measure.at is not None:
+        return f" at {_named_place(measure, system, measure.at)}{_driver(measure, system)}"
+    if measure.over is not None:
+        first, last = (_named_place(measure, system, end) for end in measure.over)
+        return f" over {first} to {last}{_driver(measure, system)}"
+    return ""
+
+
+def _driver(measure: Measure, system: System) -> str:
+    first = next(iter(system.mechanism.drivers), "")
+    return f" of {first}" if first and not measure.timed else ""
+
+
+def _named_place(measure: Measure, system: System, place: float) -> str:
+    """A coordinate of the first driver, or a time, in the unit in which places are told."""
+    first = next(iter(system.mechanism.drivers), "")
+    if measure.timed or not first:
+        return f"{place:.6g} s".replace("-", "−")
+    turns = system.turns(first)
+    text = f"{math.degrees(place) if turns else 1e3 * place:.6g}".replace("-", "−")
+    return f"{text}{'°' if turns else ' mm'}"

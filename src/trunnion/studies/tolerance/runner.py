@@ -15,11 +15,9 @@ from dataclasses import dataclass
 from typing import Generic
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.studies.tolerance.arithmetic import mixed
 from trunnion.studies.tolerance.checkpoint import Checkpoint
-from trunnion.studies.tolerance.interruption import Interruption
-from trunnion.studies.tolerance.processes import Processes
-from trunnion.studies.tolerance.protocol import Blocks, Crew, Job, Part, Prepared, T, Tally, part_of
+from trunnion.studies.tolerance.processes import Interruption, Processes
+from trunnion.studies.tolerance.protocol import Blocks, Crew, Job, Part, Prepared, T, Tally, mixed, part_of
 from trunnion.studies.tolerance.ranges import Pace, Plan, count
 
 __all__ = ["Crew", "Job", "Part", "Prepared", "Run", "Tally", "run"]

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.statistics import intervals
-from trunnion.statistics.capability import two_sided
 from trunnion.statistics.histogram import Bins, quantile
 from trunnion.statistics.tally import Moments
 from trunnion.studies.tolerance.first_order import Study
@@ -144,8 +143,7 @@ def _capability(job: Sampling, study: Study, figures: Moments) -> dict[str, Any]
         nominal = study.references[measure.name].figure
         low, high = limits_of(measure, nominal)
         if np.isfinite(low) or np.isfinite(high):
-            pair = two_sided(low, high, figures.mean[i], figures.deviation[i])
-            cp[i], cpk[i] = (float(np.nan if not np.isfinite(one) else one) for one in pair)
+            cp[i], cpk[i] = intervals.capability(low, high, figures.mean[i], figures.deviation[i])
     return {"cp": cp, "cpk": cpk}
 
 

@@ -25,7 +25,7 @@ from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import prepare
 from trunnion.statistics.histogram import Bins, count
 from trunnion.statistics.streams import SobolStream, uniforms
-from trunnion.statistics.tally import Moments, Tree, moments_of
+from trunnion.statistics.tally import Tree, moments_of
 from trunnion.studies.tolerance.inputs import Inputs, inputs_of
 from trunnion.studies.tolerance.kernel import Kernel, batch_of, kernel_of, references
 from trunnion.version import __version__
@@ -55,7 +55,7 @@ class Tally:
     histogram: Counts
     band: Counts
     failed: Counts
-    trees: tuple[Tree[Moments], ...]
+    trees: tuple[Tree, ...]
     per_replicate: int
 
     @property
@@ -95,7 +95,7 @@ class Tally:
         trees = []
         for i in range(len(arrays["histogram"])):
             own = {name.partition(".")[2]: array for name, array in arrays.items() if name.startswith(f"tree{i}.")}
-            trees.append(Tree.from_arrays(own, Moments.unpacked))
+            trees.append(Tree.from_arrays(own))
         size = int(arrays["per_replicate"])
         return cls(arrays["histogram"], arrays["band"], arrays["failed"], tuple(trees), size)
 

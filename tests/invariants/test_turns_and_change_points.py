@@ -21,7 +21,7 @@ def test_a_change_point_is_an_error_not_a_silent_change_of_assembly() -> None:
     data["drivers"]["A"]["start"] = 1.0
     data["assembly"] = {"C": [1.16, 0.25]}
     errors = [row for row in findings(trunnion.analyse(build(data), 7)) if row["severity"] == "error"]
-    assert [row["figures"]["places"] for row in errors if row["code"] == "assembly.change_point"] == [["180°"]]
+    assert [row["figures"]["places"] for row in errors if row["code"] == "assembly.change_point"] == [["180°", "360°"]]
 
 
 @pytest.mark.parametrize("name", MODELS)

@@ -31,7 +31,7 @@ def compare(measurement, mechanism=None, **options):
 def said(result, *words):
     """The findings that have all these words."""
     rows = json.loads(result.attrs["findings"])
-    return [row for row in rows if all(word in " ".join(row.values()) for word in words)]
+    return [row for row in rows if all(word in " ".join(map(str, row.values())) for word in words)]
 
 
 def codes(result):

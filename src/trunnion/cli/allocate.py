@@ -110,14 +110,8 @@ def allocate(
             mechanism, measure, by.value, DEFAULT_YIELD if target is None else target, choice.value, steps, at, samples,
             seed, curve, exact=exact, jobs=jobs, progress=progress,
         )  # fmt: skip
-
-    def draw(_: Path) -> Any:
-        from trunnion.views.shown import figure_of
-
-        return figure_of(result, kind) if result.attrs["found"] else None
-
-    show = partial(_show, result)
-    shown = Shown(result, file, SECTIONS, out or [], report, units_row, draw=draw, show=show)
+    draw = partial(_draw, result, kind)
+    shown = Shown(result, file, SECTIONS, out or [], report, units_row, draw=draw, show=partial(_show, result))
     shown.write()
     findings = findings_of(result)
     if write is not None:
@@ -150,6 +144,13 @@ def _bought(mechanism: Mechanism, result: xr.Dataset) -> Mechanism:
     options = {path: t for path, t in found.items() if made[path]}
     others = {path: t for path, t in found.items() if not made[path]}
     return mechanism.with_tolerances(options).with_tolerances(others, WRITTEN)
+
+
+def _draw(result: xr.Dataset, kind: str | None, _: Path) -> Any:
+    """The figure; none where there is no allocation."""
+    from trunnion.views.shown import figure_of
+
+    return figure_of(result, kind) if result.attrs["found"] else None
 
 
 def _show(result: xr.Dataset) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from trunnion.errors import counted
 from trunnion.results.sentences.sentence import ERROR, NOTE, WARNING, Sentence
 
 __all__ = ["STUDIES"]
@@ -176,7 +177,11 @@ TOLERANCE = {
         "{count:,} of {samples:#sample} ({share:.2%}) {count:#has/have} no answer: {why}",
         "they count as outside every limit; moments are of the others",
     ),
-    "samples.stopped": Sentence(WARNING, "stopped before the end: {done:,} of {samples:#sample}", "{remedy}"),
+    "samples.stopped": Sentence(
+        WARNING,
+        lambda kept, done, samples: f"stopped before the end: {done:,} of {counted(samples, 'sample')}",
+        lambda kept, done, samples: "go on with --resume" if kept else "with --checkpoint FILE what is done is kept",
+    ),
     "samples.machines": Sentence(
         NOTE,
         "machines of {kinds} kinds took part, whose sines or logarithms differ in the last bit",

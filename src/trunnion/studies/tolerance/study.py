@@ -89,9 +89,8 @@ def tolerance(
         tally, stopped = ran.tally, ran.stopped
         notes += ran.notes
         if stopped:
-            remedy = "go on with --resume" if checkpoint is not None else "with --checkpoint FILE what is done is kept"
-            done, phrases = done_of(job, tally), {"remedy": remedy}
-            notes.append(told("samples.stopped", "samples", phrases=phrases, done=done, samples=job.samples))
+            kept, done = checkpoint is not None, done_of(job, tally)
+            notes.append(told("samples.stopped", "samples", kept=kept, done=done, samples=job.samples))
     if "sobol" in methods:
         # Not turned: each number is to have its own coordinates of the points.
         own = replace(found.sampling("quasi-monte-carlo", samples, seed), rotation=None)

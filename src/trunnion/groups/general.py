@@ -103,8 +103,7 @@ class General:
     @cached_property
     def kept_kinds(self) -> tuple[str, ...]:
         """What each of them is, "turn" or "slide"."""
-        pairs = [self.joints[self.steps[i].joint].pair for i in self.free]
-        return tuple("turn" if pair.turns else "slide" for pair in pairs)
+        return tuple("turn" if self.joints[self.steps[i].joint].pair.turns else "slide" for i in self.free)
 
     def size(self, elements: Elements) -> Number:
         """A length typical of each lane, m."""

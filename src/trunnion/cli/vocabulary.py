@@ -26,18 +26,18 @@ def show(file: Path, mechanism: Mechanism, out: Path | None) -> None:
         raise MechanismError(Finding(f"the list is JSON, '{out.name}' is not", "--out", "name a .json file"))
     with lines_of(file):
         found = vocabulary(mechanism)
-    numbers = [
-        [one.name, _number(one.value), _unit(one.unit), one.written, "set, over" if one.swept else "set"]
-        for one in found.numbers
-    ]
-    show_rows("numbers, for --set NAME=VALUE and sweep --over NAME=FROM:TO:COUNT", [*HEAD, "as written", "by"], numbers)
-    measures = [
-        [one.name, _number(one.value), _unit(one.unit), one.text, ", ".join(one.verbs)]
-        for one in sorted(found.measures, key=lambda one: not one.stated)
-    ]
-    told = "measures, for --measure NAME, those of the model first; values are of the start, figures of the cycle;"
-    told += "\nwith a statistic before it, as maximum:effort:A, sweep takes any that play does"
-    show_rows(told, [*HEAD, "what", "beside analyse, tolerance, allocate"], measures)
+    for swept, use in ((True, "numbers that --set and sweep --over take"), (False, "numbers that only --set takes")):
+        numbers = [
+            [one.name, _number(one.value), _unit(one.unit), one.written] for one in found.numbers if one.swept is swept
+        ]
+        if numbers:
+            show_rows(use, [*HEAD, "written as"], numbers)
+    for verbs in dict.fromkeys(one.verbs for one in found.measures):
+        taking = ", ".join(("analyse", "tolerance", "allocate", *verbs))
+        title = f"measures of {taking}: figures of the cycle, or values at the start"
+        own = sorted((one for one in found.measures if one.verbs == verbs), key=lambda one: not one.stated)
+        rows = [[one.name, _number(one.value), _unit(one.unit), one.text] for one in own]
+        show_rows(title, [*HEAD, "what"], rows)
     say(placed(found.findings, file, ["measures"]))
     if out is not None:
         with whole(out) as temporary:

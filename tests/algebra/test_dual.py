@@ -38,6 +38,7 @@ def close(a: Any, b: Any, tolerance: float = 1e-9) -> None:
     np.testing.assert_allclose(x, y, rtol=tolerance, atol=tolerance * max(1e-6, *map(abs, x), *map(abs, y)))
 
 
+@pytest.mark.slow
 @given(anything, anything, anything)
 def test_ring_identities(x: Any, y: Any, z: Any) -> None:
     close((x + y) + z, x + (y + z))

@@ -80,6 +80,7 @@ def test_exp_undoes_log_of_any_pose() -> None:
         np.testing.assert_allclose(part, expected, rtol=0, atol=2e-14)
 
 
+@pytest.mark.slow
 def test_half_turn() -> None:
     """Of ± û one is given, with the slide along it; about every axis, those of the frame included."""
     directions = np.concatenate([np.eye(3), -np.eye(3), U])

@@ -41,6 +41,7 @@ def result(request: Any) -> Any:
     return RESULTS[request.param](), request.param
 
 
+@pytest.mark.spread(2)
 def test_a_result_says_what_it_is(result: Any) -> None:
     data, kind = result
     read = data.trunnion
@@ -59,11 +60,13 @@ def test_a_result_of_a_version_that_names_no_kind_is_known(result: Any) -> None:
     assert kind_of(xr.Dataset(data.data_vars, data.coords, attributes)) == kind
 
 
+@pytest.mark.spread(5)
 def test_a_result_is_drawn(result: Any) -> None:
     data, _ = result
     assert data.trunnion.plot().get_axes()
 
 
+@pytest.mark.slow
 def test_a_result_is_written_and_read_again(result: Any, tmp_path: Path) -> None:
     data, kind = result
     data.trunnion.save(tmp_path / "x.nc")
@@ -73,6 +76,7 @@ def test_a_result_is_written_and_read_again(result: Any, tmp_path: Path) -> None
         assert again.trunnion.summary == data.trunnion.summary
 
 
+@pytest.mark.slow
 def test_a_report_is_written_where_there_is_one(result: Any, tmp_path: Path) -> None:
     data, kind = result
     if kind in REPORTED:
@@ -94,6 +98,7 @@ def test_the_summary_has_the_numbers_of_the_result() -> None:
     np.testing.assert_array_equal(table[f"{driver}.effort"], cycle["drive_effort"].values[0])
 
 
+@pytest.mark.slow
 def test_it_is_there_only_where_a_result_is_made() -> None:
     code = "import sys, trunnion; trunnion.read; assert 'xarray' not in sys.modules; trunnion.analyse;"
     code += "import xarray; assert xarray.Dataset.trunnion"

@@ -12,7 +12,7 @@ SEED = 2026
 CASES = 240
 
 
-@pytest.mark.spread(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("part", range(6))
 def test_damaged_files_are_findings(part: int, tmp_path: Path) -> None:
     """As in the benchmark, which runs tens of thousands; a machine that does much else may take longer."""
@@ -21,6 +21,7 @@ def test_damaged_files_are_findings(part: int, tmp_path: Path) -> None:
     assert {one.outcome for one in found} == set(GOOD)
 
 
+@pytest.mark.slow
 def test_what_is_damaged_is_sound(tmp_path: Path) -> None:
     """Else every damage would be found, and none of what comes after it."""
     from random import Random

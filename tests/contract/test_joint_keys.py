@@ -105,7 +105,7 @@ def figures(mechanism: trunnion.Mechanism) -> np.ndarray[Any, Any]:
     return np.concatenate([result[name].values.ravel() for name in names if name in result])
 
 
-@pytest.mark.spread(10)
+@pytest.mark.slow
 @pytest.mark.parametrize(("space", "kind", "key"), samples())
 def test_a_key_changes_something_or_is_told(
     space: str, kind: str, key: str, bare: dict[tuple[str, str], dict[str, Any]]
@@ -127,6 +127,7 @@ def test_a_key_changes_something_or_is_told(
     assert not accepted, f"{key} of a {kind} joint is accepted {accepted} times and changes nothing"
 
 
+@pytest.mark.spread(4)
 @pytest.mark.parametrize("kind", ["universal", "helical"])
 @pytest.mark.parametrize("play", [{"clearance": "0.1 mm"}, {"hole_radius": "15.1 mm"}, {"cylindricity": "10 um"},
                                   {"fit": "30 mm H7/f7", "radius": None}])  # fmt: skip

@@ -48,6 +48,7 @@ def test_law_states_where_it_comes_from(name: str) -> None:
             assert declared.minimum <= declared.default <= declared.maximum
 
 
+@pytest.mark.spread(2)
 @pytest.mark.parametrize("name", FRICTION_LAWS)
 @given(loads, slips)
 def test_law_is_odd_and_dissipative(name: str, normal: float, slip: float) -> None:
@@ -58,6 +59,7 @@ def test_law_is_odd_and_dissipative(name: str, normal: float, slip: float) -> No
     assert np.isfinite(force)
 
 
+@pytest.mark.spread(3)
 @pytest.mark.parametrize("name", FRICTION_LAWS)
 @given(slips)
 def test_law_is_zero_at_zero_load_and_grows_with_it(name: str, slip: float) -> None:
@@ -208,7 +210,7 @@ def shift_numbers(shift: Any) -> tuple[np.ndarray, np.ndarray]:
     return np.array([[float(n) for n in axis] for axis in shift[:3]]).T, np.array([float(n) for n in shift[3]])
 
 
-@pytest.mark.spread(3)
+@pytest.mark.spread(2)
 @pytest.mark.parametrize(("space", "kind"), PLAYS)
 @given(st.integers(0, 10**6), st.floats(1e-6, 1e-2), st.floats(0.02, 1.0))
 def test_shift_stays_within_the_clearance(space: str, kind: str, seed: int, rho: float, length: float) -> None:

@@ -72,6 +72,7 @@ def test_drivers_and_freedoms(drivers, words):
         analyse(model(FOUR_BAR, drivers=driven), 4)
 
 
+@pytest.mark.slow
 def test_a_hint_that_starts_in_a_dead_centre_decides_beside_it():
     """At 95 mm both assemblies are one; the pin goes up if the hint lies above, else down."""
     for side in (1.0, -1.0):

@@ -28,7 +28,7 @@ def test_every_example_has_a_name_and_notes(name: str) -> None:
     assert mechanism.notes.strip().endswith("."), "the gallery shows the notes: give a sentence or two"
 
 
-@pytest.mark.spread(3)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ENTRIES)
 def test_example(name: str) -> None:
     """No error but those of the entry, no position without forces but those of the entry, and the fact."""
@@ -43,6 +43,7 @@ def test_example(name: str) -> None:
     assert found == pytest.approx(expected, rel=0, abs=entry.tolerance), entry.says
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", REFUSED)
 def test_refused(name: str) -> None:
     """It is checked, its diagnosis is an error, and it is not analysed."""

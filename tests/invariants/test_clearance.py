@@ -145,6 +145,7 @@ def test_a_seat_below_the_least_load_goes_to_the_middle(load: tuple[float, ...],
         assert gap <= rho * min(1.0, 0.5 * (least / size) ** 2) * (1 + 1e-9) + 1e-15 * rho
 
 
+@pytest.mark.slow
 @given(st.sampled_from(MODELS), vectors(3), vectors(3), lengths, radii, st.randoms(use_true_random=False))
 def test_no_place_in_the_play_does_more_work(
     model: Any, force: tuple[float, ...], moment: tuple[float, ...], length: float, rho: float, random: Any

@@ -57,6 +57,7 @@ def _finely(system, lanes: int, steps: int) -> np.ndarray:
     return reached
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_continuation_never_claims_a_solution_beyond_the_fold(seed: int) -> None:
     """Lanes that fine stepping loses on the way are not reported solved at full friction."""
@@ -73,6 +74,7 @@ def test_continuation_never_claims_a_solution_beyond_the_fold(seed: int) -> None
     assert np.median(np.abs(share[both] - fine[both])) < 2e-3
 
 
+@pytest.mark.slow
 def test_many_rounds_are_counted_right() -> None:
     mechanism = build(four_bar(), friction=0.9, radius=0.25)
     method = trunnion.FrictionMethod("successive-approximation", 1e-14, 40_000)

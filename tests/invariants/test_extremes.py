@@ -54,6 +54,7 @@ def test_does_not_depend_on_where_the_positions_lie(seed: int, start: float) -> 
     assert value(found.place) == pytest.approx(best, abs=2e-7)
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("periodic", [True, False])
 def test_order(periodic: bool) -> None:
     """Value of seventh order, place of sixth, in a period and in a range."""
@@ -85,6 +86,7 @@ def test_scale_and_shift(seed: int, scale: float, shift: float) -> None:
     assert rolled.value == pytest.approx(found.value, rel=1e-13, abs=1e-13)
 
 
+@pytest.mark.slow
 @given(st.integers(0, 10_000), st.floats(0.1, 5.0))
 def test_a_jump_adds_nothing(seed: int, step: float) -> None:
     """Never above what smooth parts and the jump together have: no overshoot where a curve jumps or has a kink."""

@@ -139,7 +139,7 @@ def test_derivatives_are_those_of_the_side_of_the_kink() -> None:
 NAMES = ("offset-slider-crank", "pezzuti-cardan", "fourbar-with-play", "rssr", "geared-five-bar")
 
 
-@pytest.mark.spread(4)
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("method", ["newton", "successive-approximation"])
 def test_the_residual_is_a_result(name: str, method: str) -> None:

@@ -61,7 +61,7 @@ def _hold_together(run: Run, steps: int = 24) -> None:
             assert own == pytest.approx(number[statistic], rel=1e-12, abs=1e-12 * scale)
 
 
-@pytest.mark.spread(2)
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("name", mechanisms.MODELS)
 def test_statistics_hold_together_in_the_plane(name: str) -> None:
     _hold_together(prepare(build(mechanisms.MODELS[name]())))

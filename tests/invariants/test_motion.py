@@ -242,7 +242,7 @@ def test_power_balances_and_the_motion_is_the_prescribed_one(name: str) -> None:
     np.testing.assert_allclose(result.drive_power[0], result.drive_effort[0] * rate, rtol=1e-12, atol=1e-12)
 
 
-@pytest.mark.spread(4)
+@pytest.mark.spread(3)
 @pytest.mark.parametrize("name", ["harmonic", "cycloidal", "modified-sine", "periodic table", "late rise"])
 def test_the_work_of_the_drive_is_that_of_friction_over_a_cycle_without_loads(name: str) -> None:
     """Between two rests, or over a period, nothing else takes or gives: velocity and power belong together."""
@@ -340,6 +340,7 @@ def test_a_general_group_follows_any_law(name: str) -> None:
 TIMES = {f"drivers.A.{key}" for key in ("period", "duration", "return_duration", "dwell", "delay")}
 
 
+@pytest.mark.slow
 def test_a_fast_rise_between_long_dwells_is_followed() -> None:
     """The grid of a general group's track is as fine as the peak of the drive needs."""
     driver = {"law": "cycloidal", "range": [0.0, 6.0], "duration": 0.01, "dwell": 1.0}

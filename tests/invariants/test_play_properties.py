@@ -28,6 +28,7 @@ def played(mechanism: Mechanism, *measures: str) -> xr.Dataset:
     return trunnion.play(mechanism, list(measures) or None, STEPS)
 
 
+@pytest.mark.slow
 @settings(max_examples=12)
 @given(clearances, st.floats(0.1, 20))
 def test_linear_in_every_clearance(clearance: float, factor: float) -> None:

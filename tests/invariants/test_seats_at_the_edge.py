@@ -30,6 +30,7 @@ def test_a_passage_is_told_once_however_few_the_positions() -> None:
     assert told_of_b == ["at 35.12°, at 223.5°"]
 
 
+@pytest.mark.slow
 def test_the_end_float_is_no_end_of_the_pin() -> None:
     """Its passages are told as those along the axis; what is least is compared with the largest of the same end."""
     result = analyse(changed("rssr-with-play", {"D.pin.end_float": "0.1 mm"}), steps=36)
@@ -40,6 +41,7 @@ def test_the_end_float_is_no_end_of_the_pin() -> None:
     assert finding["figures"]["peak"] == pytest.approx(2 * axial, rel=0.01)  # each end has half of it
 
 
+@pytest.mark.slow
 def test_a_stretch_without_load_is_one_loss_of_contact() -> None:
     """The massless compressor has no pressure from 40° to 180°: nothing presses there."""
     data = read(EXAMPLES / "slider-crank.yaml").data()
@@ -57,6 +59,7 @@ def test_a_stretch_without_load_is_one_loss_of_contact() -> None:
     assert all(one["figures"]["at"] == "between 40° and 180°" for one in findings)
 
 
+@pytest.mark.slow
 def test_nothing_is_said_of_contact_where_it_is_locked() -> None:
     result = analyse(changed("fourbar-with-play", {"joint_defaults.friction.coefficient": 5}), steps=60)
     locked = result["status"].values >= 4
@@ -65,6 +68,7 @@ def test_nothing_is_said_of_contact_where_it_is_locked() -> None:
     assert not told(result, "seat.unsettled")
 
 
+@pytest.mark.slow
 def test_where_no_force_is_known_nothing_is_said_of_what_presses() -> None:
     """With pins of 10 mm the Cardan joint locks at every position."""
     model = changed("pezzuti-cardan-as-built", {"bearing": "10 mm"})
@@ -73,6 +77,7 @@ def test_where_no_force_is_known_nothing_is_said_of_what_presses() -> None:
     assert not told(result, "seat.unloaded")
 
 
+@pytest.mark.slow
 def test_a_shaft_that_fits_but_for_its_end_float() -> None:
     """It lies at one end or the other, by its thrust."""
     values: dict[str, float | str] = {"D.pin.hole_radius": "10 mm", "D.pin.end_float": "0.1 mm"}
@@ -92,6 +97,7 @@ def test_a_fit_that_cannot_be_read_is_the_only_finding() -> None:
     assert [one.where for one in raised.value.findings] == ["joint_defaults.pin.fit"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("steps", [36, 97, 360])
 def test_passages_are_found_between_wide_steps(steps: int) -> None:
     """At 4.96° the load of end 1 turns round within 0.05 of its peak; seen over a wide step it does so far from 0."""

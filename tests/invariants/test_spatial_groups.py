@@ -322,6 +322,7 @@ def test_redundant_loops_give_the_smallest_reactions() -> None:
     assert np.max(np.abs(numbers(added(added(first, second), push)))) < 1e-12
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("reversed_", [False, True])
 def test_a_link_with_a_free_spin_moves_as_it_is_said_to(reversed_: bool) -> None:
     """A point off the line of its balls has the velocity of its places: the link does not spin on the way."""

@@ -88,6 +88,7 @@ INVARIANT = ("status", "drive_effort", "friction_power", "friction_torque", "joi
 GLOBAL = ("reaction_force", "reaction_moment", "friction_moment", "link_angular_velocity", "point_acceleration")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("symbols", CHAINS)
 def test_change_of_the_global_frame(symbols: str) -> None:
     axes, data = random_rotation(np.random.default_rng(1)), drawn(symbols)
@@ -97,6 +98,7 @@ def test_change_of_the_global_frame(symbols: str) -> None:
     same(one, two, INVARIANT, GLOBAL, axes)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("symbols", CHAINS)
 def test_change_of_the_frames_of_links(symbols: str) -> None:
     rng, data = np.random.default_rng(2), drawn(symbols)
@@ -112,6 +114,7 @@ def test_change_of_the_frames_of_links(symbols: str) -> None:
     same(analyse(Mechanism(**data), STEPS), analyse(Mechanism(**other), STEPS), INVARIANT, GLOBAL)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("symbols", CHAINS)
 def test_mirror(symbols: str) -> None:
     """Seen in a mirror forces are mirrored, moments mirrored and turned round, threads have the other hand."""
@@ -132,6 +135,7 @@ def test_mirror(symbols: str) -> None:
     same(one, two, (), ("reaction_moment", "friction_moment", "link_angular_velocity"), -mirror)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("length", [1e-6, 1e6])
 @pytest.mark.parametrize("symbols", ["RSCR", "RCCC", "HCCC"])
 def test_micrometres_and_kilometres(symbols: str, length: float) -> None:
@@ -157,6 +161,7 @@ def test_micrometres_and_kilometres(symbols: str, length: float) -> None:
     same(one, two, ("status", "drive_effort", "reaction_force", "reaction_moment", "friction_power", "condition"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("symbols", ["RSCR", "RCCC", "RSHC", "RRRRRRR"])
 def test_order_of_the_links_of_a_joint(symbols: str) -> None:
     """The reaction on the other link is the opposite; the point that it acts at is where the bearing is."""
@@ -209,6 +214,7 @@ def test_a_weld_carries_weight_and_centrifugal_force() -> None:
     np.testing.assert_allclose(moment[0], [0, -0.2 * 2 * 9.81, 0], rtol=0, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_two_welds_are_one_too_many() -> None:
     with pytest.raises(MechanismError, match="6 constraints are redundant, in the joints B, C"):
         analyse(arm(("B", 0.0), ("C", 0.0)), STEPS)
@@ -255,6 +261,7 @@ def test_a_wedge() -> None:
 # ---- free spins, gaps of a track ------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_driven_turn_is_no_free_spin() -> None:
     """A crank whose ball lies on its axis spins alone, but its driver holds that: the rocker stands still."""
     data = copy.deepcopy(rssr().data)
@@ -267,6 +274,7 @@ def test_a_driven_turn_is_no_free_spin() -> None:
     np.testing.assert_allclose(result["joint_rotation_velocity"].sel(joint="D"), 0, atol=1e-10)
 
 
+@pytest.mark.slow
 def test_an_assembly_that_is_left_out_is_followed_once(monkeypatch: pytest.MonkeyPatch) -> None:
     followed: list[int] = []
     once = Follower.both_ways
@@ -304,6 +312,7 @@ def test_a_contact_without_extent_is_refused(where: str, contact: Data) -> None:
     assert [finding.where for finding in refused.value.findings] == [where]
 
 
+@pytest.mark.slow
 def test_a_driver_too_many_is_named() -> None:
     data = copy.deepcopy(rssr().data)
     data["drivers"]["D"] = {"speed": 1.0}

@@ -189,6 +189,7 @@ def test_many_positions_agree_with_few() -> None:
     assert smooth[np.r_[100:40000]].max() < 1e-4 * np.abs(effort).max()
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("method", [None, FrictionMethod("successive-approximation", 1e-9)])
 @pytest.mark.parametrize("name", ["slider-crank", "Stephenson six-bar", "inverted slider-crank"])
 def test_chunks_are_invisible(name: str, method: FrictionMethod | None, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -278,6 +279,7 @@ def test_two_drivers_of_different_speed_make_one_cycle() -> None:
     np.testing.assert_allclose(right, 4.0, rtol=1e-12)  # named second to the ground: −(−4)
 
 
+@pytest.mark.slow
 def test_many_turns_in_one_range() -> None:
     """A linkage that assembles over a turn assembles over 365, at the positions it has in one."""
     one, many = MODELS["class III"](), MODELS["class III"]()

@@ -296,6 +296,7 @@ def test_rank_far_from_the_origin(shift: float) -> None:
     assert mobility_by_rank(["ground", "crank", "coupler", "rocker"], "ground", joints, places) == 1
 
 
+@pytest.mark.spread(3)
 @pytest.mark.parametrize("name", MODELS)
 def test_check(name: str) -> None:
     """Both mobilities agree on ordinary linkages, and nothing is wrong with them."""
@@ -306,6 +307,7 @@ def test_check(name: str) -> None:
     assert len(found.assemblies) == len(found.plan.modules)
 
 
+@pytest.mark.slow
 def test_a_special_dyad_is_named() -> None:
     """Two parallel slides determine nothing across: PRP with parallel axes is singular everywhere, not an answer."""
     data = MODELS["tangent drive"]()
@@ -357,6 +359,7 @@ def row(count: int) -> Data:
     return data
 
 
+@pytest.mark.slow
 def test_a_thousand_links() -> None:
     """Long rows come apart into their modules, whatever their rank taken at once drowns in, and are analysed."""
     plan = decompose(Mechanism(**ladder(500)))
@@ -385,6 +388,7 @@ def test_fault_in_a_long_row() -> None:
     assert len(text) < 500
 
 
+@pytest.mark.slow
 def test_time_grows_with_the_links() -> None:
     """Four times the links take about four times as long, and not sixteen."""
 

@@ -51,6 +51,7 @@ def expected(result: xr.Dataset) -> dict[str, Any]:
     }
 
 
+@pytest.mark.spread(2)
 @pytest.mark.parametrize(
     ("model", "name", "text"),
     [
@@ -133,6 +134,7 @@ TOGETHER: dict[str, Values] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", TOGETHER)
 def test_points_solved_together_equal_points_solved_alone(model: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Statuses exactly, figures but for the rounding of the friction iteration."""
@@ -150,6 +152,7 @@ def test_points_solved_together_equal_points_solved_alone(model: str, monkeypatc
         np.testing.assert_allclose(both[name].values, values.values, rtol=1e-9, atol=power, err_msg=str(name))
 
 
+@pytest.mark.slow
 def test_errors_of_followed_groups_are_those_of_analyse() -> None:
     """Whatever point comes first: what spherical joints are turned by an error is told from each point's own start."""
     mechanism = read("rssr").with_values({"joints.D.misalignment.tilt": 0.00125})
@@ -181,6 +184,7 @@ def test_errors_of_points_solved_together() -> None:
     np.testing.assert_allclose(float(swept["transmission_error_max"].sel(joint="S")[1, 1]), error, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_point_with_another_assembly_is_looked_at_by_itself() -> None:
     """The hint lies still, the joint moves past it: nearest is the other assembly then, as it is for `analyse`."""
     data = read("durango-fourbar").data()
@@ -228,6 +232,7 @@ def test_efficiency_falls_with_misalignment() -> None:
     assert np.allclose(ratio, swept["efficiency"], rtol=1e-14)
 
 
+@pytest.mark.slow
 def test_efficiency_falls_with_misalignment_by_their_own_friction(tmp_path: Path) -> None:
     """From no misalignment on; and beyond 21° the joint locks, which is told and no number."""
     text = CARDAN.read_text("utf-8")
@@ -350,6 +355,7 @@ def test_what_is_wrong_at_a_point_says_at_which() -> None:
 # ---- files ----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.spread(2)
 @pytest.mark.parametrize("suffix", [".nc", ".zarr", ".json"])
 def test_a_grid_is_kept_whole(suffix: str, tmp_path: Path) -> None:
     grid = trunnion.sweep(read("durango-fourbar"), {"AB": ["2.1 m", "2.6 m"], "C.friction.coefficient": [0.1, 0.2]}, 36)
@@ -368,6 +374,7 @@ def test_a_grid_is_kept_whole(suffix: str, tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == [f"grid{suffix}"]
 
 
+@pytest.mark.slow
 def test_a_mechanism_with_errors_stands_beside_the_ideal_one() -> None:
     """Table II's errors and loaded seats: each point as `analyse` has it, the ideal joint more efficient throughout."""
     mechanism = trunnion.read(CARDAN.with_name("pezzuti-cardan-as-built.yaml"))
@@ -391,6 +398,7 @@ def test_the_transmission_error_of_a_slide_is_a_length() -> None:
     assert found["S.transmission_error_max"][1][1] > found["S.transmission_error_max"][1][0] > 1e-5
 
 
+@pytest.mark.slow
 def test_points_without_errors_stand_beside_those_with() -> None:
     mechanism = trunnion.read(CARDAN).with_values({"joint_defaults.seat": "loaded"})
     swept = trunnion.sweep(mechanism, {"joint_defaults.pin.clearance": ["0 mm", "0.01 mm"]}, STEPS)

@@ -21,6 +21,7 @@ def model(name: str, measures: dict[str, object]) -> Mechanism:
     return Mechanism(**{**data, "measures": {**data.get("measures", {}), **measures}})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("space", ["planar", "spatial"])
 def test_each_point_is_an_analysis_of_its_own(space: str) -> None:
     """Extremes, a place, a root mean square, a stroke, the efficiency: of each point what an analysis of it has."""
@@ -55,6 +56,7 @@ def test_each_point_is_an_analysis_of_its_own(space: str) -> None:
     assert "not in this sweep" not in result.attrs["findings"]
 
 
+@pytest.mark.slow
 def test_a_pin_that_lies_in_its_seat() -> None:
     mechanism = model("toleranced-slider-crank", {"top": {"effort": "O", "as": "mean"}}).with_seats("loaded")
     result = trunnion.sweep(mechanism, {"crank": ["49 mm", "50 mm"]} if "crank" in mechanism.dimensions else
@@ -90,6 +92,7 @@ def test_measures_that_are_left_out_are_named() -> None:
     assert "swing" in str(row)
 
 
+@pytest.mark.slow
 def test_on_the_command_line(program: Run, tmp_path: Path) -> None:  # noqa: F811
     path = tmp_path / "model.yaml"
     model("durango-fourbar", {"swing": {"stroke": "D"}}).write(path)

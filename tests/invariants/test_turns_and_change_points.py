@@ -24,6 +24,7 @@ def test_a_change_point_is_an_error_not_a_silent_change_of_assembly() -> None:
     assert [row["figures"]["places"] for row in errors if row["code"] == "assembly.change_point"] == [["180°", "360°"]]
 
 
+@pytest.mark.spread(5)
 @pytest.mark.parametrize("name", MODELS)
 def test_an_ordinary_linkage_has_no_change_point(name: str) -> None:
     result = trunnion.analyse(build(MODELS[name]()), 12)

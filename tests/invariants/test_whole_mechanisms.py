@@ -33,6 +33,7 @@ def unchanged(name: str) -> Any:
     return trunnion.analyse(Mechanism(**model(MODELS[name]())), STEPS)
 
 
+@pytest.mark.spread(10)
 @pytest.mark.parametrize("friction", [None, 0.2])
 @pytest.mark.parametrize("name", MODELS)
 def test_power_balance(name: str, friction: float | None) -> None:
@@ -85,6 +86,7 @@ def test_joints_stay_closed(name: str) -> None:
             np.testing.assert_allclose(one.c * two.c + one.s * two.s, 1, atol=1e-13)
 
 
+@pytest.mark.spread(4)
 @pytest.mark.parametrize("shift", [(0.0, 0.0), (30.0, -20.0), (1e4, -2e4)])
 @pytest.mark.parametrize("name", MODELS)
 def test_change_of_frame(name: str, shift: tuple[float, float]) -> None:
@@ -104,6 +106,7 @@ def test_change_of_frame(name: str, shift: tuple[float, float]) -> None:
         same(other[variable], plain[variable], variable, tolerance)
 
 
+@pytest.mark.spread(5)
 @pytest.mark.parametrize("name", MODELS)
 def test_mirror(name: str) -> None:
     """Mirrored in x: y components, angles and moments change sign, powers do not."""
@@ -157,6 +160,7 @@ def scaled(data: Data, length: float, mass: float, time: float) -> Data:
     return data
 
 
+@pytest.mark.spread(6)
 @pytest.mark.parametrize(("length", "mass", "time"), [(1e-6, 1e-12, 1e-3), (1e6, 1e9, 1e2), (3.0, 1.0, 1.0)])
 @pytest.mark.parametrize("name", MODELS)
 def test_scale(name: str, length: float, mass: float, time: float) -> None:
@@ -184,6 +188,7 @@ def test_scale(name: str, length: float, mass: float, time: float) -> None:
     np.testing.assert_allclose(other["efficiency"], plain["efficiency"], atol=1e-9)
 
 
+@pytest.mark.spread(6)
 @pytest.mark.parametrize("name", MODELS)
 def test_order_of_links_in_pins(name: str) -> None:
     """A pin listed the other way round: the same machine, what is stated of the pin with the other sign.
@@ -205,6 +210,7 @@ def test_order_of_links_in_pins(name: str) -> None:
         same(turned[variable], plain[variable].values * sign.reshape(-1, *[1] * (plain[variable].ndim - 1)), variable)
 
 
+@pytest.mark.spread(15)
 @pytest.mark.parametrize("name", MODELS)
 def test_order_of_links_in_ideal_joints(name: str) -> None:
     """Without friction every joint may be turned round, guides too; their moments refer to the other point."""
@@ -228,6 +234,7 @@ def test_order_of_links_in_ideal_joints(name: str) -> None:
         same(turned["reaction_moment"].sel(joint=joint), -moment, "reaction_moment")
 
 
+@pytest.mark.spread(6)
 @pytest.mark.parametrize("name", MODELS)
 def test_order_of_the_file_does_not_matter(name: str) -> None:
     data = model(MODELS[name]())
@@ -286,6 +293,7 @@ def test_samples_are_independent(name: str) -> None:
                 np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9 * max(1, np.abs(expected).max()))
 
 
+@pytest.mark.spread(2)
 @pytest.mark.parametrize("law", FRICTION_LAWS)
 @pytest.mark.parametrize("name", ["four-bar", "slider-crank", "class III"])
 def test_every_law_in_a_mechanism(name: str, law: str) -> None:

@@ -122,6 +122,7 @@ def test_csv_with_positions_without_an_answer(gap: Any, tmp_path: Path) -> None:
     assert not all(missing)
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("suffix", [".nc", ".zarr"])
 def test_reopened_is_the_same_dataset(result: Any, gap: Any, tmp_path: Path, suffix: str) -> None:
     if suffix == ".zarr" and not _installed("zarr"):

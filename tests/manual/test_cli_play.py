@@ -31,6 +31,7 @@ def run(program: Run) -> Run:
     return call
 
 
+@pytest.mark.slow
 def test_tables_and_files(run: Run, tmp_path: Path) -> None:
     files = [f"p{end}" for end in (".csv", ".json", ".nc", ".svg", ".png")]
     code, out, _ = run(SLIDER, "--steps", 36, "--units-row", *(f"--out={name}" for name in files))

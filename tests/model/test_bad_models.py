@@ -142,6 +142,7 @@ CASES = [
 ]  # fmt: skip
 
 
+@pytest.mark.spread(89)
 @pytest.mark.parametrize(("old", "new", "line", "where", "what", "remedy"), CASES)
 def test_one_mistake_is_found_where_it_is(
     findings_of: FindingsOf, old: str, new: str, line: int, where: str, what: str, remedy: str

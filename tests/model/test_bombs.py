@@ -31,6 +31,7 @@ BOMBS = {
 }
 
 
+@pytest.mark.spread(29)
 @pytest.mark.parametrize("bomb", BOMBS)
 @pytest.mark.parametrize("reader", [read, Rig.read, read_mapping])
 def test_what_never_ends_is_a_finding(bomb: str, reader: object, tmp_path: Path) -> None:

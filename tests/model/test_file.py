@@ -25,6 +25,7 @@ from trunnion.model.rewrite import rewrite_mechanism
 FindingsOf = Callable[..., tuple[Finding, ...]]
 
 
+@pytest.mark.spread(32)
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
 @pytest.mark.parametrize("extension", ["yaml", "json"])
 def test_examples_are_read_and_written_without_loss(example: Path, extension: str, tmp_path: Path) -> None:
@@ -217,6 +218,7 @@ VALUES = st.one_of(
 )
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=50)
 @given(VALUES, st.sampled_from(["yaml", "json"]))
 def test_any_value_is_read_back_as_written(tmp_path_factory: pytest.TempPathFactory, value: object, kind: str) -> None:
@@ -234,6 +236,7 @@ JUNK = [*":{}[],-'\"#|0C \n\t\x00é±~%@", "", "&a ", "*a ", "!!x ", "1e999", ".
 JUNK += ["null", "9" * 20]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
 def test_no_mutation_of_an_example_gives_anything_but_findings(example: Path, tmp_path: Path) -> None:
     draw = random.Random(20)
@@ -279,6 +282,7 @@ def _holders(data: object) -> list[tuple[dict[object, object] | list[object], ob
     return [place for key, value in items for place in [(data, key), *_holders(value)]]  # type: ignore[list-item]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
 def test_no_odd_value_anywhere_gives_anything_but_findings(example: Path) -> None:
     draw = random.Random(21)

@@ -231,6 +231,7 @@ def test_a_mechanism_cannot_be_changed() -> None:
         DURANGO.name = "other"  # type: ignore[misc]
 
 
+@pytest.mark.slow
 def test_importing_the_mechanism_leaves_the_units_alone() -> None:
     code = "import sys, trunnion.model.mechanism; print('pint' in sys.modules, 'ruamel' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -263,6 +263,7 @@ def test_the_evaluator_agrees_with_python(tree: object, first: float, second: fl
     assert quantity.evaluate(names) == pytest.approx(_python(tree, names), rel=1e-12, abs=1e-9)
 
 
+@pytest.mark.slow
 @given(st.text(max_size=60) | st.text("0123456789.eE+-*/^() mkgNrads°µ±%AB,", max_size=60))
 def test_no_text_does_anything_but_fail_cleanly(text: str) -> None:
     with suppress(UnitError):

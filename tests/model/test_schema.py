@@ -25,7 +25,7 @@ def test_the_schema_knows_the_tables() -> None:
     assert all(f'"{pair}"' in text for pair in PAIRS)
 
 
-@pytest.mark.spread(16)
+@pytest.mark.spread(15)
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
 def test_the_examples_satisfy_the_schema(example) -> None:  # type: ignore[no-untyped-def]
     jsonschema = pytest.importorskip("jsonschema")

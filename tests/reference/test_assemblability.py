@@ -298,7 +298,7 @@ class Loop:
         return float(np.max(np.abs(rows(found.x))))
 
 
-@pytest.mark.spread(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("joint", ["B", "D"])
 def test_four_bar_against_an_independent_closure(joint: str) -> None:
     errors = {joint: {**LEAN, "towards": 0.5}}
@@ -363,6 +363,7 @@ def test_a_joint_without_play_has_no_offset() -> None:
     np.testing.assert_allclose(wide.stated_part.sum(["joint", "end"]), 1, rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_no_play_is_stated() -> None:
     found = solved(four_bar({"B": LEAN}), 36)
     assert (found.status == Fit.RIGID).all()
@@ -456,7 +457,7 @@ def test_bennett_with_a_twist_that_is_off() -> None:
     assert any(row["code"] == "assembly.misfit" for row in json.loads(direct.attrs["findings"]))
 
 
-@pytest.mark.spread(3)
+@pytest.mark.spread(2)
 @pytest.mark.parametrize("name", ["bennett", "sarrus", "fourbar-in-space", "spherical-four-bar"])
 def test_axes_that_fit_need_nothing(name: str) -> None:
     found = solved(trunnion.read(f"examples/{name}.yaml"), 12)

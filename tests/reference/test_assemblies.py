@@ -255,6 +255,7 @@ def test_a_group_is_found_again_on_both_ranges_of_the_crank(islands: Any) -> Non
     assert len(unequal) <= 4
 
 
+@pytest.mark.slow
 def test_both_ranges_are_closed_and_of_one_sense(islands: Any) -> None:
     solved = np.isfinite(islands.closure_residual.values)
     assert float(islands.closure_residual.max()) < 1e-12

@@ -84,7 +84,7 @@ def test_a_guide_beside_its_kink() -> None:
     assert np.array_equal(status, statuses)
 
 
-@pytest.mark.spread(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "example",
     ["durango-fourbar", "slider-crank", "whitworth-quick-return", "scotch-yoke", "geared-five-bar", "universal-joint"],
@@ -209,6 +209,7 @@ def test_what_only_numpy_does_is_said() -> None:
         compiled.CompiledKernel(run, {})
 
 
+@pytest.mark.slow
 def test_jax_is_imported_only_where_asked_for() -> None:
     code = "import sys, trunnion, trunnion.studies.tolerance.compiled; sys.exit('jax' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False, cwd=Path(__file__).parent).returncode == 0

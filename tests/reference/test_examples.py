@@ -98,6 +98,7 @@ def test_five_bar_right_motor() -> None:
     assert share(one, "E") == pytest.approx(share_by_hand("E"), abs=1e-9)
 
 
+@pytest.mark.slow
 def test_double_butterfly_pins_and_torque() -> None:
     mechanism = example("double-butterfly").with_friction("off")
     result = trunnion.analyse(mechanism, 24)

@@ -75,7 +75,7 @@ def leaned(across: Array, place: Array) -> Frame:
     return Frame(np.array([*place, 0.0]), turn)
 
 
-@pytest.mark.spread(2)
+@pytest.mark.spread(1)
 @pytest.mark.parametrize(
     "degrees", [(0.0, 0.0), (0.0, 40.0), (180.0, 0.0), (180.0, -70.0), (95.0, 150.0), (-60.0, 10.0)]
 )

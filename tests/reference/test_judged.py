@@ -21,7 +21,7 @@ DRAWN = {"planar": planar.drawn, "spatial": spatial.drawn}
 JUDGED = {"planar": judged_planar.judge, "spatial": judged_spatial.judge}
 
 
-@pytest.mark.spread(2)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("space", "seeds"),
     [
@@ -42,6 +42,7 @@ def test_random_mechanisms(space: str, seeds: Any) -> None:
     assert sum(one.statuses[0] for one in found) > 0.6 * STEPS * len(found)
 
 
+@pytest.mark.spread(2)
 @pytest.mark.parametrize(("space", "seed"), [("planar", 3), ("planar", 8097), ("planar", 8260), ("spatial", 0)])
 def test_the_quick_way_has_the_same_numbers(space: str, seed: int) -> None:
     """What leaves out the locking margin publishes what `analyse` does, bit by bit."""
@@ -68,7 +69,7 @@ def altered(result: Results, name: str, factor: float) -> Results:
     return Results.of(arrays, result.dims, labels, result.time)
 
 
-@pytest.mark.spread(6)
+@pytest.mark.spread(4)
 @pytest.mark.parametrize("space", DRAWN)
 @pytest.mark.parametrize(
     ("name", "check"),

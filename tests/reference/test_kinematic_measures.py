@@ -132,6 +132,7 @@ def test_transmission_angle_by_the_law_of_cosines(side: float) -> None:
     assert raised.value.findings[0].where == "joints.A"
 
 
+@pytest.mark.slow
 def test_powers_and_energy_of_friction() -> None:
     """Power of driver and loads, power and energy lost, against the books of `analyse`."""
     mechanism = trunnion.read(EXAMPLES / "toleranced-slider-crank.yaml")
@@ -159,6 +160,7 @@ def slope(run: Run, name: str, time: Any, step: float = 1e-5) -> Any:
     return (course(run, name, time + step) - course(run, name, time - step)) / (2 * step)
 
 
+@pytest.mark.slow
 def test_speeds_in_space_by_differences(spatial: Run) -> None:
     mechanism, time = spatial.system.mechanism, np.linspace(0.01, 0.15, 7)
     points = [f"{link}.{point}" for link, names in mechanism.points.items() for point in names]
@@ -250,6 +252,7 @@ def test_play_of_a_speed() -> None:
                 np.testing.assert_allclose(found, expected, rtol=1e-5, atol=1e-5)
 
 
+@pytest.mark.spread(2)
 @pytest.mark.parametrize("example", ["toleranced-slider-crank", "toleranced-rssr", "fourbar-with-play", "sarrus"])
 def test_everything_that_is_listed_can_be_asked_for(example: str) -> None:
     """Names mean the numbers they stand for; measures can be named, and have the units and values that are told."""

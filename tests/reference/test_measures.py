@@ -480,6 +480,7 @@ def every_measure() -> list[Measure]:
     return [*made, *(Measure(f"{kind} at", kind, *SUBJECTS[kind], at=1.0) for kind in MEASURES)]
 
 
+@pytest.mark.slow
 def test_every_kind_with_every_statistic(crank: Run) -> None:
     """A figure, a picture and a unit for each; of samples and of dual numbers the same."""
     measures = every_measure()

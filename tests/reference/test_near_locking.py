@@ -142,6 +142,7 @@ def test_coefficient_only_where_the_law_is_proportional_to_it() -> None:
     assert ends == [{"multiple"}, {"coefficient"}]
 
 
+@pytest.mark.slow
 def test_successive_approximation_has_the_same_margin() -> None:
     data, options = CASES["slider-crank"]
     plain = analyse(data(), 24, **{**options, "friction": 0.2})

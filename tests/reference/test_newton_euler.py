@@ -131,7 +131,7 @@ def tooth_contact(run: Run, back: Any, name: str, i: int) -> newton_euler.Joint:
     return newton_euler.Joint("contact", first, second, point, tangent, found)
 
 
-@pytest.mark.spread(15)
+@pytest.mark.spread(12)
 @pytest.mark.parametrize("friction", [None, 0.15])
 @pytest.mark.parametrize("name", [name for name in MODELS if name != "rocker train"])  # a train has no contact
 def test_reactions_and_efforts(name: str, friction: float | None) -> None:

@@ -123,7 +123,7 @@ RATES = ("", "_velocity", "_acceleration")
 POINT = ("position", "velocity", "acceleration")
 
 
-@pytest.mark.spread(2)
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("name", FAST)
 def test_motion(name: str) -> None:
     """Places to 1e-12, rates to 1e-10: a link's free spin is zero, so its rates are compared too."""
@@ -150,6 +150,7 @@ def test_motion(name: str) -> None:
                 assert slide == pytest.approx(slip.slide, abs=1e-10 * max(1.0, abs(slip.turn)))
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("name", FAST)
 def test_forces_without_friction(name: str) -> None:
     compared = comparison(name, False)
@@ -172,7 +173,7 @@ def test_forces_with_given_friction(name: str) -> None:
     assert rubs > 0
 
 
-@pytest.mark.spread(4)
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("name", NAMES)
 def test_forces_with_friction_by_its_law(name: str) -> None:
     """The oracle finds friction by its own formulas and its own Newton."""
@@ -186,7 +187,7 @@ def test_forces_with_friction_by_its_law(name: str) -> None:
             np.testing.assert_allclose(given, friction[joint], rtol=0, atol=1e-8 * scale, err_msg=joint)
 
 
-@pytest.mark.spread(6)
+@pytest.mark.spread(2)
 @pytest.mark.parametrize("name", FAST)
 def test_rates_are_differences_of_poses(name: str) -> None:
     """Eighth-order central differences of the result's own points, and of the matrices of the links.

@@ -61,7 +61,7 @@ def raised(data: Data) -> Data:
     }
 
 
-@pytest.mark.spread(3)
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("friction", [None, 0.12])
 @pytest.mark.parametrize("name", NAMES)
 def test_planar_mechanism_in_space(name: str, friction: float | None) -> None:

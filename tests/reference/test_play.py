@@ -111,7 +111,7 @@ def _agree(run: Run, names: list[str], time: np.ndarray) -> None:
     assert seen > 0
 
 
-@pytest.mark.spread(12)
+@pytest.mark.spread(7)
 @pytest.mark.parametrize("name", mechanisms.MODELS)
 def test_virtual_load_equals_derivatives_in_the_plane(name: str) -> None:
     """Dyads, general groups, gear pairs, drivers: the same to rounding for every measure."""
@@ -119,7 +119,7 @@ def test_virtual_load_equals_derivatives_in_the_plane(name: str) -> None:
     _agree(run, measures_of(run), run.cycle.times(5) + 1e-3)
 
 
-@pytest.mark.spread(3)
+@pytest.mark.spread(2)
 @pytest.mark.parametrize("name", [name for name in mechanisms_space.MODELS if name != "platform on six legs"])
 def test_virtual_load_equals_derivatives_in_space(name: str) -> None:
     """All pairs; every seventh measure, to save time."""
@@ -155,7 +155,7 @@ BRUTE = {
 }
 
 
-@pytest.mark.spread(4)
+@pytest.mark.spread(2)
 @pytest.mark.parametrize("name", BRUTE)
 def test_worst_case_is_reached_and_not_passed_but_by_second_order(name: str) -> None:
     """Pins pressed by Qᵢ change y by Σ ρ|Qᵢ|, anywhere else by less; what is missing falls with the square of ρ."""

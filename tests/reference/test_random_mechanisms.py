@@ -200,7 +200,7 @@ def test_random_mechanism(seed: int) -> None:
         np.testing.assert_allclose(a, b, rtol=0, atol=1e-8 * (1 + np.abs(b).max(initial=0.0)), err_msg=variable)
 
 
-@pytest.mark.spread(4)
+@pytest.mark.spread(2)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_random_mechanism_against_newton_euler(seed: int) -> None:
     data, _ = grown(seed)

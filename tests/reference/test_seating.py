@@ -397,6 +397,7 @@ def test_rssr_with_play_in_all_joints(friction: float) -> None:
             np.testing.assert_allclose(written, force, rtol=0, atol=5e-3 * size)
 
 
+@pytest.mark.slow
 def test_cardan_with_play_in_all_joints() -> None:
     """Table II of Pezzuti et al. with 0.01 mm all over, friction 0.42, pins that slide along: to 1e-6 and 1e-7."""
     start, rho, steps = 0.3, 1e-5, 72

@@ -53,7 +53,7 @@ def moved(drawn: Drawn, oracle: Oracle, time: float, start: float) -> dict[str, 
     return motions
 
 
-@pytest.mark.spread(3)
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("name", ALL)
 def test_rates_are_differences_of_places(name: str) -> None:
     """Eighth-order differences of the mass centres: 1e-8 of the largest velocity and acceleration.
@@ -75,7 +75,7 @@ def test_rates_are_differences_of_places(name: str) -> None:
         np.testing.assert_allclose(SECOND @ places / h**2, acceleration, rtol=0, atol=1e-6 * size * speed)
 
 
-@pytest.mark.spread(8)
+@pytest.mark.spread(7)
 @pytest.mark.parametrize("friction", [False, True])
 @pytest.mark.parametrize("name", ALL)
 def test_power_balances(name: str, friction: bool) -> None:
@@ -92,7 +92,7 @@ def test_power_balances(name: str, friction: bool) -> None:
         assert all(abs(moment) < 1e-12 * scale for moment in found.spin.values()), "nothing has to hold a free spin"
 
 
-@pytest.mark.spread(6)
+@pytest.mark.spread(5)
 @pytest.mark.skipif(sys.platform == "darwin" and platform.machine() == "x86_64", reason="MuJoCo is not built there")
 @pytest.mark.parametrize("name", [n for n in ALL if n not in ("RSSH", "HUSR", "RECR", "RSFRC", "platform on six legs")])
 def test_mujoco_has_the_same_forces(name: str) -> None:

@@ -173,7 +173,7 @@ def test_ideal_cardan(delta: float, general: bool) -> None:
         np.testing.assert_allclose(value(result, "joint_slide", joint), 0, rtol=0, atol=1e-14)
 
 
-@pytest.mark.spread(2)
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("general", [False, True])
 @pytest.mark.parametrize("twist", [0.01, 0.1, 0.2, 0.4, 0.5])
 @pytest.mark.parametrize("offset", [0.05e-3, 0.5e-3])

@@ -29,6 +29,7 @@ def test_band_of_a_transmission_error_is_about_nominal(statistic: str) -> None:
     assert found.band.sel(quantile=0.75).values == pytest.approx(quarter, rel=0.2)
 
 
+@pytest.mark.spread(6)
 @pytest.mark.parametrize(
     "measure",
     [{**PATH, "as": one} for one in ("mean", "rms", "minimum", "peak-to-peak", "place-of-maximum")]

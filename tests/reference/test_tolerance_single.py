@@ -114,7 +114,7 @@ def test_batches_against_mechanisms_of_their_own(name: str) -> None:
 SMOOTH = ("mean", "rms", "maximum", "minimum", "efficiency", "peak-to-peak", "stroke", "straightness")
 
 
-@pytest.mark.spread(5)
+@pytest.mark.spread(4)
 @pytest.mark.parametrize(
     "name", ["four-bar", "class III", "geared five-bar", "Cardan", "lamp", "RCCC", "lugre friction"]
 )

@@ -92,6 +92,7 @@ def test_same_bits_on_a_local_cluster(known: Any) -> None:
     assert bits(run(one, jobs=2, chunk=700, cluster="local").tally) == expected
 
 
+@pytest.mark.slow
 def test_blocks_in_any_order(known: Any) -> None:
     for method in METHODS:
         one, expected = known[method]
@@ -103,6 +104,7 @@ def test_blocks_in_any_order(known: Any) -> None:
         assert bits(tally) == expected
 
 
+@pytest.mark.slow
 def test_stopped_and_resumed(tmp_path: Path) -> None:
     """Ctrl-C after some blocks, the rest by two workers: the same Dataset as in one go, to the last bit."""
     path = tmp_path / "run.npz"

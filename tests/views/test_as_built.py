@@ -59,6 +59,7 @@ def test_without_errors_the_reason_is_told(plain, name, why):
     assert name not in drawable(plain)
 
 
+@pytest.mark.slow
 def test_balls_have_no_angles(balls):
     with pytest.raises(MechanismError, match="only balls have seats"):
         PLOTS["beta"](balls, None)
@@ -152,6 +153,7 @@ def _drawn(figure):
     return {axes.get_title(loc="left"): axes for axes in figure.axes if axes.get_title(loc="left")}
 
 
+@pytest.mark.slow
 def test_the_magnification_that_is_written_is_that_on_paper(slider, cardan):
     for result in (slider, cardan):
         figure = PLOTS["seat"](result, None)

@@ -41,7 +41,7 @@ if NODE:  # not a skip: what must hold everywhere is tested in Python; this is t
     def test_arithmetic():
         run("format.test.mjs")
 
-    @pytest.mark.spread(5)
+    @pytest.mark.spread(3)
     def test_every_kind_of_result_makes_a_page(case, tmp_path):
         _, result = case
         shown = page(result, tmp_path, result)
@@ -75,6 +75,7 @@ if NODE:  # not a skip: what must hold everywhere is tested in Python; this is t
         assert np.hypot(*np.subtract(*ends)) > 2 * 26
         assert page(analyse(slider_crank(), 24), tmp_path)["slits"] == []
 
+    @pytest.mark.slow
     def test_labels_of_loads_stay_in_the_picture(tmp_path):
         """A force at the right edge of a picture that is printed 490 px wide."""
         result = analysed(read(EXAMPLES / "elliptic-trammel.yaml"), 24)

@@ -76,6 +76,7 @@ def test_a_link_in_space_is_moved_turned_and_stretched_to_its_errors(cardan):
         assert left == pytest.approx(np.repeat(bys[:, None], 72, axis=1), abs=2e-9)
 
 
+@pytest.mark.slow
 def test_what_is_offered_shows_the_errors(slider, cardan):
     for result in (slider, cardan):
         preset = scene(result)["built"]["preset"]

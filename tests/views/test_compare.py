@@ -74,6 +74,7 @@ def case(name):
 NAMES = ("family", "one curve", "nothing varied", "many", "one turn", "one position", "motion only", "wrong", "locked")
 
 
+@pytest.mark.spread(4)
 @pytest.mark.parametrize("name", NAMES)
 def test_every_figure_is_drawn_with_all_texts_in_it(name):
     assert outside(figure(case(name))) == []
@@ -207,7 +208,7 @@ def page_of(name):
     return report(case(name))
 
 
-@pytest.mark.spread(2)
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("name", ["wrong", "one turn", "one position", "motion only"])
 def test_every_result_makes_a_page_that_fetches_and_runs_nothing(name):
     text = page_of(name)
@@ -237,6 +238,7 @@ def test_files_at_hand_are_hashed(tmp_path, monkeypatch):
     assert found == [{"file": "run-1.csv", "bytes": 4, "sha256": digest}]
 
 
+@pytest.mark.slow
 def test_many_conditions_are_limited_and_said():
     found = measured(settings=settings(np.linspace(2, 6, 10), (3.0, 4.0)), channels=POWERS, positions=12)
     page = Page(report(trunnion.compare(rocker(), found, ["out"])))

@@ -153,7 +153,7 @@ def test_the_page_is_told_where():
     assert scene(analyse(press(), 36))["ease"] == [1.0]
 
 
-@pytest.mark.spread(2)
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("verb", ["plot", "report", "analyse", "sweep", "play"])
 def test_every_verb_that_draws_can_show_all(verb, tmp_path):
     """The page is told that no position may be cut; the others take the switch."""

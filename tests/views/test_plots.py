@@ -19,7 +19,7 @@ PLAIN = [name for name in PLOTS if name not in READY]  # of results without erro
 SIGNATURES = {".png": b"\x89PNG", ".pdf": b"%PDF", ".svg": b"<?xml"}
 
 
-@pytest.mark.spread(7)
+@pytest.mark.spread(3)
 @pytest.mark.parametrize("name", PLAIN)
 def test_every_figure_of_every_result(name, case, tmp_path):
     kind, result = case
@@ -140,6 +140,7 @@ def test_the_same_figure_gives_the_same_file(plain, tmp_path):
     assert first == second
 
 
+@pytest.mark.spread(2)
 @pytest.mark.parametrize("suffix", SIGNATURES)
 def test_formats(suffix, plain, tmp_path):
     path = save(PLOTS["polar"](plain, None), tmp_path / f"polar{suffix}")
@@ -177,7 +178,7 @@ def test_hull_leaves_inner_points_out():
     assert {tuple(corner) for corner in corners} == {(0, 0), (4, 0), (0, 4)}
 
 
-@pytest.mark.spread(9)
+@pytest.mark.spread(2)
 @pytest.mark.parametrize("name", PLAIN)
 def test_svg_is_well_formed_and_fetches_nothing(name, case, tmp_path):
     kind, result = case

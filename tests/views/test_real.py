@@ -70,7 +70,7 @@ def test_a_slider_has_its_guide_along_the_frame(slider_crank):
     assert (joint["type"], joint["axis"], joint["at"]) == ("prismatic", [1.0, 0.0], "piston.S")
 
 
-@pytest.mark.spread(8)
+@pytest.mark.spread(4)
 @pytest.mark.parametrize("name", [name for name in PLOTS if name not in READY])
 @pytest.mark.parametrize("which", ["stuck", "slider_crank"])
 def test_figures(name, which, request, tmp_path):

@@ -50,6 +50,7 @@ def test_figures_of_every_example(results, tmp_path):
             assert path.stat().st_size > 5_000, (name, kind)
 
 
+@pytest.mark.slow
 def test_poses_and_frames_put_the_joints_where_the_points_are(results):
     """What the drawings are made of gives the places that the result tells, on both links."""
     for name, result in results.items():
@@ -69,6 +70,7 @@ def test_poses_and_frames_put_the_joints_where_the_points_are(results):
                 assert shown.slides(joint) == pytest.approx(slide, abs=1e-9 * size, nan_ok=True), (name, joint)
 
 
+@pytest.mark.slow
 def test_every_report_is_sound_and_small(results):
     for name, result in results.items():
         text = report(result)

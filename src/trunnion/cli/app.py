@@ -96,15 +96,15 @@ def check(
     list_: Annotated[
         bool, typer.Option("--list", help="Instead, list what can be set, swept and measured, with units and values.")
     ] = False,
-    names: Annotated[
+    out: Annotated[
         Path | None, typer.Option("--out", help="Write that list: a .json file.", show_default=False)
     ] = None,
 ) -> None:
     """Findings, mobility, structural formula and plan of a mechanism, and the ways it can be assembled in."""
-    if list_ or names:
+    if list_ or out:
         from trunnion.cli.vocabulary import show
 
-        show(file, stated(file, set_, table, friction), names)
+        show(file, stated(file, set_, table, friction), out)
         raise typer.Exit
     from trunnion.cycle.inspect import check as inspect
     from trunnion.views.assembly.ways import gear_line, lines
@@ -117,23 +117,25 @@ def check(
     with lines_of(file):
         found = inspect(mechanism)
     rank = "not known: no position can be assembled" if found.rank_mobility is None else str(found.rank_mobility)
-    out = console()
-    out.print(mechanism.name or file.name, style="bold", markup=False)
-    out.print(f"mobility {found.mobility} by formula, {rank} by rank; drivers: {len(mechanism.drivers)}", markup=False)
-    out.print(f"formula  {found.formula or '(no moving link)'}", markup=False)
+    screen = console()
+    screen.print(mechanism.name or file.name, style="bold", markup=False)
+    screen.print(
+        f"mobility {found.mobility} by formula, {rank} by rank; drivers: {len(mechanism.drivers)}", markup=False
+    )
+    screen.print(f"formula  {found.formula or '(no moving link)'}", markup=False)
     for number, (module, count) in enumerate(zip(found.plan.modules, found.assemblies, strict=True)):
         ways = "" if module.rank == 1 else f", {count} {'assembly' if count == 1 else 'assemblies'}"
         solver = "general group" if module.kind == "general" else "closed form"
         joints = ", ".join(module.joints)
-        out.print(
+        screen.print(
             f"  {module.label:<24} links {', '.join(module.links)}; joints {joints}; {solver}{ways}",
             markup=False, soft_wrap=True,
         )  # fmt: skip
         for choice in (one for one in found.choices if one.module == number):
             for line in lines(choice):
-                out.print(f"    {line}", markup=False, highlight=False, soft_wrap=True)
+                screen.print(f"    {line}", markup=False, highlight=False, soft_wrap=True)
     for pair in found.gears:
-        out.print(f"gears    {gear_line(pair)}", markup=False, highlight=False, soft_wrap=True)
+        screen.print(f"gears    {gear_line(pair)}", markup=False, highlight=False, soft_wrap=True)
     say(placed(found.findings, file, ["assembly"]))
     if assemblies:
         from trunnion.views.assembly.drawings import ways as drawings

@@ -14,8 +14,10 @@ import io
 import json
 import math
 import os
+import re
 import shutil
 import sys
+from collections.abc import Iterable
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass, field
@@ -51,6 +53,15 @@ RIG: dict[str, list[str]] = {
     "identify": ["identify", "MODEL", "rig/mapping.yaml", "--out", "identify.nc", "--out", "identify.csv"],
 }
 RIGGED = {"cardan-rig": "pezzuti-cardan", "fourbar-rig": "toleranced-fourbar"}  # rig → its model
+# what measures rounding: its size matters, not its digits
+RESIDUALS = {
+    "power_residual",
+    "closure_residual",
+    "friction_change",
+    "friction_residual",
+    "seat_change",
+    "efficiency_error",
+}
 # attributes that say when and by what a file was made, and sentences
 PASSING = {"created", "version", "command", "trunnion", "duration", "seconds", "history"}
 
@@ -133,10 +144,11 @@ class Difference:
     largest: tuple[float, str] = (0.0, "")
     beyond: list[tuple[float, str]] = field(default_factory=list)
     other: list[str] = field(default_factory=list)
+    added: list[tuple[str, list[str]]] = field(default_factory=list)
     texts: list[str] = field(default_factory=list)
 
-    def values(self, old: Any, new: Any, place: str) -> None:
-        """Compare two arrays."""
+    def values(self, old: Any, new: Any, place: str, scale: float = 0.0) -> None:
+        """Compare two arrays. scale: what a difference is related to, beside the largest of them."""
         old, new = np.asarray(old), np.asarray(new)
         if old.shape != new.shape or (old.dtype.kind in "OUS") != (new.dtype.kind in "OUS"):
             self.other.append(f"{place}: shape {old.shape} was, {new.shape} is")
@@ -145,18 +157,28 @@ class Difference:
                 self.other.append(f"{place}: other words")
         else:
             self.numbers += old.size
-            self._numbers(old.astype(float), new.astype(float), place)
+            self._numbers(old.astype(float), new.astype(float), place, scale)
 
-    def _numbers(self, old: Any, new: Any, place: str) -> None:
+    def _numbers(self, old: Any, new: Any, place: str, scale: float) -> None:
         same = (old == new) | (np.isnan(old) & np.isnan(new))
         if same.all():
             return
-        size = np.max(np.abs(old), where=np.isfinite(old), initial=0.0) or 1.0
+        size = max(scale, np.max(np.abs(old), where=np.isfinite(old), initial=0.0)) or 1.0
         gap = np.where(same, 0.0, np.abs(new - old) / size)
         largest = math.inf if np.isnan(gap).any() else float(gap.max())
+        if RESIDUALS & set(re.split(r"[ .]", place)):
+            return
         self.largest = max(self.largest, (largest, place))
         if largest > LIMIT:
             self.beyond.append((largest, place))
+
+    def kept(self, old: Iterable[str], new: Iterable[str], place: str) -> None:
+        """Note names that are gone, and those that are added."""
+        was, now = set(old), set(new)
+        if gone := sorted(was - now):
+            self.other.append(f"{place}: {', '.join(gone)} gone")
+        if more := sorted(now - was):
+            self.added.append((place, more))
 
     def same(self, old: Any, new: Any, place: str) -> None:
         """Note two things that are not equal."""
@@ -169,7 +191,7 @@ def compare(old: Path, new: Path) -> Difference:
     found = Difference()
     names = [{path.relative_to(one) for path in one.rglob("*") if path.is_file()} for one in (old, new)]
     found.other += [f"{name}: is missing" for name in sorted(names[0] - names[1])]
-    found.other += [f"{name}: is new" for name in sorted(names[1] - names[0])]
+    found.added += [("files", [str(name)]) for name in sorted(names[1] - names[0])]
     for name in sorted(names[0] & names[1]):
         found.files += 1
         kind = name.name if name.name.endswith("exit.txt") else name.suffix
@@ -190,8 +212,8 @@ def _datasets(old: Path, new: Path, name: str, found: Difference) -> None:
     import xarray as xr
 
     with xr.open_dataset(old, decode_times=False) as was, xr.open_dataset(new, decode_times=False) as now:
-        found.same(sorted(map(str, was.variables)), sorted(map(str, now.variables)), f"{name} variables")
-        found.same(sorted(was.attrs), sorted(now.attrs), f"{name} attributes")
+        found.kept(map(str, was.variables), map(str, now.variables), f"{name} variables")
+        found.kept(map(str, was.attrs), map(str, now.attrs), f"{name} attributes")
         for one in sorted(map(str, set(was.variables) & set(now.variables))):
             found.same(was[one].dims, now[one].dims, f"{name} {one} dims")
             found.same(was[one].dtype.kind, now[one].dtype.kind, f"{name} {one} type")
@@ -202,22 +224,40 @@ def _datasets(old: Path, new: Path, name: str, found: Difference) -> None:
 
 def _rows(old: Path, new: Path, name: str, found: Difference) -> None:
     was, now = (list(csv.reader(path.read_text(encoding="utf-8").splitlines())) for path in (old, new))
-    found.same(was[:1], now[:1], f"{name} header")
-    if was[:1] == now[:1] and len(was) == len(now):
-        for column, *cells in zip(*was, strict=True):
-            k = was[0].index(column)
-            _cells(cells, [row[k] for row in now[1:]], f"{name} {column}", found)
-    else:
+    if not (was and now and len(was) == len(now)):
         found.same(len(was), len(now), f"{name} rows")
+        return
+    found.kept(was[0], now[0], f"{name} columns")
+    kept = [column for column in now[0] if column in was[0]]
+    found.same([column for column in was[0] if column in kept], kept, f"{name} order of columns")
+    columns = {one: [row[was[0].index(one)] for row in was[1:]] for one in kept}
+    of_quantity: dict[str, float] = {}  # the largest number of a quantity, over all joints and components
+    for column, cells in columns.items():
+        quantity = _quantity(column)
+        of_quantity[quantity] = max([of_quantity.get(quantity, 0.0), *map(_size, cells)])
+    for column, cells in columns.items():
+        others = [row[now[0].index(column)] for row in now[1:]]
+        _cells(cells, others, f"{name} {column}", found, of_quantity[_quantity(column)])
 
 
-def _cells(was: list[str], now: list[str], place: str, found: Difference) -> None:
+def _quantity(column: str) -> str:
+    return re.sub(r"_[xyz]$", "", column.rpartition(".")[2])
+
+
+def _size(cell: str) -> float:
     try:
-        numbers = [[float(cell or "nan") for cell in cells] for cells in (was, now)]
+        return abs(float(cell)) if math.isfinite(float(cell)) else 0.0
+    except ValueError:
+        return 0.0
+
+
+def _cells(was: list[str], now: list[str], place: str, found: Difference, scale: float) -> None:
+    try:
+        old, new = ([float(cell or "nan") for cell in cells] for cells in (was, now))
     except ValueError:
         found.same(was, now, place)
         return
-    found.values(*numbers, place)
+    found.values(old, new, place, scale)
 
 
 def _json(old: Path, new: Path, name: str, found: Difference) -> None:
@@ -227,9 +267,11 @@ def _json(old: Path, new: Path, name: str, found: Difference) -> None:
 
 def _tree(was: Any, now: Any, place: str, found: Difference) -> None:
     if isinstance(was, dict) and isinstance(now, dict):
-        found.same(sorted(was), sorted(now), f"{place} keys")
+        found.kept(was, now, f"{place} keys")
         for key in sorted(was.keys() & now.keys() - PASSING):
             _tree(was[key], now[key], f"{place} {key}", found)
+    elif _numeric(was) and _numeric(now) and np.shape(was) == np.shape(now):
+        found.values(np.array(was, float), np.array(now, float), place)
     elif isinstance(was, list) and isinstance(now, list) and len(was) == len(now):
         for k, (a, b) in enumerate(zip(was, now, strict=True)):
             _tree(a, b, f"{place} {k}", found)
@@ -242,6 +284,13 @@ def _tree(was: Any, now: Any, place: str, found: Difference) -> None:
         found.same(was, now, place)
 
 
+def _numeric(data: Any) -> bool:
+    """Whether it is a list of numbers, nested or not, null among them."""
+    if isinstance(data, list):
+        return bool(data) and all(_numeric(one) for one in data)
+    return data is None or (isinstance(data, (int, float)) and not isinstance(data, bool))
+
+
 KINDS = {".nc": _datasets, ".csv": _rows, ".json": _json, "exit.txt": _exits}
 
 
@@ -250,7 +299,8 @@ def show(found: Difference) -> int:
     print(f"{found.files:,} files, {found.numbers:,} numbers")
     print(f"largest difference {found.largest[0]:.3g} {found.largest[1]}")
     print(f"{len(found.beyond):,} variables beyond {LIMIT:g}, {len(found.other):,} other differences, ", end="")
-    print(f"{len(found.texts):,} texts differ")
+    print(f"{len(found.texts):,} texts differ, {len(found.added):,} places have additions: ", end="")
+    print(", ".join(sorted({one for _, names in found.added for one in names})) or "none")
     for size, place in sorted(found.beyond, reverse=True)[:40]:
         print(f"  {size:.3g}  {place}")
     for line in found.other[:60]:

@@ -25,16 +25,15 @@ test: $(VENV)/.dev
 	$(BIN)/python -m pytest -n 2 --dist worksteal -m "not slow"
 	NO_MKDOCS_2_WARNING=1 TRUNNION_DOCS=text $(BIN)/mkdocs build --strict --quiet --site-dir $(VENV)/site
 
-# What `make test` leaves out: every example, long counts, further oracles, every page and figure of the
-# documentation.
+# What `make test` leaves out: every example, long counts, further oracles, every page of the documentation.
 test-all: $(VENV)/.dev
 	$(BIN)/python -m pytest -n 2 --dist worksteal -m slow
-	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet --site-dir $(VENV)/site
 
 # Ratios to peers and hand-written kernels, measured in one run.
 bench: $(VENV)/.bench
 	$(BIN)/python -m benchmarks.run
 
+# The documentation in site/, with all figures: some minutes.
 docs: $(VENV)/.dev
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 

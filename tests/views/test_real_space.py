@@ -43,6 +43,7 @@ def results():
 
 
 @pytest.mark.slow
+@pytest.mark.slow
 def test_figures_of_every_example(results, tmp_path):
     for name, result in results.items():
         for kind in ("mechanism", "motion"):
@@ -50,6 +51,7 @@ def test_figures_of_every_example(results, tmp_path):
             assert path.stat().st_size > 5_000, (name, kind)
 
 
+@pytest.mark.slow
 @pytest.mark.slow
 def test_poses_and_frames_put_the_joints_where_the_points_are(results):
     """What the drawings are made of gives the places that the result tells, on both links."""
@@ -71,6 +73,7 @@ def test_poses_and_frames_put_the_joints_where_the_points_are(results):
 
 
 @pytest.mark.slow
+@pytest.mark.slow
 def test_every_report_is_sound_and_small(results):
     for name, result in results.items():
         text = report(result)
@@ -80,6 +83,7 @@ def test_every_report_is_sound_and_small(results):
         assert len(text) < 1_500_000
 
 
+@pytest.mark.slow
 def test_the_screw_axis_of_a_shaft_is_its_bearing(results):
     links = {link["name"]: link for link in scene(results["pezzuti-cardan"])["links"]}
     screw = links["input-shaft"]["screw"]
@@ -87,6 +91,7 @@ def test_the_screw_axis_of_a_shaft_is_its_bearing(results):
     assert np.abs(screw["pitch"]).max() < 1e-9
 
 
+@pytest.mark.slow
 def test_reactions_that_are_rounding_are_not_drawn(results):
     """The axes of a spherical linkage without weight carry moments alone."""
     for joint in scene(results["spherical-four-bar"])["joints"]:
@@ -94,6 +99,7 @@ def test_reactions_that_are_rounding_are_not_drawn(results):
         assert max(abs(value) for part in joint["moment"].values() for value in part) > 1e-3
 
 
+@pytest.mark.slow
 def test_columns_of_the_cardan_joint(results, tmp_path):
     result = results["pezzuti-cardan"]
     write(result, tmp_path / "cardan.csv")

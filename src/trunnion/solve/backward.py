@@ -303,7 +303,7 @@ def _record(
         if contact.own is not None:
             wrench = algebra.minus(wrench, part)
     back.friction_wrenches[joint], back.friction[joint], back.losses[joint] = friction, amount, loss
-    whole, back.reactions[joint] = algebra.added(wrench, friction), wrench
+    whole, back.reactions[joint] = algebra.added(wrench, friction), wrench if driven else walk.bare(joint, wrench)
     if driven:
         motion, unit = walk.freedom(joint, walk.system.turns(joint))
         effort = back.efforts[joint] = algebra.power(wrench, motion)

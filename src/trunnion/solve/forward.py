@@ -289,6 +289,10 @@ class Forward(ABC):
     def wrench(self, place: Place, reaction: Reaction) -> Any:
         """The reaction of a joint on its second link as the file names it, from what its module found."""
 
+    def bare(self, joint: str, wrench: Any) -> Any:
+        """The reaction of a joint without a driver, without what is only rounding."""
+        return wrench
+
     @abstractmethod
     def inertia_moment(self, link: str) -> Any:
         """What a link's own inertia does about its mass centre, N m; None of a link without."""

@@ -157,6 +157,11 @@ class PlaneWalk(Forward):
         here, there = self.ends(place.joint)  # the module's second point is the file's first
         return about(found, there.x - here.x, there.y - here.y)
 
+    def bare(self, joint: str, wrench: Wrench) -> Wrench:
+        """A reaction without what acts along the freedom of its joint: rounding, and of a pin exactly nothing."""
+        motion, unit = self.freedom(joint, self.system.turns(joint))
+        return plane.minus(wrench, plane.times(plane.power(wrench, motion), unit))
+
     def inertia_moment(self, link: str) -> Number | None:
         """−J α about the mass centre, N m; None of a link without inertia.  [D 2-5]"""
         about_origin = self.system.mechanism.links[link].inertia_about == "origin"

@@ -11,7 +11,7 @@ from trunnion.algebra import duallinalg as linalg
 from trunnion.algebra import line as lines
 from trunnion.algebra import pose as poses
 from trunnion.algebra import screw as screws
-from trunnion.algebra import space as vectors
+from trunnion.algebra import vector as vectors
 from trunnion.algebra.dual import Dual, derivative, functions, parts, primal, seed, spatial
 from trunnion.groups import ccc
 

@@ -211,3 +211,12 @@ def test_the_space_epsilon_lies_below_those_of_derivatives() -> None:
     assert (real.real, real.dual, dual.real, dual.dual) == (1.0, 2.0, 3.0, 0.0)
     assert parts(2.5) == (2.5, 0.0)
     same(dot(cross(vector(U), vector(V)), vector(U)), np.zeros(COUNT))
+
+
+def test_the_public_modules_of_dual_vectors_and_screws_go_together() -> None:
+    from trunnion import dual
+
+    screw = dual.screws.log(dual.poses.frame(point=(0.3, 0.0, 0.1), x=(0, 1, 0), z=(0, 0, 1)))
+    size = dual.vectors.length(screw)
+    assert float(size.real) == pytest.approx(np.pi / 2)
+    assert float(size.dual) == pytest.approx(0.1)

@@ -79,7 +79,7 @@ def place(tmp_path: Path, files: dict[str, str], monkeypatch: pytest.MonkeyPatch
     return tmp_path
 
 
-QUICK = ("CONTRIBUTING.md", "groups-by-hand.md")
+QUICK = ("CONTRIBUTING.md", "groups-by-hand.md", "dual-algebra.md")
 
 
 @pytest.mark.parametrize(

@@ -139,12 +139,18 @@ def test_powers_and_energy_of_friction() -> None:
     run, result = prepare(mechanism), trunnion.analyse(mechanism, 24)
     time = result["time"].values
     np.testing.assert_allclose(course(run, "power:O", time), result["drive_power"].sel(driver="O"), rtol=1e-12)
+    energies = {}
     for joint in result["joint"].values:
         lost = course(run, f"friction_power:{joint}", time)
         np.testing.assert_allclose(lost, result["friction_power"].sel(joint=joint), rtol=1e-12)
         energy = figures(run, [Measure("energy", "friction_energy", str(joint))], 24)["energy"]
         mean = float(result["friction_power_mean"].sel(joint=joint))
-        assert energy == pytest.approx(mean * run.cycle.duration, rel=1e-3)  # by a rule of fixed nodes
+        # A measure goes by fixed nodes, `analyse` by nodes that are added: they part where the guide changes its side.
+        assert energy == pytest.approx(mean * run.cycle.duration, rel=5e-4 if joint == "S" else 1e-6)
+        energies[joint] = energy
+    # Over a whole cycle all that the driver gives is lost to friction: nothing else takes power here.
+    driven = figures(run, [Measure("driven", "power", "O", statistic="mean")], 24)["driven"] * run.cycle.duration
+    assert sum(energies.values()) == pytest.approx(driven, rel=1e-12)
     parts = [
         figures(run, [Measure("part", "friction_energy", "O", over=over)], 720)["part"]
         for over in ((0.0, np.pi), (np.pi, 2 * np.pi))

@@ -106,8 +106,8 @@ def check(
 
         show(file, stated(file, set_, table, friction), out)
         raise typer.Exit
+    from trunnion.cli.structure import show_structure
     from trunnion.cycle.inspect import check as inspect
-    from trunnion.views.assembly.ways import gear_line, lines
 
     if assemblies:
         from trunnion.views.cycle.plots import check_figure
@@ -116,26 +116,7 @@ def check(
     mechanism = stated(file, set_, table, friction)
     with lines_of(file):
         found = inspect(mechanism)
-    rank = "not known: no position can be assembled" if found.rank_mobility is None else str(found.rank_mobility)
-    screen = console()
-    screen.print(mechanism.name or file.name, style="bold", markup=False)
-    screen.print(
-        f"mobility {found.mobility} by formula, {rank} by rank; drivers: {len(mechanism.drivers)}", markup=False
-    )
-    screen.print(f"formula  {found.formula or '(no moving link)'}", markup=False)
-    for number, (module, count) in enumerate(zip(found.plan.modules, found.assemblies, strict=True)):
-        ways = "" if module.rank == 1 else f", {count} {'assembly' if count == 1 else 'assemblies'}"
-        solver = "general group" if module.kind == "general" else "closed form"
-        joints = ", ".join(module.joints)
-        screen.print(
-            f"  {module.label:<24} links {', '.join(module.links)}; joints {joints}; {solver}{ways}",
-            markup=False, soft_wrap=True,
-        )  # fmt: skip
-        for choice in (one for one in found.choices if one.module == number):
-            for line in lines(choice):
-                screen.print(f"    {line}", markup=False, highlight=False, soft_wrap=True)
-    for pair in found.gears:
-        screen.print(f"gears    {gear_line(pair)}", markup=False, highlight=False, soft_wrap=True)
+    show_structure(found, mechanism.name or file.name, len(mechanism.drivers))
     say(placed(found.findings, file, ["assembly"]))
     if assemblies:
         from trunnion.views.assembly.drawings import ways as drawings

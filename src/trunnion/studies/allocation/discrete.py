@@ -23,7 +23,8 @@ from scipy.optimize import Bounds, LinearConstraint, milp
 
 from trunnion.errors import Finding
 from trunnion.results.sentences import told
-from trunnion.studies.allocation.continuous import Point, allocate_continuous, gap_of, minimise, unbounded
+from trunnion.studies.allocation.continuous import allocate_continuous, minimise, unbounded
+from trunnion.studies.allocation.interior import Point
 from trunnion.studies.allocation.problem import ALLOWED, PROVEN, Answer, Contribution, Problem, none, shortfalls
 from trunnion.studies.allocation.task import Sides, Task, sides, task_of
 
@@ -55,7 +56,6 @@ class _Best:
     cost: float = np.inf
     taken: Flags = field(default_factory=lambda: np.zeros(0, bool))
     point: Point | None = None
-    gap: float = 0.0
 
 
 class _Search:
@@ -209,7 +209,7 @@ class _Search:
 
     def _complete(self, taken: Flags, u: Array, best: _Best) -> None:
         """With these options: the best half widths of the others; the options are settled and not asked for again."""
-        price, point, gap = float(np.sum(self.prices @ taken)), None, 0.0
+        price, point = float(np.sum(self.prices @ taken)), None
         self._forbid(taken)
         if len(self.task.unit):
             self._price_tangents(u)
@@ -221,14 +221,14 @@ class _Search:
             point = minimise(part)
             if point is None:
                 return
-            price, gap = price + part.cost(point.u), gap_of(part, point)
+            price += part.cost(point.u)
             self._price_tangents(point.u)
             for k in point.rows:
                 self._limit(int(k), part.tolerances(point.u), point.u)
         elif np.any(self.limits.value(self._tolerances(taken, u)) > 1 + ALLOWED):
             return
         if price < best.cost:
-            best.cost, best.taken, best.point, best.gap = price, taken, point, gap
+            best.cost, best.taken, best.point = price, taken, point
 
     def _forbid(self, taken: Flags) -> None:
         row = np.zeros(self.columns)
@@ -241,7 +241,7 @@ class _Search:
             doubt = told("allocation.no_choice", "processes")
             return none(problem, shortfalls(problem, self.narrowest()) or [doubt])
         u = best.point.u if best.point else np.zeros(0)
-        gap = max(best.cost - bound, 0.0) / self.scale + best.gap
+        gap = max(best.cost - bound, 0.0) / self.scale + (best.point.gap if best.point else 0.0)
         costs = self.prices @ best.taken
         t = self._tolerances(best.taken, u)
         costs += [one.cost.value(float(t[i])) if one.cost else 0.0 for i, one in enumerate(problem.contributions)]
@@ -262,6 +262,7 @@ class _Search:
             min(bound, best.cost),
             gap,
             proven,
+            residual=best.point.residual if best.point else 0.0,
             choices=choices,
             price=nothing,
             findings=() if proven else (doubt,),

@@ -35,7 +35,7 @@ CRITERIA: dict[Criterion, str] = {
 }
 SHOWN = {"rad": (180 / np.pi, "deg"), "m": (1e3, "mm")}
 ALLOWED = 1e-9  # of a limit: how far a row may lie beyond it
-PROVEN = 1e-7  # of the cost that tolerances change: a gap below it proves the optimum
+PROVEN = 1e-9  # of the cost that tolerances change: a gap below it proves the optimum
 
 
 @dataclass(frozen=True)
@@ -202,7 +202,7 @@ class Answer:
 
     tolerances, costs: by contribution, m or rad; a fixed one costs nothing. choices: names of the options taken.
     bound: no allocation costs less than this; gap: cost minus bound, a share of the cost that tolerances change.
-    proven: whether the gap proves a global optimum.
+    residual: of the optimality conditions, relative; proven: whether the gap proves a global optimum.
     price: what one more unit (rad, m, …) of a row's room would save, (row,); NaN for a discrete choice.
     active: rows that limit; used: share of its room each row takes. rounds: of the solver.
     Of a yield: expected, of normal deviations, linearly; sampled, by `verify`; trials: all that were sampled. There the
@@ -216,6 +216,7 @@ class Answer:
     bound: float
     gap: float
     proven: bool
+    residual: float = np.nan
     choices: dict[str, str] = field(default_factory=dict)
     price: Array = field(default_factory=lambda: np.zeros(0))
     findings: tuple[Finding, ...] = ()

@@ -69,16 +69,15 @@ def tolerance(
     counted, and are outside every limit.
     Raises MechanismError if nothing varies, for an unknown measure or method, or as `analyse` does.
     """
-    _check(methods, samples, seed, engine)
-    _check_target(target, methods)
+    _check(methods, samples, seed, engine, target)
     found = study(mechanism, measures, steps, at, friction)
     worst = found.worst() if "worst-case" in methods else None
-    method = next((one for one in methods if one in SAMPLINGS), None)
     job: Sampling | None = None
     tally: Tally | None = None
     shares: Indices | None = None
     notes: list[Finding] = []
     stopped = False
+    method = next((one for one in methods if one in SAMPLINGS), None)
     if method is not None:
         job = found.sampling(method, samples, seed, engine)
         alone = job.samples * job.positions < FEW and cluster is None
@@ -87,10 +86,7 @@ def tolerance(
             job, jobs=jobs, chunk=chunk, cluster=cluster, checkpoint=checkpoint, resume=resume, progress=progress
         )
         tally, stopped = ran.tally, ran.stopped
-        notes += ran.notes
-        if stopped:
-            kept, done = checkpoint is not None, done_of(job, tally)
-            notes.append(told("samples.stopped", "samples", kept=kept, done=done, samples=job.samples))
+        notes += [*ran.notes, *_stopped(ran, job, kept=checkpoint is not None)]
     if "sobol" in methods:
         # Not turned: each number is to have its own coordinates of the points.
         own = replace(found.sampling("quasi-monte-carlo", samples, seed), rotation=None)
@@ -98,12 +94,19 @@ def tolerance(
     return dataset(Outcome(found, tuple(methods), worst, job, tally, shares, stopped, target), [*found.told, *notes])
 
 
+def _stopped(ran: runner.Run[Tally], job: Sampling, kept: bool) -> list[Finding]:
+    """What to say of a run that was stopped. kept: whether its samples are in a file."""
+    if not ran.stopped:
+        return []
+    return [told("samples.stopped", "samples", kept=kept, done=done_of(job, ran.tally), samples=job.samples)]
+
+
 def done_of(job: Sampling, tally: Tally) -> int:
     """Samples in a tally."""
     return int(sum(np.max(total.count) for tree in tally.trees if (total := tree.total()) is not None))
 
 
-def _check(methods: Sequence[str], samples: int, seed: int, engine: str) -> None:
+def _check(methods: Sequence[str], samples: int, seed: int, engine: str, target: float | None) -> None:
     known = ", ".join(METHODS)
     findings = [
         Finding(f"there is no method '{method}'", "method", f"use {known}")
@@ -121,6 +124,7 @@ def _check(methods: Sequence[str], samples: int, seed: int, engine: str) -> None
         findings.append(Finding(f"a seed of {seed}", "seed", "give a whole number from 0"))
     if findings:
         raise MechanismError(findings)
+    _check_target(target, methods)
 
 
 def _check_target(target: float | None, methods: Sequence[str]) -> None:

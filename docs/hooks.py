@@ -131,7 +131,7 @@ def _drawn(model: str, models: dict[str, str], kinds: list[str], steps: int, rep
     from trunnion import analyse, assemble, read
     from trunnion import report as page
     from trunnion.views.assembly import figure as fit
-    from trunnion.views.assembly.drawings import ways
+    from trunnion.views.assembly.mode_drawings import ways
     from trunnion.views.cycle.plots import PLOTS, save
 
     base, values = _base_of(model, models)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
 import trunnion
-from trunnion.measures.kernel import NumpyKernel
+from trunnion.measures.evaluation import NumpyKernel
 from trunnion.measures.measures import named
 from trunnion.rig.reading.measurement import Accuracy, Condition, Course, Measurement
 from trunnion.solve.friction_method import FrictionMethod

@@ -203,7 +203,7 @@ _SOLVE = (
 _CYCLE = (
     Fault(
         "residual-not-related-to-power",
-        "cycle/account.py",
+        "cycle/summary.py",
         "return residual / highest if highest > 0 else residual",
         "return residual",
         ("tests/reference/test_means.py",),
@@ -269,7 +269,7 @@ _MEASURES = (
     ),
     Fault(
         "transmission-angle-not-folded",
-        "measures/courses.py",
+        "measures/curves.py",
         "np.pi / 2 - namespace(angle).abs(angle)",
         "np.pi / 2 - angle",
         ("tests/reference/test_kinematic_measures.py", "-k", "cosines"),

@@ -14,9 +14,9 @@ import xarray as xr
 from trunnion.errors import Finding
 from trunnion.files import whole
 from trunnion.results.attributes import findings_of, summary_of
-from trunnion.results.columns import KINDS, kind_of
 from trunnion.results.export import frame, save
 from trunnion.results.figure import Figure as Figure
+from trunnion.results.tables import KINDS, kind_of
 from trunnion.views.shown import figure_of, report_of
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ import pytest
 import xarray as xr
 
 import trunnion
-from trunnion.results.columns import KINDS, kind_of
+from trunnion.results.tables import KINDS, kind_of
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 STEPS = 12

@@ -10,7 +10,7 @@ import yaml
 from trunnion import Mechanism, MechanismError, analyse, check, sweep
 from trunnion.errors import agreeing, counted
 from trunnion.results.attributes import summary_of
-from trunnion.views.cycle.as_built import continued
+from trunnion.views.cycle.deviations import continued
 
 ENGINE = """
 trunnion: 1

@@ -15,7 +15,7 @@ import xarray as xr
 
 import trunnion
 from trunnion import Mechanism, MechanismError, Status
-from trunnion.results.columns.studies import swept as figures_of
+from trunnion.results.tables.studies import swept as figures_of
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.studies.sweep.grid import grid as grid_of
 from trunnion.studies.sweep.points import Points

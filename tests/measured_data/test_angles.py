@@ -11,8 +11,8 @@ import pytest
 from measured_data.recording import IDLE, RPM, ZERO, Columns, faults, mapping, off, read, recorded
 from trunnion.errors import MechanismError
 from trunnion.model.units import KINDS
-from trunnion.rig.reading.account import Account
 from trunnion.rig.reading.channels import resolution
+from trunnion.rig.reading.log import Account
 from trunnion.rig.reading.mapping import AngleSource
 from trunnion.rig.reading.pulses import unwrapped
 from trunnion.rig.reading.read import read_measured

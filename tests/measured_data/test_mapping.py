@@ -14,9 +14,9 @@ from manual.conftest import Run, program
 from measured_data.recording import Columns, mapping, off, read, recorded
 from trunnion.errors import MechanismError, Severity
 from trunnion.model.units import UnitError
-from trunnion.rig.reading.amounts import read_amount
 from trunnion.rig.reading.mapping import read_mapping
 from trunnion.rig.reading.read import read_measured
+from trunnion.rig.reading.sensor_quantity import read_amount
 
 __all__ = ["program"]  # a fixture
 

@@ -10,7 +10,7 @@ import pytest
 from trunnion.model import units
 from trunnion.model.quantity import Quantity
 from trunnion.model.units import KINDS, UnitError, unit
-from trunnion.rig.reading.amounts import dimensions
+from trunnion.rig.reading.sensor_quantity import dimensions
 
 
 @pytest.mark.parametrize(

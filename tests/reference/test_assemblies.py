@@ -19,7 +19,7 @@ from mechanisms import MODELS, analyse, build, class_three, excavator, findings,
 from mechanisms_parts import Data
 from trunnion import Mechanism, MechanismError
 from trunnion.errors import Severity
-from trunnion.solve.assemblies import Choice, put_together
+from trunnion.solve.assembly_modes import Choice, put_together
 
 Array = NDArray[np.float64]
 START = np.array([0.0])

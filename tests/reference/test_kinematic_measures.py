@@ -14,7 +14,7 @@ from measured import figures
 from mechanisms import build, four_bar, slider_crank
 from trunnion import Mechanism, MechanismError
 from trunnion.algebra.dual import Dual, derivative
-from trunnion.measures.courses import COURSES
+from trunnion.measures.curves import COURSES
 from trunnion.measures.measures import Measure, named
 from trunnion.model.measure_table import MEASURES
 from trunnion.solve.forward import forward

@@ -12,14 +12,14 @@ import pytest
 import trunnion
 from trunnion import Mechanism
 from trunnion.algebra.quadrature import Effort, integrals
-from trunnion.cycle.account import balance
+from trunnion.cycle.summary import balance
 from trunnion.errors import Status
 from trunnion.results.attributes import summary_of
 from trunnion.solve.loads import useful_loads
 from trunnion.solve.run import Run, prepare
 from trunnion.solve.switches import Mechanisms, edges
 from trunnion.views.common.quantities import quantity
-from trunnion.views.cycle.built_tables import error_rows
+from trunnion.views.cycle.deviations_tables import error_rows
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 STEPS = (60, 72, 90, 360, 720)

@@ -14,10 +14,10 @@ from rig_measurements import course, exact, measured, rocker
 from trunnion import MechanismError, Status
 from trunnion.errors import Finding, Severity
 from trunnion.model.units import KINDS
-from trunnion.rig.compare.causes import best, causes
-from trunnion.rig.compare.judge import Verdict, expanded, independent, judge, uncertainty_of
+from trunnion.rig.compare.assessment import Verdict, expanded, independent, judge, uncertainty_of
+from trunnion.rig.compare.error_sources import best, causes
+from trunnion.rig.compare.findings import gathered
 from trunnion.rig.compare.result import VARIABLES
-from trunnion.rig.compare.said import gathered
 from trunnion.rig.reading.measurement import Accuracy, Condition, Course, Measurement
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"

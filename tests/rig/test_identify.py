@@ -18,11 +18,11 @@ from trunnion.errors import MechanismError
 from trunnion.measures.measures import named
 from trunnion.model.mechanism import read_mechanism
 from trunnion.rig.identify import identify, with_estimates
-from trunnion.rig.identify.courses import Model
-from trunnion.rig.identify.held import held_out
+from trunnion.rig.identify.findings import _formula
+from trunnion.rig.identify.holdout import held_out
+from trunnion.rig.identify.identifiability import Combination
 from trunnion.rig.identify.run import identified
-from trunnion.rig.identify.said import _formula
-from trunnion.rig.identify.separate import Combination
+from trunnion.rig.identify.signals import Model
 from trunnion.rig.identify.unknowns import described, limits, unknowns
 from trunnion.rig.reading.measurement import Accuracy, Condition, Course, Measurement
 from trunnion.solve.friction_method import FrictionMethod

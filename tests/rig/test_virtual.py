@@ -14,7 +14,7 @@ from trunnion.errors import MechanismError, Severity
 from trunnion.model.mechanism import Mechanism
 from trunnion.rig.reading.efficiency import efficiency_of
 from trunnion.rig.reading.rig_file import Rig
-from trunnion.rig.virtual import courses as virtual_courses
+from trunnion.rig.virtual import true_signals as virtual_courses
 from trunnion.rig.virtual.files import units_of
 from trunnion.rig.virtual.observe import Observation
 from trunnion.rig.virtual.plan import plan

@@ -10,8 +10,8 @@ from matplotlib.patches import Circle
 
 import trunnion
 from trunnion.errors import MechanismError, Status
-from trunnion.views.cycle.as_built import angle_scale, broken, continued, losses, outputs, seated, worst_points
-from trunnion.views.cycle.error_plot import error, with_worst_case
+from trunnion.views.cycle.deviations import angle_scale, broken, continued, losses, outputs, seated, worst_points
+from trunnion.views.cycle.deviations_plot import error, with_worst_case
 from trunnion.views.cycle.plots import PLOTS, READY, drawable, save
 from trunnion.views.cycle.seat_plot import FACTORS, PIN
 from trunnion.views.sweep.figure import figure as sweep_figure

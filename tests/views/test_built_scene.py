@@ -11,7 +11,7 @@ from as_built_models import EXAMPLES, four_bar, loaded
 from test_report import Page
 
 import trunnion
-from trunnion.views.cycle.built_tables import error_rows, loss_rows
+from trunnion.views.cycle.deviations_tables import error_rows, loss_rows
 from trunnion.views.cycle.report import report
 from trunnion.views.cycle.scene import scene
 

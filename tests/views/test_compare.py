@@ -21,10 +21,10 @@ import trunnion
 from rig_measurements import measured, rocker
 from trunnion import MechanismError
 from trunnion.cli.app import main
-from trunnion.results.columns.comparison import TABLES
+from trunnion.results.tables.comparison import TABLES
 from trunnion.rig.reading.measurement import Measurement
 from trunnion.views.common.bundle import web_text
-from trunnion.views.compare.compared import drive, label, levels, varied
+from trunnion.views.compare.comparison import drive, label, levels, varied
 from trunnion.views.compare.figure import MOST_PANELS, figure, overlay, panels
 from trunnion.views.compare.report import MOST_DRAWN, report
 from trunnion.views.compare.tables import conditions, efficiencies, files, headline, results, sensors, verdicts

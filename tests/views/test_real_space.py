@@ -15,8 +15,8 @@ import trunnion
 from trunnion import Mechanism, analyse
 from trunnion.errors import Status
 from trunnion.results.export import save as write
-from trunnion.solve.assemblies import Choice, Way
-from trunnion.views.assembly.drawings import ways
+from trunnion.solve.assembly_modes import Choice, Way
+from trunnion.views.assembly.mode_drawings import ways
 from trunnion.views.cycle.plots import PLOTS, save
 from trunnion.views.cycle.report import report
 from trunnion.views.cycle.scene import scene

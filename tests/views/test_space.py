@@ -13,7 +13,7 @@ from stand_in_space import SPATIAL, Z, cardan, every_kind, rssr
 from test_report import Page
 
 from trunnion.errors import MechanismError, Status
-from trunnion.results.columns import columns
+from trunnion.results.tables import columns
 from trunnion.views.cycle.plots import PLOTS, READY, mechanism, save
 from trunnion.views.cycle.report import report
 from trunnion.views.cycle.scene import scene

@@ -22,8 +22,8 @@ from trunnion.views.allocation.cost import Offer, Price, tolerance_cost, trade_o
 from trunnion.views.common.figures import PALETTE
 from trunnion.views.cycle.plots import save
 from trunnion.views.tolerance.figure import KINDS, MOST_PANELS, check_kind, drawable, figure, sheet
+from trunnion.views.tolerance.readings import fixed, limits_text, readings, scaled, share, share_interval
 from trunnion.views.tolerance.tables import corners, figures, indices, inputs, overview, tables
-from trunnion.views.tolerance.toleranced import fixed, limits_text, readings, scaled, share, share_interval
 
 
 @pytest.fixture(scope="module", params=CASES)

@@ -15,9 +15,9 @@ from test_report import Page
 from trunnion.views.common.bundle import web_text
 from trunnion.views.tolerance.figure import drawable, figure
 from trunnion.views.tolerance.notes import NOTES
+from trunnion.views.tolerance.readings import readings
 from trunnion.views.tolerance.report import Section, report
 from trunnion.views.tolerance.tables import Table
-from trunnion.views.tolerance.toleranced import readings
 
 SOURCE = "data:image/svg+xml;base64,"
 

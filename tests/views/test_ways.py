@@ -11,10 +11,10 @@ from matplotlib.colors import to_hex
 import trunnion
 from mechanisms import MODELS, build, class_three, four_bar, scotch_yoke, stephenson_six_bar, watt_six_bar
 from trunnion.errors import MechanismError
-from trunnion.solve.assemblies import choices
+from trunnion.solve.assembly_modes import choices
 from trunnion.solve.run import prepare
-from trunnion.views.assembly.drawings import _drawn, ways
-from trunnion.views.assembly.ways import lines, places
+from trunnion.views.assembly.mode_drawings import _drawn, ways
+from trunnion.views.assembly.modes import lines, places
 from trunnion.views.common.cycle import layout
 from trunnion.views.common.drawing import PALE
 from trunnion.views.common.figures import INK, RULE

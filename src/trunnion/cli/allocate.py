@@ -97,7 +97,7 @@ def allocate(
 ) -> None:
     """Tolerances and plays of least cost that keep the limits of measures, verified; what accuracy costs."""
     from trunnion.studies.allocation.allocate import allocate as run
-    from trunnion.studies.allocation.allocated import DEFAULT_YIELD
+    from trunnion.studies.allocation.outcome import DEFAULT_YIELD
 
     check_files(out or [], report, of="allocation", kind=kind)
     check_model(write, file, force)

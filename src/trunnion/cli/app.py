@@ -119,7 +119,7 @@ def check(
     show_structure(found, mechanism.name or file.name, len(mechanism.drivers))
     say(placed(found.findings, file, ["assembly"]))
     if assemblies:
-        from trunnion.views.assembly.drawings import ways as drawings
+        from trunnion.views.assembly.mode_drawings import ways as drawings
         from trunnion.views.cycle.plots import save
 
         save(drawings(mechanism, found.choices), assemblies)
@@ -212,7 +212,7 @@ def plot(
 ) -> None:
     """Figures: drive torque, friction power, reactions, polar diagram, mechanism with coupler curve."""
     from trunnion.views.common.peaks import whole_peaks
-    from trunnion.views.cycle.error_plot import with_worst_case
+    from trunnion.views.cycle.deviations_plot import with_worst_case
     from trunnion.views.cycle.plots import PLOTS, check_kinds, drawable, save
 
     check_kinds(kind or [])
@@ -368,7 +368,7 @@ def _ideal(mechanism: Mechanism, steps: int, method: FrictionMethod | None) -> x
 def _page(mechanism: Mechanism, result: xr.Dataset, uncut: bool) -> str:
     """The report of a cycle as HTML."""
     from trunnion.views.common.peaks import whole_peaks
-    from trunnion.views.cycle.error_plot import with_worst_case
+    from trunnion.views.cycle.deviations_plot import with_worst_case
     from trunnion.views.cycle.report import report as page
 
     shown = whole_peaks(with_worst_case(result, mechanism), uncut)

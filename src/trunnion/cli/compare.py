@@ -48,7 +48,7 @@ def compare(
 
     Exit status 0 if every course and efficiency is within, 1 if not or if it cannot be told.
     """
-    from trunnion.rig.compare.said import gathered
+    from trunnion.rig.compare.findings import gathered
     from trunnion.rig.compare.study import compare as run
     from trunnion.rig.reading.read import read_measured
 

@@ -116,7 +116,7 @@ def identify(
     units_row: UnitsRow = False,
 ) -> None:
     """Numbers of the model from measured data: estimates, 95 % intervals, what the data cannot tell apart."""
-    from trunnion.rig.compare.said import gathered
+    from trunnion.rig.compare.findings import gathered
     from trunnion.rig.identify import identify as run
     from trunnion.rig.reading.read import read_measured
 

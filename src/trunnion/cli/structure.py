@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from trunnion.cli.terminal import console
 from trunnion.cycle.inspect import Check
-from trunnion.views.assembly.ways import gear_line, lines
+from trunnion.views.assembly.modes import gear_line, lines
 
 __all__ = ["show_structure"]
 

@@ -89,7 +89,7 @@ def sweep(
 ) -> None:
     """How efficiency, drive effort, reactions, friction and locking margin change with numbers of the model."""
     from trunnion.studies.sweep.study import sweep as run
-    from trunnion.views.sweep.swept import check_measure
+    from trunnion.views.sweep.scales import check_measure
 
     grid = over(over_)
     measures = list(dict.fromkeys(measure or ["efficiency"]))
@@ -117,7 +117,7 @@ def sweep(
 def _check_figures(grid: Mapping[str, Any], x: str, family: str, kind: str) -> None:
     """MechanismError for figures that cannot be drawn of a grid, before anything is computed."""
     from trunnion.views.sweep.figure import check_kind
-    from trunnion.views.sweep.swept import check_axes
+    from trunnion.views.sweep.scales import check_axes
 
     check_kind(kind)
     counts = {name: points({name: values}) for name, values in grid.items()}

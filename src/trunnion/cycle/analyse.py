@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from trunnion.cycle import account
+from trunnion.cycle import summary
 from trunnion.model.mechanism import Mechanism
 from trunnion.solve.friction_method import FrictionMethod
 
@@ -50,4 +50,4 @@ def analyse_run(
 ) -> xr.Dataset:
     """What `analyse` does, for a mechanism that is prepared."""
     found = positions(run, steps, method, progress)
-    return account.finish(run, found)
+    return summary.finish(run, found)

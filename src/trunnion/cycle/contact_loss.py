@@ -20,10 +20,10 @@ from numpy.typing import NDArray
 
 from trunnion.errors import Finding, Status
 from trunnion.results.sentences import told
+from trunnion.solve.eccentricity_rate import FINE as LANES
 from trunnion.solve.seating import NO_LOAD, ROUNDS, TOLERANCE, Seated, loads_of
 from trunnion.solve.seats import Seat
 from trunnion.solve.system import Dial
-from trunnion.solve.travel import FINE as LANES
 
 if TYPE_CHECKING:
     from trunnion.solve.backward import Backward

@@ -8,13 +8,13 @@ from typing import NamedTuple
 import numpy as np
 
 from trunnion.algebra.dual import primal
-from trunnion.cycle import account
+from trunnion.cycle import summary
 from trunnion.cycle.positions import positions
 from trunnion.cycle.scene import pitch_circles
 from trunnion.errors import Finding, Severity
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.sentences import told
-from trunnion.solve.assemblies import Choice, choices
+from trunnion.solve.assembly_modes import Choice, choices
 from trunnion.solve.forward import Forward, forward
 from trunnion.solve.run import Run, prepare
 from trunnion.structure.decompose import Plan
@@ -65,7 +65,7 @@ def check(mechanism: Mechanism, steps: int = 360) -> Check:
     Raises MechanismError if the structure does not determine the motion.
     """
     run = prepare(mechanism)
-    found, _ = account.findings(run, positions(run, steps, averaged=False))
+    found, _ = summary.findings(run, positions(run, steps, averaged=False))
     walk = forward(run.system, run.values, run.chosen.assembly, run.cycle.times(steps))
     rank = run.determinacy.mobility if run.determinacy else _rank(walk)
     if run.determinacy is None and rank is not None and rank != run.system.plan.mobility:

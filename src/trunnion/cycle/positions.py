@@ -11,19 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.quadrature import Effort
-from trunnion.cycle import contact_loss, diagnosis, rest
-from trunnion.cycle.asbuilt import COMPARED, fill_errors, fill_seats
-from trunnion.cycle.blanks import blank
+from trunnion.cycle import contact_loss, diagnosis, resting_joints
+from trunnion.cycle.deviations import COMPARED, fill_errors, fill_seats
 from trunnion.cycle.fill import fill_power
 from trunnion.cycle.means import AVERAGED, Means, means_of, still
+from trunnion.cycle.unanswered import blank
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.results import variables as results
 from trunnion.solve.backward import Backward
+from trunnion.solve.eccentricity_rate import Lanes, around, lanes
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.seating import settle
 from trunnion.solve.switches import Mechanisms
 from trunnion.solve.system import System
-from trunnion.solve.travel import Lanes, around, lanes
 
 if TYPE_CHECKING:
     pass
@@ -95,7 +95,7 @@ def positions(
         if progress:
             progress(window.stop)
     quick = replace(method, margin_up_to=0.0)  # the margin is known by now
-    rest.bracket(arrays, run, time, quick, causes.zero_slip(), causes.seats())
+    resting_joints.bracket(arrays, run, time, quick, causes.zero_slip(), causes.seats())
     losses = contact_loss.find(arrays, run, time) if run.seats else []
     fill_of(run.system).unwrap(arrays, run.system, run.values, time)
 

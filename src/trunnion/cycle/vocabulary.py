@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from trunnion.algebra.dual import primal
-from trunnion.cycle.watched import watched
+from trunnion.cycle.model_measures import watched
 from trunnion.errors import Finding, MechanismError
-from trunnion.measures.kernel import courses_of
+from trunnion.measures.evaluation import courses_of
 from trunnion.measures.measures import Measure, named
 from trunnion.measures.motion import MOTIONS
 from trunnion.model.checks.measures import subjects

@@ -17,7 +17,7 @@ from trunnion.algebra import space
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, MechanismError
-from trunnion.measures.courses import COURSES
+from trunnion.measures.curves import COURSES
 from trunnion.measures.motion import AXES, MOTIONS
 from trunnion.model.checks.measures import check_measure
 from trunnion.model.contact import motions

@@ -9,7 +9,7 @@ from typing import Annotated
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
 from trunnion.joints.fits import GRADES
-from trunnion.model.part import Name, Part, known, problem
+from trunnion.model.entry import Name, Part, known, problem
 from trunnion.model.quantity import AnyQuantity, Dimensionless
 
 __all__ = ["COST_MODELS", "Cost", "CostOption", "Grade", "Process"]

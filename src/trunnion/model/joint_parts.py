@@ -24,7 +24,7 @@ from pydantic_core import CoreSchema
 
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.joints.pairs import PAIRS
-from trunnion.model.part import Direction, Name, Part, forms, known, problem
+from trunnion.model.entry import Direction, Name, Part, forms, known, problem
 from trunnion.model.quantity import Angle, AnyQuantity, Length, Quantity
 from trunnion.model.units import KINDS, UnitError
 

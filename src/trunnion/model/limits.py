@@ -9,8 +9,8 @@ from typing import Annotated
 import numpy as np
 from pydantic import PlainSerializer, PlainValidator, WithJsonSchema
 
+from trunnion.model.entry import problem
 from trunnion.model.expression import normalise
-from trunnion.model.part import problem
 from trunnion.model.quantity import Quantity, term
 from trunnion.model.units import UnitError
 

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import Field, create_model
 
+from trunnion.model.entry import Direction, Part
 from trunnion.model.limits import LimitText
 from trunnion.model.measure_table import MEASURES, MeasureKind
-from trunnion.model.part import Direction, Part
 from trunnion.model.quantity import AnyQuantity
 
 __all__ = ["STATISTICS", "Measure", "Statistic"]

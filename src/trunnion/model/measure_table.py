@@ -1,6 +1,6 @@
 """What a measure may be of: the one table that the file, its checks, every study and the documentation read.
 
-Its course, the numbers position by position, is the function of the same name in `measures.courses.COURSES`.
+Its course, the numbers position by position, is the function of the same name in `measures.curves.COURSES`.
 """
 
 from __future__ import annotations

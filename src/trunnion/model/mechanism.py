@@ -22,11 +22,11 @@ from trunnion.model.checks.check import check_model
 from trunnion.model.contact import has_play, play
 from trunnion.model.csv_table import TableFiles, place_findings, with_points
 from trunnion.model.findings import repair, schema_findings
+from trunnion.model.friction_override import with_law
 from trunnion.model.limit_texts import DIGITS
 from trunnion.model.merge import DEFAULT_LAW
 from trunnion.model.names import nearest
 from trunnion.model.numbers import Numbers
-from trunnion.model.other_law import with_law
 from trunnion.model.parameters import LIMITS, Location
 from trunnion.model.parts import (
     Guide,

@@ -24,6 +24,7 @@ from pydantic_core import CoreSchema
 
 from trunnion.joints.motion import MOTION_LAWS, MotionLaw
 from trunnion.model.cost_parts import Cost, CostOption
+from trunnion.model.entry import FORMS, Direction, Name, Part, Position, forms, known, shape
 from trunnion.model.joint_parts import (
     FRICTION_MODELS,
     JOINT_TYPES,
@@ -39,7 +40,6 @@ from trunnion.model.joint_parts import (
     freedoms,
 )
 from trunnion.model.measure_parts import Measure
-from trunnion.model.part import FORMS, Direction, Name, Part, Position, forms, known, shape
 from trunnion.model.quantity import (
     Angle,
     AngleOrLength,

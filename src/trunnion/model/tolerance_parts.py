@@ -15,8 +15,8 @@ from pydantic import (
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
+from trunnion.model.entry import Part, known
 from trunnion.model.limits import Limits, LimitText
-from trunnion.model.part import Part, known
 from trunnion.model.quantity import AnyQuantity, Dimensionless
 
 __all__ = ["DISTRIBUTIONS", "OPTIONS", "Correlation", "Variation", "VariationDefaults"]

@@ -74,7 +74,7 @@ def dataset_of(
     attributes: Mapping[str, Any],
     along: Mapping[str, Any] | None = None,
 ) -> xr.Dataset:
-    """A result of a kind, see `results.columns`.
+    """A result of a kind, see `results.tables`.
 
     labels: names along its dimensions; attributes: lists and dicts become JSON; along: other coordinates, as xarray
     takes them.

@@ -11,8 +11,8 @@ CSV (and Parquet) have one row a position and flat columns: `time`, `<joint>.rot
 they were given, then `efficiency`, `<driver>.effort_max`, `<joint>.reaction_max`, …, `status`. The play of joints has
 `drive`, `<measure>`, `<measure>.worst_case`, `<measure>.rss`, `<measure>.deviation`, `<measure>.<joint>.worst_case`,
 …. Of tolerances the file's name says which table it holds: one row a measure, or of `x.parameters.csv` one a toleranced
-number, see `results.columns.tolerances`; so it does of a comparison with measurements and of what `identify` finds, see
-`results.columns.comparison` and `results.columns.identification`. What `assemble` finds has one row a position:
+number, see `results.tables.tolerances`; so it does of a comparison with measurements and of what `identify` finds, see
+`results.tables.comparison` and `results.tables.identification`. What `assemble` finds has one row a position:
 `<driver>.coordinate`, `needed_share`, `needed_clearance`, …, `<joint>.uniform_1_x` of end 1, …, `status`. Measured
 courses have one row a condition and position: `condition`, what was set, `phase`, `<channel>.mean`, `.scatter`,
 `.uncertainty`, `.turns`.
@@ -32,7 +32,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from trunnion.errors import Finding, MechanismError
 from trunnion.files import whole
 from trunnion.model.names import guarded
-from trunnion.results.columns import columns, table_of
+from trunnion.results.tables import columns, table_of
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError, Status
-from trunnion.measures.kernel import courses_of
+from trunnion.measures.evaluation import courses_of
 from trunnion.measures.measures import Measure, coordinate_unit, named
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.parameters import measured

@@ -22,10 +22,10 @@ from trunnion.algebra.namespace import Number
 from trunnion.algebra.nested import flat
 from trunnion.joints.clearance import pressed, turned_by_friction
 from trunnion.solve.backward import Backward
+from trunnion.solve.eccentricity_rate import Lanes, part_of, travel
 from trunnion.solve.forward import Travel
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.system import System, rubbing
-from trunnion.solve.travel import Lanes, part_of, travel
 
 if TYPE_CHECKING:
     from trunnion.solve.run import Run

@@ -6,7 +6,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.results.columns import kind_of
+from trunnion.results.tables import kind_of
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.cycle.account import PEZZUTI, inputs, references
+from trunnion.cycle.summary import PEZZUTI, inputs, references
 from trunnion.errors import Status
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.attributes import cited, codes, finding_rows, origin
 from trunnion.results.dataset import Variable, dataset_of, described
-from trunnion.rig.compare.judge import Verdict, difference, expanded, probability, uncertainty_of
-from trunnion.rig.compare.pairs import Compared, Pair
-from trunnion.rig.compare.said import findings_of, gathered, units_set
+from trunnion.rig.compare.assessment import Verdict, difference, expanded, probability, uncertainty_of
+from trunnion.rig.compare.comparison import Compared, Pair
+from trunnion.rig.compare.findings import findings_of, gathered, units_set
 from trunnion.rig.reading.measurement import Condition, Measurement
 from trunnion.solve.friction_method import FrictionMethod
 

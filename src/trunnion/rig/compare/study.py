@@ -15,9 +15,9 @@ import numpy as np
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.names import nearest
-from trunnion.rig.compare.causes import best, causes
-from trunnion.rig.compare.judge import Verdict, judge, uncertainty_of
-from trunnion.rig.compare.pairs import Compared, Efficient, Pair, unmeasured
+from trunnion.rig.compare.assessment import Verdict, judge, uncertainty_of
+from trunnion.rig.compare.comparison import Compared, Efficient, Pair, unmeasured
+from trunnion.rig.compare.error_sources import best, causes
 from trunnion.rig.compare.result import dataset
 from trunnion.rig.modelled import Modelled, check_settings, modelled
 from trunnion.rig.reading.efficiency import Pairs, efficiency_of, load_joints, pairs_of

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from trunnion.errors import Status
 from trunnion.rig.identify.blocks import OWN, Block, shared_zero
-from trunnion.rig.identify.courses import Courses, Model
+from trunnion.rig.identify.signals import Courses, Model
 
 __all__ = ["Fit", "Problem", "Sensor", "fit", "sensors_of"]
 

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from trunnion.model.mechanism import Mechanism
 from trunnion.rig.identify.fit import Problem
+from trunnion.rig.identify.identifiability import Group
 from trunnion.rig.identify.search import Search
-from trunnion.rig.identify.separate import Group
 from trunnion.rig.identify.uncertainty import Spread
 from trunnion.rig.reading.measurement import Measurement
 from trunnion.solve.run import Run

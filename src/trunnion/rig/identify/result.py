@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.cycle.account import references
+from trunnion.cycle.summary import references
 from trunnion.results.attributes import finding_rows, origin
 from trunnion.results.dataset import Variable, dataset_of, described
 from trunnion.rig.compare.result import data_findings, hashed_files
+from trunnion.rig.identify.assessment import Judged
+from trunnion.rig.identify.findings import sentences
 from trunnion.rig.identify.identified import Identified
-from trunnion.rig.identify.judged import Judged
-from trunnion.rig.identify.said import sentences
 from trunnion.rig.identify.uncertainty import CONFIDENCE
 
 if TYPE_CHECKING:

@@ -13,11 +13,11 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.measures.measures import Measure, named
 from trunnion.model.mechanism import Mechanism
 from trunnion.rig.identify.blocks import EFFICIENCY, Block, blocks_of, channels_of, finite
-from trunnion.rig.identify.courses import Model, SeatedModel
 from trunnion.rig.identify.fit import Problem, fit, sensors_of
-from trunnion.rig.identify.held import HoldOut, held_out
+from trunnion.rig.identify.holdout import HoldOut, held_out
+from trunnion.rig.identify.identifiability import inseparable
 from trunnion.rig.identify.search import search
-from trunnion.rig.identify.separate import inseparable
+from trunnion.rig.identify.signals import Model, SeatedModel
 from trunnion.rig.identify.uncertainty import left_over, spread_of
 from trunnion.rig.identify.unknowns import Parameters, described, unknowns
 from trunnion.rig.modelled import check_settings, told_at
@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 from trunnion.rig.identify.identified import Identified
+from trunnion.rig.identify.model_values import values
 from trunnion.rig.identify.result import dataset
-from trunnion.rig.identify.written import values
 
 __all__ = ["identify", "with_estimates"]
 

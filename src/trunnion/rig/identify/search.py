@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.rig.identify.fit import Fit, Problem, fit
-from trunnion.rig.identify.separate import sizes_of
+from trunnion.rig.identify.identifiability import sizes_of
 from trunnion.rig.identify.uncertainty import correlation_factors, lack_of_fit
 
 __all__ = ["Search", "refuse_unusable", "search"]

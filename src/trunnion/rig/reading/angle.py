@@ -16,11 +16,11 @@ from scipy.ndimage import minimum_filter1d, uniform_filter1d
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.units import UnitError
-from trunnion.rig.reading.account import Account, counted, times
-from trunnion.rig.reading.amounts import alike, dimensions
 from trunnion.rig.reading.columns import Table
+from trunnion.rig.reading.log import Account, counted, times
 from trunnion.rig.reading.mapping import AngleSource
 from trunnion.rig.reading.pulses import by_index, index_times, pulses_of
+from trunnion.rig.reading.sensor_quantity import alike, dimensions
 from trunnion.rig.reading.timebase import Timeline
 
 __all__ = ["Coordinate", "coordinate", "seen_edges", "smoothed", "unresolved"]

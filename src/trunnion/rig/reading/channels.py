@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.model.units import UnitError
-from trunnion.rig.reading.account import Account, counted, runs
-from trunnion.rig.reading.amounts import HERTZ, Amount, alike, dimensions
 from trunnion.rig.reading.columns import Column
+from trunnion.rig.reading.log import Account, counted, runs
 from trunnion.rig.reading.mapping import Channel, Filter, Zero
 from trunnion.rig.reading.scale import Scale, default_unit, scale
+from trunnion.rig.reading.sensor_quantity import HERTZ, Amount, alike, dimensions
 from trunnion.rig.reading.timebase import Timeline
 
 __all__ = ["Reading", "Zeroed", "filtered", "mean_uncertainty", "reading", "resolution", "zeroed"]

@@ -12,8 +12,8 @@ from scipy.ndimage import median_filter
 from scipy.special import bdtrc
 
 from trunnion.errors import Severity
-from trunnion.rig.reading.account import Account, counted, places, runs
 from trunnion.rig.reading.columns import Column
+from trunnion.rig.reading.log import Account, counted, places, runs
 
 __all__ = ["Span", "cells", "signal"]
 

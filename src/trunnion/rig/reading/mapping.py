@@ -13,14 +13,14 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BeforeValidator, Field, Tag, ValidationError, WithJsonSchema, model_validator
 
 from trunnion.errors import Finding, MechanismError
+from trunnion.model.entry import Name, Part, forms, problem
 from trunnion.model.file import Lines, place, read_entries
 from trunnion.model.findings import schema_findings
 from trunnion.model.names import nearest
-from trunnion.model.part import Name, Part, forms, problem
 from trunnion.model.quantity import Angle, AnyQuantity, Dimensionless, Quantity, Rate, Time
 from trunnion.model.units import ANGLE, KINDS, UnitError
-from trunnion.rig.reading.amounts import Amount, Frequency, Number, UnitText, alike, dimensions
 from trunnion.rig.reading.scale import MeasureText, Scale, scale
+from trunnion.rig.reading.sensor_quantity import Amount, Frequency, Number, UnitText, alike, dimensions
 
 __all__ = [
     "AngleSource",

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.rig.reading.account import Account, counted, times
+from trunnion.rig.reading.log import Account, counted, times
 from trunnion.rig.reading.mapping import AngleSource
 from trunnion.rig.reading.timebase import GAP, Timeline
 

@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.rig.reading import faults
-from trunnion.rig.reading.account import Account, counted, told
 from trunnion.rig.reading.angle import Coordinate, coordinate
 from trunnion.rig.reading.channels import Reading, Zeroed, filtered, reading, resolution, zeroed
 from trunnion.rig.reading.columns import Table
-from trunnion.rig.reading.courses import Drift, drift, signs, speeds, steady
+from trunnion.rig.reading.log import Account, counted, told
 from trunnion.rig.reading.mapping import DataMapping, File, FromData, Mapped, Zero, read_mapping
 from trunnion.rig.reading.measurement import Accuracy, Condition, Course, Measurement
 from trunnion.rig.reading.settings import Setting, dimension_of, settings, stated
+from trunnion.rig.reading.signal_checks import Drift, drift, signs, speeds, steady
 from trunnion.rig.reading.tables import read_table
 from trunnion.rig.reading.timebase import Timeline, timeline
 from trunnion.rig.reading.turns import DENSE, Turns, cut, resampled, time_mean

@@ -15,13 +15,13 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, Tag, ValidationError
 
 from trunnion.errors import Finding, MechanismError
+from trunnion.model.entry import Name, Part, forms
 from trunnion.model.expression import LITERAL, normalise
 from trunnion.model.file import place, read_entries
 from trunnion.model.findings import schema_findings
 from trunnion.model.names import nearest
-from trunnion.model.part import Name, Part, forms
-from trunnion.rig.reading.amounts import Amount, Frequency, Number
 from trunnion.rig.reading.mapping import FixedAngle, FixedNumber, FixedTime
+from trunnion.rig.reading.sensor_quantity import Amount, Frequency, Number
 
 __all__ = ["FAULTS", "FORMATS", "Accuracy", "Encoder", "Fault", "Idle", "Rig", "Schedule", "Sensor", "placed_in_rig"]
 

@@ -9,11 +9,11 @@ from typing import Annotated
 
 from pydantic import AfterValidator
 
+from trunnion.model.entry import problem
 from trunnion.model.measure_table import MEASURES
 from trunnion.model.names import nearest
-from trunnion.model.part import problem
 from trunnion.model.units import UnitError
-from trunnion.rig.reading.amounts import HERTZ, Amount, Dimensions, alike, dimensions, unit_name
+from trunnion.rig.reading.sensor_quantity import HERTZ, Amount, Dimensions, alike, dimensions, unit_name
 
 __all__ = ["QUANTITIES", "MeasureText", "Scale", "default_unit", "scale"]
 

@@ -6,8 +6,8 @@ import json
 from typing import Any
 
 from trunnion.model.schema import SchemaGenerator
-from trunnion.rig.reading.amounts import Amount
 from trunnion.rig.reading.mapping import DataMapping
+from trunnion.rig.reading.sensor_quantity import Amount
 
 __all__ = ["schema_text"]
 

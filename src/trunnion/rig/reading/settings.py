@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from trunnion.errors import Finding, MechanismError, agreeing, counted
 from trunnion.model.quantity import Quantity
 from trunnion.model.units import Dimension, UnitError
-from trunnion.rig.reading.account import Account
-from trunnion.rig.reading.amounts import Dimensions, dimensions
 from trunnion.rig.reading.columns import Table
+from trunnion.rig.reading.log import Account
 from trunnion.rig.reading.mapping import DataMapping, File, FromData
+from trunnion.rig.reading.sensor_quantity import Dimensions, dimensions
 from trunnion.rig.reading.timebase import Timeline
 
 __all__ = ["Setting", "dimension_of", "settings", "stated"]

@@ -22,9 +22,9 @@ import numpy as np
 
 from trunnion.model.names import unguarded
 from trunnion.model.units import UnitError
-from trunnion.rig.reading.amounts import dimensions
 from trunnion.rig.reading.clock import Clock, is_time
 from trunnion.rig.reading.columns import NOTHING, Column, Table, choose, clock_of, failed, number, numbers
+from trunnion.rig.reading.sensor_quantity import dimensions
 
 __all__ = ["read_csv"]
 

@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.units import UnitError
-from trunnion.rig.reading.account import Account, counted, times
-from trunnion.rig.reading.amounts import dimensions
 from trunnion.rig.reading.clock import Clock
 from trunnion.rig.reading.columns import Column, Table
+from trunnion.rig.reading.log import Account, counted, times
 from trunnion.rig.reading.mapping import TimeBase
+from trunnion.rig.reading.sensor_quantity import dimensions
 
 __all__ = ["Timeline", "timeline"]
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.rig.reading.account import Account, counted
+from trunnion.rig.reading.log import Account, counted
 from trunnion.rig.reading.timebase import GAP, Timeline
 
 __all__ = ["Turns", "cut", "resampled", "time_mean", "turn_means"]

@@ -14,9 +14,9 @@ from trunnion.measures.measures import Measure, named
 from trunnion.results.sentences import told
 from trunnion.rig.modelled import told_at
 from trunnion.rig.reading.rig_file import Rig, Value
-from trunnion.rig.virtual.courses import Sampled, cycle_efficiency, sampled
 from trunnion.rig.virtual.faults import misfits
 from trunnion.rig.virtual.sensors import Channel, resolved
+from trunnion.rig.virtual.true_signals import Sampled, cycle_efficiency, sampled
 from trunnion.solve.run import Run
 
 __all__ = ["Case", "case_names", "case_of", "channels_of", "findings_of", "measures_of", "placed_at", "speed_differs"]

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.errors import Finding
-from trunnion.rig.reading.amounts import Amount, alike, dimensions
 from trunnion.rig.reading.rig_file import Fault, Rig
+from trunnion.rig.reading.sensor_quantity import Amount, alike, dimensions
 from trunnion.rig.virtual.sensors import Channel, stream
 
 __all__ = ["faulty", "misfits"]

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.measure_table import MEASURES
 from trunnion.model.units import UnitError
-from trunnion.rig.reading.amounts import Amount, Dimensions, alike, dimensions
 from trunnion.rig.reading.rig_file import Sensor
+from trunnion.rig.reading.sensor_quantity import Amount, Dimensions, alike, dimensions
 
 __all__ = ["Channel", "Drawn", "draw", "resolved", "stream"]
 

@@ -32,7 +32,7 @@ from trunnion.studies.tolerance.targets import limits
 if TYPE_CHECKING:
     import xarray as xr
 
-from trunnion.studies.allocation.allocated import CLOSE, DEFAULT_YIELD, Allocated, Asked, Choice, share_of
+from trunnion.studies.allocation.outcome import CLOSE, DEFAULT_YIELD, Allocated, Asked, Choice, share_of
 from trunnion.studies.allocation.result import dataset
 
 __all__ = ["allocate", "half_widths"]

@@ -14,8 +14,8 @@ from trunnion.model.prices import Price
 from trunnion.results.attributes import attribute, encoded, figure_rows, finding_rows, findings_of, summary_of
 from trunnion.results.dataset import Variable, described
 from trunnion.statistics.costs import Cost
-from trunnion.studies.allocation import said
-from trunnion.studies.allocation.allocated import Allocated
+from trunnion.studies.allocation import findings
+from trunnion.studies.allocation.outcome import Allocated
 from trunnion.studies.tolerance.targets import MISSED
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ def dataset(found: Allocated, known: xr.Dataset) -> xr.Dataset:
     variables = described(arrays, VARIABLES, {"parameter": units[0] if len(set(units)) == 1 else "", "1/": ""})
     # the criterion says what is to be kept
     kept = [one for one in findings_of(known) if not one.code.startswith(MISSED)]
-    own = list(said.findings_of(found, known))
+    own = list(findings.findings_of(found, known))
     attributes: dict[str, Any] = {
         "kind": "allocation",
         "found": int(found.answer.found),
@@ -80,7 +80,7 @@ def dataset(found: Allocated, known: xr.Dataset) -> xr.Dataset:
         "choices": found.way,
         "proven": int(found.answer.proven),
         "prices": [_plain(price) for price in found.prices.values()],
-        "summary": figure_rows([*said.summary(found, known, arrays), *summary_of(known)]),
+        "summary": figure_rows([*findings.summary(found, known, arrays), *summary_of(known)]),
         "findings": finding_rows([*own, *kept]),
         "missed": [f"{one.where}: {one.what}".lstrip(": ") for one in own if one.severity is Severity.ERROR],
     }

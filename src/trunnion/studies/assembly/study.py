@@ -30,7 +30,7 @@ from trunnion.solve.space.loops import End, Loops, ends_of
 from trunnion.solve.space.starts import Start, start_of
 from trunnion.solve.space.system import SpatialSystem
 from trunnion.solve.system import Cycle, System, Values
-from trunnion.studies.assembly.account import ENOUGH, FIGURES, Fit, Result, labels
+from trunnion.studies.assembly.result import ENOUGH, FIGURES, Fit, Result, labels
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
-from trunnion.cycle.account import references
+from trunnion.cycle.summary import references
 from trunnion.errors import Finding, Status
 from trunnion.measures.measures import Measure
 from trunnion.results.attributes import cited, figure_rows, finding_rows, origin

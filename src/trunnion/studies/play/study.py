@@ -26,8 +26,8 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import Dual, derivative
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.unwrap import unwrap_row
-from trunnion.cycle.account import model_notes
 from trunnion.cycle.positions import check_steps
+from trunnion.cycle.summary import model_notes
 from trunnion.errors import Finding, MechanismError, Severity, Status
 from trunnion.joints.clearance import CLEARANCE_MODELS, Vector, worst_case
 from trunnion.measures.measures import Measure, named, outputs

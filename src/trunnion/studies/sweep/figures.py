@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.cycle.account import sound_positions
 from trunnion.cycle.means import Means
+from trunnion.cycle.summary import sound_positions
 from trunnion.errors import Status
 from trunnion.joints.pairs import PAIRS
 from trunnion.results.dataset import Variable

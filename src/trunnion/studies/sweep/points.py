@@ -20,11 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.namespace import Number
-from trunnion.cycle.account import model_notes
 from trunnion.cycle.means import AVERAGED, Means, means_of, still
 from trunnion.cycle.positions import check_steps, filled, positions
+from trunnion.cycle.summary import model_notes
 from trunnion.errors import Finding, MechanismError, Severity, Status
-from trunnion.measures.kernel import figures_of
+from trunnion.measures.evaluation import figures_of
 from trunnion.model.checks.values import check_values
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.parameters import ParameterSet

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.cycle.account import effort_units, references
+from trunnion.cycle.summary import effort_units, references
 from trunnion.errors import Finding, Severity, Status, counted
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.mechanism import Mechanism

@@ -11,8 +11,8 @@ import numpy as np
 
 from trunnion.cycle.positions import check_steps
 from trunnion.errors import Finding, MechanismError
+from trunnion.measures.evaluation import NumpyKernel
 from trunnion.measures.figures import Reference
-from trunnion.measures.kernel import NumpyKernel
 from trunnion.measures.measures import Measure, named, outputs
 from trunnion.measures.positions import Plan, plan
 from trunnion.model.measure_kinds import place_kind

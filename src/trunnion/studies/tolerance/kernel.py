@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, MechanismError
+from trunnion.measures.evaluation import Courses, NumpyKernel, where_known
 from trunnion.measures.figures import Reference, known, reference
-from trunnion.measures.kernel import Courses, NumpyKernel, where_known
 from trunnion.measures.measures import Measure
 from trunnion.measures.positions import Plan
 from trunnion.solve.backward import Backward

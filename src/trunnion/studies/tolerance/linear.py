@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import Dual
 from trunnion.algebra.namespace import Number
+from trunnion.measures.evaluation import NumpyKernel
 from trunnion.measures.figures import Reference, figure, shown, span
-from trunnion.measures.kernel import NumpyKernel
 from trunnion.measures.measures import Measure
 from trunnion.measures.positions import Plan
 from trunnion.studies.tolerance.effects import Effects

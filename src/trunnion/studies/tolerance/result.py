@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.cycle.account import references
+from trunnion.cycle.summary import references
 from trunnion.errors import Finding, Status
 from trunnion.measures.figures import moment
 from trunnion.measures.measures import Measure
@@ -17,9 +17,9 @@ from trunnion.model.parameters import dimension_kinds
 from trunnion.results.attributes import cited, figure_rows, finding_rows, origin
 from trunnion.results.dataset import Variable, dataset_of, described, driven
 from trunnion.solve.system import System
+from trunnion.studies.tolerance.findings import findings_of, summary
 from trunnion.studies.tolerance.first_order import Study
 from trunnion.studies.tolerance.outcome import Outcome
-from trunnion.studies.tolerance.said import findings_of, summary
 from trunnion.studies.tolerance.sampled import QUANTILES, sampled
 from trunnion.studies.tolerance.targets import MISSED
 

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.errors import Status
+from trunnion.measures.evaluation import Courses, NumpyKernel
 from trunnion.measures.figures import Reference, judged
-from trunnion.measures.kernel import Courses, NumpyKernel
 from trunnion.measures.measures import Measure
 from trunnion.measures.positions import Plan, plan
 from trunnion.model.mechanism import Mechanism

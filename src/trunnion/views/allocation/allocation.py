@@ -15,10 +15,10 @@ from trunnion.views.common.cycle import names
 from trunnion.views.common.table import Table
 from trunnion.views.tolerance.figure import KINDS as OF_TOLERANCES
 from trunnion.views.tolerance.figure import figure as tolerance_figure
+from trunnion.views.tolerance.readings import readings, scaled, share
 from trunnion.views.tolerance.report import Section
 from trunnion.views.tolerance.report import report as tolerance_report
 from trunnion.views.tolerance.tables import tables as tolerance_tables
-from trunnion.views.tolerance.toleranced import readings, scaled, share
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -18,7 +18,7 @@ from trunnion.views.common.cycle import Array
 from trunnion.views.common.figures import INK, MUTED, PALETTE, dress, legend, new
 from trunnion.views.common.lettering import plain
 from trunnion.views.common.quantities import number
-from trunnion.views.tolerance.toleranced import scaled
+from trunnion.views.tolerance.readings import scaled
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -35,7 +35,7 @@ from trunnion.views.common.figures import (
 )
 from trunnion.views.common.lettering import Sheet, plain
 from trunnion.views.common.quantities import number
-from trunnion.views.compare.compared import (
+from trunnion.views.compare.comparison import (
     coverage_of,
     drive,
     index_of,
@@ -47,7 +47,7 @@ from trunnion.views.compare.compared import (
     varied,
     verdict,
 )
-from trunnion.views.sweep.swept import Scale, cause
+from trunnion.views.sweep.scales import Scale, cause
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from trunnion.views.compare.compared import coverage_of
+from trunnion.views.compare.comparison import coverage_of
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -16,7 +16,7 @@ import numpy as np
 from trunnion.results.attributes import attribute
 from trunnion.views.common.bundle import web_text
 from trunnion.views.common.cycle import names
-from trunnion.views.compare.compared import label, units
+from trunnion.views.compare.comparison import label, units
 from trunnion.views.compare.figure import efficiency, panels, small
 from trunnion.views.compare.notes import definitions
 from trunnion.views.compare.tables import conditions, efficiencies, files, headline, results, sensors, verdicts

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from trunnion.results.attributes import attribute
-from trunnion.rig.compare.judge import Verdict
+from trunnion.rig.compare.assessment import Verdict
 from trunnion.views.common.cycle import Array, names
 from trunnion.views.common.quantities import number, prefixed
 from trunnion.views.common.table import Table
-from trunnion.views.compare.compared import coverage_of, scale_of, sets, setting, text, units, verdict
+from trunnion.views.compare.comparison import coverage_of, scale_of, sets, setting, text, units, verdict
 from trunnion.views.rig.conditions import shortened
 
 if TYPE_CHECKING:

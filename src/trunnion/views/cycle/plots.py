@@ -48,8 +48,8 @@ from trunnion.views.common.figures import (
 from trunnion.views.common.lettering import plain
 from trunnion.views.common.peaks import ease, peak, usual_peak
 from trunnion.views.common.quantities import prefixed, quantity
-from trunnion.views.cycle.as_built import has
-from trunnion.views.cycle.error_plot import error
+from trunnion.views.cycle.deviations import has
+from trunnion.views.cycle.deviations_plot import error
 from trunnion.views.cycle.measures_plot import drawn, measures
 from trunnion.views.cycle.seat_curves import beta, described
 from trunnion.views.cycle.seat_plot import seat

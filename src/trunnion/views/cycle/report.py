@@ -22,7 +22,7 @@ from trunnion.results.figure import MORE_THAN, Figure
 from trunnion.views.common.bundle import bundle, web_text
 from trunnion.views.common.cycle import abscissa, column, intervals, names
 from trunnion.views.common.quantities import number, quantity
-from trunnion.views.cycle.built_tables import error_rows, loss_rows
+from trunnion.views.cycle.deviations_tables import error_rows, loss_rows
 from trunnion.views.cycle.scene import scene
 
 if TYPE_CHECKING:

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from trunnion.results.attributes import attribute
 from trunnion.views.common.cycle import abscissa, column, intervals, layout, names, numbers, series
 from trunnion.views.common.peaks import ease
-from trunnion.views.cycle.as_built import losses
-from trunnion.views.cycle.built_scene import built
+from trunnion.views.cycle.deviations import losses
+from trunnion.views.cycle.deviations_scene import built
 from trunnion.views.space.bodies import is_spatial, without_noise
 from trunnion.views.space.scene import space_scene
 

@@ -15,8 +15,8 @@ from trunnion.views.common.cycle import Abscissa, Array, abscissa, column, names
 from trunnion.views.common.figures import PALETTE, along, curve, legend, new, shade, style_of
 from trunnion.views.common.lettering import plain
 from trunnion.views.common.quantities import prefixed
-from trunnion.views.cycle.as_built import JUMP, NOWHERE, Seats, broken, continued, losses, need, seated
-from trunnion.views.cycle.error_plot import LOST
+from trunnion.views.cycle.deviations import JUMP, NOWHERE, Seats, broken, continued, losses, need, seated
+from trunnion.views.cycle.deviations_plot import LOST
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -20,7 +20,7 @@ from trunnion.views.common.cycle import Abscissa, Array, abscissa
 from trunnion.views.common.figures import INK, MUTED, PALETTE, SHADE, dress, new
 from trunnion.views.common.lettering import plain
 from trunnion.views.common.quantities import number, prefixed, quantity
-from trunnion.views.cycle.as_built import Seats, need, seated
+from trunnion.views.cycle.deviations import Seats, need, seated
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -12,7 +12,7 @@ from trunnion.views.common.cycle import Array, names
 from trunnion.views.common.figures import INK, MUTED, PALETTE, SHADE, dress, legend, new
 from trunnion.views.common.lettering import plain
 from trunnion.views.common.quantities import prefixed
-from trunnion.views.identify.identified import Estimate, channels, conditions, curve_of, estimates
+from trunnion.views.identify.identification import Estimate, channels, conditions, curve_of, estimates
 from trunnion.views.rig.conditions import shortened
 
 if TYPE_CHECKING:

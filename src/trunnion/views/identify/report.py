@@ -17,7 +17,7 @@ from trunnion.views.common.table import Table
 from trunnion.views.compare.tables import files
 from trunnion.views.cycle.report import said
 from trunnion.views.identify.figure import figure
-from trunnion.views.identify.identified import estimates
+from trunnion.views.identify.identification import estimates
 from trunnion.views.identify.tables import budget, correlations, estimated, fits, held_out, sensors
 from trunnion.views.tolerance.report import source, template
 

@@ -10,7 +10,7 @@ import numpy as np
 from trunnion.views.common.cycle import names
 from trunnion.views.common.quantities import prefixed
 from trunnion.views.common.table import Table
-from trunnion.views.identify.identified import Estimate, channels, conditions, estimates, percent
+from trunnion.views.identify.identification import Estimate, channels, conditions, estimates, percent
 from trunnion.views.rig.conditions import shortened
 
 if TYPE_CHECKING:

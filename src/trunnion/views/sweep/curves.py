@@ -15,7 +15,7 @@ from trunnion.views.common.cycle import Array
 from trunnion.views.common.figures import INK, MUTED, SHADE, outside, style_of
 from trunnion.views.common.lettering import plain
 from trunnion.views.sweep.panels import ALIKE, Board, Field, Panel, ends, on_scale, ring, scale_of_colours, tell, ticks
-from trunnion.views.sweep.swept import Scale, cause
+from trunnion.views.sweep.scales import Scale, cause
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from trunnion.errors import Status
-from trunnion.results.columns.studies import swept as figures
-from trunnion.views.sweep.swept import Arrangement, arrange, cause, grid, statuses, thinned
+from trunnion.results.tables.studies import swept as figures
+from trunnion.views.sweep.scales import Arrangement, arrange, cause, grid, statuses, thinned
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -10,7 +10,7 @@ import numpy as np
 from trunnion.views.common.cycle import names
 from trunnion.views.common.figures import INK, MUTED, PALETTE, dress, legend
 from trunnion.views.common.lettering import plain
-from trunnion.views.tolerance.toleranced import Contribution, Reading
+from trunnion.views.tolerance.readings import Contribution, Reading
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -10,7 +10,7 @@ from trunnion.views.common.figures import INK, MUTED, WIDTH, new
 from trunnion.views.common.lettering import plain
 from trunnion.views.tolerance.bars import contributions, rows_of, rows_of_sobol, sobol
 from trunnion.views.tolerance.plots import convergence, envelope, histogram
-from trunnion.views.tolerance.toleranced import Reading, readings
+from trunnion.views.tolerance.readings import Reading, readings
 
 if TYPE_CHECKING:
     import xarray as xr

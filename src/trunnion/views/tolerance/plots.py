@@ -13,7 +13,7 @@ from trunnion.statistics import intervals
 from trunnion.views.common.cycle import Abscissa, Array
 from trunnion.views.common.figures import INK, MUTED, PALETTE, SHADE, along, curve, dress, legend
 from trunnion.views.common.lettering import plain
-from trunnion.views.tolerance.toleranced import OUTER, Reading, failures, share, share_interval, share_parts
+from trunnion.views.tolerance.readings import OUTER, Reading, failures, share, share_interval, share_parts
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

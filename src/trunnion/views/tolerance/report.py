@@ -19,6 +19,7 @@ from trunnion.views.common.bundle import web_text
 from trunnion.views.cycle.report import inputs_of, said
 from trunnion.views.tolerance.figure import KINDS, drawable, figure
 from trunnion.views.tolerance.notes import NOTES, ON_SAMPLES
+from trunnion.views.tolerance.readings import Reading, methods, readings
 from trunnion.views.tolerance.tables import (
     Table,
     contributions,
@@ -30,7 +31,6 @@ from trunnion.views.tolerance.tables import (
     inputs,
     overview,
 )
-from trunnion.views.tolerance.toleranced import Reading, methods, readings
 
 if TYPE_CHECKING:
     import xarray as xr

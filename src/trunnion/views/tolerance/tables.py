@@ -12,7 +12,7 @@ from trunnion.views.common.cycle import names
 from trunnion.views.common.quantities import number
 from trunnion.views.common.table import Table
 from trunnion.views.tolerance.plots import outer, rss_label
-from trunnion.views.tolerance.toleranced import (
+from trunnion.views.tolerance.readings import (
     Contribution,
     Reading,
     failures,
@@ -23,7 +23,7 @@ from trunnion.views.tolerance.toleranced import (
     share_interval,
     share_parts,
 )
-from trunnion.views.tolerance.toleranced import with_unit as limits_of
+from trunnion.views.tolerance.readings import with_unit as limits_of
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -9,7 +9,7 @@ from trunnion.views.common.quantities import prefixed
 
 if TYPE_CHECKING:
     from trunnion.cycle.inspect import GearPair
-    from trunnion.solve.assemblies import Choice, Way
+    from trunnion.solve.assembly_modes import Choice, Way
 
 __all__ = ["gear_line", "lines", "places", "some"]
 

@@ -13,7 +13,7 @@ from trunnion.views.common.figures import along, curve, frame_peak, legend, new,
 from trunnion.views.common.lettering import plain
 from trunnion.views.common.peaks import ease, usual_peak
 from trunnion.views.common.quantities import prefixed
-from trunnion.views.cycle.as_built import Output, angle_scale, has, losses, need, outputs, point_errors, worst_points
+from trunnion.views.cycle.deviations import Output, angle_scale, has, losses, need, outputs, point_errors, worst_points
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -11,14 +11,14 @@ from trunnion.errors import Finding, Severity
 from trunnion.results.attributes import attribute
 from trunnion.results.figure import Figure
 from trunnion.results.sentences import told
-from trunnion.studies.allocation.allocated import CLOSE, DEFAULT_YIELD, share_of
+from trunnion.studies.allocation.outcome import CLOSE, DEFAULT_YIELD, share_of
 from trunnion.studies.allocation.problem import SHOWN
 from trunnion.studies.tolerance.targets import limits
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from trunnion.studies.allocation.allocated import Allocated
+    from trunnion.studies.allocation.outcome import Allocated
 
 __all__ = ["findings_of", "summary"]
 

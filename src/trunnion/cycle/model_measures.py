@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.unwrap import unwrap_row
 from trunnion.errors import Finding, MechanismError, Severity
-from trunnion.measures.kernel import courses_of, figures_of
+from trunnion.measures.evaluation import courses_of, figures_of
 from trunnion.measures.measures import Measure, named
 from trunnion.measures.positions import plan
 from trunnion.results.attributes import encoded

@@ -13,11 +13,11 @@ from trunnion.algebra.dual import primal
 from trunnion.cycle.analyse import analyse
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.mechanism import Mechanism
-from trunnion.solve.assemblies import Choice, Way, choices, put_together
+from trunnion.solve.assembly_modes import Choice, Way, choices, put_together
 from trunnion.solve.forward import forward
 from trunnion.solve.run import Run, prepare
-from trunnion.views.assembly.space import space_ways
-from trunnion.views.assembly.ways import some
+from trunnion.views.assembly.mode_drawings_space import space_ways
+from trunnion.views.assembly.modes import some
 from trunnion.views.common.cycle import Array, layout
 from trunnion.views.common.drawing import Picture, framed, labels, sketch
 from trunnion.views.common.figures import INK, MUTED, RULE, new

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from trunnion.errors import Status
 from trunnion.results.attributes import attribute
-from trunnion.results.columns.column import Column, column, status_column, time_column
+from trunnion.results.tables.column import Column, column, status_column, time_column
 
 if TYPE_CHECKING:
     import xarray as xr

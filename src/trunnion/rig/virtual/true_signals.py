@@ -17,11 +17,11 @@ from trunnion.cycle.positions import positions
 from trunnion.errors import Status
 from trunnion.measures.measures import Measure
 from trunnion.solve.backward import Backward
+from trunnion.solve.eccentricity_rate import lanes
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run
 from trunnion.solve.seating import settle
 from trunnion.solve.status import status_of
-from trunnion.solve.travel import lanes
 
 __all__ = ["MOST_EXACT", "Sampled", "Solved", "cycle_efficiency", "phases", "sampled", "solved"]
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.cycle import contact_loss, diagnosis, near_locking
-from trunnion.cycle.asbuilt import error_figures
+from trunnion.cycle.deviations import error_figures
 from trunnion.cycle.means import Means
 from trunnion.cycle.scene import DRAWN
 from trunnion.errors import Finding, Severity, Status
@@ -35,8 +35,8 @@ if TYPE_CHECKING:
     from trunnion.cycle.positions import Positions
     from trunnion.solve.run import Run
 
+from trunnion.cycle.model_measures import watched
 from trunnion.cycle.variables import fill_of
-from trunnion.cycle.watched import watched
 from trunnion.solve.loads import useful_loads
 
 __all__ = [

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.rig.reading.account import Account, counted
+from trunnion.rig.reading.log import Account, counted
 from trunnion.rig.reading.mapping import Channel
 from trunnion.rig.reading.turns import Turns, turn_means
 

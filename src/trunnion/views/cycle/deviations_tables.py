@@ -9,7 +9,7 @@ import numpy as np
 from trunnion.results.attributes import attribute
 from trunnion.views.common.cycle import Abscissa, Array, abscissa, column, mean_friction, names, valid
 from trunnion.views.common.quantities import number, quantity
-from trunnion.views.cycle.as_built import angle_scale, losses, outputs, worst_points
+from trunnion.views.cycle.deviations import angle_scale, losses, outputs, worst_points
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from trunnion.results.columns import comparison, cycle, identification, studies, tolerances
-from trunnion.results.columns.column import Column, whole
+from trunnion.results.tables import comparison, cycle, identification, studies, tolerances
+from trunnion.results.tables.column import Column, whole
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -8,7 +8,7 @@ import numpy as np
 
 from trunnion.joints.pairs import PAIRS
 from trunnion.results.attributes import attribute
-from trunnion.results.columns.column import Column, column, status_column, time_column, vector
+from trunnion.results.tables.column import Column, column, status_column, time_column, vector
 
 if TYPE_CHECKING:
     import xarray as xr

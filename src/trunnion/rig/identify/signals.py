@@ -19,6 +19,7 @@ from trunnion.measures.measures import Measure, coordinate_unit
 from trunnion.rig.identify.unknowns import Unknown
 from trunnion.solve import shifts
 from trunnion.solve.backward import Backward
+from trunnion.solve.eccentricity_rate import lanes
 from trunnion.solve.forward import Forward, posed
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
@@ -26,7 +27,6 @@ from trunnion.solve.seating import settle
 from trunnion.solve.seats import given_offsets
 from trunnion.solve.status import pose_status, status_of
 from trunnion.solve.system import sticking
-from trunnion.solve.travel import lanes
 
 __all__ = ["Courses", "Model", "Said", "SeatedModel"]
 

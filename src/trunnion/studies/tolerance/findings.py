@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.cycle.account import model_notes
+from trunnion.cycle.summary import model_notes
 from trunnion.errors import Finding, Severity, Status
 from trunnion.model.checks.values import NOT_NEGATIVE
 from trunnion.results.figure import Figure

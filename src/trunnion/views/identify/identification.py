@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from trunnion.results.attributes import attribute
-from trunnion.rig.identify.amounts import decimals, scaled
+from trunnion.rig.identify.number_text import decimals, scaled
 from trunnion.views.common.cycle import Array, names
 
 if TYPE_CHECKING:

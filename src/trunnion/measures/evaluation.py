@@ -16,12 +16,12 @@ from trunnion.measures.figures import known, reference
 from trunnion.measures.measures import Measure
 from trunnion.measures.positions import plan
 from trunnion.solve.backward import Backward
+from trunnion.solve.eccentricity_rate import lanes
 from trunnion.solve.forward import Forward, forward, posed
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.run import Run
 from trunnion.solve.seating import settle
 from trunnion.solve.status import pose_status, status_of
-from trunnion.solve.travel import lanes
 
 __all__ = ["Courses", "NumpyKernel", "courses_of", "figures_of", "where_known"]
 

@@ -16,9 +16,9 @@ from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import core_schema
 
+from trunnion.model.entry import problem
 from trunnion.model.expression import normalise
 from trunnion.model.names import nearest
-from trunnion.model.part import problem
 from trunnion.model.units import UnitError, root, si_unit, unit
 
 __all__ = [

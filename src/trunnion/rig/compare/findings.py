@@ -11,18 +11,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from trunnion.cycle.account import inputs, model_notes
+from trunnion.cycle.summary import inputs, model_notes
 from trunnion.errors import Finding, Severity, Status, counted
 from trunnion.model.expression import LITERAL
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.names import as_key
 from trunnion.model.units import unit as unit_of
 from trunnion.results.sentences import told
-from trunnion.rig.compare.causes import KINDS, Cause
-from trunnion.rig.compare.judge import Verdict, going_on
+from trunnion.rig.compare.assessment import Verdict, going_on
+from trunnion.rig.compare.error_sources import KINDS, Cause
 
 if TYPE_CHECKING:
-    from trunnion.rig.compare.pairs import Compared, Pair
+    from trunnion.rig.compare.comparison import Compared, Pair
 
 __all__ = ["findings_of", "gathered", "other_speed", "said", "units_set"]
 

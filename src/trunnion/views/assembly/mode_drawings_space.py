@@ -12,8 +12,8 @@ import numpy as np
 from trunnion.cycle.analyse import analyse
 from trunnion.errors import MechanismError
 from trunnion.model.mechanism import Mechanism
-from trunnion.solve.assemblies import Choice, Way, put_together
-from trunnion.views.assembly.ways import some
+from trunnion.solve.assembly_modes import Choice, Way, put_together
+from trunnion.views.assembly.modes import some
 from trunnion.views.common.figures import INK, MUTED, RULE, new
 from trunnion.views.common.lettering import plain
 from trunnion.views.space.bodies import Space, space

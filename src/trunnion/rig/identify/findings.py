@@ -8,11 +8,11 @@ import numpy as np
 
 from trunnion.errors import Finding, Severity, Status
 from trunnion.results.sentences import told
-from trunnion.rig.compare.said import other_speed
-from trunnion.rig.identify.amounts import amount, share
+from trunnion.rig.compare.findings import other_speed
+from trunnion.rig.identify.assessment import Judged
 from trunnion.rig.identify.blocks import OWN, shared_zero
-from trunnion.rig.identify.judged import Judged
-from trunnion.rig.identify.separate import Combination, Group, known_of, sizes_of
+from trunnion.rig.identify.identifiability import Combination, Group, known_of, sizes_of
+from trunnion.rig.identify.number_text import amount, share
 from trunnion.rig.identify.uncertainty import RANDOM, quantile
 
 __all__ = ["sentences"]

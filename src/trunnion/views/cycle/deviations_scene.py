@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.views.common.cycle import Array, abscissa, column, names, numbers
-from trunnion.views.cycle.as_built import (
+from trunnion.views.cycle.deviations import (
     JUMP,
     Seats,
     angle_scale,

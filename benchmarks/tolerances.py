@@ -26,7 +26,7 @@ from benchmarks import durango as d
 from benchmarks.run import peak_memory
 from trunnion.model.mechanism import Mechanism
 from trunnion.studies.tolerance import runner
-from trunnion.studies.tolerance.first_order import Study, study
+from trunnion.studies.tolerance.first_order import ToleranceStudy, study
 from trunnion.studies.tolerance.sampling import Method, Sampling
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
@@ -43,7 +43,7 @@ def fourbar(friction: bool = True) -> Mechanism:
     return mechanism if friction else mechanism.with_friction("off")
 
 
-def sampling(found: Study, samples: int, method: Method = "monte-carlo", seed: int = 1) -> Sampling:
+def sampling(found: ToleranceStudy, samples: int, method: Method = "monte-carlo", seed: int = 1) -> Sampling:
     return found.sampling(method, samples, seed)
 
 

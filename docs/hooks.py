@@ -534,7 +534,7 @@ def formats_table() -> str:
 
 def codes_table() -> str:
     """The codes of findings about results, with the sentence where it is a plain text."""
-    from trunnion.results.sentences.told import SENTENCES
+    from trunnion.results.sentences.codes import SENTENCES
 
     rows = [(_code(code), str(one.severity), one.what if isinstance(one.what, str) else "")
             for code, one in sorted(SENTENCES.items())]  # fmt: skip

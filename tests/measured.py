@@ -7,14 +7,14 @@ from typing import Any
 
 from trunnion.measures.figures import Reference, figure, reference
 from trunnion.measures.measures import Measure
-from trunnion.measures.positions import Plan, plan
+from trunnion.measures.positions import PositionPlan, plan
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.run import Run
 
 __all__ = ["courses", "figures", "references"]
 
 
-def references(run: Run, measures: Sequence[Measure], steps: int) -> tuple[Plan, dict[str, Reference]]:
+def references(run: Run, measures: Sequence[Measure], steps: int) -> tuple[PositionPlan, dict[str, Reference]]:
     """The positions of measures, and what they are of the nominal mechanism."""
     found = plan(run, measures, steps)
     back = run.solve(found.times, method=FrictionMethod(margin_up_to=MARGIN))
@@ -24,7 +24,9 @@ def references(run: Run, measures: Sequence[Measure], steps: int) -> tuple[Plan,
     }
 
 
-def courses(run: Run, positions: Plan, measures: Sequence[Measure], changes: Mapping[str, Any]) -> dict[str, Any]:
+def courses(
+    run: Run, positions: PositionPlan, measures: Sequence[Measure], changes: Mapping[str, Any]
+) -> dict[str, Any]:
     """The courses of mechanisms with other numbers."""
     values = run.system.mechanism.parameters(changes) if changes else run.values
     back = run.solve(positions.moved(values), values, FrictionMethod(margin_up_to=MARGIN))

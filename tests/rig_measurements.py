@@ -11,7 +11,7 @@ import numpy as np
 from mechanisms import four_bar, model
 from trunnion import FrictionMethod, Mechanism
 from trunnion.rig.modelled import modelled
-from trunnion.rig.reading.measurement import Accuracy, Condition, Course, Measurement
+from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal
 
 CHANNELS = {"torque": "effort:A", "speed": "rate:A", "brake": "load:brake", "out": "rate:D", "angle": "rotation:D"}
 SURE = Accuracy()
@@ -34,9 +34,9 @@ def exact(mechanism: Mechanism, values: tuple[tuple[str, float], ...], names: tu
     return phase, modelled(mechanism, condition, {one: CHANNELS[one] for one in names}, FrictionMethod()).courses
 
 
-def course(channel: str, turns: Any, accuracy: Accuracy = SURE) -> Course:
+def course(channel: str, turns: Any, accuracy: Accuracy = SURE) -> Signal:
     measures = CHANNELS[channel]
-    return Course(channel, measures, UNITS[measures.partition(":")[0]], turns, accuracy)
+    return Signal(channel, measures, UNITS[measures.partition(":")[0]], turns, accuracy)
 
 
 def measured(

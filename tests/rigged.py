@@ -13,7 +13,7 @@ from scipy.signal import butter, sosfiltfilt
 import trunnion
 from trunnion.measures.evaluation import NumpyKernel
 from trunnion.measures.measures import named
-from trunnion.rig.reading.measurement import Accuracy, Condition, Course, Measurement
+from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal
 from trunnion.solve.friction_method import FrictionMethod
 
 __all__ = ["Sensors", "True_", "truth"]
@@ -63,7 +63,7 @@ class True_:  # noqa: N801
                 if sensors.step:
                     read = np.round(read / (sensors.step * size[name])) * sensors.step * size[name]
                 accuracy = Accuracy(sensors.zero * size[name], sensors.gain, sensors.step * size[name])
-                courses[name] = Course(name, measures, self.units[name], read.reshape(turns, -1), accuracy)
+                courses[name] = Signal(name, measures, self.units[name], read.reshape(turns, -1), accuracy)
             conditions.append(Condition(f"run-{k + 1}", values, self.phase, courses))
         return Measurement("simulated", tuple(conditions))
 

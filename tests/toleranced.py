@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from mechanisms_parts import Data, prismatic, revolute, slide
 from trunnion import Mechanism
-from trunnion.studies.tolerance.first_order import Study, study
+from trunnion.studies.tolerance.first_order import ToleranceStudy, study
 from trunnion.studies.tolerance.inputs import inputs_of
 from trunnion.studies.tolerance.sampling import Sampler, Sampling
 
@@ -197,13 +197,13 @@ def slopes(of: Callable[..., Any], at: Mapping[str, float], step: float = 1e-6) 
     return np.array(found)
 
 
-def many(mechanism: Mechanism, samples: int = 512, **options: Any) -> tuple[Study, Sampler]:
+def many(mechanism: Mechanism, samples: int = 512, **options: Any) -> tuple[ToleranceStudy, Sampler]:
     """A study and what draws and analyses samples of it; options of `study`."""
     found = study(mechanism, **options)
     return found, sampler(found, samples)
 
 
-def sampler(found: Study, samples: int = 512, method: Any = "monte-carlo", seed: int = 1) -> Sampler:
+def sampler(found: ToleranceStudy, samples: int = 512, method: Any = "monte-carlo", seed: int = 1) -> Sampler:
     """What draws samples of a study, without the first order that a run of it starts with."""
     unknown = [(np.zeros(1), np.ones(1))] * len(found.measures)
     job = Sampling(

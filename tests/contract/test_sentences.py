@@ -10,12 +10,12 @@ import pytest
 
 from trunnion.errors import Finding, Severity
 from trunnion.results.attributes import finding_rows
-from trunnion.results.sentences import told
+from trunnion.results.sentences import finding_for
+from trunnion.results.sentences.codes import SENTENCES
 from trunnion.results.sentences.cycle import CYCLE
 from trunnion.results.sentences.rig import RIG
 from trunnion.results.sentences.structure import STRUCTURE
 from trunnion.results.sentences.studies import STUDIES
-from trunnion.results.sentences.told import SENTENCES
 
 
 def test_no_code_is_given_twice() -> None:
@@ -34,16 +34,16 @@ def test_a_code_has_a_sentence(code: str) -> None:
 
 
 def test_a_finding_is_told_by_its_figures() -> None:
-    one = told("effort.peak_missed", "drivers.A", rms=2.0, largest=1.5, unit="N m")
+    one = finding_for("effort.peak_missed", "drivers.A", rms=2.0, largest=1.5, unit="N m")
     assert (one.code, one.where, one.severity) == ("effort.peak_missed", "drivers.A", Severity.WARNING)
     assert one.figures == {"rms": 2.0, "largest": 1.5, "unit": "N m"}
     assert "2 N m, is above the largest at any position, 1.5 N m" in one.what
 
 
 def test_lists_counts_and_the_infinite_are_told_in_words() -> None:
-    assert told("model.point_mass", links=["a", "b"]).what.startswith("a, b have a mass")
-    assert "2 other solutions" in told("friction.other_solutions", count=2, at="at 3°").what
-    endless = told("position.near_singular", at="at 3°", condition=float("inf"))
+    assert finding_for("model.point_mass", links=["a", "b"]).what.startswith("a, b have a mass")
+    assert "2 other solutions" in finding_for("friction.other_solutions", count=2, at="at 3°").what
+    endless = finding_for("position.near_singular", at="at 3°", condition=float("inf"))
     assert endless.what.endswith("up to ∞")
     assert json.loads(json.dumps(finding_rows([endless]), allow_nan=False))[0]["figures"]["condition"] is None
 

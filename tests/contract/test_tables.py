@@ -15,7 +15,7 @@ from trunnion.errors import Status
 from trunnion.groups import GROUPS
 from trunnion.joints.clearance import CLEARANCE_MODELS, pressed, worst_case
 from trunnion.joints.friction import FRICTION_LAWS
-from trunnion.joints.pairs import PAIRS, Load
+from trunnion.joints.pairs import PAIRS, PlanarContactLoad
 from trunnion.model.contact import has_guide, has_pin, motions
 
 loads = st.floats(0, 1e6)
@@ -125,8 +125,8 @@ def test_a_pair_about_one_axis_can_be_driven(name: str) -> None:
     assert not (has_pin(name) and has_guide(name))
 
 
-def load_of(turn: float | None) -> Load:
-    return Load() if turn is None else Load((-np.sin(turn), np.cos(turn)), 0.37)
+def load_of(turn: float | None) -> PlanarContactLoad:
+    return PlanarContactLoad() if turn is None else PlanarContactLoad((-np.sin(turn), np.cos(turn)), 0.37)
 
 
 @given(st.one_of(st.none(), st.floats(-3, 3)), components, components, components, st.floats(0.01, 50))
@@ -172,7 +172,7 @@ def test_gradient_of_the_normal_load(turn: float | None, x: float, y: float, m: 
 
 
 def test_gradient_without_load_is_zero() -> None:
-    assert [float(g) for g in Load().gradient((0.0, 0.0, 0.0), 0.0)] == [0.0, 0.0, 0.0]
+    assert [float(g) for g in PlanarContactLoad().gradient((0.0, 0.0, 0.0), 0.0)] == [0.0, 0.0, 0.0]
 
 
 # ---- play of pairs --------------------------------------------------------------------------------------------

@@ -11,17 +11,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from trunnion.statistics.costs import Cost
-from trunnion.studies.allocation.problem import Criterion, Problem
+from trunnion.studies.allocation.problem import AllocationProblem, Criterion
 from trunnion.studies.allocation.solve import solve
 
 SEEDS = st.integers(0, 10**6)
 CRITERIA = st.sampled_from(["worst-case", "rss", "yield"])
 
 
-def case(seed: int, criterion: Criterion) -> Problem:
+def case(seed: int, criterion: Criterion) -> AllocationProblem:
     """Six rows, four tolerances."""
     rng = np.random.default_rng(seed)
-    return Problem(
+    return AllocationProblem(
         bought(random_costs(rng, 4), most=0.3), rows(rng.normal(size=(6, 4)), rng.uniform(0.1, 0.5, 6)), criterion
     )
 

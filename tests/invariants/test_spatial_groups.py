@@ -16,7 +16,7 @@ from trunnion.algebra.dual import derivative, seed
 from trunnion.algebra.nested import flat
 from trunnion.algebra.space import ORIGIN, Frame, Screw, added, compose, element, minus, moment_at, power, relative
 from trunnion.groups.cylindrical_dyad import CylindricalDyad
-from trunnion.groups.spatial import Pose, SpatialGroup
+from trunnion.groups.spatial import SpatialGroup, SpatialPose
 from trunnion.groups.spatial_tree import Element
 from trunnion.groups.tree import OUTER, GroupJoint
 from trunnion.joints.spatial import MOTIONS
@@ -129,7 +129,7 @@ def test_the_closed_form_of_the_dyad_is_the_general_group(sides: tuple[tuple[int
     assert solved > LANES
 
 
-def answers(group: SpatialGroup, pose: Pose, outer: Any, outer_second: Any, loads: Any) -> Array:
+def answers(group: SpatialGroup, pose: SpatialPose, outer: Any, outer_second: Any, loads: Any) -> Array:
     """Everything that a group finds, (number, lane)."""
     speeds = group.rates(pose, outer)
     twists = group.twists(pose, outer, speeds)
@@ -175,7 +175,7 @@ def loop(kinds: tuple[str, ...], at: Array) -> tuple[SpatialGroup, list[Element]
     return group, elements, start, float(q[0][0])
 
 
-def follow(group: SpatialGroup, elements: list[Element], start: list[Any], drive: Array) -> list[Pose]:
+def follow(group: SpatialGroup, elements: list[Element], start: list[Any], drive: Array) -> list[SpatialPose]:
     """Poses one after the other from the first."""
     poses = []
     for value in drive:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.statistics.costs import Cost
-from trunnion.studies.allocation.problem import Contribution, Criterion, Effects, Option, Problem
+from trunnion.studies.allocation.problem import AllocationProblem, Contribution, Criterion, Option, RowEffects
 
 Array = NDArray[np.float64]
 FOUR_BAR = (100.0, 30.0, 90.0, 70.0)  # ground, crank, coupler, rocker, mm
@@ -35,20 +35,22 @@ def rocker_sensitivities(crank: Array) -> Array:
     return np.asarray(np.stack(parts) / lever, float).T
 
 
-def four_bar(criterion: Criterion = "worst-case", positions: int = 72, limit: float = np.radians(0.1)) -> Problem:
+def four_bar(
+    criterion: Criterion = "worst-case", positions: int = 72, limit: float = np.radians(0.1)
+) -> AllocationProblem:
     """The four-bar of THEORY 7: rocker angle within ± limit at all positions; half widths in mm."""
     effect = rocker_sensitivities(np.arange(positions) * 2 * np.pi / positions)
     bought = tuple(
         Contribution(f"l{i + 1}", cost=Cost("power", {"B": price, "k": 0.45, "unit": 1.0}))
         for i, price in enumerate(PRICES)
     )
-    return Problem(bought, rows(effect, limit), criterion)
+    return AllocationProblem(bought, rows(effect, limit), criterion)
 
 
-def rows(effect: Array, limit: float | Array, **more: Any) -> Effects:
+def rows(effect: Array, limit: float | Array, **more: Any) -> RowEffects:
     """Rows with limits ± limit."""
     each = np.broadcast_to(np.asarray(limit, float), len(effect)).copy()
-    return Effects(np.abs(effect), -each, each, half=effect, **more)
+    return RowEffects(np.abs(effect), -each, each, half=effect, **more)
 
 
 def bought(costs: list[Cost], **bounds: float) -> tuple[Contribution, ...]:

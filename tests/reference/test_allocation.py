@@ -13,13 +13,13 @@ from scipy.optimize import NonlinearConstraint, minimize
 
 from trunnion.errors import MechanismError
 from trunnion.statistics.costs import Cost
-from trunnion.studies.allocation.problem import Answer, Contribution, Criterion, Effects, Problem
+from trunnion.studies.allocation.problem import AllocationProblem, Answer, Contribution, Criterion, RowEffects
 from trunnion.studies.allocation.solve import solve, trade_off
 
 Array = NDArray[np.float64]
 
 
-def slsqp(problem: Problem, start: Array) -> tuple[float, Array]:
+def slsqp(problem: AllocationProblem, start: Array) -> tuple[float, Array]:
     """SciPy's SLSQP from a start, in log t; half widths and cost."""
     costs = [one.cost for one in problem.contributions]
 
@@ -71,7 +71,7 @@ def test_one_row_has_its_closed_form(criterion: Criterion, seed: int) -> None:
     rng = np.random.default_rng(seed)
     k, s, b, limit = rng.uniform(0.3, 2.5), rng.uniform(-3, 3, 6), rng.uniform(0.1, 5, 6), rng.uniform(1e-4, 1)
     costs = [Cost("power", {"B": one, "k": k, "unit": 1e-3}) for one in b]
-    answer = solve(Problem(bought(costs), rows(s[None], limit), criterion, z=2.5))
+    answer = solve(AllocationProblem(bought(costs), rows(s[None], limit), criterion, z=2.5))
     if criterion == "worst-case":
         t = (k * b / np.abs(s)) ** (1 / (k + 1))
         t *= limit / np.sum(np.abs(s) * t)
@@ -86,7 +86,7 @@ def test_exponential_costs_of_one_row_have_their_closed_form() -> None:
     """B_i k_i exp(−k_i t_i) = λ S_i: linear in log λ, with all t above 0."""
     s, b, k, limit = np.array([1.0, 2.0, 0.5]), np.array([5.0, 4.0, 3.0]), np.array([3.0, 2.0, 4.0]), 2.0
     costs = [Cost("exponential", {"B": b[i], "k": k[i], "unit": 1.0}) for i in range(3)]
-    answer = solve(Problem(bought(costs), rows(s[None], limit)))
+    answer = solve(AllocationProblem(bought(costs), rows(s[None], limit)))
     log_price = (np.sum(s / k * np.log(b * k / s)) - limit) / np.sum(s / k)
     assert answer.tolerances == pytest.approx((np.log(b * k / s) - log_price) / k, rel=1e-10)
     assert answer.proven
@@ -106,7 +106,7 @@ def test_random_problems_agree_with_scipy(criterion: Criterion, seed: int) -> No
     if seed % 3 == 0:
         more["correlation"] = np.full((count, count), 0.4) + 0.6 * np.eye(count)
     effects = rows(effect, rng.uniform(0.1, 0.5, many), **more)
-    problem = Problem(bought(random_costs(rng, count), least=1e-4, most=0.2), effects, criterion)
+    problem = AllocationProblem(bought(random_costs(rng, count), least=1e-4, most=0.2), effects, criterion)
     answer = solve(problem)
     assert answer.proven, answer
     assert np.max(answer.used) <= 1 + 1e-9
@@ -162,8 +162,8 @@ def test_fixed_grouped_and_bounded_tolerances() -> None:
 def test_limits_on_one_side_and_off_the_middle() -> None:
     """0.3 of the room is taken by the middle of the tolerances; the other side has no limit."""
     costs = [Cost("power", {"B": 1.0, "k": 1.0, "unit": 1.0})]
-    effects = Effects(np.ones((1, 1)), np.array([-np.inf]), np.ones(1), offset=np.array([0.3]))
-    assert solve(Problem(bought(costs), effects)).tolerances[0] == pytest.approx(0.7, rel=1e-12)
+    effects = RowEffects(np.ones((1, 1)), np.array([-np.inf]), np.ones(1), offset=np.array([0.3]))
+    assert solve(AllocationProblem(bought(costs), effects)).tolerances[0] == pytest.approx(0.7, rel=1e-12)
 
 
 def test_what_cannot_be_met_says_where_and_by_how_much() -> None:
@@ -190,14 +190,14 @@ def test_what_cannot_be_met_says_where_and_by_how_much() -> None:
 )
 def test_what_is_no_problem_is_refused(contribution: Contribution, said: str) -> None:
     with pytest.raises(MechanismError, match=said):
-        solve(Problem((contribution,), rows(np.ones((1, 1)), 1.0)))
+        solve(AllocationProblem((contribution,), rows(np.ones((1, 1)), 1.0)))
 
 
 def test_a_tolerance_that_nothing_limits_is_refused() -> None:
     costs = [Cost("power", {"B": 1.0, "k": 1.0, "unit": 1.0})] * 2
     effects = rows(np.array([[1.0, 0.0]]), 1.0)
-    assert "state `most`" in str(solve(Problem(bought(costs), effects)).findings[0])
-    assert solve(Problem(bought(costs, most=3.0), effects)).tolerances == pytest.approx([1.0, 3.0])
+    assert "state `most`" in str(solve(AllocationProblem(bought(costs), effects)).findings[0])
+    assert solve(AllocationProblem(bought(costs, most=3.0), effects)).tolerances == pytest.approx([1.0, 3.0])
 
 
 def test_curve_of_cost_against_accuracy_is_a_power_law_for_power_costs() -> None:
@@ -211,6 +211,6 @@ def test_thousands_of_rows_are_fast() -> None:
     effect = rng.normal(size=(20_000, 15)) * (1 + 0.2 * rng.normal(size=(20_000, 1)))
     for criterion in ("worst-case", "rss", "yield"):
         began = time.perf_counter()
-        answer: Answer = solve(Problem(bought(random_costs(rng, 15), most=1.0), rows(effect, 0.2), criterion))
+        answer: Answer = solve(AllocationProblem(bought(random_costs(rng, 15), most=1.0), rows(effect, 0.2), criterion))
         assert answer.proven
         assert time.perf_counter() - began < 10

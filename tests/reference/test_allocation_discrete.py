@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from allocations import random_costs, random_options, rows
 
-from trunnion.studies.allocation.problem import Contribution, Criterion, Option, Problem
+from trunnion.studies.allocation.problem import AllocationProblem, Contribution, Criterion, Option
 from trunnion.studies.allocation.solve import solve
 
 
-def exhaustive(problem: Problem) -> float:
+def exhaustive(problem: AllocationProblem) -> float:
     """The least cost of all choices, infinite if none keeps the limits."""
     best = np.inf
     for picked in itertools.product(*(one.options for one in problem.contributions)):
@@ -35,7 +35,7 @@ def test_four_dimensions_by_six_processes_equal_exhaustive_search(criterion: Cri
         more["correlation"] = np.eye(4) + 0.6 * (np.eye(4, k=1) + np.eye(4, k=-1)) * np.array([1, 1, 0, 0])[:, None]
         more["correlation"] = (more["correlation"] + more["correlation"].T) / 2
     parts = tuple(Contribution(f"p{i}", options=random_options(rng, 6)) for i in range(4))
-    problem = Problem(parts, rows(effect, limit, **more), criterion)
+    problem = AllocationProblem(parts, rows(effect, limit, **more), criterion)
     answer, best = solve(problem, "discrete"), exhaustive(problem)
     assert answer.found == np.isfinite(best)
     if answer.found:
@@ -56,7 +56,7 @@ def test_a_mixture_equals_the_best_of_all_choices(criterion: Criterion, seed: in
     effects = rows(rng.normal(size=(many, 4)), rng.uniform(0.1, 0.5, many))
     free = tuple(Contribution(f"q{i}", cost=cost, most=0.3) for i, cost in enumerate(random_costs(rng, 2)))
     chosen = tuple(Contribution(f"p{i}", options=random_options(rng, 4)) for i in range(2))
-    problem = Problem(chosen + free, effects, criterion)
+    problem = AllocationProblem(chosen + free, effects, criterion)
     answer, best = solve(problem, "discrete"), np.inf
     for picked in itertools.product(*(one.options for one in chosen)):
         held = tuple(Contribution(one.name, value=each.tolerance) for one, each in zip(chosen, picked, strict=True))
@@ -73,7 +73,7 @@ def test_a_group_takes_the_option_of_one_name() -> None:
     grades = (Option("IT7", 0.01, 9.0), Option("IT8", 0.02, 5.0), Option("IT9", 0.03, 2.0))
     larger = tuple(Option(one.name, 1.5 * one.tolerance, one.cost + 1) for one in grades)
     parts = (Contribution("a", options=grades, group="g"), Contribution("b", options=larger, group="g"))
-    answer = solve(Problem(parts, rows(np.ones((1, 2)), 0.05)), "discrete")
+    answer = solve(AllocationProblem(parts, rows(np.ones((1, 2)), 0.05)), "discrete")
     assert answer.choices == {"a": "IT8", "b": "IT8"}
     assert answer.tolerances == pytest.approx([0.02, 0.03])
     assert answer.cost == 11
@@ -81,7 +81,7 @@ def test_a_group_takes_the_option_of_one_name() -> None:
 
 def test_no_choice_says_what_the_finest_take() -> None:
     parts = (Contribution("a", options=(Option("fine", 0.01, 9.0), Option("rough", 0.1, 1.0))),)
-    answer = solve(Problem(parts, rows(np.ones((1, 1)), 0.005)), "discrete")
+    answer = solve(AllocationProblem(parts, rows(np.ones((1, 1)), 0.005)), "discrete")
     assert not answer.found
     assert "+0.01, 2 times the limit" in str(answer.findings[0])
-    assert "choose discrete" in str(solve(Problem(parts, rows(np.ones((1, 1)), 1.0))).findings[0])
+    assert "choose discrete" in str(solve(AllocationProblem(parts, rows(np.ones((1, 1)), 1.0))).findings[0])

@@ -12,7 +12,7 @@ from scipy.special import ndtr, ndtri
 from scipy.stats import multivariate_normal
 
 from trunnion.statistics.costs import Cost
-from trunnion.studies.allocation.problem import Contribution, Problem
+from trunnion.studies.allocation.problem import AllocationProblem, Contribution
 from trunnion.studies.allocation.solve import solve, trade_off
 from trunnion.studies.allocation.yields import normal_yield
 
@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 PLAIN = Cost("power", {"B": 1.0, "k": 1.0, "unit": 1.0})
 
 
-def sampled(problem: Problem, wider: float = 1.0, count: int = 400_000) -> object:
+def sampled(problem: AllocationProblem, wider: float = 1.0, count: int = 400_000) -> object:
     """A yield of normal deviations by plain samples, with standard deviations `wider` than reckoned."""
 
     def verify(t: Array) -> tuple[float, float, float]:
@@ -35,14 +35,14 @@ def sampled(problem: Problem, wider: float = 1.0, count: int = 400_000) -> objec
 
 @pytest.mark.parametrize("target", [0.9, 0.9973, 0.999999])
 def test_one_row_has_the_margin_of_the_normal_distribution(target: float) -> None:
-    problem = Problem(bought([PLAIN] * 3), rows(np.array([[1.0, -2.0, 0.5]]), 0.1), "yield")
+    problem = AllocationProblem(bought([PLAIN] * 3), rows(np.array([[1.0, -2.0, 0.5]]), 0.1), "yield")
     answer = solve(problem, target=target)
     assert answer.problem.z == pytest.approx(ndtri((1 + target) / 2), rel=1e-6)
     assert answer.expected == pytest.approx(target, abs=1e-9)
 
 
 def test_independent_rows_multiply() -> None:
-    problem = Problem(bought([PLAIN] * 3), rows(np.diag([1.0, 2.0, 3.0]), 0.1), "yield")
+    problem = AllocationProblem(bought([PLAIN] * 3), rows(np.diag([1.0, 2.0, 3.0]), 0.1), "yield")
     t = np.array([0.15, 0.07, 0.04])
     each = 2 * ndtr(0.1 / (np.array([1.0, 2.0, 3.0]) * t / 3)) - 1
     assert normal_yield(problem, t) == pytest.approx(float(np.prod(each)), abs=3e-4)
@@ -51,7 +51,7 @@ def test_independent_rows_multiply() -> None:
 def test_dependent_shifted_rows_agree_with_scipy() -> None:
     """Two rows of three deviations, the first with a shift: the normal distribution of two numbers over a box."""
     effect, mean = np.array([[1.0, 2.0, -1.0], [0.5, -1.0, 2.0]]), np.array([[0.3, 0.0, 0.2], [0.0, 0.0, 0.0]])
-    problem = Problem(bought([PLAIN] * 3), rows(effect, np.array([0.1, 0.12]), mean=mean), "yield")
+    problem = AllocationProblem(bought([PLAIN] * 3), rows(effect, np.array([0.1, 0.12]), mean=mean), "yield")
     t = np.array([0.06, 0.05, 0.07])
     sigma = effect * t / 3
     box = multivariate_normal(mean @ t, sigma @ sigma.T)
@@ -87,7 +87,7 @@ def test_what_is_sampled_tightens_and_loosens(wider: float) -> None:
 def test_processes_meet_a_yield_at_least_cost() -> None:
     rng = np.random.default_rng(2)
     parts = tuple(Contribution(f"p{i}", options=random_options(rng, 6)) for i in range(4))
-    problem = Problem(parts, rows(rng.normal(size=(5, 4)), 0.12), "yield")
+    problem = AllocationProblem(parts, rows(rng.normal(size=(5, 4)), 0.12), "yield")
     answer = solve(problem, "discrete", 0.95, sampled(problem, count=100_000))  # type: ignore[arg-type]
     assert answer.sampled is not None
     assert answer.sampled.high >= 0.95
@@ -111,5 +111,5 @@ def test_cost_falls_along_the_curve() -> None:
 def test_a_shift_counts_on_the_side_it_moves_to(mean: float) -> None:
     """A deviation of mean m t and standard deviation t/3 keeps z of them within ±0.1: (z/3 + |m|) t = 0.1."""
     effects = rows(np.array([[1.0]]), 0.1, mean=np.array([[mean]]))
-    answer = solve(Problem(bought([PLAIN]), effects, "yield", z=2.5))
+    answer = solve(AllocationProblem(bought([PLAIN]), effects, "yield", z=2.5))
     assert answer.tolerances == pytest.approx(0.1 / (2.5 / 3 + 0.4), rel=1e-9)

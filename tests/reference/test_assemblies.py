@@ -19,7 +19,7 @@ from mechanisms import MODELS, analyse, build, class_three, excavator, findings,
 from mechanisms_parts import Data
 from trunnion import Mechanism, MechanismError
 from trunnion.errors import Severity
-from trunnion.solve.assembly_modes import Choice, put_together
+from trunnion.solve.assembly_modes import GroupModes, put_together
 
 Array = NDArray[np.float64]
 START = np.array([0.0])
@@ -35,7 +35,7 @@ def at_start(mechanism: Mechanism, link: str, point: str) -> Array:
     return np.array([float(np.ravel(n)[0]) for n in place])
 
 
-def choice_of(data: Data) -> Choice:
+def choice_of(data: Data) -> GroupModes:
     (choice,) = trunnion.check(build(data), 12).choices
     return choice
 

@@ -13,9 +13,9 @@ from trunnion import Mechanism, Status, locking
 from trunnion.algebra.plane import Wrench
 from trunnion.cycle.near_locking import _count
 from trunnion.joints.friction import FRICTION_LAWS
-from trunnion.joints.pairs import Load
+from trunnion.joints.pairs import PlanarContactLoad
 from trunnion.results.attributes import summary_of
-from trunnion.solve.friction import Contact, Problem
+from trunnion.solve.friction import Contact, FrictionProblem
 from trunnion.solve.friction_method import FrictionMethod
 
 
@@ -98,9 +98,11 @@ def test_all_solutions_of_one_pin(coefficient: float, x: float, y: float, gain: 
     if np.hypot(x, y) < 0.1:
         return
     law = FRICTION_LAWS["coulomb"]
-    contact = Contact(0, [], Load(), law, {"coefficient": coefficient, "pair_factor": 1.0}, np.array([sense]))
+    contact = Contact(
+        0, [], PlanarContactLoad(), law, {"coefficient": coefficient, "pair_factor": 1.0}, np.array([sense])
+    )
     lane = np.ones(1)
-    problem = Problem([contact], [Wrench(x * lane, y * lane, 0.0)], [[Wrench(gain * lane, 0.0 * lane, 0.0)]])
+    problem = FrictionProblem([contact], [Wrench(x * lane, y * lane, 0.0)], [[Wrench(gain * lane, 0.0 * lane, 0.0)]])
     # φ² = f² (R² + 2 g x φ + g² φ²), φ against the slip
     roots = np.roots(
         [1 - (coefficient * gain) ** 2, -2 * coefficient**2 * gain * x, -(coefficient**2) * (x * x + y * y)]

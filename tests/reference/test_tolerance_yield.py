@@ -14,7 +14,7 @@ from mechanisms import Array
 from mechanisms_parts import prismatic
 from toleranced import FOURBAR, fourbar, fourbar_angle
 from trunnion import Mechanism
-from trunnion.studies.tolerance.first_order import Study, study
+from trunnion.studies.tolerance.first_order import ToleranceStudy, study
 from trunnion.studies.tolerance.sampled import QUANTILES, sampled
 
 MM, SEEDS = 1e-3, 200
@@ -110,7 +110,7 @@ def intervals(mechanism: Mechanism, method: str, samples: int) -> dict[str, Arra
     return {key: np.array([row[key] for row in rows]) for key in rows[0]}
 
 
-def _arrays(found: Study, first: Any, seed: int) -> dict[str, Array]:
+def _arrays(found: ToleranceStudy, first: Any, seed: int) -> dict[str, Array]:
     batch = replace(first, job=replace(first.job, seed=seed))
     arrays = sampled(batch.job, batch.evaluate(0, batch.job.blocks), found).arrays
     keys = ("mean", "deviation", "quantile")

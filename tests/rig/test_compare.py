@@ -18,7 +18,7 @@ from trunnion.rig.compare.assessment import Verdict, expanded, independent, judg
 from trunnion.rig.compare.error_sources import best, causes
 from trunnion.rig.compare.findings import gathered
 from trunnion.rig.compare.result import VARIABLES
-from trunnion.rig.reading.measurement import Accuracy, Condition, Course, Measurement
+from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 POWERS = ("torque", "speed", "brake", "out")
@@ -483,7 +483,7 @@ def test_a_load_that_rests_takes_no_power():
     driver = next(iter(mechanism.drivers))
     kinds = {"T": (f"effort:{driver}", "N m"), "w": (f"rate:{driver}", "rad/s"), "L": (f"load:{name}", force),
              "v": (f"rate:{load.joint}", speed)}  # fmt: skip
-    blank = {key: Course(key, what, unit, np.ones((3, 24))) for key, (what, unit) in kinds.items()}
+    blank = {key: Signal(key, what, unit, np.ones((3, 24))) for key, (what, unit) in kinds.items()}
     result = compare(Measurement("bench", (Condition("a", {}, np.arange(24) / 24, blank),)), mechanism)
     assert np.isnan(result.model.sel(channel="L").values).any()
     assert np.isfinite(result.efficiency_model.values).all()

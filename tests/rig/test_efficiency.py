@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from trunnion.errors import MechanismError
 from trunnion.rig.reading.efficiency import efficiency_of
-from trunnion.rig.reading.measurement import Accuracy, Condition, Course
+from trunnion.rig.reading.measurement import Accuracy, Condition, Signal
 
 TURNS, POSITIONS = 12, 24
 PHASE = np.arange(POSITIONS) / POSITIONS
@@ -35,7 +35,7 @@ ETA = float(np.mean(TRUE["T2"] * TRUE["n2"]) / np.mean(TRUE["T1"] * TRUE["n1"]))
 def condition(turns: dict[str, NDArray[np.float64]], accuracy: dict[str, Accuracy] | None = None) -> Condition:
     known = ACCURACY if accuracy is None else accuracy
     courses = {
-        name: Course(name, MEASURES[name], "", values, known.get(name, Accuracy())) for name, values in turns.items()
+        name: Signal(name, MEASURES[name], "", values, known.get(name, Accuracy())) for name, values in turns.items()
     }
     return Condition("one", {}, PHASE, courses)
 

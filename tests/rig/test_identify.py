@@ -24,7 +24,7 @@ from trunnion.rig.identify.identifiability import Combination
 from trunnion.rig.identify.run import identified
 from trunnion.rig.identify.signals import Model
 from trunnion.rig.identify.unknowns import described, limits, unknowns
-from trunnion.rig.reading.measurement import Accuracy, Condition, Course, Measurement
+from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import prepare
 from trunnion.views.identify.figure import KINDS, figure
@@ -335,7 +335,7 @@ def test_a_clearance_by_pins_that_lie_as_they_are_loaded() -> None:
     true, output = float(model.parameters()[path]), next(iter(model.drivers))
     course = trunnion.analyse(model, steps=24)["drive_effort"].sel(driver=output).values
     noise = np.random.default_rng(1).normal(size=(6, 24)) * 1e-7 * np.max(np.abs(course))
-    data = Course("torque", f"effort:{output}", "N m", course + noise)
+    data = Signal("torque", f"effort:{output}", "N m", course + noise)
     measured = Measurement("play", (Condition("one", {}, np.arange(24) / 24, {"torque": data}),))
     found = identify(model, measured, [path], start={path: 0.7 * true})
     assert found["estimate"].values[0] == pytest.approx(true, rel=0.02)

@@ -11,15 +11,15 @@ import pytest
 from numpy.typing import NDArray
 
 from trunnion.rig.identify.blocks import Block
-from trunnion.rig.identify.fit import Problem
+from trunnion.rig.identify.fit import FitProblem
 from trunnion.rig.identify.uncertainty import spread_of
-from trunnion.rig.reading.measurement import Course
+from trunnion.rig.reading.measurement import Signal
 
 Array = NDArray[np.float64]
 FAR = 1e3  # of the constant: the same figures wherever it lies
 
 
-def constant(conditions: Sequence[Array]) -> Problem:
+def constant(conditions: Sequence[Array]) -> FitProblem:
     """The mean of one channel in all conditions as the only unknown; turns: (turn, position) by condition."""
 
     def courses(x: Array) -> Any:
@@ -37,10 +37,10 @@ def constant(conditions: Sequence[Array]) -> Problem:
         run=SimpleNamespace(system=None),
     )
     blocks = [
-        Block(k, "torque", Course("torque", "effort:A", "N m", turns), turns, turns[:0])
+        Block(k, "torque", Signal("torque", "effort:A", "N m", turns), turns, turns[:0])
         for k, turns in enumerate(conditions)
     ]
-    problem = Problem(model, blocks, [], masks=[np.ones(one.shape[1], bool) for one in conditions])
+    problem = FitProblem(model, blocks, [], masks=[np.ones(one.shape[1], bool) for one in conditions])
     problem.start_scatter()
     return problem
 

@@ -11,10 +11,10 @@ from trunnion.rig.reading.rig_file import Sensor
 from trunnion.rig.reading.scale import scale
 from trunnion.rig.reading.sensor_quantity import read_amount
 from trunnion.rig.virtual import sensors as virtual_sensors
-from trunnion.rig.virtual.sensors import Drawn, converted, draw, pulsed, readings, resolved, smoothed, stream
+from trunnion.rig.virtual.sensors import SensorErrors, converted, draw, pulsed, readings, resolved, smoothed, stream
 from trunnion.rig.virtual.true_signals import phases
 
-NONE = Drawn(0.0, 0.0, 0.0)
+NONE = SensorErrors(0.0, 0.0, 0.0)
 
 
 def channel(si: str = "N m", **stated: object) -> virtual_sensors.Channel:
@@ -142,7 +142,7 @@ def test_order_of_the_chain() -> None:
     """Gain and drift on the true value, offset always, the zero of the running sensor while it runs."""
     found = channel(drift="0.1 N m/s", sensitivity="1 V/(N m)")
     true = np.array([0.0, 0.0, 10.0, 10.0, 0.0])
-    answer = readings(found, true, slice(2, 4), 10.0, Drawn(0.1, 0.5, 0.2), None)
+    answer = readings(found, true, slice(2, 4), 10.0, SensorErrors(0.1, 0.5, 0.2), None)
     assert answer == pytest.approx([0.2, 0.21, 11 + 0.5 + 0.2 + 0.02, 11 + 0.5 + 0.2 + 0.03, 0.24])
 
 

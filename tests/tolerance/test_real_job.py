@@ -15,7 +15,7 @@ from toleranced import fourbar
 from trunnion import Mechanism, MechanismError
 from trunnion.studies.tolerance.first_order import study
 from trunnion.studies.tolerance.runner import run
-from trunnion.studies.tolerance.sampling import Sampling, Tally
+from trunnion.studies.tolerance.sampling import SampleTally, Sampling
 
 SAMPLES, STEPS = 3000, 120
 METHODS = ("monte-carlo", "quasi-monte-carlo")
@@ -56,7 +56,7 @@ def known() -> dict[str, tuple[Sampling, dict[str, bytes]]]:
     return found
 
 
-def bits(tally: Tally) -> dict[str, bytes]:
+def bits(tally: SampleTally) -> dict[str, bytes]:
     """Every array of a tally, byte by byte."""
     arrays = tally.to_arrays().items()
     return {name: array.tobytes() + str((array.shape, array.dtype)).encode() for name, array in arrays}
@@ -100,7 +100,7 @@ def test_blocks_in_any_order(known: Any) -> None:
         order = np.random.default_rng(2).permutation(one.blocks)
         tally = one.empty()
         for block in order:
-            tally = tally.merge(Tally.from_arrays(sampler.evaluate(int(block), int(block) + 1).to_arrays()))
+            tally = tally.merge(SampleTally.from_arrays(sampler.evaluate(int(block), int(block) + 1).to_arrays()))
         assert bits(tally) == expected
 
 

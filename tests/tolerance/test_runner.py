@@ -18,7 +18,7 @@ from toy_programs import ENVIRONMENT, POSIX, interrupted
 from trunnion import Finding, MechanismError
 from trunnion.errors import Severity
 from trunnion.studies.tolerance.checkpoint import Checkpoint
-from trunnion.studies.tolerance.ranges import Pace, Plan, count, gaps, union
+from trunnion.studies.tolerance.ranges import BlockRanges, Pace, count, gaps, union
 from trunnion.studies.tolerance.runner import run
 
 
@@ -200,7 +200,7 @@ def test_gaps_and_plan() -> None:
     assert gaps([(0, 5)], 5) == []
     assert gaps([(1, 2), (4, 5)], 7) == [(0, 1), (2, 4), (5, 7)]
     assert union([(4, 5), (0, 2), (2, 3)]) == ((0, 3), (4, 5))
-    plan = Plan([(1, 2), (4, 5)], 16)
+    plan = BlockRanges([(1, 2), (4, 5)], 16)
     taken = []
     while plan.left:
         taken.append(plan.take(4, aligned=False))
@@ -208,7 +208,7 @@ def test_gaps_and_plan() -> None:
 
 
 def test_aligned_portions_are_nodes_of_the_tree() -> None:
-    plan = Plan([(3, 5)], 100)
+    plan = BlockRanges([(3, 5)], 100)
     taken = []
     while plan.left:
         taken.append(plan.take(17, aligned=True))

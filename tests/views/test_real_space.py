@@ -15,7 +15,7 @@ import trunnion
 from trunnion import Mechanism, analyse
 from trunnion.errors import Status
 from trunnion.results.export import save as write
-from trunnion.solve.assembly_modes import Choice, Way
+from trunnion.solve.assembly_modes import AssemblyMode, GroupModes
 from trunnion.views.assembly.mode_drawings import ways
 from trunnion.views.cycle.plots import PLOTS, save
 from trunnion.views.cycle.report import report
@@ -116,8 +116,8 @@ def test_columns_of_the_cardan_joint(results, tmp_path):
 
 def test_ways_of_a_spatial_group_are_drawn(tmp_path):
     mechanism = Mechanism.read(EXAMPLES / "pezzuti-cardan.yaml")
-    told = tuple(Way(f"way-{number}", {"pin-2": (0.0, 0.0, 0.0)}, number == 1) for number in (1, 2, 9))
-    figure = ways(mechanism, [Choice(1, "II(2,3)CCC", ("cross", "output-shaft"), "cross", 0.0, "", told)])
+    told = tuple(AssemblyMode(f"way-{number}", {"pin-2": (0.0, 0.0, 0.0)}, number == 1) for number in (1, 2, 9))
+    figure = ways(mechanism, [GroupModes(1, "II(2,3)CCC", ("cross", "output-shaft"), "cross", 0.0, "", told)])
     titles = [axes.get_title(loc="left") for axes in figure.axes if axes.get_visible()]
     assert titles == ["cross: way-1  taken", "cross: way-2", "cross: way-9"]
     words = [{text.get_text() for text in axes.texts} for axes in figure.axes if axes.get_visible()]

@@ -18,7 +18,7 @@ from trunnion.cli.result import check_files
 from trunnion.cli.tolerance import shown_of
 from trunnion.errors import MechanismError
 from trunnion.results.export import save as export
-from trunnion.views.allocation.cost import Offer, Price, tolerance_cost, trade_off
+from trunnion.views.allocation.cost import Offer, PriceCurve, tolerance_cost, trade_off
 from trunnion.views.common.figures import PALETTE
 from trunnion.views.cycle.plots import save
 from trunnion.views.tolerance.figure import KINDS, MOST_PANELS, check_kind, drawable, figure, sheet
@@ -238,8 +238,8 @@ def prices(count):
         (f"turning {grade}", 1e-6 * t, cost) for grade, t, cost in ((6, 6.5, 16), (7, 10.5, 9), (8, 16.5, 6))
     )
     return [
-        Price(f"joints.J{k}.pin.clearance", "m", (10.5e-6, 9.0), processes=turned) if k % 2
-        else Price(f"links.L{k}.曲柄", "m", (2e-5, 5.8 + k), HALF, (HALF * 1e3) ** -0.45, group="bores")
+        PriceCurve(f"joints.J{k}.pin.clearance", "m", (10.5e-6, 9.0), processes=turned) if k % 2
+        else PriceCurve(f"links.L{k}.曲柄", "m", (2e-5, 5.8 + k), HALF, (HALF * 1e3) ** -0.45, group="bores")
         for k in range(count)
     ]  # fmt: skip
 

@@ -17,7 +17,7 @@ from trunnion.views.tolerance.figure import drawable, figure
 from trunnion.views.tolerance.notes import NOTES
 from trunnion.views.tolerance.readings import readings
 from trunnion.views.tolerance.report import Section, report
-from trunnion.views.tolerance.tables import Table
+from trunnion.views.tolerance.tables import TextTable
 
 SOURCE = "data:image/svg+xml;base64,"
 
@@ -87,7 +87,7 @@ def test_findings_notes_and_inputs_are_told():
 @pytest.mark.slow
 def test_other_parts_may_come_first():
     result = toleranced(24, 300)
-    table = Table("chosen", ["tolerance", "cost"], [["AB", "4.507"]])
+    table = TextTable("chosen", ["tolerance", "cost"], [["AB", "4.507"]])
     part = Section("Allocation", "least cost", [("a picture", figure(result, "contributions"))], [table])
     page = Page(report(result, [part], "What tolerances to buy"))
     words = " ".join(page.words)

@@ -19,10 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.errors import Finding, Status
-from trunnion.results.sentences import told
+from trunnion.results.sentences import finding_for
 from trunnion.solve.eccentricity_rate import FINE as LANES
 from trunnion.solve.seating import NO_LOAD, ROUNDS, TOLERANCE, Seated, loads_of
-from trunnion.solve.seats import Seat
+from trunnion.solve.seats import GivenSeat
 from trunnion.solve.system import Dial
 
 if TYPE_CHECKING:
@@ -118,7 +118,7 @@ def gaps(run: Run) -> NDArray[np.float64]:
     return np.array([every - near, every + near])
 
 
-def _turned(run: Run, seat: Seat, time: NDArray[np.float64]) -> Iterator[float]:
+def _turned(run: Run, seat: GivenSeat, time: NDArray[np.float64]) -> Iterator[float]:
     """Times at which the load of an end passes near zero, seen closely wherever it turns round between two of these."""
     with np.errstate(all="ignore"):
         back = run.ideal(time)
@@ -137,7 +137,7 @@ def _turned(run: Run, seat: Seat, time: NDArray[np.float64]) -> Iterator[float]:
                     yield float(np.interp(one, np.arange(len(fine)), fine))
 
 
-def _loads_at(back: Backward, seat: Seat, time: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+def _loads_at(back: Backward, seat: GivenSeat, time: NDArray[np.float64]) -> list[NDArray[np.float64]]:
     """Loads of the ends of a joint, (component, time) each."""
     return [np.array([np.broadcast_to(part, time.shape) for part in load]) for load in loads_of(back, seat)]
 
@@ -204,7 +204,9 @@ def _least_loaded(forces: NDArray[np.float64], rows: Sequence[int]) -> NDArray[n
     return np.array([rows[k] for k in least], np.intp)
 
 
-def _of_joint(run: Run, seat: Seat, forces: NDArray[np.float64], time: NDArray[np.float64], largest: float) -> Loss:
+def _of_joint(
+    run: Run, seat: GivenSeat, forces: NDArray[np.float64], time: NDArray[np.float64], largest: float
+) -> Loss:
     """Where the load of an end of one joint passes through zero."""
     places: list[tuple[float, int]] = []
     least, peak = np.inf, 1.0
@@ -227,7 +229,7 @@ def _of_joint(run: Run, seat: Seat, forces: NDArray[np.float64], time: NDArray[n
 
 
 def _seen(
-    run: Run, seat: Seat, number: int, load: NDArray[np.float64], time: NDArray[np.float64], peak: float
+    run: Run, seat: GivenSeat, number: int, load: NDArray[np.float64], time: NDArray[np.float64], peak: float
 ) -> Iterator[tuple[float, float]]:
     """Passages of a load near zero; between wide steps those that are there when looked at closely, without play.
 
@@ -255,7 +257,7 @@ def _once(found: Iterable[tuple[float, float]], count: int, periodic: bool) -> I
             yield place, size
 
 
-def _end_loads(seat: Seat, forces: NDArray[np.float64]) -> Iterator[tuple[int, NDArray[np.float64]]]:
+def _end_loads(seat: GivenSeat, forces: NDArray[np.float64]) -> Iterator[tuple[int, NDArray[np.float64]]]:
     """(number, load (component, position)) of every end that can move at all."""
     for number, (end, radius) in enumerate(zip(seat.play.model.ends, seat.play.radii, strict=True)):
         if np.any(np.asarray(radius) > 0):
@@ -296,19 +298,19 @@ def findings(found: Sequence[Loss], arrays: Arrays, joints: Sequence[str], dial:
         return
     held = np.flatnonzero((arrays["seat_travel"] == 0) & (arrays["status"] < Status.CONTACT_LOST))
     if len(held):
-        yield told("seat.held", "joints", at=dial.intervals(held))
+        yield finding_for("seat.held", "joints", at=dial.intervals(held))
     for loss in found:
         where = f"joints.{loss.joint}"
         if not loss.loaded:
-            yield told("seat.unloaded", where, part=loss.part)
+            yield finding_for("seat.unloaded", where, part=loss.part)
             continue
         if loss.places:
             yield _lost(loss, arrays["contact_loss_number"][joints.index(loss.joint)], dial)
         if len(loss.lifted):
-            yield told("contact.lifted", where, part=loss.part, at=dial.intervals(loss.lifted))
+            yield finding_for("contact.lifted", where, part=loss.part, at=dial.intervals(loss.lifted))
         if len(loss.unsettled):
             worst = np.nanmax(arrays["seat_change"][loss.unsettled])
-            yield told("seat.unsettled", where, rounds=ROUNDS, at=dial.intervals(loss.unsettled), change=worst)
+            yield finding_for("seat.unsettled", where, rounds=ROUNDS, at=dial.intervals(loss.unsettled), change=worst)
 
 
 def _lost(loss: Loss, numbers: NDArray[np.float64], dial: Dial) -> Finding:
@@ -317,7 +319,7 @@ def _lost(loss: Loss, numbers: NDArray[np.float64], dial: Dial) -> Finding:
     at = ", ".join(shown[:MOST_PLACES]) + (f" and {more} more" if more > 0 else "")
     least = loss.least if loss.least > NO_LOAD * loss.peak else 0.0  # less than that is rounding
     top = int(np.nanargmax(numbers)) if loss.turns and np.any(np.isfinite(numbers)) else None
-    return told(
+    return finding_for(
         "contact.lost", f"joints.{loss.joint}", part=loss.part, least=least, peak=loss.peak, at=at, likely=EARLES_WU,
         number=None if top is None else numbers[top], turning="" if top is None else f"at {dial.at(top)}",
     )  # fmt: skip

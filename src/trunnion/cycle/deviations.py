@@ -17,7 +17,7 @@ from trunnion.model.contact import clearance
 from trunnion.results.figure import Figure
 from trunnion.solve.forward import Forward
 from trunnion.solve.seating import Seated
-from trunnion.solve.seats import Seat
+from trunnion.solve.seats import GivenSeat
 
 if TYPE_CHECKING:
     from trunnion.solve.run import Run
@@ -39,7 +39,7 @@ DIFFERENCES = {
 COMPARED = {*DIFFERENCES.values(), "link_angle", "link_rotation", "joint_rotation"}
 
 
-def fill_seats(arrays: Arrays, found: Sequence[Seat], seated: Seated, window: slice) -> None:
+def fill_seats(arrays: Arrays, found: Sequence[GivenSeat], seated: Seated, window: slice) -> None:
     """Seats, end forces and places of contact of one chunk."""
     walk = seated.back.walk
     joints = list(walk.system.joints)
@@ -56,7 +56,7 @@ def fill_seats(arrays: Arrays, found: Sequence[Seat], seated: Seated, window: sl
 
 
 def _fill_ends(
-    array: NDArray[np.float64], seat: Seat, vectors: Sequence[Vector], window: slice, shared: bool = False
+    array: NDArray[np.float64], seat: GivenSeat, vectors: Sequence[Vector], window: slice, shared: bool = False
 ) -> None:
     """Vectors of the ends at end 1 and 2; what is along the axis belongs to both, a force by halves."""
     for place in {key[0] for end in seat.play.model.ends for key in end} - {"3"}:
@@ -70,7 +70,7 @@ def _fill_ends(
                 array[int(place) - 1, AXES.index(axis), window] = number
 
 
-def _describe(arrays: Arrays, i: int, window: slice, walk: Forward, seat: Seat) -> None:
+def _describe(arrays: Arrays, i: int, window: slice, walk: Forward, seat: GivenSeat) -> None:
     """β and ξ of a pin or guide; of a ball there are none."""
     ends = arrays["seat_offset"][i, :, :, window]
     if len(seat.play.model.ends[0]) == 3:
@@ -88,7 +88,7 @@ def _describe(arrays: Arrays, i: int, window: slice, walk: Forward, seat: Seat) 
         arrays["seat_xi_pin"][i, window] = wrapped(xi + turn)
 
 
-def _fill_contacts(arrays: Arrays, i: int, window: slice, walk: Forward, seat: Seat) -> None:
+def _fill_contacts(arrays: Arrays, i: int, window: slice, walk: Forward, seat: GivenSeat) -> None:
     """B₁ and B₂: on the wall of the hole in the direction of the offset; of a guide the ends of its axis."""
     frame = walk.hole(seat.joint)
     own = clearance(seat.joint, walk.values)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, Status
 from trunnion.groups import rpr, rrp, rrr
-from trunnion.results.sentences import told
+from trunnion.results.sentences import finding_for
 from trunnion.solve.backward import Backward
 from trunnion.solve.forward import Forward
 from trunnion.solve.system import Dial, Positions, System, rubbing, sticking
@@ -158,26 +158,26 @@ def findings(
     stuck = causes.stuck()
     stuck = stuck[status[stuck] == Status.ZERO_SLIP]
     if len(stuck):
-        found.append(told("friction.sense", "joints", at=dial.intervals(stuck)))
+        found.append(finding_for("friction.sense", "joints", at=dial.intervals(stuck)))
     for number, singular in causes.singular().items():
         module = causes.system.plan.modules[number]
         kind = "dead centre (singular position)" if module.rank == CLASS_TWO else "singular position"
         where, most = f"links {', '.join(module.links)}", _most(condition[singular])
         found.append(
-            told("position.singular", where, at=dial.intervals(singular), condition=most, phrases={"kind": kind})
+            finding_for("position.singular", where, at=dial.intervals(singular), condition=most, phrases={"kind": kind})
         )
     for path, positions in causes.undefined().items():
         code = "load.undefined" if path.startswith("loads.") else "spring.undefined"
-        found.append(told(code, path, at=dial.intervals(positions)))
+        found.append(finding_for(code, path, at=dial.intervals(positions)))
     for number, (positions, share) in causes.locked().items():
         found.append(_locked(causes.system, dial, number, positions, share, near))
     late = np.flatnonzero(status == Status.NOT_CONVERGED)
     if len(late):
-        found.append(told("friction.not_converged", "joints", at=dial.intervals(late)))
+        found.append(finding_for("friction.not_converged", "joints", at=dial.intervals(late)))
     close = np.flatnonzero(status == Status.NEAR_SINGULAR)
     if len(close):
         found.append(
-            told("position.near_singular", "links", at=dial.intervals(close), condition=_most(condition[close]))
+            finding_for("position.near_singular", "links", at=dial.intervals(close), condition=_most(condition[close]))
         )
     for joints, positions in _together(causes.zero_slip()):
         widths = [upper[positions] - lower[positions] for lower, upper, _ in efforts.values()]
@@ -200,15 +200,15 @@ def _not_assembled(causes: Causes, dial: Dial, part: _Open) -> Finding:
     where, at = f"links {', '.join(module.links)}", dial.intervals(part.positions)
     if not part.reasons:
         errors, redundant = mechanism.has_errors, bool(module.redundant)
-        return told("assembly.open", where, at=at, everywhere=everywhere, redundant=redundant, errors=errors)
+        return finding_for("assembly.open", where, at=at, everywhere=everywhere, redundant=redundant, errors=errors)
     gaps = {name: np.nanmax(sizes) for name, sizes in part.reasons.items() if np.any(sizes > 0)}
-    return told("assembly.gap", where, at=at, everywhere=everywhere, gaps=gaps)
+    return finding_for("assembly.gap", where, at=at, everywhere=everywhere, gaps=gaps)
 
 
 def _shortfalls(walk: Forward, number: int) -> dict[str, Number]:
     """Why a closed form has no position: each reason with the length by which it holds where it is positive."""
     module, pose = walk.system.plan.modules[number], walk.poses[number]
-    if isinstance(pose, rrr.Pose):
+    if isinstance(pose, rrr.RRRPose):
         b, c, d = module.joints
         (pin_b, _), _, (pin_d, _) = walk.pairs(walk.system.places[number])
         gap = np.hypot(pin_d.x - pin_b.x, pin_d.y - pin_b.y)
@@ -217,10 +217,10 @@ def _shortfalls(walk: Forward, number: int) -> dict[str, Number]:
             f"|{b}{d}| exceeds {b}{c} + {c}{d}": gap - (bc + cd),
             f"|{b}{d}| falls short of |{b}{c} − {c}{d}|": np.abs(bc - cd) - gap,
         }
-    if isinstance(pose, rrp.Pose):
+    if isinstance(pose, rrp.RRPPose):
         b, c, _ = module.joints
         return {f"the path of {c} is farther from {b} than |{b}{c}|": np.abs(pose.p) - pose.length}
-    if isinstance(pose, rpr.Pose):
+    if isinstance(pose, rpr.RPRPose):
         b, c, d = module.joints
         return {f"|{b}{d}| falls short of the offset of the slide {c}": np.abs(pose.offset) - pose.length}
     return {}
@@ -244,7 +244,7 @@ def _locked(
         responsible = near.responsible()
         if responsible and responsible[0] in module.joints:
             decides, multiple = responsible
-    return told(
+    return finding_for(
         "friction.locked", f"links {', '.join(module.links)}", at=dial.intervals(positions), share=np.min(share),
         joints=joints, reverse=reverse, decides=decides, multiple=multiple,
     )  # fmt: skip
@@ -263,7 +263,7 @@ def _zero_slip(
             k = positions[int(np.nanargmax(widths))]
             widest[driver] = {"from": lower[k], "to": upper[k], "unit": unit, "at": f"at {dial.at(k)}"}
     where, at = f"joints.{joints}", dial.intervals(positions)
-    return told("friction.interval", where, at=at, efforts=widest, locks=bool(efforts))
+    return finding_for("friction.interval", where, at=at, efforts=widest, locks=bool(efforts))
 
 
 def _most(values: NDArray[np.float64]) -> float:

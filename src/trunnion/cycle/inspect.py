@@ -13,12 +13,12 @@ from trunnion.cycle.positions import positions
 from trunnion.cycle.scene import pitch_circles
 from trunnion.errors import Finding, Severity
 from trunnion.model.mechanism import Mechanism
-from trunnion.results.sentences import told
-from trunnion.solve.assembly_modes import Choice, choices
+from trunnion.results.sentences import finding_for
+from trunnion.solve.assembly_modes import GroupModes, choices
 from trunnion.solve.forward import Forward, forward
 from trunnion.solve.run import Run, prepare
 from trunnion.structure.decompose import Plan
-from trunnion.structure.mobility import Part, mobility_by_rank
+from trunnion.structure.mobility import Subsystem, mobility_by_rank
 
 __all__ = ["Check", "GearPair", "check"]
 
@@ -43,7 +43,7 @@ class Check:
     plan: Plan
     rank_mobility: int | None
     assemblies: tuple[int, ...]
-    choices: tuple[Choice, ...]
+    choices: tuple[GroupModes, ...]
     findings: tuple[Finding, ...]
     gears: tuple[GearPair, ...] = ()
 
@@ -69,7 +69,7 @@ def check(mechanism: Mechanism, steps: int = 360) -> Check:
     walk = forward(run.system, run.values, run.chosen.assembly, run.cycle.times(steps))
     rank = run.determinacy.mobility if run.determinacy else _rank(walk)
     if run.determinacy is None and rank is not None and rank != run.system.plan.mobility:
-        found.append(told("mobility.special", "joints", formula=run.system.plan.mobility, rank=rank))
+        found.append(finding_for("mobility.special", "joints", formula=run.system.plan.mobility, rank=rank))
     order = list(Severity)
     found.sort(key=lambda finding: order.index(finding.severity))
     return Check(run.system.plan, rank, run.chosen.found, choices(run), tuple(found), _gears(run))
@@ -108,6 +108,6 @@ def _rank(walk: Forward) -> int | None:
         name: (gear.joints, float(np.ravel(primal(walk.values[f"gears.{name}.ratio"]))[0]))
         for name, gear in system.mechanism.gears.items()
     }
-    parts = [Part(one.links, one.joints, one.driven, one.gears) for one in system.plan.modules]
+    parts = [Subsystem(one.links, one.joints, one.driven, one.gears) for one in system.plan.modules]
     links = [link for part in parts for link in part.links]
     return mobility_by_rank(links, system.mechanism.fixed_link, system.joints, at, gears, parts)

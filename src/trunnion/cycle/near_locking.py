@@ -17,12 +17,12 @@ from trunnion.algebra.dual import primal
 from trunnion.algebra.quadrature import CANCELLED, integrals
 from trunnion.errors import Finding, counted
 from trunnion.results.figure import MORE_THAN, Figure
-from trunnion.results.sentences import told
+from trunnion.results.sentences import finding_for
 from trunnion.solve import continuation
 from trunnion.solve.backward import Backward, Given, backward
 from trunnion.solve.bristles import histories
 from trunnion.solve.forward import Forward
-from trunnion.solve.friction import Problem, frictionless, identity_minus, scaled
+from trunnion.solve.friction import FrictionProblem, frictionless, identity_minus, scaled
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.system import Dial, law_of
 
@@ -70,7 +70,7 @@ def critical_multiples(back: Backward, most: float) -> dict[str, Array]:
     return {joint: found[joint] for joint in system.joints if joint in found}
 
 
-def _alone(problem: Problem, own: NDArray[np.bool_], most: float) -> list[Array]:
+def _alone(problem: FrictionProblem, own: NDArray[np.bool_], most: float) -> list[Array]:
     """The multiples for the contacts of each joint: the others' friction is raised to full first, then theirs.
 
     own: (joint, contact). The joints are followed side by side, each in lanes of its own.
@@ -114,7 +114,7 @@ def others(back: Backward) -> Array:
     return total
 
 
-def _count(problem: Problem, known: Array) -> Array:
+def _count(problem: FrictionProblem, known: Array) -> Array:
     """Solutions other than the known ones (contact, lane), NaN where there is none, lane by lane."""
     contacts, lanes = known.shape
     many = problem.mapped(lambda number: np.repeat(number, STARTS))
@@ -138,7 +138,7 @@ def _count(problem: Problem, known: Array) -> Array:
     return counted
 
 
-def _size(problem: Problem, lanes: int) -> Array:
+def _size(problem: FrictionProblem, lanes: int) -> Array:
     """The largest load without friction, N."""
     normals = problem.state([np.zeros(lanes) for _ in problem.contacts]).normals
     largest: Array = np.max([np.abs(np.broadcast_to(normal, lanes)) for normal in normals], axis=0)
@@ -311,7 +311,7 @@ def findings(near: Locking, dial: Dial) -> Iterator[Finding]:
     more = np.flatnonzero((near.others > 0) & ~near.locked)
     if len(more):
         count = int(np.max(near.others[more]))
-        yield told("friction.other_solutions", "joints", count=count, at=dial.intervals(more))
+        yield finding_for("friction.other_solutions", "joints", count=count, at=dial.intervals(more))
 
 
 def _locks(back: Backward) -> NDArray[np.bool_]:

@@ -23,7 +23,7 @@ from trunnion.model.units import KINDS, Dimension, si_unit
 from trunnion.results import variables as results
 from trunnion.results.attributes import cited, figure_rows, finding_rows, origin
 from trunnion.results.figure import Figure
-from trunnion.results.sentences import told
+from trunnion.results.sentences import finding_for
 from trunnion.solve.forward import start
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.loads import Stated
@@ -125,23 +125,23 @@ def model_notes(mechanism: Mechanism, system: System) -> list[Finding]:
     heavy = [name for name, link in bodies.items() if link.mass.source != 0]
     if heavy and mechanism.gravity is None:
         down, none = ("[0, -9.81]", "[0, 0]") if mechanism.space == "planar" else ("[0, 0, -9.81]", "[0, 0, 0]")
-        notes.append(told("model.gravity", "gravity", links=heavy, phrases={"down": down, "none": none}))
+        notes.append(finding_for("model.gravity", "gravity", links=heavy, phrases={"down": down, "none": none}))
     sliding = {link for joint in mechanism.joints.values() if PAIRS[joint.type].guided for link in joint.links}
     points = [name for name in heavy if bodies[name].inertia == ZERO_INERTIA and name not in sliding]
     if points:
-        notes.append(told("model.point_mass", "links", links=points))
+        notes.append(finding_for("model.point_mass", "links", links=points))
     tight = [
         name
         for name, joint in mechanism.effective_joints.items()
         if joint.seat not in (None, "free") and name not in mechanism.seated and clearance(name, values) is not None
     ]
     if tight:
-        notes.append(told("model.seat_without_play", "joints", joints=tight))
+        notes.append(finding_for("model.seat_without_play", "joints", joints=tight))
     if playing:
         # no seats are taken where links are over-constrained
         held = {name for module in system.plan.modules if module.redundant for name in module.joints}
         seatable = [name for name in playing if name not in held]
-        notes.append(told("model.play_centred", "joints", joints=playing, seatable=seatable))
+        notes.append(finding_for("model.play_centred", "joints", joints=playing, seatable=seatable))
     return notes
 
 
@@ -165,7 +165,7 @@ def _over_the_cycle(
     several = len(spans) > 1 or run.system.mechanism.gears
     if several and not run.cycle.periodic and spans and all(span.periodic for span in spans):
         whom = "drivers" if len(spans) > 1 else "driver and the gears"
-        found.append(told("cycle.not_common", "drivers", duration=run.cycle.duration, phrases={"whom": whom}))
+        found.append(finding_for("cycle.not_common", "drivers", duration=run.cycle.duration, phrases={"whom": whom}))
     return [*found, *_loads_over_the_cycle(run, arrays, time)]
 
 
@@ -177,7 +177,7 @@ def _missed_peaks(system: System, at: Positions) -> Iterator[Finding]:
     for i, (name, unit) in enumerate(zip(system.mechanism.drivers, effort_units(system), strict=True)):
         largest, rms = float(np.max(np.abs(at.arrays["drive_effort"][i][sound]))), float(at.means.drive_effort_rms[i])
         if rms > (1 + 1e-6) * largest:
-            yield told("effort.peak_missed", f"drivers.{name}", rms=rms, largest=largest, unit=unit)
+            yield finding_for("effort.peak_missed", f"drivers.{name}", rms=rms, largest=largest, unit=unit)
 
 
 def _loads_over_the_cycle(run: Run, arrays: Arrays, time: NDArray[np.float64]) -> Iterator[Finding]:
@@ -189,12 +189,12 @@ def _loads_over_the_cycle(run: Run, arrays: Arrays, time: NDArray[np.float64]) -
         if entry.varies and entry.location[-1] in ("resisting_torque", "resisting_force"):
             negative = np.flatnonzero(np.broadcast_to(np.asarray(stated.get(path)), time.shape) < 0)
             if len(negative):
-                yield told("load.drives", path, at=dial.intervals(negative))
+                yield finding_for("load.drives", path, at=dial.intervals(negative))
     for i, (name, spring) in enumerate(run.system.mechanism.springs.items()):
         if spring.joint is not None and spring_units(run.system)[i][1] == "rad":
             jumps = np.flatnonzero(np.abs(np.diff(arrays["spring_elongation"][i])) > np.pi)
             if len(jumps):
-                yield told("spring.jump", f"springs.{name}", at=dial.at(int(jumps[0])))
+                yield finding_for("spring.jump", f"springs.{name}", at=dial.at(int(jumps[0])))
 
 
 def references(mechanism: Mechanism) -> list[str]:

@@ -12,15 +12,15 @@ from typing import NamedTuple
 
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.plane import Acceleration, Frame, Twist, Wrench, accelerated, moved, turned
-from trunnion.groups.gear import NUMBERS, ONE, Gear, GearRow
+from trunnion.groups.gear import NUMBERS, ONE, GearPair, GearRow
 from trunnion.groups.tree import OUTER, GroupJoint, Step
 
-__all__ = ["Row", "rows"]
+__all__ = ["CutRow", "rows"]
 
 Pairs = Sequence[tuple[Frame, Frame]]
 
 
-class Row(NamedTuple):
+class CutRow(NamedTuple):
     """One constraint. drive: index of the prescribed coordinate it holds, −1 if none.
 
     The methods take the elements of the joint's first and second side and their motion (global axes).
@@ -110,18 +110,18 @@ class Row(NamedTuple):
 
 
 def rows(
-    joints: Sequence[GroupJoint], steps: Sequence[Step], driven: Sequence[int], gears: Sequence[Gear]
-) -> tuple[Row | GearRow, ...]:
+    joints: Sequence[GroupJoint], steps: Sequence[Step], driven: Sequence[int], gears: Sequence[GearPair]
+) -> tuple[CutRow | GearRow, ...]:
     """Constraints of the joints that the tree leaves out and of the gear pairs, in the order of the rows of J."""
-    found: list[Row | GearRow] = []
+    found: list[CutRow | GearRow] = []
     place = {step.joint: i for i, step in enumerate(steps)}
     for k, joint in enumerate(joints):
         if k in place or joint.sides == (OUTER, OUTER):
             continue
         turns = joint.pair.turns
-        found += [Row(k, kind, -1) for kind in (("x", "y") if turns else ("across", "turn"))]
+        found += [CutRow(k, kind, -1) for kind in (("x", "y") if turns else ("across", "turn"))]
         if k in driven:
-            found.append(Row(k, "turn" if turns else "along", driven.index(k)))
+            found.append(CutRow(k, "turn" if turns else "along", driven.index(k)))
     for i, gear in enumerate(gears):
         found.append(GearRow(gear, len(driven) + NUMBERS * i, place.get(gear.first, -1)))
     return tuple(found)

@@ -17,7 +17,7 @@ from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.space import Frame, compose, relative, vector_minus
 from trunnion.algebra.vector import Vector3, cross, dot, plus, scaled, unit, vector_parts
 from trunnion.groups import ccc
-from trunnion.groups.spatial import Pose, SpatialGroup
+from trunnion.groups.spatial import SpatialGroup, SpatialPose
 from trunnion.groups.spatial_tree import Element
 from trunnion.groups.tree import OUTER
 
@@ -27,7 +27,7 @@ __all__ = ["CylindricalDyad"]
 class CylindricalDyad(SpatialGroup):
     """Joints in the order outer, inner, outer; links: that of the first outer joint, then the other."""
 
-    def position(self, elements: Sequence[Element], assembly: int, drive: Sequence[Number] = ()) -> Pose:  # type: ignore[override]
+    def position(self, elements: Sequence[Element], assembly: int, drive: Sequence[Number] = ()) -> SpatialPose:  # type: ignore[override]
         """Pose of the assembly ±1: the sign of ĉ · (b̂ × d̂); NaN where the axes do not reach each other."""
         with np.errstate(all="ignore"):
             outer = [self._of(elements, k, OUTER) for k in (0, 2)]

@@ -14,10 +14,10 @@ from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.plane import Acceleration, Frame, Twist, Wrench, about, accelerated, moved, relative, turned
 from trunnion.groups.protocol import Elements
 
-__all__ = ["PRISMATIC", "REVOLUTE", "Driver", "Pose"]
+__all__ = ["PRISMATIC", "REVOLUTE", "DriverGroup", "DriverPose"]
 
 
-class Pose(NamedTuple):
+class DriverPose(NamedTuple):
     """Frame of the driven link; its joint element (point, direction of the slide); base point → element."""
 
     frames: tuple[Frame]
@@ -26,13 +26,13 @@ class Pose(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Driver:
+class DriverGroup:
     """A driver; `slides` tells a prismatic pair from a revolute one."""
 
     slides: bool
     BRANCHES: ClassVar[tuple[int, ...]] = (1,)
 
-    def position(self, elements: Elements, assembly: object, drive: Sequence[Number] = ()) -> Pose:
+    def position(self, elements: Elements, assembly: object, drive: Sequence[Number] = ()) -> DriverPose:
         """Pose of the driven link from the base element (global), its own (local) and the coordinate."""
         ((base, local),) = elements
         (q,) = drive
@@ -44,9 +44,9 @@ class Driver:
             slide = (0.0, 0.0)
             c, s = turned(xp.cos(q), xp.sin(q), base.c, base.s)
             element = Frame(base.x, base.y, c, s)
-        return Pose((relative(element, local),), element, slide)
+        return DriverPose((relative(element, local),), element, slide)
 
-    def velocity(self, pose: Pose, outer: Sequence[Twist | None], drive: Sequence[Number] = ()) -> list[Twist]:
+    def velocity(self, pose: DriverPose, outer: Sequence[Twist | None], drive: Sequence[Number] = ()) -> list[Twist]:
         """outer: velocity of the base element's point; drive: rate of the coordinate."""
         (base,), (rate,) = outer, drive
         if base is None:
@@ -60,7 +60,7 @@ class Driver:
 
     def acceleration(
         self,
-        pose: Pose,
+        pose: DriverPose,
         twists: Sequence[Twist],
         outer_twists: Sequence[Twist | None],
         outer: Sequence[Acceleration | None],
@@ -81,25 +81,25 @@ class Driver:
             at = Acceleration(base.x, base.y, base.w + second)
         return [accelerated(at, w, *self._to_origin(pose))]
 
-    def reactions(self, pose: Pose, loads: Sequence[Wrench]) -> list[Wrench]:
+    def reactions(self, pose: DriverPose, loads: Sequence[Wrench]) -> list[Wrench]:
         """F_0h = −F_h [D 14] and the moment that balances the link about the joint [D 15]."""
         dx, dy = self._to_origin(pose)
         load = about(loads[0], -dx, -dy)
         return [Wrench(-load.x, -load.y, -load.m)]
 
-    def closure(self, pose: Pose) -> Number:
+    def closure(self, pose: DriverPose) -> Number:
         """Nothing closes: 0."""
         return 0.0
 
-    def condition(self, pose: Pose) -> Number:
+    def condition(self, pose: DriverPose) -> Number:
         """A driver has no dead centre: 1."""
         return 1.0
 
     @staticmethod
-    def _to_origin(pose: Pose) -> tuple[Number, Number]:
+    def _to_origin(pose: DriverPose) -> tuple[Number, Number]:
         (frame,) = pose.frames
         return frame.x - pose.element.x, frame.y - pose.element.y
 
 
-REVOLUTE = Driver(slides=False)
-PRISMATIC = Driver(slides=True)
+REVOLUTE = DriverGroup(slides=False)
+PRISMATIC = DriverGroup(slides=True)

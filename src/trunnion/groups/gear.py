@@ -14,14 +14,14 @@ from typing import NamedTuple
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.plane import Acceleration, Frame, Twist, Wrench, times
 
-__all__ = ["NUMBERS", "ONE", "Action", "Gear", "GearRow", "Mesh", "actions", "apart", "mesh", "rotation"]
+__all__ = ["NUMBERS", "ONE", "GearPair", "GearRow", "Mesh", "ToothForces", "actions", "apart", "mesh", "rotation"]
 
 ONE = 1.0  # the factor that need not be multiplied by
 NUMBERS = 3  # that a module is given for each gear pair, after its drive: ratio, phase, rotation φ₁ to the nearest turn
 Pairs = Sequence[tuple[Frame, Frame]]
 
 
-class Gear(NamedTuple):
+class GearPair(NamedTuple):
     """A gear pair of a module: its two joints, and for each the side of its carrier (0, 1), if they share one."""
 
     first: int
@@ -29,7 +29,7 @@ class Gear(NamedTuple):
     carriers: tuple[int, int] | None = None
 
 
-class Action(NamedTuple):
+class ToothForces(NamedTuple):
     """What a gear pair does to the link on one side of one of its joints, about a place (global, m)."""
 
     joint: int
@@ -52,7 +52,7 @@ class Mesh(NamedTuple):
 class GearRow(NamedTuple):
     """The constraint of a gear pair. slot: where its numbers stand in the drive; step: of φ₁ in the tree, −1 if not."""
 
-    gear: Gear
+    gear: GearPair
     slot: int
     step: int
     is_length: bool = False
@@ -116,7 +116,7 @@ def _turn(pair: tuple[Frame, Frame], less: Number) -> Number:
     return namespace(s, c).arctan2(s, c)
 
 
-def mesh(gear: Gear, pairs: tuple[tuple[Frame, Frame], tuple[Frame, Frame]], ratio: Number) -> Mesh:
+def mesh(gear: GearPair, pairs: tuple[tuple[Frame, Frame], tuple[Frame, Frame]], ratio: Number) -> Mesh:
     """Pitch point and directions of a gear pair with a carrier, from the elements of its two joints (global).
 
     Seen from the carrier the gears turn at ω₁ and ω₂ = ρ ω₁; the point P = A + t (D − A) with t = ρ/(ρ − 1) has the
@@ -137,7 +137,7 @@ def mesh(gear: Gear, pairs: tuple[tuple[Frame, Frame], tuple[Frame, Frame]], rat
     return Mesh(pitch, along, (-along[1], along[0]), factor, -namespace(relative).sign(relative))
 
 
-def actions(gear: Gear, placed: Pairs, ratio: Number, torque: Number) -> list[Action]:
+def actions(gear: GearPair, placed: Pairs, ratio: Number, torque: Number) -> list[ToothForces]:
     """What the pair does to the links when it puts `torque` (N m) into its second joint, separating force apart."""
     pairs = placed[gear.first], placed[gear.second]
     if gear.carriers is not None:
@@ -147,17 +147,19 @@ def actions(gear: Gear, placed: Pairs, ratio: Number, torque: Number) -> list[Ac
         return _on_gears(gear, push, touch.pitch)
     found = []
     for joint, pair, moment in ((gear.second, pairs[1], torque), (gear.first, pairs[0], -ratio * torque)):
-        found += [Action(joint, side, Wrench(0.0, 0.0, s * moment), pair[side]) for side, s in ((1, 1.0), (0, -1.0))]
+        found += [
+            ToothForces(joint, side, Wrench(0.0, 0.0, s * moment), pair[side]) for side, s in ((1, 1.0), (0, -1.0))
+        ]
     return found
 
 
-def apart(gear: Gear, touch: Mesh, size: Number) -> list[Action]:
+def apart(gear: GearPair, touch: Mesh, size: Number) -> list[ToothForces]:
     """What a separating force of `size` (N) does to the gears."""
     push = Wrench(size * touch.apart * touch.along[0], size * touch.apart * touch.along[1], 0.0)
     return _on_gears(gear, push, touch.pitch)
 
 
-def _on_gears(gear: Gear, push: Wrench, at: Frame) -> list[Action]:
+def _on_gears(gear: GearPair, push: Wrench, at: Frame) -> list[ToothForces]:
     """A force on the second gear at the pitch point, and its opposite on the first."""
     one, two = (1 - side for side in gear.carriers or (0, 0))
-    return [Action(gear.second, two, push, at), Action(gear.first, one, times(-1.0, push), at)]
+    return [ToothForces(gear.second, two, push, at), ToothForces(gear.first, one, times(-1.0, push), at)]

@@ -42,12 +42,12 @@ from trunnion.algebra.plane import (
 )
 from trunnion.algebra.traced import looped
 from trunnion.groups import tree as spanning
-from trunnion.groups.cuts import Row, rows
-from trunnion.groups.gear import NUMBERS, ONE, Gear, GearRow, actions
+from trunnion.groups.cuts import CutRow, rows
+from trunnion.groups.gear import NUMBERS, ONE, GearPair, GearRow, actions
 from trunnion.groups.protocol import Elements
 from trunnion.groups.tree import FEW, OUTER, GroupJoint, Step, across, size_of
 
-__all__ = ["OUTER", "General", "GroupJoint", "Pose"]
+__all__ = ["OUTER", "General", "GeneralPose", "GroupJoint"]
 
 QUICK = 8  # rounds for all lanes
 NEWTON_LIMIT = 60  # more for those that need them
@@ -55,7 +55,7 @@ NEARLY = 1e-7  # of its largest allowed step: from here one more round reaches r
 TURN_LIMIT = 0.4  # rad a step: keeps Newton on the branch it starts on
 
 
-class Pose(NamedTuple):
+class GeneralPose(NamedTuple):
     """Frames of the links; both elements of each joint (global); tree coordinates q; J⁻¹; gap; condition.
 
     orientation: sign of det J, which is the same all along one branch of assembly; ratios: of the gear pairs.
@@ -82,7 +82,7 @@ class General:
     links: int
     joints: tuple[GroupJoint, ...]
     driven: tuple[int, ...] = ()
-    gears: tuple[Gear, ...] = ()
+    gears: tuple[GearPair, ...] = ()
     BRANCHES: ClassVar[tuple[int, ...]] = ()
 
     @cached_property
@@ -109,7 +109,7 @@ class General:
         """A length typical of each lane, m."""
         return size_of(self.joints, elements)
 
-    def signature(self, pose: Pose, spread: float) -> list[Number]:
+    def signature(self, pose: GeneralPose, spread: float) -> list[Number]:
         """Numbers that tell assemblies apart: places and directions of the links."""
         return [n for frame in pose.frames for n in (frame.x / spread, frame.y / spread, frame.c, frame.s)]
 
@@ -134,7 +134,7 @@ class General:
 
     # ---- position -------------------------------------------------------------------------------------------
 
-    def position(self, elements: Elements, assembly: Sequence[Number], drive: Sequence[Number] = ()) -> Pose:
+    def position(self, elements: Elements, assembly: Sequence[Number], drive: Sequence[Number] = ()) -> GeneralPose:
         """Pose by Newton from the free tree coordinates `assembly` (rad, m; order of `free`).
 
         NaN in the lanes that do not close. Dual inputs: one more step at the solution for each level of ε.
@@ -162,7 +162,7 @@ class General:
             opening = xp.maximum(opening, xp.abs(value))
         condition = self._condition(jacobian, inverse, size)
         ratios = tuple(drive[len(self.driven) :: NUMBERS])
-        return Pose(frames, placed, tuple(q), inverse, opening, condition, orientation, ratios)
+        return GeneralPose(frames, placed, tuple(q), inverse, opening, condition, orientation, ratios)
 
     def _newton(self, elements: Elements, start: Sequence[Number], drive: Sequence[Number]) -> list[Number]:
         """Newton on real numbers from `start`; lanes that do not converge are NaN."""
@@ -248,7 +248,7 @@ class General:
     # ---- the Jacobian ---------------------------------------------------------------------------------------
 
     @cached_property
-    def _rows(self) -> tuple[Row | GearRow, ...]:
+    def _rows(self) -> tuple[CutRow | GearRow, ...]:
         return rows(self.joints, self.steps, self.driven, self.gears)
 
     def _gap(self, placed: Sequence[tuple[Frame, Frame]], q: Sequence[Number], drive: Sequence[Number]) -> list[Number]:
@@ -307,12 +307,12 @@ class General:
 
     # ---- velocity and acceleration --------------------------------------------------------------------------
 
-    def velocity(self, pose: Pose, outer: Sequence[Twist | None], drive: Sequence[Number] = ()) -> list[Twist]:
+    def velocity(self, pose: GeneralPose, outer: Sequence[Twist | None], drive: Sequence[Number] = ()) -> list[Twist]:
         """Velocities of the frame origins: outer motion and driven rates give the gaps' rates, J⁻¹ closes them."""
         rates = self.rates(pose, outer, drive)
         return self._twists(pose, outer, rates)
 
-    def rates(self, pose: Pose, outer: Sequence[Twist | None], drive: Sequence[Number] = ()) -> list[Number]:
+    def rates(self, pose: GeneralPose, outer: Sequence[Twist | None], drive: Sequence[Number] = ()) -> list[Number]:
         """Rates of all tree coordinates, rad/s and m/s."""
         rates = self.coordinates((), [0.0] * len(self.free), drive)
         twists = self._twists(pose, outer, rates)
@@ -325,7 +325,7 @@ class General:
             rates[i] = -linalg.weighted(line, open_rates)
         return rates
 
-    def _twists(self, pose: Pose, outer: Sequence[Twist | None], rates: Sequence[Number]) -> list[Twist]:
+    def _twists(self, pose: GeneralPose, outer: Sequence[Twist | None], rates: Sequence[Number]) -> list[Twist]:
         twists: dict[int, Twist] = {}
         for rate, step in zip(rates, self.steps, strict=True):
             near, far = pose.elements[step.joint][step.near], pose.elements[step.joint][1 - step.near]
@@ -342,7 +342,7 @@ class General:
 
     def _at(
         self,
-        pose: Pose,
+        pose: GeneralPose,
         twists: dict[int, Twist] | list[Twist],
         outer: Sequence[Twist | None],
         k: int,
@@ -360,7 +360,7 @@ class General:
 
     def acceleration(
         self,
-        pose: Pose,
+        pose: GeneralPose,
         twists: Sequence[Twist],
         outer_twists: Sequence[Twist | None],
         outer: Sequence[Acceleration | None],
@@ -420,7 +420,7 @@ class General:
 
     # ---- reactions ------------------------------------------------------------------------------------------
 
-    def reactions(self, pose: Pose, loads: Sequence[Wrench]) -> list[Wrench]:
+    def reactions(self, pose: GeneralPose, loads: Sequence[Wrench]) -> list[Wrench]:
         """Cut wrenches from Jᵀ λ = −(outboard power on each screw), the others link by link from outside in.
 
         After the joints come the gear pairs, each with the torque it puts into its second joint.
@@ -455,7 +455,7 @@ class General:
                 carried[step.parent] = added(carried[step.parent], total)
         return [found[k] for k in range(len(self.joints))] + [Wrench(0.0, 0.0, torque) for torque in torques]
 
-    def _multipliers(self, pose: Pose, carried: dict[int, Wrench]) -> list[Number]:
+    def _multipliers(self, pose: GeneralPose, carried: dict[int, Wrench]) -> list[Number]:
         """λ of every constraint."""
         powers: list[Number] = []
         screws = self._screws(pose.elements, _reference(pose))
@@ -467,34 +467,34 @@ class General:
             powers.append(screws[i].x * outboard.x + screws[i].y * outboard.y + screws[i].w * outboard.m)
         return [-linalg.weighted([line[j] for line in pose.inverse], powers) for j in range(len(self._rows))]
 
-    def closure(self, pose: Pose) -> Number:
+    def closure(self, pose: GeneralPose) -> Number:
         """Largest distance by which a cut joint is open, m."""
         return pose.gap
 
-    def condition(self, pose: Pose) -> Number:
+    def condition(self, pose: GeneralPose) -> Number:
         """Frobenius condition of J with lengths measured in the size of the group."""
         return pose.condition
 
 
 class _Motion(NamedTuple):
-    pose: Pose
+    pose: GeneralPose
     twists: list[Twist]
     outer_twists: Sequence[Twist | None]
     outer: Sequence[Acceleration | None]
 
 
-def _reference(pose: Pose) -> Frame:
+def _reference(pose: GeneralPose) -> Frame:
     """A point of the group about which wrenches are added up: near, so that no digits are lost."""
     return pose.elements[0][0]
 
 
-def _moved_to(pose: Pose, wrench: Wrench, at: Frame) -> Wrench:
+def _moved_to(pose: GeneralPose, wrench: Wrench, at: Frame) -> Wrench:
     """A wrench about `at`, about the common reference point."""
     reference = _reference(pose)
     return about(wrench, reference.x - at.x, reference.y - at.y)
 
 
-def _moved_from(pose: Pose, wrench: Wrench, at: Frame) -> Wrench:
+def _moved_from(pose: GeneralPose, wrench: Wrench, at: Frame) -> Wrench:
     """A wrench about the common reference point, about `at`."""
     reference = _reference(pose)
     return about(wrench, at.x - reference.x, at.y - reference.y)

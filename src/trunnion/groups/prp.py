@@ -30,12 +30,12 @@ from trunnion.algebra.plane import (
 )
 from trunnion.groups.protocol import Elements
 
-__all__ = ["BRANCHES", "Pose", "acceleration", "closure", "condition", "position", "reactions", "velocity"]
+__all__ = ["BRANCHES", "PRPPose", "acceleration", "closure", "condition", "position", "reactions", "velocity"]
 
 BRANCHES = (1,)
 
 
-class Pose(NamedTuple):
+class PRPPose(NamedTuple):
     """Frames of i, j; u, v; 1/(u × v); from the origins: i → B, C; j → C, D; from the guides' points to C; gap."""
 
     frames: tuple[Frame, Frame]
@@ -49,7 +49,7 @@ class Pose(NamedTuple):
     closure: Number
 
 
-def position(elements: Elements, assembly: int = 1, drive: Sequence[Number] = ()) -> Pose:
+def position(elements: Elements, assembly: int = 1, drive: Sequence[Number] = ()) -> PRPPose:
     """Pose of both sliders; there is one.
 
     elements: (B on h, B on i), (C on i, C on j), (D on k, D on j); those on h and k global, else local; m.
@@ -65,7 +65,7 @@ def position(elements: Elements, assembly: int = 1, drive: Sequence[Number] = ()
     on_i, on_j = compose(frame_i, c_i), compose(frame_j, c_j)
     at_b, at_d = compose(frame_i, b_i), compose(frame_j, d_j)
     xp = namespace(s, t)
-    return Pose(
+    return PRPPose(
         (frame_i, frame_j),
         u,
         v,
@@ -78,7 +78,7 @@ def position(elements: Elements, assembly: int = 1, drive: Sequence[Number] = ()
     )
 
 
-def velocity(pose: Pose, outer: Sequence[Twist | None], drive: Sequence[Number] = ()) -> list[Twist]:
+def velocity(pose: PRPPose, outer: Sequence[Twist | None], drive: Sequence[Number] = ()) -> list[Twist]:
     """Velocities from v_h(C) + ṡ u = v_k(C) + ṫ v; outer: (of B on h, None, of D on k)."""
     b, d = both_ends(outer, "PRP")
     one, two = moved(b, *pose.from_guides[0]), moved(d, *pose.from_guides[1])
@@ -89,7 +89,7 @@ def velocity(pose: Pose, outer: Sequence[Twist | None], drive: Sequence[Number] 
 
 
 def acceleration(
-    pose: Pose,
+    pose: PRPPose,
     twists: Sequence[Twist],
     outer_twists: Sequence[Twist | None],
     outer: Sequence[Acceleration | None],
@@ -111,12 +111,12 @@ def acceleration(
     ]
 
 
-def _rates(pose: Pose, jump: Vector) -> tuple[Number, Number]:
+def _rates(pose: PRPPose, jump: Vector) -> tuple[Number, Number]:
     """(s, t) with s u − t v = jump; no solution where the guides are parallel."""
     return cross(jump, pose.v) * pose.inverse, cross(jump, pose.u) * pose.inverse
 
 
-def reactions(pose: Pose, loads: Sequence[Wrench]) -> list[Wrench]:
+def reactions(pose: PRPPose, loads: Sequence[Wrench]) -> list[Wrench]:
     """Reactions (F, M)_hi, F_ij, (F, M)_kj: F_ij · u = F_i · u on i, F_ij · v = −F_j · v on j."""
     on_i, on_j = about(loads[0], *pose.b), about(loads[1], *pose.d)
     u, v = pose.u, pose.v
@@ -134,11 +134,11 @@ def reactions(pose: Pose, loads: Sequence[Wrench]) -> list[Wrench]:
     ]
 
 
-def closure(pose: Pose) -> Number:
+def closure(pose: PRPPose) -> Number:
     """By how much the two sides of the pin C are apart, m."""
     return pose.closure
 
 
-def condition(pose: Pose) -> Number:
+def condition(pose: PRPPose) -> Number:
     """2/|sin| of the angle between the guides."""
     return 2 * namespace(pose.inverse).abs(pose.inverse)

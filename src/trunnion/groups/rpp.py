@@ -31,12 +31,12 @@ from trunnion.algebra.plane import (
 )
 from trunnion.groups.protocol import Elements
 
-__all__ = ["BRANCHES", "Pose", "acceleration", "closure", "condition", "position", "reactions", "velocity"]
+__all__ = ["BRANCHES", "RPPPose", "acceleration", "closure", "condition", "position", "reactions", "velocity"]
 
 BRANCHES = (1,)
 
 
-class Pose(NamedTuple):
+class RPPPose(NamedTuple):
     """Frames of i, j; u, v; 1/(u × v); from the origins: i → B, j → C, j → D; to C on j from B and from D on k; gap."""
 
     frames: tuple[Frame, Frame]
@@ -50,7 +50,7 @@ class Pose(NamedTuple):
     closure: Number
 
 
-def position(elements: Elements, assembly: int = 1, drive: Sequence[Number] = ()) -> Pose:
+def position(elements: Elements, assembly: int = 1, drive: Sequence[Number] = ()) -> RPPPose:
     """Pose of both links; there is one.
 
     elements: (B on h, B on i), (C on i, C on j), (D on k, D on j); those on h and k global, else local; m.
@@ -66,7 +66,7 @@ def position(elements: Elements, assembly: int = 1, drive: Sequence[Number] = ()
     inverse = 1 / cross(u, v)
     frame_j = shifted(rest_j, v, cross((guide.x - on_i.x, guide.y - on_i.y), u) * inverse)
     on_j, at_d = compose(frame_j, c_j), compose(frame_j, d_j)
-    return Pose(
+    return RPPPose(
         (frame_i, frame_j),
         u,
         v,
@@ -79,7 +79,7 @@ def position(elements: Elements, assembly: int = 1, drive: Sequence[Number] = ()
     )
 
 
-def velocity(pose: Pose, outer: Sequence[Twist | None], drive: Sequence[Number] = ()) -> list[Twist]:
+def velocity(pose: RPPPose, outer: Sequence[Twist | None], drive: Sequence[Number] = ()) -> list[Twist]:
     """Velocities from v_i(C) + ṡ u = v_k(C) + ṫ v with ω_i = ω_j = ω_k; outer: (of B, None, of D on k)."""
     b, d = both_ends(outer, "RPP")
     on_i = Twist(b.x, b.y, d.w)
@@ -90,7 +90,7 @@ def velocity(pose: Pose, outer: Sequence[Twist | None], drive: Sequence[Number] 
 
 
 def acceleration(
-    pose: Pose,
+    pose: RPPPose,
     twists: Sequence[Twist],
     outer_twists: Sequence[Twist | None],
     outer: Sequence[Acceleration | None],
@@ -109,14 +109,14 @@ def acceleration(
     return [accelerated(on_i, w, -pose.b[0], -pose.b[1]), accelerated(on_j, w, -pose.c[0], -pose.c[1])]
 
 
-def _rates(pose: Pose, b: Twist, d: Twist) -> tuple[Number, Number]:
+def _rates(pose: RPPPose, b: Twist, d: Twist) -> tuple[Number, Number]:
     """(ṡ, ṫ) of the slides C and D; none where the guides are parallel."""
     one, two = moved(b, *pose.to_c[0]), moved(d, *pose.to_c[1])
     jump = (two.x - one.x, two.y - one.y)
     return cross(jump, pose.v) * pose.inverse, cross(jump, pose.u) * pose.inverse
 
 
-def reactions(pose: Pose, loads: Sequence[Wrench]) -> list[Wrench]:
+def reactions(pose: RPPPose, loads: Sequence[Wrench]) -> list[Wrench]:
     """Reactions F_hi, (N n, M)_ij, (F, M)_kj: N n · v = −F_j · v on j, and moments about B on i."""
     on_i, on_j = about(loads[0], *pose.b), about(loads[1], *pose.d)
     u, v = pose.u, pose.v
@@ -132,11 +132,11 @@ def reactions(pose: Pose, loads: Sequence[Wrench]) -> list[Wrench]:
     ]
 
 
-def closure(pose: Pose) -> Number:
+def closure(pose: RPPPose) -> Number:
     """By how much the slide C is off its axis, m."""
     return pose.closure
 
 
-def condition(pose: Pose) -> Number:
+def condition(pose: RPPPose) -> Number:
     """2/|sin| of the angle between the guides."""
     return 2 * namespace(pose.inverse).abs(pose.inverse)

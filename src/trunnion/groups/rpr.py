@@ -29,12 +29,12 @@ from trunnion.algebra.plane import (
 )
 from trunnion.groups.protocol import Elements
 
-__all__ = ["BRANCHES", "Pose", "acceleration", "closure", "condition", "position", "reactions", "velocity"]
+__all__ = ["BRANCHES", "RPRPose", "acceleration", "closure", "condition", "position", "reactions", "velocity"]
 
 BRANCHES = (1, -1)
 
 
-class Pose(NamedTuple):
+class RPRPose(NamedTuple):
     """Frames of i, j; u; X, e of B→D = X u + e n; from the origins: i → B, j → D; from D to C on j; |BD|."""
 
     frames: tuple[Frame, Frame]
@@ -48,7 +48,7 @@ class Pose(NamedTuple):
     closure: Number
 
 
-def position(elements: Elements, assembly: int, drive: Sequence[Number] = ()) -> Pose:
+def position(elements: Elements, assembly: int, drive: Sequence[Number] = ()) -> RPRPose:
     """Pose of both links. assembly: ±1, D ahead of B along the slide's axis or behind it.
 
     elements: (B on h, B on i), (C on i, C on j), (D on k, D on j); those on h and k global, else local; m.
@@ -68,10 +68,10 @@ def position(elements: Elements, assembly: int, drive: Sequence[Number] = ()) ->
     frame_j = relative(Frame(d.x - to_d[0], d.y - to_d[1], *u), c_j)
     arm_b, arm_d = turned(frame_i.c, frame_i.s, b_i.x, b_i.y), turned(frame_j.c, frame_j.s, d_j.x, d_j.y)
     gap = xp.abs((x * u[1] - y * u[0]) + offset)
-    return Pose((frame_i, frame_j), u, along, offset, arm_b, arm_d, (-to_d[0], -to_d[1]), xp.sqrt(square), gap)
+    return RPRPose((frame_i, frame_j), u, along, offset, arm_b, arm_d, (-to_d[0], -to_d[1]), xp.sqrt(square), gap)
 
 
-def velocity(pose: Pose, outer: Sequence[Twist | None], drive: Sequence[Number] = ()) -> list[Twist]:
+def velocity(pose: RPRPose, outer: Sequence[Twist | None], drive: Sequence[Number] = ()) -> list[Twist]:
     """Velocities from v_D − v_B = Ẋ u + ω × BD; outer: (of B, None, of D)."""
     b, d = both_ends(outer, "RPR")
     w, _ = _rates(pose, (d.x - b.x, d.y - b.y))
@@ -82,7 +82,7 @@ def velocity(pose: Pose, outer: Sequence[Twist | None], drive: Sequence[Number] 
 
 
 def acceleration(
-    pose: Pose,
+    pose: RPRPose,
     twists: Sequence[Twist],
     outer_twists: Sequence[Twist | None],
     outer: Sequence[Acceleration | None],
@@ -105,14 +105,14 @@ def acceleration(
     ]
 
 
-def _rates(pose: Pose, jump: Vector) -> tuple[Number, Number]:
+def _rates(pose: RPRPose, jump: Vector) -> tuple[Number, Number]:
     """(ω, Ẋ) with ω × BD + Ẋ u = jump; no solution where the slide is across BD (X = 0)."""
     u = pose.u
     w = (u[0] * jump[1] - u[1] * jump[0]) / pose.along
     return w, u[0] * jump[0] + u[1] * jump[1] + w * pose.offset
 
 
-def reactions(pose: Pose, loads: Sequence[Wrench]) -> list[Wrench]:
+def reactions(pose: RPRPose, loads: Sequence[Wrench]) -> list[Wrench]:
     """Reactions F_hi, (N n, M)_ij and F_kj: the slide carries N across it, and X N = M_i about B + M_j about D."""
     u = pose.u
     on_i, on_j = about(loads[0], *pose.b), about(loads[1], *pose.d)
@@ -126,11 +126,11 @@ def reactions(pose: Pose, loads: Sequence[Wrench]) -> list[Wrench]:
     ]
 
 
-def closure(pose: Pose) -> Number:
+def closure(pose: RPRPose) -> Number:
     """By how much the two axes of the slide are apart, m."""
     return pose.closure
 
 
-def condition(pose: Pose) -> Number:
+def condition(pose: RPRPose) -> Number:
     """2 |BD|/|X|: a dead centre is where the slide is across BD."""
     return 2 * pose.length / namespace(pose.along).abs(pose.along)

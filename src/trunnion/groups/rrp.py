@@ -32,12 +32,12 @@ from trunnion.algebra.plane import (
 )
 from trunnion.groups.protocol import Elements
 
-__all__ = ["BRANCHES", "Pose", "acceleration", "closure", "condition", "position", "reactions", "velocity"]
+__all__ = ["BRANCHES", "RRPPose", "acceleration", "closure", "condition", "position", "reactions", "velocity"]
 
 BRANCHES = (1, -1)
 
 
-class Pose(NamedTuple):
+class RRPPose(NamedTuple):
     """Frames of i, j; u; r, p of B→C = r u + p n; from the origins: i → B, j → C, j → D; from D on k: → C, → D on j."""
 
     frames: tuple[Frame, Frame]
@@ -53,7 +53,7 @@ class Pose(NamedTuple):
     closure: Number
 
 
-def position(elements: Elements, assembly: int, drive: Sequence[Number] = ()) -> Pose:
+def position(elements: Elements, assembly: int, drive: Sequence[Number] = ()) -> RRPPose:
     """Pose of rod and slider. assembly: ±1, C ahead of B (along the guide's axis) or behind it.
 
     elements: (B on h, B on i), (C on i, C on j), (D on k, D on j); those on h and k global, else local; m.
@@ -75,10 +75,10 @@ def position(elements: Elements, assembly: int, drive: Sequence[Number] = ()) ->
     to_d = (frame_j.x + arm_d[0] - d.x, frame_j.y + arm_d[1] - d.y)
     to_c = (frame_j.x + arm_c[0] - d.x, frame_j.y + arm_c[1] - d.y)
     gap = xp.abs(to_d[1] * u[0] - to_d[0] * u[1])
-    return Pose((frame_i, frame_j), u, r, p, arm_b, arm_c, arm_d, xp.sqrt(square), to_c, to_d, gap)
+    return RRPPose((frame_i, frame_j), u, r, p, arm_b, arm_c, arm_d, xp.sqrt(square), to_c, to_d, gap)
 
 
-def velocity(pose: Pose, outer: Sequence[Twist | None], drive: Sequence[Number] = ()) -> list[Twist]:
+def velocity(pose: RRPPose, outer: Sequence[Twist | None], drive: Sequence[Number] = ()) -> list[Twist]:
     """Velocities from v_B + ω_i × BC = v_k(C) + ṡ u; outer: (of B, None, of D on k)."""
     b, d = both_ends(outer, "RRP")
     carried = moved(d, *pose.to_c)
@@ -88,7 +88,7 @@ def velocity(pose: Pose, outer: Sequence[Twist | None], drive: Sequence[Number] 
 
 
 def acceleration(
-    pose: Pose,
+    pose: RRPPose,
     twists: Sequence[Twist],
     outer_twists: Sequence[Twist | None],
     outer: Sequence[Acceleration | None],
@@ -111,14 +111,14 @@ def acceleration(
     ]
 
 
-def _rates(pose: Pose, jump: Vector) -> tuple[Number, Number]:
+def _rates(pose: RRPPose, jump: Vector) -> tuple[Number, Number]:
     """(ω, ṡ) with ω × BC − ṡ u = jump; no solution where the rod is across the guide (r = 0)."""
     across = pose.u[0] * jump[1] - pose.u[1] * jump[0]
     w = across / pose.r
     return w, -pose.p * w - dot(jump, pose.u)
 
 
-def reactions(pose: Pose, loads: Sequence[Wrench]) -> list[Wrench]:
+def reactions(pose: RRPPose, loads: Sequence[Wrench]) -> list[Wrench]:
     """Reactions F_hi, F_ij and (F, M)_kj: moments about B on the rod, forces along the guide on the slider.
 
     BC × F_ij = M_i about B, (F_ij + F_j) · u = 0; then forces on i and on j, and moments about D on j.
@@ -139,11 +139,11 @@ def reactions(pose: Pose, loads: Sequence[Wrench]) -> list[Wrench]:
     ]
 
 
-def closure(pose: Pose) -> Number:
+def closure(pose: RRPPose) -> Number:
     """By how much the slider is off its guide, m."""
     return pose.closure
 
 
-def condition(pose: Pose) -> Number:
+def condition(pose: RRPPose) -> Number:
     """2 |BC|/|r|: a dead centre is where the rod stands across the guide."""
     return 2 * pose.length / namespace(pose.r).abs(pose.r)

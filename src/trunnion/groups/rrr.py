@@ -28,12 +28,12 @@ from trunnion.algebra.plane import (
 )
 from trunnion.groups.protocol import Elements
 
-__all__ = ["BRANCHES", "Pose", "acceleration", "closure", "condition", "meet", "position", "reactions", "velocity"]
+__all__ = ["BRANCHES", "RRRPose", "acceleration", "closure", "condition", "meet", "position", "reactions", "velocity"]
 
 BRANCHES = (1, -1)
 
 
-class Pose(NamedTuple):
+class RRRPose(NamedTuple):
     """Frames of the links i, j; B→C, D→C, and from the frame origins to B and D, global axes, m; |BC|, |CD|.
 
     area: 1/(BC × DC), 1/m²; infinite in a dead centre. closure: opening of the pin C, m.
@@ -63,7 +63,7 @@ def meet(b: Vector, d: Vector, bc: Number, cd: Number, branch: int) -> Vector:
     return along * x - across * y, along * y + across * x
 
 
-def position(elements: Elements, assembly: int, drive: Sequence[Number] = ()) -> Pose:
+def position(elements: Elements, assembly: int, drive: Sequence[Number] = ()) -> RRRPose:
     """Pose of both links. assembly: ±1, C left or right of B→D.
 
     elements: (B on h, B on i), (C on i, C on j), (D on k, D on j); those on h and k global, else local; m.
@@ -79,10 +79,10 @@ def position(elements: Elements, assembly: int, drive: Sequence[Number] = ()) ->
     frame_j, arm_d = pinned(d, d_j, dc, side_j, lengths[1] * lengths[1])
     xp = namespace(*bc)
     gap = xp.abs(xp.sqrt(dot(bc, bc)) - lengths[0]) + xp.abs(xp.sqrt(dot(dc, dc)) - lengths[1])
-    return Pose((frame_i, frame_j), bc, dc, arm_b, arm_d, lengths, 1 / cross(bc, dc), gap)
+    return RRRPose((frame_i, frame_j), bc, dc, arm_b, arm_d, lengths, 1 / cross(bc, dc), gap)
 
 
-def velocity(pose: Pose, outer: Sequence[Twist | None], drive: Sequence[Number] = ()) -> list[Twist]:
+def velocity(pose: RRRPose, outer: Sequence[Twist | None], drive: Sequence[Number] = ()) -> list[Twist]:
     """Velocities from v_B + ω_i × BC = v_D + ω_j × DC; outer: (of B, None, of D)."""
     b, d = both_ends(outer, "RRR")
     w_i, w_j = _rates(pose, (d.x - b.x, d.y - b.y))
@@ -93,7 +93,7 @@ def velocity(pose: Pose, outer: Sequence[Twist | None], drive: Sequence[Number] 
 
 
 def acceleration(
-    pose: Pose,
+    pose: RRRPose,
     twists: Sequence[Twist],
     outer_twists: Sequence[Twist | None],
     outer: Sequence[Acceleration | None],
@@ -115,12 +115,12 @@ def acceleration(
     ]
 
 
-def _rates(pose: Pose, jump: Vector) -> tuple[Number, Number]:
+def _rates(pose: RRRPose, jump: Vector) -> tuple[Number, Number]:
     """(p, q) with p × BC − q × DC = jump; × means z × vector. No solution where B, C, D are in line."""
     return dot(jump, pose.dc) * pose.area, dot(jump, pose.bc) * pose.area
 
 
-def reactions(pose: Pose, loads: Sequence[Wrench]) -> list[Wrench]:
+def reactions(pose: RRRPose, loads: Sequence[Wrench]) -> list[Wrench]:
     """Reactions F_hi at B, F_ij at C, F_kj at D.  [D 2-7, with friction among the loads 12-13]
 
     Moments about B on link i and about D on link j hold only F_ij:
@@ -137,7 +137,7 @@ def reactions(pose: Pose, loads: Sequence[Wrench]) -> list[Wrench]:
     ]
 
 
-def _shared(m_i: Number, m_j: Number, pose: Pose) -> Vector:
+def _shared(m_i: Number, m_j: Number, pose: RRRPose) -> Vector:
     """F_ij from the moments on both links; a literal zero among them, as in a unit friction load, costs nothing."""
     if is_zero(m_j):
         q = m_i * pose.area
@@ -149,12 +149,12 @@ def _shared(m_i: Number, m_j: Number, pose: Pose) -> Vector:
     return p * pose.bc[0] + q * pose.dc[0], p * pose.bc[1] + q * pose.dc[1]
 
 
-def closure(pose: Pose) -> Number:
+def closure(pose: RRRPose) -> Number:
     """By how much the pin C found misses the two circles, m."""
     return pose.closure
 
 
-def condition(pose: Pose) -> Number:
+def condition(pose: RRRPose) -> Number:
     """2/|sin μ|, μ the transmission angle between BC and DC: Frobenius condition of their unit vectors."""
     xp = namespace(*pose.bc)
     return 2 * pose.lengths[0] * pose.lengths[1] * xp.abs(pose.area)

@@ -36,7 +36,7 @@ from trunnion.groups.spatial_tree import Element, SpatialTree, entries
 from trunnion.groups.tree import FEW, OUTER
 from trunnion.joints.spatial import MOTIONS
 
-__all__ = ["Pose", "SpatialGroup"]
+__all__ = ["SpatialGroup", "SpatialPose"]
 
 QUICK = 8  # rounds for all lanes
 NEWTON_LIMIT = 60  # more for those that need them
@@ -46,7 +46,7 @@ SLIDE_LIMIT = 0.3  # of the size
 CLOSED = 1e-9  # rad, or of the size: a gap that redundant equations leave at most
 
 
-class Pose(NamedTuple):
+class SpatialPose(NamedTuple):
     """Frames of the links; elements of the joints and the screws of their freedoms (global); coordinates q; J and J⁻¹.
 
     size: a length typical of each lane, in which J has its lengths; orientation: sign of det J, which is the same all
@@ -76,7 +76,7 @@ class SpatialGroup(SpatialTree):
 
     def position(
         self, elements: Sequence[Element], assembly: Sequence[Number] | None, drive: Sequence[Number] = ()
-    ) -> Pose:
+    ) -> SpatialPose:
         """Pose by Newton from the coordinates `assembly` of all joints but the prescribed (rad, m, quaternions).
 
         NaN in the lanes that do not close. Dual inputs: one more step at the solution for each level of ε.
@@ -93,7 +93,7 @@ class SpatialGroup(SpatialTree):
                 q = self._step(elements, q, size)
             return self._posed(elements, q, size)
 
-    def _posed(self, elements: Sequence[Element], q: list[list[Number]], size: Number) -> Pose:
+    def _posed(self, elements: Sequence[Element], q: list[list[Number]], size: Number) -> SpatialPose:
         frames, placed, screws = self.place(elements, q)
         jacobian = self.jacobian(placed, screws, size)
         orientation: Number = 1.0
@@ -112,7 +112,7 @@ class SpatialGroup(SpatialTree):
                 orientation = np.sign(primal(linalg.determinant(jacobian)))
         condition = redundant.condition(jacobian) if self.redundant and inverse else _condition(jacobian, inverse)
         all_q = tuple(value for joint in q for value in joint)
-        return Pose(frames, placed, screws, all_q, jacobian, inverse, size, gap, condition, orientation)
+        return SpatialPose(frames, placed, screws, all_q, jacobian, inverse, size, gap, condition, orientation)
 
     def _newton(self, elements: Sequence[Element], q: list[list[Number]], size: Number) -> list[list[Number]]:
         """Newton on real numbers; lanes that do not converge are NaN."""
@@ -220,7 +220,9 @@ class SpatialGroup(SpatialTree):
 
     # ---- velocity and acceleration --------------------------------------------------------------------------
 
-    def rates(self, pose: Pose, outer: Sequence[Screw | None], drive: Sequence[Number] = ()) -> list[list[Number]]:
+    def rates(
+        self, pose: SpatialPose, outer: Sequence[Screw | None], drive: Sequence[Number] = ()
+    ) -> list[list[Number]]:
         """Rate of every freedom of every joint, rad/s and m/s."""
         rates = self._driven_only(drive)
         twists = self.twists(pose, outer, rates)
@@ -240,14 +242,16 @@ class SpatialGroup(SpatialTree):
             rates[k][0] = value
         return rates
 
-    def _closing(self, pose: Pose, rates: list[list[Number]], rows: Sequence[Number]) -> list[list[Number]]:
+    def _closing(self, pose: SpatialPose, rates: list[list[Number]], rows: Sequence[Number]) -> list[list[Number]]:
         """The rates with those of the free coordinates that close what is open."""
         for (k, i), line in zip(self.free, pose.inverse, strict=True) if rows else ():
             value = -linalg.weighted(line, rows)
             rates[k][i] = value * pose.size if self.slides(k, i) else value
         return rates
 
-    def twists(self, pose: Pose, outer: Sequence[Screw | None], rates: Sequence[Sequence[Number]]) -> list[Screw]:
+    def twists(
+        self, pose: SpatialPose, outer: Sequence[Screw | None], rates: Sequence[Sequence[Number]]
+    ) -> list[Screw]:
         """Twists of the links from the rates of all freedoms."""
         twists: dict[int, Screw] = {}
         for step in self.steps:
@@ -260,7 +264,7 @@ class SpatialGroup(SpatialTree):
 
     def acceleration(
         self,
-        pose: Pose,
+        pose: SpatialPose,
         twists: Sequence[Screw],
         outer_twists: Sequence[Screw | None],
         outer: Sequence[Screw | None],
@@ -286,7 +290,7 @@ class SpatialGroup(SpatialTree):
         second = self._closing(pose, second, rows)
         return self._accelerations(pose, outer, second, carried)
 
-    def _carried(self, pose: Pose, speeds: Sequence[Number], k: int, base: Screw) -> Screw:
+    def _carried(self, pose: SpatialPose, speeds: Sequence[Number], k: int, base: Screw) -> Screw:
         """Σ q̇ (V × s) of a joint: its screws are carried along by its first link and by the freedoms before them."""
         motion = MOTIONS[self.joints[k].kind]
         found, twist = ZERO, base
@@ -299,7 +303,7 @@ class SpatialGroup(SpatialTree):
 
     def _accelerations(
         self,
-        pose: Pose,
+        pose: SpatialPose,
         outer: Sequence[Screw | None],
         second: Sequence[Sequence[Number]],
         carried: Sequence[Screw],
@@ -316,7 +320,7 @@ class SpatialGroup(SpatialTree):
 
     # ---- reactions ------------------------------------------------------------------------------------------
 
-    def reactions(self, pose: Pose, loads: Sequence[Screw]) -> list[Screw]:
+    def reactions(self, pose: SpatialPose, loads: Sequence[Screw]) -> list[Screw]:
         """Wrench on the second link of each joint by the first, about the origin.
 
         loads: everything else that acts on each link, inertia included. The component along a driven freedom is the
@@ -331,7 +335,7 @@ class SpatialGroup(SpatialTree):
             multipliers = redundant.least(pose.jacobian, reactions, multipliers)
         return self.link_by_link(pose, loads, multipliers)
 
-    def link_by_link(self, pose: Pose, loads: Sequence[Screw], multipliers: Sequence[Number]) -> list[Screw]:
+    def link_by_link(self, pose: SpatialPose, loads: Sequence[Screw], multipliers: Sequence[Number]) -> list[Screw]:
         """The wrenches of all joints from those of the loops."""
         carried = dict(enumerate(loads))
         found: dict[int, Screw] = {}
@@ -352,18 +356,18 @@ class SpatialGroup(SpatialTree):
                 carried[step.parent] = added(carried[step.parent], total)
         return [found[k] for k in range(len(self.joints))]
 
-    def cut_wrench(self, pose: Pose, k: int, sizes: Sequence[Number]) -> Screw:
+    def cut_wrench(self, pose: SpatialPose, k: int, sizes: Sequence[Number]) -> Screw:
         """The wrench of six multipliers, moment and force at the place where the loop is closed, about the origin."""
         mx, my, mz, *force = sizes
         x, y, z = (part / pose.size for part in force)
         place = pose.elements[k].second.place
         return Screw((x, y, z), plus((mx, my, mz), cross(place, (x, y, z))))
 
-    def spin_torques(self, pose: Pose, loads: Sequence[Screw]) -> list[Number]:
+    def spin_torques(self, pose: SpatialPose, loads: Sequence[Screw]) -> list[Number]:
         """Torque about its line that each link with a free spin would need to keep from spinning, N m."""
         return self._multipliers(pose, loads)[6 * len(self.chords) :]
 
-    def _multipliers(self, pose: Pose, loads: Sequence[Screw]) -> list[Number]:
+    def _multipliers(self, pose: SpatialPose, loads: Sequence[Screw]) -> list[Number]:
         """λ of every row."""
         if not pose.inverse:
             return [0.0] * len(pose.jacobian)
@@ -383,15 +387,15 @@ class SpatialGroup(SpatialTree):
         rows = range(len(pose.inverse[0]))
         return [-linalg.weighted([line[j] for line in pose.inverse], powers) for j in rows]
 
-    def closure(self, pose: Pose) -> Number:
+    def closure(self, pose: SpatialPose) -> Number:
         """Largest distance by which a loop is open, m; an angle counts as angle times size."""
         return pose.gap
 
-    def condition(self, pose: Pose) -> Number:
+    def condition(self, pose: SpatialPose) -> Number:
         """2/n ‖J‖·‖J⁻¹‖ (Frobenius) with lengths in units of the size: 2 at best."""
         return pose.condition
 
-    def signature(self, pose: Pose, spread: float) -> list[Number]:
+    def signature(self, pose: SpatialPose, spread: float) -> list[Number]:
         """Numbers that tell assemblies apart: axes and places of the links; of a spinning one its two joints."""
         spun = {link for link, _, _ in self.spinning}
         found: list[Number] = []
@@ -408,7 +412,7 @@ class Outside:
     """Twists (or their derivatives) of the links at both sides of each joint, known links included."""
 
     group: SpatialGroup
-    pose: Pose
+    pose: SpatialPose
     twists: Sequence[Screw]
     outer: Sequence[Screw | None]
 
@@ -434,7 +438,7 @@ def _condition(jacobian: Sequence[Sequence[Number]], inverse: Sequence[Sequence[
     return 2 * np.sqrt(direct * reverse) / len(inverse)
 
 
-def _weighed(pose: Pose, wrenches: Sequence[Screw]) -> NDArray[np.float64]:
+def _weighed(pose: SpatialPose, wrenches: Sequence[Screw]) -> NDArray[np.float64]:
     """(lane, entry): forces and moments at the joints over the size, of all joints."""
     rows: list[Number] = []
     for wrench, one in zip(wrenches, pose.elements, strict=True):

@@ -14,7 +14,7 @@ import numpy as np
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
 
-__all__ = ["GUIDED", "PAIRS", "ContactLoad", "Load", "Pair", "Reaction"]
+__all__ = ["GUIDED", "PAIRS", "ContactLoad", "Pair", "PlanarContactLoad", "Reaction"]
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ class ContactLoad(Protocol):
         """The same with `change` applied to every number."""
 
 
-class Load(NamedTuple):
+class PlanarContactLoad(NamedTuple):
     """How a planar joint's reaction presses on its contact: the normal load N, its gradient, and a bound.
 
     A pin (across is None) presses with N = |F|.  [D 8]
@@ -173,11 +173,11 @@ class Load(NamedTuple):
         """A pin feels no moment."""
         return self.across is not None or not all(isinstance(n, float) and n == 0.0 for n in reaction[:2])
 
-    def mapped(self, change: Callable[[Number], Number]) -> Load:
+    def mapped(self, change: Callable[[Number], Number]) -> PlanarContactLoad:
         """The same with `change` applied to every number."""
         across = None if self.across is None else (change(self.across[0]), change(self.across[1]))
         arm = None if self.arm is None else (change(self.arm[0]), change(self.arm[1]))
-        return Load(across, change(self.length), arm)
+        return PlanarContactLoad(across, change(self.length), arm)
 
     def _across(self, reaction: Reaction) -> Number:
         """F_n."""

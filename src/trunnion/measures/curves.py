@@ -15,7 +15,7 @@ import numpy as np
 
 from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.measures.motion import MOTIONS, Asked, component
+from trunnion.measures.motion import MOTIONS, MotionRequest, component
 from trunnion.measures.transmission import of_joint
 from trunnion.solve.backward import Backward
 from trunnion.solve.forward import Forward
@@ -25,46 +25,46 @@ from trunnion.solve.space.motion import SpatialWalk
 
 __all__ = ["COURSES", "Course"]
 
-Course = Callable[[Asked, Any], tuple[Number, ...]]
+Course = Callable[[MotionRequest, Any], tuple[Number, ...]]
 
 
 # ---- of the places --------------------------------------------------------------------------------------------
 
 
-def _motion(measure: Asked, walk: Forward, of: str = "") -> Number:
+def _motion(measure: MotionRequest, walk: Forward, of: str = "") -> Number:
     kind = MOTIONS[of or measure.kind]
     return kind.value_in_space(measure, walk) if isinstance(walk, SpatialWalk) else kind.value(measure, walk)
 
 
-def value(measure: Asked, walk: Forward) -> tuple[Number, ...]:
+def value(measure: MotionRequest, walk: Forward) -> tuple[Number, ...]:
     """The number of the motion itself."""
     return (_motion(measure, walk),)
 
 
-def of_joint_motion(measure: Asked, walk: Forward) -> tuple[Number, ...]:
+def of_joint_motion(measure: MotionRequest, walk: Forward) -> tuple[Number, ...]:
     """The rotation of a joint, or the slide of one that does not turn."""
     return (_motion(measure, walk, "rotation" if walk.system.turns(measure.subject) else "slide"),)
 
 
-def attitude(measure: Asked, walk: Forward) -> tuple[Number, ...]:
+def attitude(measure: MotionRequest, walk: Forward) -> tuple[Number, ...]:
     """The angle of a link; in space the axes of its frame, nine numbers."""
     if not isinstance(walk, SpatialWalk):
         return value(measure, walk)
     return tuple(number for axis in walk.motions[measure.subject].frame[:3] for number in axis)
 
 
-def place(measure: Asked, walk: Forward) -> tuple[Number, ...]:
+def place(measure: MotionRequest, walk: Forward) -> tuple[Number, ...]:
     """Coordinates of a point, m: two in the plane, three in space."""
     link, point = measure.subject.split(".")
     return tuple(walk.point(link, point).place)
 
 
-def pressure_angle(measure: Asked, walk: Forward) -> tuple[Number, ...]:
+def pressure_angle(measure: MotionRequest, walk: Forward) -> tuple[Number, ...]:
     """Of the dyad of a joint, rad in −π/2 … π/2."""
     return (of_joint(walk, measure.subject),)
 
 
-def transmission_angle(measure: Asked, walk: Forward) -> tuple[Number, ...]:
+def transmission_angle(measure: MotionRequest, walk: Forward) -> tuple[Number, ...]:
     """Of the dyad of a joint, rad in 0 … π/2: of an RRR the angle at its inner pin, folded to be acute."""
     angle = of_joint(walk, measure.subject)
     return (np.pi / 2 - namespace(angle).abs(angle),)
@@ -73,36 +73,36 @@ def transmission_angle(measure: Asked, walk: Forward) -> tuple[Number, ...]:
 # ---- of the motion --------------------------------------------------------------------------------------------
 
 
-def velocity(measure: Asked, walk: Forward) -> tuple[Number, ...]:
+def velocity(measure: MotionRequest, walk: Forward) -> tuple[Number, ...]:
     """Of a point, m/s."""
     link, point = measure.subject.split(".")
     return (component(measure, tuple(walk.point(link, point).velocity)),)
 
 
-def acceleration(measure: Asked, walk: Forward) -> tuple[Number, ...]:
+def acceleration(measure: MotionRequest, walk: Forward) -> tuple[Number, ...]:
     """Of a point, m/s²."""
     link, point = measure.subject.split(".")
     return (component(measure, tuple(walk.point(link, point).acceleration)),)
 
 
-def angular_velocity(measure: Asked, walk: Forward) -> tuple[Number, ...]:
+def angular_velocity(measure: MotionRequest, walk: Forward) -> tuple[Number, ...]:
     """Of a link, rad/s; in the plane counterclockwise."""
     twist = walk.motions[measure.subject].twist
     return (component(measure, tuple(twist.u)) if isinstance(walk, SpatialWalk) else twist.w,)
 
 
-def angular_acceleration(measure: Asked, walk: Forward) -> tuple[Number, ...]:
+def angular_acceleration(measure: MotionRequest, walk: Forward) -> tuple[Number, ...]:
     """Of a link, rad/s²; in the plane counterclockwise."""
     second = walk.motions[measure.subject].acceleration
     return (component(measure, tuple(second.u)) if isinstance(walk, SpatialWalk) else second.w,)
 
 
-def rate(measure: Asked, walk: Forward) -> tuple[Number, ...]:
+def rate(measure: MotionRequest, walk: Forward) -> tuple[Number, ...]:
     """Speed of the second link of a joint against the first, rad/s about the joint's axis or m/s along it."""
     return (walk.rates(measure.subject)[0 if walk.system.turns(measure.subject) else 1],)
 
 
-def joint_acceleration(measure: Asked, walk: Forward) -> tuple[Number, ...]:
+def joint_acceleration(measure: MotionRequest, walk: Forward) -> tuple[Number, ...]:
     """Second derivative of the rotation of a joint, rad/s², or of the slide of one that does not turn, m/s²."""
     return (walk.second_rates(measure.subject)[0 if walk.system.turns(measure.subject) else 1],)
 
@@ -110,12 +110,12 @@ def joint_acceleration(measure: Asked, walk: Forward) -> tuple[Number, ...]:
 # ---- of the forces --------------------------------------------------------------------------------------------
 
 
-def effort(measure: Asked, back: Backward) -> tuple[Number, ...]:
+def effort(measure: MotionRequest, back: Backward) -> tuple[Number, ...]:
     """Torque or force of a driver, N m or N."""
     return (back.efforts[measure.subject],)
 
 
-def load(measure: Asked, back: Backward) -> tuple[Number, ...]:
+def load(measure: MotionRequest, back: Backward) -> tuple[Number, ...]:
     """Torque or force of a load on a joint against the joint's positive sense, N m or N; NaN where the joint rests.
 
     Times the speed of the joint it is the power that the load takes.
@@ -128,13 +128,13 @@ def load(measure: Asked, back: Backward) -> tuple[Number, ...]:
     return (-back.load_powers[measure.subject] / xp.where(moving, speed, np.nan),)
 
 
-def reaction(measure: Asked, back: Backward) -> tuple[Number, ...]:
+def reaction(measure: MotionRequest, back: Backward) -> tuple[Number, ...]:
     """Force in a joint without friction and drive effort, N."""
     found: Any = back.reactions[measure.subject]
     return (component(measure, (found.x, found.y) if hasattr(found, "x") else tuple(found.u)),)
 
 
-def power(measure: Asked, back: Backward) -> tuple[Number, ...]:
+def power(measure: MotionRequest, back: Backward) -> tuple[Number, ...]:
     """What a driver, or a load, gives the mechanism, W."""
     name = measure.subject
     if name in back.efforts:
@@ -142,12 +142,12 @@ def power(measure: Asked, back: Backward) -> tuple[Number, ...]:
     return (back.load_powers[name],)
 
 
-def friction_power(measure: Asked, back: Backward) -> tuple[Number, ...]:
+def friction_power(measure: MotionRequest, back: Backward) -> tuple[Number, ...]:
     """Power lost to friction in a joint, W."""
     return (back.friction_power(measure.subject),)
 
 
-def friction_energy(measure: Asked, back: Backward) -> tuple[Number, ...]:
+def friction_energy(measure: MotionRequest, back: Backward) -> tuple[Number, ...]:
     """Power lost to friction in a joint, W, and how long the first driver takes for its cycle, s."""
     walk = back.walk
     driver = next(iter(walk.system.mechanism.drivers), "")
@@ -155,7 +155,7 @@ def friction_energy(measure: Asked, back: Backward) -> tuple[Number, ...]:
     return back.friction_power(measure.subject), duration
 
 
-def efficiency(measure: Asked, back: Backward) -> tuple[Number, ...]:
+def efficiency(measure: MotionRequest, back: Backward) -> tuple[Number, ...]:
     """Useful and drive power, W; of an instant their ratio, NaN where the drivers put no power in."""
     walk = back.walk
     useful: Number = 0.0
@@ -170,7 +170,7 @@ def efficiency(measure: Asked, back: Backward) -> tuple[Number, ...]:
     return (useful / xp.where(driven > 0, driven, np.nan),)
 
 
-def locking_margin(measure: Asked, back: Backward) -> tuple[Number, ...]:
+def locking_margin(measure: MotionRequest, back: Backward) -> tuple[Number, ...]:
     """Multiple of the friction at which a module locks, MARGIN where it does not up to there.
 
     The search for it has no derivatives: they are NaN where dual numbers ask for some below MARGIN.

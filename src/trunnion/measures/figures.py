@@ -34,14 +34,14 @@ from trunnion.measures.measures import Measure
 from trunnion.measures.positions import Window
 from trunnion.solve.system import System
 
-__all__ = ["RULES", "Course", "Reference", "figure", "judged", "kept", "known", "moment", "reference", "shown", "span"]
+__all__ = ["RULES", "Curve", "Reference", "figure", "judged", "kept", "known", "moment", "reference", "shown", "span"]
 
 Array = NDArray[np.float64]
 TURN = 2 * np.pi
 FLAT = 1e-9  # of its size: a course that changes less has no extremes to tell the place of
 
 
-class Course(NamedTuple):
+class Curve(NamedTuple):
     """What a figure is made of: one number, (…, position), at rising times, s.
 
     coordinate: of the first driver there, which gains so much in a period; there is no period of a range. band: of a
@@ -82,24 +82,24 @@ def _both_ways(number: Number, shape: tuple[int, ...] | None = None) -> Number:
 # ---- rules ----------------------------------------------------------------------------------------------------
 
 
-def _largest(course: Course) -> Number:
+def _largest(course: Curve) -> Number:
     """The largest |value|."""
     above, below = course.both()
     return namespace(above, below).maximum(above, below)
 
 
-def _dead_centre(course: Course, sign: float = 1.0) -> Number:
+def _dead_centre(course: Curve, sign: float = 1.0) -> Number:
     """The place of the largest value within the range; NaN if it is at an end, where the motion does not turn back."""
     found = course.largest(sign)
     return found.of(course.coordinate, course.gain) + np.where(found.inside, 0.0, np.nan)
 
 
-def _rms(course: Course) -> Number:
+def _rms(course: Curve) -> Number:
     square = total(course.number * course.number, course.grid.weights)
     return namespace(square).sqrt(square)
 
 
-RULES: dict[str, Callable[[Course], Number]] = {
+RULES: dict[str, Callable[[Curve], Number]] = {
     "value": lambda course: course.number[..., 0],
     "maximum": lambda course: course.largest().value,
     "minimum": lambda course: -course.largest(-1.0).value,
@@ -116,14 +116,14 @@ RULES: dict[str, Callable[[Course], Number]] = {
 }
 
 
-def _ratio(useful: Number, driven: Number, course: Course) -> Number:
+def _ratio(useful: Number, driven: Number, course: Curve) -> Number:
     """Useful over drive work of the cycle; NaN where the loads drive.  [D 1]"""
     work = total(driven, course.grid.weights)
     share = _net(useful, course) / namespace(work).where(primal(work) > 0, work, np.nan)
     return namespace(share, work).where(primal(_net(driven, course)) > 0, share, np.nan)
 
 
-def _net(power: Number, course: Course) -> Number:
+def _net(power: Number, course: Curve) -> Number:
     """The mean of a power, 0 where it is no more than rounding or the error of its integral: it cancels.
 
     The error as QUADPACK tells it from two rules; see `quadrature`.
@@ -342,15 +342,15 @@ def _single(nominal: Reference, parts: Sequence[Number]) -> Number:
     return parts[0] - nominal.parts[0] if nominal.against else parts[0]
 
 
-def _course(nominal: Reference, number: Number) -> Course:
+def _course(nominal: Reference, number: Number) -> Curve:
     """A course over the window; one that gains whole turns in a period with the end of the period, as a range."""
     window, band = nominal.window, nominal.measure.within or (-np.inf, np.inf)
     if not nominal.opened:
-        return Course(number, nominal.grid, window.coordinate, window.gain, band)
+        return Curve(number, nominal.grid, window.coordinate, window.gain, band)
     again = np.append(np.arange(len(window.time)), 0)
     gains = np.append(np.zeros(len(window.time)), nominal.turns)
     coordinate = np.append(window.coordinate, window.coordinate[0] + window.gain)
-    return Course(number[..., again] + gains, nominal.grid, coordinate, window.gain, band)
+    return Curve(number[..., again] + gains, nominal.grid, coordinate, window.gain, band)
 
 
 def _parts(curve: Sequence[Number], nominal: Reference) -> tuple[Number, ...]:

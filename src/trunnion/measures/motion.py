@@ -19,13 +19,13 @@ from trunnion.algebra.vector import Vector3, cross, dot
 from trunnion.solve.forward import Forward
 from trunnion.solve.space.motion import SpatialWalk
 
-__all__ = ["MOTIONS", "Asked", "MotionKind", "component", "direction"]
+__all__ = ["MOTIONS", "MotionKind", "MotionRequest", "component", "direction"]
 
 AXES = ("x", "y", "z")
 NULL: Vector3 = (0.0, 0.0, 0.0)
 
 
-class Asked(Protocol):
+class MotionRequest(Protocol):
     """What of a measure its course depends on; see `measures.Measure`."""
 
     @property
@@ -38,7 +38,7 @@ class Asked(Protocol):
     def along(self) -> tuple[float, ...]: ...
 
 
-def direction(measure: Asked, size: int) -> tuple[float, ...]:
+def direction(measure: MotionRequest, size: int) -> tuple[float, ...]:
     """Unit vector of the component that is asked for, of two or three numbers; empty for none: the magnitude."""
     if measure.along:
         length = sum(part * part for part in measure.along) ** 0.5
@@ -46,7 +46,7 @@ def direction(measure: Asked, size: int) -> tuple[float, ...]:
     return tuple(1.0 if axis == measure.axis else 0.0 for axis in AXES[:size]) if measure.axis else ()
 
 
-def component(measure: Asked, vector: tuple[Number, ...]) -> Number:
+def component(measure: MotionRequest, vector: tuple[Number, ...]) -> Number:
     """The component of a vector that is asked for, or its magnitude, which has no derivative where it is 0."""
     if measure.axis:
         return vector[AXES.index(measure.axis)]
@@ -65,21 +65,21 @@ def component(measure: Asked, vector: tuple[Number, ...]) -> Number:
 class MotionKind:
     """A number of the motion with unit loads: for the plane and for space its value and the loads that go with it."""
 
-    value: Callable[[Asked, Forward], Number]
-    loads: Callable[[Asked, Forward], dict[str, Any]]
-    value_in_space: Callable[[Asked, SpatialWalk], Number]
-    loads_in_space: Callable[[Asked, SpatialWalk], dict[str, Any]]
+    value: Callable[[MotionRequest, Forward], Number]
+    loads: Callable[[MotionRequest, Forward], dict[str, Any]]
+    value_in_space: Callable[[MotionRequest, SpatialWalk], Number]
+    loads_in_space: Callable[[MotionRequest, SpatialWalk], dict[str, Any]]
 
 
 # ---- in the plane ---------------------------------------------------------------------------------------------
 
 
-def _coordinate(measure: Asked, walk: Any) -> Number:
+def _coordinate(measure: MotionRequest, walk: Any) -> Number:
     link, point = measure.subject.split(".")
     return component(measure, tuple(walk.point(link, point).place))
 
 
-def _push(measure: Asked, walk: Forward) -> dict[str, Any]:
+def _push(measure: MotionRequest, walk: Forward) -> dict[str, Any]:
     link, point = measure.subject.split(".")
     x, y = walk.point(link, point).place
     along = direction(measure, 2)
@@ -92,32 +92,32 @@ def _at(walk: Forward, link: str, wrench: Wrench, x: Number, y: Number) -> Wrenc
     return plane.about(wrench, frame.x - x, frame.y - y)
 
 
-def _angle(measure: Asked, walk: Forward) -> Number:
+def _angle(measure: MotionRequest, walk: Forward) -> Number:
     frame = walk.motions[measure.subject].frame
     return namespace(frame.c, frame.s).arctan2(frame.s, frame.c)
 
 
-def _turn(measure: Asked, walk: Forward) -> dict[str, Any]:
+def _turn(measure: MotionRequest, walk: Forward) -> dict[str, Any]:
     return {measure.subject: Wrench(0.0, 0.0, 1.0)}
 
 
-def _rotation(measure: Asked, walk: Forward) -> Number:
+def _rotation(measure: MotionRequest, walk: Forward) -> Number:
     first, second = (walk.motions[link].frame for link in walk.system.joints[measure.subject][1])
     c, s = plane.turned(first.c, -first.s, second.c, second.s)
     return namespace(c, s).arctan2(s, c)
 
 
-def _twist(measure: Asked, walk: Forward) -> dict[str, Any]:
+def _twist(measure: MotionRequest, walk: Forward) -> dict[str, Any]:
     first, second = walk.system.joints[measure.subject][1]
     return {first: Wrench(0.0, 0.0, -1.0), second: Wrench(0.0, 0.0, 1.0)}
 
 
-def _slide(measure: Asked, walk: Forward) -> Number:
+def _slide(measure: MotionRequest, walk: Forward) -> Number:
     first, second = (walk.element(link, measure.subject) for link in walk.system.joints[measure.subject][1])
     return first.c * (second.x - first.x) + first.s * (second.y - first.y)
 
 
-def _pull(measure: Asked, walk: Forward) -> dict[str, Any]:
+def _pull(measure: MotionRequest, walk: Forward) -> dict[str, Any]:
     first, second = walk.system.joints[measure.subject][1]
     axis, at = walk.element(first, measure.subject), walk.element(second, measure.subject)
     return {
@@ -129,12 +129,12 @@ def _pull(measure: Asked, walk: Forward) -> dict[str, Any]:
 # ---- in space -------------------------------------------------------------------------------------------------
 
 
-def _push_in_space(measure: Asked, walk: SpatialWalk) -> dict[str, Any]:
+def _push_in_space(measure: MotionRequest, walk: SpatialWalk) -> dict[str, Any]:
     link, point = measure.subject.split(".")
     return {link: space.about(cast(Vector3, direction(measure, 3)), NULL, walk.point(link, point).place)}
 
 
-def _angle_in_space(measure: Asked, walk: SpatialWalk) -> Number:
+def _angle_in_space(measure: MotionRequest, walk: SpatialWalk) -> Number:
     """½ Σ eᵢ⁰ × eᵢ along the axis: the rotation vector from the frame's real part, which has a derivative only."""
     frame = walk.motions[measure.subject].frame
     total: Number = 0.0
@@ -144,7 +144,7 @@ def _angle_in_space(measure: Asked, walk: SpatialWalk) -> Number:
     return total
 
 
-def _turn_in_space(measure: Asked, walk: SpatialWalk) -> dict[str, Any]:
+def _turn_in_space(measure: MotionRequest, walk: SpatialWalk) -> dict[str, Any]:
     return {measure.subject: Screw(NULL, cast(Vector3, direction(measure, 3)))}
 
 
@@ -154,20 +154,20 @@ def _both(walk: SpatialWalk, joint: str, load: Screw) -> dict[str, Any]:
     return {first: space.times(-1.0, load), second: load}
 
 
-def _rotation_in_space(measure: Asked, walk: SpatialWalk) -> Number:
+def _rotation_in_space(measure: MotionRequest, walk: SpatialWalk) -> Number:
     return walk.coordinates(measure.subject)[0]
 
 
-def _twist_in_space(measure: Asked, walk: SpatialWalk) -> dict[str, Any]:
+def _twist_in_space(measure: MotionRequest, walk: SpatialWalk) -> dict[str, Any]:
     joint = measure.subject
     return _both(walk, joint, Screw(NULL, walk.element(walk.system.joints[joint][1][1], joint).z))
 
 
-def _slide_in_space(measure: Asked, walk: SpatialWalk) -> Number:
+def _slide_in_space(measure: MotionRequest, walk: SpatialWalk) -> Number:
     return walk.coordinates(measure.subject)[1]
 
 
-def _pull_in_space(measure: Asked, walk: SpatialWalk) -> dict[str, Any]:
+def _pull_in_space(measure: MotionRequest, walk: SpatialWalk) -> dict[str, Any]:
     joint = measure.subject
     second = walk.element(walk.system.joints[joint][1][1], joint)
     return _both(walk, joint, space.about(second.z, NULL, second.place))

@@ -20,7 +20,7 @@ from trunnion.solve.system import System, Values
 if TYPE_CHECKING:
     from trunnion.solve.run import Run
 
-__all__ = ["Plan", "Window", "plan"]
+__all__ = ["PositionPlan", "Window", "plan"]
 
 Array = NDArray[np.float64]
 
@@ -62,7 +62,7 @@ class Window:
 
 
 @dataclass(frozen=True)
-class Plan:
+class PositionPlan:
     """Times to evaluate, s, rising, (position,), and the window of each measure, by name."""
 
     run: Run
@@ -87,7 +87,7 @@ class Plan:
         return _reached(system, values, name, system.drive(before, name, self.times)[0], scaled, span.duration)
 
 
-def plan(run: Run, measures: Sequence[Measure], steps: int) -> Plan:
+def plan(run: Run, measures: Sequence[Measure], steps: int) -> PositionPlan:
     """The positions that measures need: the grid of `steps` positions only if one is of all positions or of a window.
 
     Raises MechanismError for places and windows that are not in the cycle.
@@ -105,7 +105,7 @@ def plan(run: Run, measures: Sequence[Measure], steps: int) -> Plan:
             raise MechanismError(findings)
         nothing = np.zeros(1)
         one = Window(np.zeros(1, np.intp), nothing, nothing)
-        return Plan(run, nothing, {measure.name: one for measure in measures})
+        return PositionPlan(run, nothing, {measure.name: one for measure in measures})
     ends: dict[str, tuple[float, ...]] = {}
     for measure in measures:
         try:
@@ -125,7 +125,7 @@ def plan(run: Run, measures: Sequence[Measure], steps: int) -> Plan:
     index = np.searchsorted(times, rule.at)
     period = duration if run.cycle.periodic else None
     whole = Window(index, rule.at, known[0][index], period, known[1], (rule.weights, rule.inside))
-    return Plan(run, times, windows | dict.fromkeys(averaged, whole))
+    return PositionPlan(run, times, windows | dict.fromkeys(averaged, whole))
 
 
 def _averages(run: Run, measure: Measure) -> bool:

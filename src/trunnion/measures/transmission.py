@@ -30,13 +30,13 @@ def pressure_angle(pose: Any) -> Number | None:
     Source: R. L. Norton, Design of Machinery, "Transmission angle" (π/2 less |φ|) and "Pressure angle".
     """
     match pose:  # what is lost of the force, and what moves
-        case rrr.Pose():
+        case rrr.RRRPose():
             lost, moves = dot(pose.bc, pose.dc), 1 / pose.area
-        case rrp.Pose():
+        case rrp.RRPPose():
             lost, moves = pose.p, pose.r
-        case rpr.Pose():
+        case rpr.RPRPose():
             lost, moves = pose.offset, pose.along
-        case prp.Pose() | rpp.Pose():
+        case prp.PRPPose() | rpp.RPPPose():
             lost, moves = dot(pose.u, pose.v), cross(pose.u, pose.v)
         case _:
             return None

@@ -27,7 +27,7 @@ from trunnion.model.quantity import Quantity
 from trunnion.model.text import read_text
 from trunnion.model.units import ANY, KINDS, Kind, UnitError, dimension_text, unit
 
-__all__ = ["Points", "TableFiles", "column", "place_findings", "with_own_points", "with_points"]
+__all__ = ["TableFiles", "TablePoints", "column", "place_findings", "with_own_points", "with_points"]
 
 TableFiles = Mapping[str, str | os.PathLike[str]]  # file by name of a driver or table
 
@@ -43,7 +43,7 @@ _NO_UNIT = ("", "-", "–", "1")
 Row = tuple[int, list[str]]  # line and cells
 
 
-class Points(NamedTuple):
+class TablePoints(NamedTuple):
     """Points from a file: where they belong in the model, and the line of each."""
 
     where: str
@@ -52,7 +52,7 @@ class Points(NamedTuple):
     lines: list[int]
 
 
-def with_points(data: Mapping[str, Any], files: TableFiles) -> tuple[dict[str, Any], list[Points]]:
+def with_points(data: Mapping[str, Any], files: TableFiles) -> tuple[dict[str, Any], list[TablePoints]]:
     """Plain data of a model with the points of drivers and tables replaced by those of files.
 
     A driver of another motion law becomes one of law `table`. MechanismError with every finding in every file.
@@ -73,7 +73,7 @@ def with_points(data: Mapping[str, Any], files: TableFiles) -> tuple[dict[str, A
     return changed, read
 
 
-def _put(data: dict[str, Any], section: str, key: str, points: Points) -> None:
+def _put(data: dict[str, Any], section: str, key: str, points: TablePoints) -> None:
     """Points in place of those that a driver or table states, or of the file that it names."""
     entry = data[section][key]
     kept = {one: value for one, value in entry.items() if one != "file"} if isinstance(entry, Mapping) else {}
@@ -82,7 +82,7 @@ def _put(data: dict[str, Any], section: str, key: str, points: Points) -> None:
     data[section] = {**data[section], key: {**kept, "points": points.rows}}
 
 
-def with_own_points(data: Mapping[str, Any], model: Path) -> tuple[dict[str, Any], list[Points]]:
+def with_own_points(data: Mapping[str, Any], model: Path) -> tuple[dict[str, Any], list[TablePoints]]:
     """Plain data of a model file with the points from the files in its folder that drivers and tables name.
 
     MechanismError with every finding: about a name where it stands in the model, about the content with file and line.
@@ -120,7 +120,7 @@ def with_own_points(data: Mapping[str, Any], model: Path) -> tuple[dict[str, Any
     return changed, read
 
 
-def place_findings(findings: Sequence[Finding], read: Sequence[Points]) -> list[Finding]:
+def place_findings(findings: Sequence[Finding], read: Sequence[TablePoints]) -> list[Finding]:
     """The findings, those about points with the file and line that these came from and a few for each file."""
     placed = [finding for finding in findings if not any(_speaks_of(finding, points) for points in read)]
     for points in read:
@@ -129,11 +129,11 @@ def place_findings(findings: Sequence[Finding], read: Sequence[Points]) -> list[
     return placed
 
 
-def _speaks_of(finding: Finding, points: Points) -> bool:
+def _speaks_of(finding: Finding, points: TablePoints) -> bool:
     return f"{finding.where}.".startswith(f"{points.where}.")
 
 
-def _line(finding: Finding, points: Points) -> int:
+def _line(finding: Finding, points: TablePoints) -> int:
     index = finding.where[len(points.where) + 1 :].partition(".")[0]
     return points.lines[int(index) if index.isdecimal() else 0]
 
@@ -187,7 +187,7 @@ def _coordinate(data: Mapping[str, Any], joint: str) -> Kind:
 # ---- the file -------------------------------------------------------------------------------------------------
 
 
-def _points(path: Path, where: str, kinds: tuple[Kind, Kind], shown: str = "") -> Points:
+def _points(path: Path, where: str, kinds: tuple[Kind, Kind], shown: str = "") -> TablePoints:
     """The points of a file; MechanismError with file and line of every finding, a few of each file.
 
     shown: what the file is called in findings.
@@ -207,7 +207,7 @@ def _points(path: Path, where: str, kinds: tuple[Kind, Kind], shown: str = "") -
     except MechanismError as error:
         raise MechanismError([finding.at(shown, finding.line) for finding in error.findings]) from None
     points = [[_value(cell, separator, one) for cell, one in zip(cells, units, strict=True)] for _, cells in numbers]
-    return Points(where, shown, points, [line for line, _ in numbers])
+    return TablePoints(where, shown, points, [line for line, _ in numbers])
 
 
 def column(path: Path, kind: Kind) -> list[float]:

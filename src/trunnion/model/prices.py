@@ -21,13 +21,13 @@ from trunnion.model.units import KINDS, Kind, UnitError, unit
 if TYPE_CHECKING:
     from trunnion.model.numbers import Numbers
 
-__all__ = ["Choice", "Price", "cost_entries", "cost_paths", "prices"]
+__all__ = ["Price", "ProcessChoice", "cost_entries", "cost_paths", "prices"]
 
 FORMULA = ("A", "B", "k")
 
 
 @dataclass(frozen=True)
-class Choice:
+class ProcessChoice:
     """One way to make a dimension: its name (an IT grade as `IT7`), the half width that it keeps, SI, and its cost."""
 
     name: str
@@ -51,7 +51,7 @@ class Price:
     least: float = 0.0
     most: float = np.inf
     group: str = ""
-    choices: tuple[Choice, ...] = ()
+    choices: tuple[ProcessChoice, ...] = ()
 
 
 def prices(mechanism: Numbers) -> list[Price]:
@@ -97,11 +97,12 @@ def price(mechanism: Numbers, path: str, cost: Cost, numbers: ParameterSet | Non
     )
 
 
-def _choices(mechanism: Numbers, path: str, cost: Cost, numbers: ParameterSet) -> list[Choice]:
+def _choices(mechanism: Numbers, path: str, cost: Cost, numbers: ParameterSet) -> list[ProcessChoice]:
     names = numbers.dimension_values
     if cost.options is not None:
         return [
-            Choice(name, _number(one.tolerance, names), _number(one.cost, names)) for name, one in cost.options.items()
+            ProcessChoice(name, _number(one.tolerance, names), _number(one.cost, names))
+            for name, one in cost.options.items()
         ]
     if cost.process is None or cost.process not in mechanism.processes:
         return []
@@ -112,7 +113,7 @@ def _choices(mechanism: Numbers, path: str, cost: Cost, numbers: ParameterSet) -
             half = standard_tolerance(abs(size), int(grade)) / 2
         except MechanismError:  # a finding of its own
             half = np.nan
-        found.append(Choice(f"IT{grade}", half, _number(one, names)))
+        found.append(ProcessChoice(f"IT{grade}", half, _number(one, names)))
     return found
 
 

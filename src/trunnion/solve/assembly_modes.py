@@ -21,7 +21,7 @@ from trunnion.solve.run import Run
 from trunnion.solve.system import System
 from trunnion.structure.decompose import Module
 
-__all__ = ["Choice", "Way", "choices", "put_together"]
+__all__ = ["AssemblyMode", "GroupModes", "choices", "put_together"]
 
 Array = NDArray[np.float64]
 
@@ -30,7 +30,7 @@ APART = 1e-3  # of the largest coordinate: nearer ways read alike
 
 
 @dataclass(frozen=True)
-class Way:
+class AssemblyMode:
     """One assembly of a group.
 
     name: what chooses it, `assembly: {LINK: NAME}`. joints: (x, y), in space (x, y, z), of pins and balls inside the
@@ -45,7 +45,7 @@ class Way:
 
 
 @dataclass(frozen=True)
-class Choice:
+class GroupModes:
     """A group with more than one assembly.
 
     module: its place in the plan; label: in the structural formula; links: of the group; link: the one to name it by.
@@ -58,14 +58,14 @@ class Choice:
     link: str
     time: float
     where: str
-    ways: tuple[Way, ...]
+    ways: tuple[AssemblyMode, ...]
 
-    def line(self, way: Way) -> str:
+    def line(self, way: AssemblyMode) -> str:
         """What to write into the model file to take one of its ways."""
         return f"assembly: {{{as_key(self.link)}: {way.name}}}"
 
 
-def choices(run: Run) -> tuple[Choice, ...]:
+def choices(run: Run) -> tuple[GroupModes, ...]:
     """Every group that can be assembled, and in several ways, with where its inner joints lie in each of them.
 
     That is at the start of the cycle, if the group can be assembled there and its ways are apart; else at the first
@@ -73,7 +73,7 @@ def choices(run: Run) -> tuple[Choice, ...]:
     """
     times = run.cycle.times(STEPS)
     walk = forward(run.system, run.values, run.chosen.assembly, times)
-    found: list[Choice] = []
+    found: list[GroupModes] = []
     for number, module in enumerate(run.system.plan.modules):
         assembly = run.chosen.assembly[number]
         with np.errstate(all="ignore"):
@@ -88,11 +88,11 @@ def choices(run: Run) -> tuple[Choice, ...]:
         if rows and run.chosen.found[number] > 1:
             ways = _ways(rows, run.chosen.found[number], taken, turning(run.system))
             where = _where(run, moment)
-            found.append(Choice(number, module.label, module.links, _name_of(run, module), moment, where, ways))
+            found.append(GroupModes(number, module.label, module.links, _name_of(run, module), moment, where, ways))
     return tuple(found)
 
 
-def put_together(mechanism: Mechanism, choice: Choice, way: Way) -> Mechanism:
+def put_together(mechanism: Mechanism, choice: GroupModes, way: AssemblyMode) -> Mechanism:
     """The mechanism with one group assembled in another way, chosen by name; its hints by place stay."""
     data = mechanism.data()
     stated = data.get("assembly", {})
@@ -177,12 +177,12 @@ def turning(system: System) -> list[str]:
     return [name for name, (kind, _) in system.joints.items() if PAIRS[kind].turns and not PAIRS[kind].ball]
 
 
-def _ways(rows: Mapping[str, Array], count: int, taken: int, turned: Sequence[str]) -> tuple[Way, ...]:
+def _ways(rows: Mapping[str, Array], count: int, taken: int, turned: Sequence[str]) -> tuple[AssemblyMode, ...]:
     """The ways of joints (number, way); turned: those whose number is an angle."""
     found = []
     for i in range(count):
         told = {name: tuple(float(n[i]) for n in numbers) for name, numbers in rows.items()}
         turns = {name: numbers[0] for name, numbers in told.items() if name in turned}
         places = {name: numbers for name, numbers in told.items() if name not in turned}
-        found.append(Way(way_name(i), places, i == taken, turns))
+        found.append(AssemblyMode(way_name(i), places, i == taken, turns))
     return tuple(found)

@@ -22,7 +22,7 @@ from trunnion.solve.friction import Contact, Settled, settle
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.friction_problem import Rubbing
 from trunnion.solve.gears import GearLoad, acting, gear_load, gears_of, on_links, power_of, teeth
-from trunnion.solve.loads import Action, Share, SpringState, springs, stated_loads
+from trunnion.solve.loads import LoadAction, Share, SpringState, springs, stated_loads
 from trunnion.solve.system import Place, System, Values, law_of, rubbing
 
 __all__ = ["Backward", "Given", "Sense", "Slip", "backward", "held", "sense_of", "solve", "under"]
@@ -231,7 +231,7 @@ def _add_stated_loads(back: Backward, zero_slip: Mapping[str, Sense]) -> None:
         _act(back, f"springs.{name}", action)
 
 
-def _act(back: Backward, path: str, action: Action) -> None:
+def _act(back: Backward, path: str, action: LoadAction) -> None:
     back.undefined[path] = action.undefined
     for link, wrench in action.on:
         back.add(link, wrench)

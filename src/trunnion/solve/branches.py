@@ -26,7 +26,7 @@ from trunnion.groups.spatial import SpatialGroup
 from trunnion.groups.spins import unspun
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.names import as_key
-from trunnion.results.sentences import told
+from trunnion.results.sentences import finding_for
 from trunnion.solve import change_points
 from trunnion.solve.branch_tracking import Follower, assemblies, at, closing, lane_of, limits
 from trunnion.solve.forward import Forward, pose_of, start
@@ -56,7 +56,7 @@ class Track:
     coordinates: Array
     orientation: float
     periodic: bool
-    clock: Clock
+    clock: TrackClock
     turns: Mapping[int, Array]
     again: Positions
     begin: float = 0.0
@@ -88,7 +88,7 @@ class Track:
         return pose._replace(frames=_kept(pose.frames, stays))
 
 
-class Clock(NamedTuple):
+class TrackClock(NamedTuple):
     """How a track is read: by a driver of constant speed, and where and how fast that went in the nominal cycle.
 
     A run at another speed passes the same coordinates at other times. Without such a driver (speed 0) it is read
@@ -101,7 +101,7 @@ class Clock(NamedTuple):
     duration: float
 
     @classmethod
-    def of(cls, system: System, values: Values) -> Clock:
+    def of(cls, system: System, values: Values) -> TrackClock:
         """The first driver's of constant speed, else the first one's."""
         drivers = system.mechanism.drivers
         for name in [*(name for name, one in drivers.items() if one.law == "constant"), *drivers]:
@@ -228,22 +228,22 @@ def _unstated(walk: Forward, module: Module, count: int) -> Finding:
     if given:
         remedy = "give a hint that is nearer to one of them, or name one as `check` does"
     phrases = {"why": why, "remedy": remedy}
-    return told("assembly.choice", "assembly", links=list(module.links), ways=count, phrases=phrases)
+    return finding_for("assembly.choice", "assembly", links=list(module.links), ways=count, phrases=phrases)
 
 
 def _anew(module: Module, dial: Dial, positions: Positions) -> Finding:
-    return told("assembly.anew", "links", links=list(module.links), at=dial.intervals(positions))
+    return finding_for("assembly.anew", "links", links=list(module.links), at=dial.intervals(positions))
 
 
 def _never(system: System, module: Module) -> Finding:
     links = list(module.links)
     if not module.redundant:
-        return told("assembly.never", "links", links=links)
+        return finding_for("assembly.never", "links", links=links)
     if system.mechanism.has_errors:
-        return told("assembly.never_rigid", "links", links=links)
+        return finding_for("assembly.never_rigid", "links", links=links)
     plan, drivers = system.plan, len(system.mechanism.drivers)
     spinning = f" ({len(plan.passive)} of it spins of a link alone)" if plan.passive else ""
-    return told(
+    return finding_for(
         "assembly.over_constrained", "links", links=links, formula=plan.mobility, drivers=drivers,
         phrases={"spinning": spinning},
     )  # fmt: skip
@@ -320,7 +320,7 @@ def _track(walk: Forward, number: int, group: Any, drive: Sequence[Number], time
     drive = [turns.get(slot, number) for slot, number in enumerate(drive)]
     grid = len(times)
     rows = np.full((len(group.kept), grid), np.nan)
-    clock = Clock.of(walk.system, walk.values)
+    clock = TrackClock.of(walk.system, walk.values)
     nowhere = np.array([], np.intp)
     if not group.kept:  # joints without a free coordinate: there is nothing to choose or to follow
         return Decision(Track(times, rows, 1.0, periodic, clock, turns, nowhere), 1, True)

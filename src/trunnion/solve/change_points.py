@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.errors import Finding
-from trunnion.results.sentences import told
+from trunnion.results.sentences import finding_for
 from trunnion.solve.forward import Forward, pose_of, start
 from trunnion.solve.system import System, Values
 from trunnion.structure.decompose import Module
@@ -25,7 +25,7 @@ def finding(system: System, values: Values, module: Module, at: Sequence[float])
     """What to say of change points at these times."""
     places = [system.dial(values, np.array([moment])).at(0) for moment in at]
     links, joint = list(module.links), module.joints[1]
-    return told("assembly.change_point", f"links {', '.join(links)}", places=places, links=links, joint=joint)
+    return finding_for("assembly.change_point", f"links {', '.join(links)}", places=places, links=links, joint=joint)
 
 
 def suspects(margin: Array) -> NDArray[np.bool_]:

@@ -28,12 +28,12 @@ from trunnion.algebra.traced import looped
 from trunnion.joints.pairs import Reaction
 from trunnion.solve import continuation
 from trunnion.solve.friction_method import FrictionMethod, method_named, peak
-from trunnion.solve.friction_problem import Contact, Problem, State, added, largest, total
+from trunnion.solve.friction_problem import Contact, FrictionProblem, State, added, largest, total
 
 __all__ = [
     "Contact",
     "FrictionMethod",
-    "Problem",
+    "FrictionProblem",
     "Settled",
     "frictionless",
     "identity_minus",
@@ -77,7 +77,7 @@ class Settled(NamedTuple):
     share: Number = 1.0
     margin: Number = np.inf
     certain: Number = True
-    problem: Problem | None = None
+    problem: FrictionProblem | None = None
 
 
 def settle(
@@ -88,7 +88,7 @@ def settle(
     if not contacts:
         return Settled(start, [], 0, 0.0, 0.0, True)
     influence = [_with_own(contact, list(group.reactions(pose, contact.unit_loads))) for contact in contacts]
-    problem = Problem(contacts, start, influence)
+    problem = FrictionProblem(contacts, start, influence)
     if method.name == "successive-approximation":
         return _successive(problem, method)
     if problem.one_way:
@@ -102,7 +102,7 @@ def _with_own(contact: Contact, column: list[Reaction]) -> list[Reaction]:
     return column
 
 
-def _newton(problem: Problem, method: FrictionMethod) -> Settled:
+def _newton(problem: FrictionProblem, method: FrictionMethod) -> Settled:
     """Newton from no friction; lanes without the certificate of `bound` are followed by continuation.
 
     So are certain lanes that kinks keep from settling: their continuation leads to the same, only solution. The rounds
@@ -167,18 +167,18 @@ class _Iterate:
     change: Number = np.inf
 
 
-def _obeyed(real: Problem, at: _Iterate) -> Number:
+def _obeyed(real: FrictionProblem, at: _Iterate) -> Number:
     """Where every law is obeyed as closely as a solved position promises; NaN is no answer and breaks no promise."""
     return ~(real.excess(at.gaps, at.forces) > OBEYED)
 
 
-def _started(real: Problem, forces: list[Number], done: Number) -> _Iterate:
+def _started(real: FrictionProblem, forces: list[Number], done: Number) -> _Iterate:
     """At these forces, with nothing done in the lanes that are not."""
     state = real.state(forces)
     return _Iterate(forces, done, state, real.gaps(state, forces))
 
 
-def _iterated(real: Problem, start: _Iterate, method: FrictionMethod) -> _Iterate:
+def _iterated(real: FrictionProblem, start: _Iterate, method: FrictionMethod) -> _Iterate:
     """Newton's method from a start, in the lanes that are not done; those that are stay as they are.
 
     A is that of the side of each kink on which the normal loads are. It is kept while a round leaves less than a
@@ -220,7 +220,7 @@ def _chosen(lanes: Number, rows: Sequence[Sequence[Number]], others: Sequence[Se
     return [[np.where(lanes, a, b) for a, b in zip(*pair, strict=True)] for pair in zip(rows, others, strict=True)]
 
 
-def _unrolled(problem: Problem, method: FrictionMethod) -> Settled:
+def _unrolled(problem: FrictionProblem, method: FrictionMethod) -> Settled:
     """Newton with a fixed number of rounds, for numbers that are compiled; the last one carries the derivatives.
 
     Lanes that need more, and those without the certificate, are for whoever compiles to compute again.
@@ -261,13 +261,13 @@ def _unrolled(problem: Problem, method: FrictionMethod) -> Settled:
     )
 
 
-def _matrix(problem: Problem, state: State) -> list[list[Number]]:
+def _matrix(problem: FrictionProblem, state: State) -> list[list[Number]]:
     """(1 − A)⁻¹ at a state where the rows of |A| add up to less than 1: no pivots are needed."""
     matrix = identity_minus(problem.map_derivative(state))
     return linalg.quick_inverse(matrix) if len(matrix) <= FEW else linalg.inverse(matrix, pivoting=False)
 
 
-def _at_once(problem: Problem) -> Settled:
+def _at_once(problem: FrictionProblem) -> Settled:
     """Friction from the frictionless reactions, which it does not change but in what no law looks at."""
     forces = problem.target(problem.state([0.0] * len(problem.contacts)).normals)
     reactions = problem.reactions(forces, problem.state(forces))
@@ -285,7 +285,7 @@ def _changed(state: State, before: State) -> Number:
     return largest([a - b for a, b in zip(state.normals, before.normals, strict=True)])
 
 
-def _successive(problem: Problem, method: FrictionMethod) -> Settled:
+def _successive(problem: FrictionProblem, method: FrictionMethod) -> Settled:
     """[D] steps 1-5: friction from the last reactions, reactions from the last friction, until they rest."""
     forces: list[Number] = [0.0] * len(problem.contacts)
     state = problem.state(forces)
@@ -320,7 +320,7 @@ def _successive(problem: Problem, method: FrictionMethod) -> Settled:
     )
 
 
-def _margin(problem: Problem, bound: Number, most: float, shares: Number = 1.0) -> Number:
+def _margin(problem: FrictionProblem, bound: Number, most: float, shares: Number = 1.0) -> Number:
     """Multiple of the friction at which the module locks; ∞ where it does not up to `most`.
 
     shares: those at which lanes are known to lock, 1 of the others.
@@ -339,7 +339,9 @@ def _margin(problem: Problem, bound: Number, most: float, shares: Number = 1.0) 
     return margin
 
 
-def _follow(problem: Problem, forces: Sequence[Number], lanes: Number) -> tuple[list[Number], NDArray[np.float64]]:
+def _follow(
+    problem: FrictionProblem, forces: Sequence[Number], lanes: Number
+) -> tuple[list[Number], NDArray[np.float64]]:
     """Forces with the chosen lanes followed from no friction; NaN where they lock, and the share reached."""
     part, chosen = problem.picked(lanes)
     shape = chosen.shape
@@ -353,7 +355,7 @@ def _follow(problem: Problem, forces: Sequence[Number], lanes: Number) -> tuple[
 Weights = Callable[[NDArray[np.float64], NDArray[np.intp]], Sequence[Number]]
 
 
-def scaled(problem: Problem, weights: Weights | None = None) -> continuation.Family:
+def scaled(problem: FrictionProblem, weights: Weights | None = None) -> continuation.Family:
     """Residual φ − w(s) law(N(φ)) and its Jacobian; w(s, lanes): multiple of each contact's friction, or s."""
 
     def family(lanes: NDArray[np.intp]) -> continuation.System:
@@ -375,7 +377,7 @@ def scaled(problem: Problem, weights: Weights | None = None) -> continuation.Fam
     return family
 
 
-def frictionless(problem: Problem, chosen: NDArray[np.bool_]) -> list[NDArray[np.float64]]:
+def frictionless(problem: FrictionProblem, chosen: NDArray[np.bool_]) -> list[NDArray[np.float64]]:
     """Forces without friction, lane by lane: none but those that push gears apart."""
     none = [np.zeros(int(np.count_nonzero(chosen))) for _ in problem.contacts]
     target = problem.target(problem.state(none).normals)
@@ -386,11 +388,11 @@ def identity_minus(rows: Sequence[Sequence[Number]]) -> list[list[Number]]:
     return [[(1.0 if k == j else 0.0) - entry for j, entry in enumerate(row)] for k, row in enumerate(rows)]
 
 
-def _depth(problem: Problem) -> int:
+def _depth(problem: FrictionProblem) -> int:
     """Levels of ε among the inputs: each costs one Newton step at the solution."""
     return max((n.depth for n in problem.numbers() if isinstance(n, Dual)), default=0)
 
 
-def _primal(problem: Problem) -> Problem:
+def _primal(problem: FrictionProblem) -> FrictionProblem:
     """The problem without derivatives."""
     return problem.mapped(primal) if _depth(problem) or problem.compiled else problem

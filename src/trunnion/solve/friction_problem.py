@@ -22,7 +22,7 @@ from trunnion.algebra.namespace import Number, compiled
 from trunnion.joints.friction import FrictionLaw
 from trunnion.joints.pairs import ContactLoad, Reaction
 
-__all__ = ["Contact", "Problem", "Rubbing", "State", "added", "largest", "total"]
+__all__ = ["Contact", "FrictionProblem", "Rubbing", "State", "added", "largest", "total"]
 
 
 class Contact(NamedTuple):
@@ -84,21 +84,21 @@ class State(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Problem:
+class FrictionProblem:
     """φ = law(N(R₀ + G φ)): the friction forces of one module, φ, with its reactions R."""
 
     contacts: Sequence[Contact]
     start: Sequence[Reaction]
     influence: Sequence[Sequence[Reaction]]
 
-    def mapped(self, change: Callable[[Number], Number]) -> Problem:
+    def mapped(self, change: Callable[[Number], Number]) -> FrictionProblem:
         """The same with `change` applied to every number."""
 
         def each(wrenches: Sequence[Reaction]) -> list[Reaction]:
             return [tuple(change(n) for n in wrench) for wrench in wrenches]
 
         contacts = [contact.mapped(change) for contact in self.contacts]
-        return Problem(contacts, each(self.start), [each(column) for column in self.influence])
+        return FrictionProblem(contacts, each(self.start), [each(column) for column in self.influence])
 
     def numbers(self) -> list[Number]:
         """All numbers of the problem."""
@@ -111,7 +111,7 @@ class Problem:
         self.mapped(note)
         return found
 
-    def picked(self, lanes: Number) -> tuple[Problem, NDArray[np.bool_]]:
+    def picked(self, lanes: Number) -> tuple[FrictionProblem, NDArray[np.bool_]]:
         """The problem of the chosen lanes alone, each number a flat array, and the choice in full shape."""
         shape = np.broadcast_shapes(np.shape(lanes), *(np.shape(number) for number in self.numbers()))
         chosen = np.broadcast_to(lanes, shape)

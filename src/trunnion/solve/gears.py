@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.plane import ZERO_LOAD, Wrench, about, added, moved, power
-from trunnion.groups.gear import Action, Gear, Mesh, actions, apart, mesh
+from trunnion.groups.gear import GearPair, Mesh, ToothForces, actions, apart, mesh
 from trunnion.groups.general import General
 from trunnion.joints.friction import FrictionLaw
-from trunnion.joints.pairs import Load
+from trunnion.joints.pairs import PlanarContactLoad
 from trunnion.solve.forward import Forward
 from trunnion.solve.friction_problem import Contact
 
@@ -24,12 +24,12 @@ class GearLoad(NamedTuple):
     force: tuple[Number, Number]
 
 
-def gears_of(group: object) -> tuple[Gear, ...]:
+def gears_of(group: object) -> tuple[GearPair, ...]:
     """The gear pairs of a module."""
     return group.gears if isinstance(group, General) else ()
 
 
-def _mesh(walk: Forward, number: int, i: int) -> tuple[Gear, Mesh]:
+def _mesh(walk: Forward, number: int, i: int) -> tuple[GearPair, Mesh]:
     """A gear pair of a module and where its gears touch."""
     pose = walk.poses[number]
     gear = gears_of(walk.system.groups[number])[i]
@@ -51,7 +51,7 @@ def teeth(walk: Forward, number: int) -> Iterator[Contact]:
                 units[link] = added(units[link], about(wrench, frame.x - at.x, frame.y - at.y))
         angle = walk.values[f"gears.{name}.pressure_angle"]
         # a guide of length 2/|f/λ| under the moment λ alone presses with |f|
-        load = Load((1.0, 0.0), 2 / namespace(touch.factor).abs(touch.factor))
+        load = PlanarContactLoad((1.0, 0.0), 2 / namespace(touch.factor).abs(touch.factor))
         slope = namespace(angle).sin(angle) / namespace(angle).cos(angle)
         yield Contact(len(places) + i, list(units.values()), load, SEPARATION, {"slope": slope}, 0.0, rubs=False)
 
@@ -63,7 +63,7 @@ def _separation(normal: Number, slip: Number, **parameters: Number) -> Number:
 SEPARATION = FrictionLaw(_separation)
 
 
-def acting(walk: Forward, number: int, i: int, torque: Number, parting: bool = True) -> list[Action]:
+def acting(walk: Forward, number: int, i: int, torque: Number, parting: bool = True) -> list[ToothForces]:
     """What a gear pair of a module does with a torque in its second joint; parting: by tooth forces, not torques alone.
 
     Torques alone are what moves with the play of joints: the ratio holds between rotations, which no offset of a pin
@@ -73,7 +73,9 @@ def acting(walk: Forward, number: int, i: int, torque: Number, parting: bool = T
     return actions(gear if parting else gear._replace(carriers=None), pose.elements, pose.ratios[i], torque)
 
 
-def gear_load(walk: Forward, number: int, i: int, torque: Number, separation: Number) -> tuple[GearLoad, list[Action]]:
+def gear_load(
+    walk: Forward, number: int, i: int, torque: Number, separation: Number
+) -> tuple[GearLoad, list[ToothForces]]:
     """What a gear pair does in the file's sense, and to which links. separation: the force that parts its gears, N."""
     done = acting(walk, number, i, torque)
     force: tuple[Number, Number] = (0.0, 0.0)
@@ -87,7 +89,7 @@ def gear_load(walk: Forward, number: int, i: int, torque: Number, separation: Nu
     return GearLoad(-torque * walk.poses[number].ratios[i], (-force[0], -force[1])), done
 
 
-def power_of(walk: Forward, number: int, done: Sequence[Action]) -> Number:
+def power_of(walk: Forward, number: int, done: Sequence[ToothForces]) -> Number:
     """Power of a gear pair on the way of its wheels' centres, W; without travel of their pins there is none."""
     total: Number = 0.0
     for joint, side, wrench, at in done:
@@ -96,7 +98,7 @@ def power_of(walk: Forward, number: int, done: Sequence[Action]) -> Number:
     return total
 
 
-def on_links(walk: Forward, number: int, done: Sequence[Action]) -> Iterator[tuple[str, Wrench]]:
+def on_links(walk: Forward, number: int, done: Sequence[ToothForces]) -> Iterator[tuple[str, Wrench]]:
     """What gear pairs do to the known links of a module, about their origins."""
     for joint, side, wrench, at in done:
         place = walk.system.places[number][joint]

@@ -12,7 +12,7 @@ from trunnion.algebra.namespace import Number
 from trunnion.algebra.nested import each
 from trunnion.errors import Finding, MechanismError
 from trunnion.joints.pairs import PAIRS
-from trunnion.results.sentences import told
+from trunnion.results.sentences import finding_for
 from trunnion.solve.forward import Forward
 from trunnion.solve.system import System
 from trunnion.structure.decompose import Module
@@ -77,8 +77,10 @@ def told_twice(walk: Forward, module: Module, named: int, placed: int | None) ->
     links, (key, name) = list(module.links), _names(walk.system, module)[0]
     if placed is not None and placed != named:
         way = way_name(placed)
-        return [told("assembly.contradiction", f"assembly.{key}", links=links, places=places, way=way, name=name)]
-    return [told("assembly.told_twice", f"assembly.{key}", links=links, places=places)]
+        return [
+            finding_for("assembly.contradiction", f"assembly.{key}", links=links, places=places, way=way, name=name)
+        ]
+    return [finding_for("assembly.told_twice", f"assembly.{key}", links=links, places=places)]
 
 
 def hints(walk: Forward, module: Module) -> list[tuple[str, str, tuple[Number, ...]]]:

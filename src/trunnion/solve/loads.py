@@ -19,7 +19,7 @@ from trunnion.model.parts import Load
 from trunnion.solve.forward import Forward, Vector
 
 __all__ = [
-    "Action",
+    "LoadAction",
     "Share",
     "SpringState",
     "Stated",
@@ -36,7 +36,7 @@ SPLINED = 3  # of a spline every so many points: it bends at none, but may be an
 Share = float | NDArray[np.float64]  # of what resists a joint at rest, with the sign of the slip about to begin
 
 
-class Action(NamedTuple):
+class LoadAction(NamedTuple):
     """What one load or spring does: the wrench on each link, about what all on it are, and the power it gives, W."""
 
     on: list[tuple[str, Any]]
@@ -146,7 +146,7 @@ class Stated:
 # ---- loads ----------------------------------------------------------------------------------------------------
 
 
-def stated_loads(walk: Forward, zero_slip: Mapping[str, Share]) -> Iterator[tuple[str, Action]]:
+def stated_loads(walk: Forward, zero_slip: Mapping[str, Share]) -> Iterator[tuple[str, LoadAction]]:
     """The loads of the model, by name. zero_slip: see `backward.Given`."""
     stated = Stated(walk)
     for name, load in walk.system.mechanism.loads.items():
@@ -159,7 +159,7 @@ def stated_loads(walk: Forward, zero_slip: Mapping[str, Share]) -> Iterator[tupl
             yield name, _resist(walk, load, size, torque is not None, zero_slip.get(load.joint, 0.0))
 
 
-def _push(stated: Stated, load: Load, path: str) -> Action:
+def _push(stated: Stated, load: Load, path: str) -> LoadAction:
     """A force at a point of a link and a moment, in global axes or the link's."""
     walk, link, algebra = stated.walk, load.link or "", stated.walk.algebra
     frame, twist, _ = walk.motions[link]
@@ -170,10 +170,10 @@ def _push(stated: Stated, load: Load, path: str) -> Action:
         force, moment = algebra.rotated(frame, force), algebra.rotated_moment(frame, moment)
     place = walk.placed(frame, link, load.at) if load.at else algebra.point_of(frame, algebra.NULL)
     wrench = algebra.load(frame, force, moment, place)
-    return Action([(link, wrench)], algebra.power(wrench, twist))
+    return LoadAction([(link, wrench)], algebra.power(wrench, twist))
 
 
-def _resist(walk: Forward, load: Load, size: Number, turns: bool, at_rest: Share) -> Action:
+def _resist(walk: Forward, load: Load, size: Number, turns: bool, at_rest: Share) -> LoadAction:
     """A torque or force that opposes the motion of a joint, whichever way it goes or one way only.
 
     at_rest: the share of the load where there is no motion, with the sign of that which is about to begin.
@@ -186,18 +186,18 @@ def _resist(walk: Forward, load: Load, size: Number, turns: bool, at_rest: Share
     return _in_joint(walk, joint, -sign * size, turns, speed)
 
 
-def _in_joint(walk: Forward, joint: str, effort: Number, turns: bool, speed: Number) -> Action:
+def _in_joint(walk: Forward, joint: str, effort: Number, turns: bool, speed: Number) -> LoadAction:
     """An effort in the freedom of a joint, on its second link by its first: N m about its axis, or N along it."""
     first, second = walk.system.joints[joint][1]
     wrench, times = walk.axis(joint, turns)[1], walk.algebra.times
     on = [(link, walk.on_link(link, times(size, wrench), joint)) for link, size in ((second, effort), (first, -effort))]
-    return Action(on, effort * speed)
+    return LoadAction(on, effort * speed)
 
 
 # ---- springs --------------------------------------------------------------------------------------------------
 
 
-def springs(walk: Forward) -> Iterator[tuple[str, Action, SpringState]]:
+def springs(walk: Forward) -> Iterator[tuple[str, LoadAction, SpringState]]:
     """The springs and dampers of the model: pull = preload + stiffness · elongation + damping · rate."""
     for name, spring in walk.system.mechanism.springs.items():
         path = f"springs.{name}"
@@ -223,7 +223,7 @@ def _elongation(walk: Forward, path: str, joint: str, turns: bool) -> Number:
     return xp.arctan2(xp.sin(angle), xp.cos(angle))
 
 
-def _line(walk: Forward, path: str, ends: tuple[str, str], only: str | None) -> tuple[Action, SpringState]:
+def _line(walk: Forward, path: str, ends: tuple[str, str], only: str | None) -> tuple[LoadAction, SpringState]:
     """A spring along the line between two points; no value where they meet, for the line has no direction there."""
     one, other = (end.partition(".")[0] for end in ends)
     a, b = (walk.point(link, point) for link, _, point in (end.partition(".") for end in ends))
@@ -240,7 +240,7 @@ def _line(walk: Forward, path: str, ends: tuple[str, str], only: str | None) -> 
     for link, end, sign in ((one, a, 1.0), (other, b, -1.0)):
         pull = tuple(sign * state.force * part for part in direction)
         on.append((link, walk.algebra.load(walk.motions[link].frame, pull, walk.algebra.NO_MOMENT, end.place)))
-    return Action(on, state.power), state
+    return LoadAction(on, state.power), state
 
 
 def _difference(a: Vector, b: Vector) -> Vector:

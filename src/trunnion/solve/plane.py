@@ -15,7 +15,7 @@ from trunnion.algebra.dual import primal
 from trunnion.algebra.literal import is_zero
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.plane import Acceleration, Frame, Twist, Wrench, about, accelerated, moved
-from trunnion.joints.pairs import Load, Reaction
+from trunnion.joints.pairs import PlanarContactLoad, Reaction
 from trunnion.solve.forward import Forward, rate_of
 from trunnion.solve.friction_problem import Rubbing
 from trunnion.solve.system import Place
@@ -181,10 +181,10 @@ def contacts(walk: PlaneWalk, joint: str) -> Iterator[Rubbing]:
     zero = np.abs(primal(speed)) <= walk.noise(joint, turns)
     if turns:
         lever = walk.values[f"{path}.pin.radius"]
-        yield Rubbing(Load(), lever * speed, Wrench(0.0, 0.0, lever), zero, amount=lever, turning=1.0)
+        yield Rubbing(PlanarContactLoad(), lever * speed, Wrench(0.0, 0.0, lever), zero, amount=lever, turning=1.0)
         return
     axis, middle = walk.ends(joint)
     at = axis if joint in walk.system.reversed else middle  # what the module's reaction is about
     arm = None if at is middle else (middle.x - at.x, middle.y - at.y)
-    load = Load((-axis.s, axis.c), walk.values[f"{path}.guide.length"], arm)
+    load = PlanarContactLoad((-axis.s, axis.c), walk.values[f"{path}.guide.length"], arm)
     yield Rubbing(load, speed, Wrench(axis.c, axis.s, 0.0), zero)

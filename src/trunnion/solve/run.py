@@ -19,7 +19,7 @@ from trunnion.solve.bristles import History, histories
 from trunnion.solve.forward import Forward, Travel, forward
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.geometry import build
-from trunnion.solve.seats import Seat, seats
+from trunnion.solve.seats import GivenSeat, seats
 from trunnion.solve.space.determinacy import Determinacy
 from trunnion.solve.switches import Mechanisms, edges
 from trunnion.solve.system import COMMON_TURNS, Cycle, System, Values
@@ -90,7 +90,7 @@ class Run:
         return self._solve(time, self.ideal_values, self._ideal_past, method)
 
     @functools.cached_property
-    def seats(self) -> list[Seat]:
+    def seats(self) -> list[GivenSeat]:
         """Joints whose pins lie in seats that are given or follow the load."""
         return seats(self.system, self.values)
 

@@ -30,7 +30,7 @@ from trunnion.solve.system import System, rubbing
 if TYPE_CHECKING:
     from trunnion.solve.run import Run
 
-from trunnion.solve.seats import Seat
+from trunnion.solve.seats import GivenSeat
 
 __all__ = ["ROUNDS", "TOLERANCE", "Seated", "loads_of", "settle"]
 
@@ -63,13 +63,13 @@ class Seated:
     told: NDArray[np.bool_]
 
 
-def loads_of(back: Backward, seat: Seat) -> list[Vector]:
+def loads_of(back: Backward, seat: GivenSeat) -> list[Vector]:
     """Load of the pin on each end of its hole, N, in the hole's frame."""
     force, moment = back.on_hole(seat.joint)
     return seat.play.model.loads(force, moment, seat.play.length)
 
 
-def _pressed(back: Backward, seat: Seat, loads: Sequence[Vector], least: Number) -> list[Vector]:
+def _pressed(back: Backward, seat: GivenSeat, loads: Sequence[Vector], least: Number) -> list[Vector]:
     """Where the loads press the pin at its ends, friction taken into account."""
     share = _share(back, seat.joint)
     spin = back.walk.hole_spin(seat.joint)
@@ -200,7 +200,7 @@ def _extrapolated(
 
 
 def _at_the_wall(
-    found: Sequence[Seat], paths: Sequence[str], ahead: NDArray[np.float64], there: NDArray[np.float64]
+    found: Sequence[GivenSeat], paths: Sequence[str], ahead: NDArray[np.float64], there: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Extrapolated offsets with the lengths that pins pressed to the wall have."""
     row = {path: i for i, path in enumerate(paths)}
@@ -238,7 +238,7 @@ def _largest_reaction(back: Backward) -> Number:
 
 
 def _change(
-    found: Sequence[Seat], before: Mapping[str, NDArray[np.float64]], after: Mapping[str, NDArray[np.float64]]
+    found: Sequence[GivenSeat], before: Mapping[str, NDArray[np.float64]], after: Mapping[str, NDArray[np.float64]]
 ) -> NDArray[np.float64]:
     """Largest way of a pin from seat to seat, of the radius of its end."""
     worst: Number = 0.0

@@ -13,12 +13,12 @@ if TYPE_CHECKING:
 
 from trunnion.algebra.namespace import Number
 
-__all__ = ["Seat", "given_offsets", "seats"]
+__all__ = ["GivenSeat", "given_offsets", "seats"]
 
 Vector = tuple[Number, ...]
 
 
-class Seat(NamedTuple):
+class GivenSeat(NamedTuple):
     """A joint whose pin does not lie in the middle of its hole: its play, and the offsets at its ends if given."""
 
     joint: str
@@ -26,14 +26,16 @@ class Seat(NamedTuple):
     given: list[Vector] | None
 
 
-def seats(system: System, values: Values) -> list[Seat]:
+def seats(system: System, values: Values) -> list[GivenSeat]:
     """The joints whose seat is given or follows the load."""
     found = []
     space = system.mechanism.space
     for joint, stated in system.mechanism.seated.items():
         play = play_of(space, system.joints[joint][0], values, joint)
         if play is not None:
-            found.append(Seat(joint, play, given_offsets(values, joint, play) if not isinstance(stated, str) else None))
+            found.append(
+                GivenSeat(joint, play, given_offsets(values, joint, play) if not isinstance(stated, str) else None)
+            )
     return found
 
 

@@ -16,7 +16,7 @@ from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.plane import Frame
 from trunnion.errors import Finding, MechanismError
 from trunnion.groups import GROUPS, Group
-from trunnion.groups.gear import Gear
+from trunnion.groups.gear import GearPair
 from trunnion.groups.general import OUTER, General, GroupJoint
 from trunnion.joints.friction import FRICTION_LAWS, FrictionLaw
 from trunnion.joints.motion import Span
@@ -166,12 +166,12 @@ class System:
         driven = tuple(names.index(name) for name in module.driven)
         return General(len(module.links), joints, driven, tuple(self._gear(name, names) for name in module.gears))
 
-    def _gear(self, name: str, names: Sequence[str]) -> Gear:
+    def _gear(self, name: str, names: Sequence[str]) -> GearPair:
         first, second = (names.index(joint) for joint in self.gear_joints(name))
         carriers = self.mechanism.carriers(name) if self.mechanism.gears[name].teeth else None
         if carriers and name in self.turned_round:
             carriers = carriers[1], carriers[0]
-        return Gear(first, second, carriers)
+        return GearPair(first, second, carriers)
 
     @cached_property
     def turned_round(self) -> frozenset[str]:

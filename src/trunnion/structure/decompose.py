@@ -97,7 +97,7 @@ def passive(mechanism: Mechanism) -> dict[str, tuple[str, str]]:
     found: dict[str, tuple[str, str]] = {}
     if mechanism.space == "planar" or mechanism.loop:
         return found
-    table = Table(mechanism)
+    table = LinkTable(mechanism)
     for link in mechanism.links:
         joints = table.joints_of.get(link, [])
         balls = [name for name in joints if PAIRS[mechanism.joints[name].type].ball]
@@ -129,7 +129,7 @@ def decompose(mechanism: Mechanism) -> Plan:
     """
     ground = mechanism.fixed_link
     mobility = mobility_by_formula(mechanism)
-    table = Table(mechanism)
+    table = LinkTable(mechanism)
     bodies = [link for link in mechanism.effective_links if link != ground]
     spinning = passive(mechanism)
     determines, unmatched = _match(mechanism, bodies, ground, spinning)
@@ -168,7 +168,7 @@ def decompose(mechanism: Mechanism) -> Plan:
     return Plan(tuple(modules), mobility, tuple(spinning))
 
 
-class Table:
+class LinkTable:
     """The links and joints of a mechanism, looked up rather than searched for."""
 
     def __init__(self, mechanism: Mechanism) -> None:
@@ -262,14 +262,14 @@ def _undriven(mechanism: Mechanism, mobility: int, spins: int, exactly: bool = F
     return [Finding(what, "drivers", remedy)]
 
 
-def _whole(table: Table, links: list[str], spinning: Mapping[str, tuple[str, str]]) -> Module:
+def _whole(table: LinkTable, links: list[str], spinning: Mapping[str, tuple[str, str]]) -> Module:
     """All links as one module, whose joints constrain more than its links have freedoms."""
     module = _module(table, links, {table.mechanism.fixed_link}, [], spinning)
     return replace(module, kind="general", redundant=True)
 
 
 def _module(
-    table: Table, links: list[str], known: set[str], gears: list[str], spinning: Mapping[str, tuple[str, str]]
+    table: LinkTable, links: list[str], known: set[str], gears: list[str], spinning: Mapping[str, tuple[str, str]]
 ) -> Module:
     """The module that the given links form on the links known so far, and through these gear pairs."""
     mechanism, numbers = table.mechanism, table.numbers

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from trunnion.joints.pairs import PAIRS
 
-__all__ = ["Gears", "Joints", "Part", "Places", "constraints", "mobility_by_rank", "rank"]
+__all__ = ["Gears", "Joints", "Places", "Subsystem", "constraints", "mobility_by_rank", "rank"]
 
 RANK_TOLERANCE = 1e-9  # of the largest singular value
 
@@ -73,7 +73,7 @@ def rank(matrix: NDArray[np.float64]) -> int:
     return int(np.sum(values > RANK_TOLERANCE * values[0]))
 
 
-class Part(NamedTuple):
+class Subsystem(NamedTuple):
     """Links that are determined together, with what holds them: joints, those of them that are driven, gear pairs."""
 
     links: tuple[str, ...]
@@ -88,7 +88,7 @@ def mobility_by_rank(
     joints: Joints,
     places: Places,
     gears: Gears | None = None,
-    parts: Sequence[Part] = (),
+    parts: Sequence[Subsystem] = (),
 ) -> int:
     """Freedoms of the links less the rank of the joints' constraints at one position.
 
@@ -97,7 +97,7 @@ def mobility_by_rank(
     it should, unless a later one that does not hangs on it: so few constraints of a long row are looked at together.
     """
     gears = gears or {}
-    weak: list[Part] = []
+    weak: list[Subsystem] = []
     needed: set[str] = set()
     firm = 0
     for part in reversed(parts):

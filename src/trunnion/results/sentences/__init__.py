@@ -1,5 +1,5 @@
 """What findings about results say: their codes, with the sentence that is made of the figures of each."""
 
-from trunnion.results.sentences.told import told
+from trunnion.results.sentences.codes import finding_for
 
-__all__ = ["told"]
+__all__ = ["finding_for"]

@@ -16,11 +16,11 @@ from math import erf, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.rig.reading.measurement import Course
+from trunnion.rig.reading.measurement import Signal
 
 __all__ = [
-    "Judged", "Uncertainty", "Verdict", "difference", "expanded", "going_on", "independent", "judge", "probability",
-    "uncertainty_of",
+    "SignalAssessment", "Uncertainty", "Verdict", "difference", "expanded", "going_on", "independent", "judge",
+    "probability", "uncertainty_of",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -78,7 +78,7 @@ class Uncertainty:
 
 
 @dataclass(frozen=True)
-class Judged:
+class SignalAssessment:
     """Figures of a residual, measured less model, over the positions that can be compared; NaN where not known.
 
     largest: the residual of the largest size; place: its position, −1 if there is none; least: the share within ±U
@@ -111,7 +111,7 @@ def expanded(standard: Array, freedom: Array, coverage: float) -> Array:
     return np.asarray(np.where(np.isinf(freedom), coverage, factor) * standard)
 
 
-def uncertainty_of(course: Course) -> Uncertainty:
+def uncertainty_of(course: Signal) -> Uncertainty:
     """The parts of a course's uncertainty."""
     zero = np.full_like(course.mean, course.accuracy.zero)
     shared = np.array([zero, course.accuracy.gain * course.mean])
@@ -120,11 +120,11 @@ def uncertainty_of(course: Course) -> Uncertainty:
     return Uncertainty(random, local, shared, course.count, course.turns - course.mean)
 
 
-def judge(course: Course, model: Array, comparable: NDArray[np.bool_], coverage: float = 2.0) -> Judged:
+def judge(course: Signal, model: Array, comparable: NDArray[np.bool_], coverage: float = 2.0) -> SignalAssessment:
     """Measured against the model at the positions that can be compared."""
     where = comparable & np.isfinite(course.mean) & np.isfinite(model)
     if not np.any(where):
-        return Judged()
+        return SignalAssessment()
     measured, theirs = course.mean[where], model[where]
     residual = difference(measured, theirs)
     size = float(np.max(np.abs(np.append(measured, theirs))))
@@ -143,7 +143,7 @@ def judge(course: Course, model: Array, comparable: NDArray[np.bool_], coverage:
         verdict = Verdict.WITHIN
     elif share_0 >= least_0:
         verdict = Verdict.OFFSET
-    return Judged(
+    return SignalAssessment(
         int(np.count_nonzero(where)), _rms(residual), float(residual[worst]), int(np.flatnonzero(where)[worst]),
         bias, _bias_expanded(of, coverage), _rms(unbiased), share, least, _correlation(measured, theirs), verdict,
     )  # fmt: skip
@@ -219,7 +219,7 @@ def _bias_expanded(of: Uncertainty, coverage: float) -> float:
     return float(expanded(own.total, own.freedom, coverage)[0])
 
 
-def going_on(course: Course) -> tuple[float, int]:
+def going_on(course: Signal) -> tuple[float, int]:
     """Correlation of the mean error of a turn with that of the next, and of how many; (NaN, 0) of fewer than five.
 
     That of n independent turns is −1/n in the mean, which is taken off, and scatters by 1/√n.

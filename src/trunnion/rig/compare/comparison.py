@@ -9,23 +9,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.model.mechanism import Mechanism
-from trunnion.rig.compare.assessment import Judged, Verdict
+from trunnion.rig.compare.assessment import SignalAssessment, Verdict
 from trunnion.rig.compare.error_sources import Cause
 from trunnion.rig.modelled import Modelled
-from trunnion.rig.reading.measurement import Condition, Course
+from trunnion.rig.reading.measurement import Condition, Signal
 from trunnion.solve.loads import useful_loads
 
-__all__ = ["Compared", "Efficient", "Pair", "unmeasured"]
+__all__ = ["ChannelComparison", "Compared", "Efficient", "unmeasured"]
 
 
 @dataclass(frozen=True, eq=False)
-class Pair:
+class ChannelComparison:
     """One channel in one condition: what was measured, what the model has, what it comes to."""
 
-    course: Course
+    course: Signal
     model: NDArray[np.float64]
     comparable: NDArray[np.bool_]
-    judged: Judged
+    judged: SignalAssessment
     cause: Cause | None
     others: tuple[Cause, ...] = ()
 
@@ -61,7 +61,7 @@ class Compared:
 
     condition: Condition
     model: Modelled
-    pairs: Mapping[str, Pair]
+    pairs: Mapping[str, ChannelComparison]
     efficiency: Efficient | None
     unmeasured: tuple[str, ...] = ()
 

@@ -17,12 +17,12 @@ from trunnion.model.expression import LITERAL
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.names import as_key
 from trunnion.model.units import unit as unit_of
-from trunnion.results.sentences import told
+from trunnion.results.sentences import finding_for
 from trunnion.rig.compare.assessment import Verdict, going_on
 from trunnion.rig.compare.error_sources import KINDS, Cause
 
 if TYPE_CHECKING:
-    from trunnion.rig.compare.comparison import Compared, Pair
+    from trunnion.rig.compare.comparison import ChannelComparison, Compared
 
 __all__ = ["findings_of", "gathered", "other_speed", "said", "units_set"]
 
@@ -112,7 +112,7 @@ def _in(names: Sequence[str], of: int) -> str:
     return f"in {len(names)} of {counted(of, 'condition')} ({first})"
 
 
-def _cases(name: str, found: Sequence[Compared]) -> list[tuple[Compared, Pair]]:
+def _cases(name: str, found: Sequence[Compared]) -> list[tuple[Compared, ChannelComparison]]:
     return [(one, one.pairs[name]) for one in found if name in one.pairs]
 
 
@@ -122,7 +122,7 @@ def _cases(name: str, found: Sequence[Compared]) -> list[tuple[Compared, Pair]]:
 def _of_channel(name: str, measures: str, found: Sequence[Compared]) -> Iterator[Finding]:
     """One finding for each explanation, over all conditions."""
     cases, shifted = _cases(name, found), _agreed(found)
-    by_cause: dict[str, list[tuple[Compared, Pair]]] = {}
+    by_cause: dict[str, list[tuple[Compared, ChannelComparison]]] = {}
     for one, pair in cases:
         verdict = pair.judged.verdict
         if verdict in (Verdict.NOT, Verdict.OFFSET):
@@ -144,10 +144,12 @@ def _of_channel(name: str, measures: str, found: Sequence[Compared]) -> Iterator
         names = [one.condition.name for one, pair in cases if pair.judged.verdict is verdict]
         if names:
             phrases = {"cases": _in(names, len(cases)), "once": once}
-            yield told(code, f"channels.{name}", severity=None, phrases=phrases, **figures)
+            yield finding_for(code, f"channels.{name}", severity=None, phrases=phrases, **figures)
 
 
-def _explained(name: str, measures: str, kind: str, members: Sequence[tuple[Compared, Pair]], of: int) -> Finding:
+def _explained(
+    name: str, measures: str, kind: str, members: Sequence[tuple[Compared, ChannelComparison]], of: int
+) -> Finding:
     """A channel that is not within, with what would explain it."""
     where = _in([one.condition.name for one, _ in members], of)
     worst = min(pair.judged.within for _, pair in members)
@@ -157,7 +159,7 @@ def _explained(name: str, measures: str, kind: str, members: Sequence[tuple[Comp
     if offset and kind == "zero":
         story, remedy = _story(name, measures, kind, [_size(pair, kind) for _, pair in members], members)
         phrases = {"cases": where, "story": story, "remedy": remedy}
-        return told("compare.offset", f"channels.{name}", phrases=phrases, within_percent=100 * worst)
+        return finding_for("compare.offset", f"channels.{name}", phrases=phrases, within_percent=100 * worst)
     remedy = "look at the residual along the cycle; `trunnion identify` fits numbers of the model to it"
     phrases = {"cases": where, "rms_told": said(rms, unit), "explained": "", "remedy": remedy}
     figures: dict[str, Any] = {"within_percent": 100 * worst, "rms": rms, "several": len(members) > 1, "cause": kind}
@@ -169,10 +171,10 @@ def _explained(name: str, measures: str, kind: str, members: Sequence[tuple[Comp
         also = f"; {' or '.join(KINDS[one] for one in KINDS if one in alike)} would explain as much" if alike else ""
         phrases["explained"] = f"; {story} explains {_share(least)} of its mean square{also}"
         figures["explains"] = least
-    return told("compare.not_within", f"channels.{name}", severity=None, phrases=phrases, **figures)
+    return finding_for("compare.not_within", f"channels.{name}", severity=None, phrases=phrases, **figures)
 
 
-def _size(pair: Pair, kind: str) -> Cause:
+def _size(pair: ChannelComparison, kind: str) -> Cause:
     if pair.cause is not None and pair.cause.kind == kind:
         return pair.cause
     judged = pair.judged  # an offset that is less than nearly all of the residual
@@ -192,7 +194,7 @@ MODEL = "it is not the same in all conditions: look at friction and loads of the
 
 
 def _story(
-    name: str, measures: str, kind: str, sizes: Sequence[Cause], members: Sequence[tuple[Compared, Pair]]
+    name: str, measures: str, kind: str, sizes: Sequence[Cause], members: Sequence[tuple[Compared, ChannelComparison]]
 ) -> tuple[str, str]:
     """What would explain it, with its size, and what to do about it."""
     first, pair = members[0]
@@ -222,7 +224,7 @@ def _story(
     return story, MODEL if kind in ("zero", "gain") and _differ(kind, sizes, members) else REMEDIES[kind]
 
 
-def _differ(kind: str, sizes: Sequence[Cause], members: Sequence[tuple[Compared, Pair]]) -> bool:
+def _differ(kind: str, sizes: Sequence[Cause], members: Sequence[tuple[Compared, ChannelComparison]]) -> bool:
     """Whether an offset or a gain changes with the condition by more than its uncertainty, as no sensor's does."""
     values = [one.size for one in sizes]
     spread = max(values) - min(values)
@@ -285,7 +287,7 @@ def _shifts(found: Sequence[Compared]) -> Iterator[Finding]:
     where = _in(list(dict.fromkeys(one.condition.name for _, one, _ in cases)), len(found))
     least = min(cause.explains for _, _, cause in cases)
     phrases = {"cases": where, "channels": names, "range": _range(ahead, unit), "mean_told": said(mean, unit, True)}
-    yield told("compare.angle_shifted", "angle.zero", phrases=phrases, explains_percent=100 * least, mean=mean)
+    yield finding_for("compare.angle_shifted", "angle.zero", phrases=phrases, explains_percent=100 * least, mean=mean)
 
 
 # ---- efficiency, the model, the sensors -----------------------------------------------------------------------
@@ -300,15 +302,15 @@ def _efficiencies(found: Sequence[Compared]) -> Iterator[Finding]:
         most = f"; the most in {one.condition.name}" if len(off) > 1 else ""
         phrases = {"cases": _in([case.condition.name for case, _ in off], len(known)), "most": most}
         figures = {"measured": of.measured, "expanded": of.expanded, "model": of.model}
-        yield told("compare.efficiency", "efficiency", severity=None, phrases=phrases, **figures)
+        yield finding_for("compare.efficiency", "efficiency", severity=None, phrases=phrases, **figures)
     for missing in dict.fromkeys(one.unmeasured for one in found if one.unmeasured):
         where = _in([one.condition.name for one in found if one.unmeasured == missing], len(found))
         phrases = {"cases": where}
-        yield told("compare.efficiency_unmeasured", "efficiency", phrases=phrases, missing=list(missing))
+        yield finding_for("compare.efficiency_unmeasured", "efficiency", phrases=phrases, missing=list(missing))
     for reason in dict.fromkeys(of.reason for _, of in known if of.reason[0]):
         where = _in([one.condition.name for one, of in known if of.reason == reason], len(known))
         phrases = {"cases": where, "reason": reason[0], "remedy": reason[1]}
-        yield told("compare.efficiency_unknown", "efficiency", phrases=phrases)
+        yield finding_for("compare.efficiency_unknown", "efficiency", phrases=phrases)
 
 
 def _speeds(found: Sequence[Compared]) -> Iterator[Finding]:
@@ -333,7 +335,7 @@ def other_speed(driver: str, rows: Sequence[tuple[str, float, float]], of: int) 
             "measured_told": said(measured, "rad/s"), "model_told": said(theirs, "rad/s"),
         }  # fmt: skip
         figures = {"measured": measured, "model": theirs, "driver": driver}
-        yield told("compare.speed", f"drivers.{driver}", severity=None, phrases=phrases, **figures)
+        yield finding_for("compare.speed", f"drivers.{driver}", severity=None, phrases=phrases, **figures)
 
 
 def _answers(found: Sequence[Compared]) -> Iterator[Finding]:
@@ -349,7 +351,7 @@ def _answers(found: Sequence[Compared]) -> Iterator[Finding]:
             where = _in([one.condition.name for one, _ in cases], len(found))
             phrases = {"cases": where, "analyse": f"run analyse {values}".rstrip()}
             size = len(first.condition.phase)
-            yield told("compare.no_answer", phrases=phrases, count=count, positions=size, status=code.text)
+            yield finding_for("compare.no_answer", phrases=phrases, count=count, positions=size, status=code.text)
 
 
 def _of_the_model(found: Sequence[Compared]) -> Iterator[Finding]:
@@ -372,7 +374,7 @@ def _left_out(found: Sequence[Compared]) -> Iterator[Finding]:
             counts[name] += int(np.count_nonzero(np.isfinite(pair.model) & ~pair.comparable))
     left = {name: count for name, count in counts.items() if count}
     if left:
-        yield told("compare.left_out", counts=left)
+        yield finding_for("compare.left_out", counts=left)
 
 
 def _going_on(channels: Mapping[str, str], found: Sequence[Compared]) -> Iterator[Finding]:
@@ -384,7 +386,7 @@ def _going_on(channels: Mapping[str, str], found: Sequence[Compared]) -> Iterato
             continue
         mean = sum(value * turns for value, turns in alike if turns) / count
         if mean * math.sqrt(count) > SIGNIFICANT:
-            yield told("compare.turns_alike", f"channels.{name}", correlation=mean)
+            yield finding_for("compare.turns_alike", f"channels.{name}", correlation=mean)
 
 
 def _accuracies(channels: Mapping[str, str], found: Sequence[Compared]) -> Iterator[Finding]:
@@ -393,8 +395,8 @@ def _accuracies(channels: Mapping[str, str], found: Sequence[Compared]) -> Itera
         if all(pair.course.accuracy.zero == pair.course.accuracy.gain == 0 for _, pair in _cases(name, found))
     ]  # fmt: skip
     if bare:
-        yield told("compare.no_accuracy", "channels", channels=bare)
+        yield finding_for("compare.no_accuracy", "channels", channels=bare)
 
 
 def _exact(mechanism: Mechanism) -> Finding:
-    return told("compare.model_exact", toleranced=bool(mechanism.tolerances()))
+    return finding_for("compare.model_exact", toleranced=bool(mechanism.tolerances()))

@@ -16,7 +16,7 @@ from trunnion.model.mechanism import Mechanism
 from trunnion.results.attributes import cited, codes, finding_rows, origin
 from trunnion.results.dataset import Variable, dataset_of, described
 from trunnion.rig.compare.assessment import Verdict, difference, expanded, probability, uncertainty_of
-from trunnion.rig.compare.comparison import Compared, Pair
+from trunnion.rig.compare.comparison import ChannelComparison, Compared
 from trunnion.rig.compare.findings import findings_of, gathered, units_set
 from trunnion.rig.reading.measurement import Condition, Measurement
 from trunnion.solve.friction_method import FrictionMethod
@@ -119,7 +119,9 @@ def _fill(
         arrays["efficiency_within"][k] = int(of.within) if known else -1
 
 
-def _fill_channel(arrays: dict[str, Array], at: tuple[int, int], one: Compared, pair: Pair, coverage: float) -> None:
+def _fill_channel(
+    arrays: dict[str, Array], at: tuple[int, int], one: Compared, pair: ChannelComparison, coverage: float
+) -> None:
     course, judged, count = pair.course, pair.judged, len(one.condition.phase)
     of = uncertainty_of(course)
     there = pair.comparable & np.isfinite(course.mean) & np.isfinite(pair.model)

@@ -16,7 +16,7 @@ from trunnion.errors import Finding, MechanismError, Status
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.names import nearest
 from trunnion.rig.compare.assessment import Verdict, judge, uncertainty_of
-from trunnion.rig.compare.comparison import Compared, Efficient, Pair, unmeasured
+from trunnion.rig.compare.comparison import ChannelComparison, Compared, Efficient, unmeasured
 from trunnion.rig.compare.error_sources import best, causes
 from trunnion.rig.compare.result import dataset
 from trunnion.rig.modelled import Modelled, check_settings, modelled
@@ -97,11 +97,11 @@ def _channels(measurement: Measurement, wanted: Sequence[str] | None) -> dict[st
     return known if wanted is None else {name: known[name] for name in dict.fromkeys(wanted)}
 
 
-def _pair(condition: Condition, model: Modelled, channel: str, coverage: float) -> Pair:
+def _pair(condition: Condition, model: Modelled, channel: str, coverage: float) -> ChannelComparison:
     course, theirs = condition.courses[channel], model.courses[channel]
     comparable = model.comparable(channel)
     judged = judge(course, theirs, comparable, coverage)
-    pair = Pair(course, theirs, comparable, judged, None)
+    pair = ChannelComparison(course, theirs, comparable, judged, None)
     if judged.verdict not in (Verdict.NOT, Verdict.OFFSET):
         return pair
     where = comparable & np.isfinite(course.mean) & np.isfinite(theirs)

@@ -9,11 +9,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.rig.identify.fit import Problem
+from trunnion.rig.identify.fit import FitProblem
 from trunnion.rig.identify.identified import Identified
 from trunnion.rig.identify.uncertainty import quantile
 
-__all__ = ["HeldOut", "Judged", "Misses"]
+__all__ = ["Assessment", "HeldOut", "Misses"]
 
 Array = NDArray[np.float64]
 AT_LIMIT = 0.05  # of the standard uncertainty: nearer than this to a limit is on it
@@ -47,13 +47,13 @@ class HeldOut:
 
 
 @dataclass(frozen=True)
-class Judged:
+class Assessment:
     """The figures of an identification, (unknown,) unless said."""
 
     found: Identified
 
     @property
-    def problem(self) -> Problem:
+    def problem(self) -> FitProblem:
         """What was fitted."""
         return self.found.problem
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.rig.reading.efficiency import efficiency_of, pairs_of
-from trunnion.rig.reading.measurement import Accuracy, Condition, Course, Measurement
+from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal
 
 __all__ = ["EFFICIENCY", "OWN", "Block", "blocks_of", "channels_of", "finite", "shared_zero"]
 
@@ -37,7 +37,7 @@ class Block:
 
     condition: int
     channel: str
-    course: Course
+    course: Signal
     turns: Array
     held: Array
     effects: Mapping[str, float] = field(default_factory=dict)
@@ -131,7 +131,7 @@ def channels_of(measurement: Measurement, wanted: Sequence[str] | None, joints: 
     return [name for name in dict.fromkeys([*known, EFFICIENCY]) if name in wanted]
 
 
-def _efficiency(condition: Condition, joints: Mapping[str, str]) -> tuple[Course, dict[str, float]]:
+def _efficiency(condition: Condition, joints: Mapping[str, str]) -> tuple[Signal, dict[str, float]]:
     """The efficiency of each turn as a course of one position, and what the errors of its sensors do to it."""
     found = efficiency_of(condition, joints)
     effects: dict[str, float] = {}
@@ -143,7 +143,7 @@ def _efficiency(condition: Condition, joints: Mapping[str, str]) -> tuple[Course
             shared = shared_zero(accuracy)
             effects |= {f"zero of {one.channel}": one.sensitivity * shared} if shared else {}
             effects |= {f"{OWN} of {one.channel}": one.sensitivity * accuracy.own} if accuracy.own else {}
-    return Course(EFFICIENCY, "efficiency:cycle", "1", found.per_turn[:, None]), effects
+    return Signal(EFFICIENCY, "efficiency:cycle", "1", found.per_turn[:, None]), effects
 
 
 def shared_zero(accuracy: Accuracy) -> float:

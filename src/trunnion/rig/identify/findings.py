@@ -7,11 +7,11 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from trunnion.errors import Finding, Severity, Status
-from trunnion.results.sentences import told
+from trunnion.results.sentences import finding_for
 from trunnion.rig.compare.findings import other_speed
-from trunnion.rig.identify.assessment import Judged
+from trunnion.rig.identify.assessment import Assessment
 from trunnion.rig.identify.blocks import OWN, shared_zero
-from trunnion.rig.identify.identifiability import Combination, Group, known_of, sizes_of
+from trunnion.rig.identify.identifiability import Combination, InseparableUnknowns, known_of, sizes_of
 from trunnion.rig.identify.number_text import amount, share
 from trunnion.rig.identify.uncertainty import RANDOM, quantile
 
@@ -27,7 +27,7 @@ FEW = 5.0  # degrees of freedom
 NUMBERS = ("no", "one", "two", "three", "four", "five", "six")
 
 
-def sentences(judged: Judged) -> list[Finding]:
+def sentences(judged: Assessment) -> list[Finding]:
     """Errors and warnings first."""
     parts = (_search, _fit, _speeds, _groups, _near, _limits, _sensors, _exact, _data, _held)
     found = [one for part in parts for one in part(judged)]
@@ -43,50 +43,52 @@ def _count(number: int, what: str) -> str:
     return f"{NUMBERS[number] if number < len(NUMBERS) else f'{number:,}'} {what}{'s' * (number != 1)}"
 
 
-def _search(judged: Judged) -> Iterator[Finding]:
+def _search(judged: Assessment) -> Iterator[Finding]:
     """How the search went."""
     search, problem = judged.found.search, judged.problem
     if search.shared < 1:
-        yield told("search.start", "start", share=search.shared)
+        yield finding_for("search.start", "start", share=search.shared)
     if problem.refused:
         phrases = {"told": _count(problem.refused, "step")}
-        yield told("search.refused", "search", phrases=phrases, count=problem.refused)
+        yield finding_for("search.refused", "search", phrases=phrases, count=problem.refused)
     if not search.fit.converged:
-        yield told("search.not_ended", "search", evaluations=search.fit.evaluations)
+        yield finding_for("search.not_ended", "search", evaluations=search.fit.evaluations)
     elif not search.settled:
-        yield told("search.unsettled", "search")
+        yield finding_for("search.unsettled", "search")
     lost = judged.lost[: problem.count]
     if search.other is not None and not np.any(lost):
         pairs = list(zip(problem.model.unknowns, (float(value) for value in search.other), strict=False))
         phrases = {"told": ", ".join(f"{one.name} = {amount(value, None, one.unit)}" for one, value in pairs)}
-        yield told("search.other", "search", phrases=phrases, values={one.name: value for one, value in pairs})
+        yield finding_for("search.other", "search", phrases=phrases, values={one.name: value for one, value in pairs})
 
 
-def _fit(judged: Judged) -> Iterator[Finding]:
+def _fit(judged: Assessment) -> Iterator[Finding]:
     """Whether the model fits, and whether turns repeat."""
     test, problem = judged.found.spread.test, judged.problem
     if test.misfit:
         chance = "less than 0.01 %" if test.chance < 1e-4 else f"{100 * test.chance:.2g} %"
         phrases = {"chance_told": chance}
-        yield told("fit.misfit", "fit", phrases=phrases, reduced=test.reduced, chance=test.chance)
+        yield finding_for("fit.misfit", "fit", phrases=phrases, reduced=test.reduced, chance=test.chance)
     apart = judged.found.spread.apart
     for p in np.flatnonzero((apart > 1) & ~judged.lost[: problem.count]):
         where, times = f"parameter {problem.model.unknowns[p].name}", np.sqrt(apart[p])
-        yield told("fit.conditions_disagree", where, severity=Severity.WARNING if times > MUCH else None, times=times)
+        yield finding_for(
+            "fit.conditions_disagree", where, severity=Severity.WARNING if times > MUCH else None, times=times
+        )
     single = [block for block in problem.blocks if block.fitted and not block.repeats]
     if single and len(single) == sum(block.fitted for block in problem.blocks):
-        yield told("fit.not_repeated", "data")
+        yield finding_for("fit.not_repeated", "data")
     freedom = judged.found.spread.freedom[: problem.count][~judged.lost[: problem.count]]
     if freedom.size and np.min(freedom) < FEW:
         least = round(float(np.min(freedom)))
-        yield told("fit.freedom", "data", phrases={"told": _count(least, "degree")}, degrees=least)
+        yield finding_for("fit.freedom", "data", phrases={"told": _count(least, "degree")}, degrees=least)
     follows = judged.found.spread.follows
     pairs = sum(len(block.turns) - 1 for block in problem.blocks if block.fitted)
     if follows > 2 / np.sqrt(max(pairs, 1)):
-        yield told("fit.turns_alike", "data", correlation=follows)
+        yield finding_for("fit.turns_alike", "data", correlation=follows)
 
 
-def _speeds(judged: Judged) -> Iterator[Finding]:
+def _speeds(judged: Assessment) -> Iterator[Finding]:
     """A driver that ran at another speed than the model's."""
     model = judged.problem.model
     driver = next(iter(model.run.system.mechanism.drivers), "")
@@ -99,22 +101,22 @@ def _speeds(judged: Judged) -> Iterator[Finding]:
 # ---- what cannot be told apart --------------------------------------------------------------------------------
 
 
-def _groups(judged: Judged) -> Iterator[Finding]:
+def _groups(judged: Assessment) -> Iterator[Finding]:
     for group in judged.found.groups:
         names = [_name(judged, i) for i in group.members]
         channels = _joined(list(dict.fromkeys(block.channel for block in judged.problem.blocks if block.fitted)))
         where = f"parameter {names[0]}"
         if len(group.members) == 1:
-            yield told("parameter.no_effect", where, name=names[0], phrases={"channels": channels})
+            yield finding_for("parameter.no_effect", where, name=names[0], phrases={"channels": channels})
             continue
         verb = "act on" if group.exact else "act nearly alike on"
         alike = f"{_joined(names)} {verb} {channels}{' in the same way' if group.exact else ''}"
         some = "one" if len(names) == 2 else "some"
         phrases = {"alike": alike, "known": _known(judged, group, names), "some": some}
-        yield told("parameter.not_told_apart", where, phrases=phrases, names=names)
+        yield finding_for("parameter.not_told_apart", where, phrases=phrases, names=names)
 
 
-def _near(judged: Judged) -> Iterator[Finding]:
+def _near(judged: Assessment) -> Iterator[Finding]:
     """Pairs that are told apart, but badly: what of them is known far better than either."""
     n = judged.problem.count
     size = sizes_of(judged.problem, judged.found.x)
@@ -126,23 +128,25 @@ def _near(judged: Judged) -> Iterator[Finding]:
             known = known_of(judged.problem, judged.found.x, judged.found.spread, pair, size)
             names = [_name(judged, i) for i in pair]
             together = f"{judged.correlation[p, q]:.3f}".replace("-", "−")
-            said = f": {_known(judged, Group(pair, known, exact=False), names, short=True)}" if known else ""
+            said = (
+                f": {_known(judged, InseparableUnknowns(pair, known, exact=False), names, short=True)}" if known else ""
+            )
             phrases = {"known": said, "correlation_told": together}
             correlation = judged.correlation[p, q]
-            yield told(
+            yield finding_for(
                 "parameter.hardly_told_apart", f"parameter {names[1]}", phrases=phrases, other=names[0],
                 correlation=correlation,
             )  # fmt: skip
 
 
-def _name(judged: Judged, i: int) -> str:
+def _name(judged: Assessment, i: int) -> str:
     problem = judged.problem
     if i < problem.count:
         return problem.model.unknowns[i].name
     return f"the {problem.sensors[i - problem.count].name}"
 
 
-def _known(judged: Judged, group: Group, names: Sequence[str], short: bool = False) -> str:
+def _known(judged: Assessment, group: InseparableUnknowns, names: Sequence[str], short: bool = False) -> str:
     """What of them is known, and that the rest is not; short: of what is known only."""
     if not group.known:
         return "no combination of them is known"
@@ -170,7 +174,7 @@ def _known(judged: Judged, group: Group, names: Sequence[str], short: bool = Fal
     return f"{many}, none alone: {listed}"
 
 
-def _unit(judged: Judged, i: int) -> str:
+def _unit(judged: Assessment, i: int) -> str:
     """SI unit of an unknown; errors of sensors are in their standard uncertainties."""
     return judged.problem.model.unknowns[i].unit if i < judged.problem.count else "1"
 
@@ -203,7 +207,7 @@ def _ratio(over: str, under: str) -> str:
 # ---- limits, sensors, data ------------------------------------------------------------------------------------
 
 
-def _limits(judged: Judged) -> Iterator[Finding]:
+def _limits(judged: Assessment) -> Iterator[Finding]:
     low, high = judged.interval
     for p, unknown in enumerate(judged.problem.model.unknowns):
         where = f"parameter {unknown.name}"
@@ -213,17 +217,17 @@ def _limits(judged: Judged) -> Iterator[Finding]:
             side = "at most" if judged.limit[p] < 0 else "at least"
             ends = [amount(one, None, unknown.unit) for one in (end, far)]
             phrases = {"limit_told": ends[0], "side": side, "far_told": ends[1]}
-            yield told("parameter.limit", where, phrases=phrases, limit=end, far=far)
+            yield finding_for("parameter.limit", where, phrases=phrases, limit=end, far=far)
             continue
         size = max(abs(judged.estimate[p]), unknown.size)
         half = quantile(judged.found.spread.freedom[p]) * judged.deviation[p]
         if size > 0 and half > size:
             value = judged.estimate[p]
             phrases = {"told": amount(value, half, unknown.unit)}
-            yield told("parameter.hardly_known", where, phrases=phrases, value=value, half=half)
+            yield finding_for("parameter.hardly_known", where, phrases=phrases, value=value, half=half)
 
 
-def _sensors(judged: Judged) -> Iterator[Finding]:
+def _sensors(judged: Assessment) -> Iterator[Finding]:
     """Which sensor limits what is known, and whether one is off by more than was stated of it."""
     problem = judged.problem
     names, shares = judged.budget
@@ -234,13 +238,15 @@ def _sensors(judged: Judged) -> Iterator[Finding]:
                 if source.startswith(OWN):
                     remedy = "record a longer unloaded stretch in each file, or more files"
                 phrases = {"share_told": share(part), "remedy": remedy}
-                yield told("parameter.sensor", f"parameter {unknown.name}", phrases=phrases, share=part, source=source)
+                yield finding_for(
+                    "parameter.sensor", f"parameter {unknown.name}", phrases=phrases, share=part, source=source
+                )
     for s, sensor in enumerate(problem.sensors, problem.count):
         if sensor.stated and abs(judged.found.x[s]) > FAR:
-            yield told("sensor.off", sensor.name, times=abs(judged.found.x[s]))
+            yield finding_for("sensor.off", sensor.name, times=abs(judged.found.x[s]))
 
 
-def _exact(judged: Judged) -> Iterator[Finding]:
+def _exact(judged: Assessment) -> Iterator[Finding]:
     """Channels whose zero and gain are taken as exact: of torques and forces that is hardly so."""
     measures = judged.problem.model.measures
     known: dict[str, bool] = {}
@@ -255,24 +261,24 @@ def _exact(judged: Judged) -> Iterator[Finding]:
         if channels:
             narrow = ", and the intervals are too narrow by that" if severity is Severity.WARNING else ""
             phrases = {"channels": _joined(channels), "too_narrow": narrow}
-            yield told("sensor.no_accuracy", "sensors", severity=severity, phrases=phrases)
+            yield finding_for("sensor.no_accuracy", "sensors", severity=severity, phrases=phrases)
 
 
-def _data(judged: Judged) -> Iterator[Finding]:
+def _data(judged: Assessment) -> Iterator[Finding]:
     """What was left out."""
     problem = judged.problem
     courses = problem.courses(judged.found.x)
     used, out = (sum(getattr(one, key) for one in judged.misses) for key in ("used", "out"))
     if out:
-        yield told("data.left_out", "data", count=out, positions=used + out)
+        yield finding_for("data.left_out", "data", count=out, positions=used + out)
     locked = sum(int(np.count_nonzero(status == Status.LOCKED)) for status in courses.status)
     lost = sum(int(np.count_nonzero(status >= Status.NOT_CONVERGED)) for status in courses.status) - locked
     for number, why in ((locked, "locked by friction"), (lost, "without an answer")):
         if number:
-            yield told("fit.no_answer", "fit", phrases={"why": why}, count=number)
+            yield finding_for("fit.no_answer", "fit", phrases={"why": why}, count=number)
 
 
-def _held(judged: Judged) -> Iterator[Finding]:
+def _held(judged: Assessment) -> Iterator[Finding]:
     """How well what was held out is predicted."""
     rows = judged.held_out
     if not rows:
@@ -283,7 +289,7 @@ def _held(judged: Judged) -> Iterator[Finding]:
     names = "; ".join(held) if len(held) <= MOST_NAMED else f"of {len(held)} conditions"
     phrases = {"names": names}
     if not np.isfinite(trust):
-        yield told("held_out.untested", "hold_out", phrases=phrases)
+        yield finding_for("held_out.untested", "hold_out", phrases=phrases)
     else:
         code = "held_out.missed" if trust > POOR else "held_out.predicted"
-        yield told(code, "hold_out", phrases=phrases, times=trust)
+        yield finding_for(code, "hold_out", phrases=phrases, times=trust)

@@ -18,7 +18,7 @@ from trunnion.errors import Status
 from trunnion.rig.identify.blocks import OWN, Block, shared_zero
 from trunnion.rig.identify.signals import Courses, Model
 
-__all__ = ["Fit", "Problem", "Sensor", "fit", "sensors_of"]
+__all__ = ["FitProblem", "LeastSquaresFit", "SensorError", "fit", "sensors_of"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -31,7 +31,7 @@ GUESS = 0.01  # of a course: the scatter of one without repetitions, until its r
 
 
 @dataclass(frozen=True)
-class Sensor:
+class SensorError:
     """One error of a sensor: its zero, its gain, or by how much it lags behind.
 
     sizes: its standard uncertainty in each block, in the unit of the course or relative, 0 in blocks of other sensors;
@@ -57,14 +57,14 @@ def sensors_of(
     own: Sequence[str] | None = None,
     delay: float | None = None,
     lags: Mapping[str, float] | None = None,
-) -> list[Sensor]:
+) -> list[SensorError]:
     """Errors of the sensors of all blocks: one for each channel, or of each condition if these have names.
 
     An infinite standard uncertainty says that nothing is known of it. delay: by which a channel may lag behind the
     angle, standard uncertainty, s; none if not given. lags: the same of all channels of each condition together, by
     its name in the order of the conditions.
     """
-    found: list[Sensor] = []
+    found: list[SensorError] = []
     for kind in ("zero", "gain"):
         groups: dict[tuple[str, str], list[int]] = {}
         for k, block in enumerate(blocks):
@@ -82,7 +82,7 @@ def sensors_of(
             for k, size in zip(members, stated, strict=True):
                 sizes[k] = float(size)
             name = f"{kind} of {channel}" + (f" in {place}" if place else "")
-            found.append(Sensor(name, channel, kind, tuple(sizes), not free))
+            found.append(SensorError(name, channel, kind, tuple(sizes), not free))
     return [
         *found,
         *_of_files(blocks),
@@ -92,7 +92,7 @@ def sensors_of(
     ]
 
 
-def _of_files(blocks: Sequence[Block]) -> list[Sensor]:
+def _of_files(blocks: Sequence[Block]) -> list[SensorError]:
     """The zero that each file has by itself."""
     single: dict[tuple[str, tuple[str, ...]], list[float]] = {}
     for k, block in enumerate(blocks):
@@ -100,12 +100,14 @@ def _of_files(blocks: Sequence[Block]) -> list[Sensor]:
             key = block.channel, block.files or (str(block.condition),)
             single.setdefault(key, [0.0] * len(blocks))[k] = float(block.course.accuracy.own)
     return [
-        Sensor(f"{OWN} of {channel}: {' '.join(files)}", channel, "zero", tuple(sizes), True, f"{OWN} of {channel}")
+        SensorError(
+            f"{OWN} of {channel}: {' '.join(files)}", channel, "zero", tuple(sizes), True, f"{OWN} of {channel}"
+        )
         for (channel, files), sizes in single.items()
     ]
 
 
-def _late(blocks: Sequence[Block], delay: float | None) -> list[Sensor]:
+def _late(blocks: Sequence[Block], delay: float | None) -> list[SensorError]:
     """By how much each channel with a course lags behind the angle."""
     if not delay:
         return []
@@ -115,23 +117,23 @@ def _late(blocks: Sequence[Block], delay: float | None) -> list[Sensor]:
         for channel in dict.fromkeys(one.channel for one in blocks)
     }
     return [
-        Sensor(f"delay of {channel}", channel, "delay", sizes, bool(np.isfinite(delay)))
+        SensorError(f"delay of {channel}", channel, "delay", sizes, bool(np.isfinite(delay)))
         for channel, sizes in rows.items()
         if any(sizes)
     ]
 
 
-def _sampled(blocks: Sequence[Block], lags: Mapping[str, float]) -> list[Sensor]:
+def _sampled(blocks: Sequence[Block], lags: Mapping[str, float]) -> list[SensorError]:
     """By how much all channels of a condition lag together, since its angle is known to the sampling only."""
     found = []
     for index, (name, lag) in enumerate(lags.items()):
         sizes = tuple(lag * (one.condition == index and one.turns.shape[1] > 2) for one in blocks)
         if any(sizes):
-            found.append(Sensor(f"{ANGLE}: {name}", "", "delay", sizes, True, ANGLE))
+            found.append(SensorError(f"{ANGLE}: {name}", "", "delay", sizes, True, ANGLE))
     return found
 
 
-def _behind(blocks: Sequence[Block], own: Sequence[str] | None) -> list[Sensor]:
+def _behind(blocks: Sequence[Block], own: Sequence[str] | None) -> list[SensorError]:
     """Errors of the sensors behind courses that are computed."""
     effects: dict[tuple[str, str, str], list[float]] = {}
     for k, block in enumerate(blocks):
@@ -142,7 +144,7 @@ def _behind(blocks: Sequence[Block], own: Sequence[str] | None) -> list[Sensor]:
             elif own:
                 name = f"{name} in {own[block.condition]}"
             effects.setdefault((name, block.channel, group), [0.0] * len(blocks))[k] = size
-    return [Sensor(name, one, "zero", tuple(sizes), True, group) for (name, one, group), sizes in effects.items()]
+    return [SensorError(name, one, "zero", tuple(sizes), True, group) for (name, one, group), sizes in effects.items()]
 
 
 def _stated(block: Block, kind: str) -> float:
@@ -152,7 +154,7 @@ def _stated(block: Block, kind: str) -> float:
 
 
 @dataclass
-class Problem:
+class FitProblem:
     """What is fitted: the model to the blocks.
 
     masks: positions used, by block; variances: of one turn, by block; factors: by channel, for the correlation within a
@@ -162,7 +164,7 @@ class Problem:
 
     model: Model
     blocks: Sequence[Block]
-    sensors: Sequence[Sensor]
+    sensors: Sequence[SensorError]
     guard: int | None = None
     masks: list[Mask] = field(default_factory=list)
     variances: list[Array] = field(default_factory=list)
@@ -334,7 +336,7 @@ def _widened(turned: Mask, guard: int) -> Mask:
 
 
 @dataclass(frozen=True)
-class Fit:
+class LeastSquaresFit:
     """Where a least-squares search ended. cost: sum of squares."""
 
     x: Array
@@ -343,7 +345,7 @@ class Fit:
     converged: bool
 
 
-def fit(problem: Problem, start: Array) -> Fit:
+def fit(problem: FitProblem, start: Array) -> LeastSquaresFit:
     """The trust-region search of SciPy within the limits; steps to where there is no answer are taken back."""
     from scipy.optimize import least_squares
 
@@ -353,4 +355,4 @@ def fit(problem: Problem, start: Array) -> Fit:
         problem.residuals, inside, problem.jacobian, (low, high), "trf", ftol=TOLERANCE, xtol=TOLERANCE, gtol=TOLERANCE,
         x_scale="jac", max_nfev=MOST_EVALUATIONS,
     )  # fmt: skip
-    return Fit(np.asarray(found.x), 2 * float(found.cost), int(found.nfev), bool(found.status > 0))
+    return LeastSquaresFit(np.asarray(found.x), 2 * float(found.cost), int(found.nfev), bool(found.status > 0))

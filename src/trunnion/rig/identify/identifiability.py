@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.rig.identify.fit import Problem
-from trunnion.rig.identify.uncertainty import Spread, quantile
+from trunnion.rig.identify.fit import FitProblem
+from trunnion.rig.identify.uncertainty import Covariances, quantile
 
-__all__ = ["Combination", "Group", "inseparable", "known_of", "sizes_of"]
+__all__ = ["Combination", "InseparableUnknowns", "inseparable", "known_of", "sizes_of"]
 
 Array = NDArray[np.float64]
 PART = 0.05  # of the largest share in a direction: what is below it takes no part
@@ -34,7 +34,7 @@ class Combination:
 
 
 @dataclass(frozen=True)
-class Group:
+class InseparableUnknowns:
     """Unknowns (and sensors, by their place behind them) that the data do not tell apart.
 
     known: combinations that they do; exact: whether nothing at all is known of the rest, or only too little.
@@ -46,7 +46,7 @@ class Group:
     exact: bool
 
 
-def sizes_of(problem: Problem, x: Array) -> Array:
+def sizes_of(problem: FitProblem, x: Array) -> Array:
     """How large each unknown is: by the model or the estimate; of one that is 0, what would change the data visibly."""
     found = [max(one.size, abs(value)) for one, value in zip(problem.model.unknowns, x[: problem.count], strict=True)]
     for p in range(problem.count):
@@ -62,16 +62,19 @@ def sizes_of(problem: Problem, x: Array) -> Array:
     return np.array(found + [1.0] * len(problem.sensors))
 
 
-def inseparable(problem: Problem, x: Array, spread: Spread) -> list[Group]:
+def inseparable(problem: FitProblem, x: Array, spread: Covariances) -> list[InseparableUnknowns]:
     """The groups of unknowns that the data do not tell apart."""
     sizes = sizes_of(problem, x)
-    found: list[Group] = []
+    found: list[InseparableUnknowns] = []
     lost: set[int] = set()
     for members in _connected(spread.null * 1.0, sizes):
-        found.append(Group(members, known_of(problem, x, spread, members, sizes), exact=True))
+        found.append(InseparableUnknowns(members, known_of(problem, x, spread, members, sizes), exact=True))
         lost |= set(members)
     vague = _vague(problem, spread, sizes, lost)
-    return [*found, *(Group(members, known_of(problem, x, spread, members, sizes), exact=False) for members in vague)]
+    return [
+        *found,
+        *(InseparableUnknowns(members, known_of(problem, x, spread, members, sizes), exact=False) for members in vague),
+    ]
 
 
 def _connected(null: Array, sizes: Array) -> list[tuple[int, ...]]:
@@ -93,7 +96,7 @@ def _connected(null: Array, sizes: Array) -> list[tuple[int, ...]]:
     return groups
 
 
-def _vague(problem: Problem, spread: Spread, sizes: Array, lost: set[int]) -> list[tuple[int, ...]]:
+def _vague(problem: FitProblem, spread: Covariances, sizes: Array, lost: set[int]) -> list[tuple[int, ...]]:
     """Unknowns that would be known well were others fixed, and together are known to no better than their size."""
     own = [p for p in range(problem.count) if p not in lost]
     covariance = spread.covariance[np.ix_(own, own)]
@@ -119,7 +122,7 @@ def _vague(problem: Problem, spread: Spread, sizes: Array, lost: set[int]) -> li
 
 
 def known_of(
-    problem: Problem, x: Array, spread: Spread, members: Sequence[int], sizes: Array
+    problem: FitProblem, x: Array, spread: Covariances, members: Sequence[int], sizes: Array
 ) -> tuple[Combination, ...]:
     """Combinations of the members that the data know, the best known first."""
     index = np.array(members)
@@ -153,7 +156,7 @@ def _marginal(information: Array, index: Array) -> Array:
     return np.asarray(own - (cross / size) @ rest @ (cross / size).T)
 
 
-def _named(problem: Problem, x: Array, index: Array, factors: Array, half: float) -> Combination:
+def _named(problem: FitProblem, x: Array, index: Array, factors: Array, half: float) -> Combination:
     """A combination of two as a product or a ratio where it is one: p q moves by q dp + p dq."""
     values = x[index]
     if len(index) == 2 and max(index) < problem.count and np.all(values != 0):

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.model.mechanism import Mechanism
-from trunnion.rig.identify.fit import Problem
-from trunnion.rig.identify.identifiability import Group
+from trunnion.rig.identify.fit import FitProblem
+from trunnion.rig.identify.identifiability import InseparableUnknowns
 from trunnion.rig.identify.search import Search
-from trunnion.rig.identify.uncertainty import Spread
+from trunnion.rig.identify.uncertainty import Covariances
 from trunnion.rig.reading.measurement import Measurement
 from trunnion.solve.run import Run
 
@@ -29,10 +29,10 @@ class Identified:
     mechanism: Mechanism
     measurement: Measurement
     run: Run
-    problem: Problem
+    problem: FitProblem
     search: Search
-    spread: Spread
-    groups: Sequence[Group]
+    spread: Covariances
+    groups: Sequence[InseparableUnknowns]
 
     @property
     def x(self) -> Array:

@@ -11,7 +11,7 @@ from trunnion.cycle.summary import references
 from trunnion.results.attributes import finding_rows, origin
 from trunnion.results.dataset import Variable, dataset_of, described
 from trunnion.rig.compare.result import data_findings, hashed_files
-from trunnion.rig.identify.assessment import Judged
+from trunnion.rig.identify.assessment import Assessment
 from trunnion.rig.identify.findings import sentences
 from trunnion.rig.identify.identified import Identified
 from trunnion.rig.identify.uncertainty import CONFIDENCE
@@ -30,7 +30,7 @@ SOURCES = (
 
 def dataset(found: Identified) -> xr.Dataset:
     """Estimates with all that is said of them."""
-    judged = Judged(found)
+    judged = Assessment(found)
     problem, measurement = found.problem, found.measurement
     unknowns = problem.model.unknowns
     names = [one.name for one in unknowns]
@@ -74,7 +74,7 @@ def _drive(found: Identified) -> str:
     return next(iter(found.mechanism.drivers), "")
 
 
-def _driven(judged: Judged) -> list[list[float] | None]:
+def _driven(judged: Assessment) -> list[list[float] | None]:
     """Angles of the first driver where the cycle begins and ends, rad, by condition; None if they name no position."""
     model = judged.problem.model
     ends = (model.driven(k, judged.told) for k in range(len(model.phases)))
@@ -140,7 +140,7 @@ VARIABLES = {
 }
 
 
-def _parameters(judged: Judged) -> dict[str, Array]:
+def _parameters(judged: Assessment) -> dict[str, Array]:
     n = judged.problem.count
     low, high = judged.interval
     return {
@@ -163,7 +163,7 @@ def _parameters(judged: Judged) -> dict[str, Array]:
     }
 
 
-def _sensors(judged: Judged) -> dict[str, Array]:
+def _sensors(judged: Assessment) -> dict[str, Array]:
     n = judged.problem.count
     lost = judged.lost[n:]
     return {
@@ -172,7 +172,7 @@ def _sensors(judged: Judged) -> dict[str, Array]:
     }
 
 
-def _blocks(judged: Judged) -> dict[str, Array]:
+def _blocks(judged: Assessment) -> dict[str, Array]:
     problem = judged.problem
     channels = list(problem.model.measures)
     shape = len(channels), len(judged.found.measurement.conditions)

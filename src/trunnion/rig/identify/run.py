@@ -13,7 +13,7 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.measures.measures import Measure, named
 from trunnion.model.mechanism import Mechanism
 from trunnion.rig.identify.blocks import EFFICIENCY, Block, blocks_of, channels_of, finite
-from trunnion.rig.identify.fit import Problem, fit, sensors_of
+from trunnion.rig.identify.fit import FitProblem, fit, sensors_of
 from trunnion.rig.identify.holdout import HoldOut, held_out
 from trunnion.rig.identify.identifiability import inseparable
 from trunnion.rig.identify.search import search
@@ -107,7 +107,7 @@ def identified(
         model, blocks = _telling(model, blocks)
     names = [one.name for one in measurement.conditions] if sensors == "condition" else None
     lags = {one.name: one.lag for one in measurement.conditions}
-    problem = Problem(model, blocks, sensors_of(blocks, names, delay, lags), guard)
+    problem = FitProblem(model, blocks, sensors_of(blocks, names, delay, lags), guard)
     found = search(problem, starts)
     spread = spread_of(problem, found.fit.x)
     problem.left_over = left_over(problem, spread)

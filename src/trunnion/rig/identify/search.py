@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError, Status
-from trunnion.rig.identify.fit import Fit, Problem, fit
+from trunnion.rig.identify.fit import FitProblem, LeastSquaresFit, fit
 from trunnion.rig.identify.identifiability import sizes_of
 from trunnion.rig.identify.uncertainty import correlation_factors, lack_of_fit
 
@@ -35,13 +35,13 @@ class Search:
 
     start: Array
     shared: float
-    fit: Fit
+    fit: LeastSquaresFit
     starts: int
     other: Array | None
     settled: bool
 
 
-def search(problem: Problem, starts: int | None) -> Search:
+def search(problem: FitProblem, starts: int | None) -> Search:
     """The estimates. starts: how many places to begin at; 1, and more if the model does not fit, if not given."""
     problem.start_scatter()
     first, shared = _runnable(problem)
@@ -69,7 +69,7 @@ def search(problem: Problem, starts: int | None) -> Search:
     return Search(first[: problem.count], shared, best, count, other, settled)
 
 
-def _runnable(problem: Problem) -> tuple[Array, float]:
+def _runnable(problem: FitProblem) -> tuple[Array, float]:
     """The start, with less friction where that locks; how much of it is left. MechanismError if nothing runs."""
     start = np.array([one.start for one in problem.model.unknowns] + [0.0] * len(problem.sensors))
     rubs = np.array([any(".friction." in path for path in one.paths) for one in problem.model.unknowns], bool)
@@ -87,7 +87,7 @@ def _runnable(problem: Problem) -> tuple[Array, float]:
     return best, shared
 
 
-def _inside(problem: Problem, start: Array) -> Array:
+def _inside(problem: FitProblem, start: Array) -> Array:
     """A start that is not on a limit: there a search would not get off."""
     problem.masks = problem.allowed(start)
     sizes = sizes_of(problem, start)
@@ -96,7 +96,7 @@ def _inside(problem: Problem, start: Array) -> Array:
     return np.asarray(np.clip(start, low + room, high - room))
 
 
-def _refined(problem: Problem, start: Array) -> tuple[Fit, bool]:
+def _refined(problem: FitProblem, start: Array) -> tuple[LeastSquaresFit, bool]:
     """A fit whose weights and used positions are those of where it ends; whether they came to rest."""
     problem.masks, problem.factors = problem.allowed(start), {}
     found = fit(problem, start)
@@ -116,7 +116,7 @@ def _refined(problem: Problem, start: Array) -> tuple[Fit, bool]:
     return found, False
 
 
-def _others(problem: Problem, first: Array, wanted: int) -> list[Array]:
+def _others(problem: FitProblem, first: Array, wanted: int) -> list[Array]:
     """Other places to begin at: the start times and divided by 3, then at random between a tenth and ten times."""
     low, high = problem.bounds
     found = []
@@ -129,7 +129,7 @@ def _others(problem: Problem, first: Array, wanted: int) -> list[Array]:
     return found
 
 
-def _tried(problem: Problem, place: Array) -> Fit | None:
+def _tried(problem: FitProblem, place: Array) -> LeastSquaresFit | None:
     """A fit from a place; None if the model has no answer there."""
     kept = problem.masks
     problem.masks = problem.allowed(place)
@@ -142,19 +142,19 @@ def _tried(problem: Problem, place: Array) -> Fit | None:
     return fit(problem, place)
 
 
-def refuse_unusable(problem: Problem, start: Array) -> None:
+def refuse_unusable(problem: FitProblem, start: Array) -> None:
     """MechanismError where no position can be used, or a channel is dead."""
     findings = list(_dead(problem, start)) or list(_unusable(problem, start))
     if findings:
         raise MechanismError(findings)
 
 
-def _any(problem: Problem, start: Array) -> bool:
+def _any(problem: FitProblem, start: Array) -> bool:
     pairs = zip(problem.blocks, problem.allowed(start), strict=True)
     return any(bool(np.any(mask)) for block, mask in pairs if block.fitted)
 
 
-def _unusable(problem: Problem, start: Array) -> Iterator[Finding]:
+def _unusable(problem: FitProblem, start: Array) -> Iterator[Finding]:
     """Why no position is used, if none is."""
     if _any(problem, start):
         return
@@ -177,7 +177,7 @@ def _unusable(problem: Problem, start: Array) -> Iterator[Finding]:
     yield Finding(what, "start", "give a start from which it runs, or look at it with analyse")
 
 
-def _dead(problem: Problem, start: Array) -> Iterator[Finding]:
+def _dead(problem: FitProblem, start: Array) -> Iterator[Finding]:
     """Channels that read one number, without scatter or course, where the model has a course."""
     dead: dict[str, list[tuple[int, float, float, float]]] = {}
     for k, block in enumerate(problem.blocks):

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from scipy import special
 
 from trunnion.rig.identify.blocks import Block
-from trunnion.rig.identify.fit import Problem
+from trunnion.rig.identify.fit import FitProblem
 
-__all__ = ["CONFIDENCE", "RANDOM", "Spread", "Test", "correlation_factors", "left_over", "quantile", "spread_of"]
+__all__ = ["CONFIDENCE", "RANDOM", "Covariances", "Test", "correlation_factors", "left_over", "quantile", "spread_of"]
 
 Array = NDArray[np.float64]
 CONFIDENCE = 0.95
@@ -48,7 +48,7 @@ class Test:
 
 
 @dataclass(frozen=True)
-class Spread:
+class Covariances:
     """Covariances of all unknowns and sensors, by where they come from.
 
     information: Jᵀ W J + Λ; inverse: its inverse, pseudo where it is singular; null: (direction, unknown and sensor),
@@ -80,7 +80,7 @@ def quantile(freedom: Array | float, confidence: float = CONFIDENCE, one_sided: 
     return np.asarray(special.stdtrit(known, level))
 
 
-def _parts(problem: Problem, x: Array, k: int, inverse: Array) -> Array:
+def _parts(problem: FitProblem, x: Array, k: int, inverse: Array) -> Array:
     """What each position of each turn of a block adds to the estimates, (unknown and sensor, turn, position)."""
     block = problem.blocks[k]
     columns = inverse @ (np.nan_to_num(problem.said(x, k)[1]) * problem.weight(k))
@@ -109,7 +109,7 @@ def _seam(parts: Array, reach: int) -> Array:
     return np.asarray(product + product.T)
 
 
-def correlation_factors(problem: Problem, x: Array) -> dict[str, float]:
+def correlation_factors(problem: FitProblem, x: Array) -> dict[str, float]:
     """By channel, how much more neighbours of a turn tell the same than if they were independent.
 
     The variance of the scores between turns over what independent positions would give, in all directions that the
@@ -145,7 +145,7 @@ def _basis(columns: Array) -> Array:
 # ---- the whole ------------------------------------------------------------------------------------------------
 
 
-def spread_of(problem: Problem, x: Array) -> Spread:
+def spread_of(problem: FitProblem, x: Array) -> Covariances:
     """Covariance of the estimates by source, with its degrees of freedom."""
     count = len(x)
     rows = problem.jacobian(x)
@@ -178,10 +178,10 @@ def spread_of(problem: Problem, x: Array) -> Spread:
     random = np.diagonal(np.sum([parts[key] for key in RANDOM if key in parts], axis=0))
     with np.errstate(all="ignore"):  # Welch and Satterthwaite; what was stated has infinite freedom
         freedom = np.where(random > 0, freedom * (whole / random) ** 2, np.inf)
-    return Spread(information, inverse, null, parts, freedom, test, follows, apart[: problem.count])
+    return Covariances(information, inverse, null, parts, freedom, test, follows, apart[: problem.count])
 
 
-def _steps(problem: Problem, x: Array, inverse: Array, blocks: Sequence[int] | None = None) -> Array:
+def _steps(problem: FitProblem, x: Array, inverse: Array, blocks: Sequence[int] | None = None) -> Array:
     """Covariance by readings that stick to steps: of a mean that does not get finer by more turns; of some blocks."""
     total = np.zeros_like(inverse)
     for k in range(len(problem.blocks)) if blocks is None else blocks:
@@ -216,7 +216,7 @@ def _joined(parts: Sequence[tuple[Array, Array]]) -> Array:
     return np.asarray(found)
 
 
-def _between_turns(problem: Problem, x: Array, inverse: Array) -> tuple[Array, Array, float, dict[int, Array]]:
+def _between_turns(problem: FitProblem, x: Array, inverse: Array) -> tuple[Array, Array, float, dict[int, Array]]:
     """Covariance by what each turn would have changed, its freedom, how turns follow each other, and its variances
     by condition, with their freedom last."""
     count = len(x)
@@ -257,7 +257,7 @@ def _between_turns(problem: Problem, x: Array, inverse: Array) -> tuple[Array, A
     return total, freedom, follows, alone
 
 
-def _apart(problem: Problem, x: Array, inverse: Array, alone: dict[int, Array]) -> Array:
+def _apart(problem: FitProblem, x: Array, inverse: Array, alone: dict[int, Array]) -> Array:
     """How much the conditions disagree in what they add to each unknown, over what their turns explain; 1 if by chance.
 
     What they add is 0 in all, so that of C conditions the sum of squares over variances is χ² of C − 1, or F for
@@ -312,7 +312,7 @@ def _doubled(size: int) -> Array:
     return found
 
 
-def lack_of_fit(problem: Problem, x: Array) -> Test:
+def lack_of_fit(problem: FitProblem, x: Array) -> Test:
     """χ² of the residuals of the means, frequency by frequency, against the scatter between turns.
 
     A frequency of the residual has the variance that it has between turns, over their number: noise may be coloured as
@@ -339,7 +339,7 @@ def lack_of_fit(problem: Problem, x: Array) -> Test:
     return Test(value / mean, freedom, float(special.chdtrc(freedom, value / scale)))
 
 
-def _weighed(problem: Problem, x: Array, k: int) -> tuple[float, Array, float]:
+def _weighed(problem: FitProblem, x: Array, k: int) -> tuple[float, Array, float]:
     """Sum over the frequencies of the residual, that of each turn, and the least variance it has, of normal noise."""
     block, mask = problem.blocks[k], problem.masks[k]
     gap = np.where(mask, problem.misses(x, k, block.mean), 0.0)
@@ -357,7 +357,7 @@ def _weighed(problem: Problem, x: Array, k: int) -> tuple[float, Array, float]:
     return float(np.sum(weights * fair * _powers(gap))), np.asarray(each), least
 
 
-def left_over(problem: Problem, spread: Spread) -> float:
+def left_over(problem: FitProblem, spread: Covariances) -> float:
     """How much more than the scatter the misfit and the conditions move the estimates, as variances; 1 without."""
     more = np.diagonal(np.sum([spread.parts[key] for key in RANDOM if key in spread.parts], axis=0))
     scatter = np.diagonal(spread.parts["scatter"])
@@ -367,7 +367,7 @@ def left_over(problem: Problem, spread: Spread) -> float:
     )
 
 
-def _left_over(problem: Problem, x: Array, inverse: Array, again: bool) -> tuple[Array, float]:
+def _left_over(problem: FitProblem, x: Array, inverse: Array, again: bool) -> tuple[Array, float]:
     """Covariance by the residuals of the means, as correlated as they are along the cycle, and its freedom.
 
     again: beside the scatter between turns, as a misfit of the model; it is larger by as much as the conditions

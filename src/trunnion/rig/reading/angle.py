@@ -16,7 +16,7 @@ from scipy.ndimage import minimum_filter1d, uniform_filter1d
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.units import UnitError
-from trunnion.rig.reading.columns import Table
+from trunnion.rig.reading.columns import DataTable
 from trunnion.rig.reading.log import Account, counted, times
 from trunnion.rig.reading.mapping import AngleSource
 from trunnion.rig.reading.pulses import by_index, index_times, pulses_of
@@ -48,7 +48,9 @@ class Coordinate:
     lag: float = 0.0
 
 
-def coordinate(source: AngleSource, table: Table, line: Timeline, speed: Array | None, account: Account) -> Coordinate:
+def coordinate(
+    source: AngleSource, table: DataTable, line: Timeline, speed: Array | None, account: Account
+) -> Coordinate:
     """The coordinate by its source; speed: that of the channel, rad/s, of a source `speed`."""
     zero = float(source.zero.evaluate())
     index = np.empty(0)
@@ -75,7 +77,7 @@ def coordinate(source: AngleSource, table: Table, line: Timeline, speed: Array |
     return Coordinate(values + zero, spoilt)
 
 
-def _of_column(source: AngleSource, table: Table, line: Timeline, account: Account) -> Array:
+def _of_column(source: AngleSource, table: DataTable, line: Timeline, account: Account) -> Array:
     column = table.columns[str(source.column)]
     unit = source.unit or column.unit
     if not unit:
@@ -189,7 +191,7 @@ def _check_index(values: Array, index: Array, line: Timeline, account: Account) 
 
 
 def _of_pulses(
-    source: AngleSource, table: Table, line: Timeline, index: Array, zero: float, account: Account
+    source: AngleSource, table: DataTable, line: Timeline, index: Array, zero: float, account: Account
 ) -> Coordinate:
     """The angle between pulses by interpolation in time, counted anew from every index pulse."""
     assert source.per_turn is not None

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.rig.reading.clock import Clock, is_time
-from trunnion.rig.reading.columns import Column, Table, choose, clock_of, failed, numbers
+from trunnion.rig.reading.columns import Column, DataTable, choose, clock_of, failed, numbers
 
 __all__ = ["read_parquet", "read_tdms"]
 
@@ -20,7 +20,7 @@ MOST = 100_000_000  # numbers in the columns that are asked for, 0.8 GB: a small
 UNFOLDED = 2 << 30  # bytes of the pages of these columns, as the file states them
 
 
-def read_parquet(path: Path, wanted: Sequence[str], optional: Sequence[str]) -> Table:
+def read_parquet(path: Path, wanted: Sequence[str], optional: Sequence[str]) -> DataTable:
     """The columns of a Parquet file; a unit is the entry `unit` or `units` of the column's metadata."""
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -40,7 +40,7 @@ def read_parquet(path: Path, wanted: Sequence[str], optional: Sequence[str]) -> 
                 columns[name] = _column(file.read(columns=[name]).column(name), unit)
     except pa.ArrowException as error:
         raise failed(path, f"is not Parquet: {str(error).splitlines()[0][:120]}", "check the file") from None
-    return Table(str(path), columns)
+    return DataTable(str(path), columns)
 
 
 def _is_text(kind: Any) -> bool:
@@ -115,7 +115,7 @@ def _of_dictionary(told: list[Any], places: NDArray[np.intp], known: NDArray[np.
     return Column(np.where(known, own[places], np.nan), unit, int(np.count_nonzero(hit)), first, clock)
 
 
-def read_tdms(path: Path, wanted: Sequence[str], optional: Sequence[str]) -> Table:
+def read_tdms(path: Path, wanted: Sequence[str], optional: Sequence[str]) -> DataTable:
     """Channels of a TDMS file, by `group/channel` or by the channel's name where only one group has it.
 
     Unit: the property unit_string; sampling: wf_start_offset and wf_increment of waveforms.
@@ -133,7 +133,7 @@ def read_tdms(path: Path, wanted: Sequence[str], optional: Sequence[str]) -> Tab
         raise failed(path, f"is not TDMS: {str(error)[:120] or type(error).__name__}", "check the file") from None
 
 
-def _channels(path: Path, file: Any, wanted: Sequence[str], optional: Sequence[str]) -> Table:
+def _channels(path: Path, file: Any, wanted: Sequence[str], optional: Sequence[str]) -> DataTable:
     found = {f"{group.name}/{channel.name}": channel for group in file.groups() for channel in group.channels()}
     short = [channel.name for channel in found.values()]
     names = {full: (channel.name if short.count(channel.name) == 1 else full) for full, channel in found.items()}
@@ -161,4 +161,4 @@ def _channels(path: Path, file: Any, wanted: Sequence[str], optional: Sequence[s
         raise MechanismError(
             Finding(f"its channels are sampled at {told}", file=str(path), remedy="record them at one rate")
         )
-    return Table(str(path), columns, next(iter(sorted(intervals)), None))
+    return DataTable(str(path), columns, next(iter(sorted(intervals)), None))

@@ -13,11 +13,11 @@ from trunnion.model.units import UnitError
 from trunnion.rig.reading.columns import Column
 from trunnion.rig.reading.log import Account, counted, runs
 from trunnion.rig.reading.mapping import Channel, Filter, Zero
-from trunnion.rig.reading.scale import Scale, default_unit, scale
+from trunnion.rig.reading.scale import SensorScale, default_unit, scale
 from trunnion.rig.reading.sensor_quantity import HERTZ, Amount, alike, dimensions
 from trunnion.rig.reading.timebase import Timeline
 
-__all__ = ["Reading", "Zeroed", "filtered", "mean_uncertainty", "reading", "resolution", "zeroed"]
+__all__ = ["ChannelReading", "Zeroed", "filtered", "mean_uncertainty", "reading", "resolution", "zeroed"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -41,10 +41,10 @@ class Zeroed:
 
 
 @dataclass(frozen=True)
-class Reading:
+class ChannelReading:
     """A channel's scale, and its limits in readings."""
 
-    scale: Scale
+    scale: SensorScale
     unit: str
     limit: float | None
     accuracy_zero: float
@@ -56,7 +56,7 @@ class Reading:
         return sign * self.scale.factor * (off - zero.drift * (seconds - zero.since) if zero.drift else off)
 
 
-def reading(name: str, channel: Channel, column: Column, account: Account) -> Reading:
+def reading(name: str, channel: Channel, column: Column, account: Account) -> ChannelReading:
     """The unit of a channel's readings: the mapping's, else the file's, else that of what it measures in SI."""
     where = f"channels.{name}"
     unit = channel.unit or ""
@@ -79,8 +79,8 @@ def reading(name: str, channel: Channel, column: Column, account: Account) -> Re
             what = f"a reading of 1 is {found.factor:.3g} {found.unit}, which no sensor has"
             raise MechanismError(Finding(what, f"{where}.gain", "check unit and gain", file=account.file))
         limit = found.reading(channel.range, "range") if channel.range else None
-        return Reading(found, unit, limit, abs(found.factor) * found.reading(channel.accuracy.zero, "accuracy.zero"),
-                       float(channel.accuracy.gain.evaluate()))  # fmt: skip
+        zero = abs(found.factor) * found.reading(channel.accuracy.zero, "accuracy.zero")
+        return ChannelReading(found, unit, limit, zero, float(channel.accuracy.gain.evaluate()))
     except UnitError as error:
         remedy = error.remedy
         if not channel.unit and column.unit:  # a file of a logger is not written anew
@@ -104,7 +104,7 @@ def _compare(where: str, channel: Channel, column: Column, account: Account) -> 
 
 
 def zeroed(
-    name: str, channel: Channel, own: Reading, readings: Array, line: Timeline, remove: bool, account: Account
+    name: str, channel: Channel, own: ChannelReading, readings: Array, line: Timeline, remove: bool, account: Account
 ) -> Zeroed:
     """The zero of a channel: a value, or the mean over its unloaded stretches.
 

@@ -14,7 +14,7 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.model.names import nearest
 from trunnion.rig.reading.clock import Clock, is_time
 
-__all__ = ["NOTHING", "SHOWN", "Column", "Table", "choose", "clock_of", "failed", "number", "numbers"]
+__all__ = ["NOTHING", "SHOWN", "Column", "DataTable", "choose", "clock_of", "failed", "number", "numbers"]
 
 
 Array = NDArray[np.float64]
@@ -36,7 +36,7 @@ class Column:
 
 
 @dataclass(frozen=True)
-class Table:
+class DataTable:
     """The columns of a file that were asked for, all of one length.
 
     interval: (start, step) of evenly spaced samples in s, if the file itself tells; line: of the first row of a text.

@@ -20,12 +20,12 @@ from numpy.typing import NDArray
 from scipy.special import ndtr, stdtrit
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.rig.reading.measurement import Condition, Course
+from trunnion.rig.reading.measurement import Condition, Signal
 
 if TYPE_CHECKING:
     from trunnion.model.mechanism import Mechanism
 
-__all__ = ["COVERAGE", "Contribution", "Efficiency", "Pairs", "efficiency_of", "load_joints", "pairs_of"]
+__all__ = ["COVERAGE", "Efficiency", "Pairs", "UncertaintyContribution", "efficiency_of", "load_joints", "pairs_of"]
 
 COVERAGE = 2.0
 """Factor k of the expanded uncertainty U = k u where turns are many: 95.45 % of a normal distribution (GUM 6.3.3)."""
@@ -38,7 +38,7 @@ Source = Literal["gain", "zero", "resolution", "repeatability"]
 
 
 @dataclass(frozen=True)
-class Contribution:
+class UncertaintyContribution:
     """What one source of one channel does to the efficiency; channel: empty of the scatter between turns.
 
     input: its standard uncertainty, of a gain relative, else in the unit of the channel; sensitivity: ∂η/∂ of it;
@@ -68,7 +68,7 @@ class Efficiency:
     power_in: float
     power_out: float
     per_turn: Array
-    contributions: tuple[Contribution, ...]
+    contributions: tuple[UncertaintyContribution, ...]
     left_out: int = 0
 
     @property
@@ -103,8 +103,8 @@ class Efficiency:
 class Pairs:
     """The courses whose products are powers: (torque or force, speed), of drivers and of loads."""
 
-    driven: tuple[tuple[Course, Course], ...]
-    loaded: tuple[tuple[Course, Course], ...]
+    driven: tuple[tuple[Signal, Signal], ...]
+    loaded: tuple[tuple[Signal, Signal], ...]
 
 
 def load_joints(mechanism: Mechanism) -> dict[str, str]:
@@ -118,7 +118,7 @@ def pairs_of(condition: Condition, joints: Mapping[str, str] | None = None) -> P
     joints: of the loads, see `load_joints`. Without it a load goes with the one measured speed that is no driver's, or
     with the only one there is. None where a torque or its speed is missing.
     """
-    subjects: dict[str, dict[str, Course]] = {"effort": {}, "rate": {}, "load": {}}
+    subjects: dict[str, dict[str, Signal]] = {"effort": {}, "rate": {}, "load": {}}
     for course in condition.courses.values():
         kind, _, subject = course.measures.partition(":")
         if kind in subjects:
@@ -170,10 +170,10 @@ def efficiency_of(
     if noise is None:
         several = len(per_turn) > 1
         scatter = float(np.std(per_turn, ddof=1)) / len(per_turn) ** 0.5 if several else float("nan")
-        repeated = [Contribution("", "repeatability", scatter, 1.0)]
+        repeated = [UncertaintyContribution("", "repeatability", scatter, 1.0)]
     else:
         repeated = [
-            Contribution(name, "repeatability", noise.get(name, 0.0), float(np.sqrt(np.nanmean(weight**2))))
+            UncertaintyContribution(name, "repeatability", noise.get(name, 0.0), float(np.sqrt(np.nanmean(weight**2))))
             for name, (_, weight) in weights.items()
         ]
     contributions = (*(one for one in repeated if one.input != 0), *_type_b(weights))
@@ -187,7 +187,7 @@ class _Clock:
     or none where positions are equal steps of time."""
 
     dwell: Array
-    courses: tuple[Course, ...] = ()
+    courses: tuple[Signal, ...] = ()
 
 
 def _clock(pairs: Pairs, condition: Condition) -> _Clock:
@@ -207,7 +207,7 @@ def _clock(pairs: Pairs, condition: Condition) -> _Clock:
     return _Clock(dwell / np.mean(dwell), (driver,))
 
 
-def _powers(pairs: Sequence[tuple[Course, Course]], dwell: Array) -> Array:
+def _powers(pairs: Sequence[tuple[Signal, Signal]], dwell: Array) -> Array:
     """Power times dwell at each position, W, (turn, position); NaN where one of the channels has a gap."""
     total: Array = np.sum([dwell * force.turns * speed.turns for force, speed in pairs], axis=0)
     return total
@@ -232,13 +232,13 @@ def _filled(powers_in: Array, powers_out: Array) -> tuple[Array, Array, NDArray[
 
 def _weights(
     pairs: Pairs, value: float, power_in: float, whole: NDArray[np.bool_], clock: _Clock
-) -> dict[str, tuple[Course, Array]]:
+) -> dict[str, tuple[Signal, Array]]:
     """∂η/∂x of the readings of each channel, at every position of all whole turns; its mean is that of a zero.
 
     η = P_out/P_in: dη = (dP_out − η dP_in)/P_in, and a power changes with a torque by ω, with a speed by T, each by the
     dwell there; the dwell itself with 1/ω of its channel. A channel in several powers has the sum.
     """
-    found: dict[str, tuple[Course, Array]] = {}
+    found: dict[str, tuple[Signal, Array]] = {}
     for side, factor in ((pairs.driven, -value), (pairs.loaded, 1.0)):
         for force, speed in side:
             by = factor / power_in * clock.dwell
@@ -248,18 +248,18 @@ def _weights(
             for own, weight in parts:
                 before = found.get(own.channel)
                 found[own.channel] = (own, weight if before is None else before[1] + weight)
-    return {name: (Course(name, one.measures, one.unit, one.turns[whole], one.accuracy), weight)
+    return {name: (Signal(name, one.measures, one.unit, one.turns[whole], one.accuracy), weight)
             for name, (one, weight) in found.items()}  # fmt: skip
 
 
-def _type_b(weights: Mapping[str, tuple[Course, Array]]) -> list[Contribution]:
+def _type_b(weights: Mapping[str, tuple[Signal, Array]]) -> list[UncertaintyContribution]:
     """Contributions of gain, zero and resolution, channel by channel: x → (1 + gain) x + zero."""
     found = []
     for name, (course, weight) in weights.items():
         by_zero = float(np.nanmean(weight))
         found += [
-            Contribution(name, "gain", course.accuracy.gain, float(np.nanmean(weight * course.turns))),
-            Contribution(name, "zero", course.accuracy.zero, by_zero),
-            Contribution(name, "resolution", course.unresolved, by_zero),
+            UncertaintyContribution(name, "gain", course.accuracy.gain, float(np.nanmean(weight * course.turns))),
+            UncertaintyContribution(name, "zero", course.accuracy.zero, by_zero),
+            UncertaintyContribution(name, "resolution", course.unresolved, by_zero),
         ]
     return [one for one in found if one.input > 0]

@@ -15,7 +15,7 @@ from trunnion.errors import Severity
 from trunnion.rig.reading.columns import Column
 from trunnion.rig.reading.log import Account, counted, places, runs
 
-__all__ = ["Span", "cells", "signal"]
+__all__ = ["FaultSpan", "cells", "signal"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -30,7 +30,7 @@ SEEN = 0.1  # of the span from the 1st to the 99th percentile, that a spike or a
 
 
 @dataclass(frozen=True)
-class Span:
+class FaultSpan:
     """The rows in which the drive runs, and when its turns begin and end there, s."""
 
     low: int
@@ -71,7 +71,7 @@ def signal(
     where: str,
     readings: Array,
     seconds: Array,
-    span: Span,
+    span: FaultSpan,
     limit: float | None,
     account: Account,
     steady: bool = False,
@@ -111,7 +111,7 @@ def _leave_out(part: Array, mask: Mask) -> None:
     part[mask] = np.nan
 
 
-def _doubtful(part: Array, mask: Mask, span: Span) -> str:
+def _doubtful(part: Array, mask: Mask, span: FaultSpan) -> str:
     """Leave out what may be the signal's own only where there are turns enough to tell; what was done."""
     if span.turns < FEW:
         return f"left in: in {counted(span.turns, 'turn')} nothing tells whether it is the signal's own"
@@ -119,7 +119,7 @@ def _doubtful(part: Array, mask: Mask, span: Span) -> str:
     return "left out"
 
 
-def _own(count: int, span: Span) -> bool:
+def _own(count: int, span: FaultSpan) -> bool:
     """Whether something happens in so many places that it belongs to the signal."""
     return span.turns >= FEW and count >= 0.5 * span.turns
 
@@ -178,7 +178,7 @@ def _plateaus(where: str, part: Array, time: Array, account: Account) -> None:
             )
 
 
-def _zeros(where: str, part: Array, time: Array, wide: float, span: Span, account: Account) -> None:
+def _zeros(where: str, part: Array, time: Array, wide: float, span: FaultSpan, account: Account) -> None:
     """Readings of exactly zero between others that are far from it."""
     mask = part == 0
     if not mask.any() or np.count_nonzero(mask) > 0.5 * part.size:
@@ -202,7 +202,7 @@ def _zeros(where: str, part: Array, time: Array, wide: float, span: Span, accoun
     account.warn("data.readings.zero", where, f"{what}, {places(bad, time)}; {done}", "check cable and connector")
 
 
-def _stuck(where: str, part: Array, time: Array, span: Span, account: Account) -> None:
+def _stuck(where: str, part: Array, time: Array, span: FaultSpan, account: Account) -> None:
     """The same reading in a row much more often than is usual for the channel."""
     same = np.concatenate([np.diff(part) == 0, [False]])
     starts, lengths = runs(same)
@@ -222,7 +222,7 @@ def _stuck(where: str, part: Array, time: Array, span: Span, account: Account) -
     account.warn("data.readings.stuck", where, f"{what}; {_doubtful(part, bad, span)}", "check sensor and logger")
 
 
-def _spikes(where: str, part: Array, time: Array, wide: float, span: Span, account: Account) -> None:
+def _spikes(where: str, part: Array, time: Array, wide: float, span: FaultSpan, account: Account) -> None:
     """One to three readings far from the median of those around them."""
     finite = np.isfinite(part)
     if np.count_nonzero(finite) < 2 * WIDTH:

@@ -19,7 +19,7 @@ from trunnion.model.findings import schema_findings
 from trunnion.model.names import nearest
 from trunnion.model.quantity import Angle, AnyQuantity, Dimensionless, Quantity, Rate, Time
 from trunnion.model.units import ANGLE, KINDS, UnitError
-from trunnion.rig.reading.scale import MeasureText, Scale, scale
+from trunnion.rig.reading.scale import MeasureText, SensorScale, scale
 from trunnion.rig.reading.sensor_quantity import Amount, Frequency, Number, UnitText, alike, dimensions
 
 __all__ = [
@@ -222,7 +222,7 @@ class Channel(Part):
             self.scale(self.unit)
         return self
 
-    def scale(self, unit: str) -> Scale:
+    def scale(self, unit: str) -> SensorScale:
         """How readings in a unit become the quantity; an error of pydantic if they cannot."""
         try:
             found = scale(self.measures, unit, self.gain)

@@ -22,7 +22,7 @@ from trunnion.results.dataset import Variable, dataset_of, described
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Accuracy", "Condition", "Course", "Measurement", "dataset"]
+__all__ = ["Accuracy", "Condition", "Measurement", "Signal", "dataset"]
 
 Array = NDArray[np.float64]
 COURSE = ("condition", "channel", "position")
@@ -54,7 +54,7 @@ class Accuracy:
 
 
 @dataclass(frozen=True)
-class Course:
+class Signal:
     """One channel in one condition.
 
     channel: its name in the mapping; measures: what it measures, as `measures.measures.named` reads it (`effort:input`,
@@ -126,7 +126,7 @@ class Condition:
     name: str
     values: Mapping[str, float]
     phase: Array
-    courses: Mapping[str, Course]
+    courses: Mapping[str, Signal]
     files: Sequence[str] = ()
     speed: float = float("nan")
     start: float = float("nan")

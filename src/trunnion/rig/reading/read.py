@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.rig.reading import faults
 from trunnion.rig.reading.angle import Coordinate, coordinate
-from trunnion.rig.reading.channels import Reading, Zeroed, filtered, reading, resolution, zeroed
-from trunnion.rig.reading.columns import Table
+from trunnion.rig.reading.channels import ChannelReading, Zeroed, filtered, reading, resolution, zeroed
+from trunnion.rig.reading.columns import DataTable
 from trunnion.rig.reading.log import Account, counted, told
 from trunnion.rig.reading.mapping import DataMapping, File, FromData, Mapped, Zero, read_mapping
-from trunnion.rig.reading.measurement import Accuracy, Condition, Course, Measurement
+from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal
 from trunnion.rig.reading.settings import Setting, dimension_of, settings, stated
 from trunnion.rig.reading.signal_checks import Drift, drift, signs, speeds, steady
 from trunnion.rig.reading.tables import read_table
@@ -176,7 +176,7 @@ class _File:
         self.line: Timeline = timeline(table, mapping.time, account)
         if mapping.filter is not None:
             self._check_filter(table)
-        self.own: dict[str, Reading] = {}
+        self.own: dict[str, ChannelReading] = {}
         self.lag = 0.0
         self.readings: dict[str, Array] = {}
         self.steps: dict[str, float] = {}
@@ -264,7 +264,7 @@ class _File:
         gone = float(np.ptp(known)) if known.size else 0.0
         return f"there is no whole turn: {gone:.3g} cycles in {counted(int(allowed.sum()), 'row')}"
 
-    def _check_filter(self, table: Table) -> None:
+    def _check_filter(self, table: DataTable) -> None:
         assert self.mapping.filter is not None
         rate, cut_off = 1.0 / self.line.step, self.mapping.filter.cut_off.value
         if 2 * cut_off >= rate:
@@ -330,7 +330,7 @@ class _File:
         channel, own, where = mapping.channels[name], self.own[name], f"channels.{name}"
         begin, end = (np.sort(np.concatenate([getattr(part.turns, one) for part in parts])) for one in ("begin", "end"))
         low, high = int(np.searchsorted(line.seconds, begin[0])), int(np.searchsorted(line.seconds, end[-1], "right"))
-        span = faults.Span(low, high, begin, end)
+        span = faults.FaultSpan(low, high, begin, end)
         readings = self.readings.pop(name)
         self.steps[name] = abs(own.scale.factor) * resolution(readings[low:high])
         speed = channel.measures.startswith("rate:")
@@ -378,7 +378,7 @@ class _File:
             of_file = float(np.hypot(abs(own.scale.factor) * zeros[name].uncertainty, extra))
             zero = float(np.hypot(own.accuracy_zero, of_file))
             accuracy = Accuracy(zero, own.accuracy_gain, self.steps[name], of_file)
-            courses[name] = Course(name, channel.measures, own.scale.unit, part.courses[name], accuracy)
+            courses[name] = Signal(name, channel.measures, own.scale.unit, part.courses[name], accuracy)
         values, known_as = dict(part.setting.values), dict(part.setting.dimensions)
         for path, channel_name in part.setting.means.items():
             turns = courses[channel_name].turns
@@ -406,7 +406,7 @@ def _gone(share: Array, allowed: NDArray[np.bool_]) -> float:
     return float(np.sum(np.abs(steps[np.isfinite(steps)])))
 
 
-def _table(path: Path, mapping: DataMapping, entry: File) -> Table:
+def _table(path: Path, mapping: DataMapping, entry: File) -> DataTable:
     """The columns of a file that the mapping names; a missing one is told with the entry that names it."""
     named = _columns(mapping, entry)
     own = "time.column" if path.suffix.lower() == ".tdms" else ""  # which may tell its time by itself

@@ -15,7 +15,7 @@ from trunnion.model.names import nearest
 from trunnion.model.units import UnitError
 from trunnion.rig.reading.sensor_quantity import HERTZ, Amount, Dimensions, alike, dimensions, unit_name
 
-__all__ = ["QUANTITIES", "MeasureText", "Scale", "default_unit", "scale"]
+__all__ = ["QUANTITIES", "MeasureText", "SensorScale", "default_unit", "scale"]
 
 NONE = Fraction(0)
 # SI units that a kind of measure may have, the first being what a plain number is taken for
@@ -45,7 +45,7 @@ MeasureText = Annotated[str, AfterValidator(_measures)]
 
 
 @dataclass(frozen=True)
-class Scale:
+class SensorScale:
     """Quantity (SI) = factor · reading.
 
     unit: SI unit of the quantity; of_reading, of_quantity: dimensions of both; raw: of a reading in SI.
@@ -80,7 +80,7 @@ def default_unit(measures: str) -> str:
     return QUANTITIES.get(_kind(measures), ("",))[0]
 
 
-def scale(measures: str, unit: str, gain: Amount | None) -> Scale:
+def scale(measures: str, unit: str, gain: Amount | None) -> SensorScale:
     """How readings in a unit become what is measured; UnitError if they do not. A plain gain multiplies.
 
     The gain is reading per quantity or quantity per reading: whichever gives what is measured.
@@ -103,7 +103,7 @@ def scale(measures: str, unit: str, gain: Amount | None) -> Scale:
             name = unit_name({key: value for key, value in found.items() if value})
         if name:
             factor = raw * gain.value**power
-            return Scale(factor, name, raw, of_reading, dimensions(name)[1])
+            return SensorScale(factor, name, raw, of_reading, dimensions(name)[1])
     if gain.plain and alike(of_reading, HERTZ) and kind == "rate":
         what = f"readings in '{unit}' do not give {measures}, for they may count turns or radians"
         raise UnitError(what, "write the unit as rpm or rad/s")

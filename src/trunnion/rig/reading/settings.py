@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from trunnion.errors import Finding, MechanismError, agreeing, counted
 from trunnion.model.quantity import Quantity
 from trunnion.model.units import Dimension, UnitError
-from trunnion.rig.reading.columns import Table
+from trunnion.rig.reading.columns import DataTable
 from trunnion.rig.reading.log import Account
 from trunnion.rig.reading.mapping import DataMapping, File, FromData
 from trunnion.rig.reading.sensor_quantity import Dimensions, dimensions
@@ -45,7 +45,7 @@ def stated(mapping: DataMapping, entry: File) -> dict[str, FromData | Quantity]:
     return {**mapping.set, **entry.set}
 
 
-def settings(mapping: DataMapping, entry: File, table: Table, line: Timeline, account: Account) -> list[Setting]:
+def settings(mapping: DataMapping, entry: File, table: DataTable, line: Timeline, account: Account) -> list[Setting]:
     """The conditions of a file: one, or as many as the columns that state them take different values."""
     values: dict[str, float] = {}
     texts: dict[str, str] = {}

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from trunnion.errors import Finding, MechanismError
 from trunnion.files import reading
 from trunnion.rig.reading.binary_tables import read_parquet, read_tdms
-from trunnion.rig.reading.columns import Table, failed
+from trunnion.rig.reading.columns import DataTable, failed
 from trunnion.rig.reading.text_tables import read_csv
 
 __all__ = ["FORMATS", "read_table"]
@@ -23,7 +23,7 @@ __all__ = ["FORMATS", "read_table"]
 Array = NDArray[np.float64]
 
 
-def read_table(path: Path, wanted: Iterable[str], optional: Iterable[str] = ()) -> Table:
+def read_table(path: Path, wanted: Iterable[str], optional: Iterable[str] = ()) -> DataTable:
     """The columns of a file by their names; MechanismError lists those that exist if one does not.
 
     optional: columns that may be missing.
@@ -51,7 +51,7 @@ def read_table(path: Path, wanted: Iterable[str], optional: Iterable[str] = ()) 
     return table
 
 
-Reader = Callable[[Path, Sequence[str], Sequence[str]], Table]
+Reader = Callable[[Path, Sequence[str], Sequence[str]], DataTable]
 
 # extension: reader, the package it needs and the extra that brings it
 FORMATS: dict[str, tuple[Reader, str, str]] = {

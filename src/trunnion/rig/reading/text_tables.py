@@ -23,7 +23,7 @@ import numpy as np
 from trunnion.model.names import unguarded
 from trunnion.model.units import UnitError
 from trunnion.rig.reading.clock import Clock, is_time
-from trunnion.rig.reading.columns import NOTHING, Column, Table, choose, clock_of, failed, number, numbers
+from trunnion.rig.reading.columns import NOTHING, Column, DataTable, choose, clock_of, failed, number, numbers
 from trunnion.rig.reading.sensor_quantity import dimensions
 
 __all__ = ["read_csv"]
@@ -54,7 +54,7 @@ class _Layout:
     width: int
 
 
-def read_csv(path: Path, wanted: Sequence[str], optional: Sequence[str]) -> Table:
+def read_csv(path: Path, wanted: Sequence[str], optional: Sequence[str]) -> DataTable:
     """The columns of a text file, read in pieces, so that memory is that of the columns asked for."""
     layout = _layout(path, {*wanted, *optional})
     places = choose(path, layout.names, wanted, optional)
@@ -80,7 +80,7 @@ def read_csv(path: Path, wanted: Sequence[str], optional: Sequence[str]) -> Tabl
         values = np.concatenate(pieces.pop(name) or [np.empty(0)])
         columns[name] = Column(values, units[name], texts[name], examples[name], clocks.get(name))
     notes = [] if layout.encoding.startswith("utf-8") else [f"{path.name}: read as {layout.encoding}"]
-    return Table(str(path), columns, notes=notes)
+    return DataTable(str(path), columns, notes=notes)
 
 
 def _check_signs(path: Path, name: str, cells: Any) -> None:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.units import UnitError
 from trunnion.rig.reading.clock import Clock
-from trunnion.rig.reading.columns import Column, Table
+from trunnion.rig.reading.columns import Column, DataTable
 from trunnion.rig.reading.log import Account, counted, times
 from trunnion.rig.reading.mapping import TimeBase
 from trunnion.rig.reading.sensor_quantity import dimensions
@@ -48,7 +48,7 @@ class Timeline:
         return values if self.kept is None else values[self.kept]
 
 
-def timeline(table: Table, base: TimeBase | None, account: Account) -> Timeline:
+def timeline(table: DataTable, base: TimeBase | None, account: Account) -> Timeline:
     """Time of the rows of a table by the mapping, else by what the file itself tells of its sampling."""
     if base is not None and base.rate is not None:
         step = 1.0 / base.rate.value

@@ -11,12 +11,12 @@ import numpy as np
 
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.measures.measures import Measure, named
-from trunnion.results.sentences import told
+from trunnion.results.sentences import finding_for
 from trunnion.rig.modelled import told_at
 from trunnion.rig.reading.rig_file import Rig, Value
 from trunnion.rig.virtual.faults import misfits
-from trunnion.rig.virtual.sensors import Channel, resolved
-from trunnion.rig.virtual.true_signals import Sampled, cycle_efficiency, sampled
+from trunnion.rig.virtual.sensors import SensorChannel, resolved
+from trunnion.rig.virtual.true_signals import SampledSignals, cycle_efficiency, sampled
 from trunnion.solve.run import Run
 
 __all__ = ["Case", "case_names", "case_of", "channels_of", "findings_of", "measures_of", "placed_at", "speed_differs"]
@@ -42,7 +42,7 @@ class Case:
     running: int
     after: int
     lead: float
-    true: Sampled
+    true: SampledSignals
     efficiency: float
 
     @property
@@ -129,9 +129,9 @@ def measures_of(rig: Rig, run: Run) -> list[Measure]:
     return found
 
 
-def channels_of(rig: Rig, run: Run, measures: Sequence[Measure]) -> dict[str, Channel]:
+def channels_of(rig: Rig, run: Run, measures: Sequence[Measure]) -> dict[str, SensorChannel]:
     """The sensors in the units of what they measure; MechanismError with all that does not fit."""
-    found: dict[str, Channel] = {}
+    found: dict[str, SensorChannel] = {}
     findings: list[Finding] = []
     for (name, sensor), measure in zip(rig.sensors.items(), measures, strict=True):
         try:
@@ -172,7 +172,7 @@ def case_of(
     run: Run,
     rig: Rig,
     measures: Sequence[Measure],
-    channels: Mapping[str, Channel],
+    channels: Mapping[str, SensorChannel],
 ) -> Case:
     """One condition with its true courses. The idle times are taken to a whole number of samples."""
     rate, cycle = rig.rate.value, run.cycle
@@ -204,7 +204,7 @@ def case_of(
     return replace(case, efficiency=cycle_efficiency(run))
 
 
-def findings_of(cases: Sequence[Case], channels: Mapping[str, Channel], rig: Rig) -> Iterator[Finding]:
+def findings_of(cases: Sequence[Case], channels: Mapping[str, SensorChannel], rig: Rig) -> Iterator[Finding]:
     """What there is to say of conditions: those that cannot be, and what sensors do not tell; each kind once."""
     where = "schedule.conditions" if rig.schedule.conditions else "schedule.over"
     for status in reversed(Status):
@@ -213,26 +213,26 @@ def findings_of(cases: Sequence[Case], channels: Mapping[str, Channel], rig: Rig
             one = stopped[0]
             places = np.flatnonzero(one.true.status >= Status.NOT_CONVERGED)
             first = 360 * one.true.time[places[0]] / one.run.cycle.duration
-            yield told(
+            yield finding_for(
                 "rig.no_answer", where, phrases={"cases": _named(stopped)}, status=status.text, condition=one.number,
                 count=len(places), positions=len(one.true.status), first_deg=first,
             )  # fmt: skip
     sound = [case for case in cases if case.worst.solved]
     if mended := [case for case in sound if case.true.mended]:
         most = max(case.true.mended for case in mended)
-        yield told("rig.load_at_rest", where, phrases={"cases": _named(mended)}, positions=most)
+        yield finding_for("rig.load_at_rest", where, phrases={"cases": _named(mended)}, positions=most)
     yield from _lost_pulses(sound, rig)
     yield from _both_ways(sound, rig)
     driver = next(iter(cases[0].run.system.mechanism.drivers))
     placed = rig.encoder or any(one.measures == f"rate:{driver}" for one in channels.values())
     if sound and not placed and speed_differs(sound):
-        yield told("rig.no_angle", "encoder", driver=driver)
+        yield finding_for("rig.no_angle", "encoder", driver=driver)
     for i, (name, channel) in enumerate(channels.items()):
         peaks = {case.number: float(np.max(np.abs(case.true.values[i]))) for case in sound}
         clipped = [case for case in sound if peaks[case.number] > channel.limit]
         if clipped:
             key = "range" if channel.limit == channel.range else "span"
-            yield told(
+            yield finding_for(
                 "rig.clipped", f"sensors.{name}.{key}", phrases={"cases": _named(clipped)}, measures=channel.measures,
                 peak=max(peaks.values()), unit=channel.unit, limit=channel.limit,
             )  # fmt: skip
@@ -244,9 +244,9 @@ def _both_ways(cases: Sequence[Case], rig: Rig) -> Iterator[Finding]:
     if len({case.drive(rig.rate.value)[1] > 0 for case in one_way}) < 2:
         return
     if rig.encoder is None:
-        yield told("rig.both_ways", "encoder")
+        yield finding_for("rig.both_ways", "encoder")
     elif rig.encoder.kind == "level":
-        yield told("rig.both_ways_level", "encoder.kind")
+        yield finding_for("rig.both_ways_level", "encoder.kind")
 
 
 def speed_differs(cases: Sequence[Case]) -> bool:
@@ -279,4 +279,6 @@ def _lost_pulses(cases: Sequence[Case], rig: Rig) -> Iterator[Finding]:
     lost = [case for case in cases if 4 * peaks[case.number] * rig.encoder.per_turn > rig.rate.value * (1 + 1e-9)]
     if lost:
         most = max(peaks.values()) * rig.encoder.per_turn
-        yield told("rig.pulses_lost", "encoder.kind", phrases={"cases": _named(lost)}, pulses=most, rate=rig.rate.value)
+        yield finding_for(
+            "rig.pulses_lost", "encoder.kind", phrases={"cases": _named(lost)}, pulses=most, rate=rig.rate.value
+        )

@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 from trunnion.errors import Finding
 from trunnion.rig.reading.rig_file import Fault, Rig
 from trunnion.rig.reading.sensor_quantity import Amount, alike, dimensions
-from trunnion.rig.virtual.sensors import Channel, stream
+from trunnion.rig.virtual.sensors import SensorChannel, stream
 
 __all__ = ["faulty", "misfits"]
 
 Columns = dict[str, NDArray[Any]]
 
 
-def misfits(rig: Rig, channels: Mapping[str, Channel]) -> Iterator[Finding]:
+def misfits(rig: Rig, channels: Mapping[str, SensorChannel]) -> Iterator[Finding]:
     """Sizes of faults that are in no unit of the sensors they befall."""
     for number, fault in enumerate(rig.faults):
         for name in _befallen(fault, rig) if fault.by else ():
@@ -32,7 +32,7 @@ def _befallen(fault: Fault, rig: Rig) -> tuple[str, ...]:
     return fault.sensors or tuple(rig.sensors)
 
 
-def _size(by: Amount, channel: Channel) -> float | None:
+def _size(by: Amount, channel: SensorChannel) -> float | None:
     """The size of a fault in the unit of the readings; None if it has another."""
     if by.plain or alike(by.dimensions, dimensions(channel.unit)[1]):
         return by.value * channel.per
@@ -41,7 +41,7 @@ def _size(by: Amount, channel: Channel) -> float | None:
 
 
 def faulty(
-    columns: Columns, rig: Rig, channels: Mapping[str, Channel], condition: int, seed: int, rate: float
+    columns: Columns, rig: Rig, channels: Mapping[str, SensorChannel], condition: int, seed: int, rate: float
 ) -> Columns:
     """The columns of one condition with the faults of the rig that befall it, in the order of the file.
 
@@ -67,7 +67,7 @@ def faulty(
 
 
 def _befall(
-    values: NDArray[Any], fault: Fault, channel: Channel, rate: float, random: np.random.Generator
+    values: NDArray[Any], fault: Fault, channel: SensorChannel, rate: float, random: np.random.Generator
 ) -> NDArray[Any]:
     """One fault of one sensor."""
     by = (_size(fault.by, channel) or 0.0) if fault.by else 0.0

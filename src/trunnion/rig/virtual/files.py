@@ -29,7 +29,7 @@ from trunnion.version import __version__
 
 if TYPE_CHECKING:
     from trunnion.rig.virtual.observation import Record, Recorded
-    from trunnion.rig.virtual.sensors import Channel
+    from trunnion.rig.virtual.sensors import SensorChannel
 
 __all__ = ["MAPPING", "TRUTH", "check_folder", "check_form", "mapping_of", "truth_of", "write"]
 
@@ -342,7 +342,7 @@ def _channel(observation: Recorded, name: str) -> dict[str, Any]:
     return found | ({"accuracy": accuracy} if accuracy else {})
 
 
-def _stated_zero(channel: Channel, zero: float) -> float:
+def _stated_zero(channel: SensorChannel, zero: float) -> float:
     """Uncertainty of the zero with the steps of a converter that noise does not carry over (GUM F.2.2.1)."""
     return zero if channel.noise > channel.step / 2 else math.hypot(zero, channel.step / math.sqrt(12))
 

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.mechanism import Mechanism
-from trunnion.rig.reading.measurement import Accuracy, Condition, Course, Measurement
+from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal
 from trunnion.rig.reading.rig_file import Rig, Value
 from trunnion.rig.virtual.cases import Case
 from trunnion.rig.virtual.faults import faulty
-from trunnion.rig.virtual.sensors import Channel, Drawn, draw, index_level, level, pulses, readings, stream
+from trunnion.rig.virtual.sensors import SensorChannel, SensorErrors, draw, index_level, level, pulses, readings, stream
 
 __all__ = ["MOST_SEEDS", "PER_SECOND", "TIME_DECIMALS", "Record", "Recorded", "check_seed"]
 
@@ -48,8 +48,8 @@ class Recorded:
     mechanism: Mechanism
     rig: Rig
     seed: int
-    channels: Mapping[str, Channel]
-    drawn: Mapping[str, Drawn]
+    channels: Mapping[str, SensorChannel]
+    drawn: Mapping[str, SensorErrors]
     cases: tuple[Case, ...]
     skipped: tuple[int, ...]
     findings: tuple[Finding, ...]
@@ -104,7 +104,7 @@ class Recorded:
             true[: case.before] = 0.0 if channel.at_rest else course[0]
             true[case.part.stop :] = 0.0 if channel.at_rest else course[-1]
             if perfect:
-                channel, noise, drawn = replace(channel, drift=0.0, step=0.0), None, Drawn(0.0, 0.0, 0.0)
+                channel, noise, drawn = replace(channel, drift=0.0, step=0.0), None, SensorErrors(0.0, 0.0, 0.0)
             else:
                 noise = stream(self.seed, case.number, name, "noise").standard_normal(case.rows)
                 drawn = self.drawn[name]
@@ -156,7 +156,7 @@ class Recorded:
                 values = found[name] / channel.per
                 zero = float(np.mean(values[: case.before])) if channel.zeroed and case.before else 0.0
                 by_turn = np.interp(at.ravel(), np.arange(case.rows), values - zero).reshape(at.shape)
-                courses[name] = Course(name, channel.measures, channel.unit, by_turn, self.accuracy(name))
+                courses[name] = Signal(name, channel.measures, channel.unit, by_turn, self.accuracy(name))
             settings = {
                 name: _si(self.mechanism, name, value) for name, value in {**self.rig.set_, **case.settings}.items()
             }

@@ -23,7 +23,7 @@ from trunnion.rig.reading.rig_file import Rig
 from trunnion.rig.virtual.cases import Case, case_names, case_of, channels_of, findings_of, measures_of, placed_at
 from trunnion.rig.virtual.files import mapping_of, truth_of, write
 from trunnion.rig.virtual.observation import Recorded, check_seed
-from trunnion.rig.virtual.sensors import Channel, draw
+from trunnion.rig.virtual.sensors import SensorChannel, draw
 from trunnion.solve.run import prepare
 
 __all__ = ["observe"]
@@ -72,7 +72,7 @@ def observe(
     with placed_at("set"):
         mechanism = mechanism.with_values(dict(rig.set_)) if rig.set_ else mechanism
     rows = rig.schedule.rows()
-    channels: dict[str, Channel] = {}
+    channels: dict[str, SensorChannel] = {}
     cases: list[Case] = []
     for number, (name, row) in enumerate(zip(case_names(len(rows)), rows, strict=True), 1):
         key = f"conditions.{number - 1}" if rig.schedule.conditions else "over"

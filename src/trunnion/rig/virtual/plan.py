@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.errors import Finding
-from trunnion.results.sentences import told
+from trunnion.results.sentences import finding_for
 from trunnion.rig.reading.efficiency import Efficiency, efficiency_of, load_joints, pairs_of
-from trunnion.rig.reading.measurement import Accuracy, Condition, Course
+from trunnion.rig.reading.measurement import Accuracy, Condition, Signal
 from trunnion.rig.virtual.cases import Case
 from trunnion.rig.virtual.observe import Observation
 
-__all__ = ["Expected", "Forecast", "Plan", "plan"]
+__all__ = ["Expected", "Forecast", "RigPlan", "plan"]
 
 Array = NDArray[np.float64]
 SMALL_RANGE, FEW_STEPS = 0.05, 100
@@ -72,7 +72,7 @@ class Forecast:
 
 
 @dataclass(frozen=True)
-class Plan:
+class RigPlan:
     """What to expect of a rig: sensor by sensor, condition by condition, and what is to be thought about."""
 
     sensors: tuple[Expected, ...]
@@ -81,7 +81,7 @@ class Plan:
 
 
 @np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN or infinite
-def plan(observation: Observation) -> Plan:
+def plan(observation: Observation) -> RigPlan:
     """What to expect of the sensors of an observation, and of the efficiency in each of its conditions."""
     expected: dict[str, list[tuple[int, float, float, bool]]] = {name: [] for name in observation.channels}
     forecasts = []
@@ -93,7 +93,7 @@ def plan(observation: Observation) -> Plan:
             expected[name].append((case.number, float(np.min(steady[name])), float(np.max(steady[name])), beyond))
         forecasts.append(_forecast(observation, case, steady))
     sensors = tuple(_expected(observation, name, rows) for name, rows in expected.items())
-    return Plan(sensors, tuple(forecasts), tuple(_said(observation, sensors, forecasts)))
+    return RigPlan(sensors, tuple(forecasts), tuple(_said(observation, sensors, forecasts)))
 
 
 def _steady(observation: Observation, case: Case) -> dict[str, Array]:
@@ -116,7 +116,7 @@ def _forecast(observation: Observation, case: Case, steady: dict[str, Array]) ->
         carried = channel.noise > channel.step / 2  # over the steps of the converter
         step = Accuracy(accuracy.zero, accuracy.gain, 0.0 if carried else channel.step)
         values = steady[name] / channel.per
-        courses[name] = Course(name, channel.measures, channel.unit, values[None, :], step)
+        courses[name] = Signal(name, channel.measures, channel.unit, values[None, :], step)
         variance = channel.noise * channel.noise + (channel.step * channel.step / 12 if carried else 0.0)
         readings = max(turns * case.run.cycle.duration * observation.rate, 1.0)
         noise[name] = math.sqrt(variance / readings)
@@ -144,15 +144,15 @@ def _said(observation: Observation, sensors: tuple[Expected, ...], forecasts: li
     found = []
     for one in sensors:
         if one.share < SMALL_RANGE:
-            found.append(told("rig.range_wide", f"sensors.{one.sensor}.range", percent=100 * one.share))
+            found.append(finding_for("rig.range_wide", f"sensors.{one.sensor}.range", percent=100 * one.share))
         if 0 < one.steps < FEW_STEPS:
-            found.append(told("rig.steps_few", f"sensors.{one.sensor}.bits", steps=one.steps))
+            found.append(finding_for("rig.steps_few", f"sensors.{one.sensor}.bits", steps=one.steps))
     measured = [one for one in forecasts if one.measured]
     off = [one for one in measured if one.measured and abs(one.bias) > one.measured.uncertainty]
     if off:
         worst = max(off, key=lambda one: abs(one.bias))
         figures = {"count": len(off), "of": len(measured), "condition": worst.case.number, "bias": worst.bias}
-        found.append(told("rig.biased", "sensors", severity=None, phrases=None, **figures))
+        found.append(finding_for("rig.biased", "sensors", severity=None, phrases=None, **figures))
     if not measured:
-        found.append(told("rig.no_efficiency", "sensors"))
+        found.append(finding_for("rig.no_efficiency", "sensors"))
     return found

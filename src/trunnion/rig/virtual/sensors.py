@@ -20,7 +20,7 @@ from trunnion.model.units import UnitError
 from trunnion.rig.reading.rig_file import Sensor
 from trunnion.rig.reading.sensor_quantity import Amount, Dimensions, alike, dimensions
 
-__all__ = ["Channel", "Drawn", "draw", "resolved", "stream"]
+__all__ = ["SensorChannel", "SensorErrors", "draw", "resolved", "stream"]
 
 Array = NDArray[np.float64]
 READINGS = ("V", "A", "Hz")  # what the reading of a sensor with a sensitivity may be in
@@ -28,7 +28,7 @@ FINE = 1e-3  # of a step of the converter, or of the noise: decimals of a readin
 
 
 @dataclass(frozen=True)
-class Channel:
+class SensorChannel:
     """A sensor put to a mechanism: its numbers in the SI unit of what it measures.
 
     unit: SI, of what is measured; reading: unit of the file; per: readings per SI unit, below 0 where the sensitivity
@@ -80,7 +80,7 @@ class Channel:
 
 
 @dataclass(frozen=True)
-class Drawn:
+class SensorErrors:
     """The errors that a sensor has in fact: gain, relative; zero while it runs and offset, in the unit measured."""
 
     gain: float
@@ -97,16 +97,16 @@ def stream(seed: int, condition: int, name: str, purpose: str) -> np.random.Gene
     return np.random.Generator(np.random.Philox(np.random.SeedSequence(seed, spawn_key=key)))
 
 
-def draw(channel: Channel, seed: int) -> Drawn:
+def draw(channel: SensorChannel, seed: int) -> SensorErrors:
     """The actual errors of a sensor, normal with the stated standard uncertainties; the same in all conditions."""
     normal = stream(seed, 0, channel.name, "accuracy").standard_normal(3)
-    return Drawn(*(float(one) + 0.0 for one in normal * (channel.gain, channel.zero, channel.offset)))
+    return SensorErrors(*(float(one) + 0.0 for one in normal * (channel.gain, channel.zero, channel.offset)))
 
 
 # ---- what is stated, in one unit ------------------------------------------------------------------------------
 
 
-def resolved(name: str, sensor: Sensor, column: str, unit: str) -> Channel:
+def resolved(name: str, sensor: Sensor, column: str, unit: str) -> SensorChannel:
     """A sensor of what is measured in an SI unit; MechanismError for quantities that do not fit it."""
     findings: list[Finding] = []
     where = f"sensors.{name}"
@@ -136,7 +136,7 @@ def resolved(name: str, sensor: Sensor, column: str, unit: str) -> Channel:
 
     limit = number("range", sensor.range, math.inf)
     span = number("span", sensor.span, limit) if sensor.bits else math.inf
-    channel = Channel(
+    channel = SensorChannel(
         name, column, sensor.measures, unit, reading, per, limit,
         noise=number("noise", sensor.noise),
         step=2 * span / 2**sensor.bits if sensor.bits else 0.0,
@@ -230,7 +230,9 @@ def pulsed(true: Array, running: slice, per_turn: int, rate: float) -> Array:
     return found
 
 
-def readings(channel: Channel, true: Array, running: slice, rate: float, drawn: Drawn, noise: Array | None) -> Array:
+def readings(
+    channel: SensorChannel, true: Array, running: slice, rate: float, drawn: SensorErrors, noise: Array | None
+) -> Array:
     """What a sensor makes of a true course, in the unit of its readings.
 
     true: in SI at the samples, the idle stretches included; running: those in which the machine runs; noise: standard
@@ -246,7 +248,7 @@ def readings(channel: Channel, true: Array, running: slice, rate: float, drawn: 
     return converted(channel, value)
 
 
-def converted(channel: Channel, value: Array) -> Array:
+def converted(channel: SensorChannel, value: Array) -> Array:
     """Clipped, in steps, in the unit of the reading, with the decimals that a file has."""
     value = np.clip(value, -channel.range, channel.range)
     if channel.step:

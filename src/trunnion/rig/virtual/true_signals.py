@@ -23,7 +23,7 @@ from trunnion.solve.run import Run
 from trunnion.solve.seating import settle
 from trunnion.solve.status import status_of
 
-__all__ = ["MOST_EXACT", "Sampled", "Solved", "cycle_efficiency", "phases", "sampled", "solved"]
+__all__ = ["MOST_EXACT", "SampledSignals", "Solved", "cycle_efficiency", "phases", "sampled", "solved"]
 
 Array = NDArray[np.float64]
 
@@ -101,7 +101,7 @@ def _bridged(row: Array, time: Array, period: float | None) -> Array:
 
 
 @dataclass(frozen=True)
-class Sampled:
+class SampledSignals:
     """The courses of one condition at the samples of its run.
 
     values: (measure, instant) at `time`; place: of each sample among the instants, None to interpolate at `phase`;
@@ -153,7 +153,7 @@ def sampled(
     count: int,
     lead: float = 0.0,
     tolerances: Mapping[int, float] | None = None,
-) -> Sampled:
+) -> SampledSignals:
     """The courses at `count` samples at a rate (Hz), the first `lead` sampling intervals before the start of the cycle.
 
     tolerances: of each measure by its place, SI: how far interpolation may be off.
@@ -173,7 +173,7 @@ def sampled(
             return between
     answer = solved(run, measures, instants)
     none = np.zeros(len(measures))
-    return Sampled(instants, answer.values, answer.status, place, time, period, none, answer.mended)
+    return SampledSignals(instants, answer.values, answer.status, place, time, period, none, answer.mended)
 
 
 def _sorted(time: Array) -> tuple[Array, NDArray[np.intp]]:
@@ -183,7 +183,7 @@ def _sorted(time: Array) -> tuple[Array, NDArray[np.intp]]:
 
 def _interpolated(
     run: Run, measures: Sequence[Measure], phase: Array, tolerances: Mapping[int, float]
-) -> Sampled | None:
+) -> SampledSignals | None:
     """The courses between positions of a grid; None if no grid is fine enough."""
     duration = run.cycle.duration
     grid = GRID
@@ -193,7 +193,7 @@ def _interpolated(
         error = np.array([_error(row, time, duration) for row in answer.values])
         fine = all(not error[i] > limit for i, limit in tolerances.items() if limit > 0)
         if fine or np.any(answer.status >= Status.NOT_CONVERGED):
-            return Sampled(time, answer.values, answer.status, None, phase, duration, error, answer.mended)
+            return SampledSignals(time, answer.values, answer.status, None, phase, duration, error, answer.mended)
         grid *= 4
     return None
 

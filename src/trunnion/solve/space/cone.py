@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from trunnion.solve.space.loops import LARGEST, Linear, Loops
+from trunnion.solve.space.loops import LARGEST, LinearLoops, Loops
 
-__all__ = ["CLOSED", "Ask", "Found", "least_play"]
+__all__ = ["CLOSED", "Ask", "LeastPlay", "least_play"]
 
 Array = NDArray[np.float64]
 CLOSED = 1e-12  # rad, or of the size: a gap that counts as closed
@@ -40,7 +40,7 @@ class Ask(NamedTuple):
     widths: tuple[int, ...]
 
 
-class Answer(NamedTuple):
+class ConeAnswer(NamedTuple):
     """Of one linearised problem: steps, offsets, t, the dual's lower bound of t, and what each end contributes."""
 
     steps: Array
@@ -51,7 +51,7 @@ class Answer(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Found:
+class LeastPlay:
     """Least t of every lane, its lower bound by the dual, coordinates, offsets, contributions (lane, end), opening.
 
     t is ∞ where no play of this kind closes the loops, NaN where the sequence did not settle.
@@ -66,7 +66,7 @@ class Found:
     rounds: int
 
 
-def least_play(loops: Loops, q: Array, c: Array, ask: Ask) -> Found:
+def least_play(loops: Loops, q: Array, c: Array, ask: Ask) -> LeastPlay:
     """The least t at every lane, from coordinates (lane, kept) and offsets (lane, component).
 
     A step is halved where the gap grew, from the round PATIENCE on.
@@ -89,7 +89,7 @@ def least_play(loops: Loops, q: Array, c: Array, ask: Ask) -> Found:
         for place, lane in enumerate(active):
             if settled[place]:
                 continue
-            answer = _solve(Linear(*(one[place] for one in linear)), c[lane], ask, loops.size)
+            answer = _solve(LinearLoops(*(one[place] for one in linear)), c[lane], ask, loops.size)
             if answer is None:
                 least[lane], done[place] = np.inf, True
                 continue
@@ -104,10 +104,10 @@ def least_play(loops: Loops, q: Array, c: Array, ask: Ask) -> Found:
         active = active[moving]
         rounds += 1
     least[active] = np.nan
-    return Found(least, bound, q, c, weights, loops.opening(q, c), rounds)
+    return LeastPlay(least, bound, q, c, weights, loops.opening(q, c), rounds)
 
 
-def _solve(linear: Linear, c: Array, ask: Ask, size: float) -> Answer | None:
+def _solve(linear: LinearLoops, c: Array, ask: Ask, size: float) -> ConeAnswer | None:
     """One linearised problem; None if nothing closes it. Unknowns in units of what has to be taken up."""
     gap, jacobian, effect = linear
     side = effect @ c - gap
@@ -115,7 +115,7 @@ def _solve(linear: Linear, c: Array, ask: Ask, size: float) -> Answer | None:
     columns, components, ends = jacobian.shape[1], effect.shape[1], len(ask.widths)
     lever = float(np.max(np.abs(effect), initial=0.0))
     if unit <= NOTHING:
-        return Answer(np.zeros(columns), np.zeros(components), 0.0, 0.0, np.zeros(ends))
+        return ConeAnswer(np.zeros(columns), np.zeros(components), 0.0, 0.0, np.zeros(ends))
     if not lever:
         return None
     length = unit / lever  # m: an offset of 1
@@ -136,7 +136,7 @@ def _solve(linear: Linear, c: Array, ask: Ask, size: float) -> Answer | None:
         return None
     x, z = np.asarray(found.x), np.asarray(found.z)
     firsts = len(gap) + np.cumsum([0, *(width + 1 for width in ask.widths[:-1])])
-    return Answer(
+    return ConeAnswer(
         unit * x[:columns],
         length * x[columns:-1],
         length / share * float(x[-1]),

@@ -21,8 +21,8 @@ from trunnion.algebra.space import ZERO, Screw, moment_at
 from trunnion.algebra.vector import dot, minus
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.groups.redundant import RANK, stacked
-from trunnion.groups.spatial import Pose, SpatialGroup
-from trunnion.results.sentences import told
+from trunnion.groups.spatial import SpatialGroup, SpatialPose
+from trunnion.results.sentences import finding_for
 from trunnion.solve.backward import Given, backward
 from trunnion.solve.branch_tracking import SEED, at, extent, guess_reaches, lane_of
 from trunnion.solve.branches import Chosen
@@ -30,14 +30,14 @@ from trunnion.solve.forward import forward
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.system import Cycle, System, Values, driven_coordinates
 
-__all__ = ["Determinacy", "Part", "look"]
+__all__ = ["Determinacy", "ModuleDeterminacy", "look"]
 
 LOOKED = 12  # positions: what is special at one of them only is a singular position
 TRIES = 96  # guesses at a pose
 PRESENT = 1e-6  # of the largest entry of a null vector
 
 
-class Part(NamedTuple):
+class ModuleDeterminacy(NamedTuple):
     """Of one module: redundant constraints and undetermined freedoms at every position looked at; joints that carry the
     former, links that have the latter. surplus: drivers more than there are freedoms, for which it does not close.
     """
@@ -56,7 +56,7 @@ class _Module:
     names: tuple[str, ...]
     links: tuple[str, ...]
     group: SpatialGroup
-    pose: Pose
+    pose: SpatialPose
 
 
 @np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
@@ -84,7 +84,7 @@ def look(system: System, values: Values, chosen: Chosen, cycle: Cycle) -> Determ
         rows, columns = table.shape[1:]
         one = _Module(number, module.joints, module.links, group, _lane(pose, best, len(table)))
         joints, links = _strained(one, table[best]), _loose(one, table[best])
-        found.append(Part(number, rows - rank, columns - rank, joints, links))
+        found.append(ModuleDeterminacy(number, rows - rank, columns - rank, joints, links))
     return Determinacy(system, tuple(found), *_spins(walk))
 
 
@@ -119,7 +119,7 @@ def _largest(values: Any) -> float:
     return float(np.nanmax(np.abs(primal(values)), initial=0.0))
 
 
-def _too_many(system: System, walk: Any, number: int, group: SpatialGroup) -> list[Part]:
+def _too_many(system: System, walk: Any, number: int, group: SpatialGroup) -> list[ModuleDeterminacy]:
     """Whether a module does not close because it has more drivers than freedoms: it is solved without any."""
     pose = _by_least_squares(system, walk, number, replace(group, driven=()))
     if pose is None:
@@ -127,10 +127,10 @@ def _too_many(system: System, walk: Any, number: int, group: SpatialGroup) -> li
     table = stacked(pose.jacobian)[0]
     freedoms = table.shape[1] - int(np.linalg.matrix_rank(table, rtol=RANK))
     surplus = len(group.driven) - freedoms  # without any freedom it is its dimensions that do not let it move
-    return [Part(number, 0, 0, (), (), surplus)] if freedoms and surplus > 0 else []
+    return [ModuleDeterminacy(number, 0, 0, (), (), surplus)] if freedoms and surplus > 0 else []
 
 
-def _by_least_squares(system: System, walk: Any, number: int, group: SpatialGroup) -> Pose | None:
+def _by_least_squares(system: System, walk: Any, number: int, group: SpatialGroup) -> SpatialPose | None:
     """A module that Newton's method does not close because J is singular, at the start, solved all the same."""
     module, places = system.plan.modules[number], system.places[number]
     free = SpatialGroup(group.links, group.joints, group.driven, group.spinning, redundant=True)
@@ -148,7 +148,7 @@ def _by_least_squares(system: System, walk: Any, number: int, group: SpatialGrou
         return free.position(elements, [lane_of(pose.q[i], best) for i in free.kept], drive)
 
 
-def _lane(pose: Pose | None, lane: int, count: int) -> Pose:
+def _lane(pose: SpatialPose | None, lane: int, count: int) -> SpatialPose:
     """The pose at one position, with plain numbers."""
 
     def pick(number: Any) -> Any:
@@ -204,7 +204,7 @@ class Determinacy:
     """
 
     system: System
-    parts: tuple[Part, ...]
+    parts: tuple[ModuleDeterminacy, ...]
     spins: Mapping[str, float]
     dragged: Mapping[str, float]
 
@@ -230,9 +230,11 @@ class Determinacy:
         for module in self.system.plan.modules:
             for link, *points in module.spinning:
                 where, drag = f"links.{link}", self.dragged.get(link)
-                found.append(told("mobility.spin", where, link=link, points=points, torque=drag))
+                found.append(finding_for("mobility.spin", where, link=link, points=points, torque=drag))
                 if link in self.spins:
-                    found.append(told("mobility.spin_loaded", where, link=link, points=points, torque=self.spins[link]))
+                    found.append(
+                        finding_for("mobility.spin_loaded", where, link=link, points=points, torque=self.spins[link])
+                    )
         return found
 
     @property
@@ -241,13 +243,15 @@ class Determinacy:
 
     def _overdriven(self) -> Finding:
         spins, drivers = len(self.system.plan.passive), len(self.system.mechanism.drivers)
-        return told("mobility.overdriven", "drivers", **self._counts, spins=spins, drivers=drivers)
+        return finding_for("mobility.overdriven", "drivers", **self._counts, spins=spins, drivers=drivers)
 
-    def _undetermined(self, one: Part) -> Finding:
-        return told(
+    def _undetermined(self, one: ModuleDeterminacy) -> Finding:
+        return finding_for(
             "mobility.undetermined", "drivers", **self._counts, freedoms=one.undetermined, links=list(one.links)
         )
 
-    def _redundant(self, one: Part) -> Finding:
+    def _redundant(self, one: ModuleDeterminacy) -> Finding:
         code = "redundant" if self.system.mechanism.over_constraint == "refuse" else "redundant_least"
-        return told(f"mobility.{code}", "joints", **self._counts, constraints=one.redundant, joints=list(one.joints))
+        return finding_for(
+            f"mobility.{code}", "joints", **self._counts, constraints=one.redundant, joints=list(one.joints)
+        )

@@ -31,7 +31,7 @@ from trunnion.solve import shifts
 from trunnion.solve.space.system import SpatialSystem
 from trunnion.solve.system import Values, driven_coordinates
 
-__all__ = ["End", "Linear", "Loops", "ends_of"]
+__all__ = ["End", "LinearLoops", "Loops", "ends_of"]
 
 Array = NDArray[np.float64]
 LARGEST = 0.3  # rad, or of the size: a coordinate goes no farther in one step
@@ -51,7 +51,7 @@ class End(NamedTuple):
     pin: bool
 
 
-class Linear(NamedTuple):
+class LinearLoops(NamedTuple):
     """gap (lane, row), J (lane, row, coordinate) and C (lane, row, component): rad and lengths over the size."""
 
     gap: Array
@@ -138,7 +138,7 @@ class Loops:
 
         return self.group.coordinates([column(one) for one in q.T], [column(one) for one in self.drive])
 
-    def linear(self, q: Array, c: Array) -> Linear:
+    def linear(self, q: Array, c: Array) -> LinearLoops:
         """Gap and its derivatives at coordinates (lane, kept) and offsets (lane, component), m."""
         group, count = self.group, c.shape[1]
         joints = self._coordinates(q)
@@ -148,12 +148,12 @@ class Loops:
             stacked(group.jacobian(placed, screws, self.size)), (len(q), gap.shape[1], len(group.free))
         )
         if not count:
-            return Linear(gap, jacobian, np.zeros((*gap.shape, 0)))
+            return LinearLoops(gap, jacobian, np.zeros((*gap.shape, 0)))
         seeds = [Dual(one[:, None], row[None, :]) for one, row in zip(c.T, np.eye(count), strict=True)]
         deep = self._coordinates(q, deep=True)
         opened = group.gaps(group.place(self._elements(seeds), deep)[1], deep, self.size)
         effect = _full([n.dual if isinstance(n, Dual) else 0.0 for n in opened], (len(q), count))
-        return Linear(gap, jacobian, effect)
+        return LinearLoops(gap, jacobian, effect)
 
     def opening(self, q: Array, c: Array) -> Array:
         """Largest opening of a loop at every lane, in units of the size; rad."""

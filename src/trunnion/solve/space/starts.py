@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.groups.redundant import RANK
-from trunnion.results.sentences import told
+from trunnion.results.sentences import finding_for
 from trunnion.solve.branch_tracking import GUESSES, SEED, guess_reaches
 from trunnion.solve.branches import Chosen, choose
 from trunnion.solve.forward import forward, start
@@ -73,7 +73,7 @@ def start_of(system: SpatialSystem, values: Values, ideal: Values, cycle: Cycle)
     if chosen.found[0]:
         return _Ideal(system, ideal, chosen), list(chosen.findings)
     nearly = _followed(system, values, cycle)
-    misfit = told("assembly.misfit", "links")
+    misfit = finding_for("assembly.misfit", "links")
     if nearly is None:
         what = f"{misfit.what}: nowhere is every loop nearly closed"
         raise MechanismError(Finding(what, "links", "check the lengths"))

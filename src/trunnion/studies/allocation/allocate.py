@@ -18,21 +18,30 @@ from trunnion.algebra.dual import Dual, derivative
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.prices import Price
-from trunnion.results.sentences import told
+from trunnion.results.sentences import finding_for
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.statistics.costs import Cost
-from trunnion.studies.allocation.problem import CRITERIA, SHOWN, Answer, Contribution, Criterion, Option, Problem, none
+from trunnion.studies.allocation.problem import (
+    CRITERIA,
+    SHOWN,
+    AllocationProblem,
+    Answer,
+    Contribution,
+    Criterion,
+    Option,
+    none,
+)
 from trunnion.studies.allocation.rows import Rows, joined, part_of, rows_of
 from trunnion.studies.allocation.solve import CHOICES, solve, trade_off
 from trunnion.studies.allocation.solve import Choice as Way
-from trunnion.studies.tolerance.first_order import Study, study
+from trunnion.studies.tolerance.first_order import ToleranceStudy, study
 from trunnion.studies.tolerance.study import DEFAULT_SAMPLES, tolerance
 from trunnion.studies.tolerance.targets import limits
 
 if TYPE_CHECKING:
     import xarray as xr
 
-from trunnion.studies.allocation.outcome import CLOSE, DEFAULT_YIELD, Allocated, Asked, Choice, share_of
+from trunnion.studies.allocation.outcome import CLOSE, DEFAULT_YIELD, Allocated, AllocationRequest, Choice, share_of
 from trunnion.studies.allocation.result import dataset
 
 __all__ = ["allocate", "half_widths"]
@@ -77,7 +86,7 @@ def allocate(
     Raises MechanismError if nothing has a cost, no measure a limit, or as `tolerance` does. That no tolerances keep the
     limits is a finding of the result.
     """
-    asked = Asked(criterion, target, choice, steps, at, samples, seed, friction, jobs, curve, exact)
+    asked = AllocationRequest(criterion, target, choice, steps, at, samples, seed, friction, jobs, curve, exact)
     _check(asked)
     found = _found(mechanism, _limited(mechanism, measures), asked)
     with_them = mechanism.with_tolerances(found.bought) if found.answer.found else mechanism
@@ -99,7 +108,7 @@ def half_widths(result: xr.Dataset) -> dict[str, float]:
     return {name: t for name, there, t, was in zip(*columns, strict=True) if there and abs(t - was) > 1e-12 * t}
 
 
-def _check(asked: Asked) -> None:
+def _check(asked: AllocationRequest) -> None:
     findings = []
     if asked.criterion not in CRITERIA:
         remedy = f"use {', '.join(CRITERIA)}"
@@ -131,7 +140,7 @@ def _limited(mechanism: Mechanism, measures: Sequence[str] | None) -> list[str]:
     return found
 
 
-def _found(mechanism: Mechanism, measures: Sequence[str], asked: Asked) -> Allocated:
+def _found(mechanism: Mechanism, measures: Sequence[str], asked: AllocationRequest) -> Allocated:
     """The allocation, with effects that belong to the tolerances found."""
     if not mechanism.costs:
         remedy = "say what tolerances cost, as costs: {AB: {model: power, B: 1, k: 0.45, unit: mm}}"
@@ -155,11 +164,11 @@ def _found(mechanism: Mechanism, measures: Sequence[str], asked: Asked) -> Alloc
     return Allocated(asked, now, rows, answer, way, prices, before, findings, search.tight, tuple(offers))
 
 
-def _studied(mechanism: Mechanism, measures: Sequence[str], asked: Asked) -> Study:
+def _studied(mechanism: Mechanism, measures: Sequence[str], asked: AllocationRequest) -> ToleranceStudy:
     return study(mechanism, measures, asked.steps, asked.at, asked.friction)
 
 
-def _target(asked: Asked) -> float | None:
+def _target(asked: AllocationRequest) -> float | None:
     return asked.target if asked.criterion == "yield" else None
 
 
@@ -187,7 +196,7 @@ def _start(one: Price) -> float:
     return float(np.sqrt(np.prod(ends))) if len(ends) == 2 else (ends[0] if ends else START)
 
 
-def _prices(found: Study) -> tuple[dict[str, Price], list[Finding]]:
+def _prices(found: ToleranceStudy) -> tuple[dict[str, Price], list[Finding]]:
     """What can be bought of a study's numbers, by path, and what of the costs is of no use."""
     mechanism, inputs = found.run.system.mechanism, found.inputs
     known = {one.path: one for one in inputs.tolerances}
@@ -203,7 +212,7 @@ def _prices(found: Study) -> tuple[dict[str, Price], list[Finding]]:
                 f"it changes the play of {', '.join(plays)}: state pin.clearance and buy {plays[0]}.clearance instead"
             )
         if what:
-            findings.append(told("allocation.not_for_sale", f"costs.{one.path}", phrases={"why": what}))
+            findings.append(finding_for("allocation.not_for_sale", f"costs.{one.path}", phrases={"why": what}))
         else:
             prices[one.path] = one
     if not prices:
@@ -211,7 +220,7 @@ def _prices(found: Study) -> tuple[dict[str, Price], list[Finding]]:
     return prices, findings
 
 
-def _plays_of(found: Study, path: str) -> list[str]:
+def _plays_of(found: ToleranceStudy, path: str) -> list[str]:
     """Joints whose pins may lie anywhere in a play that the number changes."""
     mechanism, inputs = found.run.system.mechanism, found.inputs
     if not any(one.path == path for one in inputs.tolerances):
@@ -223,14 +232,14 @@ def _plays_of(found: Study, path: str) -> list[str]:
     ]
 
 
-def _stated(found: Study, prices: Mapping[str, Price]) -> dict[str, float]:
+def _stated(found: ToleranceStudy, prices: Mapping[str, Price]) -> dict[str, float]:
     """Half widths and clearances of a study, of what can be bought."""
     mechanism = found.run.system.mechanism
     known = {one.path: one.half_width for one in found.inputs.tolerances}
     return {path: known[path] if path in known else _clearance(mechanism, path) for path in prices}
 
 
-def _contributions(found: Study, prices: Mapping[str, Price]) -> tuple[Contribution, ...]:
+def _contributions(found: ToleranceStudy, prices: Mapping[str, Price]) -> tuple[Contribution, ...]:
     """All that varies: what can be bought with its price, the others with their effects as they are."""
     return tuple(
         _contribution(prices[name]) if name in prices else Contribution(name, 1.0) for name in found.inputs.names
@@ -245,25 +254,30 @@ def _contribution(one: Price) -> Contribution:
 
 # ---- rounds ---------------------------------------------------------------------------------------------------
 
-Found = tuple[Answer, Study, Rows, list[Finding]]
+Found = tuple[Answer, ToleranceStudy, Rows, list[Finding]]
 
 
 class _Search:
     """Rounds of rows and answers until they belong together."""
 
     def __init__(
-        self, mechanism: Mechanism, measures: Sequence[str], asked: Asked, prices: Mapping[str, Price], way: Way
+        self,
+        mechanism: Mechanism,
+        measures: Sequence[str],
+        asked: AllocationRequest,
+        prices: Mapping[str, Price],
+        way: Way,
     ) -> None:
         self.mechanism, self.measures, self.asked, self.prices, self.way = mechanism, measures, asked, prices, way
         self.tight: dict[str, float] = {}
 
-    def run(self, now: Study) -> Found:
+    def run(self, now: ToleranceStudy) -> Found:
         """The answer with rows taken at its own tolerances, from those of a study."""
         kept: Rows | None = None
         rows = self._rows(now, _stated(now, self.prices))
         for count in range(1, ROUNDS + 1):
             whole = rows if kept is None else joined(rows, kept)
-            problem = Problem(_contributions(now, self.prices), whole.effects, self.asked.criterion)
+            problem = AllocationProblem(_contributions(now, self.prices), whole.effects, self.asked.criterion)
             off = _off(now)
             answer = none(problem, off) if off else self._solved(problem)
             if not answer.found:
@@ -278,10 +292,10 @@ class _Search:
                 kept = moving if kept is None else joined(moving, kept)
                 rows, now = ahead, after
         else:
-            return answer, now, whole, [told("allocation.unsettled", "costs", rounds=ROUNDS)]
+            return answer, now, whole, [finding_for("allocation.unsettled", "costs", rounds=ROUNDS)]
         return answer, now, whole, []
 
-    def tightened(self, answer: Answer, now: Study, rows: Rows, found: list[Finding]) -> Found:
+    def tightened(self, answer: Answer, now: ToleranceStudy, rows: Rows, found: list[Finding]) -> Found:
         """The same with limits narrowed until the worst case found on the mechanism keeps the stated ones."""
         for _ in range(ROUNDS):
             beyond = {of.measure.name: share for of, share in zip(now.linear.measures, _beyond(now), strict=True)}
@@ -295,13 +309,13 @@ class _Search:
                 break
         return answer, now, rows, found
 
-    def _rows(self, now: Study, bought: Mapping[str, float]) -> Rows:
+    def _rows(self, now: ToleranceStudy, bought: Mapping[str, float]) -> Rows:
         return rows_of(now, bought, self.asked.criterion, self.tight)
 
     def _bought(self, answer: Answer) -> dict[str, float]:
         return {name: t for name, t in answer.by_name.items() if name in self.prices}
 
-    def _solved(self, problem: Problem) -> Answer:
+    def _solved(self, problem: AllocationProblem) -> Answer:
         """The answer of a problem; of a yield that of the samples."""
         asked, names = self.asked, [one.name for one in problem.contributions]
 
@@ -319,7 +333,7 @@ class _Search:
         return solve(problem, self.way, _target(asked), verify if asked.samples else None)
 
 
-def _same(problem: Problem, tolerances: Array, rows: Rows, ahead: Rows) -> bool:
+def _same(problem: AllocationProblem, tolerances: Array, rows: Rows, ahead: Rows) -> bool:
     """Whether the rows at the tolerances found take as much of their room as those they were found with."""
     if len(ahead.measure) != len(rows.measure):
         return False
@@ -328,7 +342,7 @@ def _same(problem: Problem, tolerances: Array, rows: Rows, ahead: Rows) -> bool:
     return bool(np.all(np.abs(after - before)[still] <= SAME) and np.all(after[rows.moving] <= 1 + SAME))
 
 
-def _beyond(now: Study) -> list[float]:
+def _beyond(now: ToleranceStudy) -> list[float]:
     """The worst case that is found on the mechanism, as a share of the limit it is nearest to, of each measure."""
     found = []
     for of, (least, most) in zip(now.linear.measures, now.worst(), strict=True):
@@ -337,7 +351,7 @@ def _beyond(now: Study) -> list[float]:
     return found
 
 
-def _off(now: Study) -> list[Finding]:
+def _off(now: ToleranceStudy) -> list[Finding]:
     """Measures whose nominal figure is beyond their bounds, which no tolerance mends."""
     found = []
     for of in now.linear.measures:
@@ -351,10 +365,12 @@ def _off(now: Study) -> list[Finding]:
             phrases = dict(zip(("told", "limit"), texts, strict=True))
             where = f"measures.{measure.name}"
             found.append(
-                told("allocation.nominal_outside", where, phrases=phrases, nominal=nominal, bound=bound, word=word)
+                finding_for(
+                    "allocation.nominal_outside", where, phrases=phrases, nominal=nominal, bound=bound, word=word
+                )
             )
     return found
 
 
 def _unknown(name: str) -> Finding:
-    return told("allocation.unknown", f"measures.{name}")
+    return finding_for("allocation.unknown", f"measures.{name}")

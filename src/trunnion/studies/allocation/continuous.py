@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.errors import Finding
-from trunnion.results.sentences import told
+from trunnion.results.sentences import finding_for
 from trunnion.studies.allocation.cones import settled
-from trunnion.studies.allocation.interior import Point, polished
-from trunnion.studies.allocation.problem import PROVEN, Answer, Problem, none, shortfalls
+from trunnion.studies.allocation.interior import Optimum, polished
+from trunnion.studies.allocation.problem import PROVEN, AllocationProblem, Answer, none, shortfalls
 from trunnion.studies.allocation.task import Task, sides, task_of
 
 __all__ = ["allocate_continuous", "minimise"]
@@ -25,7 +25,7 @@ ACTIVE = 1e-6  # of the largest multiplier: a side to begin Newton's method with
 NEAR = 1e-3  # of the first units: the least unit to try again with
 
 
-def allocate_continuous(problem: Problem) -> Answer:
+def allocate_continuous(problem: AllocationProblem) -> Answer:
     """The half widths of least cost, or why there are none."""
     problem.check()
     chosen = [one.name for one in problem.contributions if one.options]
@@ -39,11 +39,11 @@ def allocate_continuous(problem: Problem) -> Answer:
         return none(problem, trouble)
     point = minimise(task)
     if point is None:
-        return none(problem, [told("allocation.not_found", "costs")])
+        return none(problem, [finding_for("allocation.not_found", "costs")])
     return answer_of(problem, task, point)
 
 
-def answer_of(problem: Problem, task: Task, point: Point) -> Answer:
+def answer_of(problem: AllocationProblem, task: Task, point: Optimum) -> Answer:
     """A point of the task in the terms of the problem."""
     tolerances = task.tolerances(point.u)
     pairs = zip(problem.contributions, tolerances, strict=True)
@@ -51,7 +51,7 @@ def answer_of(problem: Problem, task: Task, point: Point) -> Answer:
     cost, gap = float(np.sum(costs)), max(point.gap, 0.0)
     price = np.zeros(len(problem.effects.worst))
     np.add.at(price, task.sides.row[point.rows], point.weights / task.sides.room[point.rows])
-    doubt = told("allocation.proven_roughly", "costs", gap=gap)
+    doubt = finding_for("allocation.proven_roughly", "costs", gap=gap)
     return Answer(
         problem,
         tolerances,
@@ -70,10 +70,10 @@ def answer_of(problem: Problem, task: Task, point: Point) -> Answer:
 def unbounded(task: Task) -> list[Finding]:
     """What no limit and no bound holds."""
     free = np.flatnonzero(~np.isfinite(task.most))
-    return [told("allocation.unbounded", f"costs.{task.names[one]}") for one in free]
+    return [finding_for("allocation.unbounded", f"costs.{task.names[one]}") for one in free]
 
 
-def unmet(problem: Problem, task: Task) -> list[Finding]:
+def unmet(problem: AllocationProblem, task: Task) -> list[Finding]:
     """Why no half widths keep the limits; empty if some do."""
     least = task.tolerances(task.low)
     if task.sides.rising or not np.all(task.sides.room > 0):
@@ -84,7 +84,7 @@ def unmet(problem: Problem, task: Task) -> list[Finding]:
     return shortfalls(problem, task.tolerances(found[0])) if found else []
 
 
-def minimise(task: Task) -> Point | None:
+def minimise(task: Task) -> Optimum | None:
     """The point of least cost of a task whose limits can be kept; None if it was not found."""
     found = settled(task) or _inside(task)
     if found is None:
@@ -110,6 +110,6 @@ def _inside(task: Task) -> tuple[Array, NDArray[np.intp], Array, int] | None:
     return None
 
 
-def _polished(task: Task, u: Array, rows: NDArray[np.intp], weights: Array, rounds: int) -> Point:
+def _polished(task: Task, u: Array, rows: NDArray[np.intp], weights: Array, rounds: int) -> Optimum:
     active = weights > ACTIVE * np.max(weights, initial=0.0)
     return replace(polished(task, u, rows[active], weights[active]), rounds=rounds)

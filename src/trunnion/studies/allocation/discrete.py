@@ -22,10 +22,18 @@ from numpy.typing import NDArray
 from scipy.optimize import Bounds, LinearConstraint, milp
 
 from trunnion.errors import Finding
-from trunnion.results.sentences import told
+from trunnion.results.sentences import finding_for
 from trunnion.studies.allocation.continuous import allocate_continuous, minimise, unbounded
-from trunnion.studies.allocation.interior import Point
-from trunnion.studies.allocation.problem import ALLOWED, PROVEN, Answer, Contribution, Problem, none, shortfalls
+from trunnion.studies.allocation.interior import Optimum
+from trunnion.studies.allocation.problem import (
+    ALLOWED,
+    PROVEN,
+    AllocationProblem,
+    Answer,
+    Contribution,
+    none,
+    shortfalls,
+)
 from trunnion.studies.allocation.task import Sides, Task, sides, task_of
 
 __all__ = ["allocate_discrete"]
@@ -37,7 +45,7 @@ AT_ONCE = 16  # rows added in one round
 ROUNDS = 2000
 
 
-def allocate_discrete(problem: Problem) -> Answer:
+def allocate_discrete(problem: AllocationProblem) -> Answer:
     """The processes, and the half widths of contributions with a cost model, of least cost; or why there are none."""
     problem.check()
     groups = [members for members in problem.groups().values() if members[0].options]
@@ -55,13 +63,13 @@ class _Best:
 
     cost: float = np.inf
     taken: Flags = field(default_factory=lambda: np.zeros(0, bool))
-    point: Point | None = None
+    point: Optimum | None = None
 
 
 class _Search:
     """Outer approximation: unknowns are [0/1 of all options, u of the groups with a cost model, their costs]."""
 
-    def __init__(self, problem: Problem, groups: list[list[Contribution]]) -> None:
+    def __init__(self, problem: AllocationProblem, groups: list[list[Contribution]]) -> None:
         self.problem = problem
         place = {one.name: i for i, one in enumerate(problem.contributions)}
         self.limits: Sides = sides(problem)
@@ -100,7 +108,7 @@ class _Search:
         if any(not names for names in self.names):
             which = next(k for k, names in enumerate(self.names) if not names)
             one = self.problem.contributions[self.members[which][0]]
-            return [told("allocation.no_common_option", f"costs.{one.name}")]
+            return [finding_for("allocation.no_common_option", f"costs.{one.name}")]
         if not self.limits.rising and np.all(self.limits.room > 0):
             return []
         return shortfalls(self.problem, self.narrowest())
@@ -238,7 +246,7 @@ class _Search:
     def _answer(self, best: _Best, bound: float, rounds: int) -> Answer:
         problem = self.problem
         if not np.isfinite(best.cost):
-            doubt = told("allocation.no_choice", "processes")
+            doubt = finding_for("allocation.no_choice", "processes")
             return none(problem, shortfalls(problem, self.narrowest()) or [doubt])
         u = best.point.u if best.point else np.zeros(0)
         gap = max(best.cost - bound, 0.0) / self.scale + (best.point.gap if best.point else 0.0)
@@ -252,7 +260,7 @@ class _Search:
             for i in members
         }
         proven = gap <= PROVEN
-        doubt = told("allocation.choice_proven_roughly", "processes", gap=gap)
+        doubt = finding_for("allocation.choice_proven_roughly", "processes", gap=gap)
         nothing = np.full(len(problem.effects.worst), np.nan)
         return Answer(
             problem,

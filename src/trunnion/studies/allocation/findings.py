@@ -10,7 +10,7 @@ import numpy as np
 from trunnion.errors import Finding, Severity
 from trunnion.results.attributes import attribute
 from trunnion.results.figure import Figure
-from trunnion.results.sentences import told
+from trunnion.results.sentences import finding_for
 from trunnion.studies.allocation.outcome import CLOSE, DEFAULT_YIELD, share_of
 from trunnion.studies.allocation.problem import SHOWN
 from trunnion.studies.tolerance.targets import limits
@@ -50,13 +50,13 @@ def findings_of(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:
     if not answer.found:
         return
     if answer.proven and found.asked.criterion == "yield":
-        yield told("allocation.proven_margin")
+        yield finding_for("allocation.proven_margin")
     elif answer.proven:
-        yield told("allocation.proven", gap=max(answer.gap, 0.0))
+        yield finding_for("allocation.proven", gap=max(answer.gap, 0.0))
     for name, share in found.tight.items():
-        yield told("allocation.narrowed", f"measures.{name}", percent=100 * (1 - share))
+        yield finding_for("allocation.narrowed", f"measures.{name}", percent=100 * (1 - share))
     if found.asked.criterion != "yield" and found.study.effects.correlated:
-        yield told("allocation.correlations_left_out", "correlations", criterion=found.asked.criterion)
+        yield finding_for("allocation.correlations_left_out", "correlations", criterion=found.asked.criterion)
     if found.asked.criterion == "worst-case":
         yield from _searched(found, known)
     if found.asked.criterion == "rss" and "yield" in known:
@@ -66,7 +66,7 @@ def findings_of(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:
     kept = [factor for factor, one in found.offers if one.found]
     if len(kept) < len(found.offers):
         points, least = len(found.offers), min(kept, default=None)
-        yield told("allocation.curve_short", points=points, lost=points - len(kept), least=least)
+        yield finding_for("allocation.curve_short", points=points, lost=points - len(kept), least=least)
 
 
 def _yielded(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:
@@ -74,9 +74,9 @@ def _yielded(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:
     target, any_other = found.asked.target, any(one.where == "yield" for one in found.answer.findings)
     share, low, high = (float(known[f"yield_all{end}"]) for end in ("", "_low", "_high"))
     if high < target and not any_other:
-        yield told("yield.short", "yield", share=share, target=target)
+        yield finding_for("yield.short", "yield", share=share, target=target)
     elif share < target <= high:
-        yield told("yield.uncertain", "yield", share=share, target=target, low=low, high=high)
+        yield finding_for("yield.uncertain", "yield", share=share, target=target, low=low, high=high)
 
 
 def _promised(known: xr.Dataset) -> Iterator[Finding]:
@@ -91,7 +91,7 @@ def _promised(known: xr.Dataset) -> Iterator[Finding]:
         if not high < DEFAULT_YIELD:
             continue
         severity = Severity.ERROR if 1 - high > TWICE * (1 - DEFAULT_YIELD) else Severity.WARNING
-        yield told("yield.below_rss", f"measures.{name}", severity=severity, share=share, target=DEFAULT_YIELD)
+        yield finding_for("yield.below_rss", f"measures.{name}", severity=severity, share=share, target=DEFAULT_YIELD)
 
 
 def _searched(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:
@@ -107,7 +107,7 @@ def _searched(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:
         factor, unit = SHOWN.get(units[k], (1.0, units[k]))
         value, limit = (high, upper) if shares[1] >= shares[0] else (low, lower)
         severity = Severity.ERROR if beyond > ROUGH else Severity.WARNING if beyond > SLIGHT else Severity.NOTE
-        yield told(
+        yield finding_for(
             "allocation.worst_case_beyond", f"measures.{of.measure.name}", severity=severity, worst=factor * value,
             unit=unit, percent=100 * beyond, limit=factor * limit,
         )  # fmt: skip

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from trunnion.studies.allocation.task import Task
 
-__all__ = ["Point", "polished"]
+__all__ = ["Optimum", "polished"]
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -38,7 +38,7 @@ FRACTION = 0.995  # of the way to where a slack or multiplier would be 0
 
 
 @dataclass(frozen=True)
-class Point:
+class Optimum:
     """Where the conditions hold: unknowns u, sides with their multipliers, how well, and the proof.
 
     scale: the part of the cost that tolerances change; residual: of stationarity, relative to the largest slope, of
@@ -54,7 +54,7 @@ class Point:
     rounds: int = 0
 
 
-def polished(task: Task, u: Array, rows: Rows, weights: Array) -> Point:
+def polished(task: Task, u: Array, rows: Rows, weights: Array) -> Optimum:
     """The optimum from a point near it; the best point known if Newton's method does not arrive."""
     value = task.sides.value(task.tolerances(u))
     near = np.argsort(-value, kind="stable")[:MOST]
@@ -76,7 +76,7 @@ def polished(task: Task, u: Array, rows: Rows, weights: Array) -> Point:
         rows, weights = np.append(rows, broken), np.append(point.weights, np.zeros(len(broken)))
 
 
-def point_of(task: Task, u: Array, rows: Rows, weights: Array) -> Point:
+def point_of(task: Task, u: Array, rows: Rows, weights: Array) -> Optimum:
     """A point with its residual and gap."""
     t = task.tolerances(u)
     slope, jacobian = task.slope(u), _jacobian(task, t, rows)
@@ -91,7 +91,7 @@ def point_of(task: Task, u: Array, rows: Rows, weights: Array) -> Point:
         float(np.max(weights * np.abs(over), initial=0.0)) / scale,
         float(np.max(task.sides.value(t), initial=0.0)) - 1.0,
     )
-    return Point(u, rows, weights, residual, -(float(weights @ over) + float(np.sum(rise))) / scale, scale)
+    return Optimum(u, rows, weights, residual, -(float(weights @ over) + float(np.sum(rise))) / scale, scale)
 
 
 def _kept(task: Task, u: Array) -> Array:
@@ -126,7 +126,7 @@ class _State:
         return np.asarray(own + np.diag(task.curvature(u) / scale), float)
 
 
-def _led(task: Task, u: Array, rows: Rows, weights: Array) -> Point:
+def _led(task: Task, u: Array, rows: Rows, weights: Array) -> Optimum:
     """The path of the method from a point near the optimum; the point of least gap on it."""
     gap = task.high - task.low
     u = np.clip(u, task.low + np.minimum(CLEAR * np.maximum(u, CLEAR), 0.4 * gap), task.high - CLEAR * gap)
@@ -136,7 +136,7 @@ def _led(task: Task, u: Array, rows: Rows, weights: Array) -> Point:
     slack[len(rows) :] = -state.over[len(rows) :]
     slack = np.maximum(slack, 1e-12)
     lamda = np.maximum(np.concatenate([weights / scale, np.zeros(2 * len(u))]), CLEAR)
-    best: Point | None = None
+    best: Optimum | None = None
     for _ in range(STEPS):
         aim = float(slack @ lamda) / len(slack)
         bend = _State.bend(task, u, rows, lamda, scale)

@@ -14,9 +14,9 @@ from trunnion.solve.friction_method import FrictionMethod
 from trunnion.studies.allocation.problem import Answer, Criterion
 from trunnion.studies.allocation.rows import Rows
 from trunnion.studies.allocation.solve import Choice as Way
-from trunnion.studies.tolerance.first_order import Study
+from trunnion.studies.tolerance.first_order import ToleranceStudy
 
-__all__ = ["CLOSE", "DEFAULT_YIELD", "Allocated", "Asked", "Choice", "share_of"]
+__all__ = ["CLOSE", "DEFAULT_YIELD", "Allocated", "AllocationRequest", "Choice", "share_of"]
 
 
 DEFAULT_YIELD = 0.9973
@@ -25,7 +25,7 @@ CLOSE = 1e-6  # of a limit: how close to it the worst case found is brought
 
 
 @dataclass(frozen=True)
-class Asked:
+class AllocationRequest:
     """What was asked for; see `allocate`."""
 
     criterion: Criterion
@@ -49,8 +49,8 @@ class Allocated:
     measure, so that the mechanism itself keeps them; offers: factors of all limits with their answers.
     """
 
-    asked: Asked
-    study: Study
+    asked: AllocationRequest
+    study: ToleranceStudy
     rows: Rows
     answer: Answer
     way: Way

@@ -21,10 +21,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError, agreeing
-from trunnion.results.sentences import told
+from trunnion.results.sentences import finding_for
 from trunnion.statistics.costs import Cost
 
-__all__ = ["CRITERIA", "Answer", "Contribution", "Criterion", "Effects", "Option", "Problem", "Sampled", "Trial"]
+__all__ = [
+    "CRITERIA",
+    "AllocationProblem",
+    "Answer",
+    "Contribution",
+    "Criterion",
+    "Option",
+    "RowEffects",
+    "SampledYield",
+    "Trial",
+]
 
 Array = NDArray[np.float64]
 Criterion = Literal["worst-case", "rss", "yield"]
@@ -71,7 +81,7 @@ class Contribution:
 
 
 @dataclass(frozen=True)
-class Effects:
+class RowEffects:
     """What each contribution does to each row, per unit of its half width: arrays (row, contribution).
 
     lower, upper: limits of the deviation from the nominal, (row,), infinite where there is none; offset: deviation of
@@ -122,17 +132,17 @@ class Effects:
         """Deviation of the middle of the tolerances, (row,)."""
         return np.zeros(len(self.worst)) if self.offset is None else self.offset
 
-    def scaled(self, factor: float) -> Effects:
+    def scaled(self, factor: float) -> RowEffects:
         """With all limits times a factor."""
         return replace(self, lower=factor * self.lower, upper=factor * self.upper)
 
 
 @dataclass(frozen=True)
-class Problem:
+class AllocationProblem:
     """Contributions, their effects, the criterion; z: how many standard deviations of room `yield` asks for."""
 
     contributions: tuple[Contribution, ...]
-    effects: Effects
+    effects: RowEffects
     criterion: Criterion = "worst-case"
     z: float = 3.0
 
@@ -180,7 +190,7 @@ class Problem:
         return np.asarray(np.max(np.where(np.isinf(room), 0.0, share), axis=0), float)
 
 
-class Sampled(NamedTuple):
+class SampledYield(NamedTuple):
     """A yield that was sampled, with its interval."""
 
     share: float
@@ -193,7 +203,7 @@ class Trial(NamedTuple):
 
     z: float
     cost: float
-    sampled: Sampled
+    sampled: SampledYield
 
 
 @dataclass(frozen=True)
@@ -209,7 +219,7 @@ class Answer:
     optimum is that of the same z in every row; other margins in some rows might cost a little less.
     """
 
-    problem: Problem
+    problem: AllocationProblem
     tolerances: Array
     costs: Array
     cost: float
@@ -222,7 +232,7 @@ class Answer:
     findings: tuple[Finding, ...] = ()
     rounds: int = 0
     expected: float = np.nan
-    sampled: Sampled | None = None
+    sampled: SampledYield | None = None
     trials: tuple[Trial, ...] = ()
 
     @property
@@ -253,7 +263,7 @@ class Answer:
         return f"cost {self.cost:.8g}, {word} (lower bound {self.bound:.8g}, gap {self.gap:.1e})"
 
 
-def none(problem: Problem, findings: Sequence[Finding]) -> Answer:
+def none(problem: AllocationProblem, findings: Sequence[Finding]) -> Answer:
     """The answer that there is none."""
     nothing = np.full(len(problem.contributions), np.nan)
     return Answer(
@@ -269,7 +279,7 @@ def none(problem: Problem, findings: Sequence[Finding]) -> Answer:
     )
 
 
-def shortfalls(problem: Problem, least: Array) -> list[Finding]:
+def shortfalls(problem: AllocationProblem, least: Array) -> list[Finding]:
     """Of each measure with limits that are broken even with all tolerances at their least what they would have to be.
 
     least: the half widths, m or rad, that are the least to be had.
@@ -289,7 +299,7 @@ def shortfalls(problem: Problem, least: Array) -> list[Finding]:
     return found
 
 
-def _shortfall(problem: Problem, least: Array, row: int, more: str) -> Finding:
+def _shortfall(problem: AllocationProblem, least: Array, row: int, more: str) -> Finding:
     """That a row cannot keep its limit, and what has the largest part in that."""
     effects = problem.effects
     low, high = (float(one[row]) for one in problem.at(least))
@@ -301,7 +311,7 @@ def _shortfall(problem: Problem, least: Array, row: int, more: str) -> Finding:
     ratio = f", {over / limit:.3g} times the limit" if over * limit > 0 else ""
     takes = f"{effects.say(row, over)}{effects.place(row)}"
     phrases = {"limit_told": effects.say(row, limit), "takes_told": takes, "ratio": ratio, "more": more, "kept": kept}
-    return told(
+    return finding_for(
         "allocation.impossible", effects.label(row), phrases=phrases, limit=limit, takes=over, largest=largest.name
     )
 
@@ -339,7 +349,7 @@ def _group(members: list[Contribution]) -> list[Finding]:
     return []
 
 
-def _effects(effects: Effects, count: int) -> list[Finding]:
+def _effects(effects: RowEffects, count: int) -> list[Finding]:
     if effects.worst.shape[1:] != (count,):
         return [Finding(f"{count} contributions, effects of {effects.worst.shape[1:]}", "measures", "give one each")]
     if not len(effects.worst):

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from trunnion.model.tolerances import Tolerance
 from trunnion.statistics.population import Marginal
-from trunnion.studies.allocation.problem import Criterion, Effects
-from trunnion.studies.tolerance.first_order import Study
+from trunnion.studies.allocation.problem import Criterion, RowEffects
+from trunnion.studies.tolerance.first_order import ToleranceStudy
 from trunnion.studies.tolerance.linear import Of, by_position
 from trunnion.studies.tolerance.targets import against, limits
 from trunnion.studies.tolerance.zones import Spread
@@ -39,7 +39,7 @@ class Rows:
     moving: rows whose effects depend on the tolerances themselves; unknown: measures of which first order has no row.
     """
 
-    effects: Effects
+    effects: RowEffects
     measure: NDArray[np.intp]
     position: NDArray[np.intp]
     moving: NDArray[np.bool_]
@@ -74,7 +74,7 @@ def _block(of: Of) -> _Block:
 
 
 def rows_of(
-    study: Study, bought: Mapping[str, float], criterion: Criterion, tight: Mapping[str, float] | None = None
+    study: ToleranceStudy, bought: Mapping[str, float], criterion: Criterion, tight: Mapping[str, float] | None = None
 ) -> Rows:
     """The rows of a study. bought: half widths as they are in it, of what is to be chosen, by path.
 
@@ -95,7 +95,7 @@ def rows_of(
         which.append(k)
     none = np.zeros(0, np.intp)
     if not blocks:
-        empty = Effects(np.zeros((0, len(study.inputs.names))), np.zeros(0), np.zeros(0))
+        empty = RowEffects(np.zeros((0, len(study.inputs.names))), np.zeros(0), np.zeros(0))
         return Rows(empty, none, none, none.astype(bool), tuple(unknown))
     sizes = [len(block.position) for block in blocks]
     position = np.concatenate([block.position for block in blocks])
@@ -119,7 +119,9 @@ def _taken(block: _Block, known: NDArray[np.bool_]) -> _Block:
     return replace(block, sensitivity=block.sensitivity[:, known], spread=spread, position=block.position[known])
 
 
-def _parts(study: Study, bought: Mapping[str, float], criterion: Criterion, blocks: Sequence[_Block]) -> Effects:
+def _parts(
+    study: ToleranceStudy, bought: Mapping[str, float], criterion: Criterion, blocks: Sequence[_Block]
+) -> RowEffects:
     """Effects (row, contribution) without their limits."""
     slopes = np.concatenate([block.sensitivity for block in blocks], axis=1)
     lower, upper, half, shift, deviation = (
@@ -143,7 +145,7 @@ def _parts(study: Study, bought: Mapping[str, float], criterion: Criterion, bloc
         upper[i], half[i] = np.abs(slopes[i]) * size, slopes[i] * size
         deviation[i], mean[i] = slopes[i] * scatter * size, slopes[i] * drift * size
     nothing = np.zeros(0)
-    return Effects(upper.T, nothing, nothing, half.T, deviation.T, mean.T, offset)
+    return RowEffects(upper.T, nothing, nothing, half.T, deviation.T, mean.T, offset)
 
 
 def _rates(one: Tolerance) -> Rates:
@@ -159,7 +161,7 @@ def _rates(one: Tolerance) -> Rates:
     return wide.deviation / half, drift, wide.mean - middle - drift * half
 
 
-def _correlation(study: Study) -> Array | None:
+def _correlation(study: ToleranceStudy) -> Array | None:
     """Correlation of all that varies, by their covariance; None if there is none."""
     covariance = study.inputs.population.covariance()
     deviations = np.sqrt(np.diag(covariance))
@@ -174,7 +176,7 @@ def _correlation(study: Study) -> Array | None:
     return found
 
 
-def _texts(study: Study, measure: NDArray[np.intp], position: NDArray[np.intp]) -> tuple[Texts, Texts, Texts]:
+def _texts(study: ToleranceStudy, measure: NDArray[np.intp], position: NDArray[np.intp]) -> tuple[Texts, Texts, Texts]:
     """Names, places and units of rows."""
     system, values = study.run.system, study.run.values
     dial = system.dial(values, study.plan.times)

@@ -9,17 +9,20 @@ from typing import Literal
 from trunnion.errors import Finding, MechanismError
 from trunnion.studies.allocation.continuous import allocate_continuous
 from trunnion.studies.allocation.discrete import allocate_discrete
-from trunnion.studies.allocation.problem import Answer, Problem
+from trunnion.studies.allocation.problem import AllocationProblem, Answer
 from trunnion.studies.allocation.yields import Verify, meet
 
 __all__ = ["CHOICES", "Choice", "solve", "trade_off"]
 
 Choice = Literal["continuous", "discrete"]
-CHOICES: dict[Choice, Callable[[Problem], Answer]] = {"continuous": allocate_continuous, "discrete": allocate_discrete}
+CHOICES: dict[Choice, Callable[[AllocationProblem], Answer]] = {
+    "continuous": allocate_continuous,
+    "discrete": allocate_discrete,
+}
 
 
 def solve(
-    problem: Problem, choice: Choice = "continuous", target: float | None = None, verify: Verify | None = None
+    problem: AllocationProblem, choice: Choice = "continuous", target: float | None = None, verify: Verify | None = None
 ) -> Answer:
     """The allocation of least cost.
 
@@ -34,7 +37,7 @@ def solve(
 
 
 def trade_off(
-    problem: Problem, factors: Sequence[float], choice: Choice = "continuous", target: float | None = None
+    problem: AllocationProblem, factors: Sequence[float], choice: Choice = "continuous", target: float | None = None
 ) -> list[Answer]:
     """One answer for each factor by which all limits are multiplied; `found` is False where there is none."""
     return [solve(replace(problem, effects=problem.effects.scaled(factor)), choice, target) for factor in factors]

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.statistics.costs import Cost
-from trunnion.studies.allocation.problem import Problem
+from trunnion.studies.allocation.problem import AllocationProblem
 
 __all__ = ["Sides", "Task", "sides", "task_of"]
 
@@ -70,7 +70,7 @@ class Sides:
         return total
 
 
-def sides(problem: Problem) -> Sides:
+def sides(problem: AllocationProblem) -> Sides:
     """The sides of a problem's rows that can bind; of a symmetric row only the nearer one."""
     effects = problem.effects
     none = np.zeros_like(effects.worst)
@@ -172,7 +172,7 @@ class Task:
         return self.most / self.unit
 
 
-def task_of(problem: Problem, limits: Sides) -> Task:
+def task_of(problem: AllocationProblem, limits: Sides) -> Task:
     """The task of a problem's contributions with a cost; those with options are left at 0."""
     groups = {name: members for name, members in problem.groups().items() if not members[0].options}
     place = {one.name: i for i, one in enumerate(problem.contributions)}

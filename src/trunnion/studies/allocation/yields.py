@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.special import chdtr, ndtr, ndtri
 
-from trunnion.results.sentences import told
+from trunnion.results.sentences import finding_for
 from trunnion.statistics.streams import SobolStream, factor
-from trunnion.studies.allocation.problem import Answer, Problem, Sampled, Trial
+from trunnion.studies.allocation.problem import AllocationProblem, Answer, SampledYield, Trial
 
 __all__ = ["Verify", "meet", "normal_yield"]
 
@@ -35,7 +35,7 @@ CLOSE = 1e-3  # of z: two choices of processes that lie closer are neighbours
 SURE = 1e-9  # of the target, in standard scores
 
 
-def normal_yield(problem: Problem, tolerances: Array) -> float:
+def normal_yield(problem: AllocationProblem, tolerances: Array) -> float:
     """Share of mechanisms within all limits, for normal deviations and linear rows.
 
     The row that fails most is reckoned exactly, and the directions only say what the others add to it.
@@ -89,7 +89,12 @@ def _directions(dims: int) -> Array:
     return np.concatenate([points, -points], axis=1)
 
 
-def meet(problem: Problem, target: float, solve: Callable[[Problem], Answer], verify: Verify | None = None) -> Answer:
+def meet(
+    problem: AllocationProblem,
+    target: float,
+    solve: Callable[[AllocationProblem], Answer],
+    verify: Verify | None = None,
+) -> Answer:
     """The allocation of least cost whose yield meets the target.
 
     solve: of a problem with z given; verify: half widths (contribution,) → yield, and its interval, low and high.
@@ -100,7 +105,7 @@ def meet(problem: Problem, target: float, solve: Callable[[Problem], Answer], ve
     return _sampled(answer, target, solve, verify)
 
 
-def _expected(problem: Problem, target: float, solve: Callable[[Problem], Answer]) -> Answer:
+def _expected(problem: AllocationProblem, target: float, solve: Callable[[AllocationProblem], Answer]) -> Answer:
     """The cheapest allocation that meets the target for normal deviations."""
     tried: list[Answer] = []
 
@@ -122,11 +127,11 @@ def _expected(problem: Problem, target: float, solve: Callable[[Problem], Answer
     if enough:
         return min(enough, key=lambda one: one.cost)
     best = max(tried, key=lambda one: one.expected)
-    doubt = told("yield.narrowest", "yield", share=best.expected, target=target)
+    doubt = finding_for("yield.narrowest", "yield", share=best.expected, target=target)
     return replace(best, findings=(*best.findings, doubt))
 
 
-def _sampled(answer: Answer, target: float, solve: Callable[[Problem], Answer], verify: Verify) -> Answer:
+def _sampled(answer: Answer, target: float, solve: Callable[[AllocationProblem], Answer], verify: Verify) -> Answer:
     """The same with the margin corrected by what is sampled, until the target lies in the interval of the yield."""
     low, high = 0.0, np.inf
     z, problem = answer.problem.z, answer.problem
@@ -136,7 +141,7 @@ def _sampled(answer: Answer, target: float, solve: Callable[[Problem], Answer], 
         if answer.found:
             key = np.round(answer.tolerances, 15).tobytes()
             known = seen.get(key)
-            sampled = known.sampled if known and known.sampled else Sampled(*verify(answer.tolerances))
+            sampled = known.sampled if known and known.sampled else SampledYield(*verify(answer.tolerances))
             seen[key] = answer = replace(answer, sampled=sampled)
             trials.append(Trial(z, answer.cost, sampled))
             if sampled.low <= target <= sampled.high:
@@ -159,7 +164,7 @@ def _sampled(answer: Answer, target: float, solve: Callable[[Problem], Answer], 
     if met:
         return replace(best, trials=tuple(trials))
     share = best.sampled.share if best.sampled else np.nan
-    doubt = told("yield.best", "yield", share=share, target=target)
+    doubt = finding_for("yield.best", "yield", share=share, target=target)
     return replace(best, trials=tuple(trials), findings=(*best.findings, doubt))
 
 

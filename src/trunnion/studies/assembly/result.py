@@ -14,13 +14,13 @@ from trunnion.errors import Finding
 from trunnion.results.attributes import cited, figure_rows, finding_rows, origin
 from trunnion.results.dataset import TIME, Variable, dataset_of, described
 from trunnion.results.figure import Figure
-from trunnion.results.sentences import told
+from trunnion.results.sentences import finding_for
 from trunnion.solve.system import System, Values
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["ENOUGH", "FIGURES", "Fit", "Result", "labels"]
+__all__ = ["ENOUGH", "FIGURES", "AssemblyStatus", "Result", "labels"]
 
 Array = NDArray[np.float64]
 ENOUGH = 1 + 1e-9  # of the stated clearances: all of it is enough
@@ -33,12 +33,12 @@ SOURCE = (
 )
 
 
-class Fit(IntEnum):
+class AssemblyStatus(IntEnum):
     """What a position came to."""
 
     text: str
 
-    def __new__(cls, value: int, text: str) -> Fit:
+    def __new__(cls, value: int, text: str) -> AssemblyStatus:
         """An integer code that carries its sentence."""
         one = int.__new__(cls, value)
         one._value_ = value
@@ -136,9 +136,9 @@ class Result:
         self._apart()
         self._short()
         self._rigid()
-        unsettled = np.flatnonzero(self.arrays["status"] == Fit.UNSETTLED)
+        unsettled = np.flatnonzero(self.arrays["status"] == AssemblyStatus.UNSETTLED)
         if len(unsettled):
-            self._say("unsettled", "joints", status=Fit.UNSETTLED.text, at=self._intervals(unsettled))
+            self._say("unsettled", "joints", status=AssemblyStatus.UNSETTLED.text, at=self._intervals(unsettled))
         if len(self.findings) > count or not self.of:
             return
         share = self.share[0]
@@ -149,18 +149,18 @@ class Result:
             self._say("fits", "joints")
 
     def _say(self, code: str, where: str, phrases: dict[str, str] | None = None, **figures: Any) -> None:
-        self.findings.append(told(f"assembly.{code}", where, phrases=phrases, **figures))
+        self.findings.append(finding_for(f"assembly.{code}", where, phrases=phrases, **figures))
 
     def _intervals(self, places: NDArray[np.intp]) -> str:
         return self.system.dial(self.values, self.time).intervals(places)
 
     def _apart(self) -> None:
-        places = np.flatnonzero(self.arrays["status"] == Fit.APART)
+        places = np.flatnonzero(self.arrays["status"] == AssemblyStatus.APART)
         if len(places):
-            self._say("apart", "links", status=Fit.APART.text, at=self._intervals(places))
+            self._say("apart", "links", status=AssemblyStatus.APART.text, at=self._intervals(places))
 
     def _short(self) -> None:
-        (share, at), short = self.share, np.flatnonzero(self.arrays["status"] == Fit.SHORT)
+        (share, at), short = self.share, np.flatnonzero(self.arrays["status"] == AssemblyStatus.SHORT)
         times = f"it takes {_share(share)} times as much"
         if len(short):
             place = self._share_place()
@@ -174,7 +174,7 @@ class Result:
                   clearance=self.clearance[0])  # fmt: skip
 
     def _rigid(self) -> None:
-        places = np.flatnonzero(self.arrays["status"] == Fit.RIGID)
+        places = np.flatnonzero(self.arrays["status"] == AssemblyStatus.RIGID)
         if not len(places):
             return
         angle, length = (float(np.nanmax(self.arrays[name])) for name in ("open_angle", "open_length"))
@@ -243,7 +243,7 @@ class Result:
             findings=finding_rows(self.findings),
             coordinate_units=["rad" if self.system.turns(name) else "m" for name in mechanism.drivers],
             periodic=int(self.system.cycle(self.values).periodic),
-        ) | cited([SOURCE, *mechanism.references], Fit)
+        ) | cited([SOURCE, *mechanism.references], AssemblyStatus)
         time = described({"time": self.time}, {"time": replace(TIME, long_name="time")})
         variables = described({name: self.arrays[name] for name in FIGURES}, FIGURES)
         return dataset_of("assembly", variables, labels(self.system), attributes, time)

@@ -20,22 +20,22 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.joints.clearance import CLEARANCE_MODELS
 from trunnion.model.contact import clearance
 from trunnion.model.mechanism import Mechanism
-from trunnion.results.sentences import told
+from trunnion.results.sentences import finding_for
 from trunnion.solve import shifts
 from trunnion.solve.branches import choose
 from trunnion.solve.forward import forward
 from trunnion.solve.geometry import build
-from trunnion.solve.space.cone import CLOSED, Ask, Found, least_play
+from trunnion.solve.space.cone import CLOSED, Ask, LeastPlay, least_play
 from trunnion.solve.space.loops import End, Loops, ends_of
 from trunnion.solve.space.starts import Start, start_of
 from trunnion.solve.space.system import SpatialSystem
 from trunnion.solve.system import Cycle, System, Values
-from trunnion.studies.assembly.result import ENOUGH, FIGURES, Fit, Result, labels
+from trunnion.studies.assembly.result import ENOUGH, FIGURES, AssemblyStatus, Result, labels
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["FIGURES", "Fit", "assemble", "assembled"]
+__all__ = ["FIGURES", "AssemblyStatus", "assemble", "assembled"]
 
 Array = NDArray[np.float64]
 Uniform = Literal["pins", "all"]
@@ -57,7 +57,7 @@ def assemble(
     steps: equally spaced positions of the cycle. uniform: what has one and the same clearance where the smallest is
     looked for: all pins with a play (all pins, if no play is stated), other plays as stated; or "all" kinds of play.
     Returns a Dataset with the variables of `FIGURES`; `smallest_clearance` (m) is the largest need of the whole cycle,
-    between the positions too. `status`: see `Fit`.
+    between the positions too. `status`: see `AssemblyStatus`.
     progress: called with the number of positions done.
     Raises MechanismError for a play without a length, or a structure that leaves a freedom undetermined.
     """
@@ -80,7 +80,7 @@ def assembled(
     if not any(module.redundant for module in system.plan.modules):
         result = _regular(system, values, cycle, time)
     else:
-        result = Study.of(cast(SpatialSystem, system), values, ideal, cycle, uniform).result(time)
+        result = AssemblyStudy.of(cast(SpatialSystem, system), values, ideal, cycle, uniform).result(time)
     if progress:
         progress(len(time))
     return result.dataset()
@@ -97,16 +97,16 @@ def _regular(system: System, values: Values, cycle: Cycle, time: Array) -> Resul
     result = Result(system, values, time, list(chosen.findings))
     for name in ("needed_share", "needed_clearance", "open_angle", "open_length", "certificate", "closure_residual"):
         result.arrays[name] = np.where(there, 0.0, np.nan)
-    result.arrays["status"] = np.where(there, Fit.FITS, Fit.APART).astype(np.int8)
+    result.arrays["status"] = np.where(there, AssemblyStatus.FITS, AssemblyStatus.APART).astype(np.int8)
     plane = "in the plane no joint constrains twice" if system.mechanism.space == "planar" else ""
     what = plane or "its joints constrain no more than its links have freedoms"
-    result.findings.append(told("assembly.no_need", "joints", phrases={"why": what}))
+    result.findings.append(finding_for("assembly.no_need", "joints", phrases={"why": what}))
     result.tell()
     return result
 
 
 @dataclass(frozen=True)
-class Study:
+class AssemblyStudy:
     """An over-constrained mechanism with its errors, the plays that it states, and those of the smallest clearance.
 
     evened: for each end of `pins`, whether its play is the clearance that is looked for; the others stay.
@@ -122,7 +122,7 @@ class Study:
     findings: tuple[Finding, ...]
 
     @classmethod
-    def of(cls, system: SpatialSystem, values: Values, ideal: Values, cycle: Cycle, uniform: Uniform) -> Study:
+    def of(cls, system: SpatialSystem, values: Values, ideal: Values, cycle: Cycle, uniform: Uniform) -> AssemblyStudy:
         stated = tuple(ends_of(system, values, every_pin=False))
         every = not any(end.pin for end in stated) and not (uniform == "all" and stated)
         pins = tuple(ends_of(system, values, every_pin=every))
@@ -130,7 +130,7 @@ class Study:
         start, findings = start_of(system, values, ideal, cycle)
         return cls(system, values, cycle, start, stated, pins, evened, tuple(findings))
 
-    def solve(self, time: Array, stated: bool) -> Found:
+    def solve(self, time: Array, stated: bool) -> LeastPlay:
         """The least share of the stated plays, or the smallest clearance, at times; ∞ where no play is there."""
         ends = self.stated if stated else self.pins
         radii = np.array([end.radius for end in ends])
@@ -143,7 +143,7 @@ class Study:
             fits = gap <= CLOSED
             if not ends or np.all(fits | np.isnan(gap)):
                 least = np.where(np.isnan(gap), np.nan, np.where(fits, 0.0, np.inf))
-                return Found(least, least, q, none, np.zeros((len(time), len(ends))), gap, 0)
+                return LeastPlay(least, least, q, none, np.zeros((len(time), len(ends))), gap, 0)
             found = least_play(loops, q, none, ask)
         # what is found where it closes as it is is rounding
         found.least[fits], found.bound[fits], found.offsets[fits], found.weights[fits] = 0.0, 0.0, 0.0, 0.0
@@ -167,9 +167,11 @@ class Study:
         arrays["certificate"] = _worst(
             shares, needs, lambda one: (one.least - one.bound) / np.where(one.least > 0, one.least, 1.0)
         )
-        status = np.where(np.isinf(share), Fit.RIGID, np.where(share > ENOUGH, Fit.SHORT, Fit.FITS))
-        status = np.where(np.isnan(share) | np.isnan(needs.least), Fit.UNSETTLED, status)
-        arrays["status"] = np.where(there, status, Fit.APART).astype(np.int8)
+        status = np.where(
+            np.isinf(share), AssemblyStatus.RIGID, np.where(share > ENOUGH, AssemblyStatus.SHORT, AssemblyStatus.FITS)
+        )
+        status = np.where(np.isnan(share) | np.isnan(needs.least), AssemblyStatus.UNSETTLED, status)
+        arrays["status"] = np.where(there, status, AssemblyStatus.APART).astype(np.int8)
         result.share = self._largest(time, share, stated=True)
         result.clearance = self._largest(time, needs.least, stated=False)
         result.tell()
@@ -181,9 +183,11 @@ class Study:
             result.arrays[name] = np.where(there, 0.0, np.nan)
         for ends, name in ((self.stated, "stated"), (self.pins, "uniform")):
             none = np.zeros((len(there), sum(len(end.axes) for end in ends)))
-            found = Found(result.arrays["needed_share"], none, none, none, np.zeros((len(there), len(ends))), none, 0)
+            found = LeastPlay(
+                result.arrays["needed_share"], none, none, none, np.zeros((len(there), len(ends))), none, 0
+            )
             self._place(found, ends, result.arrays[f"{name}_offset"], result.arrays[f"{name}_part"])
-        result.arrays["status"] = np.where(there, Fit.FITS, Fit.APART).astype(np.int8)
+        result.arrays["status"] = np.where(there, AssemblyStatus.FITS, AssemblyStatus.APART).astype(np.int8)
         result.tell()
         return result
 
@@ -203,7 +207,7 @@ class Study:
         result.arrays["open_angle"], result.arrays["open_length"] = sizes[:, 0], sizes[:, 1] * loops.size
         return np.isfinite(gap), gap > CLOSED
 
-    def _place(self, found: Found, ends: Sequence[End], offsets: Array, parts: Array) -> None:
+    def _place(self, found: LeastPlay, ends: Sequence[End], offsets: Array, parts: Array) -> None:
         """Offsets and parts of the ends at their places in the result."""
         joints, column = labels(self.system)["joint"], 0
         solved = np.isfinite(found.least)
@@ -243,7 +247,7 @@ def _nil(system: SpatialSystem, values: Values) -> bool:
     return any(one is not None and np.all(primal(one) == 0) for one in stated)
 
 
-def _worst(one: Found, other: Found, of: Callable[[Found], Array]) -> Array:
+def _worst(one: LeastPlay, other: LeastPlay, of: Callable[[LeastPlay], Array]) -> Array:
     """The larger of a number of two searches, of those that have an answer."""
     with np.errstate(invalid="ignore"):
         rows = [np.where(np.isfinite(found.least), of(found), -np.inf) for found in (one, other)]

@@ -45,7 +45,7 @@ VARIABLES: dict[str, Variable] = {
 }
 
 
-class Found(Protocol):
+class PlayEffects(Protocol):
     """What the Dataset is made of; see `play.Effect`."""
 
     @property
@@ -70,7 +70,7 @@ class Found(Protocol):
     def status(self) -> NDArray[np.int8]: ...
 
 
-def dataset(found: Found, findings: Sequence[Finding]) -> xr.Dataset:
+def dataset(found: PlayEffects, findings: Sequence[Finding]) -> xr.Dataset:
     """The arrays with all that is said of them."""
     system, mechanism = found.run.system, found.run.system.mechanism
     ends = found.loads.shape[2]
@@ -124,7 +124,7 @@ def _radii(plays: Mapping[str, Play], ends: int) -> Array:
     return found
 
 
-def _summary(found: Found, units: Sequence[str], dial: Any) -> Iterator[Figure]:
+def _summary(found: PlayEffects, units: Sequence[str], dial: Any) -> Iterator[Figure]:
     """Of each measure the largest worst case, what each joint has in it, RSS and deviation there."""
     for i, (measure, unit) in enumerate(zip(found.measures, units, strict=True)):
         name, total = measure.name, relied_on(found.total[i], found.status)

@@ -34,7 +34,7 @@ from trunnion.measures.measures import Measure, named, outputs
 from trunnion.measures.motion import MOTIONS
 from trunnion.model.contact import clearance
 from trunnion.model.mechanism import Mechanism
-from trunnion.results.sentences import told
+from trunnion.results.sentences import finding_for
 from trunnion.solve import shifts
 from trunnion.solve.backward import under
 from trunnion.solve.forward import Forward, forward
@@ -166,7 +166,7 @@ def _measures(run: Run, names: Sequence[str] | None) -> tuple[list[Measure], lis
     remedy = "`trunnion tolerance` knows the others"
     if others and names is not None:
         raise MechanismError(Finding(what, "measures", remedy))
-    notes = [told("play.measures_left_out", "measures", known=list(MOTIONS), measures=others)] if others else []
+    notes = [finding_for("play.measures_left_out", "measures", known=list(MOTIONS), measures=others)] if others else []
     found = [one for one in found if one.name not in others]
     if found:
         return found, notes
@@ -176,7 +176,7 @@ def _measures(run: Run, names: Sequence[str] | None) -> tuple[list[Measure], lis
         raise MechanismError(
             Finding("no measure is stated, and no joint to the ground is an output", "measures", remedy)
         )
-    return found, [told("measure.none_stated", "measures", measures=[one.name for one in found]), *notes]
+    return found, [finding_for("measure.none_stated", "measures", measures=[one.name for one in found]), *notes]
 
 
 def _check(known: Mapping[str, Play]) -> None:
@@ -273,17 +273,17 @@ def _model_findings(run: Run, effect: Effect) -> Iterator[Finding]:
     if run.determinacy is not None:
         yield from run.determinacy.findings()
         if any(part.redundant for part in run.determinacy.parts):
-            yield told("play.redundant", "joints")
+            yield finding_for("play.redundant", "joints")
     yield from _left_out(run, effect.plays)
     yield from _spinning(run, effect.measures)
     if run.seats:
-        yield told("play.seats_not_taken", "joints", joints=[one.joint for one in run.seats])
+        yield finding_for("play.seats_not_taken", "joints", joints=[one.joint for one in run.seats])
     yield from _limits(run, effect)
     dial = run.system.dial(run.values, effect.time)
     for code in Status:
         where = np.flatnonzero(effect.status == code)
         if code >= Status.NOT_CONVERGED and len(where):
-            yield told("play.no_answer", at=dial.intervals(where), status=code.text)
+            yield finding_for("play.no_answer", at=dial.intervals(where), status=code.text)
 
 
 def _left_out(run: Run, known: Mapping[str, Play]) -> Iterator[Finding]:
@@ -297,12 +297,12 @@ def _left_out(run: Run, known: Mapping[str, Play]) -> Iterator[Finding]:
     ]
     if stated:
         kinds = [f"{name} is {run.system.joints[name][0]}" for name in stated]
-        yield told("play.left_out", "joints", joints=list(stated), kinds=kinds, modelled=list(models))
+        yield finding_for("play.left_out", "joints", joints=list(stated), kinds=kinds, modelled=list(models))
     toothed = sorted({
         joint for gear in mechanism.gears.values() if gear.teeth for joint in gear.joints if joint in known
     })  # fmt: skip
     if toothed:
-        yield told("play.gears", "gears", joints=toothed)
+        yield finding_for("play.gears", "gears", joints=toothed)
 
 
 def _spinning(run: Run, measures: Sequence[Measure]) -> Iterator[Finding]:
@@ -311,7 +311,7 @@ def _spinning(run: Run, measures: Sequence[Measure]) -> Iterator[Finding]:
         for measure in measures:
             owner, _, point = measure.subject.partition(".")
             if owner == link and (measure.kind == "angle" or (measure.kind == "point" and point not in ends)):
-                yield told("play.spin", f"measures.{measure.name}", link=link, points=list(ends))
+                yield finding_for("play.spin", f"measures.{measure.name}", link=link, points=list(ends))
 
 
 def _limits(run: Run, effect: Effect) -> Iterator[Finding]:
@@ -326,6 +326,6 @@ def _limits(run: Run, effect: Effect) -> Iterator[Finding]:
         top = int(np.nanargmax(total))
         figures = {"worst": factor * total[top], "limit": factor * measure.limit, "unit": shown, "at": dial.at(top)}
         if len(over):
-            yield told("limit.exceeded", where, **figures, over=dial.intervals(over))
+            yield finding_for("limit.exceeded", where, **figures, over=dial.intervals(over))
         else:
-            yield told("limit.kept", where, **figures)
+            yield finding_for("limit.kept", where, **figures)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from trunnion.errors import Finding, MechanismError
 from trunnion.measures.measures import Measure, named
 from trunnion.model.mechanism import Mechanism
-from trunnion.results.sentences import told
+from trunnion.results.sentences import finding_for
 from trunnion.solve.run import Run
 from trunnion.studies.sweep.figures import FIGURES
 
@@ -37,4 +37,4 @@ def measures_of(run: Run, names: Sequence[str]) -> list[Measure]:
 def left_out(mechanism: Mechanism, names: Sequence[str]) -> list[Finding]:
     """A note that names the measures of the model that a sweep does not have."""
     others = [name for name in mechanism.measures if name not in names]
-    return [told("sweep.measures_left_out", "measures", measures=others)] if others else []
+    return [finding_for("sweep.measures_left_out", "measures", measures=others)] if others else []

@@ -20,7 +20,7 @@ from trunnion.joints.pairs import PAIRS
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.attributes import cited, encoded, finding_rows, origin
 from trunnion.results.dataset import Variable, dataset_of, described
-from trunnion.results.sentences import told
+from trunnion.results.sentences import finding_for
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.studies.sweep.figures import FIGURES
 from trunnion.studies.sweep.grid import MOST_POINTS, Over, Swept, grid, say
@@ -113,7 +113,7 @@ def _answers(swept: Sequence[Swept], arrays: Mapping[str, NDArray[Any]]) -> Iter
             continue
         first = tuple(int(i) for i in where[0])
         count = int(missing[first])
-        yield told(
+        yield finding_for(
             "sweep.no_answer", " and ".join(one.name for one in swept), points=len(where), of=status.size,
             at=say(swept, first), positions=count, status=code.text,
         )  # fmt: skip

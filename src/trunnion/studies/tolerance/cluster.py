@@ -23,7 +23,7 @@ import numpy as np
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.studies.tolerance.processes import DEATHS, PAUSE, deadly, unheard
-from trunnion.studies.tolerance.protocol import Blocks, Job, Part, T, part_of
+from trunnion.studies.tolerance.protocol import Blocks, Job, Portion, T, part_of
 from trunnion.version import __version__
 
 try:
@@ -146,13 +146,13 @@ class Cluster(Generic[T]):
         future = self._executor.submit(_evaluated, self._job, self._name, _versions(), blocks)
         self._under_way[future] = blocks
 
-    def wait(self) -> Sequence[Part[T]]:
+    def wait(self) -> Sequence[Portion[T]]:
         return [self._part(future) for future in wait(self._under_way, PAUSE, FIRST_COMPLETED).done]
 
-    def _part(self, future: Future[bytes]) -> Part[T]:
+    def _part(self, future: Future[bytes]) -> Portion[T]:
         blocks = self._under_way.pop(future)
         try:
-            part: Part[T] = pickle.loads(zlib.decompress(future.result()))
+            part: Portion[T] = pickle.loads(zlib.decompress(future.result()))
         except KilledWorker:
             raise deadly(blocks, "workers of the cluster that died") from None
         except CancelledError:

@@ -39,7 +39,7 @@ QUARTERS = (0.0, 0.5 * np.pi, np.pi, 1.5 * np.pi)
 NUMBER, SIZE, ANGLE = "number", "size", "angle"  # what of its owner a row moves; of a play it is the carrier
 
 
-class Row(NamedTuple):
+class EffectRow(NamedTuple):
     """One row of the batch: whose it is, which numbers are set and which move, by path.
 
     part: what of its owner moves: the number, a size or an angle in a direction that is set; of a play its carrier.
@@ -57,7 +57,7 @@ class Effects:
     """The rows of the batch for some inputs, and what their results mean."""
 
     inputs: Inputs
-    rows: tuple[Row, ...]
+    rows: tuple[EffectRow, ...]
 
     def values(self, at: Mapping[str, float] | None = None) -> dict[str, Number]:
         """Numbers of the mechanism: duals (row, 1) where a row sets or moves them, about a point.
@@ -394,22 +394,22 @@ class Effects:
 
 def effects_of(inputs: Inputs) -> Effects:
     """The rows of the batch of all inputs."""
-    found: list[Row] = [Row(NOBODY, 0, {}, "")]  # the mechanism itself
+    found: list[EffectRow] = [EffectRow(NOBODY, 0, {}, "")]  # the mechanism itself
     drawn = {one.direction for one in inputs.tolerances}  # these directions are those of run-outs
     for i, one in enumerate(inputs.tolerances):
         if one.direction:
-            found += [Row(i, 0, {one.direction: angle}, one.path, SIZE) for angle in QUARTERS]
-            found += [Row(i, 0, {one.direction: angle}, one.direction, ANGLE) for angle in QUARTERS]
+            found += [EffectRow(i, 0, {one.direction: angle}, one.path, SIZE) for angle in QUARTERS]
+            found += [EffectRow(i, 0, {one.direction: angle}, one.direction, ANGLE) for angle in QUARTERS]
         elif one.distribution == FULL_TURN:
             if one.path not in drawn:
-                found += [Row(i, 0, {one.path: angle}, one.path, ANGLE) for angle in QUARTERS]
+                found += [EffectRow(i, 0, {one.path: angle}, one.path, ANGLE) for angle in QUARTERS]
         else:
-            found.append(Row(i, 0, {}, one.path))
+            found.append(EffectRow(i, 0, {}, one.path))
             if i in inputs.turned:
                 turned = inputs.angle(inputs.turned[i])
-                found += [Row(i, 0, {turned: angle}, one.path, SIZE) for angle in QUARTERS]
+                found += [EffectRow(i, 0, {turned: angle}, one.path, SIZE) for angle in QUARTERS]
     for k, joint in enumerate(inputs.loose, len(inputs.tolerances)):
         for carrier in inputs.carriers(joint):
             for end, keys in enumerate(inputs.ends(joint)):
-                found += [Row(k, end, {}, f"{carrier}.{joint}.{key}", carrier) for key in keys]
+                found += [EffectRow(k, end, {}, f"{carrier}.{joint}.{key}", carrier) for key in keys]
     return Effects(inputs, tuple(found))

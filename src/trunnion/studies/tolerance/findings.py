@@ -12,7 +12,7 @@ from trunnion.cycle.summary import model_notes
 from trunnion.errors import Finding, Severity, Status
 from trunnion.model.checks.values import NOT_NEGATIVE
 from trunnion.results.figure import Figure
-from trunnion.results.sentences import told
+from trunnion.results.sentences import finding_for
 from trunnion.studies.tolerance.linear import by_position
 from trunnion.studies.tolerance.sampling import CAUSES
 from trunnion.studies.tolerance.targets import limited, missed
@@ -65,7 +65,11 @@ def _of_samples(counted: Sampled, of: Of, i: int, unit: str) -> Iterator[Figure]
     name = of.measure.name
     told = [("mean", "mean of samples", unit), ("deviation", "standard deviation of samples", unit)]
     if limited(of.measure):
-        told += [("yield", "yield", "1"), ("yield_low", "yield, least by the 95 % interval", "1"), ("cpk", "C_pk", "1")]
+        told += [
+            ("yield", "yield", "1"),
+            ("yield_low", "yield, least by the 95 % interval", "1"),
+            ("cpk", "C_pk", "1"),
+        ]
     for key, text, own in told:
         yield Figure(f"{name}.{key}", f"{name}, {text}", counted.arrays[key][i], own)
 
@@ -98,9 +102,9 @@ def findings_of(outcome: Outcome, counted: Sampled | None) -> Iterator[Finding]:
         yield from study.run.determinacy.findings()
     loaded = [seat.joint for seat in study.run.seats if seat.given is None]
     if loaded:
-        yield told("tolerance.seats_not_taken", "joints", joints=loaded)
+        yield finding_for("tolerance.seats_not_taken", "joints", joints=loaded)
     if study.effects.correlated:
-        yield told("tolerance.correlations_left_out", "correlations")
+        yield finding_for("tolerance.correlations_left_out", "correlations")
     yield from _measured(outcome)
     yield from _impossible(outcome)
     yield from _nominal(outcome)
@@ -110,7 +114,7 @@ def findings_of(outcome: Outcome, counted: Sampled | None) -> Iterator[Finding]:
     if counted is not None:
         yield from _samples(outcome, counted)
     if outcome.indices is not None and outcome.indices.lost:
-        yield told("tolerance.indices_lost", count=outcome.indices.lost)
+        yield finding_for("tolerance.indices_lost", count=outcome.indices.lost)
 
 
 def _measured(outcome: Outcome) -> Iterator[Finding]:
@@ -121,7 +125,7 @@ def _measured(outcome: Outcome) -> Iterator[Finding]:
         if one.distribution == "sample" and outside:
             far = float(values[np.argmax(np.abs(values))])
             figures: dict[str, Any] = {"lower": one.lower, "upper": one.upper, "farthest": far}
-            yield told("tolerance.measured_outside", one.path, count=int(outside), of=len(values), **figures)
+            yield finding_for("tolerance.measured_outside", one.path, count=int(outside), of=len(values), **figures)
 
 
 def _impossible(outcome: Outcome) -> Iterator[Finding]:
@@ -129,7 +133,7 @@ def _impossible(outcome: Outcome) -> Iterator[Finding]:
     for one in outcome.study.inputs.tolerances:
         least = one.nominal + one.lower
         if one.path.rpartition(".")[2] in NOT_NEGATIVE and least < 0:
-            yield told("tolerance.negative", one.path, least=least)
+            yield finding_for("tolerance.negative", one.path, least=least)
 
 
 def _nominal(outcome: Outcome) -> Iterator[Finding]:
@@ -140,23 +144,23 @@ def _nominal(outcome: Outcome) -> Iterator[Finding]:
     for code in Status:
         where = np.flatnonzero(status == code)
         if code >= Status.NOT_CONVERGED and len(where):
-            yield told("tolerance.nominal_no_answer", status=code.text, at=dial.intervals(where))
+            yield finding_for("tolerance.nominal_no_answer", status=code.text, at=dial.intervals(where))
         elif code == Status.NEAR_SINGULAR and len(where):
-            yield told("tolerance.near_singular", at=dial.intervals(where))
+            yield finding_for("tolerance.near_singular", at=dial.intervals(where))
     for of in study.linear.measures:
         if not np.isfinite(of.reference.figure):
             name = of.measure.name
-            yield told("tolerance.nominal_no_figure", f"measures.{name}", measure=name)
+            yield finding_for("tolerance.nominal_no_figure", f"measures.{name}", measure=name)
 
 
 def _first_order(outcome: Outcome, of: Of) -> Iterator[Finding]:
     """A measure of which first order knows nothing, or whose worst case found is another."""
     position = of.reference.window.index[of.place] if of.place >= 0 else -1
     if position >= 0 and not of.measure.of_motion and outcome.study.linear.status[position] == Status.ZERO_SLIP:
-        yield told("first_order.one_sided", f"measures.{of.measure.name}")
+        yield finding_for("first_order.one_sided", f"measures.{of.measure.name}")
     where, lower, upper = f"measures.{of.measure.name}", float(of.total[0]), float(of.total[1])
     if not np.isfinite(upper):
-        yield told("first_order.no_answer", where)
+        yield finding_for("first_order.no_answer", where)
         return
     if outcome.worst is None:
         return
@@ -164,10 +168,10 @@ def _first_order(outcome: Outcome, of: Of) -> Iterator[Finding]:
     least, most = outcome.worst[i]
     for end, corner in (("least", least), ("largest", most)):
         if not corner.assembles:
-            yield told("first_order.corner_open", where, end=end)
+            yield finding_for("first_order.corner_open", where, end=end)
     size, found = max(-lower, upper), max(-least.value, most.value)
     if np.isfinite(found) and abs(found - size) > FAR_OFF * max(size, found) and max(size, found) > 0:
-        yield told("first_order.worst_case_differs", where, ratio=found / size if size else np.inf)
+        yield finding_for("first_order.worst_case_differs", where, ratio=found / size if size else np.inf)
 
 
 def _carried(outcome: Outcome, of: Of) -> Iterator[Finding]:
@@ -182,7 +186,7 @@ def _carried(outcome: Outcome, of: Of) -> Iterator[Finding]:
         joints = study.run.system.mechanism.effective_joints
         links = {name: list(joints[name].links) for name, _ in others}
         where, first = f"measures.{of.measure.name}", others[0][0]
-        yield told("play.carried", where, ratios=dict(others), links=links, joint=first)
+        yield finding_for("play.carried", where, ratios=dict(others), links=links, joint=first)
 
 
 def _scatter(outcome: Outcome, counted: Sampled) -> Iterator[Finding]:
@@ -192,7 +196,7 @@ def _scatter(outcome: Outcome, counted: Sampled) -> Iterator[Finding]:
         if by_position(of.reference) or counted.done < ENOUGH or not np.isfinite(linear + found):
             continue
         if max(linear, found) > 0 and not 1 / OTHERWISE < found / max(linear, 1e-300) < OTHERWISE:
-            yield told("first_order.scatter_differs", f"measures.{of.measure.name}", found=found, linear=linear)
+            yield finding_for("first_order.scatter_differs", f"measures.{of.measure.name}", found=found, linear=linear)
 
 
 def _samples(outcome: Outcome, counted: Sampled) -> Iterator[Finding]:
@@ -201,5 +205,7 @@ def _samples(outcome: Outcome, counted: Sampled) -> Iterator[Finding]:
         if failed[code]:
             text = list(Status)[code].text if code < CAUSES - 1 else "a figure does not exist"
             count = int(failed[code])
-            yield told("samples.no_answer", "tolerances", count=count, samples=done, share=count / done, why=text)
+            yield finding_for(
+                "samples.no_answer", "tolerances", count=count, samples=done, share=count / done, why=text
+            )
     yield from _scatter(outcome, counted)

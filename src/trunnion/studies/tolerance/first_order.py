@@ -14,12 +14,12 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.measures.evaluation import NumpyKernel
 from trunnion.measures.figures import Reference
 from trunnion.measures.measures import Measure, named, outputs
-from trunnion.measures.positions import Plan, plan
+from trunnion.measures.positions import PositionPlan, plan
 from trunnion.model.measure_kinds import place_kind
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.quantity import Quantity
 from trunnion.model.units import UnitError
-from trunnion.results.sentences import told
+from trunnion.results.sentences import finding_for
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
 from trunnion.studies.tolerance.effects import Effects, effects_of
@@ -29,14 +29,14 @@ from trunnion.studies.tolerance.linear import Linear, linear, searched
 from trunnion.studies.tolerance.sampling import Sampler, Sampling, towards
 from trunnion.studies.tolerance.search import Corner
 
-__all__ = ["FEW", "Study", "placed", "study"]
+__all__ = ["FEW", "ToleranceStudy", "placed", "study"]
 
 
 FEW = 10_000_000  # configurations up to which further processes cost more than they save
 
 
 @dataclass(frozen=True, eq=False)
-class Study:
+class ToleranceStudy:
     """A mechanism whose numbers vary, with what is measured, made ready: evaluate it by any method.
 
     told: what there is to say of the choice of measures.
@@ -50,7 +50,7 @@ class Study:
     told: tuple[Finding, ...] = ()
 
     @cached_property
-    def plan(self) -> Plan:
+    def plan(self) -> PositionPlan:
         """The positions that the measures need."""
         return plan(self.run, self.measures, self.steps)
 
@@ -111,7 +111,7 @@ def study(
     steps: int = 360,
     at: float | str | None = None,
     friction: FrictionMethod | None = None,
-) -> Study:
+) -> ToleranceStudy:
     """A study of a mechanism. Raises MechanismError as `tolerance` does."""
     check_steps(steps)
     run = prepare(mechanism)
@@ -122,7 +122,7 @@ def study(
         found = named(mechanism, names, run.values)
     else:
         found = outputs(run.system)
-        note = told("measure.none_stated", "measures", measures=[one.name for one in found])
+        note = finding_for("measure.none_stated", "measures", measures=[one.name for one in found])
         if not found:
             what = "no measure is stated, and no joint to the ground is an output"
             raise MechanismError(Finding(what, "measures", note.remedy))
@@ -133,7 +133,7 @@ def study(
         found = [replace(one, statistic="value") if one.rule == "deviation" else one for one in found]
     if at is not None:
         found = [placed(mechanism, one, at) for one in found]
-    return Study(run, inputs, tuple(found), steps, friction or FrictionMethod(), tuple(notes))
+    return ToleranceStudy(run, inputs, tuple(found), steps, friction or FrictionMethod(), tuple(notes))
 
 
 def placed(mechanism: Mechanism, measure: Measure, at: float | str) -> Measure:

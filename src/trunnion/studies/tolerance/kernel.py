@@ -15,7 +15,7 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.measures.evaluation import Courses, NumpyKernel, where_known
 from trunnion.measures.figures import Reference, known, reference
 from trunnion.measures.measures import Measure
-from trunnion.measures.positions import Plan
+from trunnion.measures.positions import PositionPlan
 from trunnion.solve.backward import Backward
 from trunnion.solve.forward import forward
 from trunnion.solve.friction_method import FrictionMethod
@@ -85,7 +85,7 @@ def kernel_of(engine: str, run: Run, measures: Sequence[Measure], friction: Fric
     raise MechanismError(Finding(f"there is no engine '{engine}'", "engine", "use numpy or jax"))
 
 
-def references(kernel: NumpyKernel, plan: Plan, inputs: Inputs) -> dict[str, Reference]:
+def references(kernel: NumpyKernel, plan: PositionPlan, inputs: Inputs) -> dict[str, Reference]:
     """Every measure of the nominal mechanism, pins in the middle of their holes where no seat is given."""
     run = kernel.run
     values = {**run.values}

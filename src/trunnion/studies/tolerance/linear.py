@@ -19,7 +19,7 @@ from trunnion.algebra.namespace import Number
 from trunnion.measures.evaluation import NumpyKernel
 from trunnion.measures.figures import Reference, figure, shown, span
 from trunnion.measures.measures import Measure
-from trunnion.measures.positions import Plan
+from trunnion.measures.positions import PositionPlan
 from trunnion.studies.tolerance.effects import Effects
 from trunnion.studies.tolerance.search import Corner, search
 from trunnion.studies.tolerance.zones import Spread
@@ -65,12 +65,12 @@ class Linear:
     """All measures to first order."""
 
     effects: Effects
-    plan: Plan
+    plan: PositionPlan
     measures: Sequence[Of]
     status: NDArray[np.int8]
 
 
-def linear(kernel: NumpyKernel, plan: Plan, effects: Effects, known: Mapping[str, Reference]) -> Linear:
+def linear(kernel: NumpyKernel, plan: PositionPlan, effects: Effects, known: Mapping[str, Reference]) -> Linear:
     """First order of every measure about the nominal mechanism."""
     courses, status = _courses(kernel, plan, effects, effects.values())
     found = [_of(known[measure.name], effects, courses[measure.name]) for measure in kernel.measures]
@@ -81,7 +81,7 @@ Course = list[Dual]  # parts, (row, position) each
 
 
 def _courses(
-    kernel: NumpyKernel, plan: Plan, effects: Effects, values: Mapping[str, Number]
+    kernel: NumpyKernel, plan: PositionPlan, effects: Effects, values: Mapping[str, Number]
 ) -> tuple[dict[str, Course], NDArray[np.int8]]:
     """Every course over all positions with its derivatives, a part of the positions at a time."""
     rows, times = len(effects.rows), plan.moved(values)

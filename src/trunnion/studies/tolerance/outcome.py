@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from trunnion.studies.tolerance.first_order import Study
+from trunnion.studies.tolerance.first_order import ToleranceStudy
 from trunnion.studies.tolerance.indices import Indices
-from trunnion.studies.tolerance.sampling import Sampling, Tally
+from trunnion.studies.tolerance.sampling import SampleTally, Sampling
 from trunnion.studies.tolerance.search import Corner
 
 if TYPE_CHECKING:
@@ -21,11 +21,11 @@ __all__ = ["Outcome"]
 class Outcome:
     """What the methods that were asked for found; None of those that were not. target: the yield asked for."""
 
-    study: Study
+    study: ToleranceStudy
     methods: tuple[str, ...]
     worst: Sequence[tuple[Corner, Corner]] | None = None
     job: Sampling | None = None
-    tally: Tally | None = None
+    tally: SampleTally | None = None
     indices: Indices | None = None
     stopped: bool = False
     target: float | None = None

@@ -22,7 +22,7 @@ from types import FrameType
 from typing import Any, Generic, Self, TypeVar
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.studies.tolerance.protocol import Blocks, Job, Part, T, part_of
+from trunnion.studies.tolerance.protocol import Blocks, Job, Portion, T, part_of
 
 __all__ = ["DEATHS", "PAUSE", "Interruption", "Processes", "deadly", "unheard"]
 
@@ -58,7 +58,7 @@ def _prepared() -> Any:
     return pickle.loads(_given[0]).prepare()
 
 
-def _evaluated(blocks: Blocks) -> Part[Any]:
+def _evaluated(blocks: Blocks) -> Portion[Any]:
     return part_of(_prepared(), blocks)
 
 
@@ -69,7 +69,7 @@ class Processes(Generic[T]):
         self.workers = workers
         self._job = pickle.dumps(job)
         self._queue: deque[Blocks] = deque()
-        self._under_way: dict[Future[Part[T]], Blocks] = {}
+        self._under_way: dict[Future[Portion[T]], Blocks] = {}
         self._deaths: Counter[Blocks] = Counter()
         self._stillborn = 0
         self._begin()
@@ -89,7 +89,7 @@ class Processes(Generic[T]):
     def give(self, blocks: Blocks) -> None:
         self._queue.append(blocks)
 
-    def wait(self) -> Sequence[Part[T]]:
+    def wait(self) -> Sequence[Portion[T]]:
         parts, lost, broken = [], [], False
         try:
             while self._queue and not (self._under_way and self._suspect()):

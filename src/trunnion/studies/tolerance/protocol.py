@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from trunnion.errors import Finding
-from trunnion.results.sentences import told
+from trunnion.results.sentences import finding_for
 
-__all__ = ["Blocks", "Crew", "Job", "Part", "Prepared", "Tally", "fingerprint", "mixed", "part_of"]
+__all__ = ["Blocks", "Crew", "Job", "Portion", "Prepared", "Tally", "fingerprint", "mixed", "part_of"]
 
 Blocks = tuple[int, int]  # blocks first, first + 1, …, last - 1
 
@@ -81,7 +81,7 @@ class Job(Protocol[T_co]):
 
 
 @dataclass(frozen=True)
-class Part(Generic[T_co]):
+class Portion(Generic[T_co]):
     """Blocks done, the seconds they took where they were done, their tally, and `fingerprint` of that machine."""
 
     blocks: Blocks
@@ -90,11 +90,11 @@ class Part(Generic[T_co]):
     arithmetic: str
 
 
-def part_of(prepared: Prepared[T], blocks: Blocks) -> Part[T]:
+def part_of(prepared: Prepared[T], blocks: Blocks) -> Portion[T]:
     """These blocks, done here."""
     start = perf_counter()
     tally = prepared.evaluate(*blocks)
-    return Part(blocks, perf_counter() - start, tally, fingerprint())
+    return Portion(blocks, perf_counter() - start, tally, fingerprint())
 
 
 class Crew(Protocol[T_co]):
@@ -107,7 +107,7 @@ class Crew(Protocol[T_co]):
     def give(self, blocks: Blocks) -> None:
         """Have these blocks done; again if who does them dies."""
 
-    def wait(self) -> Sequence[Part[T_co]]:
+    def wait(self) -> Sequence[Portion[T_co]]:
         """Parts that have become ready since; may be none after a while. KeyboardInterrupt may be raised inside."""
 
     def close(self, finished: bool) -> None:
@@ -132,4 +132,4 @@ def mixed(seen: set[str]) -> tuple[Finding, ...]:
     """A note, if machines of more than one kind took part."""
     if len(seen) < 2:
         return ()
-    return (told("samples.machines", "cluster", kinds=len(seen)),)
+    return (finding_for("samples.machines", "cluster", kinds=len(seen)),)

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 from trunnion.studies.tolerance.protocol import Blocks
 
-__all__ = ["Pace", "Plan", "count", "gaps", "union"]
+__all__ = ["BlockRanges", "Pace", "count", "gaps", "union"]
 
 
 def count(ranges: Iterable[Blocks]) -> int:
@@ -32,7 +32,7 @@ def union(ranges: Iterable[Blocks]) -> tuple[Blocks, ...]:
     return tuple(joined)
 
 
-class Plan:
+class BlockRanges:
     """Hands out the blocks that are not yet done, in order."""
 
     def __init__(self, done: Iterable[Blocks], blocks: int) -> None:

@@ -18,7 +18,7 @@ from trunnion.results.attributes import cited, figure_rows, finding_rows, origin
 from trunnion.results.dataset import Variable, dataset_of, described, driven
 from trunnion.solve.system import System
 from trunnion.studies.tolerance.findings import findings_of, summary
-from trunnion.studies.tolerance.first_order import Study
+from trunnion.studies.tolerance.first_order import ToleranceStudy
 from trunnion.studies.tolerance.outcome import Outcome
 from trunnion.studies.tolerance.sampled import QUANTILES, sampled
 from trunnion.studies.tolerance.targets import MISSED
@@ -161,7 +161,7 @@ def dataset(outcome: Outcome, told: Sequence[Finding]) -> xr.Dataset:
     return dataset_of("tolerance", variables, labels, attributes, {**quantiles, **driven(found.plan.times, *dial)})
 
 
-def _of_measures(found: Study, units: Sequence[str], curve_units: Sequence[str]) -> dict[str, list[Any]]:
+def _of_measures(found: ToleranceStudy, units: Sequence[str], curve_units: Sequence[str]) -> dict[str, list[Any]]:
     """Attributes that are a list each, an entry for each measure."""
     system, measures = found.run.system, found.measures
     limits = [None if (one.lower, one.upper) == (None, None) else [one.lower, one.upper] for one in measures]
@@ -184,7 +184,7 @@ def _units(own: Sequence[str], courses: Sequence[str], parameters: Sequence[str]
     return found | dict(zip(("ratio", "course ratio"), ratios, strict=True))
 
 
-def _linear(found: Study) -> dict[str, Any]:
+def _linear(found: ToleranceStudy) -> dict[str, Any]:
     first, inputs = found.linear, found.inputs
     rows = first.measures
     effects = found.effects
@@ -217,7 +217,7 @@ def _linear(found: Study) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _place(found: Study, of: Of) -> float:
+def _place(found: ToleranceStudy, of: Of) -> float:
     """The drive coordinate at which a figure is taken; NaN if it is of no single position."""
     run, known = found.run, of.reference
     time = known.window.time[of.place] if of.place >= 0 else moment(known)
@@ -227,7 +227,7 @@ def _place(found: Study, of: Of) -> float:
     return float(run.system.dial(run.values, np.array([time])).values[0])
 
 
-def _spread_out(found: Study, arrays: Sequence[Array], shape: tuple[int, ...]) -> Array:
+def _spread_out(found: ToleranceStudy, arrays: Sequence[Array], shape: tuple[int, ...]) -> Array:
     """Numbers over the windows of measures as one array over all positions, NaN outside."""
     whole = np.full((len(arrays), *shape, len(found.plan.times)), np.nan)
     for row, array, of in zip(whole, arrays, found.linear.measures, strict=True):

@@ -17,17 +17,17 @@ from typing import Generic
 from trunnion.errors import Finding, MechanismError
 from trunnion.studies.tolerance.checkpoint import Checkpoint
 from trunnion.studies.tolerance.processes import Interruption, Processes
-from trunnion.studies.tolerance.protocol import Blocks, Crew, Job, Part, Prepared, T, Tally, mixed, part_of
-from trunnion.studies.tolerance.ranges import Pace, Plan, count
+from trunnion.studies.tolerance.protocol import Blocks, Crew, Job, Portion, Prepared, T, Tally, mixed, part_of
+from trunnion.studies.tolerance.ranges import BlockRanges, Pace, count
 
-__all__ = ["Crew", "Job", "Part", "Prepared", "Run", "Tally", "run"]
+__all__ = ["Crew", "Job", "JobRun", "Portion", "Prepared", "Tally", "run"]
 
 AHEAD = 2  # portions given to every worker: the one under way and the next
 NEAR, FAR = 1.0, 10.0  # s: what a portion takes on this machine, and on a cluster, unless `chunk` says otherwise
 
 
 @dataclass(frozen=True)
-class Run(Generic[T]):
+class JobRun(Generic[T]):
     """The tally of what was done; `stopped`: by Ctrl-C, before the end.
 
     notes: a checkpoint that could not be written; machines whose last bits differ.
@@ -50,7 +50,7 @@ class Here(Generic[T]):
     def give(self, blocks: Blocks) -> None:
         self._given.append(blocks)
 
-    def wait(self) -> Sequence[Part[T]]:
+    def wait(self) -> Sequence[Portion[T]]:
         return [part_of(self._prepared, self._given.popleft())]
 
     def close(self, finished: bool) -> None:
@@ -90,7 +90,7 @@ def run(
     checkpoint: str | os.PathLike[str] | None = None,
     resume: bool = False,
     progress: Callable[[int], None] | None = None,
-) -> Run[T]:
+) -> JobRun[T]:
     """Do the job, or what a checkpoint leaves of it.
 
     jobs: processes on this machine (None: one per core); one job and no cluster needs none beside this.
@@ -106,7 +106,7 @@ def run(
     kept = None if checkpoint is None else Checkpoint(checkpoint, job)
     tally = job.empty() if kept is None else kept.begin(resume)
     arithmetic = set[str]() if kept is None else kept.arithmetic
-    plan = Plan(tally.blocks, job.blocks)
+    plan = BlockRanges(tally.blocks, job.blocks)
     stopped = False
     if plan.left:
         stated = None if chunk is None else math.ceil(chunk / job.block_size)
@@ -127,7 +127,7 @@ def run(
     elif progress is not None:
         progress(job.samples)
     trouble = (kept.trouble,) if kept is not None and kept.trouble is not None else ()
-    return Run(tally, stopped, trouble + mixed(arithmetic))
+    return JobRun(tally, stopped, trouble + mixed(arithmetic))
 
 
 @dataclass
@@ -136,7 +136,7 @@ class _Spread(Generic[T]):
 
     job: Job[T]
     crew: Crew[T]
-    plan: Plan
+    plan: BlockRanges
     pace: Pace
     kept: Checkpoint[T] | None
     progress: Callable[[int], None] | None

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from trunnion.statistics import intervals
 from trunnion.statistics.histogram import Bins, quantile
 from trunnion.statistics.tally import Moments
-from trunnion.studies.tolerance.first_order import Study
-from trunnion.studies.tolerance.sampling import Sampling, Tally
+from trunnion.studies.tolerance.first_order import ToleranceStudy
+from trunnion.studies.tolerance.sampling import SampleTally, Sampling
 
 __all__ = ["QUANTILES", "Sampled", "sampled"]
 
@@ -34,7 +34,7 @@ class Sampled:
     passed: int
 
 
-def sampled(job: Sampling, tally: Tally, study: Study) -> Sampled | None:
+def sampled(job: Sampling, tally: SampleTally, study: ToleranceStudy) -> Sampled | None:
     """All figures of a tally; None of one that was stopped before its first block."""
     count = len(job.measures)
     totals = [total for tree in tally.trees if (total := tree.total()) is not None]
@@ -94,7 +94,7 @@ def _of_even_points(one: Moments) -> Array:
     return one.deviation * np.sqrt(np.maximum(one.count - 1, 0) / np.maximum(one.count, 1))
 
 
-def _quantiles(job: Sampling, tally: Tally, figures: Moments, replicated: bool) -> dict[str, Any]:
+def _quantiles(job: Sampling, tally: SampleTally, figures: Moments, replicated: bool) -> dict[str, Any]:
     q = np.array(QUANTILES)
     counts = np.sum(tally.histogram, axis=0)
     found = quantile(counts, job.bins, q, figures.least, figures.most)
@@ -136,7 +136,7 @@ def _yields(totals: list[Moments], passes: Moments, done: int, count: int, repli
     }  # fmt: skip
 
 
-def _capability(job: Sampling, study: Study, figures: Moments) -> dict[str, Any]:
+def _capability(job: Sampling, study: ToleranceStudy, figures: Moments) -> dict[str, Any]:
     """C_p and C_pk of the figure between its limits; of a largest |deviation|, towards the limits' smaller side."""
     cp, cpk = np.full(len(job.measures), np.nan), np.full(len(job.measures), np.nan)
     for i, measure in enumerate(job.measures):
@@ -162,7 +162,7 @@ def limits_of(measure: Any, nominal: float) -> tuple[float, float]:
     return low, high
 
 
-def _bands(job: Sampling, tally: Tally, study: Study) -> Array:
+def _bands(job: Sampling, tally: SampleTally, study: ToleranceStudy) -> Array:
     """Quantiles of the deviation of the course at every position."""
     found = np.full((len(job.measures), len(QUANTILES), job.positions), np.nan)
     for i, measure in enumerate(job.measures):
@@ -172,7 +172,7 @@ def _bands(job: Sampling, tally: Tally, study: Study) -> Array:
     return found
 
 
-def _convergence(job: Sampling, tally: Tally, count: int) -> dict[str, Any]:
+def _convergence(job: Sampling, tally: SampleTally, count: int) -> dict[str, Any]:
     """Figures of the first 1, 2, 4, … blocks, and of all; of replicates, of the first blocks of each together."""
     levels = sorted(set.intersection(*(set(tree.prefixes) for tree in tally.trees)))
     rows = []

@@ -19,7 +19,7 @@ from trunnion.errors import Status
 from trunnion.measures.evaluation import Courses, NumpyKernel
 from trunnion.measures.figures import Reference, judged
 from trunnion.measures.measures import Measure
-from trunnion.measures.positions import Plan, plan
+from trunnion.measures.positions import PositionPlan, plan
 from trunnion.model.mechanism import Mechanism
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import prepare
@@ -30,7 +30,7 @@ from trunnion.studies.tolerance.inputs import Inputs, inputs_of
 from trunnion.studies.tolerance.kernel import Kernel, batch_of, kernel_of, references
 from trunnion.version import __version__
 
-__all__ = ["METHODS", "Sampling", "Tally", "towards"]
+__all__ = ["METHODS", "SampleTally", "Sampling", "towards"]
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
@@ -45,7 +45,7 @@ BAND = {"fineness": 4, "octaves": 8}  # of the histograms at every position
 
 
 @dataclass(frozen=True, eq=False)
-class Tally:
+class SampleTally:
     """What is counted of some blocks.
 
     histogram (replicate, measure, bin), band (measure, position, bin), failed (cause): counts. trees: by replicate,
@@ -178,9 +178,9 @@ class Sampling:
             "version": __version__,
         }
 
-    def empty(self) -> Tally:
+    def empty(self) -> SampleTally:
         """The tally of no blocks."""
-        return Tally(
+        return SampleTally(
             np.zeros((self.replicates, len(self.measures), Bins(0.0, 1.0).number), np.int64),
             np.zeros((len(self.measures), self.positions, Bins(0.0, 1.0, **BAND).number), np.int64),
             np.zeros(CAUSES, np.int64),
@@ -232,7 +232,7 @@ class Sampler:
 
     job: Sampling
     inputs: Inputs
-    plan: Plan
+    plan: PositionPlan
     kernel: Kernel
     nominal: Mapping[str, Reference]
 
@@ -273,14 +273,14 @@ class Sampler:
         full = status.shape
         return {name: tuple(np.broadcast_to(part, full) for part in course) for name, course in courses.items()}, status
 
-    def evaluate(self, first: int, last: int) -> Tally:
+    def evaluate(self, first: int, last: int) -> SampleTally:
         """The tally of blocks first, …, last − 1."""
         tally = self.job.empty()
         for block in range(first, last):
             self._add(tally, block)
         return tally
 
-    def _add(self, tally: Tally, block: int) -> None:
+    def _add(self, tally: SampleTally, block: int) -> None:
         replicate, place = divmod(block, self.job.per_replicate)
         with np.errstate(all="ignore"):
             found, passed, curves, status = self.figures(self.drawn(block))

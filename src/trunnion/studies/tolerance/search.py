@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.namespace import Number
-from trunnion.studies.tolerance.effects import NOBODY, Effects, Row
+from trunnion.studies.tolerance.effects import NOBODY, EffectRow, Effects
 
 __all__ = ["Corner", "search"]
 
@@ -60,7 +60,7 @@ def search(effects: Effects, objective: Objective, start: Mapping[str, float], s
         flips = _flips(effects, best.at)
         if not flips:
             break
-        batch = replace(effects, rows=tuple(Row(NOBODY, 0, flip, "") for flip in flips))
+        batch = replace(effects, rows=tuple(EffectRow(NOBODY, 0, flip, "") for flip in flips))
         real, _ = objective(batch.values(best.at), batch)
         if not np.any(np.isfinite(real)):
             break

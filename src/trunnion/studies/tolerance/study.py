@@ -11,12 +11,12 @@ import numpy as np
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.mechanism import Mechanism
-from trunnion.results.sentences import told
+from trunnion.results.sentences import finding_for
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.studies.tolerance import runner
 from trunnion.studies.tolerance.indices import Indices, indices
 from trunnion.studies.tolerance.sampling import METHODS as SAMPLINGS
-from trunnion.studies.tolerance.sampling import Sampling, Tally
+from trunnion.studies.tolerance.sampling import SampleTally, Sampling
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -73,7 +73,7 @@ def tolerance(
     found = study(mechanism, measures, steps, at, friction)
     worst = found.worst() if "worst-case" in methods else None
     job: Sampling | None = None
-    tally: Tally | None = None
+    tally: SampleTally | None = None
     shares: Indices | None = None
     notes: list[Finding] = []
     stopped = False
@@ -94,14 +94,14 @@ def tolerance(
     return dataset(Outcome(found, tuple(methods), worst, job, tally, shares, stopped, target), [*found.told, *notes])
 
 
-def _stopped(ran: runner.Run[Tally], job: Sampling, kept: bool) -> list[Finding]:
+def _stopped(ran: runner.JobRun[SampleTally], job: Sampling, kept: bool) -> list[Finding]:
     """What to say of a run that was stopped. kept: whether its samples are in a file."""
     if not ran.stopped:
         return []
-    return [told("samples.stopped", "samples", kept=kept, done=done_of(job, ran.tally), samples=job.samples)]
+    return [finding_for("samples.stopped", "samples", kept=kept, done=done_of(job, ran.tally), samples=job.samples)]
 
 
-def done_of(job: Sampling, tally: Tally) -> int:
+def done_of(job: Sampling, tally: SampleTally) -> int:
     """Samples in a tally."""
     return int(sum(np.max(total.count) for tree in tally.trees if (total := tree.total()) is not None))
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from trunnion.errors import Finding
 from trunnion.measures.measures import Measure
-from trunnion.results.sentences import told
+from trunnion.results.sentences import finding_for
 
 if TYPE_CHECKING:
     from trunnion.studies.tolerance.linear import Of
@@ -79,9 +79,13 @@ def missed(outcome: Outcome, counted: Sampled | None) -> Iterator[Finding]:
         parts = [say.range(*known)] if beyond else []
         short = _short(counted, i, sure=bool(np.all(np.isfinite(known))) and not beyond)
         if parts or short:
-            phrases = {"told": "; ".join([*parts, *short]), "limits": say.limits(), "remedy": _remedy(outcome, of, say)}
+            phrases = {
+                "told": "; ".join([*parts, *short]),
+                "limits": say.limits(),
+                "remedy": _remedy(outcome, of, say),
+            }
             figures = {"worst_lower": known[0], "worst_upper": known[1], **_sampled(counted, i)}
-            yield told(MISSED, f"measures.{of.measure.name}", phrases=phrases, **figures)
+            yield finding_for(MISSED, f"measures.{of.measure.name}", phrases=phrases, **figures)
 
 
 def _below(outcome: Outcome, counted: Sampled | None, target: float) -> Iterator[Finding]:
@@ -95,11 +99,11 @@ def _below(outcome: Outcome, counted: Sampled | None, target: float) -> Iterator
             short = _short(counted, i, sure=True)[0]
             phrases = {"told": short, "limits": say.limits(), "remedy": _remedy(outcome, of, say)}
             figures = {"target_percent": 100 * target, **_sampled(counted, i)}
-            yield told(f"{MISSED}_yield", f"measures.{of.measure.name}", phrases=phrases, **figures)
+            yield finding_for(f"{MISSED}_yield", f"measures.{of.measure.name}", phrases=phrases, **figures)
     share, low, high = (float(counted.arrays[f"yield_all{end}"]) for end in ("", "_low", "_high"))
     if fine and high < target:
         percents: dict[str, Any] = {"percent": 100 * share, "percent_low": 100 * low, "percent_high": 100 * high}
-        yield told(f"{MISSED}_together", "measures", **percents, target_percent=100 * target)
+        yield finding_for(f"{MISSED}_together", "measures", **percents, target_percent=100 * target)
 
 
 def _sampled(counted: Sampled | None, i: int) -> dict[str, Any]:

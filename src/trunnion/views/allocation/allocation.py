@@ -10,9 +10,9 @@ import numpy as np
 from trunnion.errors import Finding, MechanismError
 from trunnion.results.attributes import attribute
 from trunnion.statistics.costs import Cost
-from trunnion.views.allocation.cost import Offer, Price, tolerance_cost, trade_off
+from trunnion.views.allocation.cost import Offer, PriceCurve, tolerance_cost, trade_off
 from trunnion.views.common.cycle import names
-from trunnion.views.common.table import Table
+from trunnion.views.common.table import TextTable
 from trunnion.views.tolerance.figure import KINDS as OF_TOLERANCES
 from trunnion.views.tolerance.figure import figure as tolerance_figure
 from trunnion.views.tolerance.readings import readings, scaled, share
@@ -32,7 +32,7 @@ AROUND = 4.0  # how many times narrower and wider than the chosen tolerance the 
 CRITERIA = {"worst-case": "worst case", "rss": "root of the sum of squares", "yield": "yield"}
 
 
-def tables(result: xr.Dataset) -> list[Table]:
+def tables(result: xr.Dataset) -> list[TextTable]:
     """What to buy, how the limits are kept, what accuracy costs, and then the tables of `tolerance`."""
     if not result.attrs["found"]:
         return []
@@ -58,7 +58,7 @@ def headed(result: xr.Dataset) -> str:
     return f"{told}, {'global optimum to first order' if result.attrs['proven'] else 'best found'}"
 
 
-def bought(result: xr.Dataset) -> Table:
+def bought(result: xr.Dataset) -> TextTable:
     """Each tolerance that has a cost: what it is to be, what it costs, and what it was."""
     rows = []
     units = attribute(result, "parameter_units")
@@ -76,7 +76,7 @@ def bought(result: xr.Dataset) -> Table:
     total, before = float(result["cost_total"]), float(result["cost_total_before"])
     rows.append(["all", "", "", "", _known(total), share(1.0), "", _known(before)])
     head = ["what to buy", "tolerance", "made", "group", "cost", "share", "as stated", "cost as stated"]
-    return _without_empty(Table(headed(result), head, rows))
+    return _without_empty(TextTable(headed(result), head, rows))
 
 
 def half_width(t: float, unit: str, sign: str = "±") -> str:
@@ -96,13 +96,13 @@ def _known(cost: float) -> str:
     return f"{cost:.6g}" if math.isfinite(cost) else "—"
 
 
-def _without_empty(table: Table) -> Table:
+def _without_empty(table: TextTable) -> TextTable:
     """Without columns that say nothing."""
     kept = [k for k in range(len(table.head)) if k == 0 or any(row[k] not in ("", "—") for row in table.rows)]
-    return Table(table.title, [table.head[k] for k in kept], [[row[k] for k in kept] for row in table.rows])
+    return TextTable(table.title, [table.head[k] for k in kept], [[row[k] for k in kept] for row in table.rows])
 
 
-def room(result: xr.Dataset) -> Table:
+def room(result: xr.Dataset) -> TextTable:
     """Of each measure how much of its room is taken by the criterion, and found by search and samples."""
     rows = []
     for read in readings(result):
@@ -117,30 +117,30 @@ def room(result: xr.Dataset) -> Table:
              _share(read.value("yield")), "—" if math.isnan(wider) else f"{wider:.4g}"]
         )  # fmt: skip
     head = ["measure", "limits", "room taken", "worst case found", "yield", "1\u00a0% wider saves"]
-    return _without_empty(Table("how the limits are kept", head, rows))
+    return _without_empty(TextTable("how the limits are kept", head, rows))
 
 
 def _share(value: float) -> str:
     return "—" if math.isnan(value) else f"{100 * value:.4g}\u00a0%"
 
 
-def trials(result: xr.Dataset) -> Table:
+def trials(result: xr.Dataset) -> TextTable:
     """What was sampled on the way to a yield."""
     keys = ("trial_margin", "trial_cost", "trial_yield", "trial_yield_low", "trial_yield_high")
     rows = [
         [f"{z:.5g} σ", _known(cost), *(_share(one) for one in shares)]
         for z, cost, *shares in zip(*(np.asarray(result[key].values, float).tolist() for key in keys), strict=True)
     ]
-    return Table("trials", ["margin of every limit", "cost", "yield", "at least", "at most"], rows)
+    return TextTable("trials", ["margin of every limit", "cost", "yield", "at least", "at most"], rows)
 
 
-def offers_table(result: xr.Dataset) -> Table:
+def offers_table(result: xr.Dataset) -> TextTable:
     """Cost over accuracy."""
     rows = [
         [f"{100 * factor:.4g}\u00a0%", _known(cost) if math.isfinite(cost) else "cannot be kept"]
         for factor, cost in zip(result["trade_off_factor"].values, result["trade_off_cost"].values, strict=True)
     ]
-    return Table("what accuracy costs", ["limits, of the stated ones", "least cost"], rows)
+    return TextTable("what accuracy costs", ["limits, of the stated ones", "least cost"], rows)
 
 
 # ---- figures ----------------------------------------------------------------------------------------------------
@@ -181,7 +181,7 @@ def _limit(result: xr.Dataset) -> tuple[str, float, str] | None:
     return found[0] if alike else None
 
 
-def prices(result: xr.Dataset) -> list[Price]:
+def prices(result: xr.Dataset) -> list[PriceCurve]:
     """What each tolerance with a cost would cost at other half widths."""
     units = dict(zip(names(result, "parameter"), attribute(result, "parameter_units"), strict=True))
     place = {name: j for j, name in enumerate(names(result, "parameter"))}
@@ -196,7 +196,7 @@ def prices(result: xr.Dataset) -> list[Price]:
             over = np.geomspace(low, high, POINTS)
             model = Cost(str(one["model"]), one["parameters"])
             curve = over, np.array([model.value(float(at)) for at in over])
-        found.append(Price(path, units[path], (t, cost), *curve, processes=made, group=str(one["group"])))
+        found.append(PriceCurve(path, units[path], (t, cost), *curve, processes=made, group=str(one["group"])))
     return found
 
 

@@ -1,7 +1,7 @@
 """Figures of an allocation: what accuracy costs, and what each tolerance costs with the chosen one marked.
 
 They take plain numbers. A trade-off is a row of `Offer`s: the limits as a share of the stated ones, and the least cost
-that keeps them. What a tolerance costs is a `Price`: a curve, or the processes that can be chosen from.
+that keeps them. What a tolerance costs is a `PriceCurve`: a curve, or the processes that can be chosen from.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["MOST_PRICES", "Offer", "Price", "tolerance_cost", "trade_off"]
+__all__ = ["MOST_PRICES", "Offer", "PriceCurve", "tolerance_cost", "trade_off"]
 
 MOST_PRICES = 12
 NAME = 30  # characters of a name over a panel
@@ -41,7 +41,7 @@ class Offer(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Price:
+class PriceCurve:
     """What the half width t of one tolerance costs.
 
     name: its path; unit: SI, of t; tolerances, costs: points of the curve, t rising; processes: (name, t, cost) of each
@@ -104,7 +104,7 @@ def _is_stepped(cost: Array) -> bool:
     return known.size > 2 and bool(np.mean(np.diff(known) == 0) > 0.25)
 
 
-def tolerance_cost(result: xr.Dataset, prices: Sequence[Price]) -> Figure:
+def tolerance_cost(result: xr.Dataset, prices: Sequence[PriceCurve]) -> Figure:
     """A panel for each tolerance, the dearest first: its cost over its half width, the chosen one marked."""
     order = sorted(prices, key=lambda one: -one.chosen[1] if math.isfinite(one.chosen[1]) else math.inf)
     shown = order[:MOST_PRICES]
@@ -121,7 +121,7 @@ def tolerance_cost(result: xr.Dataset, prices: Sequence[Price]) -> Figure:
     return drawn
 
 
-def _panel(axes: Axes, price: Price, first: bool, roomy: bool) -> None:
+def _panel(axes: Axes, price: PriceCurve, first: bool, roomy: bool) -> None:
     known = [t for _, t, _ in price.processes] or [*price.tolerances.tolist(), price.chosen[0]]
     factor, unit = scaled(max((t for t in known if math.isfinite(t)), default=1.0), price.unit)
     dress(axes, f"± [{unit}]" if unit else "±", "cost" if first else "")
@@ -144,7 +144,7 @@ def _panel(axes: Axes, price: Price, first: bool, roomy: bool) -> None:
     axes.yaxis.set_major_locator(MaxNLocator(nbins=4))
 
 
-def _told(price: Price, factor: float, unit: str) -> list[str]:
+def _told(price: PriceCurve, factor: float, unit: str) -> list[str]:
     """What is chosen, what it costs, and by which process: "±0.0105 mm, cost 9"."""
     t, cost = price.chosen
     if not math.isfinite(t + cost):
@@ -158,7 +158,7 @@ def _end(name: str) -> str:
     return name if len(name) <= NAME else f"…{name[1 - NAME :]}"
 
 
-def _headed(price: Price) -> str:
+def _headed(price: PriceCurve) -> str:
     """Name of a tolerance, with its group: the end of a long one."""
     name = f"{price.name} ({price.group})" if price.group else price.name
     return _end(name)

@@ -13,7 +13,7 @@ from trunnion.algebra.dual import primal
 from trunnion.cycle.analyse import analyse
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.mechanism import Mechanism
-from trunnion.solve.assembly_modes import Choice, Way, choices, put_together
+from trunnion.solve.assembly_modes import AssemblyMode, GroupModes, choices, put_together
 from trunnion.solve.forward import forward
 from trunnion.solve.run import Run, prepare
 from trunnion.views.assembly.mode_drawings_space import space_ways
@@ -38,16 +38,16 @@ MOST_STEPS = 1440
 
 
 @dataclass(frozen=True)
-class Drawn:
+class ModeDrawing:
     """One way: its picture, the position at which the mechanism is drawn, and links that have no place there."""
 
-    way: Way
+    way: AssemblyMode
     shown: Picture
     index: int
     missing: tuple[str, ...]
 
 
-def ways(mechanism: Mechanism, found: Sequence[Choice] | None = None) -> Figure:
+def ways(mechanism: Mechanism, found: Sequence[GroupModes] | None = None) -> Figure:
     """A drawing for every way of every group that has several, with the paths of the points; the taken one is marked.
 
     Each is what the mechanism becomes if that way is named in the file and all else is left, so later groups follow
@@ -74,7 +74,7 @@ def ways(mechanism: Mechanism, found: Sequence[Choice] | None = None) -> Figure:
     return figure
 
 
-def _drawn(mechanism: Mechanism, stated: dict[str, Any], choice: Choice, way: Way) -> Drawn:
+def _drawn(mechanism: Mechanism, stated: dict[str, Any], choice: GroupModes, way: AssemblyMode) -> ModeDrawing:
     """The whole mechanism with one group put together in one way, as far as it can be assembled."""
     run = _run(mechanism, choice, way)
     turns = max(1, math.ceil(run.cycle.turns)) if run.cycle.duration > 0 else 1
@@ -92,10 +92,10 @@ def _drawn(mechanism: Mechanism, stated: dict[str, Any], choice: Choice, way: Wa
     index = int(np.searchsorted(times, choice.time))
     missing = tuple(link for link, angle in angles.items() if not np.isfinite(angle[index]))
     picture = framed(stated, tracks, angles)
-    return Drawn(way, replace(picture, weight=0.5, only=choice.links), index, missing)
+    return ModeDrawing(way, replace(picture, weight=0.5, only=choice.links), index, missing)
 
 
-def _run(mechanism: Mechanism, choice: Choice, way: Way) -> Run:
+def _run(mechanism: Mechanism, choice: GroupModes, way: AssemblyMode) -> Run:
     """The mechanism put together in a way; without the names of other groups' ways if those then do not exist."""
     changed = put_together(mechanism, choice, way)
     try:
@@ -117,7 +117,11 @@ def _box(pictures: Sequence[Picture]) -> tuple[float, float, float, float]:
 
 
 def _group(
-    part: SubFigure, choice: Choice, row: Sequence[Drawn], columns: int, box: tuple[float, float, float, float]
+    part: SubFigure,
+    choice: GroupModes,
+    row: Sequence[ModeDrawing],
+    columns: int,
+    box: tuple[float, float, float, float],
 ) -> None:
     """The drawings of one group under its label."""
     where = f", at {choice.where}" if choice.where else ""
@@ -133,7 +137,7 @@ def _group(
         _one(axes, choice, one, float(np.hypot(box[2] - box[0], box[3] - box[1])))
 
 
-def _one(axes: Axes, choice: Choice, one: Drawn, size: float) -> None:
+def _one(axes: Axes, choice: GroupModes, one: ModeDrawing, size: float) -> None:
     """One drawing: in a frame, which is bold around the way that is taken, under the name of the way."""
     paint, width = (INK, 1.8) if one.way.taken else (RULE, 1.0)
     for spine in axes.spines.values():

@@ -12,7 +12,7 @@ import numpy as np
 from trunnion.cycle.analyse import analyse
 from trunnion.errors import MechanismError
 from trunnion.model.mechanism import Mechanism
-from trunnion.solve.assembly_modes import Choice, Way, put_together
+from trunnion.solve.assembly_modes import AssemblyMode, GroupModes, put_together
 from trunnion.views.assembly.modes import some
 from trunnion.views.common.figures import INK, MUTED, RULE, new
 from trunnion.views.common.lettering import plain
@@ -31,10 +31,10 @@ WIDTH = 2.9  # of a drawing, in
 MOST_DRAWN = 12  # ways of one group
 STEPS = 48  # positions, of the paths
 
-Drawn = tuple[Way, Space | None, int]  # a way, the mechanism in it if it can be put together, the position
+Drawn = tuple[AssemblyMode, Space | None, int]  # a way, the mechanism in it if it can be put together, the position
 
 
-def space_ways(mechanism: Mechanism, found: Sequence[Choice]) -> Figure:
+def space_ways(mechanism: Mechanism, found: Sequence[GroupModes]) -> Figure:
     """A drawing for every way of every group that has several, all from one side; the one that is taken is marked."""
     result = analyse(mechanism.with_friction("off"), 1)
     rows = [[_drawn(mechanism, choice, way) for way in some(choice, MOST_DRAWN)] for choice in found]
@@ -57,7 +57,7 @@ def space_ways(mechanism: Mechanism, found: Sequence[Choice]) -> Figure:
     return figure
 
 
-def _drawn(mechanism: Mechanism, choice: Choice, way: Way) -> Drawn:
+def _drawn(mechanism: Mechanism, choice: GroupModes, way: AssemblyMode) -> Drawn:
     """The whole mechanism with one group put together in one way."""
     try:
         result = analyse(put_together(mechanism, choice, way).with_friction("off"), STEPS)
@@ -70,7 +70,7 @@ def _drawn(mechanism: Mechanism, choice: Choice, way: Way) -> Drawn:
 
 
 def _group(
-    part: SubFigure, choice: Choice, row: list[Drawn], columns: int, frame: tuple[float, ...], looks: list[Scenery]
+    part: SubFigure, choice: GroupModes, row: list[Drawn], columns: int, frame: tuple[float, ...], looks: list[Scenery]
 ) -> None:
     """The drawings of one group under its label."""
     where = f", at {choice.where}" if choice.where else ""
@@ -86,7 +86,7 @@ def _group(
         _one(axes, choice, way, next((look for look in looks if look.shown is shown), None), index)
 
 
-def _one(axes: Axes, choice: Choice, way: Way, look: Scenery | None, index: int) -> None:
+def _one(axes: Axes, choice: GroupModes, way: AssemblyMode, look: Scenery | None, index: int) -> None:
     """One drawing: in a frame, which is bold around the way that is taken, under the name of the way."""
     paint, width = (INK, 1.8) if way.taken else (RULE, 1.0)
     for spine in axes.spines.values():

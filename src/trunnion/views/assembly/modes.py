@@ -9,7 +9,7 @@ from trunnion.views.common.quantities import prefixed
 
 if TYPE_CHECKING:
     from trunnion.cycle.inspect import GearPair
-    from trunnion.solve.assembly_modes import Choice, Way
+    from trunnion.solve.assembly_modes import AssemblyMode, GroupModes
 
 __all__ = ["gear_line", "lines", "places", "some"]
 
@@ -26,7 +26,7 @@ def gear_line(pair: GearPair) -> str:
     return f"{pair.name}: {'internal' if pair.internal else 'external'}, pitch radii {', '.join(told)}"
 
 
-def lines(choice: Choice) -> list[str]:
+def lines(choice: GroupModes) -> list[str]:
     """The position if it is not the start, each way with its joints, and what to write to take another."""
     wide = max(len(way.name) for way in choice.ways)
     found = [f"as they are at {choice.where}:"] * bool(choice.where)
@@ -37,14 +37,14 @@ def lines(choice: Choice) -> list[str]:
     return [*found, f"to take another: {choice.line(other)}"]
 
 
-def some(choice: Choice, most: int) -> list[Way]:
+def some(choice: GroupModes, most: int) -> list[AssemblyMode]:
     """The first ways of a choice, no more than `most`, the one that is taken always among them."""
     first = list(choice.ways[:most])
     taken = [way for way in choice.ways[most:] if way.taken]
     return [*first[: len(first) - len(taken)], *taken]
 
 
-def places(choice: Choice, way: Way) -> str:
+def places(choice: GroupModes, way: AssemblyMode) -> str:
     """Where the inner joints of a group are in one of its ways: 'C (70, 130) mm'."""
     numbers = [abs(n) for one in choice.ways for joint in one.joints.values() for n in joint]
     largest = max((n for n in numbers if math.isfinite(n)), default=0.0)

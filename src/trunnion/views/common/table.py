@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-__all__ = ["Table"]
+__all__ = ["TextTable"]
 
 
-class Table(NamedTuple):
+class TextTable(NamedTuple):
     """A title, the heads of the columns, the rows."""
 
     title: str

@@ -11,7 +11,7 @@ from trunnion.results.attributes import attribute
 from trunnion.rig.compare.assessment import Verdict
 from trunnion.views.common.cycle import Array, names
 from trunnion.views.common.quantities import number, prefixed
-from trunnion.views.common.table import Table
+from trunnion.views.common.table import TextTable
 from trunnion.views.compare.comparison import coverage_of, scale_of, sets, setting, text, units, verdict
 from trunnion.views.rig.conditions import shortened
 
@@ -23,7 +23,7 @@ __all__ = ["conditions", "efficiencies", "files", "headline", "results", "sensor
 NONE = "—"
 
 
-def results(result: xr.Dataset, channel: int | None = None) -> Table:
+def results(result: xr.Dataset, channel: int | None = None) -> TextTable:
     """Residual and verdict of every channel in every condition, or of one channel."""
     wanted = range(result.sizes["channel"]) if channel is None else [channel]
     what, told = shortened(names(result, "condition"))
@@ -36,10 +36,10 @@ def results(result: xr.Dataset, channel: int | None = None) -> Table:
             rows.append([*head, *_figures(result, i, k)])
     first = [what] if channel is not None else [what, "channel"]
     head = ["RMS", "largest", "at", "bias", "within ±U", "at least", "correlation", "verdict"]
-    return Table("results", [*first, *head], rows)
+    return TextTable("results", [*first, *head], rows)
 
 
-def verdicts(result: xr.Dataset) -> Table:
+def verdicts(result: xr.Dataset) -> TextTable:
     """The verdict of every channel in every condition."""
     channels = names(result, "channel")
     what, told = shortened(names(result, "condition"))
@@ -47,7 +47,7 @@ def verdicts(result: xr.Dataset) -> Table:
     for k, name in enumerate(told):
         cells = [verdict(result, i, k).text if result["turns"].values[i, k] else NONE for i in range(len(channels))]
         rows.append([name, *cells])
-    return Table("verdicts", [what, *channels], rows)
+    return TextTable("verdicts", [what, *channels], rows)
 
 
 def _figures(result: xr.Dataset, i: int, k: int) -> list[str]:
@@ -98,7 +98,7 @@ def _share(value: float) -> str:
     return f"{100 * value:.1f}\u00a0%" if np.isfinite(value) else NONE
 
 
-def efficiencies(result: xr.Dataset) -> Table | None:
+def efficiencies(result: xr.Dataset) -> TextTable | None:
     """Measured efficiency with U beside the model's; None if it was not measured."""
     if "efficiency" not in result:
         return None
@@ -112,14 +112,14 @@ def efficiencies(result: xr.Dataset) -> Table | None:
         within = words[int(result["efficiency_within"].values[k])]
         rows.append([name, *(_plain(value) for value in (measured, wide, model, measured - model)), within])
     head = [what, "η measured", f"U ({coverage_of(result)})", "η model", "difference", "model within ±U"]
-    return Table("efficiency", head, rows)
+    return TextTable("efficiency", head, rows)
 
 
 def _plain(value: float) -> str:
     return f"{value:.4f}".replace("-", "−") if np.isfinite(value) else NONE
 
 
-def conditions(result: xr.Dataset) -> Table:
+def conditions(result: xr.Dataset) -> TextTable:
     """What was set in every condition, in how many turns it was measured, and where the data are."""
     told, held = sets(result), attribute(result, "condition_files")
     rows = []
@@ -129,10 +129,10 @@ def conditions(result: xr.Dataset) -> Table:
         low, high = int(turns.min()), int(turns.max())
         kept = [file.replace("\\", "/").rsplit("/", 1)[-1] for file in held[k]] if held else []
         rows.append([name, *values, str(high) if low == high else f"{low} to {high}", ", ".join(kept) or NONE])
-    return Table("conditions", ["condition", *(one.name for one in told), "turns", "file"], rows)
+    return TextTable("conditions", ["condition", *(one.name for one in told), "turns", "file"], rows)
 
 
-def sensors(result: xr.Dataset) -> Table:
+def sensors(result: xr.Dataset) -> TextTable:
     """What each channel measures, with the standard uncertainties of its zero and gain."""
     measures = attribute(result, "channel_measures")
     rows = []
@@ -141,7 +141,7 @@ def sensors(result: xr.Dataset) -> Table:
         zeros = " to ".join(dict.fromkeys(_small(one, unit) if one else "0" for one in zero)) or NONE
         gains = " to ".join(dict.fromkeys(f"{number(100 * one, 3)}\u00a0%" if one else "0" for one in gain)) or NONE
         rows.append([name, measures[i], "" if unit == "1" else unit, zeros, gains])
-    return Table("sensors", ["channel", "measures", "unit", "u of the zero", "u of the gain"], rows)
+    return TextTable("sensors", ["channel", "measures", "unit", "u of the zero", "u of the gain"], rows)
 
 
 def _small(value: float, unit: str) -> str:
@@ -154,7 +154,7 @@ def _spread(values: Array) -> list[float]:
     return [float(known.min()), float(known.max())] if known.size else []
 
 
-def files(result: xr.Dataset, key: str = "files") -> Table | None:
+def files(result: xr.Dataset, key: str = "files") -> TextTable | None:
     """The files of the data with their size and hash; None if none is known. key: of the attribute that has them."""
     held = attribute(result, key)
     rows = [
@@ -165,7 +165,7 @@ def files(result: xr.Dataset, key: str = "files") -> Table | None:
         ]
         for row in held
     ]
-    return Table("files", ["file", "bytes", "SHA-256"], rows) if rows else None
+    return TextTable("files", ["file", "bytes", "SHA-256"], rows) if rows else None
 
 
 def headline(result: xr.Dataset) -> list[tuple[str, list[tuple[str, str]]]]:

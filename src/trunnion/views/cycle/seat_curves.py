@@ -39,7 +39,7 @@ class Curve(NamedTuple):
     look: dict[str, Any]
 
 
-class Panel(NamedTuple):
+class SeatPanel(NamedTuple):
     """A title with its unit, what is a jump in that unit, and the curves."""
 
     title: str
@@ -85,7 +85,7 @@ def described(result: xr.Dataset) -> bool:
     return bool(_panels(result))
 
 
-def _panels(result: xr.Dataset) -> list[Panel]:
+def _panels(result: xr.Dataset) -> list[SeatPanel]:
     """The panels that have any curve."""
     order = {joint: index for index, joint in enumerate(names(result, "joint"))}
     found: dict[str, list[Curve]] = {"β": [], "ξ": []}
@@ -101,7 +101,7 @@ def _panels(result: xr.Dataset) -> list[Panel]:
             if sign == "ξ" or len(seat.offsets) == 2:
                 found[sign].append(Curve(seat.joint, seat.joint, values, style_of(order[seat.joint])))
     meaning = {"β": "β, between the seats\nof the ends [°]", "ξ": "ξ, direction of\nthe seat [°]"}
-    panels = [Panel(meaning[sign], float(np.degrees(JUMP)), curves) for sign, curves in found.items() if curves]
+    panels = [SeatPanel(meaning[sign], float(np.degrees(JUMP)), curves) for sign, curves in found.items() if curves]
     if guides:
         scale, unit = prefixed(max(seat.clearance for seat in guides), "m")
         curves = [
@@ -111,11 +111,11 @@ def _panels(result: xr.Dataset) -> list[Panel]:
             for end in range(2)
         ]  # fmt: skip
         jump = scale * min(seat.clearance for seat in guides)
-        panels.append(Panel(f"offset across\nthe guide [{unit}]", jump, curves, angles=False))
+        panels.append(SeatPanel(f"offset across\nthe guide [{unit}]", jump, curves, angles=False))
     return panels
 
 
-def _draw(axes: Axes, over: Abscissa, panel: Panel, one: Curve, lost: NDArray[np.intp]) -> None:
+def _draw(axes: Axes, over: Abscissa, panel: SeatPanel, one: Curve, lost: NDArray[np.intp]) -> None:
     x, y = over.values, one.values
     if over.closed:
         x, y = np.append(x, x[0] + over.period), np.append(y, y[0])
@@ -125,7 +125,7 @@ def _draw(axes: Axes, over: Abscissa, panel: Panel, one: Curve, lost: NDArray[np
     curve(axes, replace(over, values=cut_x, closed=False), cut_y, one.label, **one.look)
 
 
-def _cross(axes: Axes, over: Abscissa, panel: Panel, lost: Mapping[str, NDArray[np.intp]]) -> None:
+def _cross(axes: Axes, over: Abscissa, panel: SeatPanel, lost: Mapping[str, NDArray[np.intp]]) -> None:
     """Crosses on the curves where their joints lose contact."""
     label: str | None = "contact lost"
     for one in panel.curves:

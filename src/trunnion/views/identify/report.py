@@ -13,7 +13,7 @@ import numpy as np
 from trunnion.results.attributes import attribute
 from trunnion.views.common.bundle import web_text
 from trunnion.views.common.quantities import number
-from trunnion.views.common.table import Table
+from trunnion.views.common.table import TextTable
 from trunnion.views.compare.tables import files
 from trunnion.views.cycle.report import said
 from trunnion.views.identify.figure import figure
@@ -113,6 +113,8 @@ def _sections(result: xr.Dataset) -> list[dict[str, Any]]:
     return [one for one in found if one is not None]
 
 
-def _section(title: str, result: xr.Dataset, kind: str, tables: list[Table | None], about: str = "") -> dict[str, Any]:
+def _section(
+    title: str, result: xr.Dataset, kind: str, tables: list[TextTable | None], about: str = ""
+) -> dict[str, Any]:
     picture = {"alt": title, "source": source(figure(result, kind))} if kind else None
     return {"title": title, "about": about, "picture": picture, "tables": [one for one in tables if one is not None]}

@@ -9,7 +9,7 @@ import numpy as np
 
 from trunnion.views.common.cycle import names
 from trunnion.views.common.quantities import prefixed
-from trunnion.views.common.table import Table
+from trunnion.views.common.table import TextTable
 from trunnion.views.identify.identification import Estimate, channels, conditions, estimates, percent
 from trunnion.views.rig.conditions import shortened
 
@@ -19,13 +19,13 @@ if TYPE_CHECKING:
 __all__ = ["budget", "correlations", "estimated", "fits", "held_out", "sensors", "tables"]
 
 
-def tables(result: xr.Dataset) -> list[Table]:
+def tables(result: xr.Dataset) -> list[TextTable]:
     """What was found, how it hangs together, how the model fits, and what was held out."""
     found = [estimated(result), correlations(result), fits(result), held_out(result)]
     return [one for one in found if one is not None]
 
 
-def estimated(result: xr.Dataset) -> Table:
+def estimated(result: xr.Dataset) -> TextTable:
     """A row for each parameter: start, estimate ± expanded uncertainty, interval, and what most of that is due to."""
     rows = [
         [
@@ -39,7 +39,7 @@ def estimated(result: xr.Dataset) -> Table:
         for one in estimates(result)
     ]
     head = ["parameter", "start", "estimate ± U", "95\u00a0% interval", "degrees of freedom", "most of its variance"]
-    return Table(f"{result.attrs['identified']}: what was found", head, rows)
+    return TextTable(f"{result.attrs['identified']}: what was found", head, rows)
 
 
 def _freedom(one: Estimate) -> str:
@@ -67,7 +67,7 @@ def _interval(one: Estimate) -> str:
     return f"{one.say(one.lower, unit=False)}\u00a0to\u00a0{one.say(one.upper)}"
 
 
-def correlations(result: xr.Dataset) -> Table | None:
+def correlations(result: xr.Dataset) -> TextTable | None:
     """Between the estimates, of several; columns are numbered as the rows are, for names would be too wide."""
     told = [p for p, one in enumerate(estimates(result)) if one.told]
     if len(told) < 2:
@@ -78,10 +78,10 @@ def correlations(result: xr.Dataset) -> Table | None:
         [f"{k} {short[p]}", *(f"{values[p, q]:.2f}".replace("-", "−") if q <= p else "" for q in told)]
         for k, p in enumerate(told, 1)
     ]
-    return Table("correlation", ["", *(f"{k}" for k in range(1, len(told) + 1))], rows)
+    return TextTable("correlation", ["", *(f"{k}" for k in range(1, len(told) + 1))], rows)
 
 
-def fits(result: xr.Dataset) -> Table | None:
+def fits(result: xr.Dataset) -> TextTable | None:
     """A row for each channel and condition: rms before and after, and what the scatter explains of it."""
     rows = []
     title, names_of = shortened(names(result, "condition"))
@@ -97,10 +97,10 @@ def fits(result: xr.Dataset) -> Table | None:
     if not rows:
         return None
     head = ["channel", title, "rms before", "rms after", "by scatter", "unit", "turns", "positions"]
-    return Table("how the model fits", head, rows)
+    return TextTable("how the model fits", head, rows)
 
 
-def held_out(result: xr.Dataset) -> Table | None:
+def held_out(result: xr.Dataset) -> TextTable | None:
     """What was not fitted but predicted."""
     rows = []
     title, names_of = shortened(names(result, "condition"))
@@ -114,10 +114,10 @@ def held_out(result: xr.Dataset) -> Table | None:
     if not rows:
         return None
     head = ["channel", title, "turns", "rms before", "rms after", "to be expected", "unit"]
-    return Table("what was held out", head, rows)
+    return TextTable("what was held out", head, rows)
 
 
-def sensors(result: xr.Dataset) -> Table | None:
+def sensors(result: xr.Dataset) -> TextTable | None:
     """Estimated errors of the sensors, in what is stated of them."""
     rows = [
         [name, f"{error:.2f} ± {2 * u:.2f}".replace("-", "−") if math.isfinite(error) else "not told"]
@@ -126,17 +126,17 @@ def sensors(result: xr.Dataset) -> Table | None:
         )
         if not name.startswith("zero of each file")  # as many as there are files
     ]
-    return Table("errors of the sensors", ["", "in stated standard uncertainties, ± 2 u"], rows) if rows else None
+    return TextTable("errors of the sensors", ["", "in stated standard uncertainties, ± 2 u"], rows) if rows else None
 
 
-def budget(result: xr.Dataset) -> Table | None:
+def budget(result: xr.Dataset) -> TextTable | None:
     """Share of each source in the variance of each estimate; of sources that are anything."""
     told = [one for one in estimates(result) if one.told]
     sources = [name for name in names(result, "source") if any(one.shares[name] >= LEAST for one in told)]
     if not told:
         return None
     rows = [[name, *(percent(one.shares[name]) for one in told)] for name in sources]
-    return Table("where the uncertainty comes from", ["share of the variance", *(one.short for one in told)], rows)
+    return TextTable("where the uncertainty comes from", ["share of the variance", *(one.short for one in told)], rows)
 
 
 LEAST = 0.005

@@ -13,14 +13,14 @@ from trunnion.views.common.figures import INK, PALETTE, along, frame_peak, legen
 from trunnion.views.common.lettering import plain
 from trunnion.views.common.peaks import ease, usual_peak
 from trunnion.views.common.quantities import prefixed, quantity
-from trunnion.views.common.table import Table
+from trunnion.views.common.table import TextTable
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["MOST_PANELS", "Table", "figure", "tables"]
+__all__ = ["MOST_PANELS", "TextTable", "figure", "tables"]
 
 MOST_PANELS = 6
 PANEL = 3.3  # height, inches
@@ -90,7 +90,7 @@ def _over(result: xr.Dataset) -> Abscissa:
 HEAD = ["joint", "play", "largest effect ±", "at", "share"]
 
 
-def tables(result: xr.Dataset) -> list[Table]:
+def tables(result: xr.Dataset) -> list[TextTable]:
     """For each measure: the joints with their play, largest effect and where, and share in the largest worst case."""
     units, over = attribute(result, "measure_units"), _over(result)
     return [
@@ -99,10 +99,10 @@ def tables(result: xr.Dataset) -> list[Table]:
     ]
 
 
-def _table(result: xr.Dataset, over: Abscissa, name: str, unit: str) -> Table:
+def _table(result: xr.Dataset, over: Abscissa, name: str, unit: str) -> TextTable:
     total = _relied_on(result, "worst_case_total")
     if not np.isfinite(total).any():
-        return Table(f"{name}: no position has an answer", HEAD, [])
+        return TextTable(f"{name}: no position has an answer", HEAD, [])
     top, rows, effects = int(np.nanargmax(total)), list[list[str]](), _relied_on(result, "worst_case")
     for j, joint in enumerate(result["joint"].values):
         effect = effects[j]
@@ -118,7 +118,7 @@ def _table(result: xr.Dataset, over: Abscissa, name: str, unit: str) -> Table:
         best = int(np.nanargmax(row))
         rows.append([label, "", quantity(float(row[best]), unit), over.say(best), ""])
     low, high = (quantity(float(pick(result["value"].values)), unit) for pick in (np.nanmin, np.nanmax))
-    return Table(f"{name}, from {low} to {high}; shares are at {over.say(top)}", HEAD, rows)
+    return TextTable(f"{name}, from {low} to {high}; shares are at {over.say(top)}", HEAD, rows)
 
 
 def _relied_on(result: xr.Dataset, name: str) -> Array:

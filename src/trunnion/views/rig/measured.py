@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from trunnion.rig.reading.measurement import Course, Measurement
-from trunnion.views.common.table import Table
+from trunnion.rig.reading.measurement import Measurement, Signal
+from trunnion.views.common.table import TextTable
 from trunnion.views.rig.conditions import shortened
 
 __all__ = ["tables"]
@@ -13,7 +13,7 @@ __all__ = ["tables"]
 MOST = 40  # conditions shown
 
 
-def tables(measurement: Measurement) -> list[Table]:
+def tables(measurement: Measurement) -> list[TextTable]:
     """The conditions with the mean of each channel, then the channels with scatter and uncertainty over all of them."""
     conditions = measurement.conditions
     channels = list(conditions[0].courses)
@@ -30,14 +30,14 @@ def tables(measurement: Measurement) -> list[Table]:
         rows.append([*own, f"{turns:,}", *speed, *(_figure(_overall(one.courses[key])) for key in channels)])
     if len(conditions) > MOST:
         rows.append([f"{len(conditions) - MOST} more", *[""] * (len(head) - 1)])
-    shown = [Table(f"{measurement.name}\nconditions: mean over turns and positions", head, rows)]
+    shown = [TextTable(f"{measurement.name}\nconditions: mean over turns and positions", head, rows)]
     head = ["channel", "measures", "unit", "least", "largest", "scatter", "uncertainty"]
     rows = [[name, *_channel([one.courses[name] for one in conditions])] for name in channels]
     title = "channels: mean courses, what turns scatter, standard uncertainty of the mean"
-    return [*shown, Table(title, head, rows)]
+    return [*shown, TextTable(title, head, rows)]
 
 
-def _channel(courses: list[Course]) -> list[str]:
+def _channel(courses: list[Signal]) -> list[str]:
     """Measure and unit of a channel; extremes of its mean courses; RMS of scatter and of uncertainty."""
     means = np.concatenate([one.mean for one in courses])
     known = means[np.isfinite(means)]
@@ -46,7 +46,7 @@ def _channel(courses: list[Course]) -> list[str]:
     return [courses[0].measures, _unit(courses[0].unit), *extremes, *(_figure(_rms(one), 3) for one in spreads)]
 
 
-def _overall(course: Course) -> float:
+def _overall(course: Signal) -> float:
     known = course.mean[np.isfinite(course.mean)]
     with np.errstate(over="ignore"):
         return float(known.mean()) if known.size else np.nan

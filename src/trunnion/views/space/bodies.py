@@ -21,7 +21,7 @@ from trunnion.views.common.cycle import Array, column, layout, names
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Pose", "Space", "gathered", "is_spatial", "rotation_matrix", "space", "without_noise"]
+__all__ = ["BodyPose", "Space", "gathered", "is_spatial", "rotation_matrix", "space", "without_noise"]
 
 PIN = 14.0  # a mechanism is drawn at least as large as so many radii of its thickest pin
 NEAR = 0.1  # joints whose points lie closer than this share of the size are drawn apart
@@ -32,7 +32,7 @@ NOISE = 1e-9  # reactions below this share of what moments and lengths make like
 
 
 @dataclass(frozen=True)
-class Pose:
+class BodyPose:
     """Where a link is: matrix (3, 3, position) and origin (3, position), m."""
 
     matrix: Array
@@ -61,7 +61,7 @@ class Space:
     """
 
     stated: dict[str, Any]
-    poses: dict[str, Pose]
+    poses: dict[str, BodyPose]
     free: dict[str, Array]
     thickest: float = 0.0
 
@@ -227,7 +227,7 @@ def gathered(result: xr.Dataset) -> Space:
     count = result.sizes["position"]
     poses = {link: _pose(result, link) for link in names(result, "link")}
     still = np.broadcast_to(np.eye(3)[:, :, None], (3, 3, count)), np.zeros((3, count))
-    poses[stated["ground"]] = Pose(*still)  # the global frame, also where nothing else is known
+    poses[stated["ground"]] = BodyPose(*still)  # the global frame, also where nothing else is known
     free = {}
     for key in names(result, "point"):
         link, point = key.split(".", 1)
@@ -240,13 +240,13 @@ def gathered(result: xr.Dataset) -> Space:
     return Space(stated, poses, free, max(radii, default=0.0))
 
 
-def _pose(result: xr.Dataset, link: str) -> Pose:
+def _pose(result: xr.Dataset, link: str) -> BodyPose:
     turn = result["link_rotation"].sel(link=link).transpose("component", "position")
     place = result["link_position"].sel(link=link).transpose("axis", "position")
-    return Pose(rotation_matrix(np.asarray(turn.values, dtype=float)), np.asarray(place.values, dtype=float))
+    return BodyPose(rotation_matrix(np.asarray(turn.values, dtype=float)), np.asarray(place.values, dtype=float))
 
 
-def _local(result: xr.Dataset, key: str, pose: Pose) -> Array | None:
+def _local(result: xr.Dataset, key: str, pose: BodyPose) -> Array | None:
     """A point in the frame of its link, from the first position that is known."""
     track = np.asarray(result["point_position"].sel(point=key).transpose("axis", "position").values, dtype=float)
     known = np.flatnonzero(np.isfinite(track).all(axis=0) & pose.known)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from trunnion.views.common.cycle import Array
 
-__all__ = ["Table", "tables"]
+__all__ = ["SweepTable", "tables"]
 
 MOST_ROWS, MOST_COLUMNS = 40, 8  # of a table
 LEAST_COLUMNS = 3
@@ -30,7 +30,7 @@ LEAST_ROWS, MOST_TABLES = 6, 6  # where there are several
 BESIDE = "friction_power_mean", "locking_margin"  # told beside the measure, if the sweep has them
 
 
-class Table(NamedTuple):
+class SweepTable(NamedTuple):
     """Title, head and rows of texts; left_out: points that are not shown."""
 
     title: str
@@ -41,7 +41,7 @@ class Table(NamedTuple):
 
 def tables(
     result: xr.Dataset, measures: Sequence[str] = ("efficiency",), x: str = "", family: str = "", room: int = 1000
-) -> list[Table]:
+) -> list[SweepTable]:
     """One table of several figures over a single name; of more names one for each measure and value of the facets.
 
     room: characters in a line, which limit how many columns of a long table are shown.
@@ -52,7 +52,7 @@ def tables(
     return [table for measure in measures for table in _matrices(result, measure, plan, room)]
 
 
-def _list(result: xr.Dataset, measures: Sequence[str], plan: Arrangement) -> Table:
+def _list(result: xr.Dataset, measures: Sequence[str], plan: Arrangement) -> SweepTable:
     found = figures(result)
     efforts = [name for name in found if name.endswith(".effort_max")]
     shown = [*measures, "efficiency", "efficiency_ideal", *efforts, *BESIDE]
@@ -67,10 +67,10 @@ def _list(result: xr.Dataset, measures: Sequence[str], plan: Arrangement) -> Tab
         cells = ["" if np.isnan(column[i]) else _number(column[i]) for column in columns]
         rows.append([_number(plan.x.values[i]), *cells, *([words[i]] if any(words) else [])])
     said = ", ".join(name.replace("_", " ") for name in measures)
-    return Table(_titled(f"{said} over {plan.x.name}", plan.at()), head, rows, len(plan.x.values) - len(picked))
+    return SweepTable(_titled(f"{said} over {plan.x.name}", plan.at()), head, rows, len(plan.x.values) - len(picked))
 
 
-def _matrices(result: xr.Dataset, measure: str, plan: Arrangement, room: int) -> list[Table]:
+def _matrices(result: xr.Dataset, measure: str, plan: Arrangement, room: int) -> list[SweepTable]:
     """A table for each combination of the facets' values; of many of them some."""
     assert plan.other is not None  # a matrix has columns
     unit, values = grid(result, plan, measure)
@@ -90,7 +90,9 @@ def _matrices(result: xr.Dataset, measure: str, plan: Arrangement, room: int) ->
     return made
 
 
-def _matrix(title: str, plan: Arrangement, values: Array, status: NDArray[np.int8], most: tuple[int, int]) -> Table:
+def _matrix(
+    title: str, plan: Arrangement, values: Array, status: NDArray[np.int8], most: tuple[int, int]
+) -> SweepTable:
     """most: rows, and characters in a line."""
     assert plan.other is not None
     down = thinned(values.shape[0], most[0])
@@ -101,7 +103,7 @@ def _matrix(title: str, plan: Arrangement, values: Array, status: NDArray[np.int
     while len(across) > LEAST_COLUMNS and _width(columns, across) > most[1]:
         across = thinned(values.shape[1], len(across) - 1)
     head, *rows = ([columns[0][i], *(columns[k + 1][i] for k in across)] for i in range(len(down) + 1))
-    return Table(title, head, rows, values.size - len(down) * len(across))
+    return SweepTable(title, head, rows, values.size - len(down) * len(across))
 
 
 def _cell(value: float, status: int) -> str:

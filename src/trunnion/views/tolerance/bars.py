@@ -10,7 +10,7 @@ import numpy as np
 from trunnion.views.common.cycle import names
 from trunnion.views.common.figures import INK, MUTED, PALETTE, dress, legend
 from trunnion.views.common.lettering import plain
-from trunnion.views.tolerance.readings import Contribution, Reading
+from trunnion.views.tolerance.readings import ContributionRow, MeasureReading
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,18 +26,18 @@ INSIDE = 0.09  # share of a bar that holds its number
 NAME = 34  # characters of a name beside a bar
 
 
-def rows_of(read: Reading) -> int:
+def rows_of(read: MeasureReading) -> int:
     """How many rows of bars the contributions to this measure take."""
     shown, rest = _kept(read)
     return len(shown) + bool(rest)
 
 
-def rows_of_sobol(read: Reading) -> int:
+def rows_of_sobol(read: MeasureReading) -> int:
     """How many rows of bars its Sobol indices take."""
     return len(_kept_indices(read))
 
 
-def _kept(read: Reading) -> tuple[list[Contribution], list[Contribution]]:
+def _kept(read: MeasureReading) -> tuple[list[ContributionRow], list[ContributionRow]]:
     """What has a bar of its own, and the rest: what is small, or too much."""
     found = read.contributions
     large = [one for one in found if one.largest_share >= LEAST]
@@ -47,7 +47,7 @@ def _kept(read: Reading) -> tuple[list[Contribution], list[Contribution]]:
     return shown, [one for one in found if one not in shown]
 
 
-def _kept_indices(read: Reading) -> list[int]:
+def _kept_indices(read: MeasureReading) -> list[int]:
     """Numbers whose Sobol indices have bars, the largest first."""
     total = np.where(np.isfinite(read.row("total_order")), read.row("total_order"), -1.0)
     order = [int(k) for k in np.argsort(-total, kind="stable")]
@@ -55,7 +55,7 @@ def _kept_indices(read: Reading) -> list[int]:
     return large or order[:1]
 
 
-def contributions(parent: FigureBase, read: Reading) -> None:
+def contributions(parent: FigureBase, read: MeasureReading) -> None:
     """Share of each number in the sum of squares, sorted, with the running total; beside it those in the worst case,
     and in the variance where they are others."""
     axes = parent.subplots()
@@ -93,7 +93,7 @@ def contributions(parent: FigureBase, read: Reading) -> None:
     legend(axes, room=ROOM)
 
 
-def sobol(parent: FigureBase, read: Reading) -> None:
+def sobol(parent: FigureBase, read: MeasureReading) -> None:
     """First-order and total share of each number in the variance, with 95 % intervals, sorted by the total."""
     axes = parent.subplots()
     paths = names(read.result, "parameter")

@@ -10,13 +10,13 @@ from trunnion.views.common.figures import INK, MUTED, WIDTH, new
 from trunnion.views.common.lettering import plain
 from trunnion.views.tolerance.bars import contributions, rows_of, rows_of_sobol, sobol
 from trunnion.views.tolerance.plots import convergence, envelope, histogram
-from trunnion.views.tolerance.readings import Reading, readings
+from trunnion.views.tolerance.readings import MeasureReading, readings
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure, FigureBase
 
-__all__ = ["KINDS", "MOST_PANELS", "Kind", "check_kind", "drawable", "figure", "sheet"]
+__all__ = ["KINDS", "MOST_PANELS", "FigureKind", "check_kind", "drawable", "figure", "sheet"]
 
 MOST_PANELS = 6
 PANEL = 3.5  # height, inches
@@ -24,13 +24,13 @@ WIDE = 6.6  # of a panel of the sheet
 FEW = ("histogram", "contributions", "envelope")  # on a sheet of several measures
 
 
-class Kind(NamedTuple):
+class FigureKind(NamedTuple):
     """A kind of figure: its title, what draws it, whether a measure has it, its height, and what to do if not."""
 
     title: str
-    draw: Callable[[FigureBase, Reading], None]
-    ready: Callable[[Reading], bool]
-    height: Callable[[Reading], float]
+    draw: Callable[[FigureBase, MeasureReading], None]
+    ready: Callable[[MeasureReading], bool]
+    height: Callable[[MeasureReading], float]
     remedy: str
 
 
@@ -39,30 +39,30 @@ def _bars(rows: int) -> float:
 
 
 SAMPLES = "ask for samples: --method monte-carlo"
-KINDS: dict[str, Kind] = {
-    "histogram": Kind(
+KINDS: dict[str, FigureKind] = {
+    "histogram": FigureKind(
         "Distribution", histogram, lambda read: read.has("histogram"), lambda _: PANEL, SAMPLES
     ),
-    "contributions": Kind(
+    "contributions": FigureKind(
         "Contributions", contributions, lambda read: read.has("contribution_rss"),
         lambda read: _bars(rows_of(read)), "ask for --method linear"
     ),
-    "envelope": Kind(
+    "envelope": FigureKind(
         "Envelope over the drive", envelope, lambda read: read.places is not None, lambda _: PANEL + 0.3,
         "measure it at more than one position; a place in the cycle has none",
     ),
-    "convergence": Kind(
+    "convergence": FigureKind(
         "Convergence", convergence, lambda read: len(read.row("convergence_samples")) > 1, lambda _: PANEL + 1.0,
         SAMPLES,
     ),
-    "sobol": Kind(
+    "sobol": FigureKind(
         "Sobol indices", sobol, lambda read: read.has("total_order"),
         lambda read: _bars(rows_of_sobol(read)), "ask for --method sobol"
     ),
 }  # fmt: skip
 
 
-def drawable(read: Reading) -> list[str]:
+def drawable(read: MeasureReading) -> list[str]:
     """The kinds of figures that a measure has something for."""
     return [name for name, kind in KINDS.items() if kind.ready(read)]
 
@@ -88,11 +88,11 @@ def figure(result: xr.Dataset, kind: str, measures: Sequence[str] | None = None)
     return drawn
 
 
-def _title(read: Reading, about: Kind) -> str:
+def _title(read: MeasureReading, about: FigureKind) -> str:
     return f"{about.title}: {read.name}"
 
 
-def _named_so(read: Reading) -> str:
+def _named_so(read: MeasureReading) -> str:
     return f"{read.name}: {read.text}" if read.text else read.name
 
 
@@ -116,7 +116,7 @@ def sheet(result: xr.Dataset, measures: Sequence[str] | None = None) -> Figure:
     return drawn
 
 
-def _alone(result: xr.Dataset, read: Reading, kinds: list[str]) -> Figure:
+def _alone(result: xr.Dataset, read: MeasureReading, kinds: list[str]) -> Figure:
     """All kinds of one measure, two in a row."""
     columns = min(len(kinds), 2)
     rows = [kinds[k : k + columns] for k in range(0, len(kinds), columns)]
@@ -130,7 +130,7 @@ def _alone(result: xr.Dataset, read: Reading, kinds: list[str]) -> Figure:
     return drawn
 
 
-def _part(part: FigureBase, read: Reading, kind: str, there: bool) -> None:
+def _part(part: FigureBase, read: MeasureReading, kind: str, there: bool) -> None:
     """One figure of a sheet under its title; nothing where the measure lacks it."""
     if there:
         part.suptitle(KINDS[kind].title, x=0.012, ha="left", fontsize=9.5, color=MUTED)
@@ -150,5 +150,5 @@ def check_count(count: int) -> None:
         raise MechanismError(Finding(what, "--out", f"name at most {MOST_PANELS} by --measure"))
 
 
-def _named(result: xr.Dataset, measures: Sequence[str] | None) -> list[Reading]:
+def _named(result: xr.Dataset, measures: Sequence[str] | None) -> list[MeasureReading]:
     return [read for read in readings(result) if measures is None or read.name in measures]

@@ -13,7 +13,7 @@ from trunnion.statistics import intervals
 from trunnion.views.common.cycle import Abscissa, Array
 from trunnion.views.common.figures import INK, MUTED, PALETTE, SHADE, along, curve, dress, legend
 from trunnion.views.common.lettering import plain
-from trunnion.views.tolerance.readings import OUTER, Reading, failures, share, share_interval, share_parts
+from trunnion.views.tolerance.readings import OUTER, MeasureReading, failures, share, share_interval, share_parts
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -33,7 +33,7 @@ MEANINGS = {"mean": "mean", "deviation": "deviation σ"}
 # ---- distribution -------------------------------------------------------------------------------------------------
 
 
-def histogram(parent: FigureBase, read: Reading) -> None:
+def histogram(parent: FigureBase, read: MeasureReading) -> None:
     """Counts of the samples within and beyond the limits, with nominal, mean and the range of 99.73 %."""
     axes = parent.subplots()
     counts, edges = read.row("histogram"), read.row("edge")
@@ -63,7 +63,7 @@ def histogram(parent: FigureBase, read: Reading) -> None:
     legend(axes, most=3)
 
 
-def _lost(read: Reading) -> str:
+def _lost(read: MeasureReading) -> str:
     """What the yield leaves out."""
     return "beyond, or failed," if any(count for _, count in failures(read.result)) else "beyond"
 
@@ -84,7 +84,7 @@ def _core(counts: Array, edges: Array) -> tuple[float, float]:
     return max(float(ends[0]), low - room), min(float(ends[1]), high + room)
 
 
-def _window(read: Reading, low: float, high: float) -> tuple[float, float]:
+def _window(read: MeasureReading, low: float, high: float) -> tuple[float, float]:
     """Ends of the axis: the core, and what lies within one more width of it to either side: limits, nominal."""
     width = high - low or abs(high) or 1.0
     marks = [read.nominal, *(read.nominal + end for end in read.room)]
@@ -94,7 +94,7 @@ def _window(read: Reading, low: float, high: float) -> tuple[float, float]:
     return (low if read.is_size and low <= 0 else low - margin), high + margin
 
 
-def _zero(read: Reading, width: float) -> tuple[float, str]:
+def _zero(read: MeasureReading, width: float) -> tuple[float, str]:
     """What is subtracted from the figures, and the title of the axis: a narrow spread is told as a deviation."""
     if not abs(read.nominal) > 0 or width > READABLE * abs(read.nominal):
         return 0.0, read.titled
@@ -118,7 +118,7 @@ def _bars(counts: Array, edges: Array, low: float, high: float) -> tuple[Array, 
     return np.diff(total), even
 
 
-def _lines(axes: Axes, read: Reading, shift: float) -> None:
+def _lines(axes: Axes, read: MeasureReading, shift: float) -> None:
     """Upright lines: limits, nominal, mean, ends of the range of 99.73 %."""
 
     def upright(value: float, label: str | None, **look: Any) -> None:
@@ -140,7 +140,7 @@ def _lines(axes: Axes, read: Reading, shift: float) -> None:
             upright(end, None if k else text, color=MUTED, linewidth=1.0, linestyle=(0, (2, 1.5)))
 
 
-def outer(read: Reading) -> tuple[float, float] | None:
+def outer(read: MeasureReading) -> tuple[float, float] | None:
     """Ends of the range of 99.73 %."""
     if not read.has("quantile_value"):
         return None
@@ -150,7 +150,7 @@ def outer(read: Reading) -> tuple[float, float] | None:
     return (found[0], found[1]) if len(found) == 2 else None
 
 
-def _left_out(axes: Axes, read: Reading, low: float, high: float) -> None:
+def _left_out(axes: Axes, read: MeasureReading, low: float, high: float) -> None:
     """How many samples lie outside the picture."""
     counts, edges = read.row("histogram"), read.row("edge")
     outside = int(counts[(edges[1:] <= low) | (edges[:-1] >= high)].sum())
@@ -168,7 +168,7 @@ def _left_out(axes: Axes, read: Reading, low: float, high: float) -> None:
 # ---- envelope -----------------------------------------------------------------------------------------------------
 
 
-def envelope(parent: FigureBase, read: Reading) -> None:
+def envelope(parent: FigureBase, read: MeasureReading) -> None:
     """Deviation of the course from nominal over the drive: worst case, bands of the samples, RSS, limits."""
     assert read.places is not None
     axes, over = parent.subplots(), read.places[0]
@@ -202,7 +202,7 @@ def envelope(parent: FigureBase, read: Reading) -> None:
     legend(axes, most=4)
 
 
-def rss_label(read: Reading) -> str:
+def rss_label(read: MeasureReading) -> str:
     """RSS, with what it leaves out."""
     return "RSS, uncorrelated" if read.correlated else "RSS"
 
@@ -217,7 +217,7 @@ def _band(axes: Axes, over: Abscissa, ends: list[Array], label: str | None, **lo
     axes.fill_between(x, low, high, label=label, linewidth=0, **look)
 
 
-def _bands(axes: Axes, over: Abscissa, read: Reading) -> None:
+def _bands(axes: Axes, over: Abscissa, read: MeasureReading) -> None:
     """Ranges that hold 99.73 % and 90 % of the samples at each position."""
     if not read.has("band"):
         return
@@ -232,7 +232,7 @@ def _bands(axes: Axes, over: Abscissa, read: Reading) -> None:
     curve(axes, over, read.along(band[middle]), None, color=WITHIN, linewidth=1.0)
 
 
-def _corner(axes: Axes, over: Abscissa, read: Reading) -> None:
+def _corner(axes: Axes, over: Abscissa, read: MeasureReading) -> None:
     """The worst corner of the nonlinear model, where the figure is the largest deviation over the drive."""
     ends = [read.value(f"searched_{end}") for end in ("lower", "upper")]
     found = max(ends, key=abs)
@@ -243,7 +243,7 @@ def _corner(axes: Axes, over: Abscissa, read: Reading) -> None:
               markerfacecolor="white", markeredgewidth=1.3)  # fmt: skip
 
 
-def _holes(axes: Axes, over: Abscissa, read: Reading) -> None:
+def _holes(axes: Axes, over: Abscissa, read: MeasureReading) -> None:
     """Grey where the nominal mechanism has no answer."""
     assert read.places is not None
     x, picked = over.values, read.places[1]
@@ -258,7 +258,7 @@ def _holes(axes: Axes, over: Abscissa, read: Reading) -> None:
 # ---- convergence --------------------------------------------------------------------------------------------------
 
 
-def convergence(parent: FigureBase, read: Reading) -> None:
+def convergence(parent: FigureBase, read: MeasureReading) -> None:
     """Mean, standard deviation and yield of the first samples, 2ᵏ of them, with their 95 % intervals."""
     size, told = read.row("convergence_samples"), ["mean", "deviation", *(["yield"] if read.limited else [])]
     panels = list(parent.subplots(len(told), 1, sharex=True, squeeze=False)[:, 0])
@@ -280,12 +280,12 @@ def convergence(parent: FigureBase, read: Reading) -> None:
     legend(panels[0])
 
 
-def _is_plain(read: Reading) -> bool:
+def _is_plain(read: MeasureReading) -> bool:
     """Whether the samples are independent, so that an interval shrinks with the root of their number."""
     return str(read.result.attrs.get("sampling", "monte-carlo")) == "monte-carlo"
 
 
-def _intervals(read: Reading, key: str, values: Array, size: Array) -> tuple[Array, Array]:
+def _intervals(read: MeasureReading, key: str, values: Array, size: Array) -> tuple[Array, Array]:
     """95 % intervals at every number of samples; of other than independent ones only of the last, as it is told."""
     low, high = read.value(f"{key}_low"), read.value(f"{key}_high")
     if not _is_plain(read):

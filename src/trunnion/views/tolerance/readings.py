@@ -1,4 +1,4 @@
-"""What tolerances do to a measure, in words and numbers: one `Reading` for each measure of a result of `tolerance`.
+"""What tolerances do to a measure, in words and numbers: a `MeasureReading` for each measure of a result.
 
 All numbers of a measure are told in one unit, with as many decimals as its spread needs: 112.3000° beside 0.0486°.
 """
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 
 __all__ = [
     "OUTER",
-    "Contribution",
-    "Reading",
+    "ContributionRow",
+    "MeasureReading",
     "failures",
     "fixed",
     "limits_text",
@@ -43,7 +43,7 @@ DEGREE = ("°", "deg")
 
 
 @dataclass(frozen=True)
-class Contribution:
+class ContributionRow:
     """What one toleranced number has in a measure, in SI; shares from 0 to 1, NaN where they are not known.
 
     name: its path; short: without the section, where that names one number only; limits: as in a drawing;
@@ -70,7 +70,7 @@ class Contribution:
 
 
 @dataclass(frozen=True)
-class Reading:
+class MeasureReading:
     """One measure of a result, (parameter, position, quantile, …), its unit and its limits.
 
     limits: (lower, upper) of the deviation from nominal, bounds: of the measure itself; SI, infinite without.
@@ -259,7 +259,7 @@ class Reading:
         return any(abs(one.variance_share - one.rss_share) > APART for one in self.contributions)
 
     @cached_property
-    def contributions(self) -> list[Contribution]:
+    def contributions(self) -> list[ContributionRow]:
         """Of every toleranced number, the largest share first."""
         units = attribute(self.result, "parameter_units")
         paths = names(self.result, "parameter")
@@ -272,7 +272,7 @@ class Reading:
         total = float(np.nansum(worst))
         short = _without_section(paths)
         found = [
-            Contribution(
+            ContributionRow(
                 path, short[j], unit, with_unit(lower[j], upper[j], unit), float(slope[j]), float(worst[j]),
                 float(worst[j]) / total if total > 0 else math.nan, float(rss[j]), float(variance[j]),
             )
@@ -281,7 +281,7 @@ class Reading:
         return sorted(found, key=lambda one: (-_known(one.rss_share), -_known(one.worst_share)))
 
 
-def readings(result: xr.Dataset) -> list[Reading]:
+def readings(result: xr.Dataset) -> list[MeasureReading]:
     """Every measure of a result."""
     keys = ("measure_units", "limits", "bounds", "measure_texts", "measure_rules", "curve_texts")
     units, limits, bounds, texts, rules, courses = (attribute(result, key) for key in keys)
@@ -292,7 +292,7 @@ def readings(result: xr.Dataset) -> list[Reading]:
         lows, highs = ([-math.inf if one[0] is None else float(one[0]) for one in about],
                        [math.inf if one[1] is None else float(one[1]) for one in about])  # fmt: skip
         ends = list(zip(lows, highs, strict=True))
-        found.append(Reading(result.isel(measure=i), name, text, str(units[i]), ends[0], ends[1], rule, course))
+        found.append(MeasureReading(result.isel(measure=i), name, text, str(units[i]), ends[0], ends[1], rule, course))
     return found
 
 

@@ -19,9 +19,9 @@ from trunnion.views.common.bundle import web_text
 from trunnion.views.cycle.report import inputs_of, said
 from trunnion.views.tolerance.figure import KINDS, drawable, figure
 from trunnion.views.tolerance.notes import NOTES, ON_SAMPLES
-from trunnion.views.tolerance.readings import Reading, methods, readings
+from trunnion.views.tolerance.readings import MeasureReading, methods, readings
 from trunnion.views.tolerance.tables import (
-    Table,
+    TextTable,
     contributions,
     corners,
     failed,
@@ -46,7 +46,7 @@ class Section(NamedTuple):
     title: str
     about: str
     figures: Sequence[tuple[str, Figure]]
-    tables: Sequence[Table]
+    tables: Sequence[TextTable]
 
 
 def report(result: xr.Dataset, first: Sequence[Section] = (), kicker: str = "What tolerances do to a linkage") -> str:
@@ -89,7 +89,7 @@ def _facts(result: xr.Dataset, run: Sequence[str]) -> list[tuple[str, str]]:
     return [*found, ("", ", ".join(NOTES[name][0] for name in run if name in NOTES))]
 
 
-def _measure(result: xr.Dataset, read: Reading) -> Section:
+def _measure(result: xr.Dataset, read: MeasureReading) -> Section:
     """What there is of one measure."""
     about = "; ".join(part for part in (read.text, f"limits {read.told_limits}" if read.limited else "") if part)
     pictures = [(f"{KINDS[kind].title} of {read.name}", figure(result, kind, [read.name])) for kind in drawable(read)]

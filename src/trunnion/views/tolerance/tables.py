@@ -10,11 +10,11 @@ import numpy as np
 
 from trunnion.views.common.cycle import names
 from trunnion.views.common.quantities import number
-from trunnion.views.common.table import Table
+from trunnion.views.common.table import TextTable
 from trunnion.views.tolerance.plots import outer, rss_label
 from trunnion.views.tolerance.readings import (
-    Contribution,
-    Reading,
+    ContributionRow,
+    MeasureReading,
     failures,
     fixed,
     readings,
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
-    "Table",
+    "TextTable",
     "contributions",
     "corners",
     "failed",
@@ -51,7 +51,7 @@ Cells = dict[str, str]  # text by column; a column without any text is left out
 COLUMNS = {"linear": "linear", "searched": "searched", "sampled": "samples", "interval": "95 % interval"}
 
 
-def tables(result: xr.Dataset) -> list[Table]:
+def tables(result: xr.Dataset) -> list[TextTable]:
     """Of each measure its figures and contributions; then the samples that failed, and the yield of all limits."""
     found = []
     for read in readings(result):
@@ -66,60 +66,60 @@ def tables(result: xr.Dataset) -> list[Table]:
 # ---- figures of a measure -------------------------------------------------------------------------------------------
 
 
-def figures(read: Reading) -> Table:
+def figures(read: MeasureReading) -> TextTable:
     """Nominal, worst case, RSS, deviation, range, yield and capability, a column for each method."""
     told = [(_label(read, label), tell(read)) for label, tell in FIGURES]
     rows = [(label, cells) for label, cells in told if any(cells.values())]
     shown = [key for key in COLUMNS if any(cells.get(key) for _, cells in rows)]
     head = ["", *(_sampling(read) if key == "sampled" else COLUMNS[key] for key in shown)]
-    return Table(heading(read), head, [[label, *(cells.get(key, "") for key in shown)] for label, cells in rows])
+    return TextTable(heading(read), head, [[label, *(cells.get(key, "") for key in shown)] for label, cells in rows])
 
 
-def _label(read: Reading, label: str) -> str:
+def _label(read: MeasureReading, label: str) -> str:
     """The label of a row; RSS says that it leaves correlation out."""
     return rss_label(read) if label == "RSS" else label
 
 
-def heading(read: Reading) -> str:
+def heading(read: MeasureReading) -> str:
     """Name, what it is, and its limits."""
     about = f"{read.name}: {read.text}" if read.text else read.name
     return f"{about}; limits {read.told_limits}" if read.limited else about
 
 
-def _sampling(read: Reading) -> str:
+def _sampling(read: MeasureReading) -> str:
     plain = str(read.result.attrs.get("sampling", "monte-carlo")) == "monte-carlo"
     return "Monte Carlo" if plain else "quasi-Monte Carlo"
 
 
-def _interval(read: Reading, key: str) -> str:
+def _interval(read: MeasureReading, key: str) -> str:
     low, high = read.value(f"{key}_low"), read.value(f"{key}_high")
     if math.isnan(low) or math.isnan(high):
         return ""
     return _between(read, low, high)
 
 
-def _told(read: Reading, key: str) -> str:
+def _told(read: MeasureReading, key: str) -> str:
     value = read.value(key)
     return "" if math.isnan(value) else read.say(value)
 
 
-def _nominal(read: Reading) -> Cells:
+def _nominal(read: MeasureReading) -> Cells:
     at = f" at {read.told_place}" if read.is_extreme and read.nominal != 0.0 and read.told_place else ""
     return {"linear": f"{_told(read, 'nominal')}{at}"}
 
 
-def _mean(read: Reading) -> Cells:
+def _mean(read: MeasureReading) -> Cells:
     shift = read.value("shift_linear")
     linear = "" if math.isnan(shift) or read.is_size else read.say(read.nominal + shift)
     return {"linear": linear, "sampled": _told(read, "mean"), "interval": _interval(read, "mean")}
 
 
-def _deviation(read: Reading) -> Cells:
+def _deviation(read: MeasureReading) -> Cells:
     linear = "" if read.is_size else _told(read, "deviation_linear")
     return {"linear": linear, "sampled": _told(read, "deviation"), "interval": _interval(read, "deviation")}
 
 
-def _range(read: Reading, low: float, high: float) -> str:
+def _range(read: MeasureReading, low: float, high: float) -> str:
     """Deviations from nominal as limits are told: "±0.2375°", "−0.1732 to +0.1599°"; one end if there is but one."""
     if math.isnan(low) and math.isnan(high):
         return ""
@@ -132,12 +132,12 @@ def _range(read: Reading, low: float, high: float) -> str:
     return f"{sign}{fixed(low * read.factor, read.decimals)} to {upper}"
 
 
-def _between(read: Reading, low: float, high: float) -> str:
+def _between(read: MeasureReading, low: float, high: float) -> str:
     """Two values with their unit once."""
     return f"{fixed(low * read.factor, read.decimals)} to {read.say(high)}"
 
 
-def _worst(read: Reading) -> Cells:
+def _worst(read: MeasureReading) -> Cells:
     found = {
         column: _range(read, read.value(f"{key}_lower"), read.value(f"{key}_upper"))
         for column, key in (("linear", "worst_case"), ("searched", "searched"))
@@ -145,7 +145,7 @@ def _worst(read: Reading) -> Cells:
     return found
 
 
-def _extremes(read: Reading) -> Cells:
+def _extremes(read: MeasureReading) -> Cells:
     """Of the samples, as deviations from nominal."""
     least, most = read.value("least"), read.value("most")
     if read.is_size:
@@ -153,12 +153,12 @@ def _extremes(read: Reading) -> Cells:
     return {"sampled": _range(read, least - read.nominal, most - read.nominal)}
 
 
-def _rss(read: Reading) -> Cells:
+def _rss(read: MeasureReading) -> Cells:
     value = read.value("rss")
     return {"linear": "" if math.isnan(value) else f"±{read.say(value)}"}
 
 
-def _outer(read: Reading) -> Cells:
+def _outer(read: MeasureReading) -> Cells:
     """The range of 99.73 %, of the measure itself."""
     ends = outer(read)
     text = "" if ends is None else _between(read, *ends)
@@ -169,7 +169,7 @@ def _outer(read: Reading) -> Cells:
     return {"linear": _between(read, middle - 3 * sigma, middle + 3 * sigma), "sampled": text}
 
 
-def _yield(read: Reading) -> Cells:
+def _yield(read: MeasureReading) -> Cells:
     value, low, high = read.interval
     if math.isnan(value) or not read.limited:
         return {}
@@ -177,11 +177,11 @@ def _yield(read: Reading) -> Cells:
     return {"sampled": told, "interval": ends}
 
 
-def _capability(key: str) -> Callable[[Reading], Cells]:
+def _capability(key: str) -> Callable[[MeasureReading], Cells]:
     return lambda read: {"sampled": "" if math.isnan(read.value(key)) else number(read.value(key), 3)}
 
 
-FIGURES: tuple[tuple[str, Callable[[Reading], Cells]], ...] = (
+FIGURES: tuple[tuple[str, Callable[[MeasureReading], Cells]], ...] = (
     ("nominal", _nominal),
     ("mean", _mean),
     ("deviation σ", _deviation),
@@ -198,7 +198,7 @@ FIGURES: tuple[tuple[str, Callable[[Reading], Cells]], ...] = (
 # ---- contributions ----------------------------------------------------------------------------------------------
 
 
-def contributions(read: Reading, short: bool = False) -> Table:
+def contributions(read: MeasureReading, short: bool = False) -> TextTable:
     """Each toleranced number: its limits, sensitivity, worst case and shares, the largest first.
 
     short: without those that matter little, which are counted; names without their section.
@@ -223,10 +223,10 @@ def contributions(read: Reading, short: bool = False) -> Table:
         sums = (float(np.nansum([getattr(one, key) for one in rest])) for key in shares.values())
         rows.append([f"{len(rest)} others", "", "", "", *(share(part, 1) for part in sums)])
     at = f" at {read.told_place}" if read.told_place else ""
-    return Table(f"what contributes to {read.name}{at}", head, rows)
+    return TextTable(f"what contributes to {read.name}{at}", head, rows)
 
 
-def indices(read: Reading, short: bool = False) -> Table:
+def indices(read: MeasureReading, short: bool = False) -> TextTable:
     """Sobol indices with their 95 % intervals, the largest total first; short: without those below half a per cent."""
     rows = {key: [read.row(f"{key}{end}") for end in ("", "_low", "_high")] for key in ("first_order", "total_order")}
     total = np.where(np.isfinite(rows["total_order"][0]), rows["total_order"][0], -1.0)
@@ -239,7 +239,7 @@ def indices(read: Reading, short: bool = False) -> Table:
     ]
     if len(order) < len(paths):
         told.append([f"{len(paths) - len(order)} others", "", ""])
-    return Table(f"Sobol indices of {read.name}", ["share of the variance", "alone", "with interactions"], told)
+    return TextTable(f"Sobol indices of {read.name}", ["share of the variance", "alone", "with interactions"], told)
 
 
 def _share_of(value: float, low: float, high: float) -> str:
@@ -247,7 +247,7 @@ def _share_of(value: float, low: float, high: float) -> str:
     return text.replace("-", "−")
 
 
-def _sensitivity(read: Reading, one: Contribution) -> str:
+def _sensitivity(read: MeasureReading, one: ContributionRow) -> str:
     """Change of the measure by the number, in the units in which both are told: "0.01365 °/mm"."""
     if math.isnan(one.sensitivity):
         return "—"
@@ -257,7 +257,7 @@ def _sensitivity(read: Reading, one: Contribution) -> str:
     return f"{number(one.sensitivity * read.factor / factor)}\u00a0{unit}".rstrip("\u00a0")
 
 
-def corners(read: Reading) -> Table | None:
+def corners(read: MeasureReading) -> TextTable | None:
     """The numbers at which the searched worst case stands; None if it was not searched."""
     ends = [end for end in ("lower", "upper") if read.has(f"corner_{end}") and math.isfinite(_searched(read, end))]
     ends = [end for end in ends if _searched(read, end) != 0.0]
@@ -269,10 +269,10 @@ def corners(read: Reading) -> Table | None:
         [path, *(value_text(float(read.row(f"corner_{end}")[j]), about[path].unit) for end in ends)]
         for j, path in enumerate(names(read.result, "parameter"))
     ]
-    return Table(f"worst corners of {read.name}, found on the nonlinear model", head, rows)
+    return TextTable(f"worst corners of {read.name}, found on the nonlinear model", head, rows)
 
 
-def _searched(read: Reading, end: str) -> float:
+def _searched(read: MeasureReading, end: str) -> float:
     return read.value(f"searched_{end}")
 
 
@@ -289,7 +289,7 @@ def value_text(value: float, unit: str, digits: int = 8) -> str:
 # ---- of the whole result --------------------------------------------------------------------------------------------
 
 
-def overview(result: xr.Dataset) -> Table:
+def overview(result: xr.Dataset) -> TextTable:
     """One row for each measure: what is asked and what comes out."""
     head = ["measure", "limits", "nominal", "worst case", "RSS", "mean", "deviation σ", "yield", "Cpk"]
     rows = []
@@ -300,7 +300,7 @@ def overview(result: xr.Dataset) -> Table:
         rows.append([read.name, read.told_limits, cells["nominal"]["linear"], worst, cells["RSS"]["linear"], *told])
     head = [_label(read, label) for label in head for read in readings(result)[:1]]
     kept = [k for k in range(len(head)) if k == 0 or any(row[k] for row in rows)]
-    return Table("measures", [head[k] for k in kept], [[row[k] for k in kept] for row in rows])
+    return TextTable("measures", [head[k] for k in kept], [[row[k] for k in kept] for row in rows])
 
 
 def headline(result: xr.Dataset) -> list[tuple[str, list[tuple[str, str]]]]:
@@ -318,20 +318,22 @@ def headline(result: xr.Dataset) -> list[tuple[str, list[tuple[str, str]]]]:
     return [*found, *([("All limits together", [(share_parts(*whole)[0], "yield")])] if whole else [])]
 
 
-def failed(result: xr.Dataset) -> list[Table]:
+def failed(result: xr.Dataset) -> list[TextTable]:
     """Samples without figures, by cause; no table if there are none."""
     found = failures(result)
     if not found or not found[0][1]:
         return []
     count = int(result["samples"].values) if "samples" in result else 0
     rows = [[cause, f"{n:,}", share(n / count, 2) if count else ""] for cause, n in found]
-    return [Table("samples that failed: outside every limit, not in means and quantiles", ["", "samples", ""], rows)]
+    return [
+        TextTable("samples that failed: outside every limit, not in means and quantiles", ["", "samples", ""], rows)
+    ]
 
 
-def overall(result: xr.Dataset) -> list[Table]:
+def overall(result: xr.Dataset) -> list[TextTable]:
     """The yield of all limits together, where there is more than one measure with limits."""
     whole = _overall(result)
-    return [Table("all limits together", ["", "yield"], [["kept", share_interval(*whole)]])] if whole else []
+    return [TextTable("all limits together", ["", "yield"], [["kept", share_interval(*whole)]])] if whole else []
 
 
 def _overall(result: xr.Dataset) -> tuple[float, float, float] | None:
@@ -342,7 +344,7 @@ def _overall(result: xr.Dataset) -> tuple[float, float, float] | None:
     return None if math.isnan(value) else (value, low, high)
 
 
-def inputs(result: xr.Dataset) -> Table:
+def inputs(result: xr.Dataset) -> TextTable:
     """Every toleranced number: nominal, limits, standard deviation, shift of its mean."""
     read = readings(result)[0]
     about = {one.name: one for one in read.contributions}
@@ -354,4 +356,4 @@ def inputs(result: xr.Dataset) -> Table:
         told = [value_text(float(nominal[j]), unit), limits_of(float(lower[j]), float(upper[j]), unit)]
         told += [value_text(float(row[j]), unit, 4) if row.size else "" for row in (deviation, shift)]
         rows.append([path, *told])
-    return Table("toleranced numbers", ["number", "nominal", "limits", "standard deviation", "shift of mean"], rows)
+    return TextTable("toleranced numbers", ["number", "nominal", "limits", "standard deviation", "shift of mean"], rows)

@@ -13,12 +13,12 @@ from trunnion.results.sentences.sentence import Sentence, filled
 from trunnion.results.sentences.structure import STRUCTURE
 from trunnion.results.sentences.studies import STUDIES
 
-__all__ = ["SENTENCES", "told"]
+__all__ = ["SENTENCES", "finding_for"]
 
 SENTENCES: dict[str, Sentence] = {**STRUCTURE, **CYCLE, **STUDIES, **RIG}
 
 
-def told(
+def finding_for(
     code: str,
     where: str = "",
     *,

@@ -17,7 +17,7 @@ from mechanisms import Data
 from trunnion.results.attributes import summary_of
 from trunnion.solve.geometry import build
 from trunnion.solve.space.loops import Loops
-from trunnion.studies.assembly.study import Fit, Study
+from trunnion.studies.assembly.study import AssemblyStatus, AssemblyStudy
 
 Array = NDArray[np.float64]
 LENGTHS = (0.100, 0.030, 0.090, 0.070)  # ground, crank, coupler, rocker
@@ -331,12 +331,12 @@ def test_stated_clearances_enough_and_not() -> None:
     need = float(solved(four_bar(errors)).smallest_clearance)
     tall = {name: {"clearance": 1.0001 * need} for name in "ABCD"}
     enough = solved(four_bar(errors, tall))
-    assert (enough.status == Fit.FITS).all()
+    assert (enough.status == AssemblyStatus.FITS).all()
     assert float(enough.largest_share) == pytest.approx(1 / 1.0001, rel=1e-9)
     assert [row["severity"] for row in json.loads(enough.attrs["findings"])] == ["note"]
     low = {name: {"clearance": 0.9 * need} for name in "ABCD"}
     short = solved(four_bar(errors, low))
-    np.testing.assert_array_equal(short.status == Fit.SHORT, short.needed_clearance > 0.9 * need)
+    np.testing.assert_array_equal(short.status == AssemblyStatus.SHORT, short.needed_clearance > 0.9 * need)
     np.testing.assert_allclose(short.needed_share * 0.9 * need, short.needed_clearance, rtol=1e-9)
     (told,) = json.loads(short.attrs["findings"])
     assert told["severity"] == "error"
@@ -366,7 +366,7 @@ def test_a_joint_without_play_has_no_offset() -> None:
 @pytest.mark.slow
 def test_no_play_is_stated() -> None:
     found = solved(four_bar({"B": LEAN}), 36)
-    assert (found.status == Fit.RIGID).all()
+    assert (found.status == AssemblyStatus.RIGID).all()
     assert np.isinf(found.needed_share).all()
     (told,) = json.loads(found.attrs["findings"])
     assert told["what"].startswith(
@@ -462,7 +462,7 @@ def test_bennett_with_a_twist_that_is_off() -> None:
 @pytest.mark.parametrize("name", ["bennett", "sarrus", "fourbar-in-space", "spherical-four-bar"])
 def test_axes_that_fit_need_nothing(name: str) -> None:
     found = solved(trunnion.read(f"examples/{name}.yaml"), 12)
-    assert (found.status == Fit.FITS).all()
+    assert (found.status == AssemblyStatus.FITS).all()
     assert (found.needed_clearance == 0).all()
     assert float(found.smallest_clearance) == 0
     assert any(row["code"] == "assembly.fits" for row in json.loads(found.attrs["findings"]))
@@ -478,7 +478,7 @@ def test_axes_that_fit_need_nothing(name: str) -> None:
 )
 def test_no_redundant_joint_needs_no_clearance(name: str, said: str) -> None:
     found = solved(trunnion.read(f"examples/{name}.yaml"), 12)
-    assert (found.status == Fit.FITS).all()
+    assert (found.status == AssemblyStatus.FITS).all()
     assert (found.needed_clearance == 0).all()
     assert any(said in row["what"] for row in json.loads(found.attrs["findings"]))
 
@@ -536,7 +536,7 @@ def test_derivatives_by_differences() -> None:
     mechanism = trunnion.Mechanism(**four_bar({"B": LEAN, "D": {"offset": 1e-4, "towards": 1.0}}))
     system: Any = build(mechanism)
     values = mechanism.parameters()
-    study = Study.of(system, values, mechanism.ideal_parameters(), system.cycle(values), "pins")
+    study = AssemblyStudy.of(system, values, mechanism.ideal_parameters(), system.cycle(values), "pins")
     time = np.array([0.3, 2.0, 5.0])
     found = study.solve(time, stated=False)
     loops = Loops.of(system, values, study.pins, time)
@@ -584,7 +584,7 @@ def test_where_it_cannot_be_assembled() -> None:
     data = four_bar({"B": LEAN})
     data["links"]["crank"]["points"]["B"]["at"] = [0.065, 0, 0]
     found = solved(data, 36)
-    apart = found.status == Fit.APART
+    apart = found.status == AssemblyStatus.APART
     assert 0 < int(apart.sum()) < 36
     assert np.isnan(found.needed_clearance[apart]).all()
     assert np.isfinite(found.needed_clearance[~apart]).all()
@@ -615,7 +615,7 @@ def test_errors_that_are_not_small(degrees: float) -> None:
 def test_pins_held_along_one_axis_and_out_of_line() -> None:
     """No end float, parallel holes: a line that leans nowhere fits to first order only; it is not guessed."""
     found = solved(hinges(0.3, 0.03, {"misalignment": {"offset": 1e-4}}), 6)
-    unsettled = found.status == Fit.UNSETTLED
+    unsettled = found.status == AssemblyStatus.UNSETTLED
     assert unsettled.any()
     assert np.isnan(found.needed_clearance[unsettled]).all()
     assert np.isnan(found.smallest_clearance)

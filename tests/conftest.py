@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 from collections import defaultdict
+from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -31,13 +32,13 @@ settings.load_profile("trunnion")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Of a test marked `spread(n)`, n of its cases, evenly chosen, stay in `make test`; the others become slow."""
-    cases: defaultdict[tuple[str, int], list[pytest.Item]] = defaultdict(list)
+    """Of a test marked `spread(n, *also)`, n of its cases, evenly chosen, and those named stay in `make test`."""
+    cases: defaultdict[tuple[Any, ...], list[pytest.Item]] = defaultdict(list)
     for item in items:
         if mark := item.get_closest_marker("spread"):
-            cases[item.nodeid.partition("[")[0], mark.args[0]].append(item)
-    for (_, count), found in cases.items():
+            cases[item.nodeid.partition("[")[0], *mark.args].append(item)
+    for (_, count, *also), found in cases.items():
         kept = {round((k + 0.5) * len(found) / count - 0.5) for k in range(count)}
         for k, item in enumerate(found):
-            if k not in kept:
+            if k not in kept and item.nodeid.partition("[")[2].removesuffix("]") not in also:
                 item.add_marker(pytest.mark.slow)

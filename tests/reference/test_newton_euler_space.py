@@ -173,7 +173,7 @@ def test_forces_with_given_friction(name: str) -> None:
     assert rubs > 0
 
 
-@pytest.mark.spread(1)
+@pytest.mark.spread(1, "RSUR")  # the only one with a cross, whose two pins are felt by each other
 @pytest.mark.parametrize("name", NAMES)
 def test_forces_with_friction_by_its_law(name: str) -> None:
     """The oracle finds friction by its own formulas and its own Newton."""

@@ -95,14 +95,14 @@ def test_page(page: Path, place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         if block.skip:
             continue
         if block.language == "python":
-            shown = _python(block.text, where, names)
+            shown = printed_by_python(block.text, where, names)
         elif block.language == "sh":
             shown = _shell(block, where, monkeypatch)
         elif block.language == "text":
-            _compare(block.text, shown, where)
+            compare(block.text, shown, where)
 
 
-def _python(text: str, where: str, names: dict[str, Any]) -> str:
+def printed_by_python(text: str, where: str, names: dict[str, Any]) -> str:
     """What the code prints."""
     output = io.StringIO()
     with contextlib.redirect_stdout(output):
@@ -134,7 +134,7 @@ def run(command: str, monkeypatch: pytest.MonkeyPatch) -> tuple[int, str]:
     return status, output.getvalue()
 
 
-def _compare(expected: str, actual: str, where: str) -> None:
+def compare(expected: str, actual: str, where: str) -> None:
     """Every line shown occurs in the output, in order; `…` stands for lines left out, rules of tables do not count."""
     lines = iter([_words(line) for line in actual.splitlines()])
     for line in (one for one in expected.splitlines() if one.strip() and one.strip() != "…"):
@@ -163,11 +163,11 @@ def _same(a: str, b: str) -> bool:
 
 def test_comparison() -> None:
     """The comparison itself sees a wrong figure and a missing line."""
-    _compare(" torque │ -18552.9 │ N m\n", "other\ntorque ┃ -18552.8749 N m\n", "here")
+    compare(" torque │ -18552.9 │ N m\n", "other\ntorque ┃ -18552.8749 N m\n", "here")
     with pytest.raises(AssertionError):
-        _compare("torque 18552.9\n", "torque 18562.9\n", "here")
+        compare("torque 18552.9\n", "torque 18562.9\n", "here")
     with pytest.raises(AssertionError):
-        _compare("one\ntwo\n", "two\none\n", "here")
+        compare("one\ntwo\n", "two\none\n", "here")
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))

@@ -14,7 +14,6 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-import networkx as nx
 import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import maximum_bipartite_matching
@@ -23,6 +22,7 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.mechanism import Mechanism
 from trunnion.structure.generic import GEAR, SPIN, Constraint, Generic
+from trunnion.structure.parts import Parts
 
 __all__ = ["FREEDOMS", "Module", "Plan", "decompose", "mobility_by_formula", "passive"]
 
@@ -142,29 +142,26 @@ def decompose(mechanism: Mechanism) -> Plan:
         findings = _undriven(mechanism, mobility, 0, exactly=True) if mobility != len(mechanism.drivers) else []
     if findings:
         raise MechanismError(findings)
-    dependence = nx.DiGraph()
-    dependence.add_nodes_from(bodies)
-    for constraint, body in determines.items():
-        for other in _links_of(mechanism, constraint):
-            if other not in (body, ground):
-                dependence.add_edge(other, body)
-    parts = nx.condensation(dependence)
+    dependence = [
+        (other, body)
+        for constraint, body in determines.items()
+        for other in _links_of(mechanism, constraint)
+        if other not in (body, ground)
+    ]
+    parts = Parts(bodies, dependence)
     if mechanism.space == "planar":
         findings = Generic(mechanism, bodies, determines).fault(unmatched, parts)
         if findings:
             raise MechanismError(findings)
-    place = {body: i for i, body in enumerate(bodies)}
-    first = {part: min(place[body] for body in parts.nodes[part]["members"]) for part in parts}
-    members = {part: sorted(parts.nodes[part]["members"], key=place.__getitem__) for part in parts}
     gears: dict[int, list[str]] = {}
     for (name, number), body in determines.items():
         if number == GEAR:
-            gears.setdefault(parts.graph["mapping"][body], []).append(name)
+            gears.setdefault(parts.part_of[body], []).append(name)
     known = {ground}
     modules: list[Module] = []
-    for part in nx.lexicographical_topological_sort(parts, key=first.__getitem__):
-        modules.append(_module(table, members[part], known, gears.get(part, []), spinning))
-        known |= set(members[part])
+    for part in parts.ordered():
+        modules.append(_module(table, parts.members[part], known, gears.get(part, []), spinning))
+        known |= set(parts.members[part])
     return Plan(tuple(modules), mobility, tuple(spinning))
 
 
@@ -320,15 +317,14 @@ def _dyad(mechanism: Mechanism, links: list[str], joints: list[str]) -> tuple[st
 
 def _class(mechanism: Mechanism, links: list[str], joints: list[str]) -> int:
     """Class after Assur and Artobolevski: joints of the richest link, or of the longest loop of links, at least 2."""
-    inner = nx.Graph()
-    inner.add_nodes_from(links)
     own, held = set(links), Counter(link for name in joints for link in mechanism.effective_joints[name].links)
     most = max(2, *(held[link] for link in links))
-    for name in joints:
-        a, b = mechanism.effective_joints[name].links
-        if a in own and b in own:
-            inner.add_edge(a, b)
-    loops = nx.minimum_cycle_basis(inner)
+    within = {tuple(sorted(mechanism.effective_joints[name].links)) for name in joints}
+    if len(links) <= 3:
+        return most  # no loop of more than three links
+    import networkx as nx  # loaded where it is needed: it takes a tenth of a small analysis
+
+    loops = nx.minimum_cycle_basis(nx.Graph([pair for pair in sorted(within) if own.issuperset(pair)]))
     return max([most, *(len(loop) for loop in loops if len(loop) > 3)])
 
 

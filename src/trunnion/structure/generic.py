@@ -9,13 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping
 
-import networkx as nx
 import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.errors import Finding
 from trunnion.model.mechanism import Mechanism
 from trunnion.structure.mobility import RANK_TOLERANCE, constraints, rank
+from trunnion.structure.parts import Parts
 
 __all__ = ["GEAR", "SPIN", "Constraint", "Generic"]
 
@@ -53,7 +53,7 @@ class Generic:
         links = dict.fromkeys(link for joint in joints for link in self.joints[joint][1])
         return [link for link in links if link != self.mechanism.fixed_link]
 
-    def fault(self, unmatched: Iterable[Constraint], parts: nx.DiGraph) -> list[Finding]:
+    def fault(self, unmatched: Iterable[Constraint], parts: Parts) -> list[Finding]:
         """What is held twice and what is loose, if anything is.
 
         unmatched: constraints that the matching leaves over; parts: links that depend on each other, in their order.
@@ -64,13 +64,12 @@ class Generic:
             return [self._told(*((set(self.bodies), set(self.bodies)) if few else self._reached(left_over)))]
         own: dict[int, list[Constraint]] = {}
         for constraint, body in self.determines.items():
-            own.setdefault(parts.graph["mapping"][body], []).append(constraint)
-        weak = [k for k in parts if not self._firm(parts.nodes[k]["members"], own.get(k, []))]
+            own.setdefault(parts.part_of[body], []).append(constraint)
+        weak = [k for k, links in enumerate(parts.members) if not self._firm(links, own.get(k, []))]
         if not weak:
             return []
-        before = {k for one in weak for k in (one, *nx.ancestors(parts, one))}
-        after = {k for one in weak for k in (one, *nx.descendants(parts, one))}
-        held, loose = ({body for k in some for body in parts.nodes[k]["members"]} for some in (before, after))
+        some = (parts.reached(weak, backward=True), parts.reached(weak))
+        held, loose = ({body for k in numbers for body in parts.members[k]} for numbers in some)
         return [self._told(held, loose)]
 
     def _firm(self, links: Collection[str], own: Iterable[Constraint]) -> bool:

@@ -54,8 +54,9 @@ def described(
     return {
         name: xr.Variable(
             (one := known[name]).dims,
-            array,
+            np.asarray(array),
             {"units": (units or {}).get(one.units, one.units), "long_name": one.long_name},
+            fastpath=True,  # else xarray loads dask, where it is installed, to see whether the array is one of its own
         )
         for name, array in arrays.items()
     }
@@ -79,7 +80,16 @@ def dataset_of(
     labels: names along its dimensions; attributes: lists and dicts become JSON; along: other coordinates, as xarray
     takes them.
     """
+    import pandas as pd
     import xarray as xr
 
-    names = {dim: (dim, np.asarray(members, dtype=str)) for dim, members in labels.items()}
-    return xr.Dataset(variables, {**names, **(along or {})}, {"kind": kind, **encoded(attributes)})
+    names: dict[str, xr.Variable] = {}
+    indexes: dict[str, xr.indexes.PandasIndex] = {}
+    for dim, members in labels.items():
+        text = np.asarray(members, dtype=str)
+        # An index of pandas: of an array, xarray would load pint and dask to see whether it is one of theirs.
+        indexes[dim] = xr.indexes.PandasIndex(pd.Index(text, name=dim), dim, coord_dtype=text.dtype)
+        names |= indexes[dim].create_variables()
+    return xr.Dataset(
+        variables, xr.Coordinates({**names, **(along or {})}, indexes), {"kind": kind, **encoded(attributes)}
+    )

@@ -105,9 +105,10 @@ def _saved(mechanism: Any) -> None:
 
     from trunnion import analyse, save
 
+    result = analyse(mechanism, STEPS)
     with tempfile.TemporaryDirectory() as folder:
         for end in ("csv", "json", "nc"):
-            save(analyse(mechanism, STEPS), Path(folder) / f"result.{end}")
+            save(result, Path(folder) / f"result.{end}")
 
 
 VERBS: tuple[Callable[[Any], None], ...] = (_design, _locking, _assemble, _play, _tolerance, _report, _saved)

@@ -111,30 +111,33 @@ def gaps(run: Run) -> NDArray[np.float64]:
     scan = np.linspace(0.0, duration, LANES + 1)
     time = np.unique(np.clip(np.concatenate([scan, run.edges - BESIDE * duration, run.edges + BESIDE * duration]),
                              0.0, duration))  # fmt: skip
-    at = np.array([moment for seat in run.seats if seat.given is None for moment in _turned(run, seat, time)])
+    with np.errstate(all="ignore"):
+        back = run.ideal(time)
+        at = np.array([moment for seat in run.seats if seat.given is None for moment in _turned(run, back, seat, time)])
     again = [at, at - duration, at + duration] if run.cycle.periodic else [at]  # beside the start or the end
     every = np.concatenate(again)
     every = every[(every > -near) & (every < duration + near)]
     return np.array([every - near, every + near])
 
 
-def _turned(run: Run, seat: GivenSeat, time: NDArray[np.float64]) -> Iterator[float]:
-    """Times at which the load of an end passes near zero, seen closely wherever it turns round between two of these."""
-    with np.errstate(all="ignore"):
-        back = run.ideal(time)
-        largest = max((float(np.nanmax(np.abs(row), initial=0.0)) for row in _all_loads(run, back)), default=0.0)
-        for number, load in enumerate(_loads_at(back, seat, time)):
-            peak = float(np.nanmax(_size(load), initial=0.0))
-            if peak <= NO_LOAD * largest:
+def _turned(run: Run, back: Backward, seat: GivenSeat, time: NDArray[np.float64]) -> Iterator[float]:
+    """Times at which the load of an end passes near zero, seen closely wherever it turns round between two of these.
+
+    back: the ideal mechanism at these times.
+    """
+    largest = max((float(np.nanmax(np.abs(row), initial=0.0)) for row in _all_loads(run, back)), default=0.0)
+    for number, load in enumerate(_loads_at(back, seat, time)):
+        peak = float(np.nanmax(_size(load), initial=0.0))
+        if peak <= NO_LOAD * largest:
+            continue
+        for place, _ in _passages(load, peak, periodic=False, near=np.inf):
+            k = min(int(place), len(time) - 2)
+            if k == place:  # there is no load here, with nothing to look at more closely
+                yield float(time[k])
                 continue
-            for place, _ in _passages(load, peak, periodic=False, near=np.inf):
-                k = min(int(place), len(time) - 2)
-                if k == place:  # there is no load here, with nothing to look at more closely
-                    yield float(time[k])
-                    continue
-                fine = np.linspace(time[k], time[k + 1], PARTS + 1)
-                for one, _ in _passages(_loads_at(run.ideal(fine), seat, fine)[number], peak, periodic=False):
-                    yield float(np.interp(one, np.arange(len(fine)), fine))
+            fine = np.linspace(time[k], time[k + 1], PARTS + 1)
+            for one, _ in _passages(_loads_at(run.ideal(fine), seat, fine)[number], peak, periodic=False):
+                yield float(np.interp(one, np.arange(len(fine)), fine))
 
 
 def _loads_at(back: Backward, seat: GivenSeat, time: NDArray[np.float64]) -> list[NDArray[np.float64]]:

@@ -49,6 +49,8 @@ from trunnion.groups.tree import FEW, OUTER, GroupJoint, Step, across, size_of
 
 __all__ = ["OUTER", "General", "GeneralPose", "GroupJoint"]
 
+Numbers = Sequence[Number]
+
 QUICK = 8  # rounds for all lanes
 NEWTON_LIMIT = 60  # more for those that need them
 NEARLY = 1e-7  # of its largest allowed step: from here one more round reaches rounding
@@ -134,16 +136,20 @@ class General:
 
     # ---- position -------------------------------------------------------------------------------------------
 
-    def position(self, elements: Elements, assembly: Sequence[Number], drive: Sequence[Number] = ()) -> GeneralPose:
+    def position(
+        self, elements: Elements, assembly: Numbers, drive: Numbers = (), late: int = NEWTON_LIMIT
+    ) -> GeneralPose:
         """Pose by Newton from the free tree coordinates `assembly` (rad, m; order of `free`).
 
-        NaN in the lanes that do not close. Dual inputs: one more step at the solution for each level of ε.
+        late: most rounds for lanes that are still open after QUICK. NaN in the lanes that do not close. Dual inputs:
+        one more step at the solution for each level of ε.
         """
         with np.errstate(all="ignore"):
             q = self._newton(
                 [each(pair, primal) for pair in elements],
                 [primal(value) for value in assembly],
                 [primal(value) for value in drive],
+                late,
             )
             numbers = [*drive, *(n for pair in elements for n in flat(pair))]
             q = self.coordinates(elements, [q[i] for i in self.free], drive)
@@ -164,8 +170,8 @@ class General:
         ratios = tuple(drive[len(self.driven) :: NUMBERS])
         return GeneralPose(frames, placed, tuple(q), inverse, opening, condition, orientation, ratios)
 
-    def _newton(self, elements: Elements, start: Sequence[Number], drive: Sequence[Number]) -> list[Number]:
-        """Newton on real numbers from `start`; lanes that do not converge are NaN."""
+    def _newton(self, elements: Elements, start: Numbers, drive: Numbers, rounds: int) -> list[Number]:
+        """Newton on real numbers from `start`; lanes that do not converge are NaN. rounds: for those that are late."""
         q = [namespace(v).asarray(v, float) for v in self.coordinates(elements, start, drive)]
         if not self.free:
             return list(q)
@@ -173,14 +179,14 @@ class General:
         scale = [TURN_LIMIT if kind == "turn" else 0.3 * size for kind in self.kept_kinds]
         q, moved_by = self._iterate(elements, q, drive, scale, FEW if compiled(q) else QUICK)
         late = ~(moved_by <= NEARLY)
-        if apart(late):
-            q, moved_by = self._finish_late(elements, q, drive, scale, late)
+        if rounds and apart(late):
+            q, moved_by = self._finish_late(elements, q, drive, scale, late, rounds)
         q = self._step(elements, q, drive, scale)  # quadratic: from NEARLY to rounding
         closed = moved_by <= NEARLY
         return [np.where(closed, value, np.nan) for value in q]
 
     def _iterate(
-        self, elements: Elements, q: list[Number], drive: Sequence[Number], scale: Sequence[Number], rounds: int
+        self, elements: Elements, q: list[Number], drive: Numbers, scale: Numbers, rounds: int
     ) -> tuple[list[Number], Number]:
         """Newton steps until no lane moves by more than NEARLY (of its scale), at most `rounds`."""
         if compiled(q):
@@ -196,7 +202,7 @@ class General:
         return q, last
 
     def _finish_late(
-        self, elements: Elements, q: list[Number], drive: Sequence[Number], scale: Sequence[Number], late: Number
+        self, elements: Elements, q: list[Number], drive: Numbers, scale: Numbers, late: Number, rounds: int
     ) -> tuple[list[Number], Number]:
         """Go on with the lanes that are still open, and with those alone: they are few or beyond help."""
         shape = late.shape
@@ -206,15 +212,13 @@ class General:
 
         some = [each(pair, part) for pair in elements]
         found, last = self._iterate(
-            some, [part(v) for v in q], [part(v) for v in drive], [part(s) for s in scale], NEWTON_LIMIT
+            some, [part(v) for v in q], [part(v) for v in drive], [part(s) for s in scale], rounds
         )
         moved_by = np.zeros(shape)
         moved_by[late] = last
         return [replaced(value, late, new) for value, new in zip(q, found, strict=True)], moved_by
 
-    def _step(
-        self, elements: Elements, q: Sequence[Number], drive: Sequence[Number], limits: Sequence[Number] | None = None
-    ) -> list[Number]:
+    def _step(self, elements: Elements, q: Numbers, drive: Numbers, limits: Numbers | None = None) -> list[Number]:
         """One Newton step, shortened as a whole where an entry would exceed its limit."""
         _, placed = self._place(elements, q)
         (step,) = linalg.solve(self._jacobian(placed, drive), self._gap(placed, q, drive))
@@ -227,9 +231,7 @@ class General:
             q[i] = q[i] - s
         return q
 
-    def _place(
-        self, elements: Elements, q: Sequence[Number]
-    ) -> tuple[tuple[Frame, ...], tuple[tuple[Frame, Frame], ...]]:
+    def _place(self, elements: Elements, q: Numbers) -> tuple[tuple[Frame, ...], tuple[tuple[Frame, Frame], ...]]:
         """Frames of all links and of both elements of all joints for the tree coordinates q."""
         frames: dict[int, Frame] = {}
 
@@ -251,7 +253,7 @@ class General:
     def _rows(self) -> tuple[CutRow | GearRow, ...]:
         return rows(self.joints, self.steps, self.driven, self.gears)
 
-    def _gap(self, placed: Sequence[tuple[Frame, Frame]], q: Sequence[Number], drive: Sequence[Number]) -> list[Number]:
+    def _gap(self, placed: Sequence[tuple[Frame, Frame]], q: Numbers, drive: Numbers) -> list[Number]:
         """By how much each constraint of the cuts is open, m or rad."""
         return [row.gap(placed, q, drive) for row in self._rows]
 
@@ -267,7 +269,7 @@ class General:
                 screws.append(Twist(sign * pivot.c, sign * pivot.s, 0.0))
         return screws
 
-    def _jacobian(self, placed: Sequence[tuple[Frame, Frame]], drive: Sequence[Number]) -> list[list[Number]]:
+    def _jacobian(self, placed: Sequence[tuple[Frame, Frame]], drive: Numbers) -> list[list[Number]]:
         """Rate of every gap for a unit rate of every free coordinate; square for an Assur group."""
         matrix: list[list[Number]] = []
         cut = {joint for row in self._rows for joint, _ in row.terms(drive)}
@@ -284,9 +286,7 @@ class General:
             matrix.append(entries)
         return matrix
 
-    def _condition(
-        self, jacobian: Sequence[Sequence[Number]], inverse: Sequence[Sequence[Number]], size: Number
-    ) -> Number:
+    def _condition(self, jacobian: Sequence[Numbers], inverse: Sequence[Numbers], size: Number) -> Number:
         """2/n ‖S J‖·‖(S J)⁻¹‖ (Frobenius, n × n) with lengths measured in `size`: 2 at best, as for a dyad."""
         if not jacobian:
             return 1.0

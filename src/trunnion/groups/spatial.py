@@ -75,17 +75,22 @@ class SpatialGroup(SpatialTree):
     # ---- position -------------------------------------------------------------------------------------------
 
     def position(
-        self, elements: Sequence[Element], assembly: Sequence[Number] | None, drive: Sequence[Number] = ()
+        self,
+        elements: Sequence[Element],
+        assembly: Sequence[Number] | None,
+        drive: Sequence[Number] = (),
+        late: int = NEWTON_LIMIT,
     ) -> SpatialPose:
         """Pose by Newton from the coordinates `assembly` of all joints but the prescribed (rad, m, quaternions).
 
-        NaN in the lanes that do not close. Dual inputs: one more step at the solution for each level of ε.
+        late: most rounds for lanes that are still open after QUICK. NaN in the lanes that do not close. Dual inputs:
+        one more step at the solution for each level of ε.
         """
         with np.errstate(all="ignore"):
             real = [each(one, primal) for one in elements]
             size = self.size(real)
             q = self.coordinates([primal(v) for v in assembly or ()], [primal(v) for v in drive])
-            q = self._newton(real, q, size)
+            q = self._newton(real, q, size, late)
             numbers = [*drive, *(n for one in elements for n in flat(one))]
             found = [value for joint in q for value in joint]
             q = self.coordinates([found[i] for i in self.kept], drive)
@@ -114,15 +119,17 @@ class SpatialGroup(SpatialTree):
         all_q = tuple(value for joint in q for value in joint)
         return SpatialPose(frames, placed, screws, all_q, jacobian, inverse, size, gap, condition, orientation)
 
-    def _newton(self, elements: Sequence[Element], q: list[list[Number]], size: Number) -> list[list[Number]]:
-        """Newton on real numbers; lanes that do not converge are NaN."""
+    def _newton(
+        self, elements: Sequence[Element], q: list[list[Number]], size: Number, rounds: int
+    ) -> list[list[Number]]:
+        """Newton on real numbers; lanes that do not converge are NaN. rounds: for those that are late."""
         q = [[namespace(v).asarray(v, float) for v in joint] for joint in q]
         if not self.free or not self.chords:
             return q
         q, moved_by = self._iterate(elements, q, size, FEW if compiled(v for joint in q for v in joint) else QUICK)
         late = ~(moved_by <= NEARLY)
-        if apart(late):
-            q, moved_by = self._finish_late(elements, q, size, late)
+        if rounds and apart(late):
+            q, moved_by = self._finish_late(elements, q, size, late, rounds)
         q = self._step(elements, q, size)  # quadratic: from NEARLY to rounding
         placed = self.place(elements, q)[1]
         closed = (moved_by <= NEARLY) & (self.opening(placed, q, size) <= CLOSED * size)
@@ -174,7 +181,7 @@ class SpatialGroup(SpatialTree):
         return functools.reduce(np.maximum, moves)
 
     def _finish_late(
-        self, elements: Sequence[Element], q: list[list[Number]], size: Number, late: Number
+        self, elements: Sequence[Element], q: list[list[Number]], size: Number, late: Number, rounds: int
     ) -> tuple[list[list[Number]], Number]:
         """Go on with the lanes that are still open, and with those alone: they are few or beyond help."""
         shape = late.shape
@@ -182,8 +189,9 @@ class SpatialGroup(SpatialTree):
         def part(number: Number) -> Number:
             return np.broadcast_to(number, shape)[late]
 
-        some = [each(one, part) for one in elements]
-        found, last = self._iterate(some, [[part(v) for v in joint] for joint in q], part(size), NEWTON_LIMIT)
+        # a number that is the same in all lanes stays one: of its zeros and ones no products are made
+        some = [each(one, lambda number: part(number) if np.ndim(number) else number) for one in elements]
+        found, last = self._iterate(some, [[part(v) for v in joint] for joint in q], part(size), rounds)
         moved_by = np.zeros(shape)
         moved_by[late] = last
         merged = [

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from itertools import pairwise
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +23,7 @@ class Followed(Protocol):
     """A group that is solved by Newton's method, in the plane or in space.
 
     kept: the coordinates (entries of a pose's q) that an assembly states; kept_kinds: "turn", "slide", or "part" of a
-    quaternion.
+    quaternion. late: most rounds of Newton for the lanes that a few do not settle.
     """
 
     @property
@@ -31,7 +32,7 @@ class Followed(Protocol):
     @property
     def kept_kinds(self) -> tuple[str, ...]: ...
 
-    def position(self, elements: Any, assembly: Any, drive: Sequence[Number] = ()) -> Any: ...
+    def position(self, elements: Any, assembly: Any, drive: Sequence[Number] = (), late: int = ...) -> Any: ...
 
     def size(self, elements: Any) -> Number: ...
 
@@ -40,6 +41,7 @@ class Followed(Protocol):
 
 GUESSES = 512
 TRIED = 64  # guesses at each place where it is tried whether there is an assembly at all
+TOGETHER = 6  # such places at a time: the first at which there is one is enough
 FEW = 16  # guesses at each place where an assembly is looked for again
 PROBES = 96  # such places in the gaps of a track
 MOST_CONDITION = 1e8  # of an assembly that counts
@@ -48,6 +50,8 @@ SEED = 20060704  # of the guesses: the same assemblies every time
 TURN_JUMP = 0.35  # rad between neighbours of the grid: more is another branch
 SLIDE_JUMP = 0.25  # of the group's size, likewise
 BLOCK = 32  # grid points tried at a time
+NEAR_LIMIT = 24  # more rounds of Newton from a guess nearby: halving a step brings it to 1e-7 where branches meet
+HALVINGS = 5  # of the way between two grid points, where Newton strays
 
 
 def _wrap(rows: Array) -> None:
@@ -97,18 +101,21 @@ def assemblies(group: Followed, elements: Elements, drive: Sequence[Number]) -> 
     )
 
 
-def closing(group: Followed, elements: Elements, drive: Sequence[Number], places: Sequence[int]) -> list[int]:
-    """Those of some grid points at which one of a few guesses closes the group, all tried at once."""
+def closing(group: Followed, elements: Elements, drive: Sequence[Number], places: Sequence[int]) -> Iterator[int]:
+    """Those of some grid points at which one of a few guesses closes the group, several points tried at once."""
     rng = np.random.default_rng(SEED)
-    lanes = np.repeat(np.array(places, np.intp), TRIED)
-    there = at(elements, lanes)
-    spread = extent(group, there)
-    guesses = [rng.uniform(-reach, reach, len(lanes)) for reach in guess_reaches(group, spread)]
-    pose = group.position(there, guesses, [lane_of(q, lanes) for q in drive])
-    closed = np.isfinite(np.broadcast_to(pose.orientation, lanes.shape)).reshape(len(places), TRIED)
-    for q in pose.q:
-        closed = closed & np.isfinite(np.broadcast_to(q, lanes.shape)).reshape(len(places), TRIED)
-    return [place for place, some in zip(places, closed.any(axis=1), strict=True) if some]
+    every = np.array(places, np.intp)
+    spread = extent(group, at(elements, every))
+    guesses = [rng.uniform(-reach, reach, (len(places), TRIED)) for reach in guess_reaches(group, spread)]
+    for first in range(0, len(places), TOGETHER):
+        some = slice(first, first + TOGETHER)
+        lanes = np.repeat(every[some], TRIED)
+        start = [guess[some].ravel() for guess in guesses]
+        pose = group.position(at(elements, lanes), start, [lane_of(q, lanes) for q in drive])
+        closed = np.isfinite(np.broadcast_to(pose.orientation, lanes.shape))
+        for q in pose.q:
+            closed = closed & np.isfinite(np.broadcast_to(q, lanes.shape))
+        yield from (int(place) for place in every[some][closed.reshape(-1, TRIED).any(axis=1)])
 
 
 def guess_reaches(group: Followed, spread: float) -> list[float]:
@@ -137,6 +144,13 @@ def at(elements: Elements, index: int | NDArray[np.intp]) -> list[Any]:
     return [each(one, lambda n: lane_of(n, index)) for one in elements]
 
 
+class Ways(NamedTuple):
+    """Assemblies at one grid point: coordinates (free, way), and what tells them apart (entry, way)."""
+
+    q: Array
+    key: Array
+
+
 @dataclass(frozen=True)
 class Follower:
     """Follows one assembly of a general group from grid point to grid point."""
@@ -159,13 +173,14 @@ class Follower:
                 slope = rows[:, ahead[0]] - rows[:, here]
                 place += 1
                 continue
-            found = self._block(rows[:, here], slope, ahead)
-            kept = found.shape[1]
-            if kept == 0 and block == 1:
-                found_one = self._advance(rows[:, here], slope, here, ahead[0], 0.0, 1.0)
-                if found_one is None:
+            if len(ahead) == 1:
+                alone = self._advance(rows[:, here], slope, here, ahead[0], 0, 1 << HALVINGS)
+                if alone is None:
                     return
-                found, kept = found_one[:, None], 1
+                found = alone[:, None]
+            else:
+                found = self._block(rows[:, here], slope, ahead)
+            kept = found.shape[1]
             if kept:
                 rows[:, ahead[:kept]] = found
                 before = rows[:, ahead[kept - 2]] if kept > 1 else rows[:, here]
@@ -193,45 +208,52 @@ class Follower:
         if not len(probes):
             return probes
         found = self._found_at(probes)
-        left_out: list[Array] = []
-        for probe, ways in zip(probes, found, strict=True):
-            if np.isfinite(rows[0, probe]) or not ways.size:
+        left_out: list[Array] = []  # what tells them from others at the probes, (entry, probe)
+        for k, (probe, ways) in enumerate(zip(probes, found, strict=True)):
+            if np.isfinite(rows[0, probe]) or not ways.q.size:
                 continue
             known = np.flatnonzero(np.isfinite(rows[0]))
             before = rows[:, known[np.argmin(np.abs(known - probe))]]
-            fresh = np.full_like(rows, np.nan)
-            fresh[:, probe] = ways[:, int(np.argmin(self._apart(ways, before)))]
-            if any(self._alike(fresh[:, probe], other[:, probe], int(probe)) for other in left_out):
+            nearest = int(np.argmin(self._apart(ways.q, before)))
+            if any(np.max(np.abs(ways.key[:, nearest] - other[:, k])) <= SAME for other in left_out):
                 continue  # to follow it again would end as before
+            fresh = np.full_like(rows, np.nan)
+            fresh[:, probe] = ways.q[:, nearest]
             self.both_ways(fresh, int(probe), periodic)
             filled = np.isfinite(fresh[0])
             if np.any(filled & np.isfinite(rows[0])):
-                left_out.append(fresh)
+                left_out.append(self._keys(fresh, probes))
             else:
                 rows[:, filled] = fresh[:, filled]
         return np.flatnonzero(gaps & np.isfinite(rows[0]))
 
-    def _alike(self, one: Array, other: Array, index: int) -> bool:
-        """Whether the coordinates of two assemblies at a grid point put the links into the same places."""
-        if not np.all(np.isfinite(other)):
-            return False
-        elements, drive = at(self.elements, index), [lane_of(n, index) for n in self.drive]
-        pose = self.group.position(elements, list(np.stack([one, other], axis=1)), drive)
-        key = [np.broadcast_to(n, (2,)) for n in self.group.signature(pose, extent(self.group, elements))]
-        return bool(np.max(np.abs(np.diff(key, axis=1))) <= SAME)
+    def _keys(self, rows: Array, probes: NDArray[np.intp]) -> Array:
+        """What tells a track from others at each grid point, (entry, probe); NaN where it does not reach."""
+        pose = self.group.position(at(self.elements, probes), list(rows[:, probes]), self._drive_at(probes))
+        return self._key(pose, probes.shape)
 
-    def _found_at(self, probes: NDArray[np.intp]) -> list[Array]:
-        """Coordinates (free, way) of assemblies of the right sense at each grid point, found from FEW guesses each."""
+    def _key(self, pose: Any, shape: tuple[int, ...]) -> Array:
+        """Numbers (entry, lane) that are the same where the links are in the same places."""
+        signature = self.group.signature(pose, extent(self.group, self.elements))
+        return np.array([np.broadcast_to(n, shape) for n in signature])
+
+    def _drive_at(self, index: NDArray[np.intp]) -> list[Number]:
+        return [lane_of(n, index) for n in self.drive]
+
+    def _found_at(self, probes: NDArray[np.intp]) -> list[Ways]:
+        """Assemblies of the right sense at each grid point, found from FEW guesses each."""
         rng = np.random.default_rng(SEED)
         spread = extent(self.group, self.elements)
         lanes = np.repeat(probes, FEW)
         guesses = [far * rng.uniform(-1, 1, len(lanes)) for far in guess_reaches(self.group, spread)]
-        pose = self.group.position(at(self.elements, lanes), guesses, [lane_of(n, lanes) for n in self.drive])
+        pose = self.group.position(at(self.elements, lanes), guesses, self._drive_at(lanes))
         sound = np.broadcast_to(pose.orientation, lanes.shape) == self.orientation
         sound &= np.broadcast_to(pose.condition, lanes.shape) < MOST_CONDITION
         q = np.array([np.broadcast_to(pose.q[i], lanes.shape) for i in self.group.kept])
         sound &= np.isfinite(q).all(axis=0)
-        return [q[:, k * FEW : (k + 1) * FEW][:, sound[k * FEW : (k + 1) * FEW]] for k in range(len(probes))]
+        key = self._key(pose, lanes.shape)
+        own = [k * FEW + np.flatnonzero(sound[k * FEW : (k + 1) * FEW]) for k in range(len(probes))]
+        return [Ways(q[:, some], key[:, some]) for some in own]
 
     def _apart(self, ways: Array, before: Array) -> Array:
         """How far assemblies (free, way) are from another, turns and slides counted against their sizes."""
@@ -242,11 +264,15 @@ class Follower:
         return np.asarray(np.sum(np.where(kinds == "turn", turned, change / size) ** 2, axis=0))
 
     def _block(self, q: Array, slope: Array, ahead: Sequence[int]) -> Array:
-        """Coordinates (free, k) at the first k points of `ahead`, k as far as they follow q smoothly."""
+        """Coordinates (free, k) at the first k points of `ahead`, k as far as they follow q smoothly.
+
+        Points that a few rounds do not settle are left to a shorter block, in the end to `_advance`: past the end of a
+        branch Newton wanders as long as it is let.
+        """
         guess = q[:, None] + slope[:, None] * np.arange(1, len(ahead) + 1)
         indices = np.asarray(ahead)
         elements = at(self.elements, indices)
-        pose = self.group.position(elements, list(guess), [lane_of(n, indices) for n in self.drive])
+        pose = self.group.position(elements, list(guess), self._drive_at(indices), late=0)
         found = np.array([np.broadcast_to(pose.q[i], indices.shape) for i in self.group.kept])
         change = np.diff(found, axis=1, prepend=q[:, None])
         bend = np.abs(np.diff(change, axis=1, prepend=change[:, :1]))
@@ -259,33 +285,42 @@ class Follower:
         """Largest change of each free coordinate between neighbours of the grid, rad or m."""
         return limits(self.group, size)
 
-    def _advance(self, q: Array, slope: Array, here: int, there: int, low: float, high: float) -> Array | None:
-        """From share `low` to `high` of the way between two grid points, halving the step where Newton strays."""
-        found = self._solve(q + slope * (high - low), q, here, there, high)
-        if found is not None:
-            return found
-        if high - low < 1 / 16:
+    def _advance(self, q: Array, slope: Array, here: int, there: int, low: int, high: int) -> Array | None:
+        """From `low` to `high`, in shortest steps between two grid points, halving the way where Newton strays.
+
+        The whole way and all its halvings are tried at once: Newton costs about as much for many lanes as for one.
+        """
+        shortest = 1 << HALVINGS
+        ends = low + (high - low) // 2 ** np.arange((high - low).bit_length())
+        found, good = self._solve(q, slope[:, None] * ((ends - low) / shortest), here, there, ends / shortest)
+        if not np.any(good):
             return None
-        middle = (low + high) / 2
-        half = self._advance(q, slope, here, there, low, middle)
-        return None if half is None else self._advance(half, slope, here, there, middle, high)
+        first = int(np.argmax(good))
+        reached: Array | None = found[:, first]
+        for begin, end in pairwise(ends[first::-1]):
+            if reached is not None:
+                reached = self._advance(reached, slope, here, there, int(begin), int(end))
+        return reached
 
-    def _solve(self, guess: Array, before: Array, here: int, there: int, share: float) -> Array | None:
-        elements = [_mixed(one, here, there, share) for one in self.elements]
-        drive = [_between(q, here, there, share) for q in self.drive]
-        pose = self.group.position(elements, list(guess), drive)
-        found = np.array([float(np.ravel(pose.q[i])[0]) for i in self.group.kept])
-        if not np.all(np.isfinite(found)) or pose.orientation != self.orientation:
-            return None
-        limits = self._limits(extent(self.group, elements))
-        return found if np.all(np.abs(found - before) <= limits) else None
+    def _solve(self, before: Array, change: Array, here: int, there: int, shares: Array) -> tuple[Array, Array]:
+        """Coordinates (free, share) at shares of the way between two grid points, and which follow those before.
+
+        change: of the coordinates, as guessed, (free, share).
+        """
+        elements = [_mixed(one, here, there, shares) for one in self.elements]
+        drive = [_between(q, here, there, shares) for q in self.drive]
+        pose = self.group.position(elements, list(before[:, None] + change), drive, late=NEAR_LIMIT)
+        found = np.array([np.broadcast_to(pose.q[i], shares.shape) for i in self.group.kept])
+        limits = self._limits(extent(self.group, elements))[:, None]
+        good = np.all(np.abs(found - before[:, None]) <= limits, axis=0)
+        return found, good & (np.broadcast_to(pose.orientation, shares.shape) == self.orientation)
 
 
-def _between(number: Number, here: int, there: int, share: float) -> Number:
+def _between(number: Number, here: int, there: int, share: Array) -> Number:
     return number[here] + share * (number[there] - number[here]) if np.ndim(number) else number
 
 
-def _mixed(pair: Any, here: int, there: int, share: float) -> Any:
+def _mixed(pair: Any, here: int, there: int, share: Array) -> Any:
     """Both elements of a joint part of the way between two grid points; axes stay of length one."""
     mixed = each(pair, lambda n: _between(n, here, there, share))
     parts: list[Any] = [one.normalised() if hasattr(one, "normalised") else one for one in mixed]

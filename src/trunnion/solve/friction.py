@@ -360,15 +360,21 @@ def scaled(problem: FrictionProblem, weights: Weights | None = None) -> continua
 
     def family(lanes: NDArray[np.intp]) -> continuation.System:
         part = problem.mapped(lambda number: number[lanes])
+        last: list[Any] = [(), (), ()]  # forces, and what follows from them: the next share begins where one ended
+
+        def laws(forces: Sequence[NDArray[np.float64]]) -> tuple[list[Number], list[list[Number]]]:
+            if not last[0] or not all(map(np.array_equal, forces, last[0])):
+                state = part.state(forces)
+                last[:] = forces, part.target(state.normals), part.map_derivative(state)
+            return last[1], last[2]
 
         def system(
             forces: Sequence[NDArray[np.float64]], share: NDArray[np.float64]
         ) -> tuple[list[Number], list[list[Number]]]:
             found = [share] * len(part.contacts) if weights is None else weights(share, lanes)
             shares = [weight if contact.rubs else 1.0 for weight, contact in zip(found, part.contacts, strict=True)]
-            state = part.state(forces)
-            residual = [f - s * t for f, s, t in zip(forces, shares, part.target(state.normals), strict=True)]
-            slopes = part.map_derivative(state)
+            target, slopes = laws(forces)
+            residual = [f - s * t for f, s, t in zip(forces, shares, target, strict=True)]
             rows = [[s * entry for entry in row] for s, row in zip(shares, slopes, strict=True)]
             return residual, identity_minus(rows)
 

@@ -19,8 +19,9 @@ from trunnion.solve.run import Run, prepare
 from trunnion.views.assembly.mode_drawings_space import space_ways
 from trunnion.views.assembly.modes import some
 from trunnion.views.common.cycle import Array, layout
-from trunnion.views.common.drawing import Picture, framed, labels, sketch
+from trunnion.views.common.drawing import Picture, framed, name_points, sketch
 from trunnion.views.common.figures import INK, MUTED, RULE, new
+from trunnion.views.common.labels import Labels
 from trunnion.views.common.lettering import plain
 
 if TYPE_CHECKING:
@@ -69,8 +70,10 @@ def ways(mechanism: Mechanism, found: Sequence[GroupModes] | None = None) -> Fig
     width = max(columns * WIDTH, 2 * WIDTH) + 0.2
     figure = new("Ways to assemble", result, 0.6 + sum(0.3 + line * high for line in lines), width)
     parts = figure.subfigures(len(found), 1, squeeze=False, height_ratios=[0.3 + line * high for line in lines])[:, 0]
+    labels = Labels(figure)
     for part, choice, row in zip(parts, found, rows, strict=True):
-        _group(part, choice, row, columns, box)
+        _group(part, choice, row, columns, box, labels)
+    labels.place()
     return figure
 
 
@@ -122,6 +125,7 @@ def _group(
     row: Sequence[ModeDrawing],
     columns: int,
     box: tuple[float, float, float, float],
+    labels: Labels,
 ) -> None:
     """The drawings of one group under its label."""
     where = f", at {choice.where}" if choice.where else ""
@@ -134,10 +138,10 @@ def _group(
     for axes, one in zip(grid, row, strict=False):
         axes.set_aspect("equal")
         axes.set(xlim=(box[0], box[2]), ylim=(box[1], box[3]), xticks=[], yticks=[])
-        _one(axes, choice, one, float(np.hypot(box[2] - box[0], box[3] - box[1])))
+        _one(axes, choice, one, float(np.hypot(box[2] - box[0], box[3] - box[1])), labels)
 
 
-def _one(axes: Axes, choice: GroupModes, one: ModeDrawing, size: float) -> None:
+def _one(axes: Axes, choice: GroupModes, one: ModeDrawing, size: float, labels: Labels) -> None:
     """One drawing: in a frame, which is bold around the way that is taken, under the name of the way."""
     paint, width = (INK, 1.8) if one.way.taken else (RULE, 1.0)
     for spine in axes.spines.values():
@@ -147,7 +151,7 @@ def _one(axes: Axes, choice: GroupModes, one: ModeDrawing, size: float) -> None:
     axes.set_title(plain(title), fontsize=8.5, fontweight=weight, color=INK, loc="left", pad=4)
     shown = replace(one.shown, size=SYMBOLS * size)
     sketch(axes, shown, one.index)
-    labels(axes, shown, one.index, list(one.way.joints))
+    name_points(axes, shown, one.index, labels, list(one.way.joints))
     if one.missing:
         text = f"not assembled here: {', '.join(one.missing)}"
         axes.text(0.03, 0.03, plain(text), transform=axes.transAxes, fontsize=7, color=MUTED, zorder=8)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,10 +14,11 @@ from trunnion.model.mechanism import Mechanism
 from trunnion.solve.assembly_modes import AssemblyMode, GroupModes, put_together
 from trunnion.views.assembly.modes import some
 from trunnion.views.common.figures import INK, MUTED, RULE, new
+from trunnion.views.common.labels import Labels
 from trunnion.views.common.lettering import plain
 from trunnion.views.space.bodies import Space, space
 from trunnion.views.space.camera import best, looking
-from trunnion.views.space.figure import Scenery, labels, scenery, sketch
+from trunnion.views.space.figure import Scenery, name_joints, scenery, sketch
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -52,8 +52,10 @@ def space_ways(mechanism: Mechanism, found: Sequence[GroupModes]) -> Figure:
         "Ways to assemble", result, 0.6 + sum(0.3 + line * tall for line in lines), max(columns, 2) * WIDTH + 0.2
     )
     parts = figure.subfigures(len(found), 1, squeeze=False, height_ratios=[0.3 + line * tall for line in lines])[:, 0]
+    labels = Labels(figure)
     for part, choice, row in zip(parts, found, rows, strict=True):
-        _group(part, choice, row, columns, frame, looks)
+        _group(part, choice, row, columns, frame, looks, labels)
+    labels.place()
     return figure
 
 
@@ -70,7 +72,13 @@ def _drawn(mechanism: Mechanism, choice: GroupModes, way: AssemblyMode) -> Drawn
 
 
 def _group(
-    part: SubFigure, choice: GroupModes, row: list[Drawn], columns: int, frame: tuple[float, ...], looks: list[Scenery]
+    part: SubFigure,
+    choice: GroupModes,
+    row: list[Drawn],
+    columns: int,
+    frame: tuple[float, ...],
+    looks: list[Scenery],
+    labels: Labels,
 ) -> None:
     """The drawings of one group under its label."""
     where = f", at {choice.where}" if choice.where else ""
@@ -83,10 +91,10 @@ def _group(
     for axes, (way, shown, index) in zip(grid, row, strict=False):
         axes.set_aspect("equal")
         axes.set(xlim=(frame[0], frame[2]), ylim=(frame[1], frame[3]), xticks=[], yticks=[])
-        _one(axes, choice, way, next((look for look in looks if look.shown is shown), None), index)
+        _one(axes, choice, way, next((look for look in looks if look.shown is shown), None), index, labels)
 
 
-def _one(axes: Axes, choice: GroupModes, way: AssemblyMode, look: Scenery | None, index: int) -> None:
+def _one(axes: Axes, choice: GroupModes, way: AssemblyMode, look: Scenery | None, index: int, labels: Labels) -> None:
     """One drawing: in a frame, which is bold around the way that is taken, under the name of the way."""
     paint, width = (INK, 1.8) if way.taken else (RULE, 1.0)
     for spine in axes.spines.values():
@@ -100,6 +108,4 @@ def _one(axes: Axes, choice: GroupModes, way: AssemblyMode, look: Scenery | None
         )
         return
     sketch(axes, look, index, choice.links)
-    wide = axes.get_xlim()[1] - axes.get_xlim()[0]
-    lettered = replace(look, box=(0.0, 0.0, wide * 1.6, wide * 0.8))  # letters are as large as in a figure of its own
-    labels(axes, lettered, index, [], tuple(way.joints), 7.5)
+    name_joints(axes, look, index, labels, tuple(way.joints), 7.5)

@@ -14,7 +14,7 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.joints.pairs import GUIDED, PAIRS
 from trunnion.views.common.cycle import Array, column, layout, names
 from trunnion.views.common.figures import INK, MUTED, PALETTE
-from trunnion.views.common.lettering import plain
+from trunnion.views.common.labels import Labels
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -105,11 +105,11 @@ def _track(result: xr.Dataset, key: str) -> Array:
     return np.asarray(result["point_position"].sel(point=key).transpose("axis", "position").values, dtype=float)
 
 
-def draw(axes: Axes, shown: Picture, index: int) -> None:
-    """Everything at position `index`, over the ghosts and the coupler curves."""
+def draw(axes: Axes, shown: Picture, index: int, labels: Labels) -> None:
+    """Everything at position `index`, over the ghosts and the coupler curves; the names are still to be placed."""
     _ghosts(axes, shown, index)
     sketch(axes, shown, index)
-    labels(axes, shown, index)
+    name_points(axes, shown, index, labels)
 
 
 def sketch(axes: Axes, shown: Picture, index: int) -> None:
@@ -300,8 +300,8 @@ def _slot(axes: Axes, shown: Picture, name: str, index: int, beyond: float) -> N
         axes.plot(*ends, color=paint, linewidth=width * shown.weight, solid_capstyle="round", zorder=4.2)
 
 
-def labels(axes: Axes, shown: Picture, index: int, only: Sequence[str] | None = None) -> None:
-    """Names of joints and points, all or only some, pushed away from the middle of the mechanism."""
+def name_points(axes: Axes, shown: Picture, index: int, labels: Labels, only: Sequence[str] | None = None) -> None:
+    """Names of joints and points, all or only some; points that are no joints get a dot."""
     places: dict[str, Array] = {}
     for key, track in shown.tracks.items():
         link, point = key.split(".", 1)
@@ -310,25 +310,11 @@ def labels(axes: Axes, shown: Picture, index: int, only: Sequence[str] | None = 
             places[point] = track[:, index]
             if joint is None and link != shown.ground:
                 axes.plot(*track[:, index], "o", markersize=4.5 * shown.weight, color=INK, zorder=6)
-    if not places:
-        return
-    middle = np.mean(list(places.values()), axis=0)
     places = places if only is None else {point: place for point, place in places.items() if point in only}
     for text, points in _together(places, 0.02 * shown.size):
-        place = places[points[0]]
-        away = place - middle
-        away = away / (np.hypot(*away) or 1.0)
         joints = [shown.stated["joints"].get(point, {}) for point in points]
-        if any(joint.get("type") in GUIDED for joint in joints):
-            away = np.array([0.0, 1.3])
-        elif any(shown.ground in joint.get("links", ()) for joint in joints):
-            away = np.array([-1.05 if away[0] < 0 else 1.05, -0.5])  # beside the bearing, not on the link
-        beside = away * (14 + 3 * len(text), 17) * shown.letters
-        axes.annotate(
-            plain(text), (place[0], place[1]), xytext=beside, textcoords="offset points", ha="center", va="center",
-            fontsize=10 * shown.letters, fontweight="bold", color=INK, zorder=7,
-            bbox={"boxstyle": "round,pad=0.12", "facecolor": "white", "edgecolor": "none", "alpha": 0.75},
-        )  # fmt: skip
+        block = any(joint.get("type") in GUIDED for joint in joints)
+        labels.add(axes, text, places[points[0]], 10 * shown.letters, 0.036 * shown.size if block else 0.0)
 
 
 def _together(places: dict[str, Array], near: float) -> list[tuple[str, list[str]]]:

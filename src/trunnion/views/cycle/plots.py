@@ -45,6 +45,7 @@ from trunnion.views.common.figures import (
     square,
     style_of,
 )
+from trunnion.views.common.labels import Labels
 from trunnion.views.common.lettering import plain
 from trunnion.views.common.peaks import ease, peak, usual_peak
 from trunnion.views.common.quantities import prefixed, quantity
@@ -291,13 +292,15 @@ def mechanism(result: xr.Dataset, ideal: xr.Dataset | None = None, index: int | 
     axes.set_xlim(low_x - margin, high_x + margin)
     axes.set_ylim(low_y - margin, high_y + margin)
     axes.axis("off")
-    draw(axes, shown, index)
+    labels = Labels(figure)
+    draw(axes, shown, index, labels)
     over = abscissa(result)
     facts = [f"{over.label} = {over.say(index)}", str(result.attrs.get("formula", ""))]
     status = int(result["status"].values[index])
     if status >= Status.NOT_CONVERGED:
         facts.append(status_text(status).split(":")[0])
     axes.set_title(plain("    ".join(facts)), fontsize=8.5, color=MUTED, loc="left")
+    labels.place()
     return figure
 
 

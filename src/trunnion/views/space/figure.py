@@ -13,6 +13,7 @@ from trunnion.errors import Finding, MechanismError, Status
 from trunnion.views.common.cycle import Array, abscissa, column, status_text
 from trunnion.views.common.drawing import PALE
 from trunnion.views.common.figures import INK, MUTED, PALETTE, new
+from trunnion.views.common.labels import Labels
 from trunnion.views.common.lettering import plain
 from trunnion.views.common.peaks import ease, usual_peak
 from trunnion.views.common.quantities import prefixed
@@ -97,7 +98,8 @@ def mechanism(result: xr.Dataset, index: int | None = None) -> Figure:
     sketch(axes, look, index)
     for start, end in arrows:
         _arrow(axes, start, end, REACTION)
-    labels(axes, look, index, [start + np.linspace(0.2, 1.0, 5)[:, None] * (end - start) for start, end in arrows])
+    labels = Labels(figure)
+    name_joints(axes, look, index, labels)
     _key(axes, look, most)
     over = abscissa(result)
     facts = [f"{over.label} = {over.say(index)}", str(result.attrs.get("formula", ""))]
@@ -109,6 +111,7 @@ def mechanism(result: xr.Dataset, index: int | None = None) -> Figure:
     if any(look.shown.shifts.values()):
         facts.append("joints on one spot drawn apart")
     axes.set_title(plain("    ".join(filter(None, facts))), fontsize=8.5, color=MUTED, loc="left")
+    labels.place()
     return figure
 
 
@@ -254,40 +257,14 @@ def _key(axes: Axes, look: Scenery, most: float) -> None:
                   ha="left", va="center", fontsize=8, color=MUTED)  # fmt: skip
 
 
-def labels(
-    axes: Axes, look: Scenery, index: int, arrows: list[Array], only: tuple[str, ...] = (), size: float = 9.5
+def name_joints(
+    axes: Axes, look: Scenery, index: int, labels: Labels, only: tuple[str, ...] = (), size: float = 9.5
 ) -> None:
-    """Names of joints and free points, each on that side of its place where least else lies."""
+    """Names of joints and free points, all or only some."""
     shown, camera = look.shown, look.camera
     spots = {name: camera.seen(shown.seated(name)[:, index])[:2] for name in shown.joints}
     dots = {key.split(".", 1)[1]: camera.seen(shown.track(key)[:, index])[:2] for key in shown.free
             if not key.startswith(f"{shown.ground}.")}  # fmt: skip
-    taken = list(np.concatenate([_covered(look, index), *arrows]))
-    places = spots | dots
-    for name, spot in places.items():
-        if only and name not in only:
-            continue
-        text = plain(name if len(name) <= 18 else f"{name[:17]}…")
-        half = np.array([0.007 * len(text) + 0.012, 0.016]) * look.diagonal * size / 9.5
-        ring = [np.array([np.cos(angle), np.sin(angle)]) for angle in np.radians(np.arange(0, 360, 30))]
-        reach = 0.034 * look.diagonal
-        options = [spot + (reach + half * np.abs(side)) * side for side in ring]
-        blocked = [sum(bool((np.abs(other - place) < half * 1.15).all()) for other in taken) for place in options]
-        place = options[int(np.argmin(blocked))]
-        taken += [place + half * [share, 0.0] for share in (-0.9, -0.45, 0, 0.45, 0.9)]
-        axes.text(
-            place[0], place[1], text, ha="center", va="center", fontsize=size, fontweight="bold", color=INK, zorder=8,
-            bbox={"boxstyle": "round,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.7},
-        )  # fmt: skip
-
-
-def _covered(look: Scenery, index: int) -> Array:
-    """Places (n, 2) that bodies lie on, for labels to keep off."""
-    found = []
-    for solid in look.solids:
-        pose = look.shown.poses[solid.link]
-        points = solid.points if solid.kind != "box" else _corners(solid.points)
-        if solid.kind == "rod":
-            points = points[0] + np.linspace(0, 1, 9)[:, None] * (points[1] - points[0]) if len(points) == 2 else points
-        found.append(look.camera.seen(points @ pose.matrix[:, :, index].T + pose.origin[:, index])[:, :2])
-    return np.concatenate(found)
+    for name, spot in (spots | dots).items():
+        if not only or name in only:
+            labels.add(axes, name if len(name) <= 18 else f"{name[:17]}…", spot, size, 0.022 * shown.size)

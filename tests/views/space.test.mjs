@@ -2,6 +2,7 @@
 import assert from "node:assert/strict";
 import test from "node:test";
 
+import { extent, projection } from "../../src/trunnion/views/web/projection.js";
 import { keyed, looking, shifted, turned, zoomed } from "../../src/trunnion/views/web/camera.js";
 import { meshes, seen, shades, stroke } from "../../src/trunnion/views/web/solids.js";
 import { apply, cross, dot, plus, product, rotation } from "../../src/trunnion/views/web/vector.js";
@@ -84,4 +85,23 @@ test("shades go from dark to light", () => {
   const sum = (text) => text.match(/\d+/g).map(Number).reduce((a, b) => a + b);
   assert.ok(list.slice(1).every((shade, order) => sum(shade) >= sum(list[order])));
   near(plus([1, 2, 3], [1, 1, 1], -1), [0, 1, 2]);
+});
+
+test("a turned view has the whole mechanism in the picture, and the first view is as it was", () => {
+  const reach = [[0, 0, 0], [0.4, 0.02, 0], [0.4, 0, 0.05], [0.1, 0.9, 0.1]]; // prettier-ignore
+  const home = { around: 0.3, above: 0.4 };
+  const seen = extent(reach, looking(home.around, home.above));
+  const scene = { view: home };
+  const [width, height, margin, below] = [600, 400, 40, 30];
+  const scale = Math.min((width - 2 * margin) / seen.size[0], (height - below - 2 * margin) / seen.size[1]);
+  const frame = { width, height, margin, scale, middle: seen.middle };
+  for (const [around, above] of [[0.3, 0.4], [1.9, 0.4], [0.3, 1.5], [-2.0, -0.7]]) {
+    const camera = { around, above, zoom: 1, shift: [0, 0] };
+    const { matrix, to } = projection({ scene, camera, frame, reach }, below);
+    const pixels = reach.map((place) => to(apply(matrix, place)));
+    assert.ok(pixels.every(([x, y]) => x > margin - 1 && x < width - margin + 1 && y > margin - 1 && y < height - below - margin + 1));
+    const wide = Math.max(...pixels.map(([x]) => x)) - Math.min(...pixels.map(([x]) => x));
+    const tall = Math.max(...pixels.map(([, y]) => y)) - Math.min(...pixels.map(([, y]) => y));
+    assert.ok(wide > width - 2 * margin - 1 || tall > height - below - 2 * margin - 1);
+  }
 });

@@ -235,7 +235,7 @@ def _key(axes: Axes, look: Scenery, most: float) -> None:
         axes.annotate(f"reaction {size * factor:g} {unit}", (start[0], y), xytext=(-5, 0), textcoords="offset points",
                       ha="right", va="center", fontsize=8, color=MUTED)  # fmt: skip
     arm = 0.05 * look.diagonal
-    origin = np.array([x0 + 1.25 * arm, y0 + 1.1 * arm])
+    origin = np.array([x0 + 1.6 * arm, y0 + 1.6 * arm])
     for name, axis in zip("xyz", look.camera.matrix.T, strict=True):
         end = origin + arm * axis[:2]
         axes.annotate("", (end[0], end[1]), xytext=(origin[0], origin[1]), zorder=7,

@@ -2,10 +2,11 @@
 
 import { arrow, longest } from "./arrow.js";
 import { magnified, told } from "./built.js";
-import { looking, steer } from "./camera.js";
+import { steer } from "./camera.js";
 import { at, cause, magnitude, peak, quantile, solved, usualPeak } from "./data.js";
 import { html, onWidth, set, svg } from "./dom.js";
 import { roundBelow, short, stated } from "./format.js";
+import { projection } from "./projection.js";
 import { meshes, paint, seen, shades, stroke } from "./solids.js";
 import { apply, dot, plus, rotation, scaled } from "./vector.js";
 
@@ -13,6 +14,7 @@ const MARGIN = 46; // room for names and arrows, px
 const KEY = 34; // height of the strip with triad and scales, px
 const BELOW = 330; // height of what stands below the drawing, so that all of it stays in the window, px
 const SHARP = 2; // canvas pixels for one of the page, at least: it is printed too
+const FITTED = 24; // positions whose bodies a turned view is fitted to
 const LINE = 0.75; // half length of an axis, share of the size
 const FAR = 1.5; // a screw axis farther from the middle than this many sizes is not drawn
 const LOAD = 44; // length of a load, px
@@ -88,6 +90,19 @@ function embody(view) {
   view.links = new Map(scene.links.map((link) => [link.name, link]));
   view.bodies = scene.solids.map((solid) => ({ solid, meshes: meshes(solid, scene.size) }));
   view.tracks = scene.free.map((point) => track(scene, view.links.get(point.link), point));
+  view.reach = reach(view);
+}
+
+/** Where bodies come to over the run, at some of its positions: what a turned view is fitted to. */
+function reach({ scene, links }) {
+  const places = [];
+  for (let index = 0; index < scene.count; index += Math.ceil(scene.count / FITTED)) {
+    for (const solid of scene.solids) {
+      const pose = poseOf(links.get(solid.link), index);
+      if (pose) places.push(...solid.points.map((point) => plus(apply(pose.turn, point), pose.place)));
+    }
+  }
+  return places;
 }
 
 /** A magnitude that arrows are scaled by: long ones stay in sight, common ones legible. */
@@ -145,7 +160,7 @@ function build(view, width) {
   );
   const margin = Math.min(MARGIN, width * 0.1);
   const scale = Math.min((width - 2 * margin) / wide, (height - 2 * margin - KEY) / tall);
-  view.frame = { width, height, scale, middle: [(left + right) / 2, (below + above) / 2] };
+  view.frame = { width, height, scale, margin, middle: [(left + right) / 2, (below + above) / 2] };
   const sharp = Math.max(globalThis.devicePixelRatio ?? 1, SHARP);
   set(view.canvas, { width: Math.round(width * sharp), height: Math.round(height * sharp) });
   view.context = view.canvas.getContext("2d");
@@ -158,23 +173,11 @@ function build(view, width) {
   pose(view);
 }
 
-/** The projection of the present camera: matrix, and `to` from [right, up] in metres to pixels. */
-function projection({ scene, camera, frame }) {
-  const matrix = looking(camera.around, camera.above);
-  const home = apply(looking(scene.view.around, scene.view.above), scene.middle);
-  const pivot = apply(matrix, scene.middle);
-  const scale = frame.scale * camera.zoom;
-  // the first view has the whole box in the middle of the picture; a turn leaves the middle of the mechanism in place
-  const x = frame.width / 2 + camera.shift[0] + (home[0] - frame.middle[0]) * scale;
-  const y = (frame.height - KEY) / 2 + camera.shift[1] - (home[1] - frame.middle[1]) * scale;
-  return { matrix, scale, to: ([right, up]) => [x + (right - pivot[0]) * scale, y - (up - pivot[1]) * scale] };
-}
-
 /** Pixels a newton (or newton metre) at which every usual vector of the run ends inside the first view. */
 function fitting(view, what, size) {
   if (!(size > 0)) return 0;
-  const { scene, frame } = view;
-  const camera = projection({ scene, frame, camera: first(scene) });
+  const { scene, frame, reach } = view;
+  const camera = projection({ scene, frame, reach, camera: first(scene) }, KEY);
   const rays = [];
   for (const joint of scene.joints) {
     for (let index = 0; index < scene.count; index += Math.ceil(scene.count / 120)) {
@@ -244,7 +247,7 @@ function pose(view) {
   view.stage.classList.toggle("without-answer", !answered);
   view.message.hidden = answered;
   view.message.textContent = answered ? "" : cause(scene, index);
-  view.project = projection(view);
+  view.project = projection(view, KEY);
   paintBodies(view);
   const parts = [];
   if (view.extras.has("axes")) parts.push(...axes(view));
@@ -421,7 +424,7 @@ function names(view) {
 /** Triad, length bar and reference arrows, with round numbers. */
 function key(view) {
   const { scene, frame, project } = view;
-  const [ox, oy] = [34, frame.height - 34];
+  const [ox, oy] = [46, frame.height - 46]; // its letters stay in the picture on any side
   const strip = { x: 0, y: frame.height - KEY + 6, width: frame.width, height: KEY - 6 };
   const parts = [svg("rect", { class: "strip", ...strip })];
   ["x", "y", "z"].forEach((name, axis) => {

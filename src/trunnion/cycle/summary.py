@@ -22,6 +22,7 @@ from trunnion.model.quantity import Quantity
 from trunnion.model.units import KINDS, Dimension, si_unit
 from trunnion.results import variables as results
 from trunnion.results.attributes import cited, figure_rows, finding_rows, origin
+from trunnion.results.dataset import driven
 from trunnion.results.figure import Figure
 from trunnion.results.sentences import finding_for
 from trunnion.solve.forward import start
@@ -82,8 +83,9 @@ def finish(run: Run, found_positions: Positions) -> xr.Dataset:
         "scene": _scene(run),
         "periodic": int(run.cycle.periodic),
     }
+    along = driven(time, *run.system.dial(run.values, time))
     result = results.dataset(
-        arrays, found_positions.labels, time, found_positions.means, attributes, found_positions.ideal
+        arrays, found_positions.labels, along, found_positions.means, attributes, found_positions.ideal
     )
     return measured.joined(result)
 

@@ -63,7 +63,8 @@ def described(
 
 def driven(time: NDArray[np.float64], values: ArrayLike, unit: str, of: str) -> dict[str, xr.Variable]:
     """The coordinates along the positions: time, and the drive as a dial names it."""
-    drive = Variable(("position",), unit.strip(), f"coordinate of {of}" if of else "time")
+    moves = {"°": "angle", "mm": "slide"}.get(unit.strip(), "coordinate")
+    drive = Variable(("position",), unit.strip(), f"{moves} of {of}" if of else "time")
     return described({"time": time, "drive": np.asarray(values, float)}, {"time": TIME, "drive": drive})
 
 
@@ -82,4 +83,10 @@ def dataset_of(
     import xarray as xr
 
     names = {dim: (dim, np.asarray(members, dtype=str)) for dim, members in labels.items()}
-    return xr.Dataset(variables, {**names, **(along or {})}, {"kind": kind, **encoded(attributes)})
+    found = xr.Dataset(variables, {**names, **(along or {})}, {"kind": kind, **encoded(attributes)})
+    drive = (along or {}).get("drive")
+    if drive is None or drive.dims != ("position",):
+        return found
+    # xarray draws over the coordinate that bears the dimension's name. It has no index: two results are combined
+    # position by position, not by angles that may differ in their last digit
+    return found.assign_coords(xr.Coordinates({"position": drive}, indexes={}))

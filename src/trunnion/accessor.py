@@ -17,11 +17,13 @@ from trunnion.results.attributes import findings_of, summary_of
 from trunnion.results.export import frame, save
 from trunnion.results.figure import Figure as Figure
 from trunnion.results.tables import KINDS, kind_of
-from trunnion.views.shown import figure_of, report_of
+from trunnion.views.shown import animation_of, figure_of, html_of, report_of
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure as Drawing
+
+    from trunnion.views.cycle.animation import Animation
 
 __all__ = ["Accessor"]
 
@@ -68,3 +70,15 @@ class Accessor:
     def plot(self, kind: str | None = None, **options: Any) -> Drawing:
         """A matplotlib figure: the main one of its view, or of a kind such as "reactions"."""
         return figure_of(self._result, kind, **options)
+
+    def animate(self, ideal: xr.Dataset | None = None, height: int = 760) -> Animation:
+        """The moving mechanism of a cycle, which a notebook shows in its place and `.save("motion.html")` writes.
+
+        ideal: the same run without friction, drawn beside; height: of the frame in a notebook, px. Raises
+        MechanismError of a result of another kind.
+        """
+        return animation_of(self._result, ideal, height)
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the figures that one looks at first, and the findings."""
+        return html_of(self._result)

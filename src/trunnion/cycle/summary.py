@@ -46,6 +46,7 @@ __all__ = [
     "inputs",
     "model_notes",
     "references",
+    "scene_of",
     "sound_positions",
 ]
 
@@ -80,7 +81,7 @@ def finish(run: Run, found_positions: Positions) -> xr.Dataset:
         "findings": finding_rows([*found, *measured.findings]),
         "summary": figure_rows([*_summary(run, found_positions, near), *measured.summary()]),
         "inputs": inputs(mechanism),
-        "scene": _scene(run),
+        "scene": scene_of(run),
         "periodic": int(run.cycle.periodic),
     }
     along = driven(time, *run.system.dial(run.values, time))
@@ -350,7 +351,7 @@ def inputs(mechanism: Mechanism) -> list[dict[str, Any]]:
     return rows
 
 
-def _scene(run: Run) -> dict[str, Any]:
+def scene_of(run: Run) -> dict[str, Any]:
     """What a drawing needs to know beside the positions of the points."""
     system = run.system
     found: dict[str, Any] = fill_of(system).scene(

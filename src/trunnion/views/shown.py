@@ -12,7 +12,9 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-__all__ = ["check_kind", "figure_of", "report_of"]
+    from trunnion.views.cycle.animation import Animation
+
+__all__ = ["animation_of", "check_kind", "figure_of", "html_of", "report_of"]
 
 # kind of result: the module of its view, in which `report` or `figure` stands; loaded when it is asked for, for
 # matplotlib is slow to import
@@ -39,6 +41,17 @@ def figure_of(result: xr.Dataset, kind: str | None = None, **options: Any) -> Fi
         main = getattr(view, "sheet", view.figure)
         return main(result, **options)  # type: ignore[no-any-return]
     return view.figure(result, kind=kind, **options)  # type: ignore[no-any-return]
+
+
+def animation_of(result: xr.Dataset, ideal: xr.Dataset | None, height: int) -> Animation:
+    """The moving mechanism of a cycle."""
+    view = _view(kind_of(result), {"cycle": "cycle.animation"}, "animation")
+    return view.animation(result, ideal, height)  # type: ignore[no-any-return]
+
+
+def html_of(result: xr.Dataset) -> str:
+    """What a notebook shows of a result of any kind."""
+    return str(import_module("trunnion.views.notebook").result_html(result))
 
 
 def check_kind(of: str, kind: str) -> None:

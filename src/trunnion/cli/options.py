@@ -61,7 +61,10 @@ Seats = Annotated[
     str | None,
     typer.Option("--seat", help="loaded or free: how the pins of all joints with play lie in their holes."),
 ]
-Method = Annotated[str, typer.Option("--method", help="newton, or successive-approximation (Durango et al., 2010).")]
+Method = Annotated[
+    str,
+    typer.Option("--friction-method", "--method", help="newton, or successive-approximation (Durango et al., 2010)."),
+]
 Criterion = Annotated[
     float | None,
     typer.Option(

@@ -404,5 +404,9 @@ def _canonical(value: Any) -> Any:
 
 
 def read_mechanism(path: str | os.PathLike[str], tables: TableFiles | None = None) -> Mechanism:
-    """The mechanism of a YAML, JSON or TOML file; see `Mechanism.read`."""
+    """The mechanism of a YAML, JSON or TOML file.
+
+    tables: CSV files with the points of drivers and tables, by name; they go before those that the model names.
+    Raises MechanismError with file, line, cause and remedy of every finding.
+    """
     return Mechanism.read(path, tables)

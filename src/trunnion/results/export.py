@@ -162,8 +162,9 @@ def check_format(path: str | os.PathLike[str], others: tuple[str, ...] = ()) -> 
 def save(result: xr.Dataset, path: str | os.PathLike[str], units_row: bool = False) -> None:
     """Write a result by the file's extension, whole or not at all.
 
-    units_row: a second header row with the units (CSV). Raises MechanismError for an unknown extension, a missing
-    package, or a place that cannot be written.
+    result: of any function that returns a Dataset; path: .csv .json .nc .zarr .parquet. units_row: a second header row
+    with the units (CSV). Raises MechanismError for an unknown extension, a missing package, or a place that cannot be
+    written.
     """
     check_format(path)
     writer, _, _ = FORMATS[Path(path).suffix.lower()]

@@ -6,6 +6,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from trunnion.errors import Finding, MechanismError
+from trunnion.model.mechanism import Mechanism
 from trunnion.results.tables import kind_of
 
 if TYPE_CHECKING:
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
 
     from trunnion.views.cycle.animation import Animation
 
-__all__ = ["animation_of", "check_kind", "figure_of", "html_of", "report_of"]
+__all__ = ["animation_of", "check_kind", "figure_of", "html_of", "plot", "report", "report_of"]
 
 # kind of result: the module of its view, in which `report` or `figure` stands; loaded when it is asked for, for
 # matplotlib is slow to import
@@ -27,6 +28,29 @@ FIGURES = {
     "tolerance": "tolerance.figure", "allocation": "allocation.allocation", "comparison": "compare.figure",
     "identification": "identify.figure",
 }  # fmt: skip
+
+
+def plot(of: Mechanism | xr.Dataset, kind: str | None = None, **options: Any) -> Figure:
+    """A matplotlib Figure of a mechanism at its start, or of a result.
+
+    kind: of a result one of the figures of its view, such as "reactions" of a cycle (`trunnion plot --help` lists
+    them); the main one if not given. options: those of the figure, as ideal= (the same run without friction) of a
+    cycle. Raises MechanismError for a kind that there is not, or where there is nothing to draw.
+    """
+    if not isinstance(of, Mechanism):
+        return figure_of(of, kind, **options)
+    if kind is not None or options:
+        raise MechanismError(Finding("a mechanism has one drawing", "kind", "analyse it first, and plot the result"))
+    return of.plot()
+
+
+def report(result: xr.Dataset, ideal: xr.Dataset | None = None, **options: Any) -> str:
+    """The report of a result as one HTML page that needs no network.
+
+    ideal: of a cycle, the same run without friction, drawn beside; options: others of its report. Raises MechanismError
+    of a result that has no report, ValueError if `ideal` has other positions.
+    """
+    return report_of(result, **(options if ideal is None else {"ideal": ideal, **options}))
 
 
 def report_of(result: xr.Dataset, **options: Any) -> str:

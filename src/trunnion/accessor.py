@@ -7,6 +7,7 @@ a result that is read from a file.
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import xarray as xr
@@ -55,9 +56,9 @@ class Accessor:
         """Its tables by name, with the columns of the CSV files."""
         return {name: frame(self._result, name) for name in KINDS[self.kind]}
 
-    def save(self, path: str | os.PathLike[str], units_row: bool = False) -> None:
-        """Write it by the file's extension: .csv .json .nc .zarr .parquet."""
-        save(self._result, path, units_row)
+    def save(self, path: str | os.PathLike[str], units_row: bool = False, columns: Sequence[str] | None = None) -> None:
+        """Write it by the file's extension, as `trunnion.save` does: .csv .json .nc .zarr .parquet .xlsx."""
+        save(self._result, path, units_row, columns)
 
     def report(self, path: str | os.PathLike[str] | None = None, **options: Any) -> str:
         """The report as HTML, also written if a path is given; options: those of the view, as ideal= of a cycle."""

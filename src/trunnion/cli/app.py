@@ -24,6 +24,7 @@ from trunnion.cli.identify import identify
 from trunnion.cli.model import exit_status, lines_of, placed, stated
 from trunnion.cli.options import (
     IMAGES,
+    Columns,
     Criterion,
     Data,
     File,
@@ -141,6 +142,7 @@ def analyse(
     out: Data = None,
     report: Report = None,
     units_row: UnitsRow = False,
+    columns: Columns = None,
     uncut: Uncut = False,
 ) -> None:
     """Motion, reactions with friction, drive effort and power over the cycle."""
@@ -149,7 +151,7 @@ def analyse(
     with lines_of(file):
         result = _run(mechanism, steps, _method(method, criterion, iterations))
     page = partial(_page, mechanism, result, uncut)
-    Shown(result, file, ["assembly"], out or [], report, units_row, page=page).finish()
+    Shown(result, file, ["assembly"], out or [], report, units_row, page=page, columns=columns).finish()
 
 
 @verb

@@ -61,7 +61,7 @@ app = typer.Typer(
     name="trunnion",
     help="The analysis of linkages as built: motion, reactions with friction, drive torque, power.",
     no_args_is_help=True,
-    add_completion=False,
+    add_completion=True,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )

@@ -183,7 +183,8 @@ def locking(
     mechanism = stated(file, set_, table, friction)
     with lines_of(file):
         run = prepare(mechanism)
-        found = look(run, steps)
+        with bar("positions", steps, least=200_000) as progress:
+            found = look(run, steps, progress)
     figures = report_figures(run, found)
     Shown(found, file, ["assembly"], show=lambda: show_figures(mechanism.name or str(file), figures)).finish()
 

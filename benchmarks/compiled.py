@@ -19,9 +19,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from trunnion import Mechanism, prepare
+from trunnion import Mechanism
 from trunnion.cycle.positions import CHUNK
 from trunnion.measures.measures import named
+from trunnion.solve.run import prepare
 from trunnion.solve.status import pose_status, status_of
 from trunnion.studies.tolerance.compiled import CompiledKernel
 

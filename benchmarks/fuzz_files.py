@@ -137,7 +137,7 @@ def samples(path: Path, rng: Random) -> Iterator[None]:
 
 def mapping(path: Path, rng: Random) -> Iterator[None]:
     """A mapping, and the data that it names."""
-    from trunnion import read_measured
+    from trunnion.rig import read as read_measured
     from trunnion.rig.reading.measurement import dataset
 
     dataset(read_measured(path))
@@ -146,7 +146,7 @@ def mapping(path: Path, rng: Random) -> Iterator[None]:
 
 def data(path: Path, rng: Random) -> Iterator[None]:
     """Measured data, by a mapping that is sound."""
-    from trunnion import read_measured
+    from trunnion.rig import read as read_measured
     from trunnion.rig.reading.measurement import dataset
 
     dataset(read_measured(path.with_name("mapping.yaml"), [path]))
@@ -161,7 +161,7 @@ def rig(path: Path, rng: Random) -> Iterator[None]:
 
     stated = Rig.read(path)
     if len(stated.schedule.rows()) <= FEW:
-        plan(trunnion.observe(trunnion.read(path.with_name("fourbar.yaml")), stated))
+        plan(trunnion.rig.observe(trunnion.read(path.with_name("fourbar.yaml")), stated))
     yield
 
 

@@ -17,10 +17,9 @@ from rich.table import Table
 from benchmarks import stacked
 from benchmarks.linkages import LINKAGES, Linkage
 from benchmarks.side import Side, take_turns
-from trunnion import prepare
 from trunnion.cycle.positions import CHUNK
 from trunnion.solve.forward import Forward, forward
-from trunnion.solve.run import Run
+from trunnion.solve.run import Run, prepare
 
 Array = NDArray[np.float64]
 LIMITS = {2: 0.6, 3: 15.0}  # µs per group and configuration, by class: motion, forces and friction

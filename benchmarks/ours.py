@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from benchmarks.side import MOTION_COLUMNS, OUTPUTS, Job, Side, version
 
 if version("trunnion"):
-    from trunnion import Mechanism, analyse, prepare
+    from trunnion import Mechanism, analyse
     from trunnion.solve.forward import forward
+    from trunnion.solve.run import prepare
 
 Array = NDArray[np.floating[Any]]
 MODEL = Path(__file__).parents[1] / "examples" / "durango-fourbar.yaml"

@@ -32,6 +32,7 @@ from benchmarks.drawn import planar, spatial
 from benchmarks.judged import planar as judged_planar
 from benchmarks.judged import spatial as judged_spatial
 from benchmarks.judged.verdict import CHECKS, Data, Results, Verdict
+from trunnion.solve.run import prepare
 
 SPACES = {
     "planar": (planar.drawn, judged_planar.judge),
@@ -69,7 +70,7 @@ def result_of(data: Data, steps: int, whole: bool) -> Results:
     from trunnion.cycle.positions import positions
     from trunnion.results.variables import variables
 
-    found = positions(trunnion.prepare(mechanism), steps, margin=False)
+    found = positions(prepare(mechanism), steps, margin=False)
     known = variables(mechanism.space)
     return Results.of(found.arrays, {name: known[name].dims for name in found.arrays}, found.labels, found.time)
 

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from rich.table import Table
 
 from benchmarks.side import Side, take_turns
-from trunnion import Mechanism, prepare
+from trunnion import Mechanism
 from trunnion.solve.branches import choose
-from trunnion.solve.run import Run
+from trunnion.solve.run import Run, prepare
 from trunnion.solve.space.system import SpatialSystem
 
 Array = NDArray[np.float64]

@@ -290,7 +290,7 @@ def tolerances_table() -> str:
 
 def identification_table() -> str:
     """Every variable of an identification."""
-    from trunnion.rig.identify.result import VARIABLES
+    from trunnion.rig.identification.result import VARIABLES
 
     rows = [(_code(name), ", ".join(one.dims), _unit(one.units), one.long_name) for name, one in VARIABLES.items()]
     return _rows(("variable", "dimension", "unit", "meaning"), rows)
@@ -381,7 +381,7 @@ def costs_table() -> str:
 
 def comparisons_table() -> str:
     """Every variable of a comparison with a measurement."""
-    from trunnion.rig.compare.result import VARIABLES
+    from trunnion.rig.comparison.result import VARIABLES
 
     told = {"": "of the channel", "set": "of what is set", "drive": "rad, m or s"}
     rows = [

@@ -15,6 +15,7 @@ from trunnion.measures.evaluation import NumpyKernel
 from trunnion.measures.measures import named
 from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal
 from trunnion.solve.friction_method import FrictionMethod
+from trunnion.solve.run import prepare
 
 __all__ = ["Sensors", "True_", "truth"]
 
@@ -79,7 +80,7 @@ def truth(
     phase = np.arange(positions) / positions
     courses = []
     for condition in conditions:
-        run = trunnion.prepare(mechanism.with_values({**values, **condition}))
+        run = prepare(mechanism.with_values({**values, **condition}))
         found = named(run.system.mechanism, measures.values(), run.values)
         curves, _ = NumpyKernel(run, found, FrictionMethod()).courses(run.values, run.cycle.duration * phase)
         both = zip(measures, found, strict=True)

@@ -13,60 +13,59 @@ TYPE_CHECKING = False  # as a type checker takes it for True; `typing` itself is
 if TYPE_CHECKING:
     from typing import Any
 
-    from trunnion import dual
+    from trunnion import dual as dual
+    from trunnion import rig
     from trunnion.cycle.analyse import analyse
-    from trunnion.cycle.inspect import Check, check
+    from trunnion.cycle.inspect import check
     from trunnion.cycle.locking import locking
-    from trunnion.cycle.vocabulary import vocabulary
-    from trunnion.errors import Finding, MechanismError, Status
+    from trunnion.errors import MechanismError, Status
     from trunnion.model.mechanism import Mechanism
     from trunnion.model.mechanism import read_mechanism as read
     from trunnion.results.export import save
-    from trunnion.rig.compare.study import compare
-    from trunnion.rig.identify import identify
-    from trunnion.rig.reading.read import read_measured
-    from trunnion.rig.virtual.observe import observe
     from trunnion.solve.friction_method import FrictionMethod
-    from trunnion.solve.run import prepare
     from trunnion.studies.allocation.allocate import allocate
     from trunnion.studies.assembly.study import assemble
+    from trunnion.studies.design import design
     from trunnion.studies.play.study import play
     from trunnion.studies.sweep.study import sweep
     from trunnion.studies.tolerance.study import tolerance
-    from trunnion.views.cycle.report import report
+    from trunnion.views.shown import plot, report
 
+# public name: module and the name there
 _PLACES = {
-    "FrictionMethod": "trunnion.solve.friction_method",
-    "Finding": "trunnion.errors",
-    "Mechanism": "trunnion.model.mechanism",
-    "MechanismError": "trunnion.errors",
-    "Status": "trunnion.errors",
-    "Check": "trunnion.cycle.inspect",
-    "allocate": "trunnion.studies.allocation.allocate",
-    "analyse": "trunnion.cycle.analyse",
-    "assemble": "trunnion.studies.assembly.study",
-    "check": "trunnion.cycle.inspect",
-    "compare": "trunnion.rig.compare.study",
-    "identify": "trunnion.rig.identify",
-    "locking": "trunnion.cycle.locking",
-    "observe": "trunnion.rig.virtual.observe",
-    "play": "trunnion.studies.play.study",
-    "prepare": "trunnion.solve.run",
-    "read": "trunnion.model.mechanism",
-    "read_measured": "trunnion.rig.reading.read",
-    "report": "trunnion.views.cycle.report",
-    "save": "trunnion.results.export",
-    "sweep": "trunnion.studies.sweep.study",
-    "tolerance": "trunnion.studies.tolerance.study",
-    "vocabulary": "trunnion.cycle.vocabulary",
+    "FrictionMethod": ("trunnion.solve.friction_method", "FrictionMethod"),
+    "Mechanism": ("trunnion.model.mechanism", "Mechanism"),
+    "MechanismError": ("trunnion.errors", "MechanismError"),
+    "Status": ("trunnion.errors", "Status"),
+    "allocate": ("trunnion.studies.allocation.allocate", "allocate"),
+    "analyse": ("trunnion.cycle.analyse", "analyse"),
+    "assemble": ("trunnion.studies.assembly.study", "assemble"),
+    "check": ("trunnion.cycle.inspect", "check"),
+    "design": ("trunnion.studies.design", "design"),
+    "locking": ("trunnion.cycle.locking", "locking"),
+    "play": ("trunnion.studies.play.study", "play"),
+    "plot": ("trunnion.views.shown", "plot"),
+    "read": ("trunnion.model.mechanism", "read_mechanism"),
+    "report": ("trunnion.views.shown", "report"),
+    "save": ("trunnion.results.export", "save"),
+    "sweep": ("trunnion.studies.sweep.study", "sweep"),
+    "tolerance": ("trunnion.studies.tolerance.study", "tolerance"),
 }
-_RESULTS = {"analyse", "assemble", "allocate", "compare", "identify", "locking", "play", "sweep", "tolerance"}
-_ELSEWHERE = {"read": "read_mechanism"}
-_MODULES = {"dual": "trunnion.dual"}
+_RESULTS = {"analyse", "assemble", "allocate", "locking", "play", "sweep", "tolerance"}
+_MODULES = {"dual": "trunnion.dual", "rig": "trunnion.rig"}
+# names that were public here, with where they are now
+_MOVED = {
+    "Check": ("trunnion.cycle.inspect", "Check"),
+    "Finding": ("trunnion.errors", "Finding"),
+    "compare": ("trunnion.rig", "compare"),
+    "identify": ("trunnion.rig", "identify"),
+    "observe": ("trunnion.rig", "observe"),
+    "prepare": ("trunnion.solve.run", "prepare"),
+    "read_measured": ("trunnion.rig", "read"),
+    "vocabulary": ("trunnion.cycle.vocabulary", "vocabulary"),
+}
 
 __all__ = [
-    "Check",
-    "Finding",
     "FrictionMethod",
     "Mechanism",
     "MechanismError",
@@ -75,20 +74,16 @@ __all__ = [
     "analyse",
     "assemble",
     "check",
-    "compare",
-    "dual",
-    "identify",
+    "design",
     "locking",
-    "observe",
     "play",
-    "prepare",
+    "plot",
     "read",
-    "read_measured",
     "report",
+    "rig",
     "save",
     "sweep",
     "tolerance",
-    "vocabulary",
 ]
 
 
@@ -98,11 +93,16 @@ def __getattr__(name: str) -> Any:
 
     if name in _MODULES:
         return import_module(_MODULES[name])
-    if name not in _PLACES:
+    if name not in _PLACES and name not in _MOVED:
         raise AttributeError(f"module 'trunnion' has no attribute '{name}'")
+    module, own = _PLACES.get(name) or _MOVED[name]
+    if name in _MOVED:
+        import warnings
+
+        warnings.warn(f"trunnion.{name} is now {module}.{own}", DeprecationWarning, stacklevel=2)
     if name in _RESULTS:
         import_module("trunnion.accessor")  # result.trunnion
-    return getattr(import_module(_PLACES[name]), _ELSEWHERE.get(name, name))
+    return getattr(import_module(module), own)
 
 
 def __dir__() -> list[str]:

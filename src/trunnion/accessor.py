@@ -7,6 +7,7 @@ a result that is read from a file.
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import xarray as xr
@@ -17,11 +18,13 @@ from trunnion.results.attributes import findings_of, summary_of
 from trunnion.results.export import frame, save
 from trunnion.results.figure import Figure as Figure
 from trunnion.results.tables import KINDS, kind_of
-from trunnion.views.shown import figure_of, report_of
+from trunnion.views.shown import animation_of, figure_of, html_of, report_of
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure as Drawing
+
+    from trunnion.views.cycle.animation import Animation
 
 __all__ = ["Accessor"]
 
@@ -53,9 +56,9 @@ class Accessor:
         """Its tables by name, with the columns of the CSV files."""
         return {name: frame(self._result, name) for name in KINDS[self.kind]}
 
-    def save(self, path: str | os.PathLike[str], units_row: bool = False) -> None:
-        """Write it by the file's extension: .csv .json .nc .zarr .parquet."""
-        save(self._result, path, units_row)
+    def save(self, path: str | os.PathLike[str], units_row: bool = False, columns: Sequence[str] | None = None) -> None:
+        """Write it by the file's extension, as `trunnion.save` does: .csv .json .nc .zarr .parquet .xlsx."""
+        save(self._result, path, units_row, columns)
 
     def report(self, path: str | os.PathLike[str] | None = None, **options: Any) -> str:
         """The report as HTML, also written if a path is given; options: those of the view, as ideal= of a cycle."""
@@ -68,3 +71,15 @@ class Accessor:
     def plot(self, kind: str | None = None, **options: Any) -> Drawing:
         """A matplotlib figure: the main one of its view, or of a kind such as "reactions"."""
         return figure_of(self._result, kind, **options)
+
+    def animate(self, ideal: xr.Dataset | None = None, height: int = 760) -> Animation:
+        """The moving mechanism of a cycle, which a notebook shows in its place and `.save("motion.html")` writes.
+
+        ideal: the same run without friction, drawn beside; height: of the frame in a notebook, px. Raises
+        MechanismError of a result of another kind.
+        """
+        return animation_of(self._result, ideal, height)
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the figures that one looks at first, and the findings."""
+        return html_of(self._result)

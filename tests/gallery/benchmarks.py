@@ -11,6 +11,7 @@ from scipy.optimize import fsolve
 import trunnion
 from gallery.entry import Entry, Outcome
 from gallery.plane import bend, corner, slope
+from trunnion.solve.run import prepare
 
 # ---- five-bar-robot: what the process force asks of the left motor ---------------------------------------------------
 
@@ -21,7 +22,7 @@ def share(one: Outcome, motor: str = "A") -> float:
     """Torque of a motor with the process force less that without it, both without friction, at `MOMENT`."""
     ideal = one.mechanism.with_friction("off")
     idle = ideal.with_values({"loads.process.force.x": 0.0, "loads.process.force.y": 0.0})
-    loaded, free = (float(np.ravel(trunnion.prepare(m).solve(np.array([MOMENT])).efforts[motor])[0])
+    loaded, free = (float(np.ravel(prepare(m).solve(np.array([MOMENT])).efforts[motor])[0])
                     for m in (ideal, idle))  # fmt: skip
     return loaded - free
 

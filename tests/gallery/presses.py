@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
-import trunnion
 from gallery.entry import Entry, Outcome
 from gallery.plane import corner
+from trunnion.solve.run import prepare
 from trunnion.studies import design
 
 # ---- toggle-press: where it begins to hold by itself ----------------------------------------------------------------
@@ -17,7 +17,7 @@ from trunnion.studies import design
 
 def holds_from(one: Outcome) -> float:
     """Offset of the knee on the way back at which the cylinder's force changes its sign, m."""
-    run = trunnion.prepare(one.mechanism)
+    run = prepare(one.mechanism)
 
     def force(time: float) -> float:
         return float(np.ravel(run.solve(np.array([time])).efforts["Z"])[0])
@@ -52,7 +52,7 @@ def turning_points() -> tuple[float, float]:
 
 def stroke(one: Outcome) -> float:
     """Chord of the lip between the positions where the jaw turns back."""
-    run = trunnion.prepare(one.mechanism)
+    run = prepare(one.mechanism)
     turns = np.array(design.dead_centres(run)["J"])
     x, y = run.solve(turns / (2 * np.pi) * run.cycle.duration).walk.point("jaw", "lip").place
     return float(np.hypot(np.ptp(x), np.ptp(y)))

@@ -6,16 +6,16 @@ from collections.abc import Callable
 
 import numpy as np
 
-import trunnion
 from gallery.entry import STEPS, Entry, Outcome
 from trunnion.algebra.dual import Dual, derivative
+from trunnion.solve.run import prepare
 from trunnion.studies.design import design
 
 # ---- toleranced-slider-crank: ∂x/∂r of the piston at 60° ----------------------------------------------------------
 
 
 def sensitivity(one: Outcome) -> float:
-    run = trunnion.prepare(one.mechanism)
+    run = prepare(one.mechanism)
     sixth = run.cycle.times(6)[1:2]
     back = run.solve(sixth, one.mechanism.parameters({"dimensions.crank": Dual(0.05, 1.0)}))
     return float(np.ravel(derivative(back.walk.point("piston", "Q").place[0]))[0])

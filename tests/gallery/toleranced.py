@@ -13,6 +13,7 @@ from gallery.plane import corner, slope
 from gallery.spatial import rocker_of_rssr
 from trunnion.algebra.dual import Dual, derivative
 from trunnion.measures.measures import named
+from trunnion.solve.run import prepare
 
 __all__ = ["ENTRIES"]
 
@@ -33,7 +34,7 @@ def steepest() -> float:
 
 def shifts(one: Outcome, measure: str) -> dict[str, float]:
     """|∂y/∂p| t of a measure at 60° of the crank, by dual numbers, of every tolerance that does anything to it."""
-    run = trunnion.prepare(one.mechanism)
+    run = prepare(one.mechanism)
     (what,) = named(one.mechanism, [measure], run.values)
     found = {}
     for tolerance in one.mechanism.tolerated():

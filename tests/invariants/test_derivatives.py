@@ -13,6 +13,7 @@ from mechanisms import MODELS, Array, Data, build, four_bar, law_named
 from trunnion import FrictionMethod
 from trunnion.algebra.dual import Dual, derivative, primal
 from trunnion.joints.friction import FRICTION_LAWS
+from trunnion.solve.run import prepare
 
 POSITIONS = 7
 # Settled far below what the differences can see: the differences divide noise by a step of 2e-4 of the value.
@@ -56,7 +57,7 @@ CASES = [
 @pytest.mark.parametrize(("name", "friction"), CASES)
 def test_duals_equal_central_differences(name: str, friction: float | Data | None) -> None:
     """To 1e-7 of the largest derivative or value per step-scale: sixth-order differences, all numbers at once."""
-    run = trunnion.prepare(build(MODELS[name](), friction=friction, radius=0.03))
+    run = prepare(build(MODELS[name](), friction=friction, radius=0.03))
     paths = [path for path in run.values if not path.startswith(("assembly.", "joint_defaults."))]
     time = (np.arange(POSITIONS) + 0.43) / POSITIONS * run.cycle.duration  # no slip changes its sign nearby
     step = steps_of(run, paths)
@@ -92,7 +93,7 @@ def test_duals_equal_central_differences(name: str, friction: float | Data | Non
 @pytest.mark.parametrize("name", ["four-bar", "slider-crank", "class III"])
 def test_nested_duals_give_second_derivatives(name: str) -> None:
     """∂²/∂p∂q by depth 2 equals the difference of first derivatives."""
-    run = trunnion.prepare(build(MODELS[name](), radius=0.03))
+    run = prepare(build(MODELS[name](), radius=0.03))
     time = np.array([0.21, 0.63]) * run.cycle.duration
     p, q = "links.crank.points.B.x", "joints.B.friction.coefficient"
     vp, vq = run.values[p], run.values[q]
@@ -133,7 +134,7 @@ def test_a_pin_without_load_has_a_derivative_of_zero() -> None:
         link.pop("inertia", None)
     data["gravity"] = [0, 0]
     data["loads"] = {"m": {"link": "crank", "moment": -5.0}}
-    run = trunnion.prepare(trunnion.Mechanism(**data))
+    run = prepare(trunnion.Mechanism(**data))
     values = run.system.mechanism.parameters({"links.rocker.points.C.x": Dual(0.7, 1.0)})
     effort = run.solve(np.linspace(0.0, 0.1, 5), values).efforts["A"]
     np.testing.assert_allclose(primal(effort), 5.0, rtol=1e-12)

@@ -19,6 +19,7 @@ from trunnion.algebra.dual import derivative, primal, seed
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.joints.pairs import PlanarContactLoad, Reaction
 from trunnion.solve.friction import Contact, Settled, settle
+from trunnion.solve.run import prepare
 
 Array = NDArray[np.float64]
 NEWTON = FrictionMethod()
@@ -162,7 +163,7 @@ def test_the_residual_is_a_result(name: str, method: str) -> None:
 
 def test_single_positions_of_an_eccentric_press() -> None:
     """One at a time, as no other one then makes the iteration go on; the law by hand, on both sides of a kink."""
-    run = trunnion.prepare(eccentric_press())
+    run = prepare(eccentric_press())
     sides = set()
     for time in np.linspace(0.05, 6.2, 400):
         back = run.solve(np.array([time]))

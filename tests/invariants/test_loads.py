@@ -14,6 +14,7 @@ from mechanisms import Array, Data, findings, four_bar, prismatic, revolute, sli
 from trunnion import Mechanism, MechanismError
 from trunnion.algebra.dual import Dual, derivative
 from trunnion.algebra.table import look_up
+from trunnion.solve.run import prepare
 
 STEPS = 48
 TURN = 2 * np.pi
@@ -113,7 +114,7 @@ def test_expressions_of_loads_take_samples_and_duals() -> None:
     data = bare(slider_crank()) | {"dimensions": {"F": "600 N ± 20 N"}}
     data["loads"] = {"gas": {"link": "piston", "at": "P", "force": ["-F * (1 + cos(drive))", 0]}}
     mechanism = Mechanism(**data)
-    prepared = trunnion.prepare(mechanism)
+    prepared = prepare(mechanism)
     time = prepared.cycle.times(9)
     assert "loads.gas.force.x" not in mechanism.parameters()
     one = prepared.solve(time).efforts["A"]
@@ -123,7 +124,7 @@ def test_expressions_of_loads_take_samples_and_duals() -> None:
     np.testing.assert_allclose(slope, one / 600, atol=1e-12)
     # an override makes a number of the expression, and so does `with_values`
     fixed = prepared.solve(time, mechanism.parameters({"gas.force.x": -600.0})).efforts["A"]
-    again = trunnion.prepare(mechanism.with_values({"gas.force.x": "-600 N"})).solve(time).efforts["A"]
+    again = prepare(mechanism.with_values({"gas.force.x": "-600 N"})).solve(time).efforts["A"]
     np.testing.assert_allclose(fixed, again)
     np.testing.assert_allclose(one, fixed * (1 + np.cos(data["drivers"]["A"]["speed"] * time)), atol=1e-9)
 
@@ -348,7 +349,7 @@ def test_duals_of_spring_numbers_equal_central_differences(friction: float) -> N
     data["springs"]["T"] = {"joint": "C", "stiffness": 3.0, "free_angle": 1.0, "damping": 0.2}
     data["joint_defaults"] = {"pin": {"radius": 0.02}, "friction": friction}
     mechanism = Mechanism(**data)
-    prepared = trunnion.prepare(mechanism)
+    prepared = prepare(mechanism)
     time = prepared.cycle.times(11)[1:]
     method = trunnion.FrictionMethod("newton", 1e-12)
     for path in [path for path in mechanism.parameters() if path.startswith("springs.")] + ["ground.points.S.x"]:

@@ -17,6 +17,7 @@ from trunnion.algebra.dual import Dual, derivative, primal
 from trunnion.algebra.spline import spline
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.joints.motion import MOTION_LAWS
+from trunnion.solve.run import prepare
 
 PROFILES = {name: law for name, law in MOTION_LAWS.items() if law.profile}
 TABLE = [[0.0, 0.1], [0.1, 0.5], [0.25, 0.9], [0.4, 0.3], [0.6, 0.1]]
@@ -100,7 +101,7 @@ def test_a_profile_takes_nested_duals_and_is_smooth(name: str) -> None:
 @pytest.mark.parametrize("name", DRIVERS)
 def test_derivatives_by_time_are_exact(name: str) -> None:
     """Closed-form rate and second derivative against nested duals of the coordinate."""
-    run = trunnion.prepare(driven(DRIVERS[name]))
+    run = prepare(driven(DRIVERS[name]))
     time = np.linspace(0.003, 1.7 * run.cycle.duration, 211)
     q, rate, second = run.system.drive(run.values, "A", time)
     nested = run.system.drive(run.values, "A", Dual(Dual(time, 1.0), Dual(1.0, 0.0)))[0]
@@ -128,7 +129,7 @@ def test_splines_are_those_of_scipy(ends: Any, count: int) -> None:
 
 
 def test_rise_dwell_return_dwell() -> None:
-    run = trunnion.prepare(driven({"law": "polynomial-345", "range": [0.5, 1.5], "duration": 0.2, "dwell": 0.1}))
+    run = prepare(driven({"law": "polynomial-345", "range": [0.5, 1.5], "duration": 0.2, "dwell": 0.1}))
     assert run.cycle.duration == pytest.approx(0.6)
     assert run.cycle.periodic
     q, rate, second = run.system.drive(run.values, "A", np.array([0.0, 0.1, 0.2, 0.25, 0.31, 0.4, 0.51, 0.55, 0.7]))
@@ -142,7 +143,7 @@ def test_rise_dwell_return_dwell() -> None:
 def test_a_return_of_its_own_duration(name: str) -> None:
     """Rise, dwell, return, dwell one after the other; the largest rate is that of the quicker of the two."""
     stated = {"law": name, "range": [0.5, 1.5], "duration": 0.4, "return_duration": 0.1, "dwell": 0.05}
-    run = trunnion.prepare(driven(stated))
+    run = prepare(driven(stated))
     assert run.cycle.duration == pytest.approx(0.6)
     times = np.array([0.0, 0.2, 0.42, 0.45, 0.5, 0.55, 0.58, 0.6, 0.8])
     q, rate, _ = run.system.drive(run.values, "A", times)
@@ -150,14 +151,14 @@ def test_a_return_of_its_own_duration(name: str) -> None:
     peak = PROFILES[name].peak_rate
     np.testing.assert_allclose(rate[[1, 4, 8]], [peak / 0.4, -peak / 0.1, peak / 0.4], rtol=1e-12)
     assert run.system.span(run.values, "A").peak == pytest.approx(peak / 0.1)
-    alike = trunnion.prepare(driven({**stated, "return_duration": 0.4}))
-    plain = trunnion.prepare(driven({key: value for key, value in stated.items() if key != "return_duration"}))
+    alike = prepare(driven({**stated, "return_duration": 0.4}))
+    plain = prepare(driven({key: value for key, value in stated.items() if key != "return_duration"}))
     for one, other in zip(*(r.system.drive(r.values, "A", times) for r in (alike, plain)), strict=True):
         np.testing.assert_array_equal(one, other)
 
 
 def test_a_single_rise_stays_and_a_delay_shifts_it() -> None:
-    run = trunnion.prepare(driven(DRIVERS["late rise"]))
+    run = prepare(driven(DRIVERS["late rise"]))
     assert (run.cycle.duration, run.cycle.periodic) == (pytest.approx(0.35), False)
     q, rate, _ = run.system.drive(run.values, "A", np.array([0.0, 0.05, 0.15, 0.25, 0.35, 2.0]))
     np.testing.assert_allclose(q, [0.2, 0.2, 1.05, 1.9, 1.9, 1.9], rtol=1e-14)
@@ -165,7 +166,7 @@ def test_a_single_rise_stays_and_a_delay_shifts_it() -> None:
 
 
 def test_a_periodic_table_may_gain_whole_turns() -> None:
-    run = trunnion.prepare(driven(DRIVERS["whole turns"]))
+    run = prepare(driven(DRIVERS["whole turns"]))
     time = np.linspace(0, 0.5, 40)
     here, there = (np.array(run.system.drive(run.values, "A", t)) for t in (time, time + 1.0))
     np.testing.assert_allclose(there[0] - here[0], 4 * np.pi, rtol=1e-12)
@@ -187,7 +188,7 @@ NUMBERS = [
 @pytest.mark.parametrize(("law", "key"), NUMBERS)
 def test_every_number_has_a_path_samples_and_a_derivative(law: str, key: str) -> None:
     mechanism = driven(DRIVERS[law])
-    run = trunnion.prepare(mechanism)
+    run = prepare(mechanism)
     path, time, h = f"drivers.A.{key}", run.cycle.times(31) + 0.0037, 1e-6
     nominal = float(run.values[path])
 
@@ -233,7 +234,7 @@ def test_power_balances_and_the_motion_is_the_prescribed_one(name: str) -> None:
     assert set(np.unique(result.status)) <= {Status.SOLVED, Status.ZERO_SLIP}
     power = result.drive_power.sum("driver")
     assert float(np.abs(result.power_residual).max()) < 1e-10 * float(np.abs(power).max())
-    run = trunnion.prepare(mechanism)
+    run = prepare(mechanism)
     q, rate, second = (np.broadcast_to(n, 72) for n in run.system.drive(run.values, "A", result.time.values))
     crank = result.sel(joint="A")
     np.testing.assert_allclose(crank.joint_rotation, q, rtol=1e-12)
@@ -249,7 +250,7 @@ def test_the_work_of_the_drive_is_that_of_friction_over_a_cycle_without_loads(na
     data = slider_crank()
     del data["loads"]
     data["gravity"] = [0, 0]
-    run = trunnion.prepare(driven(DRIVERS[name], data))
+    run = prepare(driven(DRIVERS[name], data))
     result = trunnion.analyse(driven(DRIVERS[name], data), 2000)
     drive = float(result.drive_power.sum("driver").mean())
     lost = float(result.friction_power.sum("joint").mean())
@@ -274,7 +275,7 @@ def test_in_a_dwell_every_joint_rests_and_the_effort_is_an_interval() -> None:
 
 def test_positions_of_a_drive_that_turns_back_are_told_by_time() -> None:
     for name, unit in (("constant", "°"), ("one rise", "°"), ("harmonic", " s"), ("late rise", " s")):
-        run = trunnion.prepare(driven(DRIVERS[name]))
+        run = prepare(driven(DRIVERS[name]))
         assert run.system.dial(run.values, run.cycle.times(5)).unit == unit
 
 
@@ -310,13 +311,13 @@ def test_two_drivers_one_later_than_the_other() -> None:
 def test_periods_and_ranges_that_do_not_fit() -> None:
     data = five_bar()
     data["drivers"] = {"A": {"speed": 2 * np.pi}, "E": DRIVERS["harmonic"]}
-    assert trunnion.prepare(build(data)).cycle.duration == pytest.approx(1.0)
+    assert prepare(build(data)).cycle.duration == pytest.approx(1.0)
     data["drivers"]["E"] = DRIVERS["one rise"]  # it waits at its end
-    run = trunnion.prepare(build(data))
+    run = prepare(build(data))
     assert (run.cycle.duration, run.cycle.periodic) == (pytest.approx(1.0), False)
     data["drivers"]["E"] = DRIVERS["natural table"]
     with pytest.raises(MechanismError, match=r"takes 0\.6 s, the whole cycle takes 1 s"):
-        trunnion.prepare(build(data))
+        prepare(build(data))
 
 
 @pytest.mark.spread(1)
@@ -324,7 +325,7 @@ def test_periods_and_ranges_that_do_not_fit() -> None:
 def test_a_general_group_follows_any_law(name: str) -> None:
     """Its track, read by time, and a slower run of the same motion."""
     mechanism = driven(DRIVERS[name], class_three())
-    run = trunnion.prepare(mechanism)
+    run = prepare(mechanism)
     result = trunnion.analyse(mechanism, 50)
     assert result.status.values.max() <= Status.ZERO_SLIP
     assert float(np.abs(result.power_residual).max()) < 1e-9 * float(np.abs(result.drive_power).max())
@@ -345,10 +346,10 @@ def test_a_fast_rise_between_long_dwells_is_followed() -> None:
     """The grid of a general group's track is as fine as the peak of the drive needs."""
     driver = {"law": "cycloidal", "range": [0.0, 6.0], "duration": 0.01, "dwell": 1.0}
     mechanism = driven(driver, class_three())
-    run = trunnion.prepare(mechanism)
+    run = prepare(mechanism)
     time = np.linspace(0, 0.01, 40)
     back = run.solve(time)
-    steady = trunnion.prepare(driven({"speed": 1.0, "range": [0.0, 6.0]}, class_three()))
+    steady = prepare(driven({"speed": 1.0, "range": [0.0, 6.0]}, class_three()))
     q = run.system.drive(run.values, "A", time)[0]
     same = steady.solve(q)
     np.testing.assert_allclose(back.walk.motions["plate"].frame.x, same.walk.motions["plate"].frame.x, atol=1e-10)

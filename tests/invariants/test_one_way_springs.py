@@ -14,6 +14,7 @@ from mechanisms import Data, four_bar, prismatic, slide
 from trunnion import Mechanism, MechanismError
 from trunnion.algebra.dual import Dual, derivative
 from trunnion.errors import Status
+from trunnion.solve.run import prepare
 
 FREE = 0.62  # m: within the lengths that the spring goes through
 
@@ -89,7 +90,7 @@ def test_a_bumper_at_the_end_of_a_slide() -> None:
 @pytest.mark.parametrize("only", ["pull", "push"])
 def test_duals_equal_central_differences(only: str) -> None:
     mechanism = Mechanism(**sprung(stiffness=900.0, free_length=FREE, damping=20.0, only=only))
-    prepared = trunnion.prepare(mechanism)
+    prepared = prepare(mechanism)
     time = prepared.cycle.times(23)[1:]
     for path in ("springs.S.stiffness", "springs.S.free_length", "springs.S.damping", "links.ground.points.S.x"):
         value = mechanism.parameters()[path]

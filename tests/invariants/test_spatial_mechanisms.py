@@ -11,9 +11,10 @@ import pytest
 from numpy.typing import NDArray
 
 from mechanisms_space import chain, random_rotation, rssr
-from trunnion import Mechanism, MechanismError, Status, analyse, prepare
+from trunnion import Mechanism, MechanismError, Status, analyse
 from trunnion.solve.branch_tracking import Follower
 from trunnion.solve.branches import Track
+from trunnion.solve.run import prepare
 
 Array = NDArray[np.float64]
 Data = dict[str, Any]

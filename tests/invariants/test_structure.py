@@ -11,7 +11,8 @@ import pytest
 
 import trunnion
 from mechanisms import MODELS, Data, build, four_bar, model, prismatic, revolute, slide
-from trunnion import Finding, Mechanism, MechanismError
+from trunnion import Mechanism, MechanismError
+from trunnion.errors import Finding
 from trunnion.structure.decompose import Plan, decompose
 
 FORMULAS = {

@@ -9,6 +9,7 @@ import pytest
 
 import trunnion
 from mechanisms import MODELS, build, five_bar, four_bar, watt_six_bar
+from trunnion.solve.run import prepare
 
 
 def findings(result) -> list[dict[str, str]]:
@@ -64,7 +65,7 @@ def test_angles_follow_their_rate_across_coarse_steps() -> None:
 @pytest.mark.parametrize("factor", [-1.0, 0.5, 3.0])
 def test_another_speed_is_the_same_motion_at_other_times(factor: float) -> None:
     """General groups too: their track is read by the drive coordinate, not by time."""
-    run = trunnion.prepare(build(MODELS["class III"]()))
+    run = prepare(build(MODELS["class III"]()))
     speed = float(run.values["drivers.A.speed"])
     time = run.cycle.times(10)
     plain = run.solve(time)

@@ -13,6 +13,7 @@ import trunnion
 from mechanisms import MODELS, Data, analyse, build, law_named, model, reverse_links, transformed
 from trunnion import FrictionMethod, Mechanism, Status
 from trunnion.joints.friction import FRICTION_LAWS
+from trunnion.solve.run import prepare
 
 STEPS = 24
 VECTORS = ["point_position", "point_velocity", "point_acceleration", "reaction_force"]
@@ -51,7 +52,7 @@ def test_power_balance(name: str, friction: float | None) -> None:
 @pytest.mark.parametrize("name", MODELS)
 def test_velocities_and_accelerations_are_derivatives(name: str) -> None:
     """Eighth-order differences of positions and of velocities along the cycle."""
-    run = trunnion.prepare(build(MODELS[name]()))
+    run = prepare(build(MODELS[name]()))
     time = (np.arange(11) + 0.41) / 11 * run.cycle.duration
     h = 2e-3 * run.cycle.duration
     weights = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 0, 4 / 5, -1 / 5, 4 / 105, -1 / 280]) / h
@@ -74,7 +75,7 @@ def test_velocities_and_accelerations_are_derivatives(name: str) -> None:
 @pytest.mark.parametrize("name", MODELS)
 def test_joints_stay_closed(name: str) -> None:
     """The two points of a pin coincide; those of a slide lie on its axis, which both links hold in line."""
-    run = trunnion.prepare(build(MODELS[name]()))
+    run = prepare(build(MODELS[name]()))
     walk = run.solve(run.cycle.times(STEPS)).walk
     for joint, (kind, (first, second)) in run.system.joints.items():
         one, two = walk.element(first, joint), walk.element(second, joint)
@@ -278,7 +279,7 @@ def test_driving_forward_and_backward_brackets_the_ideal_effort() -> None:
 @pytest.mark.parametrize("name", ["four-bar", "slider-crank", "class III", "excavator"])
 def test_samples_are_independent(name: str) -> None:
     """A batch (sample, position) equals its samples one by one."""
-    run = trunnion.prepare(build(MODELS[name]()))
+    run = prepare(build(MODELS[name]()))
     time = run.cycle.times(9) + 0.01
     rng = np.random.default_rng(3)
     paths = [path for path in run.values if ".points." in path and not path.endswith((".axis.x", ".axis.y"))]

@@ -393,7 +393,8 @@ def test_names_with_spaces_and_greek_letters_are_fine(run: Run, tmp_path: Path) 
         (["--method", "magic"], "newton"),
         (["--criterion", "-1"], "criterion"),
         (["--iterations", "0"], "iterations"),
-        (["--out", "r.xlsx"], ".csv"),
+        (["--out", "r.ods"], ".csv"),
+        (["--out", "r.csv", "--columns", "A.efort"], "A.effort"),
         (["--out", "no/such/folder/r.csv"], "folder"),
     ],
 )

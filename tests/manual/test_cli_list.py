@@ -7,6 +7,7 @@ from pathlib import Path
 
 import trunnion
 from manual.conftest import Run
+from trunnion.cycle.vocabulary import vocabulary
 from trunnion.rig.modelled import measure_of
 from trunnion.solve.run import prepare
 
@@ -27,7 +28,7 @@ def test_the_list_and_its_file(program: Run, tmp_path: Path) -> None:
     assert measures["drive-torque"]["stated"]
     assert measures["effort:O"]["value"] == measures["drive-torque"]["value"]
     assert measures["stroke:S"]["verbs"] == ["sweep"]
-    listed = trunnion.vocabulary(trunnion.read(SLIDER).with_values({"crank": "52mm"})).data()
+    listed = vocabulary(trunnion.read(SLIDER).with_values({"crank": "52mm"})).data()
     assert found == json.loads(json.dumps(listed))
 
 

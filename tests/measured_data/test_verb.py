@@ -46,7 +46,7 @@ def test_tables_and_files(program: Run, rig: Path, tmp_path: Path) -> None:
         "wrote c.nc",
     ):
         assert text in out
-    read = trunnion.read_measured(rig)
+    read = trunnion.rig.read(rig)
     course = read.conditions[0].courses["torque-in"]
     table = pd.read_csv(tmp_path / "c.csv", skiprows=[1])
     assert len(table) == 90
@@ -96,13 +96,13 @@ def test_many_files(program: Run, rig: Path, tmp_path: Path) -> None:
     assert code == 0
     assert "3 to 5 whole turns in each of 3 conditions" in out
     assert out.count("zero of torque-in") == 1
-    found = trunnion.read_measured(rig, [tmp_path / "r0.csv", tmp_path / "r0.csv"])
+    found = trunnion.rig.read(rig, [tmp_path / "r0.csv", tmp_path / "r0.csv"])
     assert len({one.name for one in found.conditions}) == 2
 
 
 def test_nothing_was_set(tmp_path: Path) -> None:
     pd.DataFrame(recorded(turns=3)).to_csv(tmp_path / "a.csv", index=False)
-    found = dataset(trunnion.read_measured(mapping(), [tmp_path / "a.csv"]))
+    found = dataset(trunnion.rig.read(mapping(), [tmp_path / "a.csv"]))
     assert found["set"].shape == (1, 0)
     trunnion.save(found, tmp_path / "c.csv")
     assert list(pd.read_csv(tmp_path / "c.csv").columns[:3]) == ["condition", "phase", "torque-in.mean"]
@@ -127,11 +127,11 @@ def test_no_text_of_a_table_is_a_formula(tmp_path: Path) -> None:
     """Names of conditions and of what was set come from files; a spreadsheet must not execute them."""
     pd.DataFrame(recorded(turns=3)).to_csv(tmp_path / "=cmd|calc!A1.csv", index=False)
     changes = {"set": {"@beta": "-15 deg"}, "files": None}
-    found = trunnion.read_measured(mapping({"set": {}}), [tmp_path / "=cmd|calc!A1.csv"])
+    found = trunnion.rig.read(mapping({"set": {}}), [tmp_path / "=cmd|calc!A1.csv"])
     trunnion.save(dataset(found), tmp_path / "one.csv")
     table = pd.read_csv(tmp_path / "one.csv")
     assert set(table["condition"]) == {"'=cmd|calc!A1"}
-    found = trunnion.read_measured(mapping(changes), [tmp_path / "=cmd|calc!A1.csv"])
+    found = trunnion.rig.read(mapping(changes), [tmp_path / "=cmd|calc!A1.csv"])
     trunnion.save(dataset(found), tmp_path / "two.csv", units_row=True)
     with (tmp_path / "two.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.reader(file))
@@ -140,4 +140,4 @@ def test_no_text_of_a_table_is_a_formula(tmp_path: Path) -> None:
     own = read_table(tmp_path / "two.csv", ["@beta", "phase"])  # our own reader knows the name
     assert own.columns["@beta"].values == pytest.approx(np.radians(-15))
     with pytest.raises(MechanismError, match="begins with '='"):
-        trunnion.read_measured(mapping({"channels": {"=T1": mapping()["channels"]["brake"]}}), [tmp_path / "one.csv"])
+        trunnion.rig.read(mapping({"channels": {"=T1": mapping()["channels"]["brake"]}}), [tmp_path / "one.csv"])

@@ -20,6 +20,7 @@ from mechanisms_parts import Data
 from trunnion import Mechanism, MechanismError
 from trunnion.errors import Severity
 from trunnion.solve.assembly_modes import GroupModes, put_together
+from trunnion.solve.run import prepare
 
 Array = NDArray[np.float64]
 START = np.array([0.0])
@@ -31,7 +32,7 @@ def named(data: Data, **assembly: str) -> Data:
 
 
 def at_start(mechanism: Mechanism, link: str, point: str) -> Array:
-    place = trunnion.prepare(mechanism).solve(START).walk.point(link, point).place
+    place = prepare(mechanism).solve(START).walk.point(link, point).place
     return np.array([float(np.ravel(n)[0]) for n in place])
 
 
@@ -79,7 +80,7 @@ def test_every_listed_way_is_what_its_name_gives(name: str) -> None:
     for choice in trunnion.check(mechanism, 12).choices:
         assert sum(way.taken for way in choice.ways) == 1
         for way in choice.ways:
-            run = trunnion.prepare(put_together(mechanism, choice, way))
+            run = prepare(put_together(mechanism, choice, way))
             walk = run.solve(np.array([choice.time])).walk
             for joint, place in way.joints.items():
                 first, second = run.system.joints[joint][1]
@@ -177,7 +178,7 @@ def test_a_general_group_is_followed_in_the_way_that_is_named() -> None:
 
 def refusal(data: Data) -> list[Any]:
     with pytest.raises(MechanismError) as error:
-        trunnion.prepare(build(data))
+        prepare(build(data))
     return list(error.value.findings)
 
 
@@ -199,7 +200,7 @@ def test_one_group_cannot_be_in_two_ways() -> None:
     (found,) = refusal(named(four_bar(), coupler="way-1", rocker="way-2"))
     assert found.where == "assembly.rocker"
     assert "contradicts 'way-1' of the link 'coupler'" in found.what
-    trunnion.prepare(build(named(four_bar(), coupler="way-2", rocker="way-2")))
+    prepare(build(named(four_bar(), coupler="way-2", rocker="way-2")))
 
 
 @pytest.mark.spread(1)

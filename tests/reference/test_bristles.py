@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-import trunnion
 from mechanisms import Array, analyse, build, four_bar, slider_crank
 from trunnion.algebra.dual import Dual, derivative
 from trunnion.errors import Status
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.solve.bristles import _chained
+from trunnion.solve.run import prepare
 
 DAHL = {"law": "dahl", "coefficient": 0.12, "stiffness": 4e3}
 LUGRE = {
@@ -60,7 +60,7 @@ def state_by_integrator(run: Any, joint: str, law: dict[str, Any], turns: int) -
 @pytest.mark.parametrize(("data", "joint"), [(four_bar(), "D"), (slider_crank(), "P")])
 def test_state_against_a_stiff_integrator(data: Any, joint: str, law: dict[str, Any]) -> None:
     """In a rocker's pin and a slider's guide, both of which turn back twice a turn, once the start is forgotten."""
-    run = trunnion.prepare(build(data, friction=law))
+    run = prepare(build(data, friction=law))
     time, expected = state_by_integrator(run, joint, law, 2)
     found = run._past[joint].at(time)
     largest = np.abs(expected).max()
@@ -70,7 +70,7 @@ def test_state_against_a_stiff_integrator(data: Any, joint: str, law: dict[str, 
 @pytest.mark.spread(1)
 @pytest.mark.parametrize("law", [DAHL, LUGRE], ids=["dahl", "lugre"])
 def test_state_is_periodic_and_settled_whatever_the_steps(law: dict[str, Any]) -> None:
-    run = trunnion.prepare(build(four_bar(), friction=law))
+    run = prepare(build(four_bar(), friction=law))
     history, duration = run._past["D"], run.cycle.duration
     time = np.linspace(0, 1, 37) * duration
     np.testing.assert_allclose(history.at(time + 3 * duration), history.at(time), rtol=1e-9, atol=1e-15)
@@ -148,7 +148,7 @@ def test_stiff_bristles_slide_steadily() -> None:
 
 
 def test_samples_of_speed_and_duals_of_the_law() -> None:
-    run = trunnion.prepare(build(four_bar(), friction=LUGRE))
+    run = prepare(build(four_bar(), friction=LUGRE))
     time = np.linspace(0.1, 0.9, 7) * run.cycle.duration
     plain = np.broadcast_to(run.solve(time).efforts["A"], time.shape)
     values = run.system.mechanism.parameters({"drivers.A.speed": np.full((5, 1), run.values["drivers.A.speed"])})

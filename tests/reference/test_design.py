@@ -9,6 +9,7 @@ import trunnion
 from mechanisms import MODELS, build, five_bar, four_bar, model, slider_crank
 from trunnion import Mechanism
 from trunnion.solve.forward import forward
+from trunnion.solve.run import prepare
 from trunnion.studies import design as figures
 
 
@@ -60,7 +61,7 @@ def test_shaking_force_is_what_the_joints_pass_to_the_frame(name: str) -> None:
     data.pop("loads", None)
     data["gravity"] = [0, 0]
     mechanism = build(data).with_friction("off")
-    run = trunnion.prepare(mechanism)
+    run = prepare(mechanism)
     time = run.cycle.times(24)
     back = run.solve(time)
     x, y, turn = np.zeros(24), np.zeros(24), np.zeros(24)
@@ -83,7 +84,7 @@ def test_shaking_force_is_what_the_joints_pass_to_the_frame(name: str) -> None:
 def test_counterweights_cancel_the_shaking_force_of_a_four_bar() -> None:
     """Added as masses they leave no shaking force; their sense is a mass opposite the crank pin."""
     mechanism = build(four_bar())
-    run = trunnion.prepare(mechanism)
+    run = prepare(mechanism)
     weights, left = figures.counterweights(run)
     assert left < 1e-12
     data = mechanism.data()
@@ -103,7 +104,7 @@ def test_counterweights_cancel_the_shaking_force_of_a_four_bar() -> None:
 
 def test_instant_centres_lie_where_the_velocities_agree_and_in_line() -> None:
     """Kennedy: the three centres of any three links are collinear; the joints are centres themselves."""
-    run = trunnion.prepare(build(four_bar()))
+    run = prepare(build(four_bar()))
     walk = forward(run.system, run.values, run.chosen.assembly, run.cycle.times(7)[1:])
     centres = figures.all_instant_centres(walk)
     links = list(run.system.mechanism.links)
@@ -115,7 +116,7 @@ def test_instant_centres_lie_where_the_velocities_agree_and_in_line() -> None:
 
 
 def test_the_path_of_a_crank_pin_bends_by_one_over_its_radius() -> None:
-    run = trunnion.prepare(build(slider_crank()))
+    run = prepare(build(slider_crank()))
     walk = forward(run.system, run.values, run.chosen.assembly, run.cycle.times(9))
     (crank,) = run.system.plan.modules[0].links
     pins = list(run.system.mechanism.links[crank].points)
@@ -179,5 +180,5 @@ def test_a_link_at_rest_does_not_turn_back() -> None:
     data = slider_crank()
     (driver,), (slide,) = data["drivers"], (n for n, one in data["joints"].items() if one["type"] == "prismatic")
     data["drivers"][driver] = {"law": "modified-sine", "range": [0.4, 1.2], "duration": 0.2, "dwell": 0.1}
-    found = figures.dead_centres(trunnion.prepare(build(data)), 60)
+    found = figures.dead_centres(prepare(build(data)), 60)
     assert found[slide] == ()

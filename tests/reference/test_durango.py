@@ -10,6 +10,7 @@ import pytest
 import trunnion
 from mechanisms import DURANGO, findings
 from trunnion import FrictionMethod, Status
+from trunnion.solve.run import prepare
 
 RATE = 10.0  # rad/s, of the crank
 
@@ -105,7 +106,7 @@ def test_zero_slip_is_an_interval(results: dict[str, Any]) -> None:
 @pytest.mark.parametrize("position", [0.0, np.pi])
 def test_interval_holds_the_limits_from_both_sides(results: dict[str, Any], position: float) -> None:
     """On either side friction at C is fully on; both torques, extrapolated to the place itself, are the ends."""
-    run = trunnion.prepare(trunnion.read(DURANGO))
+    run = prepare(trunnion.read(DURANGO))
     result, index = results["friction"], round(np.degrees(position))
     step = 1e-5  # rad: what curves over it is below 1e-10 T″ ≈ 1e-4 N m
     angles = (position + step * np.array([-2.0, -1.0, 1.0, 2.0])) % (2 * np.pi)
@@ -119,7 +120,7 @@ def test_interval_holds_the_limits_from_both_sides(results: dict[str, Any], posi
 @pytest.mark.parametrize("crank", [14.361511563, 212.157208609])
 def test_dead_centres_of_the_rocker(crank: float) -> None:
     """Crank and coupler in line: the rocker's speed changes its sign there, within the last digit given."""
-    run = trunnion.prepare(trunnion.read(DURANGO))
+    run = prepare(trunnion.read(DURANGO))
     angles = np.radians(np.array([crank - 2e-9, crank + 2e-9]))
     speeds = run.solve(angles / RATE).walk.motions["rocker"].twist.w
     assert speeds[0] * speeds[1] < 0
@@ -128,7 +129,7 @@ def test_dead_centres_of_the_rocker(crank: float) -> None:
 def test_successive_approximation_agrees_with_newton() -> None:
     mechanism = trunnion.read(DURANGO)
     newton = trunnion.analyse(mechanism)
-    named = trunnion.analyse(mechanism, method=FrictionMethod("successive-approximation", 1e-10))
+    named = trunnion.analyse(mechanism, friction_method=FrictionMethod("successive-approximation", 1e-10))
     for name in ("reaction_force", "drive_effort", "friction_torque"):
         scale = np.abs(newton[name]).max()
         np.testing.assert_allclose(named[name], newton[name], rtol=0, atol=1e-9 * float(scale), err_msg=name)
@@ -138,7 +139,7 @@ def test_successive_approximation_agrees_with_newton() -> None:
 @pytest.mark.parametrize(("limit", "share"), [(3, 1e-3), (1, 5e-2)])
 def test_three_iterations_suffice(limit: int, share: float) -> None:
     """The paper's statement: after three iterations within 0.1 % at ten equally spaced positions."""
-    run = trunnion.prepare(trunnion.read(DURANGO))
+    run = prepare(trunnion.read(DURANGO))
     time = run.cycle.times(10)
     few = run.solve(time, method=FrictionMethod("successive-approximation", None, limit))
     exact = run.solve(time)

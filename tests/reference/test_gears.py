@@ -12,6 +12,7 @@ import trunnion
 from geared import geared_five_bar, geared_loop, planet_drive, rocker_train
 from mechanisms import Data, analyse, build, findings, model
 from trunnion import Mechanism, MechanismError
+from trunnion.solve.run import prepare
 
 TOOTHED = {"five-bar": geared_five_bar, "planet": planet_drive, "loop": geared_loop}
 
@@ -78,7 +79,7 @@ def test_two_wheels() -> None:
 def test_separating_force(name: str, friction: float | None) -> None:
     """The tooth force leans by the pressure angle from the tangent of the pitch circles, and pushes the gears apart."""
     data = model(TOOTHED[name](), friction=friction)
-    run = trunnion.prepare(build(TOOTHED[name](), friction=friction))
+    run = prepare(build(TOOTHED[name](), friction=friction))
     back = run.solve(np.linspace(0.1, 0.9, 30) * run.cycle.duration)
     for gear, stated in data["gears"].items():
         angle = stated.get("pressure_angle", np.radians(20.0))
@@ -156,7 +157,7 @@ def test_turns_that_never_come_back() -> None:
 
 
 def cycle_of(data: Data) -> float:
-    return float(trunnion.prepare(build(data)).cycle.duration)
+    return float(prepare(build(data)).cycle.duration)
 
 
 def test_cycle_whichever_way_a_gear_pair_is_stated() -> None:
@@ -186,7 +187,7 @@ def test_cycle_of_a_chain_of_gear_pairs() -> None:
         "drivers": {"A": {"speed": 2 * np.pi}},
     }
     mechanism = Mechanism(**data)
-    run = trunnion.prepare(mechanism)
+    run = prepare(mechanism)
     assert run.cycle.duration == pytest.approx(8.0)
     assert run.cycle.periodic
     result = trunnion.analyse(mechanism, 80)

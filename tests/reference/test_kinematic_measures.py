@@ -14,6 +14,7 @@ from measured import figures
 from mechanisms import build, four_bar, slider_crank
 from trunnion import Mechanism, MechanismError
 from trunnion.algebra.dual import Dual, derivative
+from trunnion.cycle.vocabulary import vocabulary
 from trunnion.measures.curves import COURSES
 from trunnion.measures.measures import Measure, named
 from trunnion.model.measure_table import MEASURES
@@ -263,7 +264,7 @@ def test_play_of_a_speed() -> None:
 def test_everything_that_is_listed_can_be_asked_for(example: str) -> None:
     """Names mean the numbers they stand for; measures can be named, and have the units and values that are told."""
     mechanism = trunnion.read(EXAMPLES / f"{example}.yaml")
-    found = trunnion.vocabulary(mechanism, 24)
+    found = vocabulary(mechanism, 24)
     values, run = mechanism.parameters(), prepare(mechanism)
     assert {one.path for one in found.numbers} == set(mechanism.parameter_kinds())
     for number in found.numbers:

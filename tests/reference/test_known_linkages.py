@@ -10,6 +10,7 @@ import pytest
 import trunnion
 from mechanisms import body, build, revolute, slider_crank
 from trunnion.algebra.dual import Dual, derivative, primal
+from trunnion.solve.run import prepare
 
 MM = 1e-3
 LENGTHS = {"L1": 100.0, "L2": 30.0, "L3": 90.0, "L4": 70.0}  # ground, crank, coupler, rocker, mm
@@ -45,7 +46,7 @@ def angle(run: Any, link: str, values: Any = None) -> Any:
 
 
 def test_rocker_angle() -> None:
-    assert np.degrees(angle(trunnion.prepare(four_bar_in_mm()), "rocker"))[0] == pytest.approx(95.195700, abs=5e-7)
+    assert np.degrees(angle(prepare(four_bar_in_mm()), "rocker"))[0] == pytest.approx(95.195700, abs=5e-7)
 
 
 @pytest.mark.parametrize(
@@ -55,7 +56,7 @@ def test_sensitivity_of_the_rocker_angle(name: str, expected: float) -> None:
     """∂θ₄/∂l, rad/mm."""
     mechanism = four_bar_in_mm()
     values = mechanism.parameters({name: Dual(LENGTHS[name] * MM, 1.0)})
-    found = derivative(angle(trunnion.prepare(mechanism), "rocker", values))
+    found = derivative(angle(prepare(mechanism), "rocker", values))
     assert float(np.ravel(found)[0]) * MM == pytest.approx(expected, abs=5e-7)
 
 
@@ -75,7 +76,7 @@ def test_sensitivity_of_the_slider(dimension: str, expected: float) -> None:
         "e": ("links.ground.points.C.y", 0.0),
     }[dimension]
     mechanism = build(data)
-    run = trunnion.prepare(mechanism)
+    run = prepare(mechanism)
     back = run.solve(np.array([0.0]), mechanism.parameters({path: Dual(value, 1.0)}))
     x = back.walk.point("piston", "P").place[0]
     assert float(np.ravel(derivative(x))[0]) == pytest.approx(expected, abs=5e-7)

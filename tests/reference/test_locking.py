@@ -12,6 +12,7 @@ import trunnion
 from mechanisms import MODELS, Array, Data, build, findings, four_bar, model, prismatic, revolute, slide
 from reference import newton_euler
 from trunnion import FrictionMethod, Mechanism, Status
+from trunnion.solve.run import prepare
 
 ARM, GUIDE, LOAD = 0.15, 0.12, 40.0
 CRITICAL = GUIDE / (2 * ARM)
@@ -52,7 +53,7 @@ def test_below_the_critical_coefficient(share: float) -> None:
 def test_above_the_critical_coefficient(excess: float) -> None:
     """Locked at the share 1/excess of the friction, found to 1e-6; NaN instead of the negative P of the formula."""
     mechanism = pushed_slider(excess * CRITICAL)
-    run = trunnion.prepare(mechanism)
+    run = prepare(mechanism)
     shares = [np.min(settled.share) for settled in run.solve(run.cycle.times(5)).settled]
     assert min(shares) == pytest.approx(1 / excess, abs=1e-6)
     result = trunnion.analyse(mechanism, 5)
@@ -99,7 +100,7 @@ GRID = 120  # steps of the share from 0 to 1
 def affine(run: Any, data: Data) -> tuple[list[str], Array, Array]:
     """Joints; reactions (position, joint, xym) without friction; and their change per unit friction of each joint."""
     time = oracle.times(run)
-    ideal = trunnion.prepare(run.system.mechanism.with_friction("off"))
+    ideal = prepare(run.system.mechanism.with_friction("off"))
     back, second = ideal.solve(time), oracle.accelerations(run, time)
     names = list(run.system.joints)
 
@@ -192,7 +193,7 @@ def test_locked_positions(name: str) -> None:
     coefficient, radius, guide = HEAVY[name]
     options = {"friction": coefficient, "radius": radius, "guide": guide}
     data = model(MODELS[name](), **options)
-    run = trunnion.prepare(build(MODELS[name](), **options))
+    run = prepare(build(MODELS[name](), **options))
     expected = independent_shares(run, data, coefficient, radius, guide)  # good to one step of the grid
     back = run.solve(oracle.times(run))
     found = np.min([np.broadcast_to(settled.share, (STEPS,)) for settled in back.settled], axis=0)

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-import trunnion
 from mechanisms import MODELS, Array, Data, build, model
+from trunnion.solve.run import prepare
 
 if sys.platform == "darwin" and platform.machine() == "x86_64":
     pytest.skip("MuJoCo is not built for Macs with Intel processors", allow_module_level=True)
@@ -66,7 +66,7 @@ def test_agrees_with_mujoco(name: str, friction: float) -> None:
     """
     options: Data = {"friction": friction, "radius": RADIUS, "guide": GUIDE}
     run, engine = (
-        trunnion.prepare(build(MODELS[name](), **options)),
+        prepare(build(MODELS[name](), **options)),
         Engine(model(MODELS[name](), **options), RADIUS, GUIDE),
     )
     time = (np.arange(STEPS) + 0.37) / STEPS * run.cycle.duration

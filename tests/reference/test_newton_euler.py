@@ -11,10 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-import trunnion
 from mechanisms import MODELS, Array, Data, build, model
 from reference import newton_euler
-from trunnion.solve.run import Run
+from trunnion.solve.run import Run, prepare
 
 STEPS = 24
 STEP = 2e-3  # rad-like share of the cycle for the sixth-order differences below
@@ -137,7 +136,7 @@ def tooth_contact(run: Run, back: Any, name: str, i: int) -> newton_euler.Joint:
 def test_reactions_and_efforts(name: str, friction: float | None) -> None:
     """Same reactions and efforts to 1e-8: eighth-order differences are good to about 1e-10 of the accelerations."""
     data = model(MODELS[name](), friction=friction)
-    run = trunnion.prepare(build(MODELS[name](), friction=friction))
+    run = prepare(build(MODELS[name](), friction=friction))
     time = times(run)
     back = run.solve(time)
     second = accelerations(run, time)
@@ -160,7 +159,7 @@ def test_reactions_and_efforts(name: str, friction: float | None) -> None:
 def test_friction_obeys_its_law(name: str) -> None:
     """|M| = f r |F| at a pin, |F_t| = f (|F_n/2 + M/L| + |F_n/2 − M/L|) in a guide, against the slip."""
     coefficient, radius, guide = 0.15, 0.01, 0.4
-    run = trunnion.prepare(build(MODELS[name](), friction=coefficient, radius=radius, guide=guide))
+    run = prepare(build(MODELS[name](), friction=coefficient, radius=radius, guide=guide))
     back = run.solve(times(run))
     normals = {}
     for joint, (kind, (first, _)) in run.system.joints.items():

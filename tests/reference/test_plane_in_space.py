@@ -13,6 +13,7 @@ import pytest
 
 import trunnion
 from mechanisms import MODELS, Data, build, model
+from trunnion.solve.run import prepare
 
 NAMES = [
     name
@@ -95,7 +96,7 @@ def test_a_joint_is_at_rest_by_one_rule() -> None:
     name = next(name for name in NAMES if any(one["type"] == "prismatic" for one in MODELS[name]()["joints"].values()))
     data = model(MODELS[name](), friction=0.1)
     for mechanism in (build(MODELS[name](), friction=0.1), trunnion.Mechanism(trunnion=1, **raised(data))):
-        run = trunnion.prepare(mechanism)
+        run = prepare(mechanism)
         walk = run.walk(run.cycle.times(STEPS))
         for joint, (kind, links) in walk.system.joints.items():
             turn = 1e-10 * (sum(np.abs(walk.spins[link]) for link in links) + walk.pace)

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-import trunnion
 from mechanisms import MODELS, Array, Data, build, four_bar, slider_crank
 from trunnion import Mechanism
 from trunnion.solve.forward import forward
+from trunnion.solve.run import prepare
 from trunnion.studies import design as figures
 
 DYADS = ["four-bar", "four-bar, other branch", "slider-crank", "inverted slider-crank", "Scotch yoke", "elliptic bar",
@@ -19,7 +19,7 @@ DYADS = ["four-bar", "four-bar, other branch", "slider-crank", "inverted slider-
 
 
 def angles(mechanism: Mechanism, steps: int = 24) -> tuple[Any, Any, dict[str, Array]]:
-    run = trunnion.prepare(mechanism)
+    run = prepare(mechanism)
     walk = forward(run.system, run.values, run.chosen.assembly, run.cycle.times(steps))
     return run, walk, figures.pressure_angles(walk)
 
@@ -75,7 +75,7 @@ def test_it_is_between_the_force_and_the_velocity_of_the_analysis(name: str, loa
         for key in ("mass", "inertia", "centre", "inertia_about"):
             link.pop(key, None)
     mechanism = build({**data, "loads": {}, "gravity": [0, 0]}).with_friction("off")
-    module = next(one for one in trunnion.prepare(mechanism).system.plan.modules if len(one.links) == 2)
+    module = next(one for one in prepare(mechanism).system.plan.modules if len(one.links) == 2)
     if module.kind == "RPP" and loaded == 0:
         return  # the second link passes a couple and no force
     driven = module.links[loaded]

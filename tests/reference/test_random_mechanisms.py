@@ -17,6 +17,7 @@ import trunnion
 from mechanisms import KIND, Data, transformed
 from reference import newton_euler
 from trunnion import FrictionMethod, Mechanism, Status
+from trunnion.solve.run import prepare
 
 SEEDS = range(16)
 GROWN = ("R", "P", "RRR", "RRP", "PRR", "RPR", "PRP", "RPP", "PPR", "R[P]RR", "RR[R]R", "triad", "triad with slides")
@@ -174,7 +175,7 @@ def _well_conditioned(mechanism: Mechanism, pose: dict[str, tuple[float, float, 
 def test_random_mechanism(seed: int) -> None:
     data, pose = grown(seed)
     mechanism = Mechanism(**data)
-    run = trunnion.prepare(mechanism)
+    run = prepare(mechanism)
     assert trunnion.check(mechanism, 4).rank_mobility == len(data["drivers"])
 
     start = run.solve(np.array([0.0])).walk
@@ -204,7 +205,7 @@ def test_random_mechanism(seed: int) -> None:
 @pytest.mark.parametrize("seed", SEEDS)
 def test_random_mechanism_against_newton_euler(seed: int) -> None:
     data, _ = grown(seed)
-    run = trunnion.prepare(Mechanism(**data))
+    run = prepare(Mechanism(**data))
     time = 0.1 + 0.8 * np.arange(oracle.STEPS) / oracle.STEPS
     back = run.solve(time)
     size = np.max([np.broadcast_to(np.hypot(r.x, r.y), time.shape) for r in back.reactions.values()], axis=0)

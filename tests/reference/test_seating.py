@@ -22,7 +22,7 @@ from reference.maximal_space import Array, Data, Drive, Frame
 from reference.seat_oracle import FourBar, Link, Linkage, SliderCrank
 from reference.seat_oracle_space import settle
 from trunnion.errors import Status
-from trunnion.solve.run import Run
+from trunnion.solve.run import Run, prepare
 from trunnion.solve.seating import loads_of
 
 LINKAGES: dict[str, tuple[Any, type[Linkage]]] = {
@@ -76,7 +76,7 @@ def test_seats_reactions_and_places(name: str, friction: float) -> None:
     data, steps = loaded(name, friction), 36
     result, oracle = analysed(data, steps), LINKAGES[name][1](data)
     assert set(result.status.values) <= {int(Status.SOLVED)}
-    run = trunnion.prepare(trunnion.Mechanism(trunnion=1, **data))
+    run = prepare(trunnion.Mechanism(trunnion=1, **data))
     back = run.at(result.time.values, offsets_of(run, result))
     held_loads = {seat.joint: loads_of(back, seat) for seat in run.seats}
     for i in range(steps):
@@ -375,7 +375,7 @@ def test_rssr_with_play_in_all_joints(friction: float) -> None:
     data["assembly"] = {"D": 1.3}
     data["joint_defaults"]["pin"]["clearance"] = 2e-5
     data["joint_defaults"]["seat"] = "loaded"
-    run, steps = trunnion.prepare(trunnion.Mechanism(trunnion=1, **data)), 60
+    run, steps = prepare(trunnion.Mechanism(trunnion=1, **data)), 60
     result = analysed(data, steps)
     offsets = offsets_of(run, result)
     for i in range(5, steps, 9):
@@ -410,7 +410,7 @@ def test_cardan_with_play_in_all_joints() -> None:
         for link, frame in drawn.home.items()
         for name, at in data["links"][link]["points"].items()
     }
-    run, result = trunnion.prepare(trunnion.Mechanism(trunnion=1, **data)), analysed(data, steps)
+    run, result = prepare(trunnion.Mechanism(trunnion=1, **data)), analysed(data, steps)
     assert int(result.seat_rounds.max()) <= 10
     offsets = offsets_of(run, result)
     for i in (0, 15, 31, 50, 65):

@@ -20,6 +20,7 @@ from mechanisms_space import rssr as rssr_model
 from reference.maximal_space import Array, Data, Drive, Frame, Linkage, rotation
 from reference.shifted_space import moved
 from trunnion.joints.clearance import CLEARANCE_MODELS, worst_case
+from trunnion.solve.run import prepare
 
 FOUR_BAR = (0.100, 0.030, 0.090, 0.070)  # ground, crank, coupler, rocker; m
 SIZE, THETA = 2e-5, np.pi / 3
@@ -68,7 +69,7 @@ def test_four_bar_of_the_engine_with_given_offsets(joints: str) -> None:
     ground, ab, bc, cd = FOUR_BAR
     data = four_bar(ab, bc, cd, ground)
     data["drivers"]["A"]["start"] = THETA
-    run, rng = trunnion.prepare(build(data, friction=None)), np.random.default_rng(9)
+    run, rng = prepare(build(data, friction=None)), np.random.default_rng(9)
     for _ in range(20):
         c = {joint: SIZE * complex(*rng.normal(size=2)) for joint in joints}
         seats = {f"seats.{joint}.1.{axis}": float(part) for joint, vector in c.items()
@@ -175,7 +176,7 @@ def test_rssr_of_the_engine_with_given_offsets() -> None:
     """ψ from `seats.D.1.x` … among the values to 1e-12, offsets at the walls and inside; the rocker has the hole."""
     data = rssr_model(start=THETA).data
     data["joint_defaults"]["pin"] |= {"bearing": LENGTH}
-    run, rng = trunnion.prepare(trunnion.Mechanism(trunnion=1, **data)), np.random.default_rng(3)
+    run, rng = prepare(trunnion.Mechanism(trunnion=1, **data)), np.random.default_rng(3)
     for _ in range(40):
         c = SIZE * rng.normal(size=(2, 2))
         seats = {f"seats.D.{i + 1}.{axis}": float(c[i, k]) for i in range(2) for k, axis in enumerate("xy")}
@@ -205,7 +206,7 @@ def test_mechanisms_in_space_with_offsets_in_every_joint(name: str) -> None:
     seats = offsets_for("spatial", drawn.data, 1e-3, seed=4)
     if not seats:
         pytest.skip("no joint with play")
-    run = trunnion.prepare(trunnion.Mechanism(trunnion=1, **drawn.data))
+    run = prepare(trunnion.Mechanism(trunnion=1, **drawn.data))
     motions = run.solve(NOW, values={**run.values, **seats}).walk.motions
     other = Linkage(moved(drawn.data, seats))
     drive = {joint: Drive(float(run.system.drive(run.values, joint, 0.0)[0])) for joint in drawn.data["drivers"]}
@@ -251,10 +252,10 @@ def test_planar_mechanisms_with_offsets_in_every_joint(name: str) -> None:
     """Seats as values and a model with its points moved are one mechanism: poses, forces and drives to 1e-9."""
     data, guide = model(MODELS[name](), friction=0.1), 0.4
     seats = offsets_for("planar", data, 1e-3, seed=5)
-    run = trunnion.prepare(trunnion.Mechanism(trunnion=1, **data))
+    run = prepare(trunnion.Mechanism(trunnion=1, **data))
     time = run.cycle.times(7)
     one = run.solve(time, values={**run.values, **seats})
-    other_run = trunnion.prepare(trunnion.Mechanism(trunnion=1, **moved_planar(data, seats, guide)))
+    other_run = prepare(trunnion.Mechanism(trunnion=1, **moved_planar(data, seats, guide)))
     other = other_run.solve(time)
     for link, motion in one.walk.motions.items():
         for a, b in zip(motion.frame, other.walk.motions[link].frame, strict=True):

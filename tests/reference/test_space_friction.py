@@ -16,6 +16,7 @@ from reference.maximal_space import Data, unrolled
 from reference.space_oracle import Oracle
 from reference.test_newton_euler_space import Compared
 from reference.test_space_values import loop
+from trunnion.solve.run import prepare
 from trunnion.solve.space.determinacy import LOOKED
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -273,7 +274,7 @@ def test_friction_that_drags_a_rod_round(turned: tuple[str, ...]) -> None:
     data = trunnion.Mechanism.read(EXAMPLES / "rssr.yaml").data()
     for joint in turned:
         data["joints"][joint]["links"] = data["joints"][joint]["links"][::-1]
-    run = trunnion.prepare(trunnion.Mechanism(**data))
+    run = prepare(trunnion.Mechanism(**data))
     assert run.determinacy is not None
     back = run.solve(run.cycle.times(LOOKED))
     motions, radius, friction = back.walk.motions, 0.007, 0.1

@@ -12,6 +12,7 @@ import trunnion
 from mechanisms_space import cardan
 from reference.maximal_space import Array, Data, Frame, rotation, unrolled
 from trunnion.algebra.dual import derivative, seed
+from trunnion.solve.run import prepare
 
 SPEED = 2.0
 
@@ -136,7 +137,7 @@ def test_rssr(branch: int, degrees: float) -> None:
 def test_rssr_sensitivities() -> None:
     """∂ψ/∂(a, b, c, d, α, s₁, s₄) at 60° from the dual part, rad/mm and rad/rad; to the eight digits given."""
     mechanism = trunnion.Mechanism(trunnion=1, **rssr(1.29, start=np.pi / 3))
-    run = trunnion.prepare(mechanism)
+    run = prepare(mechanism)
     expected = (-0.00714601, -0.01955441, 0.01187232, 0.01702515, 0.26229468, -0.00948836, 0.00611075)
     for (name, number), slope in zip(RSSR.items(), expected, strict=True):
         back = run.solve(np.array([0.0]), values=mechanism.parameters({name: seed(number)}))

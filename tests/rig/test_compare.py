@@ -14,10 +14,10 @@ from rig_measurements import course, exact, measured, rocker
 from trunnion import MechanismError, Status
 from trunnion.errors import Finding, Severity
 from trunnion.model.units import KINDS
-from trunnion.rig.compare.assessment import Verdict, expanded, independent, judge, uncertainty_of
-from trunnion.rig.compare.error_sources import best, causes
-from trunnion.rig.compare.findings import gathered
-from trunnion.rig.compare.result import VARIABLES
+from trunnion.rig.comparison.assessment import Verdict, expanded, independent, judge, uncertainty_of
+from trunnion.rig.comparison.error_sources import best, causes
+from trunnion.rig.comparison.findings import gathered
+from trunnion.rig.comparison.result import VARIABLES
 from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -25,7 +25,7 @@ POWERS = ("torque", "speed", "brake", "out")
 
 
 def compare(measurement, mechanism=None, **options):
-    return trunnion.compare(mechanism or rocker(), measurement, **options)
+    return trunnion.rig.compare(mechanism or rocker(), measurement, **options)
 
 
 def said(result, *words):
@@ -489,7 +489,9 @@ def test_a_load_that_rests_takes_no_power():
     assert np.isfinite(result.efficiency_model.values).all()
 
 
-@pytest.mark.parametrize("verb", [trunnion.compare, lambda model, data: trunnion.identify(model, data, ["A.friction"])])
+@pytest.mark.parametrize(
+    "verb", [trunnion.rig.compare, lambda model, data: trunnion.rig.identify(model, data, ["A.friction"])]
+)
 def test_units_of_what_is_set_are_those_of_the_model(verb):
     mechanism = rocker()
     whole = measured(mechanism, ({"A.speed": 20.0},))

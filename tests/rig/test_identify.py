@@ -17,13 +17,13 @@ from rigged import Sensors, True_, truth
 from trunnion.errors import MechanismError
 from trunnion.measures.measures import named
 from trunnion.model.mechanism import read_mechanism
-from trunnion.rig.identify import identify, with_estimates
-from trunnion.rig.identify.findings import _formula
-from trunnion.rig.identify.holdout import held_out
-from trunnion.rig.identify.identifiability import Combination
-from trunnion.rig.identify.run import identified
-from trunnion.rig.identify.signals import Model
-from trunnion.rig.identify.unknowns import described, limits, unknowns
+from trunnion.rig.identification import identify, with_estimates
+from trunnion.rig.identification.findings import _formula
+from trunnion.rig.identification.holdout import held_out
+from trunnion.rig.identification.identifiability import Combination
+from trunnion.rig.identification.run import identified
+from trunnion.rig.identification.signals import Model
+from trunnion.rig.identification.unknowns import described, limits, unknowns
 from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import prepare

@@ -114,7 +114,7 @@ def test_results_are_not_written_over_what_is_read(  # type: ignore[no-untyped-d
         assert status == 2, options
         assert f"{options[0]}: '{options[1]}' is read here" in text
     for options in (("--out", "data/run-02.csv"), ("--report", "data.html", "data.html")):
-        monkeypatch.setattr("trunnion.rig.compare.study.compare", None)
+        monkeypatch.setattr("trunnion.rig.comparison.study.compare", None)
         monkeypatch.setattr("sys.argv", ["trunnion", "compare", MODEL, "data/mapping.yaml", *options])
         with pytest.raises(SystemExit) as ended:
             main()

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from trunnion.rig.identify.blocks import Block
-from trunnion.rig.identify.fit import FitProblem
-from trunnion.rig.identify.uncertainty import spread_of
+from trunnion.rig.identification.blocks import Block
+from trunnion.rig.identification.fit import FitProblem
+from trunnion.rig.identification.uncertainty import spread_of
 from trunnion.rig.reading.measurement import Signal
 
 Array = NDArray[np.float64]

@@ -39,8 +39,8 @@ def with_channel(name: str) -> Measurement:
 
 
 def test_a_measure_of_every_position_is_a_channel() -> None:
-    one = trunnion.compare(model(), with_channel("turned"))
-    two = trunnion.compare(model(), with_channel("rotation:D"))
+    one = trunnion.rig.compare(model(), with_channel("turned"))
+    two = trunnion.rig.compare(model(), with_channel("rotation:D"))
     np.testing.assert_array_equal(one["residual"], two["residual"])
 
 
@@ -50,12 +50,12 @@ def planned(name: str) -> object:
     key, sensor = next(iter(rig.sensors.items()))
     schedule = rig.schedule.model_copy(update={"over": {}, "conditions": ()})
     changed = {"sensors": {key: sensor.model_copy(update={"measures": name})}, "faults": (), "set_": {}}
-    return trunnion.observe(model(), rig.model_copy(update={**changed, "schedule": schedule}))
+    return trunnion.rig.observe(model(), rig.model_copy(update={**changed, "schedule": schedule}))
 
 
 VERBS = {
-    "compare": lambda name: trunnion.compare(model(), with_channel(name)),
-    "identify": lambda name: trunnion.identify(model(), with_channel(name), ["rocker.mass"], ["angle"]),
+    "compare": lambda name: trunnion.rig.compare(model(), with_channel(name)),
+    "identify": lambda name: trunnion.rig.identify(model(), with_channel(name), ["rocker.mass"], ["angle"]),
     "rig": planned,
 }
 

@@ -51,7 +51,7 @@ def rig(**changes: Any) -> Rig:
 
 @pytest.fixture(scope="module")
 def seen(mechanism: Mechanism) -> Observation:
-    return trunnion.observe(mechanism, rig(), seed=4)
+    return trunnion.rig.observe(mechanism, rig(), seed=4)
 
 
 def test_perfect_sensors_show_the_model(mechanism: Mechanism) -> None:
@@ -62,7 +62,7 @@ def test_perfect_sensors_show_the_model(mechanism: Mechanism) -> None:
         "x": {"measures": "coupler.C.x"},
         "R": {"measures": "reaction:B"},
     }
-    found = trunnion.observe(mechanism, rig(sensors=sensors))
+    found = trunnion.rig.observe(mechanism, rig(sensors=sensors))
     (case,) = found.cases
     assert case.true.exact
     (record,) = found.records()
@@ -88,10 +88,10 @@ def test_interpolated_courses_are_the_exact_ones(mechanism: Mechanism, monkeypat
     stated = rig(
         rate="517.3 Hz", sensors={"T": {"measures": "effort:A", "noise": "1 mN m"}, "n": {"measures": "rate:D"}}
     )
-    exact = trunnion.observe(mechanism, stated)
+    exact = trunnion.rig.observe(mechanism, stated)
     monkeypatch.setattr(virtual_courses, "MOST_EXACT", 100)
     monkeypatch.setattr(virtual_courses, "GRID", 2048)
-    between = trunnion.observe(mechanism, stated)
+    between = trunnion.rig.observe(mechanism, stated)
     assert exact.cases[0].true.exact
     assert not between.cases[0].true.exact
     for i in range(2):
@@ -101,10 +101,10 @@ def test_interpolated_courses_are_the_exact_ones(mechanism: Mechanism, monkeypat
 
 
 def test_same_seed_same_bits_and_sensors_of_their_own(mechanism: Mechanism, seen: Observation) -> None:
-    record, again = next(seen.records()), next(trunnion.observe(mechanism, rig(), seed=4).records())
+    record, again = next(seen.records()), next(trunnion.rig.observe(mechanism, rig(), seed=4).records())
     for name, values in record.columns.items():
         assert np.array_equal(values, again.columns[name])
-    fewer = trunnion.observe(mechanism, rig(sensors={"T2": SENSORS["T2"]}), seed=4)
+    fewer = trunnion.rig.observe(mechanism, rig(sensors={"T2": SENSORS["T2"]}), seed=4)
     assert np.array_equal(next(fewer.records()).columns["T2"], record.columns["T2"])
     other = next(seen.seeded(5).records())
     assert not np.array_equal(other.columns["T1"], record.columns["T1"])
@@ -167,8 +167,8 @@ def test_files_are_read_as_they_were_meant(seen: Observation, form: str, tmp_pat
 @pytest.mark.parametrize("name", ["T, in", "T; in", 'T "in"', "#T", "T [a]", "'T'", "Drehmoment ä"])
 def test_names_with_separators_are_read_back(mechanism: Mechanism, name: str, tmp_path: Path) -> None:
     changes = {"sensors": {name: SENSORS["T1"], "n1": SENSORS["n1"]}, "time": {"column": f"{name} t"}}
-    trunnion.observe(mechanism, rig(**changes)).write(tmp_path)
-    read = trunnion.read_measured(tmp_path / "mapping.yaml")
+    trunnion.rig.observe(mechanism, rig(**changes)).write(tmp_path)
+    read = trunnion.rig.read(tmp_path / "mapping.yaml")
     assert set(read.conditions[0].courses) == {name, "n1"}
 
 
@@ -177,7 +177,7 @@ def test_a_load_at_rest_reads_nothing(tmp_path: Path) -> None:
     press = trunnion.read(EXAMPLES / "indexing-press.yaml")
     sensors = {"T": {"measures": "effort:R"}, "v": {"measures": "rate:R"}, "L": {"measures": "load:strip"},
                "vF": {"measures": "rate:F"}}  # fmt: skip
-    seen = trunnion.observe(press, rig(sensors=sensors, encoder=None, schedule={"turns": 5}, rate="200 Hz"))
+    seen = trunnion.rig.observe(press, rig(sensors=sensors, encoder=None, schedule={"turns": 5}, rate="200 Hz"))
     assert "given 0 in a rest" in seen.findings[0].what
     (case,) = seen.cases
     load, speed = case.true.at_samples(2), case.true.at_samples(3)
@@ -190,7 +190,7 @@ def test_a_load_at_rest_reads_nothing(tmp_path: Path) -> None:
     rows = (tmp_path / "run-01.csv").read_text("utf-8")
     assert ",," not in rows
     assert ",\n" not in rows
-    read = trunnion.read_measured(tmp_path / "mapping.yaml")
+    read = trunnion.rig.read(tmp_path / "mapping.yaml")
     assert not [one for one in read.findings if "dropouts" in one.what]
 
 
@@ -207,7 +207,7 @@ def test_truth_tells_what_was_drawn(seen: Observation, tmp_path: Path) -> None:
 
 def test_grid_and_rows(mechanism: Mechanism) -> None:
     over = {"work.resisting_torque": "2 N m:6 N m:3", "A.speed": ["60 rpm", "120 rpm"]}
-    found = trunnion.observe(mechanism, rig(schedule={"over": over, "turns": 1}))
+    found = trunnion.rig.observe(mechanism, rig(schedule={"over": over, "turns": 1}))
     assert [dict(case.settings) for case in found.cases][:3] == [
         {"work.resisting_torque": "2 N m", "A.speed": "60 rpm"},
         {"work.resisting_torque": "2 N m", "A.speed": "120 rpm"},
@@ -226,7 +226,7 @@ def test_grid_and_rows(mechanism: Mechanism) -> None:
 def test_conditions_that_lock_are_left_out_and_told(mechanism: Mechanism) -> None:
     rows = [{"joint_defaults.friction.coefficient": 0.1}, {"l2": "80 mm"}, {"l2": "85 mm"}]
     rows[0] = {"work.resisting_torque": "5 N m"}
-    found = trunnion.observe(mechanism, rig(schedule={"conditions": rows, "turns": 2}))
+    found = trunnion.rig.observe(mechanism, rig(schedule={"conditions": rows, "turns": 2}))
     assert found.skipped == (2, 3)
     assert [case.number for case in found.cases] == [1]
     (finding,) = [one for one in found.findings if one.severity is Severity.WARNING]
@@ -235,12 +235,12 @@ def test_conditions_that_lock_are_left_out_and_told(mechanism: Mechanism) -> Non
     assert not any(np.isnan(values).any() for values in next(found.records()).columns.values())
     assert found.truth()["left_out"] == [2, 3]
     with pytest.raises(MechanismError, match="none of the 2 conditions can be measured"):
-        trunnion.observe(mechanism, rig(schedule={"conditions": rows[1:], "turns": 2}))
+        trunnion.rig.observe(mechanism, rig(schedule={"conditions": rows[1:], "turns": 2}))
 
 
 def test_clipped_readings_and_lost_pulses_are_told(mechanism: Mechanism) -> None:
     sensors = SENSORS | {"T1": SENSORS["T1"] | {"range": "1 N m"}}
-    found = trunnion.observe(mechanism, rig(sensors=sensors, encoder={"per_turn": 360, "kind": "level"}))
+    found = trunnion.rig.observe(mechanism, rig(sensors=sensors, encoder={"per_turn": 360, "kind": "level"}))
     told = {one.where: one.what for one in found.findings}
     assert "readings are clipped" in told["sensors.T1.range"]
     assert "some are lost" in told["encoder.kind"]
@@ -271,7 +271,7 @@ def test_rigs_that_do_not_fit_the_mechanism(
 ) -> None:
     changes = {"encoder": None} | changes
     with pytest.raises(MechanismError) as error:
-        trunnion.observe(mechanism, rig(**changes))
+        trunnion.rig.observe(mechanism, rig(**changes))
     found = [one for one in error.value.findings if one.where == where]
     assert found, error.value
     assert what in str(found[0])
@@ -285,9 +285,9 @@ def test_a_range_is_run_through_once() -> None:
     sensors = {"e": {"measures": f"effort:{driver}"}}
     stated = rig(sensors=sensors, encoder=None, rate="20 Hz")
     with pytest.raises(MechanismError, match="state turns: 1"):
-        trunnion.observe(mechanism, stated)
+        trunnion.rig.observe(mechanism, stated)
     stated = rig(sensors=sensors, encoder=None, rate="20 Hz", schedule={"turns": 1, "idle": "1 s"})
-    found = trunnion.observe(mechanism, stated)
+    found = trunnion.rig.observe(mechanism, stated)
     mapping = found.mapping()
     assert "angle" not in mapping
     record = next(found.records())
@@ -318,25 +318,25 @@ def test_negative_sensitivity_is_planned_and_read_back(mechanism: Mechanism, see
     mirrored = {
         name: one | {"sensitivity": "-100 mV/(N m)"} if name.startswith("T") else one for name, one in SENSORS.items()
     }
-    down = trunnion.observe(mechanism, rig(sensors=mirrored), seed=4)
+    down = trunnion.rig.observe(mechanism, rig(sensors=mirrored), seed=4)
     for one, other in zip(plan(down).sensors[:2], plan(seen).sensors[:2], strict=True):
         assert (one.share, one.steps, one.noise) == pytest.approx(
             (other.share, other.steps, 100 * other.noise), rel=1e-3
         )
         assert (one.least, one.most) == pytest.approx((-100 * other.most, -100 * other.least), rel=1e-3)
     down.write(tmp_path)
-    read = trunnion.read_measured(tmp_path / "mapping.yaml").conditions[0].courses["T1"]
+    read = trunnion.rig.read(tmp_path / "mapping.yaml").conditions[0].courses["T1"]
     assert read.mean.mean() == pytest.approx(seen.measurement(360).conditions[0].courses["T1"].mean.mean(), abs=0.02)
 
 
 def test_plan_tells_slow_sensors_and_coarse_converters(mechanism: Mechanism) -> None:
     slow = {name: one | {"bandwidth": "2 Hz"} for name, one in SENSORS.items()}
     slow["w2"] = slow["w2"] | {"bits": 6, "range": "1000 rad/s"}
-    told = {one.where: one for one in plan(trunnion.observe(mechanism, rig(sensors=slow))).findings}
+    told = {one.where: one for one in plan(trunnion.rig.observe(mechanism, rig(sensors=slow))).findings}
     assert "too slow for the cycle" in told["sensors"].what
     assert "steps of the converter" in told["sensors.w2.bits"].what
     assert "of the range" in told["sensors.w2.range"].what
-    alone = plan(trunnion.observe(mechanism, rig(sensors={"T1": SENSORS["T1"]})))
+    alone = plan(trunnion.rig.observe(mechanism, rig(sensors={"T1": SENSORS["T1"]})))
     assert alone.conditions[0].measured is None
     assert "no efficiency to expect" in alone.findings[-1].what
 
@@ -355,7 +355,7 @@ FAULTS = [
 def test_faults_do_what_they_say(mechanism: Mechanism, seen: Observation) -> None:
     clean = next(seen.records()).columns
     for fault in FAULTS:
-        faulty = next(trunnion.observe(mechanism, rig(faults=[fault]), seed=4).records()).columns
+        faulty = next(trunnion.rig.observe(mechanism, rig(faults=[fault]), seed=4).records()).columns
         kind = fault["kind"]
         if kind == "gap":
             assert len(faulty["t"]) == len(clean["t"]) - 50
@@ -377,7 +377,7 @@ def test_faults_do_what_they_say(mechanism: Mechanism, seen: Observation) -> Non
             assert len(set(faulty[name][1000:1100])) == 1
         else:
             assert 0 < clean[name][-1] - faulty[name][-1] < 30
-    other = trunnion.observe(mechanism, rig(faults=[{**FAULTS[2], "conditions": [2]}]), seed=4)
+    other = trunnion.rig.observe(mechanism, rig(faults=[{**FAULTS[2], "conditions": [2]}]), seed=4)
     assert np.array_equal(next(other.records()).columns["T2"], clean["T2"])
-    assert trunnion.observe(mechanism, rig(faults=FAULTS)).truth()["faults"][1] == {"kind": "gap", "sensor": [],
+    assert trunnion.rig.observe(mechanism, rig(faults=FAULTS)).truth()["faults"][1] == {"kind": "gap", "sensor": [],
         "conditions": [], "length": 1, "from": "1 s", "to": "1.1 s"}  # fmt: skip

@@ -196,7 +196,7 @@ def test_a_rig_that_fails_leaves_nothing(
     """Neither files of the one that failed nor, where there was an earlier one, other ones than its own."""
     (tmp_path / "rig.yaml").write_text(GOOD.replace("rate: 1 kHz", "rate: 500 Hz"), encoding="utf-8")
     rig, model = Rig.read(tmp_path / "rig.yaml"), trunnion.read(FOUR_BAR)
-    seen = trunnion.observe(model, rig, 1)
+    seen = trunnion.rig.observe(model, rig, 1)
     write = virtual_files.WRITERS[form]
 
     def fails(*arguments: Any) -> None:
@@ -210,7 +210,7 @@ def test_a_rig_that_fails_leaves_nothing(
     with monkeypatch.context() as patched:
         patched.setitem(virtual_files.WRITERS, form, fails)
         with pytest.raises(MechanismError if isinstance(error, OSError) else type(error)) as failure:
-            trunnion.observe(model, rig, 2).write(tmp_path / where, form)
+            trunnion.rig.observe(model, rig, 2).write(tmp_path / where, form)
     if isinstance(error, OSError):
         assert "No space left" in str(failure.value)
     assert _files(tmp_path) == before
@@ -218,10 +218,10 @@ def test_a_rig_that_fails_leaves_nothing(
     with monkeypatch.context() as patched:  # and where the last step fails
         patched.setattr(virtual_files.Path, "rename", _failing_at(3 if where == "data" else 1))
         with pytest.raises(MechanismError, match="nothing of it is left"):
-            trunnion.observe(model, rig, 2).write(tmp_path / where, form)
+            trunnion.rig.observe(model, rig, 2).write(tmp_path / where, form)
     assert _files(tmp_path) == before
     assert sorted(tmp_path.iterdir()) == folders
-    trunnion.observe(model, rig, 2).write(tmp_path / where, form)
+    trunnion.rig.observe(model, rig, 2).write(tmp_path / where, form)
     assert set(_files(tmp_path)) >= {f"{where}/{name}" for name in ("mapping.yaml", "truth.yaml", f"run-01.{form}")}
     assert _files(tmp_path) != before
 

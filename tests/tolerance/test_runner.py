@@ -15,8 +15,8 @@ import pytest
 
 from toy_job import ToyJob
 from toy_programs import ENVIRONMENT, POSIX, interrupted
-from trunnion import Finding, MechanismError
-from trunnion.errors import Severity
+from trunnion import MechanismError
+from trunnion.errors import Finding, Severity
 from trunnion.studies.tolerance.checkpoint import Checkpoint
 from trunnion.studies.tolerance.ranges import BlockRanges, Pace, count, gaps, union
 from trunnion.studies.tolerance.runner import run

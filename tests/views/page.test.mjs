@@ -96,6 +96,10 @@ const space = scene.space === "spatial" && scene.solids.length ? steered() : nul
 for (const name of ["beforeprint", "afterprint"]) events[name].forEach((act) => act());
 const seen = (place, name) => places[place].find(classes(name)).length;
 
+const alone = { stage: new Element("stage") }; // an animation has no more than the drawing and its player
+start(scene, alone).go(scene.count - 1);
+assert.equal(alone.stage.find(classes("player")).length, 1);
+
 /** What a scene with errors shows of them, at several magnifications through all positions; ends at 1. */
 function enlarged() {
   const slider = places.stage.find(classes("magnification"))[0];

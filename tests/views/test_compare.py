@@ -64,11 +64,11 @@ def case(name):
     if name == "locked":
         found = measured(settings=[{}, {}, {}], channels=POWERS).conditions
         values = ({FRICTION: 0.1}, {FRICTION: 0.2}, {FRICTION: 40.0})
-        return trunnion.compare(
+        return trunnion.rig.compare(
             rocker(),
             Measurement("bench", tuple(replace(one, values=told) for one, told in zip(found, values, strict=True))),
         )
-    return trunnion.compare(rocker(), of[name]())
+    return trunnion.rig.compare(rocker(), of[name]())
 
 
 NAMES = ("family", "one curve", "nothing varied", "many", "one turn", "one position", "motion only", "wrong", "locked")
@@ -233,7 +233,7 @@ def test_the_report_has_what_a_laboratory_files(tmp_path):
 def test_files_at_hand_are_hashed(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "run-1.csv").write_bytes(b"t,T\n")
-    found = json.loads(trunnion.compare(rocker(), measured()).attrs["files"])
+    found = json.loads(trunnion.rig.compare(rocker(), measured()).attrs["files"])
     digest = hashlib.sha256(b"t,T\n").hexdigest()
     assert found == [{"file": "run-1.csv", "bytes": 4, "sha256": digest}]
 
@@ -241,7 +241,7 @@ def test_files_at_hand_are_hashed(tmp_path, monkeypatch):
 @pytest.mark.slow
 def test_many_conditions_are_limited_and_said():
     found = measured(settings=settings(np.linspace(2, 6, 10), (3.0, 4.0)), channels=POWERS, positions=12)
-    page = Page(report(trunnion.compare(rocker(), found, ["out"])))
+    page = Page(report(trunnion.rig.compare(rocker(), found, ["out"])))
     assert f"{MOST_DRAWN} of 20 conditions are drawn" in " ".join(page.words)
     assert len([tag for tag, _ in page.tags if tag == "img"]) == 1 + MOST_DRAWN
 
@@ -249,7 +249,7 @@ def test_many_conditions_are_limited_and_said():
 def test_names_are_text():
     found = measured(channels=("out",))
     odd = tuple(replace(one, name="</style><script>alert(1)</script> $x$") for one in found.conditions)
-    text = report(trunnion.compare(rocker(), replace(found, name="<b>曲柄</b>", conditions=odd)))
+    text = report(trunnion.rig.compare(rocker(), replace(found, name="<b>曲柄</b>", conditions=odd)))
     assert "<script" not in text
     assert "<b>曲柄</b>" in " ".join(Page(text).words)
 

@@ -24,6 +24,7 @@ from trunnion.cli.identify import identify
 from trunnion.cli.model import exit_status, lines_of, placed, stated
 from trunnion.cli.options import (
     IMAGES,
+    Columns,
     Criterion,
     Data,
     File,
@@ -60,7 +61,7 @@ app = typer.Typer(
     name="trunnion",
     help="The analysis of linkages as built: motion, reactions with friction, drive torque, power.",
     no_args_is_help=True,
-    add_completion=False,
+    add_completion=True,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
@@ -141,6 +142,7 @@ def analyse(
     out: Data = None,
     report: Report = None,
     units_row: UnitsRow = False,
+    columns: Columns = None,
     uncut: Uncut = False,
 ) -> None:
     """Motion, reactions with friction, drive effort and power over the cycle."""
@@ -149,7 +151,7 @@ def analyse(
     with lines_of(file):
         result = _run(mechanism, steps, _method(method, criterion, iterations))
     page = partial(_page, mechanism, result, uncut)
-    Shown(result, file, ["assembly"], out or [], report, units_row, page=page).finish()
+    Shown(result, file, ["assembly"], out or [], report, units_row, page=page, columns=columns).finish()
 
 
 @verb
@@ -181,7 +183,8 @@ def locking(
     mechanism = stated(file, set_, table, friction)
     with lines_of(file):
         run = prepare(mechanism)
-        found = look(run, steps)
+        with bar("positions", steps, least=200_000) as progress:
+            found = look(run, steps, progress)
     figures = report_figures(run, found)
     Shown(found, file, ["assembly"], show=lambda: show_figures(mechanism.name or str(file), figures)).finish()
 

@@ -24,7 +24,7 @@ class Uniform(StrEnum):
 
 def assemble(
     file: File,
-    steps: Steps = 72,
+    steps: Steps = 360,
     set_: Set = None,
     uniform: Annotated[
         Uniform, typer.Option("--uniform", help="What shares the smallest clearance: pins, or all kinds of play.")

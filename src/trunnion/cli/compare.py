@@ -48,8 +48,8 @@ def compare(
 
     Exit status 0 if every course and efficiency is within, 1 if not or if it cannot be told.
     """
-    from trunnion.rig.compare.findings import gathered
-    from trunnion.rig.compare.study import compare as run
+    from trunnion.rig.comparison.findings import gathered
+    from trunnion.rig.comparison.study import compare as run
     from trunnion.rig.reading.read import read_measured
 
     check_files(out or [], report, of="comparison", kind=kind)

@@ -116,8 +116,8 @@ def identify(
     units_row: UnitsRow = False,
 ) -> None:
     """Numbers of the model from measured data: estimates, 95 % intervals, what the data cannot tell apart."""
-    from trunnion.rig.compare.findings import gathered
-    from trunnion.rig.identify import identify as run
+    from trunnion.rig.comparison.findings import gathered
+    from trunnion.rig.identification import identify as run
     from trunnion.rig.reading.read import read_measured
 
     check_files(out or [], report, of="identification", kind=kind)
@@ -205,7 +205,7 @@ def _write_model(
 ) -> list[Finding]:
     """The model with the estimates; findings about what is not in it."""
     from trunnion.model.rewrite import rewrite_mechanism
-    from trunnion.rig.identify import with_estimates
+    from trunnion.rig.identification import with_estimates
 
     lost = [str(name) for name, told in zip(result["parameter"].values, result["told"].values, strict=True) if not told]
     if len(lost) == result.sizes["parameter"] or not result.attrs["converged"]:

@@ -41,7 +41,7 @@ __all__ = [
     "setting",
 ]
 
-IMAGES = (".png", ".svg", ".pdf")
+IMAGES = (".png", ".svg", ".pdf", ".jpg", ".jpeg")
 PLOT_KINDS = "torque, friction-power, reactions, polar, power, mechanism, motion, error, seat, beta or measures"
 
 File = Annotated[Path, typer.Argument(help="Model file: YAML, JSON or TOML.", show_default=False)]
@@ -61,7 +61,10 @@ Seats = Annotated[
     str | None,
     typer.Option("--seat", help="loaded or free: how the pins of all joints with play lie in their holes."),
 ]
-Method = Annotated[str, typer.Option("--method", help="newton, or successive-approximation (Durango et al., 2010).")]
+Method = Annotated[
+    str,
+    typer.Option("--friction-method", "--method", help="newton, or successive-approximation (Durango et al., 2010)."),
+]
 Criterion = Annotated[
     float | None,
     typer.Option(
@@ -102,6 +105,14 @@ Data = Annotated[
 ]
 Uncut = Annotated[
     bool, typer.Option("--uncut", help="Figures show peaks near dead centres whole; else the frame cuts them there.")
+]
+Columns = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--columns",
+        help="Columns of a table file: usual, motion (velocities, accelerations), all, or names. Repeatable.",
+        show_default=False,
+    ),
 ]
 UnitsRow = Annotated[bool, typer.Option("--units-row", help="Second CSV header row with the units.")]
 Kinds = Annotated[

@@ -8,6 +8,7 @@ from typing import Any
 from trunnion.cli.model import lines_of, stated
 from trunnion.cli.options import File, FrictionLaw, Measures, Out, Set, Steps, TableFile, Uncut, UnitsRow
 from trunnion.cli.result import Shown, check_files, show_tables
+from trunnion.cli.terminal import bar
 from trunnion.errors import Finding, MechanismError
 
 __all__ = ["play"]
@@ -29,8 +30,8 @@ def play(
 
     check_files(out or [])
     mechanism = stated(file, set_, table, friction)
-    with lines_of(file):
-        result = run(mechanism, measure, steps)
+    with lines_of(file), bar("positions", steps, least=20_000) as progress:
+        result = run(mechanism, measure, steps, progress)
 
     def draw(path: Path) -> Any:
         from trunnion.views.common.peaks import whole_peaks

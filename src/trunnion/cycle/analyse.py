@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from trunnion.cycle import summary
+from trunnion.deprecation import renamed
 from trunnion.model.mechanism import Mechanism
 from trunnion.solve.friction_method import FrictionMethod
 
@@ -19,17 +20,19 @@ from trunnion.solve.run import Run, prepare
 __all__ = ["analyse", "analyse_run"]
 
 
+@renamed(method="friction_method")
 @np.errstate(all="ignore")
 def analyse(
     mechanism: Mechanism,
     steps: int = 360,
-    method: FrictionMethod | None = None,
+    friction_method: FrictionMethod | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> xr.Dataset:
     """Motion, reactions with friction, drive effort and power of a mechanism over its cycle.
 
     steps: equally spaced positions; over a full turn the end is not repeated. Returns a Dataset with the names,
     units and dims of `results.VARIABLES`; positions without an answer are NaN and have a status.
+    friction_method: how friction and reactions are settled; Newton's method if not given.
     progress: called with the number of positions done.
     Method: the modules' closed forms or the general group, friction settled per module (`friction.settle`).
     Raises MechanismError if the structure does not determine the motion or `steps` is out of range.
@@ -38,7 +41,7 @@ def analyse(
     run = prepare(mechanism)
     if run.determinacy is not None:
         run.determinacy.refuse()
-    return analyse_run(run, steps, method, progress)
+    return analyse_run(run, steps, friction_method, progress)
 
 
 @np.errstate(all="ignore")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -59,13 +60,14 @@ class Check:
 
 
 @np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
-def check(mechanism: Mechanism, steps: int = 360) -> Check:
+def check(mechanism: Mechanism, steps: int = 360, progress: Callable[[int], None] | None = None) -> Check:
     """Structure and findings of a mechanism, looked at over `steps` positions of its cycle.
 
+    progress: called with the number of positions done.
     Raises MechanismError if the structure does not determine the motion.
     """
     run = prepare(mechanism)
-    found, _ = summary.findings(run, positions(run, steps, averaged=False))
+    found, _ = summary.findings(run, positions(run, steps, progress=progress, averaged=False))
     walk = forward(run.system, run.values, run.chosen.assembly, run.cycle.times(steps))
     rank = run.determinacy.mobility if run.determinacy else _rank(walk)
     if run.determinacy is None and rank is not None and rank != run.system.plan.mobility:

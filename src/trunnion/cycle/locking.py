@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -50,26 +51,26 @@ VARIABLES = {
 }
 
 
-def locking(mechanism: Mechanism, steps: int = 360) -> xr.Dataset:
+def locking(mechanism: Mechanism, steps: int = 360, progress: Callable[[int], None] | None = None) -> xr.Dataset:
     """The result of `analyse` with what is to know of locking at every position, by dims joint, driver and position.
 
     critical_multiple: by continuation from no friction, ∞ beyond 10; 0 for a joint without whose friction its group
     still locks; NaN for joints without friction and positions without forces for another cause. The names, units and
-    meanings are in the Dataset. Raises MechanismError if the structure does not determine the motion, or for no steps
-    or more than MOST_STEPS.
+    meanings are in the Dataset. progress: called with the number of positions analysed.
+    Raises MechanismError if the structure does not determine the motion, or for no steps or more than MOST_STEPS.
     """
-    return look(prepare(mechanism), steps)
+    return look(prepare(mechanism), steps, progress)
 
 
 @np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
-def look(run: Run, steps: int = 360) -> xr.Dataset:
+def look(run: Run, steps: int = 360, progress: Callable[[int], None] | None = None) -> xr.Dataset:
     """What `locking` does, for a mechanism that is prepared."""
     mechanism = run.system.mechanism
     if run.determinacy is not None:
         run.determinacy.refuse()
     if not 1 <= steps <= MOST_STEPS:
         raise MechanismError(Finding(f"cannot look at {steps} positions", "steps", f"give 1 to {MOST_STEPS:,}"))
-    result = analyse_run(run, steps)
+    result = analyse_run(run, steps, progress=progress)
     time, status = result["time"].values, result["status"].values
     back = run.solve(time, method=FrictionMethod())
     with np.errstate(all="ignore"):

@@ -22,6 +22,7 @@ from trunnion.model.quantity import Quantity
 from trunnion.model.units import KINDS, Dimension, si_unit
 from trunnion.results import variables as results
 from trunnion.results.attributes import cited, figure_rows, finding_rows, origin
+from trunnion.results.dataset import driven
 from trunnion.results.figure import Figure
 from trunnion.results.sentences import finding_for
 from trunnion.solve.forward import start
@@ -45,6 +46,7 @@ __all__ = [
     "inputs",
     "model_notes",
     "references",
+    "scene_of",
     "sound_positions",
 ]
 
@@ -79,11 +81,12 @@ def finish(run: Run, found_positions: Positions) -> xr.Dataset:
         "findings": finding_rows([*found, *measured.findings]),
         "summary": figure_rows([*_summary(run, found_positions, near), *measured.summary()]),
         "inputs": inputs(mechanism),
-        "scene": _scene(run),
+        "scene": scene_of(run),
         "periodic": int(run.cycle.periodic),
     }
+    along = driven(time, *run.system.dial(run.values, time))
     result = results.dataset(
-        arrays, found_positions.labels, time, found_positions.means, attributes, found_positions.ideal
+        arrays, found_positions.labels, along, found_positions.means, attributes, found_positions.ideal
     )
     return measured.joined(result)
 
@@ -348,7 +351,7 @@ def inputs(mechanism: Mechanism) -> list[dict[str, Any]]:
     return rows
 
 
-def _scene(run: Run) -> dict[str, Any]:
+def scene_of(run: Run) -> dict[str, Any]:
     """What a drawing needs to know beside the positions of the points."""
     system = run.system
     found: dict[str, Any] = fill_of(system).scene(

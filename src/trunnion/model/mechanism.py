@@ -8,7 +8,8 @@ import os
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property
-from typing import Any, Literal, Self
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,6 +50,9 @@ from trunnion.model.tolerances import (
     written_limits,
 )
 from trunnion.model.units import Kind
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 __all__ = ["Mechanism", "read_mechanism"]
 
@@ -349,6 +353,23 @@ class Mechanism(Numbers):
             holder.pop("seat", None)
         return Mechanism(**kept(self, {**data, "joint_defaults": {**data.get("joint_defaults", {}), "seat": seat}}))
 
+    def plot(self) -> Figure:
+        """The mechanism at its start as a matplotlib Figure, without loads and friction: bodies, joints, point curves.
+
+        Lengths in m. Raises MechanismError if the structure does not determine the motion, or if no position of the
+        cycle can be assembled.
+        """
+        return _notebook().mechanism_figure(self)  # type: ignore[no-any-return]
+
+    def __repr__(self) -> str:
+        """One line; `data()` has all of it."""
+        parts = f"{len(self.effective_links)} links, {len(self.effective_joints)} joints"
+        return f"<Mechanism {self.name!r}, {self.space}: {parts}, {len(self.drivers)} drivers>"
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: drawing, structural formula, mobility, findings. Never raises."""
+        return str(_notebook().mechanism_html(self))
+
     @property
     def digest(self) -> str:
         """Hash of the content, 16 hexadecimal digits: equal mechanisms have equal digests."""
@@ -368,6 +389,11 @@ HASHED = (
 )
 
 
+def _notebook() -> Any:
+    """The views of a notebook, by name: they stand above the model, which knows nothing else of them."""
+    return import_module("trunnion.views.notebook")
+
+
 def _canonical(value: Any) -> Any:
     """Plain data with 1 and 1.0 alike."""
     if isinstance(value, dict):
@@ -378,5 +404,9 @@ def _canonical(value: Any) -> Any:
 
 
 def read_mechanism(path: str | os.PathLike[str], tables: TableFiles | None = None) -> Mechanism:
-    """The mechanism of a YAML, JSON or TOML file; see `Mechanism.read`."""
+    """The mechanism of a YAML, JSON or TOML file.
+
+    tables: CSV files with the points of drivers and tables, by name; they go before those that the model names.
+    Raises MechanismError with file, line, cause and remedy of every finding.
+    """
     return Mechanism.read(path, tables)

@@ -64,7 +64,8 @@ def described(
 
 def driven(time: NDArray[np.float64], values: ArrayLike, unit: str, of: str) -> dict[str, xr.Variable]:
     """The coordinates along the positions: time, and the drive as a dial names it."""
-    drive = Variable(("position",), unit.strip(), f"coordinate of {of}" if of else "time")
+    moves = {"°": "angle", "mm": "slide"}.get(unit.strip(), "coordinate")
+    drive = Variable(("position",), unit.strip(), f"{moves} of {of}" if of else "time")
     return described({"time": time, "drive": np.asarray(values, float)}, {"time": TIME, "drive": drive})
 
 
@@ -83,13 +84,16 @@ def dataset_of(
     import pandas as pd
     import xarray as xr
 
-    names: dict[str, xr.Variable] = {}
+    names: dict[str, Any] = dict(along or {})
     indexes: dict[str, xr.indexes.PandasIndex] = {}
     for dim, members in labels.items():
         text = np.asarray(members, dtype=str)
         # An index of pandas: of an array, xarray would load pint and dask to see whether it is one of theirs.
         indexes[dim] = xr.indexes.PandasIndex(pd.Index(text, name=dim), dim, coord_dtype=text.dtype)
         names |= indexes[dim].create_variables()
-    return xr.Dataset(
-        variables, xr.Coordinates({**names, **(along or {})}, indexes), {"kind": kind, **encoded(attributes)}
-    )
+    drive = names.get("drive")
+    if drive is not None and drive.dims == ("position",):
+        # xarray draws over the coordinate that bears the dimension's name. It has no index: two results are combined
+        # position by position, not by angles that may differ in their last digit
+        names["position"] = drive
+    return xr.Dataset(variables, xr.Coordinates(names, indexes), {"kind": kind, **encoded(attributes)})

@@ -1,4 +1,4 @@
-"""A result as a file: CSV, JSON, NetCDF, Zarr or Parquet, by extension.
+"""A result as a file: CSV, JSON, NetCDF, Zarr, Parquet or a workbook, by extension.
 
 CSV (and Parquet) have one row a position and flat columns: `time`, `<joint>.rotation`, `<joint>.slide`,
 `<joint>.reaction_x|y`, `<joint>.friction_torque`, `<driver>.effort`, `<link>.<point>.x|y`, `power_in`,
@@ -25,14 +25,17 @@ import json
 import math
 import os
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.files import whole
 from trunnion.model.names import guarded
-from trunnion.results.tables import columns, table_of
+from trunnion.results.tables import KINDS, Column, kind_of, table_of
+from trunnion.results.tables import columns as flat_columns
+from trunnion.results.tables.selection import selected
+from trunnion.results.workbook import write_workbook
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -40,6 +43,7 @@ if TYPE_CHECKING:
 
 __all__ = ["FORMATS", "check_format", "frame", "save"]
 
+Columns = Callable[[str], list[Column]]  # of a table by name; of the file's own if that is empty
 ROWS = 20_000  # written at a time, so that memory does not grow with the number of positions
 
 
@@ -47,14 +51,13 @@ def frame(result: xr.Dataset, table: str = "") -> pd.DataFrame:
     """The flat columns of a table, the first if none is named."""
     import pandas as pd
 
-    return pd.DataFrame({name: values(slice(None)) for name, _, values in columns(result, table)})
+    return pd.DataFrame({name: values(slice(None)) for name, _, values in flat_columns(result, table)})
 
 
-def frames(result: xr.Dataset, table: str = "") -> Iterator[pd.DataFrame]:
+def frames(found: Sequence[Column]) -> Iterator[pd.DataFrame]:
     """The flat columns, some rows at a time."""
     import pandas as pd
 
-    found = columns(result, table)
     count = len(found[0][2](slice(None)))
     for low in range(0, max(count, 1), ROWS):  # one window at least, so that the names are written
         window = slice(low, low + ROWS)
@@ -71,25 +74,26 @@ def _guarded(frame: pd.DataFrame) -> pd.DataFrame:
     return frame
 
 
-def _csv(result: xr.Dataset, path: Path, units_row: bool, table: str) -> None:
+def _csv(result: xr.Dataset, path: Path, units_row: bool, columns: Columns) -> None:
+    found = columns("")
     with path.open("w", encoding="utf-8", newline="") as file:
-        for number, frame in enumerate(map(_guarded, frames(result, table))):
+        for number, frame in enumerate(map(_guarded, frames(found))):
             if number == 0:
                 frame.head(0).to_csv(file, index=False)
                 if units_row:
                     import csv
 
-                    units = [guarded(unit) for _, unit, _ in columns(result, table)]
+                    units = [guarded(unit) for _, unit, _ in found]
                     csv.writer(file, lineterminator="\n").writerow(units)
             frame.to_csv(file, index=False, header=False)
 
 
-def _parquet(result: xr.Dataset, path: Path, units_row: bool, table: str) -> None:
+def _parquet(result: xr.Dataset, path: Path, units_row: bool, columns: Columns) -> None:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     writer = None
-    for frame in frames(result, table):
+    for frame in frames(columns("")):
         rows = pa.Table.from_pandas(frame, preserve_index=False)
         writer = writer or pq.ParquetWriter(path, rows.schema)
         writer.write_table(rows)
@@ -97,7 +101,7 @@ def _parquet(result: xr.Dataset, path: Path, units_row: bool, table: str) -> Non
         writer.close()
 
 
-def _netcdf(result: xr.Dataset, path: Path, units_row: bool, table: str) -> None:
+def _netcdf(result: xr.Dataset, path: Path, units_row: bool, columns: Columns) -> None:
     modern = all(importlib.util.find_spec(package) for package in ("h5netcdf", "h5py"))
     engine: Literal["h5netcdf", "scipy"] = "h5netcdf" if modern else "scipy"
     try:
@@ -108,7 +112,7 @@ def _netcdf(result: xr.Dataset, path: Path, units_row: bool, table: str) -> None
     path.write_bytes(made)  # by Python: where the disk is full, the HDF5 library takes the process with it
 
 
-def _zarr(result: xr.Dataset, path: Path, units_row: bool, table: str) -> None:
+def _zarr(result: xr.Dataset, path: Path, units_row: bool, columns: Columns) -> None:
     path.unlink()  # a Zarr store is a folder
     try:
         result.to_zarr(path, zarr_format=2)  # version 3 has no stable text arrays yet
@@ -117,7 +121,7 @@ def _zarr(result: xr.Dataset, path: Path, units_row: bool, table: str) -> None:
         raise
 
 
-def _json(result: xr.Dataset, path: Path, units_row: bool, table: str) -> None:
+def _json(result: xr.Dataset, path: Path, units_row: bool, columns: Columns) -> None:
     data = result.to_dict()
     for section in ("coords", "data_vars"):
         for entry in data[section].values():
@@ -133,7 +137,11 @@ def _plain(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-Writer = Callable[["xr.Dataset", Path, bool, str], None]
+def _xlsx(result: xr.Dataset, path: Path, units_row: bool, columns: Columns) -> None:
+    write_workbook(path, {name: columns(name) for name in KINDS[kind_of(result)]}, str(result.attrs.get("name", "")))
+
+
+Writer = Callable[["xr.Dataset", Path, bool, Columns], None]
 
 # extension: writer, the package it needs and the extra that brings it
 FORMATS: dict[str, tuple[Writer, str, str]] = {
@@ -142,6 +150,7 @@ FORMATS: dict[str, tuple[Writer, str, str]] = {
     ".nc": (_netcdf, "", ""),
     ".zarr": (_zarr, "zarr", "zarr"),
     ".parquet": (_parquet, "pyarrow", "parquet"),
+    ".xlsx": (_xlsx, "xlsxwriter", "xlsx"),
 }
 
 
@@ -159,15 +168,29 @@ def check_format(path: str | os.PathLike[str], others: tuple[str, ...] = ()) -> 
         raise MechanismError(Finding(f"{suffix} needs {package}", str(path), f"pip install 'trunnion[{extra}]'"))
 
 
-def save(result: xr.Dataset, path: str | os.PathLike[str], units_row: bool = False) -> None:
+def save(
+    result: xr.Dataset,
+    path: str | os.PathLike[str],
+    units_row: bool = False,
+    columns: Sequence[str] | None = None,
+) -> None:
     """Write a result by the file's extension, whole or not at all.
 
-    units_row: a second header row with the units (CSV). Raises MechanismError for an unknown extension, a missing
-    package, or a place that cannot be written.
+    result: of any function that returns a Dataset; path: .csv .json .nc .zarr .parquet .xlsx. units_row: a second
+    header row with the units (CSV; a workbook has it always). columns: of a cycle, the columns of CSV, Parquet and
+    workbook: usual, motion (with velocities and accelerations), all, or names and patterns such as `crank.B.*`. The
+    other formats hold the whole Dataset. Raises MechanismError for an unknown extension or column, a missing package,
+    or a place that cannot be written.
     """
     check_format(path)
     writer, _, _ = FORMATS[Path(path).suffix.lower()]
     if Path(path).suffix.lower() == ".zarr" and Path(path).is_dir():
         raise MechanismError(Finding("exists already", str(path), "remove it or choose another name"))
+    own = table_of(path, result)
+
+    def chosen(table: str) -> list[Column]:
+        """The columns of a table; what was asked for holds for the one that the file is named for."""
+        return selected(result, columns if table in ("", own) else None, table or own)
+
     with whole(path) as temporary:
-        writer(result, temporary, units_row, table_of(path, result))
+        writer(result, temporary, units_row, chosen)

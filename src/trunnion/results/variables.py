@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.results.dataset import TIME, Variable, dataset_of, described
+from trunnion.results.dataset import Variable, dataset_of, described
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -204,14 +204,14 @@ def allocate(
 def dataset(
     arrays: Mapping[str, NDArray[np.float64]],
     labels: Labels,
-    time: NDArray[np.float64],
+    along: Mapping[str, xr.Variable],
     means: CycleMeans,
     attributes: Mapping[str, Any],
     ideal: CycleMeans | None = None,
 ) -> xr.Dataset:
-    """The result of a cycle."""
+    """The result of a cycle. along: the coordinates of its positions, see `results.dataset.driven`."""
     known = {name: one.over("position") for name, one in variables(_space(labels)).items()}
     found = described(arrays, known) | described({name: getattr(means, name) for name in CYCLE}, CYCLE)
     if ideal is not None:
         found |= described({name: getattr(ideal, name.removesuffix("_ideal")) for name in IDEAL}, IDEAL)
-    return dataset_of("cycle", found, labels, attributes, described({"time": time}, {"time": TIME}))
+    return dataset_of("cycle", found, labels, attributes, along)

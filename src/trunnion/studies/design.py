@@ -103,7 +103,12 @@ class Design:
 
 @np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
 def design(mechanism: Mechanism, steps: int = 720) -> Design:
-    """The figures of `Design` over `steps` positions of the cycle."""
+    """What a designer asks of a planar linkage: transmission, dead centres, range, shaking, balance, motor.
+
+    steps: equally spaced positions of the cycle, at which extremes and means are taken; dead centres and limits are
+    found between them. Returns a Design, SI and rad. Source: R. L. Norton, Design of Machinery.
+    Raises MechanismError for a mechanism in space, or if the structure does not determine the motion.
+    """
     run = _planar(mechanism)
     time = run.cycle.times(steps)
     back = run.solve(time)

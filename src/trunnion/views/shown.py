@@ -6,13 +6,16 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from trunnion.errors import Finding, MechanismError
+from trunnion.model.mechanism import Mechanism
 from trunnion.results.tables import kind_of
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-__all__ = ["check_kind", "figure_of", "report_of"]
+    from trunnion.views.cycle.animation import Animation
+
+__all__ = ["animation_of", "check_kind", "figure_of", "html_of", "plot", "report", "report_of"]
 
 # kind of result: the module of its view, in which `report` or `figure` stands; loaded when it is asked for, for
 # matplotlib is slow to import
@@ -27,6 +30,29 @@ FIGURES = {
 }  # fmt: skip
 
 
+def plot(of: Mechanism | xr.Dataset, kind: str | None = None, **options: Any) -> Figure:
+    """A matplotlib Figure of a mechanism at its start, or of a result.
+
+    kind: of a result one of the figures of its view, such as "reactions" of a cycle (`trunnion plot --help` lists
+    them); the main one if not given. options: those of the figure, as ideal= (the same run without friction) of a
+    cycle. Raises MechanismError for a kind that there is not, or where there is nothing to draw.
+    """
+    if not isinstance(of, Mechanism):
+        return figure_of(of, kind, **options)
+    if kind is not None or options:
+        raise MechanismError(Finding("a mechanism has one drawing", "kind", "analyse it first, and plot the result"))
+    return of.plot()
+
+
+def report(result: xr.Dataset, ideal: xr.Dataset | None = None, **options: Any) -> str:
+    """The report of a result as one HTML page that needs no network.
+
+    ideal: of a cycle, the same run without friction, drawn beside; options: others of its report. Raises MechanismError
+    of a result that has no report, ValueError if `ideal` has other positions.
+    """
+    return report_of(result, **(options if ideal is None else {"ideal": ideal, **options}))
+
+
 def report_of(result: xr.Dataset, **options: Any) -> str:
     """The report of a result as HTML. options: those of its view, such as ideal= of a cycle."""
     return str(_view(kind_of(result), REPORTS, "report").report(result, **options))
@@ -39,6 +65,17 @@ def figure_of(result: xr.Dataset, kind: str | None = None, **options: Any) -> Fi
         main = getattr(view, "sheet", view.figure)
         return main(result, **options)  # type: ignore[no-any-return]
     return view.figure(result, kind=kind, **options)  # type: ignore[no-any-return]
+
+
+def animation_of(result: xr.Dataset, ideal: xr.Dataset | None, height: int) -> Animation:
+    """The moving mechanism of a cycle."""
+    view = _view(kind_of(result), {"cycle": "cycle.animation"}, "animation")
+    return view.animation(result, ideal, height)  # type: ignore[no-any-return]
+
+
+def html_of(result: xr.Dataset) -> str:
+    """What a notebook shows of a result of any kind."""
+    return str(import_module("trunnion.views.notebook").result_html(result))
 
 
 def check_kind(of: str, kind: str) -> None:

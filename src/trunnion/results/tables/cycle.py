@@ -13,7 +13,22 @@ from trunnion.results.tables.column import Column, column, status_column, time_c
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["positions"]
+__all__ = ["motion", "positions", "rest"]
+
+RATES = ("", "_velocity", "_acceleration")
+# what only `rest` has, beside the motion: variable, the dimension whose names stand before the column's name, that name
+REST = (
+    ("drive_power", "driver", "power"),
+    ("drive_effort_reverse", "driver", "effort_reverse"),
+    ("critical_multiple", "joint", "critical_multiple"),
+    ("friction_power_change", "joint", "friction_power_change"),
+    ("contact_loss_number", "joint", "contact_loss_number"),
+    *((name, "", name) for name in (
+        "efficiency_instant", "locking_margin", "other_solutions", "power_delivered_reverse", "power_given_reverse",
+        "closure_residual", "condition", "power_residual", "friction_iterations", "friction_change",
+        "friction_residual", "friction_contraction", "seat_change", "seat_travel",
+    )),
+)  # fmt: skip
 
 
 def positions(result: xr.Dataset) -> list[Column]:
@@ -43,6 +58,48 @@ def positions(result: xr.Dataset) -> list[Column]:
     if "seat_rounds" in result:
         found.append(column(result, "seat_rounds", "seat_rounds", ()))
     return [*found, status_column(result), *_measures(result)]
+
+
+def motion(result: xr.Dataset) -> list[Column]:
+    """Coordinates, velocities and accelerations of joints, links and points."""
+    stated = attribute(result, "scene", "{}")
+    spatial = stated.get("space") == "spatial"
+    found: list[Column] = [time_column(result)]
+    for i, joint in enumerate(result["joint"].values):
+        pair = PAIRS[stated["joints"][str(joint)]["type"]]
+        moves = {"rotation": pair.turns or not spatial, "slide": pair.slides}
+        found += [
+            column(result, f"joint_{name}{rate}", f"{joint}.{name}{rate}", (i,))
+            for name, there in moves.items() if there for rate in RATES
+        ]  # fmt: skip
+    for i, link in enumerate(result["link"].values):
+        found += _spatial_link(result, i, str(link)) if spatial else _planar_link(result, i, str(link))
+    for i, point in enumerate(result["point"].values):
+        found += vector(result, "point_position", f"{point}.", i)
+        for rate in ("velocity", "acceleration"):
+            found += vector(result, f"point_{rate}", f"{point}.{rate}_", i)
+    return found
+
+
+def rest(result: xr.Dataset) -> list[Column]:
+    """What else there is at each position: powers, efficiency, margins, and how well it is solved."""
+    found: list[Column] = []
+    for variable, dim, name in REST:
+        if variable not in result:
+            continue
+        if not dim:
+            found.append(column(result, variable, name, ()))
+        else:
+            found += [column(result, variable, f"{of}.{name}", (i,)) for i, of in enumerate(result[dim].values)]
+    if "link_error" in result:
+        for i, link in enumerate(result["link"].values):
+            vectorial = "axis" in result["link_error"].dims
+            found += (
+                vector(result, "link_error", f"{link}.error_", i)
+                if vectorial
+                else [column(result, "link_error", f"{link}.angle_error", (i,))]
+            )
+    return found
 
 
 def _measures(result: xr.Dataset) -> list[Column]:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import Dual, derivative
+from trunnion.deprecation import renamed
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.prices import Price
@@ -54,12 +55,13 @@ MOST_FACTORS = 201
 RANGE = (0.5, 2.0)  # of the stated limits: the curve of cost over accuracy
 
 
+@renamed(friction="friction_method")
 @np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
 def allocate(
     mechanism: Mechanism,
     measures: Sequence[str] | None = None,
     criterion: Criterion = "worst-case",
-    target: float = DEFAULT_YIELD,
+    target: float | None = None,
     choice: Choice = "auto",
     steps: int = 360,
     at: float | str | None = None,
@@ -68,25 +70,29 @@ def allocate(
     curve: int = 0,
     *,
     exact: bool = False,
-    friction: FrictionMethod | None = None,
-    jobs: int | None = 1,
+    friction_method: FrictionMethod | None = None,
+    jobs: int | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> xr.Dataset:
     """The tolerances and plays of least cost with which measures keep their limits, and what they do then.
 
     What is to be chosen are the tolerances and plays with a cost (`Mechanism.prices`); all others stay as they are.
     measures: those with limits that are to be kept; all of the model if not given. criterion: an entry of `CRITERIA`:
-    worst-case, rss, or yield, of which target is the share of mechanisms within all limits. choice: continuous,
+    worst-case, rss, or yield, of which target is the share of mechanisms within all limits, 0.9973 if
+    not given. choice: continuous,
     discrete, or auto: discrete where any cost is a list of processes or options. steps: positions of a whole cycle; at:
     the place of measures that state none. samples, seed: of the samples that verify it, none if 0; jobs: processes for
     them. curve: how many points of cost over accuracy, all limits being multiplied by 0.5 to 2.
+    friction_method: how friction and reactions are settled; Newton's method if not given.
+    progress: called with the samples done.
     exact: take limits narrower until the worst case found on the mechanism keeps them, and not first order alone.
     Returns the Dataset of `tolerance` for the mechanism with the tolerances found (`half_widths`), and over
     (parameter), (measure), (offer) those of `result.VARIABLES`.
     Raises MechanismError if nothing has a cost, no measure a limit, or as `tolerance` does. That no tolerances keep the
     limits is a finding of the result.
     """
-    asked = AllocationRequest(criterion, target, choice, steps, at, samples, seed, friction, jobs, curve, exact)
+    share = DEFAULT_YIELD if target is None else target
+    asked = AllocationRequest(criterion, share, choice, steps, at, samples, seed, friction_method, jobs, curve, exact)
     _check(asked)
     found = _found(mechanism, _limited(mechanism, measures), asked)
     with_them = mechanism.with_tolerances(found.bought) if found.answer.found else mechanism
@@ -95,7 +101,16 @@ def allocate(
     if samples and found.answer.found:
         methods.append("monte-carlo")
     known = tolerance(
-        with_them, names, methods, max(samples, 1), seed, steps, at, friction=friction, jobs=jobs, progress=progress
+        with_them,
+        names,
+        methods,
+        max(samples, 1),
+        seed,
+        steps,
+        at,
+        friction_method=friction_method,
+        jobs=jobs,
+        progress=progress,
     )
     return dataset(found, known)
 
@@ -323,7 +338,7 @@ class _Search:
             bought = {name: float(t) for name, t in zip(names, tolerances, strict=True) if name in self.prices}
             sampled = tolerance(
                 self.mechanism.with_tolerances(bought), self.measures, ["monte-carlo"], asked.samples, asked.seed,
-                asked.steps, asked.at, friction=asked.friction, jobs=asked.jobs,
+                asked.steps, asked.at, friction_method=asked.friction, jobs=asked.jobs,
             )  # fmt: skip
             if sampled.attrs["stopped"]:  # a part of the samples decides no tolerances
                 raise KeyboardInterrupt

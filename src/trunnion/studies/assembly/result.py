@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import primal
 from trunnion.errors import Finding
 from trunnion.results.attributes import cited, figure_rows, finding_rows, origin
-from trunnion.results.dataset import TIME, Variable, dataset_of, described
+from trunnion.results.dataset import Variable, dataset_of, described, driven
 from trunnion.results.figure import Figure
 from trunnion.results.sentences import finding_for
 from trunnion.solve.system import System, Values
@@ -244,9 +244,10 @@ class Result:
             coordinate_units=["rad" if self.system.turns(name) else "m" for name in mechanism.drivers],
             periodic=int(self.system.cycle(self.values).periodic),
         ) | cited([SOURCE, *mechanism.references], AssemblyStatus)
-        time = described({"time": self.time}, {"time": replace(TIME, long_name="time")})
+        along = driven(self.time, *self.system.dial(self.values, self.time))
+        along["time"].attrs["long_name"] = "time"
         variables = described({name: self.arrays[name] for name in FIGURES}, FIGURES)
-        return dataset_of("assembly", variables, labels(self.system), attributes, time)
+        return dataset_of("assembly", variables, labels(self.system), attributes, along)
 
 
 def _at(place: str) -> str:

@@ -48,7 +48,7 @@ BETWEEN, NARROWED = 9, 5  # points in the interval around a maximum, and how oft
 @np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
 def assemble(
     mechanism: Mechanism,
-    steps: int = 72,
+    steps: int = 360,
     uniform: Uniform = "pins",
     progress: Callable[[int], None] | None = None,
 ) -> xr.Dataset:
@@ -68,7 +68,7 @@ def assembled(
     mechanism: Mechanism,
     values: Values,
     ideal: Values,
-    steps: int = 72,
+    steps: int = 360,
     uniform: Uniform = "pins",
     progress: Callable[[int], None] | None = None,
 ) -> xr.Dataset:

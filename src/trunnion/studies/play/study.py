@@ -16,7 +16,7 @@ a ball. Both are of first order in the play.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -135,13 +135,19 @@ class Effect:
 
 
 @np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
-def play(mechanism: Mechanism, measures: Sequence[str] | None = None, steps: int = 360) -> xr.Dataset:
+def play(
+    mechanism: Mechanism,
+    measures: Sequence[str] | None = None,
+    steps: int = 360,
+    progress: Callable[[int], None] | None = None,
+) -> xr.Dataset:
     """What the play of every joint does to measures over the cycle: worst case and standard deviation.
 
     measures: names of the model's, or written as `named` reads them, of what has one number at every position:
     `link.point.x`, `angle:link`, `effort:driver`, `velocity:link.point` …; all of the model if not given, or, where it
     states none, rotation and slide of every joint to the ground that is not driven. Returns a Dataset over (measure,
     joint, position) of `result.VARIABLES`: SI, each measure in its own unit. NaN where a position has no answer.
+    steps: equally spaced positions of the cycle. progress: called with the number of positions done.
     Method: virtual work for coordinates and angles, derivatives by dual numbers for others; first order in the play,
     about the mechanism with every pin in the middle of its hole.
     Raises MechanismError if no joint states a clearance, for an unknown measure, or as `analyse` does.
@@ -153,7 +159,7 @@ def play(mechanism: Mechanism, measures: Sequence[str] | None = None, steps: int
     found, told = _measures(run, measures)
     known = plays(run.system, run.values)
     _check(known)
-    effect = _over_the_cycle(run, found, known, steps if run.cycle.duration > 0 else 1)
+    effect = _over_the_cycle(run, found, known, steps if run.cycle.duration > 0 else 1, progress)
     return dataset(effect, [*_model_findings(run, effect), *told])
 
 
@@ -189,7 +195,13 @@ def _check(known: Mapping[str, Play]) -> None:
         raise MechanismError(findings)
 
 
-def _over_the_cycle(run: Run, measures: Sequence[Measure], known: Mapping[str, Play], steps: int) -> Effect:
+def _over_the_cycle(
+    run: Run,
+    measures: Sequence[Measure],
+    known: Mapping[str, Play],
+    steps: int,
+    progress: Callable[[int], None] | None = None,
+) -> Effect:
     time = run.cycle.times(steps)
     shape = (len(measures), len(known), steps)
     ends = max(len(play.model.ends) for play in known.values())
@@ -202,6 +214,8 @@ def _over_the_cycle(run: Run, measures: Sequence[Measure], known: Mapping[str, P
         window = slice(low, min(low + CHUNK, steps))
         with np.errstate(all="ignore"):
             _fill(effect, rates, window)
+        if progress:
+            progress(window.stop)
     step = float(time[1] - time[0]) if steps > 1 else 0.0
     for i, measure in enumerate(measures):
         if measure.turning(run.system):

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.cycle.summary import effort_units, references
+from trunnion.deprecation import renamed
 from trunnion.errors import Finding, Severity, Status, counted
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.mechanism import Mechanism
@@ -33,22 +34,26 @@ if TYPE_CHECKING:
 __all__ = ["FIGURES", "MOST_POINTS", "Swept", "sweep"]
 
 
+@renamed(method="friction_method")
 @np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
 def sweep(
     mechanism: Mechanism,
     over: Over,
     steps: int = 360,
-    method: FrictionMethod | None = None,
+    friction_method: FrictionMethod | None = None,
     progress: Callable[[int], None] | None = None,
     margin: bool = False,
-    measures: Sequence[str] = (),
+    measures: Sequence[str] | None = None,
 ) -> xr.Dataset:
     """Figures of the cycle over a grid of some numbers of the mechanism.
 
     over: by name, as for `Mechanism.with_values` (a path or an ending that is unique), a list of values, or from, to
     and count: `{"misalignment": ("0 deg", "30 deg", 7), "input.speed": [50, 100]}`; plain numbers are SI.
+    steps: positions of each cycle.
+    friction_method: how friction and reactions are settled; Newton's method if not given.
     margin: whether the locking margin is looked for as well, which takes many times as long as all else.
-    measures: names of the model's, or written as for `play`, each with one figure a cycle: variables of these names.
+    measures: names of the model's, or written as for `play`, each with one figure a cycle: variables of these names;
+    none if not given.
     Returns a Dataset with a dimension for each name, last, its coordinate in SI, and the variables of `FIGURES`. Where
     any position of the cycle has no answer they are NaN, but for the locking margin of positions that lock: `status`
     and `without_answer` tell. Extremes leave out what `analyse` leaves out of its summary: positions with a relative
@@ -57,7 +62,7 @@ def sweep(
     Raises MechanismError for a name that is unknown or stands for several numbers, values that the model refuses (at
     any point), none or more than MOST_POINTS of them, or a structure that does not determine the motion.
     """
-    points = Points(mechanism, grid(mechanism, over), steps, method or FrictionMethod(), margin)
+    points = Points(mechanism, grid(mechanism, over), steps, friction_method or FrictionMethod(), margin)
     labels: dict[str, list[str]] = {
         "driver": list(mechanism.drivers),
         "joint": list(mechanism.effective_joints),
@@ -68,6 +73,7 @@ def sweep(
         for name, one in FIGURES.items()
         if margin or one.part != "margin"
     }
+    measures = measures or ()
     watched = {one.name: one for one in measures_of(points.run, measures)} if measures else {}
     arrays |= {name: np.full(points.shape, np.nan) for name in watched}
     for done, (index, row) in enumerate(points.solved(), 1):

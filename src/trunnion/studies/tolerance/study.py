@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from trunnion.deprecation import renamed
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.sentences import finding_for
@@ -34,6 +35,7 @@ DEFAULT_SAMPLES = 10_000
 MOST_SAMPLES = 10**15
 
 
+@renamed(friction="friction_method")
 @np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
 def tolerance(
     mechanism: Mechanism,
@@ -44,7 +46,7 @@ def tolerance(
     steps: int = 360,
     at: float | str | None = None,
     *,
-    friction: FrictionMethod | None = None,
+    friction_method: FrictionMethod | None = None,
     jobs: int | None = None,
     chunk: int | None = None,
     engine: str = "numpy",
@@ -60,6 +62,7 @@ def tolerance(
     where it states none, rotation and slide of every joint to the ground that is not driven. methods: of METHODS.
     samples: of the sampling method, and of the variance-based indices; seed: of its random numbers. steps: positions of
     a whole cycle; at: the place (driver coordinate or time) of measures that state neither a place nor a figure.
+    friction_method: how friction and reactions are settled; Newton's method if not given.
     jobs: processes, one a core if not given and worth it; chunk, cluster, checkpoint, resume, progress: `runner.run`.
     engine: numpy, or jax (an extra). target: the yield that is asked for; limits are missed below it, and if none is
     given where a worst case, a yield below 1 or a C_pk below 1 breaks them: errors among the findings.
@@ -70,7 +73,7 @@ def tolerance(
     Raises MechanismError if nothing varies, for an unknown measure or method, or as `analyse` does.
     """
     _check(methods, samples, seed, engine, target)
-    found = study(mechanism, measures, steps, at, friction)
+    found = study(mechanism, measures, steps, at, friction_method)
     worst = found.worst() if "worst-case" in methods else None
     job: Sampling | None = None
     tally: SampleTally | None = None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from functools import cache
 from typing import TYPE_CHECKING
 from unicodedata import category
@@ -33,6 +34,12 @@ class Sheet(Figure):
         for text in self.findobj(Text):
             text.set_fontfamily(list(families()))
         super().draw(renderer)
+
+    def _repr_png_(self) -> bytes:
+        """What a notebook shows; matplotlib tells it only of figures that pyplot has made."""
+        found = io.BytesIO()
+        self.savefig(found, format="png", dpi=100)
+        return found.getvalue()
 
 
 @cache

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from trunnion.results.attributes import attribute
-from trunnion.rig.compare.assessment import Verdict
+from trunnion.rig.comparison.assessment import Verdict
 from trunnion.views.common.cycle import Array, names
 from trunnion.views.common.quantities import number, prefixed
 from trunnion.views.common.table import TextTable

@@ -68,7 +68,7 @@ __all__ = [
     "torque",
 ]  # fmt: skip
 
-FORMATS = ("png", "svg", "pdf")
+FORMATS = ("png", "svg", "pdf", "jpg", "jpeg")
 NOTE: dict[str, Any] = {"textcoords": "offset points", "fontsize": 7.5, "color": INK, "ha": "center", "va": "center"}
 FREE: dict[str, Any] = {"color": INK, "linewidth": 0.9, "linestyle": (0, (3, 2))}  # without friction, among many curves
 
@@ -426,14 +426,14 @@ def check_figure(path: Path) -> str:
     """The format that a figure would be written in, by the extension; MechanismError if it is none."""
     kind = path.suffix.lower().lstrip(".")
     if kind not in FORMATS:
-        raise MechanismError(Finding("is no kind of figure", str(path), "end the name in .png, .svg or .pdf"))
+        raise MechanismError(Finding("is no kind of figure", str(path), "end the name in .png, .svg, .pdf or .jpg"))
     return kind
 
 
 def save(figure: Figure, path: str | os.PathLike[str]) -> Path:
     """Write a figure by its extension, whole or not at all; the same figure gives the same file.
 
-    Raises MechanismError for another extension than .png, .svg and .pdf, and where it cannot be written.
+    Raises MechanismError for another extension than .png, .svg, .pdf and .jpg, and where it cannot be written.
     """
     target = Path(path)
     kind = check_figure(target)

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from trunnion.results.attributes import attribute
-from trunnion.rig.identify.number_text import decimals, scaled
+from trunnion.rig.identification.number_text import decimals, scaled
 from trunnion.views.common.cycle import Array, names
 
 if TYPE_CHECKING:
     import xarray as xr
 
-from trunnion.rig.identify.uncertainty import quantile
+from trunnion.rig.identification.uncertainty import quantile
 
 __all__ = ["Estimate", "channels", "conditions", "curve_of", "estimates", "percent"]
 

@@ -219,7 +219,7 @@ function polarPanel(scene, kinds, pick, place) {
   return panel;
 }
 
-/** Build the page into its places. */
+/** Build the page into its places; of these only the stage must be there. */
 export function start(scene, places) {
   const kinds = new Map(scene.joints.map((joint, order) => [joint.name, kindOf(order)]));
   const spatial = scene.space === "spatial";
@@ -231,10 +231,11 @@ export function start(scene, places) {
     if (firm) crank.go(index);
     else if (!crank.playing()) crank.go(index);
   };
-  const curves = charts(scene, kinds, pick);
+  const curves = places.charts ? charts(scene, kinds, pick) : [];
   const seats = places.seats ? seatCharts(scene, kinds) : [];
   places.seats?.append(...seats.map((chart) => chart.element));
-  views.push(...curves, ...seats, polarPanel(scene, kinds, pick, places.polars));
+  views.push(...curves, ...seats);
+  if (places.polars) views.push(polarPanel(scene, kinds, pick, places.polars));
   const hint = html(
     "p",
     { class: "hint" },
@@ -247,9 +248,10 @@ export function start(scene, places) {
   places.stage.append(
     ...[mechanism.element, crank.element, errors, figures.element, vectors, mechanism.controls, hint].filter(Boolean),
   );
-  places.charts.append(...curves.map((chart) => chart.element));
+  places.charts?.append(...curves.map((chart) => chart.element));
   listenToKeys(document, crank);
   crank.go(0);
+  if (places.stage.dataset?.plays && !globalThis.matchMedia?.("(prefers-reduced-motion: reduce)").matches) crank.toggle();
   return crank;
 }
 

@@ -9,9 +9,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.rig.identify.fit import FitProblem
-from trunnion.rig.identify.identified import Identified
-from trunnion.rig.identify.uncertainty import quantile
+from trunnion.rig.identification.fit import FitProblem
+from trunnion.rig.identification.identified import Identified
+from trunnion.rig.identification.uncertainty import quantile
 
 __all__ = ["Assessment", "HeldOut", "Misses"]
 

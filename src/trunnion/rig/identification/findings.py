@@ -8,12 +8,12 @@ import numpy as np
 
 from trunnion.errors import Finding, Severity, Status
 from trunnion.results.sentences import finding_for
-from trunnion.rig.compare.findings import other_speed
-from trunnion.rig.identify.assessment import Assessment
-from trunnion.rig.identify.blocks import OWN, shared_zero
-from trunnion.rig.identify.identifiability import Combination, InseparableUnknowns, known_of, sizes_of
-from trunnion.rig.identify.number_text import amount, share
-from trunnion.rig.identify.uncertainty import RANDOM, quantile
+from trunnion.rig.comparison.findings import other_speed
+from trunnion.rig.identification.assessment import Assessment
+from trunnion.rig.identification.blocks import OWN, shared_zero
+from trunnion.rig.identification.identifiability import Combination, InseparableUnknowns, known_of, sizes_of
+from trunnion.rig.identification.number_text import amount, share
+from trunnion.rig.identification.uncertainty import RANDOM, quantile
 
 __all__ = ["sentences"]
 

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.model.mechanism import Mechanism
-from trunnion.rig.identify.fit import FitProblem
-from trunnion.rig.identify.identifiability import InseparableUnknowns
-from trunnion.rig.identify.search import Search
-from trunnion.rig.identify.uncertainty import Covariances
+from trunnion.rig.identification.fit import FitProblem
+from trunnion.rig.identification.identifiability import InseparableUnknowns
+from trunnion.rig.identification.search import Search
+from trunnion.rig.identification.uncertainty import Covariances
 from trunnion.rig.reading.measurement import Measurement
 from trunnion.solve.run import Run
 

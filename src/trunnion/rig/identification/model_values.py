@@ -9,7 +9,7 @@ from trunnion.model.expression import LITERAL, normalise
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.units import UnitError, unit
 from trunnion.results.attributes import attribute
-from trunnion.rig.identify.number_text import decimals
+from trunnion.rig.identification.number_text import decimals
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -2,24 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.deprecation import renamed
 from trunnion.errors import Finding, MechanismError
 from trunnion.measures.measures import Measure, named
 from trunnion.model.mechanism import Mechanism
-from trunnion.rig.identify.blocks import EFFICIENCY, Block, blocks_of, channels_of, finite
-from trunnion.rig.identify.fit import FitProblem, fit, sensors_of
-from trunnion.rig.identify.holdout import HoldOut, held_out
-from trunnion.rig.identify.identifiability import inseparable
-from trunnion.rig.identify.search import search
-from trunnion.rig.identify.signals import Model, SeatedModel
-from trunnion.rig.identify.uncertainty import left_over, spread_of
-from trunnion.rig.identify.unknowns import Parameters, described, unknowns
+from trunnion.rig.identification.blocks import EFFICIENCY, Block, blocks_of, channels_of, finite
+from trunnion.rig.identification.fit import FitProblem, fit, sensors_of
+from trunnion.rig.identification.holdout import HoldOut, held_out
+from trunnion.rig.identification.identifiability import inseparable
+from trunnion.rig.identification.search import search
+from trunnion.rig.identification.signals import Model, SeatedModel
+from trunnion.rig.identification.uncertainty import left_over, spread_of
+from trunnion.rig.identification.unknowns import Parameters, described, unknowns
 from trunnion.rig.modelled import check_settings, told_at
 from trunnion.rig.reading.efficiency import load_joints
 from trunnion.rig.reading.measurement import Measurement
@@ -29,9 +30,9 @@ from trunnion.solve.run import Run, prepare
 if TYPE_CHECKING:
     import xarray as xr
 
-from trunnion.rig.identify.identified import Identified
-from trunnion.rig.identify.model_values import values
-from trunnion.rig.identify.result import dataset
+from trunnion.rig.identification.identified import Identified
+from trunnion.rig.identification.model_values import values
+from trunnion.rig.identification.result import dataset
 
 __all__ = ["identify", "with_estimates"]
 
@@ -39,6 +40,7 @@ Array = NDArray[np.float64]
 Errors = Literal["channel", "condition"]
 
 
+@renamed(method="friction_method")
 @np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
 def identify(
     mechanism: Mechanism,
@@ -51,7 +53,8 @@ def identify(
     delay: float | None = None,
     guard: int | None = None,
     starts: int | None = None,
-    method: FrictionMethod | None = None,
+    friction_method: FrictionMethod | None = None,
+    progress: Callable[[int], None] | None = None,
 ) -> xr.Dataset:
     """Numbers of a mechanism from what was measured, with 95 % intervals, correlation, and what cannot be told apart.
 
@@ -64,12 +67,13 @@ def identify(
     delay: standard uncertainty, s, of the time by which a channel lags behind the angle, as its bandwidth makes it;
     what it is in fact is estimated too. guard: positions left out on each side where the sense of a friction changes;
     one for every 90 of a cycle if not given.
-    starts: places to begin at; more than one if the model does not fit and it is not given.
+    starts: places to begin at; more than one if the model does not fit and it is not given. progress: called with the
+    number of models evaluated. friction_method: how friction and reactions are settled; Newton's method if not given.
     Method: weighted least squares with exact derivatives, trust region; covariances by the scatter between turns.
     Raises MechanismError for names, channels or conditions that are not there, or where the model has no answer.
     """
     return dataset(identified(mechanism, measurement, parameters, channels, start, hold_out, sensors, delay, guard,
-                              starts, method))  # fmt: skip
+                              starts, friction_method, progress))  # fmt: skip
 
 
 def identified(
@@ -84,6 +88,7 @@ def identified(
     guard: int | None = None,
     starts: int | None = None,
     method: FrictionMethod | None = None,
+    progress: Callable[[int], None] | None = None,
 ) -> Identified:
     """What `identify` makes its Dataset of."""
     _check(sensors, delay, guard, starts)
@@ -107,7 +112,7 @@ def identified(
         model, blocks = _telling(model, blocks)
     names = [one.name for one in measurement.conditions] if sensors == "condition" else None
     lags = {one.name: one.lag for one in measurement.conditions}
-    problem = FitProblem(model, blocks, sensors_of(blocks, names, delay, lags), guard)
+    problem = FitProblem(model, blocks, sensors_of(blocks, names, delay, lags), guard, progress=progress)
     found = search(problem, starts)
     spread = spread_of(problem, found.fit.x)
     problem.left_over = left_over(problem, spread)

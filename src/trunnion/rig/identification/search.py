@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError, Status
-from trunnion.rig.identify.fit import FitProblem, LeastSquaresFit, fit
-from trunnion.rig.identify.identifiability import sizes_of
-from trunnion.rig.identify.uncertainty import correlation_factors, lack_of_fit
+from trunnion.rig.identification.fit import FitProblem, LeastSquaresFit, fit
+from trunnion.rig.identification.identifiability import sizes_of
+from trunnion.rig.identification.uncertainty import correlation_factors, lack_of_fit
 
 __all__ = ["Search", "refuse_unusable", "search"]
 

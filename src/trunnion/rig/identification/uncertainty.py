@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from trunnion.rig.identify.blocks import Block
-from trunnion.rig.identify.fit import FitProblem
+from trunnion.rig.identification.blocks import Block
+from trunnion.rig.identification.fit import FitProblem
 
 __all__ = ["CONFIDENCE", "RANDOM", "Covariances", "Test", "correlation_factors", "left_over", "quantile", "spread_of"]
 

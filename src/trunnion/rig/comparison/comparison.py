@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.model.mechanism import Mechanism
-from trunnion.rig.compare.assessment import SignalAssessment, Verdict
-from trunnion.rig.compare.error_sources import Cause
+from trunnion.rig.comparison.assessment import SignalAssessment, Verdict
+from trunnion.rig.comparison.error_sources import Cause
 from trunnion.rig.modelled import Modelled
 from trunnion.rig.reading.measurement import Condition, Signal
 from trunnion.solve.loads import useful_loads

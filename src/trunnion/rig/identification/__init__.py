@@ -1,5 +1,5 @@
 """Numbers of the model from measurements: estimates, how far they may be off, and what the data cannot tell."""
 
-from trunnion.rig.identify.run import identify, with_estimates
+from trunnion.rig.identification.run import identify, with_estimates
 
 __all__ = ["identify", "with_estimates"]

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.rig.identify.fit import FitProblem
-from trunnion.rig.identify.uncertainty import Covariances, quantile
+from trunnion.rig.identification.fit import FitProblem
+from trunnion.rig.identification.uncertainty import Covariances, quantile
 
 __all__ = ["Combination", "InseparableUnknowns", "inseparable", "known_of", "sizes_of"]
 

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from trunnion.cycle.summary import references
 from trunnion.results.attributes import finding_rows, origin
 from trunnion.results.dataset import Variable, dataset_of, described
-from trunnion.rig.compare.result import data_findings, hashed_files
-from trunnion.rig.identify.assessment import Assessment
-from trunnion.rig.identify.findings import sentences
-from trunnion.rig.identify.identified import Identified
-from trunnion.rig.identify.uncertainty import CONFIDENCE
+from trunnion.rig.comparison.result import data_findings, hashed_files
+from trunnion.rig.identification.assessment import Assessment
+from trunnion.rig.identification.findings import sentences
+from trunnion.rig.identification.identified import Identified
+from trunnion.rig.identification.uncertainty import CONFIDENCE
 
 if TYPE_CHECKING:
     import xarray as xr

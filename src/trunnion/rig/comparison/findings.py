@@ -18,11 +18,11 @@ from trunnion.model.mechanism import Mechanism
 from trunnion.model.names import as_key
 from trunnion.model.units import unit as unit_of
 from trunnion.results.sentences import finding_for
-from trunnion.rig.compare.assessment import Verdict, going_on
-from trunnion.rig.compare.error_sources import KINDS, Cause
+from trunnion.rig.comparison.assessment import Verdict, going_on
+from trunnion.rig.comparison.error_sources import KINDS, Cause
 
 if TYPE_CHECKING:
-    from trunnion.rig.compare.comparison import ChannelComparison, Compared
+    from trunnion.rig.comparison.comparison import ChannelComparison, Compared
 
 __all__ = ["findings_of", "gathered", "other_speed", "said", "units_set"]
 

@@ -16,7 +16,7 @@ from trunnion.algebra.dual import Dual, derivative, primal
 from trunnion.algebra.namespace import Number
 from trunnion.errors import MechanismError, Status
 from trunnion.measures.measures import Measure, coordinate_unit
-from trunnion.rig.identify.unknowns import Unknown
+from trunnion.rig.identification.unknowns import Unknown
 from trunnion.solve import shifts
 from trunnion.solve.backward import Backward
 from trunnion.solve.eccentricity_rate import lanes

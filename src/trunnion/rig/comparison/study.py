@@ -12,13 +12,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from trunnion.deprecation import renamed
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.names import nearest
-from trunnion.rig.compare.assessment import Verdict, judge, uncertainty_of
-from trunnion.rig.compare.comparison import ChannelComparison, Compared, Efficient, unmeasured
-from trunnion.rig.compare.error_sources import best, causes
-from trunnion.rig.compare.result import dataset
+from trunnion.rig.comparison.assessment import Verdict, judge, uncertainty_of
+from trunnion.rig.comparison.comparison import ChannelComparison, Compared, Efficient, unmeasured
+from trunnion.rig.comparison.error_sources import best, causes
+from trunnion.rig.comparison.result import dataset
 from trunnion.rig.modelled import Modelled, check_settings, modelled
 from trunnion.rig.reading.efficiency import Pairs, efficiency_of, load_joints, pairs_of
 from trunnion.rig.reading.measurement import Condition, Measurement
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 __all__ = ["compare"]
 
 
+@renamed(friction="friction_method")
 @np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
 def compare(
     mechanism: Mechanism,
@@ -37,13 +39,14 @@ def compare(
     channels: Sequence[str] | None = None,
     coverage: float = 2.0,
     *,
-    friction: FrictionMethod | None = None,
+    friction_method: FrictionMethod | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> xr.Dataset:
     """The model beside a measurement, condition by condition and channel by channel.
 
     channels: some of the measurement's by name; all that measure something if not given. coverage: factor k of the
     expanded uncertainty U = k u where turns are many (`judge.expanded`). progress: called with the conditions done.
+    friction_method: how friction and reactions are settled; Newton's method if not given.
     Returns a Dataset over (channel, condition, position) of `compared.VARIABLES`, SI, residual = measured − model;
     NaN where the model has no answer or nothing was measured.
     Method: at each position the model with the condition's values; U by the GUM from the scatter between turns, the
@@ -55,7 +58,7 @@ def compare(
         raise MechanismError(Finding(f"{coverage:g} is no coverage factor", "coverage", "give such as 2, up to 8"))
     wanted = _channels(measurement, channels)
     check_settings(mechanism, measurement)
-    method, joints = friction or FrictionMethod(), load_joints(mechanism)
+    method, joints = friction_method or FrictionMethod(), load_joints(mechanism)
     found: list[Compared] = []
     for done, condition in enumerate(measurement.conditions, 1):
         there = {name: what for name, what in wanted.items() if name in condition.courses}

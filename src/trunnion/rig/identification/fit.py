@@ -7,7 +7,7 @@ a delay τ of the sensor behind the angle, of which f − τ df/dt is read.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf
 
@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.errors import Status
-from trunnion.rig.identify.blocks import OWN, Block, shared_zero
-from trunnion.rig.identify.signals import Courses, Model
+from trunnion.rig.identification.blocks import OWN, Block, shared_zero
+from trunnion.rig.identification.signals import Courses, Model
 
 __all__ = ["FitProblem", "LeastSquaresFit", "SensorError", "fit", "sensors_of"]
 
@@ -159,7 +159,7 @@ class FitProblem:
 
     masks: positions used, by block; variances: of one turn, by block; factors: by channel, for the correlation within a
     turn; left_over: for a misfit, so that it does not outweigh what is stated of the sensors; refused: how often a step
-    was taken back because the model has no answer there.
+    was taken back because the model has no answer there; progress: called with the number of models evaluated.
     """
 
     model: Model
@@ -172,6 +172,7 @@ class FitProblem:
     left_over: float = 1.0
     refused: int = 0
     evaluations: int = 0
+    progress: Callable[[int], None] | None = None
 
     def __post_init__(self) -> None:
         self._known: dict[bytes, Courses] = {}
@@ -203,6 +204,8 @@ class FitProblem:
                 self._known.pop(next(iter(self._known)))
             self._known[key] = self.model.courses(at)
             self.evaluations += 1
+            if self.progress:
+                self.progress(self.evaluations)
         return self._known[key]
 
     def said(self, x: Array, k: int) -> tuple[Array, Array]:

@@ -1,0 +1,139 @@
+"""What a notebook shows of a mechanism and of a result: plain HTML with an inline drawing, no script."""
+
+from __future__ import annotations
+
+import io
+from collections import Counter
+from collections.abc import Iterable
+from html import escape
+from itertools import groupby
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib import rc_context
+
+from trunnion.cycle.drawable import drawable
+from trunnion.cycle.inspect import check
+from trunnion.errors import Finding, MechanismError
+from trunnion.model.mechanism import Mechanism
+from trunnion.results.attributes import findings_of, summary_of
+from trunnion.results.figure import MORE_THAN, Figure
+from trunnion.results.tables import kind_of
+from trunnion.views.common.quantities import quantity
+from trunnion.views.cycle import plots
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure as Drawing
+
+__all__ = ["mechanism_figure", "mechanism_html", "result_html"]
+
+LOOKED_AT = 36  # positions over which findings are looked for: a notebook must not wait
+MOST_FIGURES = 40  # of a summary
+MOST_FINDINGS = 12
+COLOURS = {"error": "#a1260d", "warning": "#8a4b00", "note": "#5a636e"}
+CELL = "text-align:left;padding:1px 12px 1px 0;vertical-align:top"
+
+
+def mechanism_figure(mechanism: Mechanism) -> Drawing:
+    """The mechanism at the first position of its cycle that can be assembled; MechanismError if there is none."""
+    result = drawable(mechanism)
+    points = result["point_position"].values
+    known = np.flatnonzero(np.isfinite(points).all(axis=tuple(range(points.ndim - 1))))
+    return plots.mechanism(result, index=int(known[0]) if known.size else 0)
+
+
+def mechanism_html(mechanism: Mechanism) -> str:
+    """Name, parts, structural formula, mobility, drawing and findings.
+
+    What cannot be told of a mechanism that cannot be assembled or driven is left out, and its findings say why: a
+    notebook shows what it is given, and an error here would hide the value itself.
+    """
+    facts, findings, drawing = [_parts(mechanism)], [], ""
+    try:
+        known = check(mechanism, LOOKED_AT)
+        facts.append(f"<code>{escape(known.formula)}</code>, mobility {known.mobility}")
+        findings = list(known.findings)
+        drawing = _svg(mechanism_figure(mechanism), mechanism.digest)
+    except MechanismError as error:
+        findings = findings or list(error.findings)  # that there is nothing to draw, the findings have said better
+    except Exception as error:  # what else may go wrong is told too, and by the next call that is asked for an answer
+        findings.append(Finding(f"it cannot be shown whole: {type(error).__name__}: {error}"))
+    return _page(mechanism.name or "Mechanism", facts, drawing + _findings(findings))
+
+
+def result_html(result: xr.Dataset) -> str:
+    """Name, kind and size of a result, the figures that one looks at first, and its findings."""
+    sizes = ", ".join(f"{count} {dim}{'' if count == 1 else 's'}" for dim, count in _sizes(result))
+    facts = [escape(", ".join(part for part in (kind_of(result), sizes) if part))]
+    if formula := result.attrs.get("formula"):
+        facts.append(f"<code>{escape(str(formula))}</code>")
+    figures = summary_of(result)
+    rows = [
+        f'<tr><th style="{CELL}" scope="row">{escape(subject)}</th><td style="{CELL}">{_told(members)}</td></tr>'
+        for subject, members in groupby(figures[:MOST_FIGURES], key=lambda one: one.subject)
+    ]
+    more = _more(len(figures) - MOST_FIGURES, "figures")
+    table = f"<table>{''.join(rows)}</table>{more}" if rows else ""
+    return _page(str(result.attrs.get("name") or "Result"), facts, table + _findings(findings_of(result)))
+
+
+def _sizes(result: xr.Dataset) -> list[tuple[str, int]]:
+    """The dimensions that tell how large a study is."""
+    telling = ("position", "measure", "parameter", "condition", "channel")
+    return [(dim, int(result.sizes[dim])) for dim in telling if dim in result.sizes]
+
+
+def _parts(mechanism: Mechanism) -> str:
+    """Space, links, joints by kind and drivers."""
+    kinds = Counter(joint.type for joint in mechanism.effective_joints.values())
+    joints = ", ".join(f"{count} {kind}" for kind, count in kinds.items())
+    parts = [
+        mechanism.space,
+        f"{len(mechanism.effective_links)} links",
+        f"{sum(kinds.values())} joints ({joints})",
+        f"driven at {', '.join(mechanism.drivers)}" if mechanism.drivers else "not driven",
+    ]
+    return escape(" · ".join(parts))
+
+
+def _told(members: Iterable[Figure]) -> str:
+    """The figures of one subject, each with what it is."""
+    cells = []
+    for one in members:
+        text = one.value if isinstance(one.value, str) else quantity(one.value, one.unit) or "—"
+        text = f"> {text}" if one.aspect == MORE_THAN else text
+        cells.append(f"<b>{escape(text)}</b>" + (f" {escape(one.remark)}" if one.remark else ""))
+    return "; ".join(cells)
+
+
+def _svg(figure: Drawing, salt: str) -> str:
+    """The figure as an SVG element. salt: keeps its ids apart from those of other drawings on the page."""
+    text = io.StringIO()
+    with rc_context({"svg.hashsalt": salt}):
+        figure.savefig(text, format="svg", metadata={"Date": None})
+    drawn = text.getvalue()
+    return f'<div style="max-width:640px">{drawn[drawn.index("<svg") :]}</div>'
+
+
+def _findings(findings: Iterable[Finding]) -> str:
+    rows = []
+    for one in findings:
+        where = f"<code>{escape(one.where)}</code> " if one.where else ""
+        remedy = f" — {escape(one.remedy)}" if one.remedy else ""
+        severity = str(one.severity)
+        head = f'<b style="color:{COLOURS.get(severity, "inherit")}">{escape(severity)}</b>'
+        rows.append(f"<li>{head} {where}{escape(one.what)}{remedy}</li>")
+    if not rows:
+        return ""
+    more = _more(len(rows) - MOST_FINDINGS, "findings")
+    return f'<ul style="margin:4px 0 0;padding-left:1.2em">{"".join(rows[:MOST_FINDINGS])}</ul>{more}'
+
+
+def _more(count: int, what: str) -> str:
+    return f"<p>… and {count} more {what}</p>" if count > 0 else ""
+
+
+def _page(name: str, facts: Iterable[str], body: str) -> str:
+    lines = "".join(f"<div>{fact}</div>" for fact in facts)
+    return f'<div class="trunnion"><div style="font-weight:600">{escape(name)}</div>{lines}{body}</div>'

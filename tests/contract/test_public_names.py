@@ -1,0 +1,146 @@
+"""The public names: few, typed, documented, with one name for one argument; old names warn."""
+
+from __future__ import annotations
+
+import inspect
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import trunnion
+from mechanisms import MODELS
+
+FUNCTIONS: dict[str, Callable[..., Any]] = {
+    **{name: getattr(trunnion, name) for name in trunnion.__all__ if inspect.isroutine(getattr(trunnion, name))},
+    **{
+        f"rig.{name}": getattr(trunnion.rig, name)
+        for name in trunnion.rig.__all__
+        if inspect.isroutine(getattr(trunnion.rig, name))
+    },
+}
+# where a default is another for a reason
+OTHERWISE = {("design", "steps")}  # extremes and means are taken at the positions alone: 720 of them
+MOVED = {
+    "Check": "trunnion.cycle.inspect", "Finding": "trunnion.errors", "compare": "trunnion.rig",
+    "identify": "trunnion.rig", "observe": "trunnion.rig", "prepare": "trunnion.solve.run",
+    "read_measured": "trunnion.rig", "vocabulary": "trunnion.cycle.vocabulary",
+}  # fmt: skip
+RENAMED = [
+    ("analyse", "method", "friction_method"), ("sweep", "method", "friction_method"),
+    ("rig.identify", "method", "friction_method"), ("rig.compare", "friction", "friction_method"),
+    ("tolerance", "friction", "friction_method"), ("allocate", "friction", "friction_method"),
+]  # fmt: skip
+
+
+def test_the_names_fit_one_page() -> None:
+    assert len(trunnion.__all__) <= 18
+    assert sorted(trunnion.__all__, key=str.lower) == sorted(trunnion.__all__, key=str.lower)
+    assert all(hasattr(trunnion, name) for name in trunnion.__all__)
+    assert set(dir(trunnion)) == {*trunnion.__all__, "__version__"}
+
+
+def test_an_argument_is_the_same_in_every_function() -> None:
+    """The same name has the same meaning: one annotation and one default."""
+    seen: dict[str, tuple[str, str, Any]] = {}
+    for function, made in FUNCTIONS.items():
+        for name, one in inspect.signature(made).parameters.items():
+            if one.kind is inspect.Parameter.VAR_KEYWORD or (function, name) in OTHERWISE:
+                continue
+            known = seen.setdefault(name, (function, str(one.annotation), one.default))
+            assert (str(one.annotation), one.default) == known[1:], f"{name} of {function} and of {known[0]}"
+
+
+def test_a_type_has_one_name() -> None:
+    """What is a FrictionMethod here is not called otherwise there; so is what tells the progress."""
+    names: dict[str, set[str]] = {}
+    for made in FUNCTIONS.values():
+        for name, one in inspect.signature(made).parameters.items():
+            names.setdefault(str(one.annotation), set()).add(name)
+    for kind, name in (
+        ("FrictionMethod | None", "friction_method"), ("Mechanism", "mechanism"),
+        ("Callable[[int], None] | None", "progress"), ("Measurement", "measurement"),
+    ):  # fmt: skip
+        assert names[kind] == {name}
+
+
+@pytest.mark.parametrize("name", sorted(FUNCTIONS))
+def test_a_public_function_is_typed_and_told(name: str) -> None:
+    """Every argument has a type and a word in the docstring; what can be wrong with it is said there."""
+    signature = inspect.signature(FUNCTIONS[name])
+    told = inspect.getdoc(FUNCTIONS[name]) or ""
+    assert signature.return_annotation is not inspect.Signature.empty
+    for argument, one in signature.parameters.items():
+        assert one.annotation is not inspect.Parameter.empty
+        if argument not in ("mechanism", "measurement", "result", "path", "of"):
+            assert argument in told, f"{argument} of {name} is not told"
+    assert "Raises" in told or "MechanismError" in told
+
+
+@pytest.mark.parametrize("name", sorted(MOVED))
+def test_a_name_that_has_moved_works_and_says_where_to(name: str) -> None:
+    with pytest.warns(DeprecationWarning, match=MOVED[name]):
+        old = getattr(trunnion, name)
+    new = "read" if name == "read_measured" else name
+    module = sys.modules[MOVED[name]]
+    assert old is getattr(module, new)
+
+
+def test_there_are_no_other_names() -> None:
+    with pytest.raises(AttributeError, match="analyze"):
+        trunnion.analyze  # type: ignore[attr-defined]  # noqa: B018
+    with pytest.raises(AttributeError, match="analyze"):
+        trunnion.rig.analyze  # type: ignore[attr-defined]  # noqa: B018
+
+
+@pytest.mark.parametrize(("function", "old", "new"), RENAMED)
+def test_an_old_keyword_works_and_says_the_new_one(function: str, old: str, new: str) -> None:
+    made = FUNCTIONS[function]
+    assert new in inspect.signature(made).parameters
+    with pytest.warns(DeprecationWarning, match=f"'{old}' is now '{new}'"), pytest.raises((TypeError, AttributeError)):
+        made(**{old: None})  # nothing else is given: the call itself fails
+    with pytest.raises(TypeError, match="both"):
+        made(**{old: None, new: None})
+
+
+def test_an_old_keyword_does_what_the_new_one_does() -> None:
+    mechanism = trunnion.Mechanism(**MODELS["four-bar"]())
+    settled = trunnion.FrictionMethod("successive-approximation")
+    new = trunnion.analyse(mechanism, 4, friction_method=settled)
+    with pytest.warns(DeprecationWarning, match="friction_method"):
+        assert trunnion.analyse(mechanism, 4, method=settled).identical(new)  # type: ignore[call-arg]
+
+
+@pytest.mark.parametrize("verb", ["check", "analyse", "locking"])
+def test_progress_is_told_to_the_end(verb: str) -> None:
+    done: list[int] = []
+    getattr(trunnion, verb)(trunnion.Mechanism(**MODELS["four-bar"]()), 6, progress=done.append)
+    assert done[-1] == 6
+
+
+def test_a_mechanism_and_a_result_are_drawn_by_one_function() -> None:
+    mechanism = trunnion.Mechanism(**MODELS["four-bar"]())
+    assert trunnion.plot(mechanism).axes
+    assert trunnion.plot(trunnion.analyse(mechanism, 6), "reactions").axes
+    with pytest.raises(trunnion.MechanismError, match="one drawing"):
+        trunnion.plot(mechanism, "reactions")
+
+
+def test_the_package_runs_as_a_module() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "trunnion", "--version"], capture_output=True, text=True, timeout=60, check=True
+    )
+    assert trunnion.__version__ in done.stdout
+
+
+def test_importing_the_package_loads_nothing() -> None:
+    script = "import sys, trunnion, trunnion.rig; print(len({'numpy', 'xarray', 'pydantic'} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=True)
+    assert done.stdout.strip() == "0"
+
+
+def test_the_package_says_that_it_is_typed() -> None:
+    assert (Path(trunnion.__file__).parent / "py.typed").is_file()

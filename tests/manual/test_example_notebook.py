@@ -1,0 +1,62 @@
+"""The example notebook runs, and its cells show what they say: drawing, table, plot, animation."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from html import unescape
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+NOTEBOOK = Path(__file__).parents[2] / "examples" / "notebook.ipynb"
+
+
+def executed() -> list[dict[str, Any]]:
+    """The code cells after a run of all of them from the top, in a kernel of their own."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of the notebook's own machinery
+        import nbformat
+        from nbclient import NotebookClient
+
+        book = nbformat.read(NOTEBOOK, as_version=4)
+        own = {name: value for name, value in os.environ.items() if name != "MPLBACKEND"}  # that of notebooks
+        client = NotebookClient(book, timeout=300, resources={"metadata": {"path": str(NOTEBOOK.parent)}})
+        client.execute(env=own)
+    return [cell for cell in book.cells if cell.cell_type == "code"]
+
+
+@pytest.fixture(scope="module")
+def shown() -> dict[str, dict[str, Any]]:
+    """By the last line of a cell, what it shows by its media type."""
+    found: dict[str, dict[str, Any]] = {}
+    for cell in executed():
+        data: dict[str, Any] = {}
+        for output in cell.outputs:
+            assert output.output_type in ("execute_result", "display_data"), output
+            data |= output.data
+        found[cell.source.splitlines()[-1]] = data
+    return found
+
+
+def test_it_is_kept_without_outputs() -> None:
+    text = NOTEBOOK.read_text("utf-8")
+    assert '"outputs": []' in text
+    assert "image/png" not in text
+
+
+@pytest.mark.slow
+def test_every_cell_shows_what_it_says(shown: dict[str, dict[str, Any]]) -> None:
+    mechanism = shown["mechanism"]["text/html"]
+    assert "<svg" in mechanism
+    assert "I(0,1)R → II(2,3)RRR" in mechanism
+    assert "image/png" in shown["mechanism.plot()"]
+    assert "drive torque of A" in shown["result.trunnion"]["text/html"]
+    (table,) = (data for line, data in shown.items() if line.endswith(".head()"))
+    assert table["text/html"].count("<tr") == 6
+    assert "image/png" in shown['result["drive_effort"].plot();']
+    assert "image/png" in shown['result.trunnion.plot("reactions")']
+    moving = shown["result.trunnion.animate()"]["text/html"]
+    assert moving.startswith("<iframe")
+    assert '<div id="stage"' in unescape(moving)

@@ -114,6 +114,8 @@ def test_two_names_are_a_grid() -> None:
     assert seen == [1, 2, 3, 4, 5, 6]
     assert grid["efficiency"].dims == ("AB", "B.friction.coefficient")
     assert grid["reaction_max"].dims == ("joint", "AB", "B.friction.coefficient")
+    picked = grid["efficiency"].sel({"AB": 2.0, "B.friction.coefficient": 0.3})
+    assert float(picked) == float(grid["efficiency"][1, 1]), "points are picked by their values"
     for (i, length), (k, coefficient) in itertools.product(enumerate(lengths), enumerate(coefficients)):
         one = trunnion.analyse(mechanism.with_values({"AB": length, "B.friction.coefficient": coefficient}), STEPS)
         for key, value in expected(one).items():

@@ -84,16 +84,17 @@ def dataset_of(
     import pandas as pd
     import xarray as xr
 
-    names: dict[str, Any] = dict(along or {})
+    names: dict[str, Any] = {}
     indexes: dict[str, xr.indexes.PandasIndex] = {}
     for dim, members in labels.items():
         text = np.asarray(members, dtype=str)
         # An index of pandas: of an array, xarray would load pint and dask to see whether it is one of theirs.
         indexes[dim] = xr.indexes.PandasIndex(pd.Index(text, name=dim), dim, coord_dtype=text.dtype)
         names |= indexes[dim].create_variables()
-    drive = names.get("drive")
+    drive = (along or {}).get("drive")
     if drive is not None and drive.dims == ("position",):
         # xarray draws over the coordinate that bears the dimension's name. It has no index: two results are combined
         # position by position, not by angles that may differ in their last digit
         names["position"] = drive
-    return xr.Dataset(variables, xr.Coordinates(names, indexes), {"kind": kind, **encoded(attributes)})
+    found = xr.Dataset(variables, xr.Coordinates(names, indexes), {"kind": kind, **encoded(attributes)})
+    return found.assign_coords(along or {})

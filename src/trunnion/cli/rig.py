@@ -35,11 +35,11 @@ def rig(
         typer.Option("--out", help="Folder for data files, mapping.yaml and truth.yaml.", show_default=False),
     ] = None,
     plan: Annotated[
-        bool, typer.Option("--plan", help="Readings and efficiency to expect; what is done without --out.")
+        bool, typer.Option("--plan", help="Predict readings and efficiency; the default without --out.")
     ] = False,
     format_: Annotated[
         str | None,
-        typer.Option("--format", help="csv, parquet or tdms; that of the rig file if not given.", show_default=False),
+        typer.Option("--format", help="csv, parquet or tdms; default: as stated in the rig file.", show_default=False),
     ] = None,
     seed: Seed = 1,
     set_: Set = None,
@@ -47,7 +47,7 @@ def rig(
     friction: FrictionLaw = None,
     seat: Seats = None,
 ) -> None:
-    """A virtual test rig: plan what sensors will show, or write data files as a rig would, with their mapping."""
+    """Virtual test rig: plan sensors, or write simulated data files."""
     from trunnion.model.file import files_named
     from trunnion.rig.reading.rig_file import Rig
     from trunnion.rig.virtual.files import check_folder, check_form
@@ -160,7 +160,7 @@ def _condition(one: Forecast, names: list[str], biased: bool) -> list[str]:
         *settings,
         f"{one.model:.4f}" if math.isfinite(one.model) else "none",
         *([f"{one.measured.value:.4f}"] if biased else []),
-        f"{expanded:#.2g}" if math.isfinite(expanded) else "not known",
+        f"{expanded:#.2g}" if math.isfinite(expanded) else "unknown",
         one.dominant,
     ]
 

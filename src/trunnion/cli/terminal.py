@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from trunnion.errors import Finding, Severity
 from trunnion.results.attributes import attribute
+from trunnion.results.quantities import parts
+from trunnion.results.sentences import QUIET
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -32,7 +35,7 @@ def wrote(path: Path) -> None:
 
 
 def show_figures(title: str, figures: Sequence[Figure]) -> None:
-    """Figures with label, value and unit."""
+    """Figures with label, value and a unit that fits its size."""
     from rich.table import Table
 
     table = Table(title=title, title_justify="left", show_edge=False)
@@ -40,9 +43,9 @@ def show_figures(title: str, figures: Sequence[Figure]) -> None:
     table.add_column("value", justify="right")
     table.add_column("unit")
     for one in figures:
-        value = "no answer" if one.value is None else one.value
-        told = value if isinstance(value, str) else f"{value + 0.0:.6g}"  # + 0.0: no negative zero
-        table.add_row(one.label, told, "" if one.unit == "1" else one.unit)
+        value = "undefined" if one.value is None else one.value
+        text, unit = (value, one.unit) if isinstance(value, str) else parts(value, one.unit)
+        table.add_row(one.label, text, "" if unit == "1" else unit)
     console().print(table, markup=False, highlight=False)
 
 
@@ -104,10 +107,14 @@ def say_missed(result: xr.Dataset) -> None:
         console().print(line, style="bold", markup=False, highlight=False, soft_wrap=True)
 
 
-def say(findings: Any) -> None:
-    """Findings on the error stream, one a paragraph, nothing in them taken for markup."""
+def say(findings: Iterable[Finding], every: bool = False) -> None:
+    """Findings on the error stream, one a paragraph, nothing in them taken for markup.
+
+    every: also those that nearly every result has.
+    """
     for finding in findings:
-        print(str(finding), file=sys.stderr)
+        if every or finding.severity is not Severity.NOTE or finding.code not in QUIET:
+            print(str(finding), file=sys.stderr)
 
 
 @contextmanager

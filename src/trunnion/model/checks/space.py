@@ -70,7 +70,11 @@ def contact(joint: Joint, where: str, spatial: bool) -> Iterator[Finding]:
         return
     if not turns and not slides:
         what = f"friction of a {kind} joint is not modelled"
-        reason = "nothing slips in it: remove it" if not PAIRS[kind].count else "state friction: 0 for this joint"
+        reason = (
+            "this joint has no sliding motion: remove it"
+            if not PAIRS[kind].count
+            else "state friction: 0 for this joint"
+        )
         yield Finding(what, f"{where}.friction", reason)
         return
     lacks = contact_lacks(joint, spatial)

@@ -30,7 +30,7 @@ FIGURES: dict[str, Variable] = {
     "drive_effort_max": Variable(("driver",), "N m", "largest drive effort"),
     "drive_effort_rms": Variable(("driver",), "N m", "root mean square of the drive effort"),
     "drive_power_mean": Variable((), "W", "mean power of all drivers"),
-    "useful_power_mean": Variable((), "W", "mean power taken by the useful loads"),
+    "useful_power_mean": Variable((), "W", "mean power delivered to the useful loads"),
     "friction_power_mean": Variable((), "W", "mean power lost to friction"),
     "reaction_max": Variable(("joint",), "N", "largest reaction"),
     "transmission_error_max": Variable(

@@ -33,8 +33,8 @@ NOTES: dict[str, tuple[str, str]] = {
     ),
     "sobol": (
         "Sobol indices",
-        "The share of the variance that a number makes alone, and with all its interactions (Sobol, 2001, "
-        "doi:10.1016/S0378-4754(00)00270-6). They hold for large and nonlinear deviations, but suppose independent "
+        "The share of the variance due to a parameter alone, and with all its interactions (Sobol, 2001, "
+        "doi:10.1016/S0378-4754(00)00270-6). They hold for large and nonlinear deviations, but assume independent "
         "numbers.",
     ),
 }

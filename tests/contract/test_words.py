@@ -84,11 +84,11 @@ def test_a_hint_that_starts_in_a_dead_centre_decides_beside_it():
 
 def test_a_hint_that_does_not_decide_is_named():
     (none,) = told_of_assembly(model(FOUR_BAR))
-    assert "no hint says which" in none
+    assert "no assembly hint selects one" in none
     (known,) = told_of_assembly(model(FOUR_BAR, assembly={"B": ["40 mm", "1 mm"]}))
-    assert "the hint of B does not tell them apart" in known
+    assert "the hint of B does not distinguish them" in known
     (even,) = told_of_assembly(model(FOUR_BAR, assembly={"C": ["70 mm", "0 mm"]}))
-    assert "the hint of C does not tell them apart" in even
+    assert "the hint of C does not distinguish them" in even
     assert "no hint" not in known + even
 
 

@@ -315,7 +315,7 @@ def test_periods_and_ranges_that_do_not_fit() -> None:
     run = trunnion.prepare(build(data))
     assert (run.cycle.duration, run.cycle.periodic) == (pytest.approx(1.0), False)
     data["drivers"]["E"] = DRIVERS["natural table"]
-    with pytest.raises(MechanismError, match=r"takes 0\.6 s, the whole cycle takes 1 s"):
+    with pytest.raises(MechanismError, match=r"lasts 0\.6 s, the whole cycle lasts 1 s"):
         trunnion.prepare(build(data))
 
 

@@ -153,7 +153,7 @@ def test_bad_pictures_of_the_ways(run: Run, tmp_path: Path) -> None:
         ("crank: way-1", "the link 'crank' follows the driver A"),
         ("coupler: way-1, rocker: way-2", "'way-2' contradicts 'way-1' of the link 'coupler'"),
         ("ground: way-1", "'ground' is none"),
-        ("coupler: way-x", "'way-x' is no name of an assembly"),
+        ("coupler: way-x", "'way-x' is not the name of an assembly mode"),
     ],
 )
 def test_a_wrong_name_of_an_assembly_is_found_in_its_line(

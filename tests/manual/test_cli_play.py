@@ -114,5 +114,5 @@ def test_one_position_and_no_answer_are_drawn_and_told() -> None:
     empty = result.copy(deep=True)
     for key in ("worst_case", "worst_case_total", "rss", "deviation_total"):
         empty[key] = np.nan * empty[key]
-    assert "no position has an answer" in tables(empty)[0].title
+    assert "no position is solved" in tables(empty)[0].title
     assert figure(empty).axes

@@ -159,7 +159,7 @@ def test_what_comes_back_every_turn_is_the_signals_own(run: Columns, tmp_path: P
     ("column", "channel", "told"),
     [
         ("T1", "torque-in", "power into input is below zero in all 19 turns"),
-        ("n1", "speed-in", "the angle turns the other way"),
+        ("n1", "speed-in", "the angle has the wrong sign"),
         ("T2", "brake", "power that brake takes is below zero in all 19 turns"),
     ],
 )
@@ -176,7 +176,7 @@ def test_drift_is_removed_when_asked(run: Columns, tmp_path: Path) -> None:
     run["T1"] += 0.05 * (run["t"] - 0.1)
     found = read(run, tmp_path, {"drift": "remove"})
     (one,) = faults(found, "drift")
-    assert "a straight line is taken off" in one.what
+    assert "a straight line is subtracted" in one.what
     assert off(found.conditions[0]) < 0.06
     assert found.conditions[0].courses["torque-in"].accuracy.zero > 0
 

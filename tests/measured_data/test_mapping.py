@@ -62,7 +62,7 @@ def test_everything_at_once_with_its_line(tmp_path: Path) -> None:
         4: "'dge' is not known",
         5: "'mm' is not a unit of time",
         6: "'colum' is unknown",
-        10: "nothing a sensor follows",
+        10: "not a quantity that a sensor measures",
         12: "do not give effort:input in N m or N",
         13: "'3 kg' is neither of the readings (V) nor",
         14: "takes a number",
@@ -70,7 +70,7 @@ def test_everything_at_once_with_its_line(tmp_path: Path) -> None:
         16: "readings in 'Hz' do not give rate:x",
         17: "ends before it begins",
         18: "below zero",
-        19: "nothing a sensor follows",
+        19: "not a quantity that a sensor measures",
         20: "'mHzz' is not known",
         21: "greater than or equal to 2",
         22: "none of 'report'",
@@ -212,7 +212,7 @@ def test_units_of_the_file(tmp_path: Path, columns: Columns) -> None:
     other = read(named, tmp_path, {"channels/speed-in/unit": "deg/s"})
     assert "the file has the unit 'rpm' for 'n1', the mapping 'deg/s'" in other.findings[0].what
     bare = read(columns, tmp_path, {"channels/brake/unit": None})
-    assert "taken for SI (N m)" in bare.findings[0].what
+    assert "SI is assumed (N m)" in bare.findings[0].what
     volts = {("n1 [V]" if name == "n1" else name): values for name, values in columns.items()}
     with pytest.raises(MechanismError, match="readings in 'V' do not give rate:input"):
         read(volts, tmp_path, {"channels/speed-in/unit": None})

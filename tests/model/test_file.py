@@ -163,7 +163,7 @@ def test_toml_that_is_no_model(findings_of: FindingsOf, content: str, line: int 
 def test_paths_that_are_no_file(tmp_path: Path) -> None:
     for path, what in (
         (tmp_path / "missing.yaml", "cannot be read: No such file or directory"),
-        (tmp_path / "model.txt", "the extension '.txt' is none of a model file"),
+        (tmp_path / "model.txt", "the extension '.txt' is not one of a model file"),
         (tmp_path / "model", "the extension '' is none"),
     ):
         with pytest.raises(MechanismError) as error:

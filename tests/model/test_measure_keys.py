@@ -192,7 +192,7 @@ CASES = [
     ("{angle: rocker, limit: ±0.1 deg}", "{angle: rocker, limit: ±(AB - BC)/AB}", M, "error.limit", "above the", "±"),
     ("{angle: rocker, limit: ±0.1 deg}", "{angle: rocker, at_least: 2, at_most: 1}", M, "at_least", "at least 2",
      "exch"),
-    ("{angle: rocker, at: 60 deg,", "{angle: rocker, at: 60 deg, over: [0, 1],", M + 1, "theta", "and over a range",
+    ("{angle: rocker, at: 60 deg,", "{angle: rocker, at: 60 deg, over: [0, 1],", M + 1, "theta", "both a position",
      "keep"),
     ("{angle: rocker, at: 60 deg,", "{angle: rocker, at: 60 deg, as: rms,", M + 1, "theta.as", "of a range", "over: ["),
     ("{angle: rocker, at: 60 deg,", "{angle: rocker, at: 60 mm,", M + 1, "theta.at", "a length where an angle", "deg"),

@@ -208,7 +208,7 @@ def changed(*path: Any, to: Any) -> dict[str, Any]:
         (changed("loop", 0, "pitch", to=1), "joints.a.pitch", "has no pitch"),
         (changed("loop", to=LOOP["loop"][-1:]), "loop", "one joint makes no loop"),
         (changed("ground", to="wall"), "ground", "there is no link 'wall'"),
-        ({**changed("links", "wall", to={}), "ground": "wall"}, "ground", "'wall' is none of the links of the loop"),
+        ({**changed("links", "wall", to={}), "ground": "wall"}, "ground", "'wall' is not a link of the loop"),
         (changed("links", "cross", "points", "b", to=[0, 0, 0]), "links.cross.points.b", "cannot be placed again"),
         (changed("links", "cross", "frame", to="d"), "links.cross.frame", "'d' is not a joint of the link 'cross'"),
         (changed("loads", "weight", "at", to="b1"), "loads.weight.at", "the link 'cross' has no point 'b1'"),

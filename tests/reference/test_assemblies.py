@@ -212,7 +212,7 @@ def test_a_name_beats_a_place_and_says_so(model: Any, link: str, pin: str) -> No
         assert [one.name for one in choice_of(both).ways if one.taken] == [way.name]
         (said,) = [one for one in trunnion.check(build(both), 12).findings if one.where == f"assembly.{link}"]
         assert said.severity is (Severity.NOTE if way.name == by_place.name else Severity.WARNING)
-        assert "chosen by name and by where" in said.what
+        assert "stated by name and by the place" in said.what
         assert f"would be {by_place.name}; the name, {way.name}, is taken" in said.what or way.name == by_place.name
 
 

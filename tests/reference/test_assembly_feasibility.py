@@ -407,8 +407,7 @@ def test_close_to_the_limit_the_share_is_told_from_one() -> None:
 def test_a_clearance_of_none_and_lengths_of_rounding() -> None:
     what, _, rows = told_of("0 mm")
     assert what == (
-        "the stated play cannot close the loops, however large (a clearance of 0 is none): they stay open by up to "
-        "0.2° at every position"
+        "however large the play (a clearance of 0 gives no play): they stay open by up to 0.2° at every position"
     )
     assert "open_length" not in rows
     assert "open_angle" in rows

@@ -145,7 +145,7 @@ def test_a_coefficient_on_its_limit_has_a_one_sided_interval(four_bar: trunnion.
     for one, limit in zip(found, limits, strict=True):
         assert one["lower"].values[0] >= 0.0
         assert one["upper"].values[0] > 0.0
-        assert (limit == -1) == ("on its limit 0: at most" in said(one))
+        assert (limit == -1) == ("at its bound 0: at most" in said(one))
 
 
 def test_derivatives_are_those_of_differences(cardan: trunnion.Mechanism) -> None:
@@ -203,7 +203,7 @@ def test_two_loads_in_one_place_are_known_as_their_sum(cardan: trunnion.Mechanis
     names = ["brake.resisting_torque", "fan.resisting_torque"]
     found = identify(model, shaft.measured(5), names, channels=["torque-in"])
     assert found["told"].values.tolist() == [0, 0]
-    assert "their sum is known, 10.0" in said(found, "warning")
+    assert "their sum is determined, 10.0" in said(found, "warning")
 
 
 def test_what_has_no_effect_is_said_and_a_zero_that_is_not_known(cardan: trunnion.Mechanism, shaft: True_) -> None:
@@ -391,16 +391,16 @@ def test_estimates_are_written_with_the_digits_they_have(cardan: trunnion.Mechan
         ({"parameters": ["friction"]}, "not one number"),
         ({"parameters": {"a": [FRICTION], "b": [FRICTION]}}, "is in 'a' already"),
         ({"parameters": ["A.speed"]}, "sets drivers.A.speed"),
-        ({"parameters": []}, "nothing to identify"),
+        ({"parameters": []}, "no parameter to identify"),
         ({"parameters": {"a": ["AB", "gamma"]}}, "not of one kind"),
         ({"channels": ["force"]}, "the measurement has torque"),
         ({"hold_out": ["run-9"]}, "there is no condition 'run-9'"),
         ({"hold_out": 1.5}, "cannot be held out"),
         ({"hold_out": [""]}, "there is no condition ''"),
         ({"hold_out": ["run"]}, "in the names of 5 conditions"),
-        ({"guard": 100}, "each is beside one where a friction turns round"),
+        ({"guard": 100}, "each is next to a friction reversal"),
         ({"hold_out": [f"run-{k}" for k in range(1, 6)]}, "all conditions are held out"),
-        ({"start": {"mass": 1.0}}, "is none of the parameters"),
+        ({"start": {"mass": 1.0}}, "is not one of the parameters"),
         ({"start": {FRICTION: -1.0}}, "least is 0"),
     ],
 )
@@ -447,10 +447,10 @@ def test_a_driver_at_another_speed_and_sensors_taken_as_exact_are_warned_of(
     data = torque.measured(1, 1, Sensors(zero=0.0, gain=0.0))
     fast = replace(data, conditions=tuple(replace(one, speed=3.0) for one in data.conditions))
     text = said(identify(four_bar, fast, [FRICTION]), "warning")
-    assert "the driver did not turn at the model's speed in every condition: 3 rad/s measured, 2 rad/s" in text
-    assert "no accuracy is stated of torque: zero and gain are taken as exact" in text
+    assert "the driver differs from that of the model in every condition: 3 rad/s measured, 2 rad/s" in text
+    assert "no accuracy is stated for torque: zero and gain count as exact" in text
     assert "no turn is repeated" in text
-    assert "did not turn" not in said(identify(four_bar, data, [FRICTION]))
+    assert "the measured speed of the driver differs" not in said(identify(four_bar, data, [FRICTION]))
 
 
 def test_a_value_names_all_conditions_that_have_it(four_bar: trunnion.Mechanism, torque: True_) -> None:

@@ -88,7 +88,7 @@ def test_numbers_that_are_not_told_apart_are_not_written(folder: Path, call) -> 
     status, text = call("--parameter", f"mu={FRICTION}", "--parameter", f"pair={pair}", "--kind", kind, "--out",
                         f"{kind}.png", "--write", "none.yaml")  # fmt: skip
     assert status == 1
-    assert "not told" in text
+    assert "not identifiable" in text
     assert "their product is known, 0.3" in text
     assert "'none.yaml' is not written: the data tell none of the parameters" in text
     assert not (folder / "none.yaml").exists()
@@ -126,7 +126,7 @@ def test_results_are_not_written_over_what_is_read(  # type: ignore[no-untyped-d
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ([], "there is nothing to identify"),
+        ([], "no parameter to identify"),
         (["--parameter", "=A"], "names no number"),
         (["--parameter", "mu=friction"], "is not one number"),
         (["--parameter", FRICTION, "--channel", "torque-out"], "the measurement has torque-in"),

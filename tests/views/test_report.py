@@ -105,7 +105,7 @@ def test_contents(plain, ideal):
     words = " ".join("".join(Page(report(plain, ideal)).words).split())
     for expected in (
         "Four-bar of Durango, Calle and Ruiz (2010)", "I(0,1)R → II(2,3)RRR", "9.288\u00a0kN m", "−18.55\u00a0kN m",
-        "relative speed changes sign", "expect stick there", "Power residual", "Contraction", "Condition number",
+        "relative speed changes sign", "expect stick", "Power balance residual", "Contraction", "Condition number",
         "30 deg", "doi:10.1590", "Trunnion 0.1.0", "9f2c41d07ab35e68",
     ):  # fmt: skip
         assert expected.replace("\u00a0", " ") in words.replace("\u00a0", " "), expected

@@ -136,7 +136,7 @@ def test_nothing_to_choose_is_no_figure():
 def test_lines_say_names_places_and_what_to_write():
     (choice,) = choices(prepare(build(four_bar())))
     assert lines(choice) == [
-        "way-1  C (878.6, 689.4) mm  <- taken",
+        "way-1  C (878.6, 689.4) mm  <- used",
         "way-2  C (878.6, -689.4) mm",
         "to take another: assembly: {coupler: way-2}",
     ]
@@ -157,7 +157,7 @@ def test_of_many_ways_some_are_told_and_the_one_that_is_taken():
     assert len(told) == 26
     assert told[22].startswith("way-23")
     assert told[23].startswith("way-30")
-    assert told[23].endswith("<- taken")
+    assert told[23].endswith("<- used")
     assert told[24] == "… and 16 more"
 
 
@@ -168,4 +168,4 @@ def test_a_slide_is_told_by_how_far_it_is_out():
 
 def test_a_start_in_line_is_told_farther_on():
     (choice,) = choices(prepare(build(four_bar(0.3, 1.0, 0.3, 1.0))))
-    assert lines(choice)[0] == "as they are at 1° of A:"
+    assert lines(choice)[0] == "at 1° of A:"

@@ -128,15 +128,15 @@ def _show_plan(observation: Observation) -> list[Finding]:
 
     found = plan(observation)
     head = ["sensor", "measures", "least", "most", "unit", "of range", "steps", "noise"]
-    show_rows("Readings to expect", head, [_sensor(one) for one in found.sensors])
+    show_rows("Predicted readings", head, [_sensor(one) for one in found.sensors])
     told = [one for one in found.conditions if one.measured]
     if told:
         names = list(dict.fromkeys(name for one in found.conditions for name in one.case.settings))
         biased = any(abs(one.bias) > BIASED * one.measured.uncertainty for one in told if one.measured)
-        head = [*(names or ["condition"]), "η", *(["as measured"] if biased else []), "U (k = 2)", "most of u²"]
+        head = [*(names or ["condition"]), "η", *(["as measured"] if biased else []), "U (k = 2)", "main source"]
         rows = [_condition(one, names, biased) for one in told[:MOST_SHOWN]]
         show_rows(
-            "Efficiency to expect: of the model, with the expanded uncertainty U = 2 u of its measurement", head, rows
+            "Predicted efficiency: of the model, with the expanded uncertainty U = 2 u of its measurement", head, rows
         )
         if len(told) > MOST_SHOWN:
             console().print(f"{counted(len(told) - MOST_SHOWN, 'condition')} more", markup=False, highlight=False)

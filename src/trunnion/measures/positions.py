@@ -98,9 +98,7 @@ def plan(run: Run, measures: Sequence[Measure], steps: int) -> PositionPlan:
         for measure in measures:
             if measure.of_place or measure.at is not None or measure.over is not None:
                 what = "nothing moves: a cycle has no positions"
-                findings.append(
-                    Finding(what, f"measures.{measure.name}", "measure it as it stands, without at or over")
-                )
+                findings.append(Finding(what, f"measures.{measure.name}", "remove at and over"))
         if findings:
             raise MechanismError(findings)
         nothing = np.zeros(1)

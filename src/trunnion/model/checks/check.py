@@ -133,7 +133,7 @@ def _dimensions(mechanism: Numbers, known: dict[str, Dimension | None], unreadab
 def _dimension_name(name: str) -> Iterator[Finding]:
     where = f"dimensions.{name}"
     if name in RESERVED or name in MOTION:
-        yield Finding(f"'{name}' is a name of the expressions themselves", where, "call the dimension otherwise")
+        yield Finding(f"'{name}' is a reserved name of expressions", where, "rename the dimension")
     elif not name.isidentifier() or name.startswith("_"):
         yield Finding(
             f"'{name}' cannot be used in an expression", where, "name it with letters, digits and _, a letter first"
@@ -274,7 +274,7 @@ def _motion(driver: Driver, where: str) -> Iterator[Finding]:
         what = "'return_duration' has no effect on a driver that does not return"
         yield Finding(what, f"{where}.return_duration", "remove it, or returns: false")
     if driver.points is not None and driver.periodic and len(driver.points) < 3:
-        yield Finding("a periodic table needs three points", f"{where}.points", "add points")
+        yield Finding("a periodic table needs at least three points", f"{where}.points", "add points")
     if driver.points is not None and driver.ends == "natural":
         for key in ("periodic", "delay"):
             if key in driver.model_fields_set and getattr(driver, key):

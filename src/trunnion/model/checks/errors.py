@@ -86,7 +86,7 @@ def _seat_on(joint: Joint, where: str) -> Iterator[Finding]:
     if joint.seat_on not in joint.links:
         yield Finding(f"'{joint.seat_on}' is no link of this joint", where, f"name {' or '.join(joint.links)}")
     elif joint.type not in TURNING_PAIRS:
-        what = f"the seat of a {joint.type} joint has no link to choose: its length goes with '{joint.links[1]}'"
+        what = f"the seat of a {joint.type} joint needs no seat_on: its length moves with '{joint.links[1]}'"
         yield Finding(what, where, f"remove it; {' and '.join(TURNING_PAIRS)} joints have one")
     elif isinstance(joint.seat, Seat):
         what = "the seat is given, and seat_on is for a pin without a stated seat"
@@ -175,7 +175,7 @@ def _seat(mechanism: Numbers, joint: Joint, stated_at: str, where: str) -> Itera
             "write seat: {xi: 30 deg}",
         )
     elif not spatial and not guide and seat.beta is not None and seat.beta.source != 0:
-        yield Finding("a pin in the plane does not lean: its beta is 0", f"{at}.beta", "keep xi")
+        yield Finding("a planar pin does not tilt: its beta is 0", f"{at}.beta", "keep xi")
 
 
 def _empty_seat(seat: object, where: str) -> Iterator[Finding]:
@@ -195,7 +195,7 @@ def _unused(kind: str, pin: Pin | None, friction: Friction | None, where: str, s
     if pin and pin.offset is not None and not spatial:
         yield Finding("there is no axis in the plane to offset a bearing along", f"{where}.pin.offset", "remove it")
     if friction and friction.model == "pezzuti":
-        what = f"the model pezzuti is of bearings that carry a moment, and {body} carries none"
+        what = f"the model pezzuti needs a bearing that carries a moment, and {body} carries none"
         yield Finding(what, f"{where}.friction.model", "remove it")
 
 
@@ -237,7 +237,7 @@ def play_values(mechanism: Numbers, name: str, numbers: ParameterSet) -> Iterato
     joint, where, values = mechanism.effective_joints[name], f"joints.{name}", numbers.nominal
     tilt = values.get(f"{where}.misalignment.tilt", 0.0)
     if np.abs(tilt) > STEEPEST:
-        what = f"is {np.degrees(tilt):.4g} deg, an error of at most 45 deg is meant"
+        what = f"is {np.degrees(tilt):.4g} deg, an error can be at most 45 deg"
         yield Finding(what, f"{where}.misalignment.tilt", "check its unit; turn the axis of the point instead")
     elif np.abs(tilt) > LEANING:
         what = f"is {np.degrees(tilt):.4g} deg, more than a misalignment usually is"
@@ -325,7 +325,7 @@ def _play_size(mechanism: Numbers, name: str, joint: Joint, values: Mapping[str,
     crossing = distance <= values.get(f"{where}.pin.radius", 0.0)  # axes that all but meet: that is no lever
     if rho > 0.01 * distance and not crossing:
         what = f"a play of {_mm(rho)} is {100 * rho / distance:.3g} % of the {_mm(distance)} from '{name}' to '{side}'"
-        remedy = f"above 1 % of a side of the link '{link}' small-play figures are rough: check its unit"
+        remedy = f"above 1 % of a side of the link '{link}' results for small play are inaccurate: check its unit"
         yield Finding(what, place, remedy, Severity.WARNING)
     if mechanism.space == "planar" or PAIRS[joint.type].ball:
         return
@@ -333,7 +333,7 @@ def _play_size(mechanism: Numbers, name: str, joint: Joint, values: Mapping[str,
     length = float(values.get(f"{where}.pin.length", values.get(f"{where}.pin.bearing", np.nan)))
     error = ellipse_error(rho, radius, length) if length > 0 else np.nan  # at β = π
     if error > 0.01:
-        what = f"taking the hole for a circle where a leaning pin cuts an ellipse errs by up to {100 * error:.2g} %"
+        what = f"the hole is modelled as a circle; for a tilted pin (an ellipse) the error is up to {100 * error:.2g} %"
         remedy = f"of the play {_mm(rho)}, by 2 r play / length²; a longer pin or a smaller play keeps it below 1 %"
         yield Finding(what, place, remedy, Severity.WARNING)
     leans = joint.seat not in (None, "free") or values.get(f"{where}.misalignment.tilt", 0.0) != 0

@@ -27,7 +27,7 @@ def gears(mechanism: Numbers) -> Iterator[Finding]:
             yield Finding("gear pairs are planar", where, "use a planar mechanism")
             continue
         if name in joints:
-            yield Finding("a joint has this name too", where, "call the gear pair otherwise")
+            yield Finding("a joint has this name too", where, "rename the gear pair")
         missing = [joint for joint in gear.joints if joint not in joints]
         for joint in missing:
             yield Finding(f"there is no joint '{joint}'", f"{where}.joints", nearest(joint, joints))
@@ -63,7 +63,7 @@ def gear_values(mechanism: Numbers, values: Mapping[str, Number]) -> Iterator[Fi
         known = len({*gear.joints} & mechanism.effective_joints.keys()) == len(gear.joints)
         carriers = mechanism.carriers(name) if known else None
         if gear.teeth and carriers and abs((1 if carriers[0] == carriers[1] else -1) * ratio - 1) < 1e-9:
-            what = "the gears turn alike, seen from the link that carries them: they have no pitch point"
+            what = "relative to the link that carries them, the gears turn equally: they have no pitch point"
             yield Finding(what, f"{where}.ratio", "state teeth: false, or another ratio")
         if gear.teeth and carriers and not _apart(mechanism, name, carriers, values):
             what = "both joints are at the same point of the link that carries them: the centre distance is zero"

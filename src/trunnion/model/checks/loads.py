@@ -54,7 +54,7 @@ def _measure(value: Quantity, known: Dimensions) -> Dimension | None:
 def unknown_name(mechanism: Numbers, name: str, path: str, source: object, known: Dimensions) -> Finding:
     """A name in an expression that means nothing there."""
     section = path.partition(".")[0]
-    what = f"'{source}' speaks of '{name}', which is not one of the dimensions"
+    what = f"'{source}' refers to '{name}', which is not one of the dimensions"
     if name not in MOTION and name not in mechanism.tables:
         remedy = nearest(name, [*known, *(motion_dimensions(mechanism, known) if section == "loads" else ())])
         return Finding(what, path, remedy)
@@ -71,8 +71,8 @@ def tables(mechanism: Numbers, known: Dimensions) -> Iterator[Finding]:
     for name, table in mechanism.tables.items():
         where = f"tables.{name}"
         if name in RESERVED or name in MOTION or name in mechanism.dimensions:
-            other = "a dimension" if name in mechanism.dimensions else "a name of the expressions themselves"
-            yield Finding(f"'{name}' is {other}", where, "call the table otherwise")
+            other = "a dimension" if name in mechanism.dimensions else "a reserved name of expressions"
+            yield Finding(f"'{name}' is {other}", where, "rename the table")
         elif not name.isidentifier() or name.startswith("_"):
             remedy = "name it with letters, digits and _, a letter first"
             yield Finding(f"'{name}' cannot be used in an expression", where, remedy)
@@ -203,7 +203,7 @@ def springs(mechanism: Numbers) -> Iterator[Finding]:
         where = f"springs.{name}"
         if (spring.between is None) == (spring.joint is None):
             remedy = "state between: [link.point, link.point] or joint: …"
-            yield Finding("stands neither or both between two points and in a joint", where, remedy)
+            yield Finding("states neither or both of two points and a joint", where, remedy)
             continue
         joints, joint = mechanism.effective_joints, spring.joint or ""
         if spring.between is not None:

@@ -190,10 +190,10 @@ def _limits(
     path, lower, upper = tolerance.path, tolerance.lower, tolerance.upper
     with np.errstate(all="ignore"):
         if not np.isfinite(np.var(np.atleast_1d(tolerance.options.get("values", 0.0)))):
-            yield Finding(f"the deviations of '{path}' have no finite variance", where, "remove the wild ones")
+            yield Finding(f"the deviations of '{path}' have no finite variance", where, "remove the outliers")
     unstated = variation.limits is None and written is None
     if unstated and not {"values"} & tolerance.options.keys() and tolerance.distribution != FULL_TURN:
-        remedy = "add limits: ±0.05 mm, or write them where the number stands, as 60 mm ± 0.05 mm"
+        remedy = "add limits: ±0.05 mm, or write them with the value, as 60 mm ± 0.05 mm"
         yield Finding(f"the limits of '{path}' are missing", where, remedy)
     if lower > upper:
         what = f"the lower limit {lower:g} is above the upper one {upper:g} (SI)"
@@ -254,7 +254,7 @@ def _correlations(mechanism: Numbers, numbers: ParameterSet) -> Iterator[Finding
             if len(pair) < 2:
                 yield Finding(f"'{next(iter(pair))}' is named twice", where, "name two numbers")
             elif pair in first:
-                what = f"the correlation of {_both(pair)} stands in entry {first[pair] + 1} already"
+                what = f"the correlation of {_both(pair)} is given in entry {first[pair] + 1} already"
                 yield Finding(what, where, "keep one of them")
             first.setdefault(pair, row)
     if not sound:

@@ -48,7 +48,7 @@ VARIABLES: dict[str, Variable] = {
     "uncertainty": Variable(COURSE, "", "standard uncertainty of the mean: scatter, zero, gain"),
     "expanded": Variable(COURSE, "", "expanded uncertainty U of the mean"),
     "model": Variable(COURSE, "", "the model with the values of the condition"),
-    "residual": Variable(COURSE, "", "measured less model"),
+    "residual": Variable(COURSE, "", "measured minus model"),
     "compared": Variable(COURSE, "1", "1 where the position counts in the figures of the channel", np.int8),
     "turns": Variable(CC, "1", "turns that were measured", np.int32),
     "accuracy_zero": Variable(CC, "", "standard uncertainty of the zero"),

@@ -127,7 +127,7 @@ VARIABLES = {
     "phase": Variable(("condition", "position"), "1", "share of the cycle"),
     "measured": Variable(("channel", "condition", "position"), "of the channel", "mean over the turns"),
     "residual_before": Variable(
-        ("channel", "condition", "position"), "of the channel", "measured less model, at the start"
+        ("channel", "condition", "position"), "of the channel", "measured minus model, at the start"
     ),
     "residual_after": Variable(
         ("channel", "condition", "position"),

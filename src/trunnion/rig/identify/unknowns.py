@@ -80,7 +80,7 @@ def unknowns(
     """The unknowns of a mechanism that states all their numbers; start: of some, by name."""
     extra = [name for name in start if name not in described]
     if extra:
-        what = f"'{extra[0]}' is none of the parameters"
+        what = f"'{extra[0]}' is not one of the parameters"
         raise MechanismError(Finding(what, "start", f"they are {', '.join(described)}"))
     values = mechanism.parameters()
     kinds = measured(mechanism, mechanism.parameter_set.entries.values())

@@ -61,7 +61,7 @@ class FromData(Part):
 def fixed(quantity: Quantity) -> Quantity:
     """A number with its unit; there are no dimensions here that an expression could speak of."""
     if quantity.names:
-        what = f"'{quantity.source}' speaks of {', '.join(quantity.names)}"
+        what = f"'{quantity.source}' refers to {', '.join(quantity.names)}"
         raise problem(what, "write a number with its unit")
     if quantity.tolerance is not None:
         raise problem(f"'{quantity.source}' has a tolerance, which has no effect here", "write the value alone")

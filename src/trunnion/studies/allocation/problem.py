@@ -258,7 +258,7 @@ class Answer:
 
     def __str__(self) -> str:
         if not self.found:
-            return "no allocation keeps the limits"
+            return "no allocation meets the limits"
         word = "global optimum" if self.proven else "best found"
         return f"cost {self.cost:.8g}, {word} (lower bound {self.bound:.8g}, gap {self.gap:.1e})"
 

@@ -39,7 +39,7 @@ FIGURES: dict[str, Variable] = {
     "locking_margin": Variable(
         (), "1", "least multiple of the friction at which a position locks, ∞ if beyond 10", part="margin"
     ),
-    "without_answer": Variable((), "1", "positions without an answer", np.int32),
+    "without_answer": Variable((), "1", "positions not solved", np.int32),
     "not_valid": Variable(
         (), "1", "positions at which a pin loses contact, left out of the figures", np.int32, part="errors"
     ),

@@ -92,7 +92,7 @@ VARIABLES: dict[str, Variable] = {
     "yield_all_high": Variable((), "1", "yield of all, upper end of the 95 % interval"),
     "cp": Variable(M, "1", "capability index C_p of the figure"),
     "cpk": Variable(M, "1", "capability index C_pk of the figure"),
-    "failed": Variable(("cause",), "1", "samples without an answer, by the gravest status of their positions"),
+    "failed": Variable(("cause",), "1", "samples not solved, by the gravest status of their positions"),
     "histogram": Variable(("measure", "bin"), "1", "samples in a bin"),
     "edge": Variable(("measure", "edge"), "", "edges of the bins; those at the ends stand for all beyond"),
     "band": Variable(

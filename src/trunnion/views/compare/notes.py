@@ -50,9 +50,9 @@ def definitions(result: xr.Dataset) -> list[tuple[str, str]]:
         ),
         (
             "Model",
-            "The model is computed with the values of each condition and at the same positions. It is taken as "
-            "exact: the uncertainty of its own numbers is not in the verdicts. Positions at which a relative speed "
-            "is zero, or a dead centre is near, are not compared in forces: friction is an interval there.",
+            "The model is computed with the values of each condition and at the same positions. It counts as "
+            "exact: the verdicts do not include the uncertainty of its parameters. Forces are not compared where "
+            " a joint is momentarily at rest or a dead centre is close: friction is an interval there.",
         ),
     ]  # fmt: skip
     if "efficiency" in result:

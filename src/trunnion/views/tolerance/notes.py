@@ -28,7 +28,7 @@ NOTES: dict[str, tuple[str, str]] = {
     "quasi-monte-carlo": (
         "Quasi-Monte Carlo",
         "The samples are points of Sobol's sequence, which fill the space of the tolerances more evenly than random "
-        "ones, scrambled anew for each of several replicates; the intervals come from the scatter between them by "
+        "ones, scrambled for each of several replicates; the intervals come from the scatter between them by "
         "Student's t.",
     ),
     "sobol": (

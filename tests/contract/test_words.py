@@ -103,7 +103,7 @@ def test_no_locking_margin_where_nothing_can_be_assembled():
 def test_one_point_of_a_sweep_has_no_figures():
     result = sweep(model(FOUR_BAR), {"links.coupler.points.C.x": ["80 mm", "5 mm"]}, 24)
     (what,) = [one["what"] for one in json.loads(result.attrs["findings"]) if one["code"] == "sweep.no_answer"]
-    assert re.match(r"1 of 2 points has no figures", what)
+    assert re.match(r"1 of 2 points has no result", what)
 
 
 def test_beta_stays_within_a_turn():

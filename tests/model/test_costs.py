@@ -147,5 +147,5 @@ def test_a_cost_of_what_varies_as_measured_is_doubted(varied: Mechanism, tmp_pat
 def test_a_play_of_a_radius_is_not_for_sale() -> None:
     data = Mechanism.read(EXAMPLES / "fourbar-by-grades.yaml").data()
     data["joints"]["B"]["pin"] = {"radius": "6 mm", "hole_radius": "6.01 mm"}
-    with pytest.raises(MechanismError, match=r"'B.clearance' cannot be bought: its play comes of the radii"):
+    with pytest.raises(MechanismError, match=r"'B.clearance' cannot have a cost: its play is derived from the radii"):
         Mechanism(**data)

@@ -134,7 +134,7 @@ def test_sweeps_over_what_is_not_stated_and_what_has_an_error() -> None:
         ({"errors.crank.mass": "1 mm"}, "errors.crank.mass: '1 mm' is a length where a mass is needed"),
         ({"errors.AB": 1e-5, "errors.dimensions.AB": 1e-5}, "'dimensions.AB' and 'AB' are the same number"),
         ({"errors.AB": "AB / 1000"}, "is defined by itself: AB → AB"),
-        ({"errors.AB": "CX / 1000"}, "errors.AB: 'CX / 1000' speaks of 'CX'"),
+        ({"errors.AB": "CX / 1000"}, "errors.AB: 'CX / 1000' refers to 'CX'"),
         ({"errors.AB": [1, 2]}, "errors.AB"),
     ],
 )
@@ -321,7 +321,7 @@ def test_the_end_float_of_the_defaults_is_for_revolute_joints() -> None:
 def test_choices_are_refused_with_those_there_are() -> None:
     told = refusal(PLAYING, {"joints.A.seat": "tight"})
     assert (
-        "joints.A.seat: 'tight' is none of 'free' or 'loaded' — write free or loaded, or a group of angles {beta"
+        "joints.A.seat: 'tight' is not one of 'free' or 'loaded' — write free or loaded, or a group of angles {beta"
         in told
     )
     told = refusal(PLAYING, {"errors.crnk": "1 mm"})
@@ -329,7 +329,7 @@ def test_choices_are_refused_with_those_there_are() -> None:
     assert "'minimum', 'mean' or 'maximum'" in refusal(PLAYING, {"fits": "meen"})
     data = PLAYING.data()
     data["joints"]["A"]["seat"] = {}
-    with pytest.raises(MechanismError, match=r"joints\.A\.seat: says nowhere to lie"):
+    with pytest.raises(MechanismError, match=r"joints\.A\.seat: states no position"):
         Mechanism(**data)
     assert "takes free, loaded or a group" in refusal(PLAYING, {"joints.A.seat": [1, 2]})
 
@@ -345,7 +345,7 @@ def test_choices_are_refused_with_those_there_are() -> None:
         (FOURBAR, {"B.pin.end_float": "1 mm"}, "an end float is the play along the axis of a revolute joint in space"),
         (FOURBAR, {"joint_defaults.pin.end_float": "1 mm"}, "there is no end float in the plane"),
         (PLAYING, {"B.seat.beta": "3 deg"}, "a planar pin does not tilt: its beta is 0"),
-        (PLAYING, {"B.seat.direction.x": 1}, "a pin lies at angles, not in a direction"),
+        (PLAYING, {"B.seat.direction.x": 1}, "the seat of a pin is stated by angles"),
         (SLIDER, {"O.pin.hole_radius": "11 mm"}, "a fit states radius and clearance already"),
         (SLIDER, {"O.pin.clearance": "11 um"}, "a fit states radius and clearance already"),
         (RSSR, {"B.pin.end_float": "1 mm"}, "an end float is the play along the axis of a revolute joint in space"),
@@ -466,7 +466,7 @@ def test_merging_knows_the_types() -> None:
     ("joint", "link", "said"),
     [
         ("B", "frame", "no link of this joint"),
-        ("S", "frame", "the seat of a prismatic joint has no link to choose"),
+        ("S", "frame", "the seat of a prismatic joint needs no seat_on"),
     ],
 )
 def test_links_that_carry_no_seat(joint: str, link: str, said: str) -> None:

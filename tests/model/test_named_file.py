@@ -251,7 +251,7 @@ def test_both_or_neither(tmp_path: Path) -> None:
     data = read_mechanism(EXAMPLE).data()
     data["drivers"]["O"] = {"law": "constant", "speed": "10 rpm", "file": "motion.csv"}
     with pytest.raises(
-        MechanismError, match="means nothing to the motion law constant — remove it, or state law: table"
+        MechanismError, match="has no effect on the motion law constant — remove it, or state law: table"
     ):
         Mechanism(**data)
 

@@ -102,7 +102,7 @@ CASES = [
     ("between: [ground.D, slider.C], stiffness: 2 N/mm, free_length: 60 mm", "joint: C, damping: 1 N m s/rad", 31,
      "springs.back.joint", "a spherical joint has no one axis for a spring", "two points"),
     ("C: [100 mm, 60 mm, 20 mm]", "C: [100 mm, 60 mm]", 33, "assembly.C", "has 2 coordinates", "give 3"),
-    ("C: [100 mm, 60 mm, 20 mm]", "C: 30 deg", 33, "assembly.C", "one number does not say how far a spherical joint",
+    ("C: [100 mm, 60 mm, 20 mm]", "C: 30 deg", 33, "assembly.C", "one number does not state how far a spherical joint",
      "[x, y, z]"),
     ("C: [100 mm, 60 mm, 20 mm]", "rod.C: 30 deg", 33, "assembly.rod.C", "not an angle", "[x, y, z]"),
     ("C: [100 mm, 60 mm, 20 mm]", "D: 30 deg", 33, "assembly.D", "an angle where a length", "60 mm"),

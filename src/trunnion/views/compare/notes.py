@@ -52,7 +52,7 @@ def definitions(result: xr.Dataset) -> list[tuple[str, str]]:
             "Model",
             "The model is computed with the values of each condition and at the same positions. It counts as "
             "exact: the verdicts do not include the uncertainty of its parameters. Forces are not compared where "
-            " a joint is momentarily at rest or a dead centre is close: friction is an interval there.",
+            "a joint is momentarily at rest or a dead centre is close: friction is an interval there.",
         ),
     ]  # fmt: skip
     if "efficiency" in result:

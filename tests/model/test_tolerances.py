@@ -402,7 +402,7 @@ CASES = [
     ("  AB: ±t", "  AB: -0.1 mm", T, "tolerances.AB", "a sign on one side only", "+0.02/0 mm"),
     ("  AB: ±t", "  AB: ±(t - 1 mm)", T, "tolerances.AB", "is above the upper one", "±"),
     ("  AB: ±t", "  AB: {limits: ±t, distribution: gaussian}", T, "tolerances.AB", "'gaussian' is not a distr", "norm"),
-    ("  AB: ±t", "  AB: {limits: ±t, mode: 1 um}", T, "tolerances.AB.mode", "no effect on the distribution trunc", "tri"),
+    ("  AB: ±t", "  AB: {limits: ±t, mode: 1 um}", T, "tolerances.AB.mode", "no effect on the distribution", "tri"),
     ("  AB: ±t", "  AB: {limits: ±t, cp: 0}", T, "tolerances.AB.cp", "cp is 0", "above 0"),
     ("  AB: ±t", "  AB: {limits: ±t, cp: 1 mm}", T, "tolerances.AB.cp", "a length where a number", "0.1"),
     ("  AB: ±t", "  AB: {limits: ±t, cp: 1, cpk: 1.1}", T, "tolerances.AB.cpk", "cpk 1.1 is above cp 1", "at most"),

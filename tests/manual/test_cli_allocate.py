@@ -268,7 +268,7 @@ def test_no_model_of_limits_that_are_not_kept(run: Run, tmp_path: Path) -> None:
     assert not (tmp_path / "b.yaml").exists()
     # each measure that cannot be kept, with its own positions
     assert any("measures.angle: the limit " in line and "is infeasible" in line for line in err.split("\n"))
-    assert "24 of 24 positions are beyond their limits" in err
+    assert "24 of 24 positions exceed their limits" in err
     (place,) = [line for line in err.split("\n") if "measures.place: the limit " in line and "is infeasible" in line]
     assert "positions" not in place
 
@@ -300,5 +300,5 @@ def test_the_play_of_a_fit_cannot_be_bought(run: Run, tmp_path: Path) -> None:
     (tmp_path / "m.yaml").write_text(INLINE + cost, "utf-8")
     code, _, err = run("m.yaml", *QUICK)
     assert code == 2
-    assert "its play comes of the fit 12 mm H7/g6" in err
+    assert "its play is derived from the fit 12 mm H7/g6" in err
     assert "state pin.clearance instead" in err

@@ -235,7 +235,7 @@ def test_a_nominal_figure_beyond_its_bounds() -> None:
     result = trunnion.allocate(fourbar(measures={"t": {"effort": "A", "as": "maximum", "at_most": "1 N m"}}), steps=12)
     (said,) = findings(result, "error")
     assert said.startswith("measures.t: the nominal value is ")
-    assert said.endswith("N m, at_most is 1 N m: no tolerance mends that")
+    assert said.endswith("N m, at_most is 1 N m: tolerances cannot correct that")
 
 
 def test_what_cannot_be_asked() -> None:
@@ -295,8 +295,8 @@ def test_run_outs_and_seats_stay_as_they_are() -> None:
     costs = {**data["costs"], **dict.fromkeys(("B.misalignment.offset", "C.clearance"), data["costs"]["l1"])}
     result = trunnion.allocate(fourbar(joints=joints, costs=costs, tolerances=tolerances), steps=24, samples=0)
     told = " ".join(findings(result, "warning"))
-    assert "is not allocated, it may point anywhere" in told
-    assert "is not allocated, its pin has a given seat" in told
+    assert "is not allocated: its direction is arbitrary" in told
+    assert "is not allocated: its pin has a stated seat" in told
     # what it does stays, and the others keep their limits with it
     assert result["bought"].sel(parameter="joints.B.misalignment.offset") == 0
     assert float(result["used"][0]) == pytest.approx(1)

@@ -138,7 +138,7 @@ def test_an_offset_is_named_with_its_size():
 
 def test_a_gain_is_named_with_its_size():
     result = compare(measured(wrong=wrong_in("torque", lambda true: 1.08 * true)))
-    assert said(result, "a gain that is off by +8 %", "explains 100 %")
+    assert said(result, "a gain error of +8 %", "explains 100 %")
 
 
 @pytest.mark.parametrize(
@@ -249,7 +249,7 @@ def test_locked_conditions_are_nan_and_said():
     assert np.isnan(result.model.values[0, 1][status[1] == Status.LOCKED]).all()
     assert np.isnan(result.efficiency_model.values[1])
     assert result.efficiency_within.values.tolist() == [1, -1]
-    assert said(result, "no answer in 1 of 2 conditions (tight)", "locked by friction", "--set")
+    assert said(result, "no solution in 1 of 2 conditions (tight)", "locked by friction", "--set")
     assert result.verdict.values[0, 0] == Verdict.WITHIN
     assert result.attrs["all_within"] == 0
 
@@ -279,7 +279,7 @@ def test_one_turn_is_no_uncertainty():
     assert np.isnan(result.within.values).all()
     assert result.efficiency_within.values.tolist() == [-1]
     assert said(result, "channels.torque", "one turn only", "warning")
-    assert said(result, "efficiency", "is not known in run 1: there is only one turn", "more turns")
+    assert said(result, "efficiency", "not known in run 1: there is only one turn", "more turns")
 
 
 def test_a_part_of_the_power_is_no_efficiency():
@@ -290,14 +290,14 @@ def test_a_part_of_the_power_is_no_efficiency():
     two = trunnion.Mechanism(**data)
     result = compare(measured(two, channels=POWERS), two)
     assert "efficiency" not in result
-    assert said(result, "is not compared in run 1: the power of loads.second is not measured", "warning")
+    assert said(result, "not compared in run 1: the power of loads.second is not measured", "warning")
     assert result.attrs["all_within"] == 1
 
 
 def test_a_dead_sensor_leaves_the_efficiency_unknown_and_says_why():
     result = compare(measured(channels=POWERS, wrong=wrong_in("torque", np.zeros_like), noise=0.0))
     assert result.efficiency_within.values.tolist() == [-1]
-    assert said(result, "efficiency", "is not known in run 1: there is no input power", "may have failed", "warning")
+    assert said(result, "efficiency", "not known in run 1: there is no input power", "may have failed", "warning")
     assert said(result, "channels.torque", "does not agree within")
 
 
@@ -471,7 +471,7 @@ def test_findings_of_files_that_differ_in_numbers_are_told_once():
     ]
     told = gathered([*rows, Finding("is missing", "channels.w")])
     assert len(told) == 2
-    assert "and so 6 times in all: run-0.csv" in told[0].what
+    assert "6 such findings: run-0.csv" in told[0].what
 
 
 def test_a_load_that_rests_takes_no_power():

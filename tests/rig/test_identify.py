@@ -104,7 +104,7 @@ def test_more_turns_make_it_narrower_but_not_beyond_the_sensor(cardan: trunnion.
     stated = 0.05 * 10.0
     for found in (few, many):
         assert found["standard_uncertainty"].values[0] == pytest.approx(stated, rel=0.02)
-    assert "% of its variance is the zero of torque-out: more turns do not help" in said(many)
+    assert "% of its variance comes from the zero of torque-out: more turns do not reduce it" in said(many)
     assert float(many["share"].sel(source="zero of torque-out")[0]) > 0.99
 
 

@@ -256,7 +256,7 @@ def test_clipped_readings_and_lost_pulses_are_told(mechanism: Mechanism) -> None
         ({"sensors": {"a": {"measures": "rate:D", "per_turn": 60}}}, "sensors.a.per_turn", "changes its sign"),
         ({"schedule": {"conditions": [{"speeed": 1}]}}, "schedule.conditions.0", "speeed"),
         ({"schedule": {"over": {"A.speed": ["60 rpm", "90 rpm"]}}, "encoder": None,
-          "sensors": {"a": {"measures": "effort:A"}}}, "encoder", "nothing measured tells where A is"),
+          "sensors": {"a": {"measures": "effort:A"}}}, "encoder", "no channel measures the angle of A"),
         ({"schedule": {"over": {"A.speed": ["-60 rpm", "60 rpm"]}}}, "encoder", "turn in both directions"),
         ({"schedule": {"over": {"A.speed": ["-60 rpm", "60 rpm"]}}, "encoder": {"per_turn": 60, "kind": "level"}},
          "encoder.kind", "turn in both directions"),

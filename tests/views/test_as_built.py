@@ -70,7 +70,7 @@ def test_errors_are_those_of_the_result(slider):
     place, slide = figure.axes
     size = np.linalg.norm(slider.point_error.sel(point="piston.Q").values, axis=0)
     assert _label(place, "piston.Q").get_ydata()[:-1] == pytest.approx(1e6 * size)
-    assert place.get_ylabel() == "error of place [µm]"
+    assert place.get_ylabel() == "position error [µm]"
     wrong = slider.joint_slide_error.sel(joint="S").values
     assert _label(slide, "S").get_ydata()[:-1] == pytest.approx(1e6 * wrong)
     assert "slide [µm]" in slide.get_ylabel()

@@ -177,7 +177,7 @@ def test_bands_of_values_are_drawn_as_deviations():
 def test_a_gap_breaks_the_envelope_and_other_measures_positions_do_not():
     (axes,) = figure(gap(), "envelope").axes
     assert np.isnan(line(axes, "RSS")[:, 1]).sum() == 1
-    assert "no answer" in [text.get_text() for text in axes.texts]
+    assert "not solved" in [text.get_text() for text in axes.texts]
     result = toleranced(72)
     extra = result.isel(position=[10]).assign_coords(drive=("position", [51.3]))
     extra["curve"] = np.nan * extra["curve"]

@@ -138,7 +138,7 @@ def test_lines_say_names_places_and_what_to_write():
     assert lines(choice) == [
         "way-1  C (878.6, 689.4) mm  <- used",
         "way-2  C (878.6, -689.4) mm",
-        "to take another: assembly: {coupler: way-2}",
+        "to use another: assembly: {coupler: way-2}",
     ]
 
 

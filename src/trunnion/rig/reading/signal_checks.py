@@ -114,7 +114,7 @@ def signs(
             other = (
                 "the angle has the wrong sign" if opposed else "or the load drives the motor, then the sign is correct"
             )
-            what = f"sign: the power into {driver} is below zero in {_of(power)}"
+            what = f"sign: the power into {driver} is negative in {_of(power)}"
             account.warn(
                 "data.power.sign",
                 f"channels.{likely}",

@@ -142,7 +142,7 @@ def test_gaps_are_drawn_as_gaps():
 
 def test_a_figure_says_how_many_courses_it_leaves_out():
     drawn = overlay(case("family"), panels(case("family")))
-    assert f"{MOST_PANELS} of 24 courses" in drawn._suptitle.get_text()
+    assert f"{MOST_PANELS} of 24 signals" in drawn._suptitle.get_text()
 
 
 def test_what_cannot_be_drawn_is_said():
@@ -225,7 +225,7 @@ def test_the_report_has_what_a_laboratory_files(tmp_path):
     result = case("wrong")
     words = " ".join(Page(page_of("wrong")).words)
     for told in ("bench", "crank and rocker", result.attrs["model_hash"], "Sensors", "Conditions", "Verdicts",
-                 "Efficiency", "Definitions", "Expanded uncertainty", "JCGM 100:2008", "taken as exact", "SHA-256",
+                 "Efficiency", "Definitions", "Expanded uncertainty", "JCGM 100:2008", "counts as exact", "SHA-256",
                  "Checked by", "constant offset of"):  # fmt: skip
         assert told in words, told
 

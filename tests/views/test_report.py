@@ -145,7 +145,7 @@ def test_figures_of_one_subject_stand_together(plain):
 def test_a_gap_is_told_even_if_no_finding_speaks_of_it():
     words = " ".join("".join(Page(report(four_bar(gap=(132, 229, Status.NOT_ASSEMBLED)))).words).split())
     assert "cannot be assembled, from 132° to 228° (drive angle A)" in words
-    assert "97 without an answer" in words
+    assert "97 not solved" in words
 
 
 def test_thinned_positions_are_told():

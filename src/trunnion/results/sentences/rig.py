@@ -207,7 +207,7 @@ IDENTIFY = {
         "fix it, or measure a quantity that depends on it",
     ),
     "parameter.not_told_apart": Sentence(
-        WARNING, "{alike}: {known}", "fix {some} of them, or measure a quantity that separates them"
+        WARNING, "{alike}; {known}", "fix {some} of them, or measure a quantity that separates them"
     ),
     "parameter.hardly_told_apart": Sentence(
         NOTE,

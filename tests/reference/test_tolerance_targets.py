@@ -142,7 +142,7 @@ def test_play_and_allocate_say_it_first_too(tmp_path: Path) -> None:
     mechanism = fourbar(joints=joints, measures={"angle": {"angle": "rocker", "limit": "±0.01 deg"}}, costs=COSTS)
     status, out, _ = run(tmp_path, mechanism, "play")
     assert status == 1
-    assert out.startswith("measures.angle.limit: the worst case is")
+    assert out.startswith("measures.angle.limit: the worst case, ")
     status, out, _ = run(tmp_path, mechanism, "allocate", "--samples", "0")
     assert status == 1
     assert out.startswith("measures.angle: the limit ")

@@ -218,7 +218,7 @@ def test_what_has_no_effect_is_said_and_a_zero_that_is_not_known(cardan: trunnio
     found = identify(cardan, replace(data, conditions=free), names[1:], channels=["torque-out"])
     assert np.isnan(found["estimate"].values).all()
     text = said(found, "warning")
-    assert "cross.inertia.xx has no effect on torque-out" in text
+    assert "cross.inertia.xx is not identifiable: it has no effect on torque-out" in text
     assert "they have the same effect on torque-out" in text
 
 
@@ -437,7 +437,7 @@ def test_infinite_readings_are_gaps_and_exact_data_no_misfit(four_bar: trunnion.
     for data in (exact, gappy):
         found = identify(four_bar, data, [FRICTION])
         assert found["estimate"].values[0] == pytest.approx(0.3, abs=1e-8)
-        assert said(found, "warning").startswith("sensors: no accuracy is stated of torque")
+        assert said(found, "warning").startswith("sensors: no accuracy is stated for torque")
         assert "\n" not in said(found, "warning")
 
 

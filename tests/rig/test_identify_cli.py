@@ -64,7 +64,7 @@ def test_tables_files_and_the_model(folder: Path, call) -> None:  # type: ignore
                         "found.yaml", "--report", "x.html", *outs)  # fmt: skip
     assert status == 0, text
     assert "mu │   0.3 │ 0.3" in text
-    assert "what was held out" in text
+    assert "held-out data" in text
     assert (folder / "x.csv").read_text().startswith("parameter,paths,unit,start,estimate,standard_uncertainty,lower")
     assert (folder / "x.fit.csv").read_text().count("\n") == 3
     assert (folder / "x.residuals.csv").read_text().count("\n") > 100

@@ -240,8 +240,8 @@ def _failing_at(count: int) -> Callable[[Path, Path], Path]:
 
 
 NAMED = [
-    ("schedule: {turns: 1, idle: AB}", "schedule.idle", "'AB' speaks of AB"),
-    ("schedule: {turns: 1, idle: {before: 0.1 s, after: 2 * l2}}", "schedule.idle.after", "'2 * l2' speaks of l2"),
+    ("schedule: {turns: 1, idle: AB}", "schedule.idle", "'AB' refers to AB"),
+    ("schedule: {turns: 1, idle: {before: 0.1 s, after: 2 * l2}}", "schedule.idle.after", "'2 * l2' refers to l2"),
     ("schedule: {turns: 1, idle: 1 s ± 0.1 s}", "schedule.idle", "has a tolerance"),
 ]
 

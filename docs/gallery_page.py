@@ -91,7 +91,7 @@ def _sources(mechanism: Any) -> list[str]:
 
 def _checked(entry: Any, one: Any) -> str:
     """The fact with both figures; refuses a page whose fact does not hold."""
-    from trunnion.views.common.quantities import number, prefixed
+    from trunnion.results.quantities import number, prefixed
 
     found, expected = entry.found(one), entry.expected()
     if not abs(found - expected) <= entry.tolerance:

@@ -248,7 +248,7 @@ _VIEWS = (
     ),
     Fault(
         "radians-for-degrees",
-        "views/common/quantities.py",
+        "results/quantities.py",
         'return 180.0 / math.pi, "°"',
         'return 1.0, "°"',
         ("tests/views/test_quantities.py",),

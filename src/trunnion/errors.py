@@ -95,11 +95,11 @@ class Status(IntEnum):
         return status
 
     SOLVED = 0, "solved"
-    ZERO_SLIP = 1, "a relative speed is zero: what resists that joint is an interval"
-    NEAR_SINGULAR = 2, "close to a singular position: forces and speeds are very sensitive to the dimensions"
-    CONTACT_LOST = 3, "a pin loses contact: its load passes through zero and its seat would jump"
+    ZERO_SLIP = 1, "a joint with friction is momentarily at rest: its friction may act either way"
+    NEAR_SINGULAR = 2, "close to a singular position: forces and speeds depend strongly on the dimensions"
+    CONTACT_LOST = 3, "a pin loses contact: its load reverses and it would cross its play"
     NOT_CONVERGED = 4, "the friction iteration did not converge"
-    LOCKED = 5, "locked by friction: no drive effort moves the mechanism"
+    LOCKED = 5, "locked by friction: no drive effort can move the mechanism"
     LOAD_UNDEFINED = 6, "a load or spring has no value: outside its table, a division by zero, a length of zero"
     SINGULAR = 7, "singular position (dead centre): speeds and forces have no finite value"
     NOT_ASSEMBLED = 8, "cannot be assembled"

@@ -37,7 +37,7 @@ def test_a_finding_is_told_by_its_figures() -> None:
     one = finding_for("effort.peak_missed", "drivers.A", rms=2.0, largest=1.5, unit="N m")
     assert (one.code, one.where, one.severity) == ("effort.peak_missed", "drivers.A", Severity.WARNING)
     assert one.figures == {"rms": 2.0, "largest": 1.5, "unit": "N m"}
-    assert "2 N m, is above the largest at any position, 1.5 N m" in one.what
+    assert "2 N m, exceeds the largest value at any position, 1.5 N m" in one.what
 
 
 def test_lists_counts_and_the_infinite_are_told_in_words() -> None:

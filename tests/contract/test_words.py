@@ -84,11 +84,11 @@ def test_a_hint_that_starts_in_a_dead_centre_decides_beside_it():
 
 def test_a_hint_that_does_not_decide_is_named():
     (none,) = told_of_assembly(model(FOUR_BAR))
-    assert "no hint says which" in none
+    assert "no assembly hint selects one" in none
     (known,) = told_of_assembly(model(FOUR_BAR, assembly={"B": ["40 mm", "1 mm"]}))
-    assert "the hint of B does not tell them apart" in known
+    assert "the hint of B does not distinguish them" in known
     (even,) = told_of_assembly(model(FOUR_BAR, assembly={"C": ["70 mm", "0 mm"]}))
-    assert "the hint of C does not tell them apart" in even
+    assert "the hint of C does not distinguish them" in even
     assert "no hint" not in known + even
 
 
@@ -103,7 +103,7 @@ def test_no_locking_margin_where_nothing_can_be_assembled():
 def test_one_point_of_a_sweep_has_no_figures():
     result = sweep(model(FOUR_BAR), {"links.coupler.points.C.x": ["80 mm", "5 mm"]}, 24)
     (what,) = [one["what"] for one in json.loads(result.attrs["findings"]) if one["code"] == "sweep.no_answer"]
-    assert re.match(r"1 of 2 points has no figures", what)
+    assert re.match(r"1 of 2 points has no result", what)
 
 
 def test_beta_stays_within_a_turn():

@@ -445,9 +445,9 @@ def test_round_trip(tmp_path: Path) -> None:
         ({"preload": "5 N m"}, "is a moment where a force is needed"),
         ({"stiffness": 5.0}, "a stiffness without a free_length"),
         ({"stiffness": 5.0, "free_angle": 1.0}, "this spring acts along a line"),
-        ({"damping": 5.0, "free_length": 0.1}, "means nothing without a stiffness"),
-        ({}, "there is nothing in this spring"),
-        ({"stiffness": 5.0, "free_length": 0.1, "joint": "A"}, "stands neither or both"),
+        ({"damping": 5.0, "free_length": 0.1}, "has no effect without a stiffness"),
+        ({}, "this spring is empty"),
+        ({"stiffness": 5.0, "free_length": 0.1, "joint": "A"}, "states neither or both"),
         ({"between": ["ground.S", "coupler.F"], "preload": 1.0}, "there is no point 'coupler.F'"),
         ({"between": ["coupler.B", "coupler.E"], "preload": 1.0}, "both ends are on the link 'coupler'"),
         ({"stiffnes": 5.0}, "the key 'stiffnes' is unknown"),
@@ -497,7 +497,7 @@ def test_bad_expressions_are_refused(force: str, words: str) -> None:
 
 def test_names_of_the_motion_are_not_for_dimensions_nor_for_other_sections() -> None:
     for name in ("drive", "time", "speed"):
-        assert f"dimensions.{name}: '{name}' is a name of the expressions" in refused(
+        assert f"dimensions.{name}: '{name}' is a reserved name of expressions" in refused(
             **four_bar(), dimensions={name: 1.0}
         )
     data = four_bar()
@@ -506,7 +506,7 @@ def test_names_of_the_motion_are_not_for_dimensions_nor_for_other_sections() -> 
     assert "drive, speed, time and tables are for loads" in refused(**four_bar(), dimensions={"L": "2 m * cos(drive)"})
     still = four_bar() | {"drivers": {}}
     still["loads"] = {"push": {"link": "coupler", "at": "E", "force": ["1 N * drive/1 rad", 0]}}
-    assert "but nothing is driven" in refused(**still)
+    assert "but the model has no driver" in refused(**still)
 
 
 @pytest.mark.parametrize(
@@ -515,7 +515,7 @@ def test_names_of_the_motion_are_not_for_dimensions_nor_for_other_sections() -> 
         ({"points": [[0, "1 N"]]}, "at least 2 are needed"),
         ({"points": [[0, "1 N"], ["10 mm", "2 N"]]}, "tables.t.points.1.at: '10 mm' is a length where an angle"),
         ({"points": [[0, "1 N"], [0, "2 N"]]}, "does not come after"),
-        ({"points": [[0, "1 N"], [1, "2 mm"]]}, "let a table measure one thing"),
+        ({"points": [[0, "1 N"], [1, "2 mm"]]}, "use one unit within a table"),
         ({"points": [[0, "1 N"], [1, "2 N"], [2, "3 N"]], "periodic": True}, "begins at 1 and ends at 3"),
         ({"points": [[0, "1 N"], [1, "2 N"]], "periodic": True}, "needs three points"),
         ({"points": [[0, "1 N"], [1, "2 N"]], "interpolation": "cubic"}, "is none of"),
@@ -529,7 +529,7 @@ def test_bad_tables_are_refused(table: Data, words: str) -> None:
 
 def test_names_of_tables() -> None:
     points = [[0, "1 N"], [1, "2 N"]]
-    assert "tables.time: 'time' is a name" in refused(**four_bar(), tables={"time": {"points": points}})
+    assert "tables.time: 'time' is a reserved name" in refused(**four_bar(), tables={"time": {"points": points}})
     assert "is a dimension" in refused(**four_bar(), tables={"t": {"points": points}}, dimensions={"t": 1.0})
     assert "cannot be used in an expression" in refused(**four_bar(), tables={"my table": {"points": points}})
 

@@ -316,7 +316,7 @@ def test_periods_and_ranges_that_do_not_fit() -> None:
     run = prepare(build(data))
     assert (run.cycle.duration, run.cycle.periodic) == (pytest.approx(1.0), False)
     data["drivers"]["E"] = DRIVERS["natural table"]
-    with pytest.raises(MechanismError, match=r"takes 0\.6 s, the whole cycle takes 1 s"):
+    with pytest.raises(MechanismError, match=r"lasts 0\.6 s, the whole cycle lasts 1 s"):
         prepare(build(data))
 
 
@@ -365,12 +365,12 @@ BAD: list[tuple[Data, str, str]] = [
     ({"law": "harmonic", "amplitude": 0, "period": 0.5}, "drivers.A.amplitude", "never moves"),
     ({"law": "harmonic", "amplitude": "20 mm", "period": 0.5}, "drivers.A.amplitude", "is a length where an angle"),
     ({"law": "harmonic", "amplitude": 0.1, "period": "20 mm"}, "drivers.A.period", "is a length where a time"),
-    ({**RISE, "speed": 3.0}, "drivers.A.speed", "'speed' means nothing to the motion law cycloidal"),
-    ({"speed": 3.0, "duration": 0.2}, "drivers.A.duration", "means nothing to the motion law constant"),
+    ({**RISE, "speed": 3.0}, "drivers.A.speed", "'speed' has no effect on the motion law cycloidal"),
+    ({"speed": 3.0, "duration": 0.2}, "drivers.A.duration", "has no effect on the motion law constant"),
     ({**RISE, "dwell": -0.1}, "drivers.A.dwell", "is -0.1 s, which is negative"),
     ({**RISE, "return_duration": 0}, "drivers.A.return_duration", "is 0 s, which is not above 0"),
     ({**RISE, "return_duration": 1, "returns": False}, "drivers.A.return_duration", "does not return"),
-    ({"speed": 3.0, "return_duration": 0.2}, "drivers.A.return_duration", "means nothing to the motion law constant"),
+    ({"speed": 3.0, "return_duration": 0.2}, "drivers.A.return_duration", "has no effect on the motion law constant"),
     ({**RISE, "range": [1, 1]}, "drivers.A.range", "begins and ends at 1"),
     ({**RISE, "law": "cycloid"}, "drivers.A.law", "'cycloid' is not a motion law"),
     ({**RISE, "return": True}, "drivers.A.return", "the key 'return' is unknown"),

@@ -53,7 +53,7 @@ def files(folder: Path) -> set[str]:
 def test_analyse_prints_the_figures_of_the_case_study_and_writes_every_format(run: Run, tmp_path: Path) -> None:
     done = run("analyse", FOUR_BAR, "--out", "r.csv", "--out", "r.nc", "--out", "r.json", "--report", "r.html")
     assert done.code == 0
-    for figure in ("-18552.9", "9288.3", "517.466", "2375.34", "I(0,1)R → II(2,3)RRR"):
+    for figure in ("−18.5529 │ kN m", "9.2883 │ kN m", "517.466", "2.37534", "I(0,1)R → II(2,3)RRR"):
         assert figure in done.out
     assert files(tmp_path) == {"r.csv", "r.nc", "r.json", "r.html"}
     rows = table(tmp_path / "r.csv")
@@ -113,7 +113,7 @@ def test_check_prints_mobility_formula_and_plan(run: Run) -> None:
         "I(0,1)R → II(2,3)RRR",
         "II(2,3)RRR",
         "closed form",
-        "2 assemblies",
+        "2 assembly modes",
     ):
         assert text in done.out
 
@@ -122,10 +122,10 @@ def test_check_lists_the_ways_and_draws_them(run: Run, tmp_path: Path) -> None:
     done = run("check", FOUR_BAR, "--assemblies", "ways.svg")
     assert done.code == 0
     shown = [line.strip() for line in done.out.splitlines()]
-    first = shown.index("way-1  C (7.607, 2.135) m  <- taken")
+    first = shown.index("way-1  C (7.607, 2.135) m  <- used")
     assert shown[first + 1 : first + 3] == [
         "way-2  C (7.607, -2.135) m",
-        "to take another: assembly: {coupler: way-2}",
+        "to use another: assembly: {coupler: way-2}",
     ]
     assert "wrote ways.svg" in done.out
     assert b"<!-- coupler: way-2 -->" in (tmp_path / "ways.svg").read_bytes()
@@ -139,8 +139,8 @@ def test_bad_pictures_of_the_ways(run: Run, tmp_path: Path) -> None:
     assert "folder" in run("check", FOUR_BAR, "--assemblies", "no/such/ways.png").err
     done = run("check", EXAMPLES / "scotch-yoke.yaml", "--assemblies", "ways.png")
     assert done.code == 2
-    assert "1 assembly\n" in done.out
-    assert "nothing to choose" in done.err
+    assert "1 assembly mode\n" in done.out
+    assert "nothing to draw" in done.err
     assert not files(tmp_path)
 
 
@@ -149,11 +149,11 @@ def test_bad_pictures_of_the_ways(run: Run, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("hint", "told"),
     [
-        ("coupler: way-9", "the links coupler, rocker have no assembly 'way-9' — there are: way-1, way-2"),
+        ("coupler: way-9", "the links coupler, rocker have no assembly mode 'way-9' — the modes are way-1, way-2"),
         ("crank: way-1", "the link 'crank' follows the driver A"),
         ("coupler: way-1, rocker: way-2", "'way-2' contradicts 'way-1' of the link 'coupler'"),
         ("ground: way-1", "'ground' is none"),
-        ("coupler: way-x", "'way-x' is no name of an assembly"),
+        ("coupler: way-x", "'way-x' is not the name of an assembly mode"),
     ],
 )
 def test_a_wrong_name_of_an_assembly_is_found_in_its_line(
@@ -176,7 +176,7 @@ def test_a_name_and_a_place_are_doubted_in_their_line(run: Run, tmp_path: Path, 
     done = run(verb, path)
     assert done.code == 0
     assert f"{path}:{line}: warning: assembly.rocker: " in done.err
-    assert "the name, way-2, is taken" in done.err
+    assert "which means way-1; the name is used" in done.err
 
 
 def test_a_value_set_on_the_command_line_is_not_blamed_on_a_line(run: Run) -> None:
@@ -298,7 +298,7 @@ def test_wrong_mobility_is_bad_input(run: Run, tmp_path: Path) -> None:
 def test_a_spatial_model_is_checked_and_analysed(run: Run) -> None:
     done = run("check", EXAMPLES / "rssr.yaml")
     assert (done.code, "mobility 2 by formula, 2 by rank" in done.out) == (0, True)
-    assert "links.rod: the link 'rod' can spin about the line of B and C" in done.err
+    assert "links.rod: the link 'rod' can spin about the line B-C" in done.err
     assert run("analyse", EXAMPLES / "pezzuti-cardan.yaml").code == 0
     locked = run("analyse", EXAMPLES / "pezzuti-cardan-10mm.yaml")
     assert (locked.code, "locked by friction at every position" in locked.err) == (1, True)

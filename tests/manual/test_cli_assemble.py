@@ -52,7 +52,7 @@ def test_too_little_clearance(run: Run, model: Path, tmp_path: Path) -> None:
     assert done.code == 1
     assert "0.0143451" in done.out
     assert "B 41 %" in done.out
-    assert "error: joints: the stated clearances do not close the loops between" in done.err
+    assert "error: joints: the stated clearances are too small to close the loops between" in done.err
     units, *rows = read(tmp_path / "f.csv")
     assert (units["A.coordinate"], units["needed_clearance"], units["B.uniform_1_x"]) == ("rad", "m", "m")
     assert len(rows) == 36
@@ -73,7 +73,7 @@ def test_enough(run: Run, model: Path) -> None:
     every = [option for joint in "ABCD" for option in ("--set", f"joints.{joint}.pin.clearance=0.02mm")]
     done = run(model, "--steps", 12, *every)
     assert done.code == 0
-    assert "note: joints: the stated clearances take up the errors" in done.err
+    assert "note: joints: the stated clearances are sufficient" in done.err
     done = run(model, "--steps", 12, *every, "--uniform", "all", "--set", "joints.B.misalignment.tilt=0.4deg")
     assert done.code == 1
 
@@ -115,11 +115,11 @@ def test_figure_says_what_it_shows(model: Path) -> None:
     assert [axes.get_ylabel() for axes in short.axes] == [
         "needed clearance [µm]",
         "share of the stated",
-        "part of the joint [%]",
+        "share of the joint [%]",
     ]
     assert short.axes[0].patches
     texts = [text.get_text() for axes in short.axes for text in axes.texts]
-    assert "smallest that suffices, the same in A, B, C, D: 14.35\N{NO-BREAK SPACE}µm" in texts
+    assert "smallest clearance, the same in A, B, C, D: 14.35\N{NO-BREAK SPACE}µm" in texts
     none = figure(trunnion.assemble(trunnion.read(EXAMPLES / "fourbar-in-space.yaml"), 12))
     assert len(none.axes) == 1
-    assert none.axes[0].texts[0].get_text() == "none: it goes together without"
+    assert none.axes[0].texts[0].get_text() == "no clearance is needed"

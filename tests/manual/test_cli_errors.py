@@ -31,7 +31,7 @@ def test_seats_of_all_joints_by_an_option(program: Run, tmp_path: Path) -> None:
         assert whole.seat_offset.dims == ("joint", "end", "axis", "position")
     free = program("analyse", FOUR_BAR, "--seat", "free", "--out", tmp_path / "b.csv")
     assert "P.seat_1_x" not in pd.read_csv(tmp_path / "b.csv")
-    assert "taken to lie in the middle of their play" in free.err + free.out
+    assert "are at the middle of their play" in free.err + free.out
 
 
 def test_a_seating_that_is_none(program: Run) -> None:

@@ -72,7 +72,9 @@ def test_a_grid_in_csv_has_a_row_a_point(run: Run, tmp_path: Path) -> None:
     assert [row["efficiency"] for row in found][1::2] == ["", ""]
     assert [row["A.effort_max"] == "" for row in found] == [False, True, False, True]
     assert "cannot be assembled" in done.out
-    assert "2 of 4 points have no figures, first at B.friction.coefficient = 0.1, AB = 2.6 m (5 positions" in done.err
+    assert (
+        "2 of 4 points have no result, the first at B.friction.coefficient = 0.1, AB = 2.6 m (5 positions" in done.err
+    )
     assert (tmp_path / "g.png").read_bytes().startswith(b"\x89PNG")
 
 

@@ -26,12 +26,36 @@ def test_numbers_keep_their_units(
     assert all(word in told for word in words)
 
 
-def test_a_table_too_wide_for_whole_words_is_folded(
+def test_a_table_too_wide_for_whole_words_is_shown_in_parts(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Each part names its rows, and no word is broken."""
+    monkeypatch.setenv("COLUMNS", "40")
+    show_rows("title", HEAD, ROWS)
+    told = capsys.readouterr().out
+    assert max(cell_len(line) for line in told.splitlines()) <= 40
+    assert told.count("peak") > 1
+    words = [word for row in [HEAD, *ROWS] for cell in row for word in cell.split(" ")]
+    assert all(word in told for word in words)
+
+
+def test_rows_that_two_columns_tell_apart_keep_both(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("COLUMNS", "40")
-    show_rows("title", HEAD, ROWS)
-    assert max(cell_len(line) for line in capsys.readouterr().out.splitlines()) <= 40
+    rows = [["run-1", "torque", *["12345.678"] * 5], ["run-1", "speed", *["12345.678"] * 5]]
+    show_rows("title", ["condition", "channel", *"abcde"], rows)
+    lines = [line for line in capsys.readouterr().out.splitlines() if "run-1" in line]
+    assert len(lines) > 2
+    assert all("torque" in line or "speed" in line for line in lines)
+
+
+def test_a_word_wider_than_the_terminal_is_folded(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", "20")
+    show_rows("title", ["name", "value"], [["x" * 60, "1"]])
+    assert max(cell_len(line) for line in capsys.readouterr().out.splitlines()) <= 20
 
 
 def test_a_file_has_room_for_whole_words(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:

@@ -179,7 +179,7 @@ def test_conditions_of_a_column(clean: Columns, tmp_path: Path) -> None:
     assert first.values["input.speed"] == pytest.approx(OMEGA, rel=1e-4)
     assert first.values["load"] == 3
     assert [one.courses["brake"].turns.shape[0] for one in (first, second)] == [11, 6]
-    with pytest.raises(MechanismError, match="what is measured is no setting"):
+    with pytest.raises(MechanismError, match="a measured value is not a setting"):
         read({**columns, "beta": clean["angle"]}, tmp_path, {"set": settings})
 
 
@@ -226,7 +226,7 @@ def test_units_of_what_is_set_stay_with_it(clean: Columns, tmp_path: Path) -> No
     assert one.dimensions == {name: KINDS[kind].dimensions[0] for name, kind in kinds.items()}
     with pytest.raises(MechanismError, match="'degC' is none that a number of a model has"):
         read(columns, tmp_path, {"set": {"misalignment": {"column": "beta", "unit": "degC"}}})
-    with pytest.raises(MechanismError, match="has a tolerance, which means nothing here"):
+    with pytest.raises(MechanismError, match="has a tolerance, which has no effect here"):
         read(columns, tmp_path, {"set": {"misalignment": "15 ± 1 deg"}})
 
 
@@ -312,7 +312,7 @@ def test_an_index_that_does_not_fit_the_pulses_of_a_turn(clean: Columns, tmp_pat
         assert one.where == "angle.per_turn"
         assert one.remedy.startswith("state per_turn: 60")
     twice = {"angle": {"from": "column", "column": "angle", "unit": "deg", "index": {"column": "z"}}, "cycle": "5 deg"}
-    assert faults(read(clean, tmp_path, twice), "the angle goes 0.0175 turns")
+    assert faults(read(clean, tmp_path, twice), "the angle advances 0.0175 turns")
 
 
 def test_turns_that_are_not_used_are_told(clean: Columns, tmp_path: Path) -> None:

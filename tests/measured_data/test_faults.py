@@ -158,9 +158,9 @@ def test_what_comes_back_every_turn_is_the_signals_own(run: Columns, tmp_path: P
 @pytest.mark.parametrize(
     ("column", "channel", "told"),
     [
-        ("T1", "torque-in", "power into input is below zero in all 19 turns"),
-        ("n1", "speed-in", "the angle turns the other way"),
-        ("T2", "brake", "power that brake takes is below zero in all 19 turns"),
+        ("T1", "torque-in", "power into input is negative in all 19 turns"),
+        ("n1", "speed-in", "the angle has the wrong sign"),
+        ("T2", "brake", "power delivered to brake is negative in all 19 turns"),
     ],
 )
 def test_wrong_signs(run: Columns, tmp_path: Path, column: str, channel: str, told: str) -> None:
@@ -176,7 +176,7 @@ def test_drift_is_removed_when_asked(run: Columns, tmp_path: Path) -> None:
     run["T1"] += 0.05 * (run["t"] - 0.1)
     found = read(run, tmp_path, {"drift": "remove"})
     (one,) = faults(found, "drift")
-    assert "a straight line is taken off" in one.what
+    assert "a straight line is subtracted" in one.what
     assert off(found.conditions[0]) < 0.06
     assert found.conditions[0].courses["torque-in"].accuracy.zero > 0
 
@@ -275,7 +275,9 @@ def test_with_few_turns_nothing_is_left_out_that_may_be_the_signals_own(
     short = {name: values[: 1500 + 500 * turns] for name, values in run.items()}
     found = read(short, tmp_path)
     assert found.conditions[0].courses["brake"].turns.shape[0] == turns
-    assert bool(faults(found, "left in: in 2 turns nothing tells whether it is the signal's own")) is (turns == 2)
+    assert bool(faults(found, "left in: in 2 turns it cannot be decided whether this belongs to the signal")) is (
+        turns == 2
+    )
     assert not faults(found, "left out")
     for course in found.conditions[0].courses.values():
         assert np.isfinite(course.turns).all()

@@ -62,18 +62,18 @@ def test_everything_at_once_with_its_line(tmp_path: Path) -> None:
         4: "'dge' is not known",
         5: "'mm' is not a unit of time",
         6: "'colum' is unknown",
-        10: "nothing a sensor follows",
+        10: "not a quantity that a sensor measures",
         12: "do not give effort:input in N m or N",
         13: "'3 kg' is neither of the readings (V) nor",
         14: "takes a number",
-        15: "none of 1 or -1",
+        15: "not one of 1 or -1",
         16: "readings in 'Hz' do not give rate:x",
         17: "ends before it begins",
         18: "below zero",
-        19: "nothing a sensor follows",
+        19: "not a quantity that a sensor measures",
         20: "'mHzz' is not known",
         21: "greater than or equal to 2",
-        22: "none of 'report'",
+        22: "not one of 'report'",
     }
     assert {line: text in found[line].what for line, text in told.items() if line in found} == dict.fromkeys(told, True)
     assert all(one.file == str(path) and one.remedy for one in found.values())
@@ -88,7 +88,7 @@ CHANGES: list[tuple[dict[str, Any], str, str]] = [
     ({"channels": {}}, "channels", "at least 1"),
     ({"angle": None}, "", "'angle' is missing"),
     ({"angle": {"from": "pulses", "column": "encoder"}}, "angle", "needs per_turn"),
-    ({"angle": {"from": "column", "column": "a", "per_turn": 60}}, "angle", "does not take per_turn"),
+    ({"angle": {"from": "column", "column": "a", "per_turn": 60}}, "angle", "does not use per_turn"),
     ({"angle": {"from": "speed", "channel": "speed"}}, "angle.channel", "no channel 'speed'"),
     ({"angle": {"from": "speed", "channel": "brake"}}, "angle.channel", "not a speed"),
     ({"angle": {"from": "time", "speed": 0}}, "angle", "the speed is zero"),
@@ -98,7 +98,7 @@ CHANGES: list[tuple[dict[str, Any], str, str]] = [
     ({"time": {"rate": "1 kHz"}, "filter": {"cut_off": "500 Hz"}}, "filter.cut_off", "samples come at 1000 Hz"),
     ({"set": {"a": {"mean": "speed"}}}, "set.a.mean", "no channel 'speed'"),
     ({"set": {"a": {"mean": "brake", "column": "x"}}}, "set.a", "one of mean and column"),
-    ({"set": {"a": "2 * AB"}}, "set.a", "speaks of AB"),
+    ({"set": {"a": "2 * AB"}}, "set.a", "refers to AB"),
     ({"cycle": "3 N"}, "cycle", "no angle and no time"),
     ({"cycle": 0}, "cycle", "not above zero"),
     ({"cycle": "-1 turn"}, "cycle", "not above zero"),
@@ -212,7 +212,7 @@ def test_units_of_the_file(tmp_path: Path, columns: Columns) -> None:
     other = read(named, tmp_path, {"channels/speed-in/unit": "deg/s"})
     assert "the file has the unit 'rpm' for 'n1', the mapping 'deg/s'" in other.findings[0].what
     bare = read(columns, tmp_path, {"channels/brake/unit": None})
-    assert "taken for SI (N m)" in bare.findings[0].what
+    assert "SI is assumed (N m)" in bare.findings[0].what
     volts = {("n1 [V]" if name == "n1" else name): values for name, values in columns.items()}
     with pytest.raises(MechanismError, match="readings in 'V' do not give rate:input"):
         read(volts, tmp_path, {"channels/speed-in/unit": None})

@@ -165,7 +165,7 @@ def test_kinds_of_parquet(tmp_path: Path) -> None:
 
 BAD: dict[str, tuple[str, bytes, str]] = {
     "empty": ("a.csv", b"", "is empty"),
-    "blank": ("a.csv", b"\n\n", "has nothing but remarks"),
+    "blank": ("a.csv", b"\n\n", "has only comments"),
     "header only": ("a.csv", b"t,T1\n", "has a header but no rows"),
     "no header": ("a.csv", b"0,1\n1,2\n", "has no header: its first line is 0, 1"),
     "too many cells": ("a.csv", b"t,T1\n0,1\n1,2,3\n", "has 3 cells, the header has 2"),
@@ -174,7 +174,7 @@ BAD: dict[str, tuple[str, bytes, str]] = {
     "binary": ("a.csv", b"\x00\x01\x02PK", "is not a text file"),
     "not parquet": ("a.parquet", b"t,T1\n0,1\n", "is not Parquet"),
     "not tdms": ("a.tdms", b"t,T1\n0,1\n" * 20, "is not TDMS"),
-    "extension": ("a.xlsx", b"PK", "the extension '.xlsx' is none of a data file"),
+    "extension": ("a.xlsx", b"PK", "the extension '.xlsx' is not one of a data file"),
     "twice": ("a.csv", b"t,T1,T1\n0,1,2\n", "the column 'T1' stands there 2 times"),
     "missing": ("a.csv", b"t,T2,n\n0,1,2\n", "there is no column 'T1'; the file has 't', 'T2', 'n'"),
 }

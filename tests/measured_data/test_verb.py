@@ -72,7 +72,7 @@ def test_faults_and_bad_input(program: Run, rig: Path, tmp_path: Path) -> None:
     note, fault = err.splitlines()[:2]
     assert note.startswith("rig.json:1: note: files: b.csv is read without `set`, which the mapping states for other")
     assert fault.startswith(
-        "b.csv: warning: channels.brake: sign: the power that brake takes is below zero in all 19 turns"
+        "b.csv: warning: channels.brake: sign: the power delivered to brake is negative in all 19 turns"
     )
     pd.DataFrame(columns).drop(columns=["T1", "n2"]).to_csv(tmp_path / "b.csv", index=False)
     code, out, err = program("data", "rig.json", "a.csv", "b.csv", "--out", "c.csv")

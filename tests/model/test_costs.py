@@ -110,12 +110,12 @@ CASES = [
     ("  A.clearance: {model", "  dimensions.AB: {model", C + 4, "costs.dimensions.AB", "are the same", "keep one"),
     ("model: power, B: 1, k: 1", "process: boring", C + 4, "costs.A.clearance.process", "a play has no IT", "options"),
     ("{process: boring}", "{process: borring}", C + 2, "costs.CD.process", "no process 'borring'", "'boring'"),
-    ("{process: boring}", "{process: boring, B: 1}", C + 2, "costs.CD.B", "nothing to a choice", "model"),
+    ("{process: boring}", "{process: boring, B: 1}", C + 2, "costs.CD.B", "no effect on a choice", "model"),
     ("{process: boring}", "{process: boring, group: bores}", C, "costs.AB.group", "has formulas and choices", "same"),
     ("IT7: 9", "IT17: 9", C + 6, "processes.boring", "'IT17' is no IT grade", "1 to 16"),
     ("IT7: 9", "fine: 9", C + 6, "processes.boring", "'fine' is no IT grade", "1 to 16"),
     ("IT7: 9", "IT7: 9 mm", C + 6, "processes.boring", "a length where a number", "0.1"),
-    ("tolerance: t, cost: 3", "tolerance: 0, cost: 3", C + 3, "options.milled.tolerance", "keeps a tolerance of 0", ""),
+    ("tolerance: t, cost: 3", "tolerance: 0, cost: 3", C + 3, "options.milled.tolerance", "has a tolerance of 0", ""),
     ("tolerance: t, cost: 3", "cost: 3", C + 3, "costs.AD.options.milled", "'tolerance' is missing", "add"),
     ("tolerance: t, cost: 3", "tolerance: 1 kg, cost: 3", C + 3, "milled.tolerance", "a mass where a length", "mm"),
     ("CD: 70 mm ±", "CD: 700 mm ±", C + 2, "costs.CD.process", "the size 700 mm is not in the tables", "options"),
@@ -147,5 +147,5 @@ def test_a_cost_of_what_varies_as_measured_is_doubted(varied: Mechanism, tmp_pat
 def test_a_play_of_a_radius_is_not_for_sale() -> None:
     data = Mechanism.read(EXAMPLES / "fourbar-by-grades.yaml").data()
     data["joints"]["B"]["pin"] = {"radius": "6 mm", "hole_radius": "6.01 mm"}
-    with pytest.raises(MechanismError, match=r"'B.clearance' cannot be bought: its play comes of the radii"):
+    with pytest.raises(MechanismError, match=r"'B.clearance' cannot have a cost: its play is derived from the radii"):
         Mechanism(**data)

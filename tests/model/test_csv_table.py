@@ -111,7 +111,7 @@ def test_names_of_a_driver_and_a_table_alike_are_told_apart(tmp_path: Path) -> N
 
 BAD = [
     ("", ["points.csv:1: error: is empty — write a row for each point"]),
-    ("# only\n\n", ["points.csv:1: error: has nothing but remarks"]),
+    ("# only\n\n", ["points.csv:1: error: has only comments"]),
     ("time, angle\n", ["points.csv:1: error: has no rows of numbers, a table needs two"]),
     ("time, angle\n0,0\n", ["points.csv:2: error: has 1 row of numbers, a table needs two"]),
     ("0 0\n1 1\n", ["points.csv:1: error: has a single column — write two"]),

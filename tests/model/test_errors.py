@@ -134,7 +134,7 @@ def test_sweeps_over_what_is_not_stated_and_what_has_an_error() -> None:
         ({"errors.crank.mass": "1 mm"}, "errors.crank.mass: '1 mm' is a length where a mass is needed"),
         ({"errors.AB": 1e-5, "errors.dimensions.AB": 1e-5}, "'dimensions.AB' and 'AB' are the same number"),
         ({"errors.AB": "AB / 1000"}, "is defined by itself: AB → AB"),
-        ({"errors.AB": "CX / 1000"}, "errors.AB: 'CX / 1000' speaks of 'CX'"),
+        ({"errors.AB": "CX / 1000"}, "errors.AB: 'CX / 1000' refers to 'CX'"),
         ({"errors.AB": [1, 2]}, "errors.AB"),
     ],
 )
@@ -195,10 +195,10 @@ def test_a_row_of_a_loop_has_misalignment_and_seat() -> None:
 @pytest.mark.parametrize(
     ("mechanism", "values", "what"),
     [
-        (FOURBAR, {"B.misalignment.tilt": "1 deg"}, "joints.B.misalignment.tilt: nothing tilts in the plane"),
+        (FOURBAR, {"B.misalignment.tilt": "1 deg"}, "joints.B.misalignment.tilt: a planar joint cannot tilt"),
         (SLIDER, {"S.misalignment.offset": "1 mm"}, "the misalignment of a prismatic joint is not modelled"),
         (RSSR, {"B.misalignment.tilt": "1 deg"}, "the misalignment of a spherical joint is not modelled"),
-        (RSSR, {"A.misalignment.tilt": "46 deg"}, "is 46 deg, an error of at most 45 deg is meant"),
+        (RSSR, {"A.misalignment.tilt": "46 deg"}, "is 46 deg, an error can be at most 45 deg"),
         (RSSR, {"A.misalignment.tilt": "1 mm"}, "is a length where an angle is needed"),
     ],
 )
@@ -321,7 +321,7 @@ def test_the_end_float_of_the_defaults_is_for_revolute_joints() -> None:
 def test_choices_are_refused_with_those_there_are() -> None:
     told = refusal(PLAYING, {"joints.A.seat": "tight"})
     assert (
-        "joints.A.seat: 'tight' is none of 'free' or 'loaded' — write free or loaded, or a group of angles {beta"
+        "joints.A.seat: 'tight' is not one of 'free' or 'loaded' — write free or loaded, or a group of angles {beta"
         in told
     )
     told = refusal(PLAYING, {"errors.crnk": "1 mm"})
@@ -329,7 +329,7 @@ def test_choices_are_refused_with_those_there_are() -> None:
     assert "'minimum', 'mean' or 'maximum'" in refusal(PLAYING, {"fits": "meen"})
     data = PLAYING.data()
     data["joints"]["A"]["seat"] = {}
-    with pytest.raises(MechanismError, match=r"joints\.A\.seat: says nowhere to lie"):
+    with pytest.raises(MechanismError, match=r"joints\.A\.seat: states no position"):
         Mechanism(**data)
     assert "takes free, loaded or a group" in refusal(PLAYING, {"joints.A.seat": [1, 2]})
 
@@ -337,20 +337,24 @@ def test_choices_are_refused_with_those_there_are() -> None:
 @pytest.mark.parametrize(
     ("mechanism", "values", "what"),
     [
-        (FOURBAR, {"joints.B.seat": "loaded"}, "joints.B.seat: a seat without a play to lie in"),
+        (FOURBAR, {"joints.B.seat": "loaded"}, "joints.B.seat: a seat without play"),
         (FOURBAR, {"B.pin.clearance": "-1 mm"}, "is -0.001, which is negative"),
         (FOURBAR, {"B.pin.cylindricity": "-1 um"}, "is -1e-06, which is negative"),
         (FOURBAR, {"B.pin.hole_radius": "7 mm"}, "is 7 mm, less than the radius 7.5 mm of the pin"),
         (FOURBAR, {"B.pin.hole_radius": "8 mm", "B.pin.clearance": "1 um"}, "by its radius and by the clearance"),
         (FOURBAR, {"B.pin.end_float": "1 mm"}, "an end float is the play along the axis of a revolute joint in space"),
         (FOURBAR, {"joint_defaults.pin.end_float": "1 mm"}, "there is no end float in the plane"),
-        (PLAYING, {"B.seat.beta": "3 deg"}, "a pin in the plane does not lean: its beta is 0"),
-        (PLAYING, {"B.seat.direction.x": 1}, "a pin lies at angles, not in a direction"),
+        (PLAYING, {"B.seat.beta": "3 deg"}, "a planar pin does not tilt: its beta is 0"),
+        (PLAYING, {"B.seat.direction.x": 1}, "the seat of a pin is stated by angles"),
         (SLIDER, {"O.pin.hole_radius": "11 mm"}, "a fit states radius and clearance already"),
         (SLIDER, {"O.pin.clearance": "11 um"}, "a fit states radius and clearance already"),
         (RSSR, {"B.pin.end_float": "1 mm"}, "an end float is the play along the axis of a revolute joint in space"),
-        (RSSR, {"D.seat.beta": "181 deg"}, "is 181 deg, the ends of a pin lie at most 180 deg apart"),
-        (RSSR, {"B.pin.clearance": "1 um", "B.seat.xi": 1}, "a ball lies in a direction, not at angles"),
+        (RSSR, {"D.seat.beta": "181 deg"}, "is 181 deg, the ends of a pin are at most 180 deg apart"),
+        (
+            RSSR,
+            {"B.pin.clearance": "1 um", "B.seat.xi": 1},
+            "the seat of a ball is stated by a direction, not by angles",
+        ),
     ],
 )
 def test_plays_and_seats_stated_wrongly(mechanism: Mechanism, values: Mapping[str, Any], what: str) -> None:
@@ -440,13 +444,13 @@ def test_large_plays_and_short_pins() -> None:
     assert not doubts(RSSR)
     # 2 · 10 · 0.51 / 20² = 0.0255
     (doubt,) = doubts(RSSR.with_values({"D.pin.hole_radius": "10.51 mm"}))
-    assert "errs by up to 2.5 %" in doubt or "errs by up to 2.6 %" in doubt
+    assert "the error is up to 2.5 %" in doubt or "the error is up to 2.6 %" in doubt
     found = doubts(RSSR.with_values({"D.pin.length": "19 mm"}))
     assert any("the pin is 19 mm long, less than its diameter 20 mm" in doubt for doubt in found)
     assert not doubts(RSSR.with_values({"D.pin.length": "19 mm", "D.seat": "free"}))
     assert doubts(RSSR.with_values({"D.pin.length": "19 mm", "D.seat": "free", "D.misalignment.tilt": 1e-3}))
     (doubt,) = doubts(FOURBAR.with_values({"joint_defaults.seat": "loaded"}))
-    assert "joint_defaults.seat: no joint has a play to lie in" in doubt
+    assert "joint_defaults.seat: no joint has play" in doubt
 
 
 def test_merging_knows_the_types() -> None:
@@ -462,7 +466,7 @@ def test_merging_knows_the_types() -> None:
     ("joint", "link", "said"),
     [
         ("B", "frame", "no link of this joint"),
-        ("S", "frame", "the seat of a prismatic joint has no link to choose"),
+        ("S", "frame", "the seat of a prismatic joint needs no seat_on"),
     ],
 )
 def test_links_that_carry_no_seat(joint: str, link: str, said: str) -> None:

@@ -163,8 +163,8 @@ def test_toml_that_is_no_model(findings_of: FindingsOf, content: str, line: int 
 def test_paths_that_are_no_file(tmp_path: Path) -> None:
     for path, what in (
         (tmp_path / "missing.yaml", "cannot be read: No such file or directory"),
-        (tmp_path / "model.txt", "the extension '.txt' is none of a model file"),
-        (tmp_path / "model", "the extension '' is none"),
+        (tmp_path / "model.txt", "the extension '.txt' is not one of a model file"),
+        (tmp_path / "model", "the extension '' is not one"),
     ):
         with pytest.raises(MechanismError) as error:
             read_mechanism(path)

@@ -251,7 +251,7 @@ def test_both_or_neither(tmp_path: Path) -> None:
     data = read_mechanism(EXAMPLE).data()
     data["drivers"]["O"] = {"law": "constant", "speed": "10 rpm", "file": "motion.csv"}
     with pytest.raises(
-        MechanismError, match="means nothing to the motion law constant — remove it, or state law: table"
+        MechanismError, match="has no effect on the motion law constant — remove it, or state law: table"
     ):
         Mechanism(**data)
 
@@ -266,7 +266,7 @@ def test_a_model_that_is_no_file_has_no_folder(part: str, tmp_path: Path, monkey
     with pytest.raises(MechanismError) as caught:
         Mechanism(**data)
     (only,) = caught.value.findings
-    assert "has no folder to look in" in only.what
+    assert "and has no folder" in only.what
     assert "give its points instead, or write the model into a file beside it" in only.remedy
     data[part] = read_mechanism(EXAMPLE).data()[part]
     assert Mechanism(**data)
@@ -309,7 +309,7 @@ def test_a_period_that_cannot_be(tmp_path: Path) -> None:
     assert "is a time where an angle is needed" in refused(model(tmp_path, "file: gas.csv, period: 2 s", MEASURED))[0]
     path = model(tmp_path, "file: gas.csv, period: 360 deg", MEASURED)
     path.write_text(path.read_text("utf-8").replace("periodic: true", "periodic: false"), encoding="utf-8")
-    assert "means nothing to a table that does not repeat" in refused(path)[0]
+    assert "has no effect on a table without a period" in refused(path)[0]
 
 
 def test_a_table_over_time_by_the_time_of_a_turn(tmp_path: Path) -> None:

@@ -361,7 +361,7 @@ def test_a_sample_from_a_file(varied: Mechanism, tmp_path: Path, text: str, expe
         ("d [mm]\n1\nthree\n", 3, "'three' is not a finite number"),
         ("d [mm]\n1\n", 2, "has 1 row"),
         ("1; 2\n3; 4\n", 1, "has several columns"),
-        ("# nothing\n", 1, "nothing but remarks"),
+        ("# nothing\n", 1, "only comments"),
         ("", 1, "is empty"),
     ],
 )
@@ -402,7 +402,7 @@ CASES = [
     ("  AB: ±t", "  AB: -0.1 mm", T, "tolerances.AB", "a sign on one side only", "+0.02/0 mm"),
     ("  AB: ±t", "  AB: ±(t - 1 mm)", T, "tolerances.AB", "is above the upper one", "±"),
     ("  AB: ±t", "  AB: {limits: ±t, distribution: gaussian}", T, "tolerances.AB", "'gaussian' is not a distr", "norm"),
-    ("  AB: ±t", "  AB: {limits: ±t, mode: 1 um}", T, "tolerances.AB.mode", "nothing to the distribution trunc", "tri"),
+    ("  AB: ±t", "  AB: {limits: ±t, mode: 1 um}", T, "tolerances.AB.mode", "no effect on the distribution", "tri"),
     ("  AB: ±t", "  AB: {limits: ±t, cp: 0}", T, "tolerances.AB.cp", "cp is 0", "above 0"),
     ("  AB: ±t", "  AB: {limits: ±t, cp: 1 mm}", T, "tolerances.AB.cp", "a length where a number", "0.1"),
     ("  AB: ±t", "  AB: {limits: ±t, cp: 1, cpk: 1.1}", T, "tolerances.AB.cpk", "cpk 1.1 is above cp 1", "at most"),
@@ -416,8 +416,8 @@ CASES = [
     ("  AB: ±t", "  AB: ±t\n  dimensions.AB: ±t", T + 1, "tolerances.dimensions.AB", "are the same number", "one"),
     ("  AB: ±t", "  AB: [1, 2]", T, "tolerances.AB", "not a group", ""),
     ("  AB: ±t", "  AB: ±t\n  C.x: ±t", T + 1, "tolerances.C.x", "stands for", "which"),
-    ("  AB: ±t", "  AB: ±t\n  assembly.C.x: ±t", T + 1, "tolerances.assembly.C.x", "nothing in it varies", "dimens"),
-    ("  AB: ±t", "  AB: ±t\n  theta.at: 1 deg", T + 1, "tolerances.theta.at", "nothing in it varies", "dimens"),
+    ("  AB: ±t", "  AB: ±t\n  assembly.C.x: ±t", T + 1, "tolerances.assembly.C.x", "is not a parameter", "dimens"),
+    ("  AB: ±t", "  AB: ±t\n  theta.at: 1 deg", T + 1, "tolerances.theta.at", "is not a parameter", "dimens"),
     ("  AB: ±t", "  AB: ±t\n  joint_defaults.pin.clearance: 1 um", T + 1, "clearance", "no number named",
      "joint_defaults"),
     ("  B.seat.xi:", "  A.pin.radius:", T + 7, "tolerances.A.pin.radius", "is no angle", "all directions"),
@@ -428,19 +428,19 @@ CASES = [
     ("alpha: 2", "alpha: -2", T + 9, "tolerances.drivers.A.speed.alpha", "alpha is -2", "above 0"),
     ("distribution: truncated, cp: 1.2", "distribution: sample", R - 1, "tolerance_defaults.distribution", "of one",
      ""),
-    ("distribution: truncated, cp: 1.2", "alpha: 1.2", R - 1, "tolerance_defaults.alpha", "nothing to the", "remove"),
+    ("distribution: truncated, cp: 1.2", "alpha: 1.2", R - 1, "tolerance_defaults.alpha", "no effect on the", "remove"),
     ("distribution: truncated, cp: 1.2", "cp: 1, cpk: 2", R - 1, "cpk", "is above cp", "at most"),
     ("of: [AB, BC], coefficient: 0.5", "of: [AB, XY], coefficient: 0.5", R + 1, "correlations.0.of.1", "'XY'", ""),
     ("of: [AB, BC], coefficient: 0.5", "of: [AB, t], coefficient: 0.5", R + 1, "correlations.0", "no tolerance",
      "state"),
-    ("of: [AB, BC], coefficient: 0.5", "of: [AB], coefficient: 0.5", R + 1, "correlations.0", "with nothing", "two"),
+    ("of: [AB, BC], coefficient: 0.5", "of: [AB], coefficient: 0.5", R + 1, "correlations.0", "two parameters", "two"),
     ("of: [AB, BC], coefficient: 0.5", "of: [AB, AB], coefficient: 0.5", R + 1, "correlations.0", "twice", "two"),
     ("of: [AB, BC], coefficient: 0.5", "of: [AB, BC], coefficient: 1.5", R + 1, "correlations.0.coefficient", "1.5",
      "1"),
     ("of: [AB, BC], coefficient: 0.5", "of: [AB, BC]", R + 1, "correlations.0", "'coefficient' is missing", "add"),
     ("of: [AB, BC], coefficient: 0.5", "of: [], coefficient: 0.5", R + 1, "correlations.0.of", "has 0 entries", ""),
     ("coefficient: 0.9", "coefficient: -0.6", R, "correlations", "the least eigenvalue of their matrix is -0.2",
-     "nearer"),
+     "reduce"),
     ("coefficient: 0.5}", "coefficient: 0.5}\n  - {of: [BC, AB], coefficient: 0.4}", R + 2, "correlations.1", "entry 1",
      "one"),
 ]  # fmt: skip
@@ -467,7 +467,7 @@ def test_doubts_are_kept_apart(tmp_path: Path) -> None:
     assert found["tolerances.idle"].severity is Severity.WARNING
     assert found["tolerances.AB.shift"].severity is Severity.WARNING
     assert found["tolerances.BC"].severity is Severity.NOTE
-    assert "go before those that stand with 'dimensions.BC'" in found["tolerances.BC"].what
+    assert "override those stated with 'dimensions.BC'" in found["tolerances.BC"].what
 
 
 def test_a_load_of_the_motion_has_no_tolerance(findings_of: FindingsOf) -> None:

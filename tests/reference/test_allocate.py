@@ -234,8 +234,8 @@ def test_nothing_keeps_the_limits() -> None:
 def test_a_nominal_figure_beyond_its_bounds() -> None:
     result = trunnion.allocate(fourbar(measures={"t": {"effort": "A", "as": "maximum", "at_most": "1 N m"}}), steps=12)
     (said,) = findings(result, "error")
-    assert said.startswith("measures.t: the nominal figure is ")
-    assert said.endswith("N m, at_most is 1 N m: no tolerance mends that")
+    assert said.startswith("measures.t: the nominal value is ")
+    assert said.endswith("N m, at_most is 1 N m: tolerances cannot correct that")
 
 
 def test_what_cannot_be_asked() -> None:
@@ -244,7 +244,7 @@ def test_what_cannot_be_asked() -> None:
         ({"measures": ["torque"]}, "none of the measures torque has a limit"),
         ({"criterion": "best"}, "there is no criterion 'best'"),
         ({"choice": "both"}, "there is no choice 'both'"),
-        ({"criterion": "yield", "target": 1.0}, "a yield of 1 cannot be asked for"),
+        ({"criterion": "yield", "target": 1.0}, "a yield of 1 is not possible"),
         ({"samples": -1}, "-1 samples"),
         ({"curve": 1}, "a curve of 1 points"),
         ({"measures": ["nowhere"]}, "none of the measures nowhere has a limit"),
@@ -263,7 +263,7 @@ def test_what_no_limit_bounds() -> None:
     costs["A.friction.coefficient"] = {"model": "power", "B": 1, "k": 1}
     result = trunnion.allocate(fourbar(costs=costs), steps=12, samples=0)
     assert findings(result, "error") == [
-        "costs.joints.A.friction.coefficient: no limit bounds this tolerance: the wider, the cheaper"
+        "costs.joints.A.friction.coefficient: no limit bounds this tolerance, and wider is cheaper"
     ]
     costs["A.friction.coefficient"]["most"] = 0.05
     assert trunnion.allocate(fourbar(costs=costs), steps=12, samples=0).attrs["found"]
@@ -276,7 +276,7 @@ def test_costs_that_are_not_taken() -> None:
     joints["B"] = {**joints["B"], "pin": {"radius": "6 mm ± 5 um", "hole_radius": "6.02 mm ± 5 um"}}
     costs = {**data["costs"], "joints.B.pin.radius": {"model": "power", "B": 1, "k": 1, "unit": "mm"}}
     result = trunnion.allocate(fourbar(joints=joints, costs=costs), steps=24, samples=0)
-    (said,) = [one for one in findings(result, "warning") if "cannot be bought" in one]
+    (said,) = [one for one in findings(result, "warning") if "is not allocated" in one]
     assert "it changes the play of B" in said
     assert result["bought"].sel(parameter="joints.B.pin.radius") == 0
     assert float(result["used"][0]) == pytest.approx(1)
@@ -295,8 +295,8 @@ def test_run_outs_and_seats_stay_as_they_are() -> None:
     costs = {**data["costs"], **dict.fromkeys(("B.misalignment.offset", "C.clearance"), data["costs"]["l1"])}
     result = trunnion.allocate(fourbar(joints=joints, costs=costs, tolerances=tolerances), steps=24, samples=0)
     told = " ".join(findings(result, "warning"))
-    assert "cannot be bought, it may point anywhere" in told
-    assert "cannot be bought, its pin has a given seat" in told
+    assert "is not allocated: its direction is arbitrary" in told
+    assert "is not allocated: its pin has a stated seat" in told
     # what it does stays, and the others keep their limits with it
     assert result["bought"].sel(parameter="joints.B.misalignment.offset") == 0
     assert float(result["used"][0]) == pytest.approx(1)

@@ -186,8 +186,8 @@ def refusal(data: Data) -> list[Any]:
 def test_a_name_that_does_not_exist_lists_those_that_do(model: Any, link: str) -> None:
     (found,) = refusal(named(model(), **{link: "way-9"}))
     assert found.where == f"assembly.{link}"
-    assert "no assembly 'way-9'" in found.what
-    assert "there are: way-1, way-2;" in found.remedy
+    assert "no assembly mode 'way-9'" in found.what
+    assert "the modes are way-1, way-2;" in found.remedy
 
 
 def test_wrong_names_come_in_one_go() -> None:
@@ -213,8 +213,8 @@ def test_a_name_beats_a_place_and_says_so(model: Any, link: str, pin: str) -> No
         assert [one.name for one in choice_of(both).ways if one.taken] == [way.name]
         (said,) = [one for one in trunnion.check(build(both), 12).findings if one.where == f"assembly.{link}"]
         assert said.severity is (Severity.NOTE if way.name == by_place.name else Severity.WARNING)
-        assert "chosen by name and by where" in said.what
-        assert f"would be {by_place.name}; the name, {way.name}, is taken" in said.what or way.name == by_place.name
+        assert "is stated by name" in said.what
+        assert f"means {by_place.name}; the name is used" in said.what or way.name == by_place.name
 
 
 @pytest.mark.parametrize("extension", ["yaml", "json"])

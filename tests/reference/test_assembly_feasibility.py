@@ -399,7 +399,7 @@ def test_close_to_the_limit_the_share_is_told_from_one() -> None:
     _, _, rows = told_of("8.72664 um")
     assert rows["largest_share"] == "1.000001"
     what, _, rows = told_of("8.7267 um")  # what the remedy says suffices
-    assert what == "the stated clearances take up the errors: 0.99999 of them is needed, everywhere"
+    assert what == "the stated clearances are sufficient: 0.99999 times their size is needed, everywhere"
     assert rows["largest_share.place"] == "everywhere"
 
 
@@ -407,23 +407,20 @@ def test_close_to_the_limit_the_share_is_told_from_one() -> None:
 def test_a_clearance_of_none_and_lengths_of_rounding() -> None:
     what, _, rows = told_of("0 mm")
     assert what == (
-        "the stated play cannot close the loops, however large (a clearance of 0 is none): they stay open by up to "
-        "0.2° at every position"
+        "the joints with play cannot close the loops, "
+        "however large the play (a clearance of 0 gives no play): they stay open by up to 0.2° at every position"
     )
     assert "open_length" not in rows
     assert "open_angle" in rows
     (told,) = json.loads(solved(four_bar({"B": LEAN}, {"A": {"clearance": 0.0}}), 4).attrs["findings"])
     assert told["what"].startswith(
-        "a stated clearance of 0 is no play: the loops stay open by up to 0.3898 mm and 0.2°"
+        "a stated clearance of 0 gives no play: the loops stay open by up to 0.3898 mm and 0.2°"
     )
 
 
 def test_check_says_that_it_goes_together_by_its_play_only() -> None:
     told = "\n".join(map(str, trunnion.check(trunnion.read("examples/misaligned-fourbar.yaml"), 12).findings))
-    assert (
-        "with their errors they go together only by their play, if at all: they cannot be analysed as rigid parts"
-        in told
-    )
+    assert "with their errors they need play to fit together, and as rigid parts they cannot be analysed" in told
     assert "`trunnion assemble FILE`" in told
     assert not any(words in told for words in ("seat: loaded", "check the lengths", "remove a driver"))
 

@@ -127,7 +127,7 @@ def test_ratio_is_kept_over_all_turns() -> None:
         ({"ratio": 0}, "gears.mesh.ratio", "is 0"),
         ({"ratio": -1}, "gears.mesh.ratio", "they have no pitch point"),
         ({"pressure_angle": "95 deg"}, "gears.mesh.pressure_angle", "95°"),
-        ({"teeth": False, "pressure_angle": 0.3}, "gears.mesh.pressure_angle", "means nothing without teeth"),
+        ({"teeth": False, "pressure_angle": 0.3}, "gears.mesh.pressure_angle", "has no effect without teeth"),
     ],
 )
 def test_impossible_gears(change: dict[str, Any], where: str, what: str) -> None:
@@ -200,7 +200,7 @@ def test_gears_without_room() -> None:
     data["links"]["ground"]["points"]["E"] = [0, 0]
     with pytest.raises(MechanismError) as error:
         build(data)
-    assert any("no room for gears" in finding.what for finding in error.value.findings)
+    assert any("the centre distance is zero" in finding.what for finding in error.value.findings)
 
 
 def test_check_tells_internal_from_external() -> None:

@@ -15,10 +15,10 @@ from trunnion.algebra.quadrature import Effort, integrals
 from trunnion.cycle.summary import balance
 from trunnion.errors import Status
 from trunnion.results.attributes import summary_of
+from trunnion.results.quantities import quantity
 from trunnion.solve.loads import useful_loads
 from trunnion.solve.run import Run, prepare
 from trunnion.solve.switches import Mechanisms, edges
-from trunnion.views.common.quantities import quantity
 from trunnion.views.cycle.deviations_tables import error_rows
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"

@@ -602,10 +602,10 @@ def test_no_other_positions_than_needed(durango: Run) -> None:
 @pytest.mark.parametrize(
     ("driver", "measure", "expected"),
     [
-        ({**RISE, "returns": True}, FAR, "a coordinate of 'A', which names no one position"),
+        ({**RISE, "returns": True}, FAR, "a coordinate of 'A', which is not unique"),
         (RISE, Measure("a", "slide", "C", at=3.0), "171.887 deg is outside the range of 'A', 11.4592 to 137.51 deg"),
-        (RISE, Measure("a", "slide", "C", at=3.0, timed=True), "3 s is not in the cycle, which takes 2 s"),
-        ({**RISE, "returns": True}, Measure("a", "slide", "C", at=1.0), "names no one position"),
+        (RISE, Measure("a", "slide", "C", at=3.0, timed=True), "3 s is not in the cycle, which lasts 2 s"),
+        ({**RISE, "returns": True}, Measure("a", "slide", "C", at=1.0), "is not unique"),
         ({"speed": 3.0}, Measure("a", "slide", "C", over=(0.0, 7.0)), "the window is 7 wide, the cycle 6.28319"),
         (RISE, Measure("a", "slide", "C", over=(1.0, 1.0)), "the window is empty"),
     ],

@@ -50,7 +50,7 @@ def test_drawer_driven_backward(arm: float, coefficient: float) -> None:
     np.testing.assert_allclose(found["drive_effort_reverse"], 50.0 * (1 - loss), rtol=1e-12, atol=1e-12)
     (row,) = [row for row in summary_of(result) if row.name == "efficiency_reverse"]
     assert row.value == pytest.approx(1 - loss, rel=1e-12)
-    assert (row.note == "it holds itself") == (loss >= 1)
+    assert (row.note == "self-locking") == (loss >= 1)
 
 
 CASES = {

@@ -75,7 +75,7 @@ def test_figure_that_does_not_exist() -> None:
     for name in ("nominal", "worst_case_upper", "deviation_linear", "searched_lower", "searched_upper", "mean"):
         assert np.isnan(found[name]), name
     assert found["yield"] == 0
-    assert "the nominal mechanism has no such figure" in found.attrs["findings"]
+    assert "undefined for the nominal mechanism" in found.attrs["findings"]
 
 
 def test_nominal_outside_its_limits_is_no_worst_case() -> None:

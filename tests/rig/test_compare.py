@@ -138,11 +138,11 @@ def test_an_offset_is_named_with_its_size():
 
 def test_a_gain_is_named_with_its_size():
     result = compare(measured(wrong=wrong_in("torque", lambda true: 1.08 * true)))
-    assert said(result, "a gain that is off by +8 %", "explains 100 %")
+    assert said(result, "a gain error of +8 %", "explains 100 %")
 
 
 @pytest.mark.parametrize(
-    ("gain", "words"), [(1.05, "off by +5 %"), (10.0, "10 times what"), (1e-3, "0.001 times what")]
+    ("gain", "words"), [(1.05, "error of +5 %"), (10.0, "10 times its"), (1e-3, "0.001 times its")]
 )
 def test_a_gain_is_told_from_an_offset_by_what_is_left(gain, words):
     """A course that varies by a tenth of its mean: an offset explains 99 % of a wrong gain's residual too."""
@@ -155,17 +155,17 @@ def test_a_gain_is_told_from_an_offset_by_what_is_left(gain, words):
     cause, others = best(found)
     assert (cause.kind, [one.kind for one in others]) == ("gain", [])
     result = compare(measured(wrong=wrong_in("out", lambda course: gain * course), noise=1e-6))
-    assert said(result, "channels.out", f"a gain that is {words}")
+    assert said(result, "channels.out", f"a gain {words}")
 
 
 def test_a_flat_reading_is_said_to_be_flat():
     result = compare(measured(wrong=wrong_in("torque", lambda true: np.full_like(true, 12.0))))
-    assert said(result, "channels.torque", "a reading that stays at 12 N m", "sensor and its cable")
+    assert said(result, "channels.torque", "a constant reading of 12 N m", "check the sensor, its cable")
 
 
 def test_a_crank_angle_that_runs_backwards_is_named():
     result = compare(measured(positions=72, wrong=lambda channel, true: np.roll(true[::-1], 1), noise=0.005))
-    assert said(result, "channels.torque", "a crank angle that runs the other way", "angle: {sign: -1}")
+    assert said(result, "channels.torque", "a crank angle with the wrong sign", "angle: {sign: -1}")
 
 
 def test_a_driver_that_swings_has_no_speed_to_set():
@@ -180,22 +180,22 @@ def test_a_driver_that_swings_has_no_speed_to_set():
 
 def test_offset_and_gain_together_are_named():
     result = compare(measured(wrong=wrong_in("torque", lambda true: 1.2 * true + 4.0), noise=0.005))
-    assert said(result, "an offset of +4 N m and a gain off by +20 %")
+    assert said(result, "an offset of +4 N m and a gain error of +20 %")
 
 
 def test_a_shift_of_the_angle_is_named_once_for_all_channels():
     shifted = measured(positions=72, wrong=lambda channel, true: np.roll(true, 1), noise=0.005)
     result = compare(shifted)
     (row,) = said(result, "angle.zero")
-    assert "the crank angle read off by -5 " in row["what"] or "-5.0" in row["what"] or "-4.9" in row["what"]
+    assert "an error of -5 " in row["what"] or "-5.0" in row["what"] or "-4.9" in row["what"]
     assert "torque, out" in row["what"]
     assert "add -" in row["remedy"]
-    assert not said(result, "channels.torque", "not within")
+    assert not said(result, "channels.torque", "does not agree within")
 
 
 def test_a_lag_of_one_channel_is_said_of_that_channel():
     result = compare(measured(positions=72, wrong=wrong_in("out", lambda true: np.roll(true, 2)), noise=0.005))
-    assert said(result, "channels.out", "the crank angle read off by", "delays of the channel")
+    assert said(result, "channels.out", "in the crank angle", "delays of the channel")
 
 
 def test_other_friction_is_not_put_on_a_sensor():
@@ -204,7 +204,7 @@ def test_other_friction_is_not_put_on_a_sensor():
     result = compare(other)
     assert result.verdict.sel(channel="torque").values == Verdict.NOT
     assert result.efficiency_within.values[0] == 0
-    assert said(result, "efficiency", "not within U", "identify")
+    assert said(result, "efficiency", "does not agree within U", "identify")
 
 
 def test_an_offset_that_changes_with_the_condition_is_the_models():
@@ -214,7 +214,7 @@ def test_an_offset_that_changes_with_the_condition_is_the_models():
     torque = replace(second.courses["torque"], turns=second.courses["torque"].turns + 1.0)
     courses = {**second.courses, "torque": torque}
     result = compare(replace(found, conditions=(found.conditions[0], replace(second, courses=courses))))
-    assert said(result, "offset of +1.5 to +2.5 N m", "not at the sensor")
+    assert said(result, "offset of +1.5 to +2.5 N m", "not the sensor")
 
 
 def test_a_driver_at_another_speed_is_named():
@@ -249,7 +249,7 @@ def test_locked_conditions_are_nan_and_said():
     assert np.isnan(result.model.values[0, 1][status[1] == Status.LOCKED]).all()
     assert np.isnan(result.efficiency_model.values[1])
     assert result.efficiency_within.values.tolist() == [1, -1]
-    assert said(result, "no answer in 1 of 2 conditions (tight)", "locked by friction", "--set")
+    assert said(result, "no solution in 1 of 2 conditions (tight)", "locked by friction", "--set")
     assert result.verdict.values[0, 0] == Verdict.WITHIN
     assert result.attrs["all_within"] == 0
 
@@ -279,7 +279,7 @@ def test_one_turn_is_no_uncertainty():
     assert np.isnan(result.within.values).all()
     assert result.efficiency_within.values.tolist() == [-1]
     assert said(result, "channels.torque", "one turn only", "warning")
-    assert said(result, "efficiency", "is not known in run 1: there is one turn only", "more turns")
+    assert said(result, "efficiency", "not known in run 1: there is only one turn", "more turns")
 
 
 def test_a_part_of_the_power_is_no_efficiency():
@@ -290,15 +290,15 @@ def test_a_part_of_the_power_is_no_efficiency():
     two = trunnion.Mechanism(**data)
     result = compare(measured(two, channels=POWERS), two)
     assert "efficiency" not in result
-    assert said(result, "is not compared in run 1: the power of loads.second is not measured", "warning")
+    assert said(result, "not compared in run 1: the power of loads.second is not measured", "warning")
     assert result.attrs["all_within"] == 1
 
 
 def test_a_dead_sensor_leaves_the_efficiency_unknown_and_says_why():
     result = compare(measured(channels=POWERS, wrong=wrong_in("torque", np.zeros_like), noise=0.0))
     assert result.efficiency_within.values.tolist() == [-1]
-    assert said(result, "efficiency", "is not known in run 1: no power goes in", "may be dead", "warning")
-    assert said(result, "channels.torque", "not within")
+    assert said(result, "efficiency", "not known in run 1: there is no input power", "may have failed", "warning")
+    assert said(result, "channels.torque", "does not agree within")
 
 
 def test_turns_that_faults_left_are_told_from_those_measured():
@@ -308,14 +308,14 @@ def test_turns_that_faults_left_are_told_from_those_measured():
     turns = condition.courses["torque"].turns.copy()
     turns[1:] = np.nan
     result = compare(replace(whole, conditions=(replace(condition, courses={"torque": course("torque", turns)}),)))
-    assert said(result, "no more than one turn at a position, of up to 3 that were measured", "look at the gaps")
+    assert said(result, "only one turn at a position, although up to 3 turns were measured", "see the gaps")
 
 
 def test_errors_that_go_on_from_turn_to_turn_are_said():
     """Of an AR(1) over turns; independent turns are not said to be so."""
     random, settings = np.random.default_rng(7), ({"A.speed": 4.0}, {"A.speed": 6.0})
     whole = measured(turns=30, settings=settings)
-    assert not said(compare(whole), "neighbouring turns")
+    assert not said(compare(whole), "successive turns")
     conditions = []
     for one in whole.conditions:
         steps = random.normal(size=30)
@@ -325,7 +325,7 @@ def test_errors_that_go_on_from_turn_to_turn_are_said():
         wandering = replace(torque, turns=torque.turns + 0.1 * steps[:, None])
         conditions.append(replace(one, courses={**one.courses, "torque": wandering}))
     result = compare(replace(whole, conditions=tuple(conditions)))
-    (row,) = said(result, "neighbouring turns are alike")
+    (row,) = said(result, "successive turns are correlated")
     assert (row["where"], row["severity"]) == ("channels.torque", "warning")
 
 
@@ -356,7 +356,7 @@ def test_a_channel_without_a_value_has_nothing_to_compare():
     empty = course("out", np.full((8, 36), np.nan))
     result = compare(replace(whole, conditions=(replace(condition, courses={**condition.courses, "out": empty}),)))
     assert result.verdict.values.ravel().tolist() == [Verdict.WITHIN, Verdict.NOTHING]
-    assert said(result, "channels.out", "nothing to compare")
+    assert said(result, "channels.out", "not compared, for lack of")
 
 
 def test_gaps_stay_gaps():
@@ -471,7 +471,7 @@ def test_findings_of_files_that_differ_in_numbers_are_told_once():
     ]
     told = gathered([*rows, Finding("is missing", "channels.w")])
     assert len(told) == 2
-    assert "and so 6 times in all: run-0.csv" in told[0].what
+    assert "6 such findings: run-0.csv" in told[0].what
 
 
 def test_a_load_that_rests_takes_no_power():

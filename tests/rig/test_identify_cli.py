@@ -64,7 +64,7 @@ def test_tables_files_and_the_model(folder: Path, call) -> None:  # type: ignore
                         "found.yaml", "--report", "x.html", *outs)  # fmt: skip
     assert status == 0, text
     assert "mu │   0.3 │ 0.3" in text
-    assert "what was held out" in text
+    assert "held-out data" in text
     assert (folder / "x.csv").read_text().startswith("parameter,paths,unit,start,estimate,standard_uncertainty,lower")
     assert (folder / "x.fit.csv").read_text().count("\n") == 3
     assert (folder / "x.residuals.csv").read_text().count("\n") > 100
@@ -88,9 +88,9 @@ def test_numbers_that_are_not_told_apart_are_not_written(folder: Path, call) -> 
     status, text = call("--parameter", f"mu={FRICTION}", "--parameter", f"pair={pair}", "--kind", kind, "--out",
                         f"{kind}.png", "--write", "none.yaml")  # fmt: skip
     assert status == 1
-    assert "not told" in text
-    assert "their product is known, 0.3" in text
-    assert "'none.yaml' is not written: the data tell none of the parameters" in text
+    assert "not identifiable" in text
+    assert "their product is determined, 0.3" in text
+    assert "'none.yaml' is not written: no parameter is identifiable" in text
     assert not (folder / "none.yaml").exists()
     assert (folder / f"{kind}.png").stat().st_size > 10_000
 
@@ -126,7 +126,7 @@ def test_results_are_not_written_over_what_is_read(  # type: ignore[no-untyped-d
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ([], "there is nothing to identify"),
+        ([], "no parameter to identify"),
         (["--parameter", "=A"], "names no number"),
         (["--parameter", "mu=friction"], "is not one number"),
         (["--parameter", FRICTION, "--channel", "torque-out"], "the measurement has torque-in"),

@@ -178,7 +178,7 @@ def test_a_load_at_rest_reads_nothing(tmp_path: Path) -> None:
     sensors = {"T": {"measures": "effort:R"}, "v": {"measures": "rate:R"}, "L": {"measures": "load:strip"},
                "vF": {"measures": "rate:F"}}  # fmt: skip
     seen = trunnion.rig.observe(press, rig(sensors=sensors, encoder=None, schedule={"turns": 5}, rate="200 Hz"))
-    assert "given 0 in a rest" in seen.findings[0].what
+    assert "read 0 during a rest" in seen.findings[0].what
     (case,) = seen.cases
     load, speed = case.true.at_samples(2), case.true.at_samples(3)
     assert np.isfinite(load).all()
@@ -243,7 +243,7 @@ def test_clipped_readings_and_lost_pulses_are_told(mechanism: Mechanism) -> None
     found = trunnion.rig.observe(mechanism, rig(sensors=sensors, encoder={"per_turn": 360, "kind": "level"}))
     told = {one.where: one.what for one in found.findings}
     assert "readings are clipped" in told["sensors.T1.range"]
-    assert "some are lost" in told["encoder.kind"]
+    assert "pulses are lost" in told["encoder.kind"]
     assert np.max(np.abs(next(found.records()).columns["T1"])) <= 1.0
     assert plan(found).sensors[0].clipped == (1,)
 
@@ -256,10 +256,10 @@ def test_clipped_readings_and_lost_pulses_are_told(mechanism: Mechanism) -> None
         ({"sensors": {"a": {"measures": "rate:D", "per_turn": 60}}}, "sensors.a.per_turn", "changes its sign"),
         ({"schedule": {"conditions": [{"speeed": 1}]}}, "schedule.conditions.0", "speeed"),
         ({"schedule": {"over": {"A.speed": ["60 rpm", "90 rpm"]}}, "encoder": None,
-          "sensors": {"a": {"measures": "effort:A"}}}, "encoder", "nothing measured tells where A is"),
-        ({"schedule": {"over": {"A.speed": ["-60 rpm", "60 rpm"]}}}, "encoder", "turn both ways"),
+          "sensors": {"a": {"measures": "effort:A"}}}, "encoder", "no channel measures the angle of A"),
+        ({"schedule": {"over": {"A.speed": ["-60 rpm", "60 rpm"]}}}, "encoder", "turn in both directions"),
         ({"schedule": {"over": {"A.speed": ["-60 rpm", "60 rpm"]}}, "encoder": {"per_turn": 60, "kind": "level"}},
-         "encoder.kind", "turn both ways"),
+         "encoder.kind", "turn in both directions"),
         ({"set": {"l7": 2}}, "set", "l7"),
         ({"faults": [{"kind": "drift", "sensor": "T1", "by": "3 rpm"}]}, "faults.0.by", "not in N m"),
         ({"rate": "0.4 Hz", "schedule": {"turns": 1}}, "rate", "no three samples"),
@@ -338,7 +338,7 @@ def test_plan_tells_slow_sensors_and_coarse_converters(mechanism: Mechanism) -> 
     assert "of the range" in told["sensors.w2.range"].what
     alone = plan(trunnion.rig.observe(mechanism, rig(sensors={"T1": SENSORS["T1"]})))
     assert alone.conditions[0].measured is None
-    assert "no efficiency to expect" in alone.findings[-1].what
+    assert "no efficiency is predicted" in alone.findings[-1].what
 
 
 FAULTS = [

@@ -33,8 +33,8 @@ def run(program: Run) -> Run:
 def test_plan_and_files(run: Run, tmp_path: Path) -> None:
     planned = run(FOUR_BAR, RIG)
     assert planned.code == 0
-    assert "Readings to expect" in planned.out
-    assert "Efficiency to expect" in planned.out
+    assert "Predicted readings" in planned.out
+    assert "Predicted efficiency" in planned.out
     assert "torque-rocker" in planned.out
     assert not list(tmp_path.iterdir())
     done = run(FOUR_BAR, RIG, "--out", "data", "--seed", 3, "--set", "schedule.turns=2")
@@ -217,7 +217,7 @@ def test_a_rig_that_fails_leaves_nothing(
     assert sorted(tmp_path.iterdir()) == folders
     with monkeypatch.context() as patched:  # and where the last step fails
         patched.setattr(virtual_files.Path, "rename", _failing_at(3 if where == "data" else 1))
-        with pytest.raises(MechanismError, match="nothing of it is left"):
+        with pytest.raises(MechanismError, match="no part of it is left"):
             trunnion.rig.observe(model, rig, 2).write(tmp_path / where, form)
     assert _files(tmp_path) == before
     assert sorted(tmp_path.iterdir()) == folders
@@ -240,8 +240,8 @@ def _failing_at(count: int) -> Callable[[Path, Path], Path]:
 
 
 NAMED = [
-    ("schedule: {turns: 1, idle: AB}", "schedule.idle", "'AB' speaks of AB"),
-    ("schedule: {turns: 1, idle: {before: 0.1 s, after: 2 * l2}}", "schedule.idle.after", "'2 * l2' speaks of l2"),
+    ("schedule: {turns: 1, idle: AB}", "schedule.idle", "'AB' refers to AB"),
+    ("schedule: {turns: 1, idle: {before: 0.1 s, after: 2 * l2}}", "schedule.idle.after", "'2 * l2' refers to l2"),
     ("schedule: {turns: 1, idle: 1 s ± 0.1 s}", "schedule.idle", "has a tolerance"),
 ]
 

@@ -66,7 +66,7 @@ def test_units_of_a_sensor_without_sensitivity() -> None:
         ({"drift": "1 N m"}, "drift", "is not in N m/s"),
         ({"sensitivity": "100 mV/N"}, "sensitivity", "does not turn N m into"),
         ({"sensitivity": "100 mV/(N m)", "unit": "rpm"}, "sensitivity", "does not turn N m into rpm"),
-        ({"unit": "rpm"}, "unit", "does not measure what is in N m"),
+        ({"unit": "rpm"}, "unit", "does not measure a quantity in N m"),
     ],
 )
 def test_what_does_not_fit(stated: dict[str, object], where: str, what: str) -> None:

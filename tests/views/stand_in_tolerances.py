@@ -90,7 +90,7 @@ def toleranced(
         coordinates["cause"] = [
             "solved",
             "cannot be assembled",
-            "locked by friction: no drive effort moves the mechanism",
+            "locked by friction: no drive effort can move the mechanism",
         ]
     if sobol:
         first = found["contribution_rss"][1][0]

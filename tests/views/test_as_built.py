@@ -51,7 +51,7 @@ def test_every_figure_is_drawn(which, request, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("name", "why"), [("error", "has no errors"), ("seat", "with a seat in its hole"), ("beta", "with a seat")]
+    ("name", "why"), [("error", "has no errors"), ("seat", "has a pin with a seat"), ("beta", "with a seat")]
 )
 def test_without_errors_the_reason_is_told(plain, name, why):
     with pytest.raises(MechanismError, match=f"{why}.*no figure '{name}'.*seat=loaded"):
@@ -61,7 +61,7 @@ def test_without_errors_the_reason_is_told(plain, name, why):
 
 @pytest.mark.slow
 def test_balls_have_no_angles(balls):
-    with pytest.raises(MechanismError, match="only balls have seats"):
+    with pytest.raises(MechanismError, match="the seats of balls are directions"):
         PLOTS["beta"](balls, None)
 
 
@@ -70,7 +70,7 @@ def test_errors_are_those_of_the_result(slider):
     place, slide = figure.axes
     size = np.linalg.norm(slider.point_error.sel(point="piston.Q").values, axis=0)
     assert _label(place, "piston.Q").get_ydata()[:-1] == pytest.approx(1e6 * size)
-    assert place.get_ylabel() == "error of place [µm]"
+    assert place.get_ylabel() == "position error [µm]"
     wrong = slider.joint_slide_error.sel(joint="S").values
     assert _label(slide, "S").get_ydata()[:-1] == pytest.approx(1e6 * wrong)
     assert "slide [µm]" in slide.get_ylabel()
@@ -141,7 +141,7 @@ def test_positions_without_an_answer_are_gaps(slider, tmp_path):
     assert np.isnan(curve.get_ydata()[inside]).all()
     everywhere = blank.assign(seat_offset=blank["seat_offset"] * np.nan)
     assert "seat" not in drawable(everywhere)
-    with pytest.raises(MechanismError, match="no position has an answer"):
+    with pytest.raises(MechanismError, match="no position is solved"):
         PLOTS["seat"](everywhere, None)
 
 

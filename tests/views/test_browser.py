@@ -94,7 +94,7 @@ if NODE:  # not a skip: what must hold everywhere is tested in Python; this is t
         remarks = page(plain, tmp_path)["remarks"]
         assert len(remarks) == 4
         assert all(
-            re.fullmatch(r"The peak of .*N near a dead centre lies outside; --uncut shows it\.", text)
+            re.fullmatch(r"The peak of .*N near a dead centre is outside the frame; --uncut shows it\.", text)
             for text in remarks
         )
 

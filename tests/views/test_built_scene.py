@@ -35,7 +35,7 @@ def test_a_result_without_errors_tells_none(plain):
     assert error_rows(plain) == []
     text = report(plain)
     assert 'id="seats"' not in text
-    assert "Errors against the ideal mechanism" not in text
+    assert "Errors relative to the ideal mechanism" not in text
 
 
 def test_points_less_their_errors_are_those_of_the_ideal_mechanism():
@@ -105,7 +105,7 @@ def test_the_report_has_errors_seats_and_losses_and_fetches_nothing(slider, card
         assert not page.open
         assert set(re.findall(r"https?://[^\s\"'<)]+", text)) <= {"http://www.w3.org/2000/svg"}
         words = " ".join("".join(page.words).split()).replace("\u00a0", " ")
-        for expected in ("Errors against the ideal mechanism", "Seats of the pins in their holes", "Transmission error",
+        for expected in ("Errors relative to the ideal", "Seats of the pins in their holes", "Transmission error",
                          "Efficiency of the cycle", "Friction power, mean", *figures):  # fmt: skip
             assert expected in words, expected
         assert len(text) < 1_500_000
@@ -148,7 +148,7 @@ if shutil.which("node"):  # as in test_browser.py
         assert shown["seats"] == ["O", "P", "Q", "S"]
         assert all(re.search(r"play × \d+; longest load", text) for text in shown["remarks"])
         assert shown["lost"] > 0
-        assert {"Errors of place, largest", "Transmission error, slide of S", "ξ, direction of the seats"} <= set(
+        assert {"Position errors, largest", "Transmission error, slide of S", "ξ, direction of the seats"} <= set(
             shown["titles"]
         )
         for factor in (1, 100, 1000):

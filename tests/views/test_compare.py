@@ -125,7 +125,7 @@ def test_a_model_without_an_answer_is_a_gap_with_its_cause():
 def test_courses_have_band_model_and_residual():
     above, below = figure(case("wrong"), "overlay", channel="torque").axes
     assert [text.get_text() for text in above.get_legend().get_texts()] == ["±U (95\u00a0%)", "measured", "model"]
-    assert "within apart from a constant offset" in below.get_title(loc="right")
+    assert "offset only" in below.get_title(loc="right")
     residual = below.lines[1].get_ydata() if len(below.lines) > 1 else below.lines[0].get_ydata()
     assert np.nanmedian(residual) == pytest.approx(1.0, abs=0.05) or np.nanmedian(residual) == 0
     assert below.get_xlabel() == "drive angle A [°]"
@@ -142,7 +142,7 @@ def test_gaps_are_drawn_as_gaps():
 
 def test_a_figure_says_how_many_courses_it_leaves_out():
     drawn = overlay(case("family"), panels(case("family")))
-    assert f"{MOST_PANELS} of 24 courses" in drawn._suptitle.get_text()
+    assert f"{MOST_PANELS} of 24 signals" in drawn._suptitle.get_text()
 
 
 def test_what_cannot_be_drawn_is_said():
@@ -172,7 +172,7 @@ def test_tables_are_of_texts():
     assert len(results(result).rows) == 4
     row = results(result).rows[0]
     assert row[:2] == ["1", "torque"]
-    assert row[-1] == "within apart from a constant offset"
+    assert row[-1] == "offset only"
     assert row[5].startswith(("1.00", "0.99"))
     assert len(results(result, 1).rows[0]) == len(results(result, 1).head)
     assert efficiencies(result).rows[0][-1] in ("within", "not within")
@@ -225,7 +225,7 @@ def test_the_report_has_what_a_laboratory_files(tmp_path):
     result = case("wrong")
     words = " ".join(Page(page_of("wrong")).words)
     for told in ("bench", "crank and rocker", result.attrs["model_hash"], "Sensors", "Conditions", "Verdicts",
-                 "Efficiency", "Definitions", "Expanded uncertainty", "JCGM 100:2008", "taken as exact", "SHA-256",
+                 "Efficiency", "Definitions", "Expanded uncertainty", "JCGM 100:2008", "counts as exact", "SHA-256",
                  "Checked by", "constant offset of"):  # fmt: skip
         assert told in words, told
 

@@ -65,7 +65,7 @@ def test_intervals_name_each_run_without_an_answer(plain):
 
 
 def test_an_unknown_status_is_still_said():
-    assert status_text(99) == "no answer (status 99)"
+    assert status_text(99) == "not solved (status 99)"
 
 
 def test_intervals_of_nothing():

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from trunnion.views.common.quantities import number, prefixed, quantity
+from trunnion.results.quantities import number, prefixed, quantity
 
 CASES = json.loads((Path(__file__).parent / "number_cases.json").read_text(encoding="utf-8"))
 

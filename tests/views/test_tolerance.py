@@ -177,7 +177,7 @@ def test_bands_of_values_are_drawn_as_deviations():
 def test_a_gap_breaks_the_envelope_and_other_measures_positions_do_not():
     (axes,) = figure(gap(), "envelope").axes
     assert np.isnan(line(axes, "RSS")[:, 1]).sum() == 1
-    assert "no answer" in [text.get_text() for text in axes.texts]
+    assert "not solved" in [text.get_text() for text in axes.texts]
     result = toleranced(72)
     extra = result.isel(position=[10]).assign_coords(drive=("position", [51.3]))
     extra["curve"] = np.nan * extra["curve"]
@@ -189,7 +189,7 @@ def test_a_gap_breaks_the_envelope_and_other_measures_positions_do_not():
 def test_one_position_and_a_structure_have_no_envelope():
     for result in (at_one_position(), CASES["structure"]()):
         assert "envelope" not in drawable(readings(result)[0])
-    with pytest.raises(MechanismError, match="measure it at more than one position"):
+    with pytest.raises(MechanismError, match="use a measure at every position"):
         figure(at_one_position(), "envelope")
 
 
@@ -252,7 +252,7 @@ def test_costs_of_tolerances(count):
     assert sum(axes.get_visible() for axes in drawn.axes) == min(count, 12)
     assert any("±0.02\u00a0mm, cost " in axes.get_title(loc="left") for axes in drawn.axes)
     if count > 12:
-        assert any(text.get_text() == "the 12 dearest of 14" for text in drawn.texts)
+        assert any(text.get_text() == "the 12 most expensive of 14" for text in drawn.texts)
 
 
 def test_the_trade_off_marks_the_stated_limits_and_what_cannot_be_kept():
@@ -264,7 +264,7 @@ def test_the_trade_off_marks_the_stated_limits_and_what_cannot_be_kept():
     assert not outside(drawn)
     assert axes.get_xlabel() == "limit of angle-error ± [°]"
     assert line(axes, "stated limits") == pytest.approx(np.array([[0.1, 16.456705]]), rel=1e-3)
-    assert [text.get_text() for text in axes.texts] == ["cannot be kept"]
+    assert [text.get_text() for text in axes.texts] == ["infeasible"]
     stepped = trade_off(result, [Offer(one, float(np.ceil(6 / one) // 3)) for one in shares])
     assert stepped.axes[0].lines[0].get_drawstyle() == "steps-post"
 

@@ -42,14 +42,14 @@ def colours(axes):
 def test_each_way_is_drawn_under_its_name_and_one_is_marked():
     figure = ways(build(watt_six_bar()))
     drawn = panels(figure)
-    assert list(drawn) == ["coupler: way-1  taken", "coupler: way-2", "rod: way-1  taken", "rod: way-2"]
+    assert list(drawn) == ["coupler: way-1  used", "coupler: way-2", "rod: way-1  used", "rod: way-2"]
     assert [part.get_suptitle() for part in figure.subfigs] == [
         "II(2,3)RRR    coupler, rocker",
         "II(4,5)RRR    rod, output",
     ]
     for title, axes in drawn.items():
         frame = to_hex(axes.spines["top"].get_edgecolor())
-        assert frame == (INK if "taken" in title else RULE)
+        assert frame == (INK if "used" in title else RULE)
         assert "CH"["rod" in title] in texts(axes)  # the inner pin of the group
 
 
@@ -107,7 +107,7 @@ def test_written_whole_in_every_format_with_the_names_in_it(tmp_path, extension)
     assert len(content) > 10_000
     assert [one.name for one in tmp_path.iterdir()] == [path.name]
     if extension == ".svg":
-        assert b"<!-- coupler: way-1  taken -->" in content
+        assert b"<!-- coupler: way-1  used -->" in content
         assert b"<!-- coupler: way-2 -->" in content
 
 
@@ -126,7 +126,7 @@ def test_every_mechanism_with_a_choice_is_drawn(name, tmp_path):
 
 
 def test_nothing_to_choose_is_no_figure():
-    with pytest.raises(MechanismError, match="nothing to choose"):
+    with pytest.raises(MechanismError, match="nothing to draw"):
         ways(build(scotch_yoke()))
 
 
@@ -136,9 +136,9 @@ def test_nothing_to_choose_is_no_figure():
 def test_lines_say_names_places_and_what_to_write():
     (choice,) = choices(prepare(build(four_bar())))
     assert lines(choice) == [
-        "way-1  C (878.6, 689.4) mm  <- taken",
+        "way-1  C (878.6, 689.4) mm  <- used",
         "way-2  C (878.6, -689.4) mm",
-        "to take another: assembly: {coupler: way-2}",
+        "to use another: assembly: {coupler: way-2}",
     ]
 
 
@@ -157,7 +157,7 @@ def test_of_many_ways_some_are_told_and_the_one_that_is_taken():
     assert len(told) == 26
     assert told[22].startswith("way-23")
     assert told[23].startswith("way-30")
-    assert told[23].endswith("<- taken")
+    assert told[23].endswith("<- used")
     assert told[24] == "… and 16 more"
 
 
@@ -168,4 +168,4 @@ def test_a_slide_is_told_by_how_far_it_is_out():
 
 def test_a_start_in_line_is_told_farther_on():
     (choice,) = choices(prepare(build(four_bar(0.3, 1.0, 0.3, 1.0))))
-    assert lines(choice)[0] == "as they are at 1° of A:"
+    assert lines(choice)[0] == "at 1° of A:"

@@ -66,21 +66,28 @@ def allocate(
     file: File,
     measure: Measures = None,
     criterion: Annotated[
-        Criterion, typer.Option("--criterion", help="What keeps the limits: worst-case, rss or yield.")
+        Criterion, typer.Option("--criterion", help="What must meet the limits: worst-case, rss or yield.")
     ] = Criterion.WORST_CASE,
     target: Annotated[
-        float | None, typer.Option("--yield", help="Share within all limits; sets the criterion.", show_default=False)
+        float | None,
+        typer.Option(
+            "--yield", help="Required share within all limits; implies --criterion yield.", show_default=False
+        ),
     ] = None,
     choice: Annotated[
-        Choice, typer.Option("--choice", help="continuous, discrete, or auto: as the costs are stated.")
+        Choice, typer.Option("--choice", help="continuous, discrete, or auto: according to the stated costs.")
     ] = Choice.AUTO,
     exact: Annotated[
-        bool, typer.Option("--exact", help="Worst case of the mechanism itself, not of first order.")
+        bool, typer.Option("--exact", help="Exact worst case of the mechanism instead of the first-order one.")
     ] = False,
-    curve: Annotated[int, typer.Option("--curve", help="Points of cost over accuracy; none if 0.")] = 0,
+    curve: Annotated[
+        int, typer.Option("--curve", help="Number of points of the cost-accuracy curve; 0: no curve.")
+    ] = 0,
     at: At = None,
     steps: Steps = 360,
-    samples: Annotated[int, typer.Option("--samples", help="Random mechanisms that verify it; none if 0.")] = 10_000,
+    samples: Annotated[
+        int, typer.Option("--samples", help="Number of random mechanisms for the verification; 0: none.")
+    ] = 10_000,
     seed: Seed = 1,
     jobs: Jobs = None,
     set_: Set = None,
@@ -95,7 +102,10 @@ def allocate(
     report: Report = None,
     units_row: UnitsRow = False,
 ) -> None:
-    """Tolerances and plays of least cost that keep the limits of measures, verified; what accuracy costs."""
+    """Find the tolerances of minimum cost that meet the limits.
+
+    The result is verified by samples; --curve gives cost over accuracy.
+    """
     from trunnion.studies.allocation.allocate import allocate as run
     from trunnion.studies.allocation.outcome import DEFAULT_YIELD
 
@@ -130,7 +140,7 @@ def _write_model(
     if result.attrs["found"] and not result.attrs["stopped"] and not failed:
         rewrite_mechanism(_bought(mechanism, result), file, write, force)
         return []
-    why = "the limits are not kept with the tolerances found" if result.attrs["found"] else "there is no allocation"
+    why = "the tolerances found do not meet the limits" if result.attrs["found"] else "there is no allocation"
     why = "stopped before the tolerances were verified" if result.attrs["stopped"] else why
     return [Finding(f"'{write}' is not written: {why}", "--write", "", Severity.ERROR)]
 
@@ -159,7 +169,7 @@ def _show(result: xr.Dataset) -> None:
     name, shown = str(result.attrs.get("name", "")), tables(result)
     show_tables(name, shown)
     if not shown:
-        console().print(f"{name}\nno allocation keeps the limits".lstrip(), markup=False, highlight=False)
+        console().print(f"{name}\nno allocation meets the limits".lstrip(), markup=False, highlight=False)
 
 
 def _named(findings: list[Finding], mechanism: Mechanism) -> list[Finding]:

@@ -59,7 +59,7 @@ if TYPE_CHECKING:
 
 app = typer.Typer(
     name="trunnion",
-    help="The analysis of linkages as built: motion, reactions with friction, drive torque, power.",
+    help="Analysis of linkages as built, with friction, play, axis errors and tolerances.",
     no_args_is_help=True,
     add_completion=True,
     rich_markup_mode=None,
@@ -90,18 +90,18 @@ def check(
         Path | None,
         typer.Option(
             "--assemblies",
-            help="Also draw the ways in which each group can be assembled: a .png, .svg or .pdf file.",
+            help="Also draw the assembly modes of each group: a .png, .svg or .pdf file.",
             show_default=False,
         ),
     ] = None,
     list_: Annotated[
-        bool, typer.Option("--list", help="Instead, list what can be set, swept and measured, with units and values.")
+        bool, typer.Option("--list", help="List what can be set, swept and measured, with units and values.")
     ] = False,
     out: Annotated[
         Path | None, typer.Option("--out", help="Write that list: a .json file.", show_default=False)
     ] = None,
 ) -> None:
-    """Findings, mobility, structural formula and plan of a mechanism, and the ways it can be assembled in."""
+    """Check a model: findings, mobility, structure, assembly modes."""
     if list_ or out:
         from trunnion.cli.vocabulary import show
 
@@ -118,7 +118,7 @@ def check(
     with lines_of(file):
         found = inspect(mechanism)
     show_structure(found, mechanism.name or file.name, len(mechanism.drivers))
-    say(placed(found.findings, file, ["assembly"]))
+    say(placed(found.findings, file, ["assembly"]), every=True)
     if assemblies:
         from trunnion.views.assembly.mode_drawings import ways as drawings
         from trunnion.views.cycle.plots import save
@@ -145,7 +145,7 @@ def analyse(
     columns: Columns = None,
     uncut: Uncut = False,
 ) -> None:
-    """Motion, reactions with friction, drive effort and power over the cycle."""
+    """Analyse a cycle: motion, reactions, friction, effort, power."""
     check_files(out or [], report, drawn=False)
     mechanism = stated(file, set_, table, friction, seat)
     with lines_of(file):
@@ -161,9 +161,14 @@ def design(
     set_: Set = None,
     table: TableFile = None,
     friction: FrictionLaw = None,
-    fluctuation: Annotated[float, typer.Option("--fluctuation", help="Of the drive speed, for the flywheel.")] = 0.05,
+    fluctuation: Annotated[
+        float, typer.Option("--fluctuation", help="Speed fluctuation that the flywheel allows.")
+    ] = 0.05,
 ) -> None:
-    """Transmission angles, dead centres, range, Grashof type, shaking force, balance, flywheel, motor."""
+    """Design values: transmission angle, dead centres, flywheel.
+
+    Transmission angles, dead centres, range, Grashof type, shaking force, balance, flywheel, motor.
+    """
     from trunnion.studies.design import report_figures
 
     mechanism = stated(file, set_, table, friction)
@@ -176,7 +181,11 @@ def design(
 def locking(
     file: File, steps: Steps = 360, set_: Set = None, table: TableFile = None, friction: FrictionLaw = None
 ) -> None:
-    """How close to locking, by all friction and by each joint's; other solutions; whether it can be driven backward."""
+    """Margin against locking by friction; backdriving.
+
+    The margin for the friction of all joints and of each joint alone, other solutions of the friction equations, and
+    whether the useful loads can drive the mechanism backward.
+    """
     from trunnion.cycle.locking import look, report_figures
     from trunnion.solve.run import prepare
 
@@ -213,7 +222,7 @@ def plot(
     image: Annotated[str, typer.Option("--format", help="png, svg or pdf, for a folder of plots.")] = "png",
     uncut: Uncut = False,
 ) -> None:
-    """Figures: drive torque, friction power, reactions, polar diagram, mechanism with coupler curve."""
+    """Plot a cycle: torque, friction power, reactions, mechanism."""
     from trunnion.views.common.peaks import whole_peaks
     from trunnion.views.cycle.deviations_plot import with_worst_case
     from trunnion.views.cycle.plots import PLOTS, check_kinds, drawable, save
@@ -234,8 +243,8 @@ def plot(
         path = out if single else out / f"{name}.{image.lstrip('.')}"
         save(figure, path)
         wrote(path)
-    said = [finding for finding in findings_of(result) if finding.severity is not Severity.NOTE]
-    say(placed(said, file, ["assembly"]))
+    grave = [finding for finding in findings_of(result) if finding.severity is not Severity.NOTE]
+    say(placed(grave, file, ["assembly"]))
     raise typer.Exit(exit_status(findings_of(result)))
 
 
@@ -253,7 +262,7 @@ def report(
     iterations: Rounds = 200,
     uncut: Uncut = False,
 ) -> None:
-    """One self-contained HTML file: animation, plots, findings, balance, input data."""
+    """Write an HTML report: animation, plots, findings, inputs."""
     check_page(out, "--out")
     mechanism = stated(file, set_, table, friction, seat)
     with lines_of(file):
@@ -265,11 +274,11 @@ def report(
 
 @verb
 def examples(
-    name: Annotated[str | None, typer.Argument(help="Example to copy out; all are listed if not given.")] = None,
+    name: Annotated[str | None, typer.Argument(help="Example to copy; without it, all are listed.")] = None,
     to: Annotated[Path, typer.Option("--to", help="Folder to copy it into.")] = Path(),
     force: Annotated[bool, typer.Option("--force", help="Overwrite a file of that name.")] = False,
 ) -> None:
-    """List the example models and rig files, or copy one out."""
+    """List the example models and rig files, or copy one."""
     found = _examples()
     if name is None:
         for path in found.values():
@@ -295,11 +304,11 @@ def examples(
 @verb
 def schema(
     of: Annotated[
-        FileKind, typer.Option("--of", help="Of which file: a model, or data: the mapping.")
+        FileKind, typer.Option("--of", help="File: model, or data for the mapping of measured data.")
     ] = FileKind.MODEL,
     out: Annotated[Path | None, typer.Option("--out", help="Write it to a file.", show_default=False)] = None,
 ) -> None:
-    """The JSON Schema of the model file or the mapping file, for editors that complete and check as you type."""
+    """Print the JSON Schema of model or mapping file, for editors."""
     if of is FileKind.DATA:
         from trunnion.rig.reading.schema import schema_text
 
@@ -326,7 +335,7 @@ def _options(
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
     ] = False,
     debug: Annotated[
-        bool, typer.Option("--debug", help="Show where a fault of the program itself arose. With any verb.")
+        bool, typer.Option("--debug", help="Show the traceback of a program fault. With any verb.")
     ] = False,
 ) -> None:
     """Options of the program itself."""
@@ -338,9 +347,9 @@ def main() -> None:
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(encoding="utf-8", errors="replace")
     words = sys.argv[1:]
-    told = words.index("--") if "--" in words else len(words)
-    debug = "--debug" in words[:told]  # before or behind the verb
-    sys.argv[1:] = [word for place, word in enumerate(words) if word != "--debug" or place > told]
+    end = words.index("--") if "--" in words else len(words)
+    debug = "--debug" in words[:end]  # before or behind the verb
+    sys.argv[1:] = [word for place, word in enumerate(words) if word != "--debug" or place > end]
     sys.exit(status_of(app, debug))
 
 

@@ -27,12 +27,12 @@ def assemble(
     steps: Steps = 360,
     set_: Set = None,
     uniform: Annotated[
-        Uniform, typer.Option("--uniform", help="What shares the smallest clearance: pins, or all kinds of play.")
+        Uniform, typer.Option("--uniform", help="Joints with one common clearance: pins, or all kinds of play.")
     ] = Uniform.PINS,
     out: Out = None,
     units_row: UnitsRow = False,
 ) -> None:
-    """Whether it goes together with axes out of line: needed share of the clearances, smallest clearance."""
+    """Clearance needed to assemble a linkage with axis errors."""
     from trunnion.studies.assembly.study import assemble as run
 
     check_files(out or [])

@@ -31,7 +31,7 @@ def compare(
         typer.Option("--channel", help="A channel by its name in the mapping. Repeatable.", show_default=False),
     ] = None,
     condition: Annotated[
-        str | None, typer.Option("--condition", help="The condition whose courses are drawn.", show_default=False)
+        str | None, typer.Option("--condition", help="The condition to draw.", show_default=False)
     ] = None,
     kind: Annotated[
         str | None, typer.Option("--kind", help="Figure of --out: efficiency or overlay.", show_default=False)
@@ -44,9 +44,10 @@ def compare(
     report: Report = None,
     units_row: UnitsRow = False,
 ) -> None:
-    """A model beside a measurement: residual, bias, whether it is within the uncertainty; efficiency as a rig finds it.
+    """Compare a model with measured data: residual, bias, verdict.
 
-    Exit status 0 if every course and efficiency is within, 1 if not or if it cannot be told.
+    Every channel, and the efficiency as a test rig determines it. Exit status 0 if all agree within the expanded
+    uncertainty, 1 if not or if that is undecided.
     """
     from trunnion.rig.comparison.findings import gathered
     from trunnion.rig.comparison.study import compare as run
@@ -71,6 +72,6 @@ def _show(result: xr.Dataset) -> None:
     """Results and efficiencies; the first rows of many."""
     from trunnion.views.compare.tables import efficiencies, results
 
-    first = results(result)._replace(title=f"{result.attrs['comparing']}: measured less model")
+    first = results(result)._replace(title=f"{result.attrs['comparing']}: measured minus model")
     shown = [one for one in (first, efficiencies(result)) if one is not None]
     show_tables(str(result.attrs["name"]), shown, most=MOST_ROWS, rest="FILE.figures.csv")

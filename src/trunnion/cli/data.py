@@ -25,7 +25,7 @@ def data(
     out: Data = None,
     units_row: UnitsRow = False,
 ) -> None:
-    """Measured files, read by a mapping: conditions, channels, scatter and uncertainty, and faults by name."""
+    """Read measured files: conditions, channels, scatter, faults."""
     from trunnion.results.export import save
     from trunnion.rig.reading.measurement import dataset
     from trunnion.rig.reading.read import read_measured

@@ -42,7 +42,7 @@ Parameters = Annotated[
     list[str] | None,
     typer.Option(
         "--parameter",
-        help="A number of the model, as in --set; NAME=PATH,PATH,… for several that are one unknown. Repeatable.",
+        help="A parameter, named as in --set; NAME=PATH,PATH,… for several with one common value. Repeatable.",
         show_default=False,
     ),
 ]
@@ -50,41 +50,43 @@ Channels = Annotated[
     list[str] | None,
     typer.Option(
         "--channel",
-        help="A channel by its name in the mapping, or efficiency. Repeatable; if not given, all that tell.",
+        help="A channel by its name in the mapping, or efficiency. Repeatable; default: all usable ones.",
         show_default=False,
     ),
 ]
 Starting = Annotated[
     list[str] | None,
-    typer.Option("--start", help="NAME=VALUE: where the search begins; the model's value if not given."),
+    typer.Option("--start", help="NAME=VALUE: start value; default: the value in the model."),
 ]
 HeldOut = Annotated[
     list[str] | None,
     typer.Option(
         "--hold-out",
-        help="A condition by its name, or a share of the turns such as 0.2, to predict instead of fit. Repeatable.",
+        help="A condition, or a share of the turns such as 0.2, for validation instead of the fit. Repeatable.",
         show_default=False,
     ),
 ]
 Sensors = Annotated[
     str,
-    typer.Option("--sensors", help="Zero and gain of a channel are off alike in a whole channel, or condition."),
+    typer.Option("--sensors", help="Zero and gain errors are common to a channel, or to each condition."),
 ]
 Delay = Annotated[
     str | None,
     typer.Option(
         "--delay",
-        help="By which channels may lag behind the angle: 0.2ms, a standard uncertainty.",
+        help="Standard uncertainty of the delay between channels and angle: 0.2ms.",
         show_default=False,
     ),
 ]
 Guard = Annotated[
     int | None,
-    typer.Option("--guard", help="Positions left out on each side where a friction turns round.", show_default=False),
+    typer.Option("--guard", help="Positions left out on each side of a friction reversal.", show_default=False),
 ]
 Starts = Annotated[
     int | None,
-    typer.Option("--starts", help="Places to begin at; more than one if the model does not fit.", show_default=False),
+    typer.Option(
+        "--starts", help="Number of start points; default: several if the model does not fit.", show_default=False
+    ),
 ]
 Kind = Annotated[
     str | None,
@@ -115,7 +117,10 @@ def identify(
     report: Report = None,
     units_row: UnitsRow = False,
 ) -> None:
-    """Numbers of the model from measured data: estimates, 95 % intervals, what the data cannot tell apart."""
+    """Identify parameters of a model from measured data.
+
+    Estimates, 95 % confidence intervals, and which parameters the data do not separate.
+    """
     from trunnion.rig.comparison.findings import gathered
     from trunnion.rig.identification import identify as run
     from trunnion.rig.reading.read import read_measured
@@ -156,7 +161,7 @@ def parameters(texts: list[str]) -> dict[str, list[str]]:
         found[name] = own
     if not found:
         remedy = "add --parameter joint_defaults.friction.coefficient, or another number of the model"
-        raise MechanismError(Finding("there is nothing to identify", "--parameter", remedy))
+        raise MechanismError(Finding("no parameter to identify is given", "--parameter", remedy))
     return found
 
 
@@ -207,12 +212,13 @@ def _write_model(
     from trunnion.model.rewrite import rewrite_mechanism
     from trunnion.rig.identification import with_estimates
 
-    lost = [str(name) for name, told in zip(result["parameter"].values, result["told"].values, strict=True) if not told]
+    known = zip(result["parameter"].values, result["told"].values, strict=True)
+    lost = [str(name) for name, identifiable in known if not identifiable]
     if len(lost) == result.sizes["parameter"] or not result.attrs["converged"]:
-        why = "the data tell none of the parameters" if result.attrs["converged"] else "the search did not end"
+        why = "no parameter is identifiable" if result.attrs["converged"] else "the search did not converge"
         return [Finding(f"'{write}' is not written: {why}", "--write", "", Severity.ERROR)]
     rewrite_mechanism(with_estimates(mechanism, result), file, write, force)
     written.append(write)
     if not lost:
         return []
-    return [Finding(f"{', '.join(lost)} stay as they are: the data do not tell them", "--write", "", Severity.NOTE)]
+    return [Finding(f"{', '.join(lost)} unchanged: not identifiable from the data", "--write", "", Severity.NOTE)]

@@ -59,7 +59,7 @@ FrictionLaw = Annotated[
 ]
 Seats = Annotated[
     str | None,
-    typer.Option("--seat", help="loaded or free: how the pins of all joints with play lie in their holes."),
+    typer.Option("--seat", help="loaded or free: position of the pins in all joints with play."),
 ]
 Method = Annotated[
     str,
@@ -69,30 +69,30 @@ Criterion = Annotated[
     float | None,
     typer.Option(
         "--criterion",
-        help="Largest change of a load, N, at which the friction iteration ends; by its residual if not given.",
+        help="Friction iteration: largest change of a load, N, at convergence; default: by the residual.",
         show_default=False,
     ),
 ]
-Rounds = Annotated[int, typer.Option("--iterations", help="Most rounds of the friction iteration.")]
+Rounds = Annotated[int, typer.Option("--iterations", help="Limit of friction iterations.")]
 At = Annotated[
     str | None,
-    typer.Option("--at", help="Place of measures that state none: 60deg, 20mm, 0.1s.", show_default=False),
+    typer.Option("--at", help="Position for measures that state none: 60deg, 20mm, 0.1s.", show_default=False),
 ]
-Seed = Annotated[int, typer.Option("--seed", help="Of the random numbers: the same seed, the same bits.")]
+Seed = Annotated[int, typer.Option("--seed", help="Seed of the random numbers; the same seed gives the same result.")]
 Jobs = Annotated[
     int | None,
-    typer.Option("--jobs", help="Processes; one a core if not given and the work is worth it.", show_default=False),
+    typer.Option("--jobs", help="Number of processes; default: one per core for long work.", show_default=False),
 ]
 MappingFile = Annotated[Path, typer.Argument(help="Mapping of the data: YAML.", show_default=False)]
 DataFiles = Annotated[
     list[Path] | None,
-    typer.Argument(help="Data files in place of the mapping's: CSV, Parquet, TDMS.", show_default=False),
+    typer.Argument(help="Data files instead of those in the mapping: CSV, Parquet, TDMS.", show_default=False),
 ]
 Write = Annotated[
     Path | None,
-    typer.Option("--write", help="Write the model with what was found: .yaml or .json.", show_default=False),
+    typer.Option("--write", help="Write the model with the values found: .yaml or .json.", show_default=False),
 ]
-Force = Annotated[bool, typer.Option("--force", help="With --write: also over the model itself.")]
+Force = Annotated[bool, typer.Option("--force", help="With --write: allow overwriting the model itself.")]
 Report = Annotated[
     Path | None, typer.Option("--report", help="Also write the report, one HTML file.", show_default=False)
 ]
@@ -104,7 +104,7 @@ Data = Annotated[
     list[Path] | None, typer.Option("--out", help="Write the result: .csv .json .nc .zarr .parquet. Repeatable.")
 ]
 Uncut = Annotated[
-    bool, typer.Option("--uncut", help="Figures show peaks near dead centres whole; else the frame cuts them there.")
+    bool, typer.Option("--uncut", help="Show peaks near dead centres in full; default: cut at the frame.")
 ]
 Columns = Annotated[
     list[str] | None,
@@ -132,7 +132,7 @@ def setting(text: str) -> tuple[str, float | str]:
     """A name and its value from `name=value`."""
     name, equals, value = text.partition("=")
     if not equals or not name.strip() or not value.strip():
-        raise MechanismError(Finding(f"'{text}' sets nothing", "--set", "write name=value, e.g. AB=2.1m"))
+        raise MechanismError(Finding(f"'{text}' sets no value", "--set", "write name=value, e.g. AB=2.1m"))
     return name.strip(), _plain(value)
 
 

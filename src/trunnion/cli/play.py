@@ -25,7 +25,10 @@ def play(
     units_row: UnitsRow = False,
     uncut: Uncut = False,
 ) -> None:
-    """What the play of every joint does to measures: worst case, share of each joint, standard deviation."""
+    """Effect of the play of each joint on measures.
+
+    Worst case, share of each joint, standard deviation.
+    """
     from trunnion.studies.play.study import play as run
 
     check_files(out or [])

@@ -35,11 +35,11 @@ def rig(
         typer.Option("--out", help="Folder for data files, mapping.yaml and truth.yaml.", show_default=False),
     ] = None,
     plan: Annotated[
-        bool, typer.Option("--plan", help="Readings and efficiency to expect; what is done without --out.")
+        bool, typer.Option("--plan", help="Predict readings and efficiency; the default without --out.")
     ] = False,
     format_: Annotated[
         str | None,
-        typer.Option("--format", help="csv, parquet or tdms; that of the rig file if not given.", show_default=False),
+        typer.Option("--format", help="csv, parquet or tdms; default: as stated in the rig file.", show_default=False),
     ] = None,
     seed: Seed = 1,
     set_: Set = None,
@@ -47,7 +47,7 @@ def rig(
     friction: FrictionLaw = None,
     seat: Seats = None,
 ) -> None:
-    """A virtual test rig: plan what sensors will show, or write data files as a rig would, with their mapping."""
+    """Virtual test rig: plan sensors, or write simulated data files."""
     from trunnion.model.file import files_named
     from trunnion.rig.reading.rig_file import Rig
     from trunnion.rig.virtual.files import check_folder, check_form
@@ -128,15 +128,15 @@ def _show_plan(observation: Observation) -> list[Finding]:
 
     found = plan(observation)
     head = ["sensor", "measures", "least", "most", "unit", "of range", "steps", "noise"]
-    show_rows("Readings to expect", head, [_sensor(one) for one in found.sensors])
+    show_rows("Predicted readings", head, [_sensor(one) for one in found.sensors])
     told = [one for one in found.conditions if one.measured]
     if told:
         names = list(dict.fromkeys(name for one in found.conditions for name in one.case.settings))
         biased = any(abs(one.bias) > BIASED * one.measured.uncertainty for one in told if one.measured)
-        head = [*(names or ["condition"]), "η", *(["as measured"] if biased else []), "U (k = 2)", "most of u²"]
+        head = [*(names or ["condition"]), "η", *(["as measured"] if biased else []), "U (k = 2)", "main source"]
         rows = [_condition(one, names, biased) for one in told[:MOST_SHOWN]]
         show_rows(
-            "Efficiency to expect: of the model, with the expanded uncertainty U = 2 u of its measurement", head, rows
+            "Predicted efficiency: of the model, with the expanded uncertainty U = 2 u of its measurement", head, rows
         )
         if len(told) > MOST_SHOWN:
             console().print(f"{counted(len(told) - MOST_SHOWN, 'condition')} more", markup=False, highlight=False)
@@ -160,7 +160,7 @@ def _condition(one: Forecast, names: list[str], biased: bool) -> list[str]:
         *settings,
         f"{one.model:.4f}" if math.isfinite(one.model) else "none",
         *([f"{one.measured.value:.4f}"] if biased else []),
-        f"{expanded:#.2g}" if math.isfinite(expanded) else "not known",
+        f"{expanded:#.2g}" if math.isfinite(expanded) else "unknown",
         one.dominant,
     ]
 

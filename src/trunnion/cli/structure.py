@@ -11,13 +11,13 @@ __all__ = ["show_structure"]
 
 def show_structure(found: Check, name: str, drivers: int) -> None:
     """Mobility, structural formula, modules with the ways to assemble them, and pairs of gears, a line each."""
-    rank = "not known: no position can be assembled" if found.rank_mobility is None else str(found.rank_mobility)
+    rank = "unknown, no position can be assembled," if found.rank_mobility is None else str(found.rank_mobility)
     screen = console()
     screen.print(name, style="bold", markup=False)
     screen.print(f"mobility {found.mobility} by formula, {rank} by rank; drivers: {drivers}", markup=False)
     screen.print(f"formula  {found.formula or '(no moving link)'}", markup=False)
     for number, (module, count) in enumerate(zip(found.plan.modules, found.assemblies, strict=True)):
-        ways = "" if module.rank == 1 else f", {count} {'assembly' if count == 1 else 'assemblies'}"
+        ways = "" if module.rank == 1 else f", {count} assembly {'mode' if count == 1 else 'modes'}"
         solver = "general group" if module.kind == "general" else "closed form"
         joints = ", ".join(module.joints)
         screen.print(

@@ -48,24 +48,22 @@ Drawn = Annotated[
     list[str] | None,
     typer.Option(
         "--measure",
-        help="What is shown, by its name in the CSV file: A.effort_max, or a measure of the model. Repeatable.",
+        help="Result to show, by its name in the CSV file: A.effort_max, or a measure of the model. Repeatable.",
         show_default=False,
     ),
 ]
 Along = Annotated[
     str | None,
-    typer.Option("--x", help="The swept name along the axis and down the table; the first if not given."),
+    typer.Option("--x", help="The swept value on the x axis and in the rows of the table; default: the first."),
 ]
 Family = Annotated[
     str | None,
     typer.Option(
-        "--family", help="The swept name that tells the curves, or upwards in a map; the second if not given."
+        "--family", help="The swept value with one curve each, or on the y axis of a map; default: the second."
     ),
 ]
-Kind = Annotated[str, typer.Option("--kind", help="curves, or map: contours over two of the names.")]
-Margin = Annotated[
-    bool, typer.Option("--margin", help="Look for the locking margin too; takes many times as long as all else.")
-]
+Kind = Annotated[str, typer.Option("--kind", help="curves, or map: contours over two swept values.")]
+Margin = Annotated[bool, typer.Option("--margin", help="Compute the locking margin too; takes many times as long.")]
 Picture = Annotated[str, typer.Option("--format", help="png, svg or pdf, for a folder of figures.")]
 
 
@@ -87,7 +85,10 @@ def sweep(
     units_row: UnitsRow = False,
     uncut: Uncut = False,
 ) -> None:
-    """How efficiency, drive effort, reactions, friction and locking margin change with numbers of the model."""
+    """Results over a range of model values: tables, curves, maps.
+
+    Efficiency, drive effort, reactions, friction, locking margin and measures of the model.
+    """
     from trunnion.studies.sweep.study import sweep as run
     from trunnion.views.sweep.scales import check_measure
 

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from trunnion.errors import Finding, Severity
 from trunnion.results.attributes import attribute
+from trunnion.results.quantities import parts
+from trunnion.results.sentences import QUIET
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -32,7 +35,7 @@ def wrote(path: Path) -> None:
 
 
 def show_figures(title: str, figures: Sequence[Figure]) -> None:
-    """Figures with label, value and unit."""
+    """Figures with label, value and a unit that fits its size."""
     from rich.table import Table
 
     table = Table(title=title, title_justify="left", show_edge=False)
@@ -40,34 +43,71 @@ def show_figures(title: str, figures: Sequence[Figure]) -> None:
     table.add_column("value", justify="right")
     table.add_column("unit")
     for one in figures:
-        value = "no answer" if one.value is None else one.value
-        told = value if isinstance(value, str) else f"{value + 0.0:.6g}"  # + 0.0: no negative zero
-        table.add_row(one.label, told, "" if one.unit == "1" else one.unit)
+        value = "undefined" if one.value is None else one.value
+        text, unit = (value, one.unit) if isinstance(value, str) else parts(value, one.unit)
+        table.add_row(one.label, text, "" if unit == "1" else unit)
     console().print(table, markup=False, highlight=False)
 
 
 def show_rows(title: str, head: list[str], rows: list[list[str]]) -> None:
     """Rows of texts under their heads, broken between words where they are too wide, but not before a unit.
 
-    Where no terminal sets a width, a table whose words do not fit is as wide as they need: no number is broken.
+    A table whose words do not fit the terminal is shown in parts, one below the other, each with the columns that name
+    its rows. Where no terminal sets a width, it is as wide as its words need: no number is broken.
     """
     from rich.cells import cell_len
     from rich.table import Table
 
     out = console()
     out.print(title, style="italic", markup=False, highlight=False, soft_wrap=True)
-    frame = 3 * len(head) - 1
     if not out.is_terminal and "COLUMNS" not in os.environ:
         columns = zip(head, *rows, strict=True)
         least = (max(cell_len(word) for cell in column for word in cell.split(" ")) for column in columns)
-        out.width = max(out.width, sum(least) + frame)
-    cells = _fitted([head, *rows], out.width - frame)
-    table = Table(show_edge=False)
-    for name in cells[0]:
-        table.add_column(name, justify="right", overflow="fold", no_wrap=cells[0] is not head)
-    for row in cells[1:]:
-        table.add_row(*row)
-    out.print(table, markup=False, highlight=False)
+        out.width = max(out.width, sum(least) + _frame(head))
+    for number, columns_shown in enumerate(_parts([head, *rows], out.width)):
+        if number:
+            out.print()
+        part = [[row[k] for k in columns_shown] for row in [head, *rows]]
+        cells = _fitted(part, out.width - _frame(part[0]))
+        table = Table(show_edge=False)
+        for name in cells[0]:
+            table.add_column(name, justify="right", overflow="fold", no_wrap=cells[0] is not part[0])
+        for row in cells[1:]:
+            table.add_row(*row)
+        out.print(table, markup=False, highlight=False)
+
+
+def _frame(columns: Sequence[Any]) -> int:
+    """How much of a line the lines and gaps between so many columns take."""
+    return 3 * len(columns) - 1
+
+
+def _parts(rows: list[list[str]], width: int) -> list[list[int]]:
+    """Columns of each table that a table is shown as: all in one if their words fit the width.
+
+    Otherwise each begins with the columns in which every row differs from the others.
+    """
+    from rich.cells import cell_len
+
+    columns = list(zip(*rows, strict=True))
+    least = [max(cell_len(word) for cell in column for word in cell.split(" ")) for column in columns]
+    if sum(least) + _frame(columns) <= width:
+        return [list(range(len(columns)))]
+    wanted = [max(low, min(WIDE, max(map(cell_len, column)))) for low, column in zip(least, columns, strict=True)]
+    telling = (k for k in range(1, min(4, len(columns))) if len({tuple(row[:k]) for row in rows}) == len(rows))
+    count = next(telling, 1)
+    names = list(range(count))
+    found = [list(names)]
+    for k in range(count, len(columns)):
+        taken = [*found[-1], k]
+        if len(found[-1]) > count and sum(wanted[j] for j in taken) + _frame(taken) > width:
+            found.append([*names, k])
+        else:
+            found[-1] = taken
+    return found
+
+
+WIDE = 20  # of a column that is not broken into more lines, where a table is shown in parts
 
 
 def _fitted(rows: list[list[str]], room: int) -> list[list[str]]:
@@ -104,10 +144,14 @@ def say_missed(result: xr.Dataset) -> None:
         console().print(line, style="bold", markup=False, highlight=False, soft_wrap=True)
 
 
-def say(findings: Any) -> None:
-    """Findings on the error stream, one a paragraph, nothing in them taken for markup."""
+def say(findings: Iterable[Finding], every: bool = False) -> None:
+    """Findings on the error stream, one a paragraph, nothing in them taken for markup.
+
+    every: also those that nearly every result has.
+    """
     for finding in findings:
-        print(str(finding), file=sys.stderr)
+        if every or finding.severity is not Severity.NOTE or finding.code not in QUIET:
+            print(str(finding), file=sys.stderr)
 
 
 @contextmanager

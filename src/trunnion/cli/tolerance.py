@@ -54,7 +54,7 @@ Cluster = Annotated[
 ]
 Kind = Annotated[
     str | None,
-    typer.Option("--kind", help="One figure alone: histogram, contributions, envelope, convergence or sobol."),
+    typer.Option("--kind", help="A single figure: histogram, contributions, envelope, convergence or sobol."),
 ]
 
 
@@ -66,22 +66,23 @@ def tolerance(
     target: Annotated[
         float | None,
         typer.Option(
-            "--yield", help="Share within limits that is asked for; none: the worst case too.", show_default=False
+            "--yield", help="Required share within limits; then it alone decides the exit status.", show_default=False
         ),
     ] = None,
-    samples: Annotated[int, typer.Option("--samples", help="Random mechanisms.")] = 10_000,
+    samples: Annotated[int, typer.Option("--samples", help="Number of random mechanisms.")] = 10_000,
     seed: Seed = 1,
     steps: Steps = 360,
     jobs: Jobs = None,
     chunk: Annotated[
-        int | None, typer.Option("--chunk", help="Samples handed out at a time; about a second's.", show_default=False)
+        int | None,
+        typer.Option("--chunk", help="Samples per chunk of work; about one second's by default.", show_default=False),
     ] = None,
     engine: Annotated[str, typer.Option("--engine", help="numpy, or jax: compiled, for large batches.")] = "numpy",
     cluster: Cluster = None,
     checkpoint: Annotated[
-        Path | None, typer.Option("--checkpoint", help="File that keeps what is done.", show_default=False)
+        Path | None, typer.Option("--checkpoint", help="File to save the samples done so far.", show_default=False)
     ] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on from the checkpoint.")] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Continue from the checkpoint.")] = False,
     set_: Set = None,
     table: TableFile = None,
     friction: FrictionLaw = None,
@@ -91,7 +92,7 @@ def tolerance(
     report: Report = None,
     units_row: UnitsRow = False,
 ) -> None:
-    """What tolerances and plays do to measures: worst case, RSS, scatter, yield, contributions."""
+    """Effect of tolerances and play: worst case, RSS, yield, shares."""
     from trunnion.studies.tolerance.sampling import METHODS as SAMPLINGS
     from trunnion.studies.tolerance.study import DEFAULT_METHODS
     from trunnion.studies.tolerance.study import tolerance as run

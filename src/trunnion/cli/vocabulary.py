@@ -26,7 +26,7 @@ def show(file: Path, mechanism: Mechanism, out: Path | None) -> None:
         raise MechanismError(Finding(f"the list is JSON, '{out.name}' is not", "--out", "name a .json file"))
     with lines_of(file):
         found = vocabulary(mechanism)
-    for swept, use in ((True, "numbers that --set and sweep --over take"), (False, "numbers that only --set takes")):
+    for swept, use in ((True, "parameters for --set and sweep --over"), (False, "parameters for --set only")):
         numbers = [
             [one.name, _number(one.value), _unit(one.unit), one.written] for one in found.numbers if one.swept is swept
         ]

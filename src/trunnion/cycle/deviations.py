@@ -158,7 +158,7 @@ def error_figures(
     if np.any(np.isfinite(size)):
         top, at = divmod(int(np.nanargmax(size)), size.shape[1])
         most = f"largest: {'.'.join(run.system.points[top])}"
-        yield Figure("point_error_max", "error of place", size[top, at], "m", most, f"at {dial.at(at)}")
+        yield Figure("point_error_max", "position error", size[top, at], "m", most, f"at {dial.at(at)}")
     for i, (joint, (kind, links)) in enumerate(run.system.joints.items()):
         if run.system.mechanism.fixed_link not in links or joint in run.system.mechanism.drivers:
             continue

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 __all__ = ["Causes", "findings"]
 
 CLASS_TWO = 2
+NEGLIGIBLE = 1e-3  # of the largest effort of a driver: an interval of its effort that is less is no finding
 
 
 class _Open(NamedTuple):
@@ -180,18 +181,24 @@ def findings(
             finding_for("position.near_singular", "links", at=dial.intervals(close), condition=_most(condition[close]))
         )
     for joints, positions in _together(causes.zero_slip()):
-        widths = [upper[positions] - lower[positions] for lower, upper, _ in efforts.values()]
-        if not widths or np.any(np.array(widths) != 0):  # a coefficient of 0 leaves no interval
+        if not efforts or any(_matters(positions, lower, upper) for lower, upper, _ in efforts.values()):
             found.append(_zero_slip(dial, joints, positions, efforts))
     return found
 
 
-def _together(zero: dict[str, Positions]) -> list[tuple[str, Positions]]:
+def _matters(positions: Positions, lower: NDArray[np.float64], upper: NDArray[np.float64]) -> bool:
+    """Whether an effort has an interval worth a word at one of some positions: no bounds, or ends far enough apart."""
+    widths = upper[positions] - lower[positions]
+    largest = np.nanmax(np.abs([lower, upper]), initial=0.0)
+    return bool(np.any(np.isnan(widths) | (widths > NEGLIGIBLE * largest)))
+
+
+def _together(zero: dict[str, Positions]) -> list[tuple[list[str], Positions]]:
     """Joints that rest at the same positions, as all do in a dwell, with these."""
     found: dict[bytes, tuple[list[str], Positions]] = {}
     for joint, positions in zero.items():
         found.setdefault(positions.tobytes(), ([], positions))[0].append(joint)
-    return [(", ".join(joints), positions) for joints, positions in found.values()]
+    return list(found.values())
 
 
 def _not_assembled(causes: Causes, dial: Dial, part: _Open) -> Finding:
@@ -252,7 +259,7 @@ def _locked(
 
 def _zero_slip(
     dial: Dial,
-    joints: str,
+    joints: list[str],
     positions: Positions,
     efforts: dict[str, tuple[NDArray[np.float64], NDArray[np.float64], str]],
 ) -> Finding:
@@ -262,8 +269,8 @@ def _zero_slip(
         if np.any(np.isfinite(widths)):
             k = positions[int(np.nanargmax(widths))]
             widest[driver] = {"from": lower[k], "to": upper[k], "unit": unit, "at": f"at {dial.at(k)}"}
-    where, at = f"joints.{joints}", dial.intervals(positions)
-    return finding_for("friction.interval", where, at=at, efforts=widest, locks=bool(efforts))
+    where, at = f"joints.{', '.join(joints)}", dial.intervals(positions)
+    return finding_for("friction.interval", where, joints=joints, at=at, efforts=widest, locks=bool(efforts))
 
 
 def _most(values: NDArray[np.float64]) -> float:

@@ -36,18 +36,14 @@ MOST_STEPS = 8192
 
 VARIABLES = {
     "critical_multiple": Variable(
-        ("joint", "position"), "1", "multiple of the joint's own friction at which the position locks"
+        ("joint", "position"), "1", "critical multiple of the friction of the joint alone, at which the position locks"
     ),
-    "other_solutions": Variable(("position",), "1", "solutions found at full friction beside the one given"),
+    "other_solutions": Variable(("position",), "1", "other solutions of the friction equations"),
     "drive_effort_reverse": Variable(
-        ("driver", "position"), "N m", "drive effort with the motion run backward; NaN where that locks"
+        ("driver", "position"), "N m", "drive effort of the reversed motion; NaN where it locks"
     ),
-    "power_delivered_reverse": Variable(
-        ("position",), "W", "power that the drivers take out with the motion run backward"
-    ),
-    "power_given_reverse": Variable(
-        ("position",), "W", "power that the useful loads put in with the motion run backward"
-    ),
+    "power_delivered_reverse": Variable(("position",), "W", "power delivered to the drivers when backdriven"),
+    "power_given_reverse": Variable(("position",), "W", "power supplied by the useful loads when backdriven"),
 }
 
 
@@ -69,7 +65,7 @@ def look(run: Run, steps: int = 360, progress: Callable[[int], None] | None = No
     if run.determinacy is not None:
         run.determinacy.refuse()
     if not 1 <= steps <= MOST_STEPS:
-        raise MechanismError(Finding(f"cannot look at {steps} positions", "steps", f"give 1 to {MOST_STEPS:,}"))
+        raise MechanismError(Finding(f"the number of steps is {steps}", "steps", f"give 1 to {MOST_STEPS:,}"))
     result = analyse_run(run, steps, progress=progress)
     time, status = result["time"].values, result["status"].values
     back = run.solve(time, method=FrictionMethod())
@@ -96,17 +92,17 @@ def report_figures(run: Run, found: xr.Dataset) -> list[Figure]:
     """The figures of a result of `look` that one looks at first."""
     dial = run.system.dial(run.values, found["time"].values)
     if not rubbing(run.system):
-        return [Figure("locking_margin", "there is no friction: nothing locks", None)]
+        return [Figure("locking_margin", "locking margin (no joint has friction)", None)]
     margin = found["locking_margin"].values
     figures = [least_margin("locking_margin", "locking margin, all friction together", margin, dial)]
     for joint in rubbing(run.system):
         figures += _of_joint(run, joint, found["critical_multiple"].sel(joint=joint).values, dial)
     more = found["other_solutions"].values
     if np.any(more > 0):
-        subject = f"other solutions at full friction, {dial.intervals(np.flatnonzero(more > 0))}"
+        subject = f"other solutions of the friction equations, {dial.intervals(np.flatnonzero(more > 0))}"
         figures.append(Figure("other_solutions", subject, np.nanmax(more), aspect="most"))
     backward = reverse_figure(run, _reverse(found), useful_loads(run.system.mechanism))
-    stays = Figure("efficiency_reverse", "the useful loads do not drive it backward over the cycle", None)
+    stays = Figure("efficiency_reverse", "efficiency when backdriven (the useful loads do no net work backward)", None)
     return [*figures, backward or stays]
 
 

@@ -93,7 +93,7 @@ def _had(run: Run, name: str, steps: int) -> Measure:
         raise MechanismError(Finding("it has the name of a column of the result", remedy="call it otherwise"))
     if measure.of.against or measure.of_attitude(run.system):
         what = "it is a deviation from the nominal mechanism"
-        raise MechanismError(Finding(what, remedy="`trunnion tolerance` tells what tolerances do to it"))
+        raise MechanismError(Finding(what, remedy="see `trunnion tolerance` for the effect of tolerances on it"))
     if measure.of.of_forces and run.determinacy is not None:
         run.determinacy.refuse()
     plan(run, [measure], steps)

@@ -173,7 +173,12 @@ def critical_figure(run: Run, joint: str, multiple: float, place: str) -> Figure
     """The critical friction of a joint alone: its coefficient if its law is proportional to one, else the multiple."""
     parameter = law_of(run.system, joint).scale
     if not multiple > 0:
-        return Figure(f"{joint}.critical_multiple", f"it locks even without friction in {joint}", 0.0, place=place)
+        return Figure(
+            f"{joint}.critical_multiple",
+            f"critical multiple of the friction of {joint} alone (it locks even without)",
+            0.0,
+            place=place,
+        )
     if not parameter:
         subject = f"critical multiple of the friction of {joint} alone"
         return Figure(f"{joint}.critical_multiple", subject, multiple, place=place)
@@ -187,19 +192,19 @@ def reverse_figure(run: Run, back: Reverse, useful: Sequence[str]) -> Figure | N
 
     It locks, or is 0 or less: then it holds itself.
     """
-    name, subject = "efficiency_reverse", "efficiency driven backward by the useful loads"
+    name, subject = "efficiency_reverse", "efficiency when backdriven by the useful loads"
     delivered, given = _reversed_means(run, back, useful)
     if np.all(np.isfinite(back.given)) and not given > 0:
         return None
     if np.any(back.locked):
         places = counted(int(np.count_nonzero(back.locked)), "position")
-        return Figure(name, "driven backward by the useful loads it locks", None, place=f"at {places}")
+        return Figure(name, "efficiency when backdriven by the useful loads (it locks)", None, place=f"at {places}")
     if not np.isfinite(delivered + given) or not np.all(np.isfinite(back.given + back.delivered)):
-        return Figure(name, subject, None, note="not every position has an answer")
+        return Figure(name, subject, None, note="not every position is solved")
     value = delivered / given
     if value > 1:  # over a range what masses and springs have stored comes on top
-        return Figure(name, subject, None, note="masses and springs give work too")
-    return Figure(name, subject, value, note="" if value > 0 else "it holds itself")
+        return Figure(name, subject, None, note="masses and springs supply work too")
+    return Figure(name, subject, value, note="" if value > 0 else "self-locking")
 
 
 def _reversed_means(run: Run, back: Reverse, useful: Sequence[str]) -> tuple[float, float]:

@@ -139,8 +139,8 @@ def _refuse_seats(run: Run) -> None:
     for module in run.system.plan.modules:
         names = [name for name in module.joints if name in seated]
         if module.redundant and names:
-            what = f"the links {', '.join(module.links)} are over-constrained: seats by loads do not close them"
-            remedy = "analyse it with --seat free; `trunnion assemble` tells what its play takes up"
+            what = f"the links {', '.join(module.links)} are over-constrained: they do not close with seat: loaded"
+            remedy = "analyse with --seat free; see `trunnion assemble` for the play that it needs"
             raise MechanismError(Finding(what, f"joints.{names[0]}.seat", remedy))
 
 

@@ -220,21 +220,21 @@ def _summary(run: Run, found: Positions, near: near_locking.Locking | None) -> I
         if rubbing(run.system):
             yield from _friction_figures(run, found, near, dial, sound)
         yield Figure("efficiency", "efficiency of the cycle", means.efficiency, note=_why(means, arrays))
-        yield Figure("efficiency_error", "efficiency, error of its integrals", means.efficiency_error)
+        yield Figure("efficiency_error", "efficiency, numerical error", means.efficiency_error)
         if found.ideal is not None:
             yield Figure("efficiency_ideal", "efficiency of the cycle without errors", found.ideal.efficiency)
             yield from error_figures(run, arrays, dial, status != Status.CONTACT_LOST)
         if near and (back := near_locking.reverse_figure(run, near.back, useful_loads(run.system.mechanism))):
             yield back
         residual = balance(arrays) if np.any(counted) else None
-        yield Figure("power_residual", "power residual", residual, aspect="largest, of peak drive power")
+        yield Figure("power_residual", "power balance residual", residual, aspect="largest, relative to the peak power")
     rounds = int(np.max(arrays["friction_iterations"]))
     yield Figure("friction_iterations", "friction iterations", rounds, aspect="most")
     lost = int(np.count_nonzero(status == Status.CONTACT_LOST))
     solved = int(np.count_nonzero(counted)) - lost
     yield Figure("positions_solved", "positions solved", solved, aspect=f"of {len(found.time)}")
     if lost:
-        yield Figure("positions_lost", "positions not valid, for a pin loses contact", lost)
+        yield Figure("positions_lost", "positions not valid (a pin loses contact)", lost)
 
 
 def _effort_figures(system: System, found: Positions, dial: Dial, sound: NDArray[np.intp]) -> Iterator[Figure]:
@@ -312,11 +312,11 @@ def _why(means: Means, arrays: Arrays) -> str:
     if np.isfinite(value):
         return ""
     if np.any(arrays["status"] >= Status.NOT_CONVERGED):
-        return "not every position has an answer"
+        return "not every position is solved"
     if not np.isfinite(means.drive_power.value):
-        return "there is no answer between some positions"
+        return "not every position between the steps is solved"
     if means.drive_power.net < 0:
-        return "the loads drive: the driver takes work"
+        return "the loads drive, the driver absorbs work"
     return "the driver does no net work"
 
 

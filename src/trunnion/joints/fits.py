@@ -154,7 +154,9 @@ def _deviations(size: float, tolerance_class: str) -> tuple[float, float]:
         raise _refused(f"the grade of '{tolerance_class}' is not in the tables", "the grades are 1 to 16")
     diameter = round(size * 1e3, 9)  # mm; without the rounding of the conversion, which could pass a limit
     if not 0 < diameter <= SIZES[-1]:
-        raise _refused(f"the size {diameter:g} mm is not in the tables", f"fits are known above 0 up to {SIZES[-1]} mm")
+        raise _refused(
+            f"the size {diameter:g} mm is not in the tables", f"the tables cover sizes above 0 up to {SIZES[-1]} mm"
+        )
     if grade >= 14 and diameter <= 1:
         raise _refused(f"there is no '{tolerance_class}' of {diameter:g} mm", "grades from 14 on begin above 1 mm")
     width = _at(GRADES[grade], diameter)
@@ -215,7 +217,7 @@ def _stated(shaft: str, letter: str, diameter: float) -> float:
     if found is None:
         first = next(STEPS[place - 1] for place, one in enumerate(row) if one is not None)
         other = "u" if letter.islower() else "U"
-        raise _refused(f"there is no '{letter}' of {diameter:g} mm", f"it begins above {first} mm; take '{other}'")
+        raise _refused(f"there is no '{letter}' of {diameter:g} mm", f"it begins above {first} mm; use '{other}'")
     return found
 
 

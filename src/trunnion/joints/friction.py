@@ -206,7 +206,7 @@ FRICTION_LAWS: dict[str, FrictionLaw] = {
             "viscous": LawParameter("s/m", meaning="growth of the coefficient with the slip speed"),
         },
         source="H. Olsson et al., Eur. J. Control 4 (1998) 176-195, doi:10.1016/S0947-3580(98)70113-X",
-        validity="lubricated sliding; the viscous part is taken as proportional to the load",
+        validity="lubricated sliding; the viscous part is assumed proportional to the load",
     ),
     "stribeck": FrictionLaw(
         stribeck,

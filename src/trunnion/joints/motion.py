@@ -288,7 +288,7 @@ MOTION_LAWS: dict[str, MotionLaw] = {
         needs=("speed",),
         takes=("start", "range"),
         source="definition",
-        validity="a motor that holds its speed; one full turn, or a range",
+        validity="constant speed; one full turn, or a range",
     ),
     "harmonic": MotionLaw(
         harmonic,
@@ -296,7 +296,7 @@ MOTION_LAWS: dict[str, MotionLaw] = {
         needs=("amplitude", "period"),
         takes=("mean", "phase"),
         source="definition: q = mean + amplitude sin(2π t / period + phase)",
-        validity="swings without end; all derivatives are continuous",
+        validity="periodic oscillation; all derivatives are continuous",
     ),
     "cycloidal": _profile(
         cycloidal,

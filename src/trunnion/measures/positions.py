@@ -97,10 +97,8 @@ def plan(run: Run, measures: Sequence[Measure], steps: int) -> PositionPlan:
     if duration <= 0:
         for measure in measures:
             if measure.of_place or measure.at is not None or measure.over is not None:
-                what = "nothing moves: there are no places in a cycle"
-                findings.append(
-                    Finding(what, f"measures.{measure.name}", "measure it as it stands, without at or over")
-                )
+                what = "nothing moves: a cycle has no positions"
+                findings.append(Finding(what, f"measures.{measure.name}", "remove at and over"))
         if findings:
             raise MechanismError(findings)
         nothing = np.zeros(1)
@@ -166,8 +164,8 @@ def _ends(run: Run, measure: Measure) -> tuple[float, ...]:
     where = f"measures.{measure.name}"
     name = next(iter(run.system.mechanism.drivers))
     if measure.of_place and not run.system.span(run.values, name).one_way:
-        what = f"the figure is a coordinate of '{name}', which names no one position: it goes there and back"
-        raise MechanismError(Finding(what, where, "let it run one way, or measure something else"))
+        what = f"the figure is a coordinate of '{name}', which is not unique: it moves back and forth"
+        raise MechanismError(Finding(what, where, "let it move in one direction, or measure something else"))
     if measure.at is not None:
         return (_time(run, measure, measure.at, f"{where}.at"),)
     if measure.over is None:
@@ -207,14 +205,14 @@ def _time(run: Run, measure: Measure, place: float, where: str) -> float:
     duration = run.cycle.duration
     if measure.timed:
         if not run.cycle.periodic and not -1e-12 * duration <= place <= duration * (1 + 1e-12):
-            what = f"{place:g} s is not in the cycle, which takes {duration:g} s"
+            what = f"{place:g} s is not in the cycle, which lasts {duration:g} s"
             raise MechanismError(Finding(what, where, "state a time within it"))
         return place % duration if run.cycle.periodic else min(max(place, 0.0), duration)
     system = run.system
     name = next(iter(system.mechanism.drivers), "")
     span = system.span(run.values, name) if name else None
     if span is None or not span.one_way:
-        what = f"the coordinate of '{name}' names no one position: it goes there and back" if name else "no driver"
+        what = f"the coordinate of '{name}' is not unique: it moves back and forth" if name else "no driver"
         raise MechanismError(Finding(what, where, "state a time, such as 0.2 s"))
     return _moment(run, name, place, where)
 

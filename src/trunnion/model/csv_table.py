@@ -106,7 +106,9 @@ def with_own_points(data: Mapping[str, Any], model: Path) -> tuple[dict[str, Any
                 what = (
                     f"the files that the model names are too long: over {MAX_BYTES / 1e6:g} MB or {MAX_OWN_ROWS} rows"
                 )
-                findings.append(Finding(what, f"{where}.file", "thin them out: what lies between is interpolated"))
+                findings.append(
+                    Finding(what, f"{where}.file", "use fewer points: values between them are interpolated")
+                )
                 break
             points = _points(path, f"{where}.points", _kinds(data, section, key), str(model.parent / name))
         except MechanismError as error:
@@ -217,7 +219,7 @@ def column(path: Path, kind: Kind) -> list[float]:
     """
     try:
         text = read_text(path, "a list of deviations", MAX_BYTES, "write a deviation in each line, such as 0.012")
-        lines = _lines(text, "sample", "a deviation in each line", "take a part, drawn by lot")
+        lines = _lines(text, "sample", "a deviation in each line", "use a random subset")
         rows = [(number, [line.strip().rstrip(";,\t").strip(' "')]) for number, line in lines]
         if any(sign in rows[0][1][0] for sign in ";\t"):
             remedy = "keep the column of the deviations; a table of two columns is given by --table"
@@ -241,7 +243,7 @@ def _lines(text: str, noun: str, rows: str, fewer: str) -> list[tuple[int, str]]
     stated = [(number, line) for number, line in enumerate(io.StringIO(text, newline=None), start=1)
               if line.strip() and not line.lstrip().startswith("#")]  # fmt: skip
     if not stated:
-        raise MechanismError(Finding("has nothing but remarks", remedy=f"write {rows}", line=1))
+        raise MechanismError(Finding("has only comments", remedy=f"write {rows}", line=1))
     if len(stated) > MAX_ROWS + 1:
         raise MechanismError(Finding(f"has {len(stated)} rows, a {noun} at most {MAX_ROWS}", remedy=fewer))
     return stated
@@ -249,9 +251,7 @@ def _lines(text: str, noun: str, rows: str, fewer: str) -> list[tuple[int, str]]
 
 def _rows(text: str) -> tuple[str, list[Row]]:
     """The separator, and the lines with their cells; the first has two."""
-    stated = _lines(
-        text, "table", "a row for each point", "thin them out: what lies between the points is interpolated"
-    )
+    stated = _lines(text, "table", "a row for each point", "use fewer points: values between them are interpolated")
     separator = next((one for one in ";\t" if one in stated[0][1]), ",")
     try:
         rows = [(number, _cells(line, separator)) for number, line in stated]

@@ -364,7 +364,7 @@ def _same(dimensions: list[Dimension | None], verb: str) -> Dimension | None:
 
 def _function_dimension(name: str, arguments: list[Dimension | None]) -> Dimension | None:
     function = FUNCTIONS[name]
-    common = _same(arguments, f"put together in {name}")
+    common = _same(arguments, f"combined in {name}")
     wanted = {"angle": ANGLE, "number": NUMBER}.get(function.takes)
     if wanted is not None and common is not None and not fits(common, wanted):
         raise UnitError(f"{name} is given {dimension_text(common)}", f"{name} takes {dimension_text(wanted)}")

@@ -142,7 +142,9 @@ def _file_type(path: Path) -> str:
     if suffix not in _TYPES:
         raise MechanismError(
             Finding(
-                f"the extension '{suffix}' is none of a model file", file=str(path), remedy=f"use {', '.join(_TYPES)}"
+                f"the extension '{suffix}' is not one of a model file",
+                file=str(path),
+                remedy=f"use {', '.join(_TYPES)}",
             )
         )
     return _TYPES[suffix]

@@ -59,13 +59,13 @@ def _finding(error: ErrorDetails, model: type[BaseModel], data: Mapping[str, Any
     elif kind == "extra_forbidden":
         what, remedy = f"the key '{key[:80]}' is unknown", nearest(key, _fields(model, location[:-1]))
     elif kind == "string_pattern_mismatch":  # the only texts with a pattern
-        what = f"'{error['input'][:40]}' is no name of an assembly"
+        what = f"'{error['input'][:40]}' is not the name of an assembly mode"
         remedy = "write way-1, way-2, … as `check` lists them"
     elif kind == "literal_error" and key.startswith("trunnion"):
         what, remedy = f"the file is of version {error['input']!r}, this program reads 1", f"write {key}: 1"
     elif kind == "literal_error":
         wrong = f"'{error['input'][:40]}' " if isinstance(error["input"], str) else ""
-        what, remedy = f"{wrong}is none of {context['expected']}", f"write one of {context['expected']}"
+        what, remedy = f"{wrong}is not one of {context['expected']}", f"write one of {context['expected']}"
         if key == "seat":
             remedy = "write free or loaded, or a group of angles {beta: …, xi: …}; of a ball {direction: [x, y, z]}"
     elif kind in _MEANINGS:

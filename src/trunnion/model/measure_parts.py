@@ -52,15 +52,14 @@ class Measure(_Subject):
     at: AnyQuantity | None = Field(
         default=None,
         description=(
-            "where it is taken, a coordinate of the first driver or a time; if neither this nor `as` is given, at "
-            "every position"
+            "position: a coordinate of the first driver or a time; if neither this nor `as` is given, at every position"
         ),
     )
     statistic: Statistic | None = Field(
         default=None,
         alias="as",
         description=(
-            "the figure that is taken of it over the range; `largest` is the largest magnitude, `dwell` the share of "
+            "statistic over the range; `largest` is the largest magnitude, `dwell` the share of "
             "the time that it is `within` a band. If not given, that of the subject itself (stroke, dead_centre, ...), "
             "else the largest deviation from nominal"
         ),
@@ -75,8 +74,8 @@ class Measure(_Subject):
     limit: LimitText | None = Field(
         default=None,
         description=(
-            "allowed deviation from nominal, to either side or as +0.2/-0.1 deg: `tolerance` tells how many keep it, "
-            "`play` where the worst case is above it"
+            "allowed deviation from nominal, to either side or as +0.2/-0.1 deg: `tolerance` gives the yield, "
+            "`play` the positions at which the worst case exceeds it"
         ),
     )
     at_least: AnyQuantity | None = Field(default=None, description="least that it may be itself")

@@ -87,7 +87,7 @@ MEASURES: dict[str, MeasureKind] = {
         LENGTH, "point", rule="line", reduced=True,
     ),
     "angle": MeasureKind(
-        "link whose angle is watched; in space its turn about a global axis, from where it lies without errors",
+        "link whose angle is measured; in space its rotation about a global axis, relative to the ideal mechanism",
         "angle of a link", ANGLE, "link", vector="must in space",
     ),
     "rotation": MeasureKind(
@@ -148,7 +148,7 @@ MEASURES: dict[str, MeasureKind] = {
         "reaction in a joint", FORCE, "any joint", "forces", vector="may",
     ),
     "power": MeasureKind(
-        "driver or load whose power is watched, positive where it gives the mechanism power",
+        "driver or load whose power is measured, positive into the mechanism",
         "power of a driver or load", POWER, "driver or load", "forces",
     ),
     "friction_power": MeasureKind(

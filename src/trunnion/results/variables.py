@@ -57,11 +57,11 @@ VARIABLES: dict[str, Variable] = {
     "drive_power": Variable(("driver",), "W", "power of the driver"),
     "spring_force": Variable(("spring",), "N", "pull of the spring and its damper; N m in a joint that turns"),
     "spring_elongation": Variable(("spring",), "m", "length beyond the free length; angle, rad, in a joint that turns"),
-    "spring_power": Variable(("spring",), "W", "power that the spring and its damper give the mechanism"),
+    "spring_power": Variable(("spring",), "W", "power of the spring and its damper, positive into the mechanism"),
     "damping_power": Variable(("spring",), "W", "power lost in the spring's damper"),
     "gear_torque": Variable(("gear",), "N m", "torque of the gear pair in its second joint, on its second link"),
     "gear_force": Variable(("gear", "axis"), "N", "tooth force on the gear of the second joint by that of the first"),
-    "useful_power": Variable((), "W", "power taken by the useful loads"),
+    "useful_power": Variable((), "W", "power delivered to the useful loads"),
     "efficiency_instant": Variable((), "1", "useful power over drive power"),
     "closure_residual": Variable((), "m", "largest opening of a closed loop"),
     "condition": Variable((), "1", "largest condition number of a module's Jacobian"),
@@ -84,15 +84,19 @@ VARIABLES: dict[str, Variable] = {
     "contact_position": Variable(
         ("joint", "end", "axis"), "m", "place where the pin touches its hole at each end", part="seats"
     ),
-    "contact_lost": Variable(("joint",), "1", "1 where the seat of the pin would have to jump", np.int8, part="seats"),
+    "contact_lost": Variable(("joint",), "1", "1 where the pin loses contact", np.int8, part="seats"),
     "contact_loss_number": Variable(
         ("joint",), "rad/(N s)", "rate of turn of the reaction over its size (Earles and Wu)", part="seats"
     ),
     "seat_travel": Variable(
-        (), "1", "1 where the velocities and accelerations contain the travel of the seats", np.int8, part="seats"
+        (),
+        "1",
+        "1 where velocities and accelerations include the motion of pins within their play",
+        np.int8,
+        part="seats",
     ),
-    "seat_rounds": Variable((), "1", "rounds to settle seats and reactions", np.int32, part="seats"),
-    "seat_change": Variable((), "1", "change of a seat that one more round would make, of its clearance", part="seats"),
+    "seat_rounds": Variable((), "1", "iterations of seats and reactions", np.int32, part="seats"),
+    "seat_change": Variable((), "1", "change of a seat in one more iteration, relative to its clearance", part="seats"),
     "point_error": Variable(("point", "axis"), "m", "place of the point against the ideal mechanism", part="errors"),
     "link_error": Variable(("link",), "rad", "angle of the link against the ideal mechanism", part="errors"),
     "joint_rotation_error": Variable(
@@ -128,7 +132,7 @@ CYCLE: dict[str, Variable] = {
     "efficiency_error": Variable((), "1", "how far the errors of the integrals may have moved the efficiency"),
     "drive_effort_rms": Variable(("driver",), "N m", "root mean square of the drive effort"),
     "drive_power_mean": Variable((), "W", "mean power of all drivers"),
-    "useful_power_mean": Variable((), "W", "mean power taken by the useful loads"),
+    "useful_power_mean": Variable((), "W", "mean power delivered to the useful loads"),
     "friction_power_mean": Variable(("joint",), "W", "mean power lost to friction"),
 }
 IDEAL = {

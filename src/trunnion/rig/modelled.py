@@ -74,7 +74,7 @@ def told_at(measure: Measure) -> str:
     """What a measure of the model states that no sensor follows; empty if it is of every position."""
     if measure.everywhere:
         return ""
-    return f": the model takes it {f'as {measure.statistic}' if measure.statistic else 'at a place or over a range'}"
+    return f": the model gives it {f'as {measure.statistic}' if measure.statistic else 'at a place or over a range'}"
 
 
 def modelled(

@@ -211,11 +211,11 @@ def _unstated(walk: Forward, module: Module, count: int) -> Finding:
     system = walk.system
     given = list(dict.fromkeys(name for _, name, _ in hints(walk, module)))
     known = [key for key in system.mechanism.assembly if key in module.joints and key not in given]
-    why, names = "no hint says which", given or known
+    why, names = "no assembly hint selects one", given or known
     if names:
         why = f"the {agreeing(len(names), 'hint', 'hints')} of {' and '.join(names)} "
-        why += agreeing(len(names), "does", "do") + " not tell them apart"
-        why += "" if given else f", for {agreeing(len(names), 'its place is', 'their places are')} the same in all"
+        why += agreeing(len(names), "does", "do") + " not distinguish them"
+        why += "" if given else f": {agreeing(len(names), 'its place is', 'their places are')} the same in all"
     free = [joint for joint in module.joints if joint not in known] or list(module.joints)
     joint = module.joints[len(module.joints) // 2]
     joint = joint if joint in free else free[0]
@@ -224,9 +224,9 @@ def _unstated(walk: Forward, module: Module, count: int) -> Finding:
     if system.mechanism.space == "spatial":
         met = PAIRS[system.joints[joint][0]].meets and not system.mechanism.loop
         place, hint = (place, f"{{{key}: [x, y, z]}}") if met else ("how far a joint has turned", f"{{{key}: 60 deg}}")
-    remedy = f"say roughly {place} at the start, e.g. assembly: {hint}, or name one as `check` does"
+    remedy = f"state roughly {place} at the start, e.g. assembly: {hint}, or one of the names listed by `check`"
     if given:
-        remedy = "give a hint that is nearer to one of them, or name one as `check` does"
+        remedy = "give a hint that is nearer to one of them, or one of the names listed by `check`"
     phrases = {"why": why, "remedy": remedy}
     return finding_for("assembly.choice", "assembly", links=list(module.links), ways=count, phrases=phrases)
 
@@ -242,7 +242,7 @@ def _never(system: System, module: Module) -> Finding:
     if system.mechanism.has_errors:
         return finding_for("assembly.never_rigid", "links", links=links)
     plan, drivers = system.plan, len(system.mechanism.drivers)
-    spinning = f" ({len(plan.passive)} of it spins of a link alone)" if plan.passive else ""
+    spinning = f" ({len(plan.passive)} of them spins of a single link)" if plan.passive else ""
     return finding_for(
         "assembly.over_constrained", "links", links=links, formula=plan.mobility, drivers=drivers,
         phrases={"spinning": spinning},

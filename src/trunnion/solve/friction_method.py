@@ -45,7 +45,7 @@ def method_named(name: str, criterion: float | None, limit: int) -> FrictionMeth
             if criterion is not None and not criterion > 0:
                 raise MechanismError(Finding(f"a criterion of {criterion:g} N is never met", "criterion", "above 0"))
             if limit < 1:
-                raise MechanismError(Finding(f"{limit} rounds settle nothing", "iterations", "give 1 or more"))
+                raise MechanismError(Finding(f"{limit} iterations are too few", "iterations", "give 1 or more"))
             return FrictionMethod(known, criterion, limit)
     known_names = " or ".join(get_args(Method))
     raise MechanismError(Finding(f"there is no method '{name}'", "method", f"use {known_names}"))

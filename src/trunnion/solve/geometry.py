@@ -56,7 +56,7 @@ def _bristles(mechanism: Mechanism) -> list[Finding]:
     for name, joint in mechanism.effective_joints.items():
         law = joint.friction.law if joint.friction else None
         if law and FRICTION_LAWS[law].relaxation is not None and PAIRS[joint.type].count > 1:
-            what = f"the bristles of the law {law} bend along one way, the slip of a {joint.type} joint has several"
+            what = f"the bristles of the law {law} bend in one direction, the slip of a {joint.type} joint has several"
             found.append(
                 Finding(what, f"joints.{name}.friction", "use coulomb, viscous, stribeck or brown-mcphee here")
             )

@@ -58,14 +58,14 @@ def misnamed(system: System, module: Module, count: int) -> list[Finding]:
     ways = ", ".join(way_name(i) for i in range(count))
     for key, name in named:
         if module.rank == 1:
-            what = f"the link '{key}' follows the driver {module.driven[0]}: there is no assembly to choose"
+            what = f"the link '{key}' follows the driver {module.driven[0]}: it has only one assembly mode"
             found.append(Finding(what, f"assembly.{key}", "remove it"))
         elif number_of(name) >= count:
-            remedy = f"there are: {ways}; without this line `check` shows them" if count else "check the lengths"
-            found.append(Finding(f"{links} no assembly '{name}'", f"assembly.{key}", remedy))
+            remedy = f"the modes are {ways}; without this line `check` shows them" if count else "check the lengths"
+            found.append(Finding(f"{links} no assembly mode '{name}'", f"assembly.{key}", remedy))
         elif name != named[0][1]:
             what = f"'{name}' contradicts '{named[0][1]}' of the link '{named[0][0]}', which is in the same group"
-            found.append(Finding(what, f"assembly.{key}", "choose the assembly of a group by one of its links"))
+            found.append(Finding(what, f"assembly.{key}", "state the assembly mode of a group for one of its links"))
     return found
 
 

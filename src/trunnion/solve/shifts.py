@@ -81,7 +81,7 @@ def unstated_length(joint: str, play: Play) -> list[Finding]:
         return []
     assert play.model.size is not None  # else the length is 1
     part, keys = play.model.size
-    what = "the length over which its ends lie apart is not stated"
+    what = "the distance between its ends is not stated"
     return [Finding(what, f"joints.{joint}.{part}", f"state joints.{joint}.{part}.{keys[0]}")]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -49,14 +50,18 @@ class Dial(NamedTuple):
         return f"{number}{self.unit}"
 
     def intervals(self, positions: Positions) -> str:
-        """Positions as intervals: 'at 12° and between 132° and 228° of A'."""
+        """Positions as intervals: 'at 0° and 12°, between 132° and 228° of A'."""
         runs = np.split(positions, np.flatnonzero(np.diff(positions) > 1) + 1)
         if len(positions) == len(self.values):
             return "at every position" if len(self.values) > 1 else "in its one position"
-        texts = [
-            f"at {self.at(run[0])}" if len(run) == 1 else f"between {self.at(run[0])} and {self.at(run[-1])}"
-            for run in runs[:MOST_INTERVALS]
-        ]
+        texts: list[str] = []
+        for alone, some in itertools.groupby(runs[:MOST_INTERVALS], lambda run: len(run) == 1):
+            ends = [(self.at(run[0]), self.at(run[-1])) for run in some]
+            if alone:
+                *others, last = (first for first, _ in ends)
+                texts.append(f"at {', '.join(others)} and {last}" if others else f"at {last}")
+            else:
+                texts += [f"between {first} and {last}" for first, last in ends]
         more = f" and in {len(runs) - MOST_INTERVALS} more places" if len(runs) > MOST_INTERVALS else ""
         return ", ".join(texts) + more + (f" of {self.of}" if self.of else "")
 
@@ -340,8 +345,8 @@ class System:
         ending = [name for name, span in spans.items() if not span.periodic]
         for name in ending:
             if not findings and not spans[name].rests and abs(spans[name].duration - longest) > 1e-9 * longest:
-                what = f"its range takes {spans[name].duration:g} s, the whole cycle takes {longest:g} s"
-                findings.append(Finding(what, f"drivers.{name}", "let all drivers with a range take the same time"))
+                what = f"its range lasts {spans[name].duration:g} s, the whole cycle lasts {longest:g} s"
+                findings.append(Finding(what, f"drivers.{name}", "use the same duration for all drivers with a range"))
         if findings:
             raise MechanismError(findings)
         periods = [longest / span.duration for span in spans.values()]

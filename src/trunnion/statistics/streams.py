@@ -92,7 +92,7 @@ class SobolStream:
     def _directions(self, last: int) -> Words:
         """Scrambled direction numbers, (dims, bit), enough for the points below `last`."""
         if last > MOST_POINTS:
-            raise ValueError(f"a Sobol sequence has at most 2^32 points, {last} are asked for; take more replicates")
+            raise ValueError(f"a Sobol sequence has at most 2^32 points, {last} are requested; use more replicates")
         bits = min(32, 8 + -(-max((last - 1).bit_length() - 8, 8) // 4) * 4)
         if self._scrambled.shape[1] < bits:
             plain = direction_numbers(self.dims, bits)

@@ -131,7 +131,9 @@ class Generic:
         what = (
             f"one part is constrained twice, by the joints {told}, while the links {_listed(links)} stay undetermined"
         )
-        return Finding(what, "joints", "move a joint or a driver from the part that is held twice to the loose one")
+        return Finding(
+            what, "joints", "move a joint or a driver from the part that is constrained twice to the undetermined one"
+        )
 
 
 def _null(matrix: NDArray[np.float64]) -> NDArray[np.float64]:

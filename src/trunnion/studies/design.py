@@ -5,6 +5,7 @@ Everything is read off one run over the cycle: the poses of the dyads, the twist
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import combinations
@@ -412,11 +413,11 @@ def report_figures(mechanism: Mechanism, steps: int = 720, fluctuation: float = 
     figures += [_pressure(name, extremes, scale, unit) for name, extremes in found.pressure_angle.items()]
     for name, places in found.dead_centres.items():
         if places:
-            told = ", ".join(f"{place * scale:.8g}" for place in places)
-            figures.append(Figure(f"{name}.dead_centres", f"{name} turns back at", told, f"{unit} of {driver}"))
-    told = ", ".join(f"{low * scale:.8g} … {high * scale:.8g}" for low, high in found.limits) or "no position"
+            text = ", ".join(f"{place * scale:.6g}" for place in places)
+            figures.append(Figure(f"{name}.dead_centres", f"dead centres of {name}", text, f"{unit} of {driver}"))
+    text = ", ".join(f"{low * scale:.6g} … {high * scale:.6g}" for low, high in found.limits) or "no position"
     figures += [
-        Figure("limits", "can be assembled over", told, f"{unit} of {driver}" if driver else ""),
+        Figure("limits", "range of assembly", text, f"{unit} of {driver}" if driver else ""),
         Figure("shaking_force", "shaking force", found.shaking_force, "N", "largest"),
         Figure("shaking_moment", "shaking moment about the ground's origin", found.shaking_moment, "N m", "largest"),
         Figure("effort_rms", "drive effort", found.rms_effort, "N m" if turns else "N", "RMS"),
@@ -447,8 +448,11 @@ def _balanced(run: Run) -> Iterator[Figure]:
     """The counterweights; without mass there is nothing to balance."""
     weights, left = counterweights(run)
     for weight in weights if np.isfinite(left) else ():
-        place = f"({weight.x:.5g}, {weight.y:.5g})"
-        subject = f"counterweight on {weight.link}, mass × place in its frame"
+        x, y = (0.0 if abs(part) < 1e-9 * math.hypot(weight.x, weight.y) else part for part in (weight.x, weight.y))
+        place = f"({x:.5g}, {y:.5g})"
+        subject = f"counterweight on {weight.link}, mass × position in its frame"
         yield Figure(f"{weight.link}.counterweight", subject, place, "kg m")
     if np.isfinite(left):
-        yield Figure("shaking_left", "shaking force left with these", left if left > 1e-12 else 0.0, "of its RMS")
+        yield Figure(
+            "shaking_left", "residual shaking force with counterweights", left if left > 1e-12 else 0.0, "of its RMS"
+        )

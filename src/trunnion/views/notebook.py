@@ -18,8 +18,8 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.attributes import findings_of, summary_of
 from trunnion.results.figure import MORE_THAN, Figure
+from trunnion.results.quantities import quantity
 from trunnion.results.tables import kind_of
-from trunnion.views.common.quantities import quantity
 from trunnion.views.cycle import plots
 
 if TYPE_CHECKING:

@@ -133,7 +133,7 @@ def _dimensions(mechanism: Numbers, known: dict[str, Dimension | None], unreadab
 def _dimension_name(name: str) -> Iterator[Finding]:
     where = f"dimensions.{name}"
     if name in RESERVED or name in MOTION:
-        yield Finding(f"'{name}' is a name of the expressions themselves", where, "call the dimension otherwise")
+        yield Finding(f"'{name}' is a reserved name of expressions", where, "rename the dimension")
     elif not name.isidentifier() or name.startswith("_"):
         yield Finding(
             f"'{name}' cannot be used in an expression", where, "name it with letters, digits and _, a letter first"
@@ -152,7 +152,9 @@ def _absent(mechanism: Numbers) -> Iterator[Finding]:
     jointed = {name for joint in joints.values() for name in joint.links}
     for name in links:
         if name not in jointed:
-            yield Finding(f"no joint holds the link '{name}'", f"links.{name}", "join it to another link or remove it")
+            yield Finding(
+                f"no joint connects the link '{name}'", f"links.{name}", "join it to another link or remove it"
+            )
     if not mechanism.fixed_link:
         yield Finding(
             "no link is fixed", "ground", "name the fixed link 'ground' or 'frame', or state ground: <its name>"
@@ -260,17 +262,19 @@ def _motion(driver: Driver, where: str) -> Iterator[Finding]:
     for key in sorted(stray):
         given = "points" if key == "file" else key
         others = [name for name, one in MOTION_LAWS.items() if given in (*one.needs, *one.takes)]
-        remedy = f"remove it, or state law: {' or '.join(others)}; {driver.law} takes {', '.join(takes)}"
-        yield Finding(f"'{key}' means nothing to the motion law {driver.law}", f"{where}.{key}", remedy)
+        remedy = (
+            f"remove it, or state law: {' or '.join(others)}; the parameters of {driver.law} are {', '.join(takes)}"
+        )
+        yield Finding(f"'{key}' has no effect on the motion law {driver.law}", f"{where}.{key}", remedy)
     for key in law.needs:
         if getattr(driver, key) is None:
             law_too = "" if "law" in driver.model_fields_set else f", or a law: {', '.join(MOTION_LAWS)}"
             yield Finding(f"'{key}' is missing", where, f"add {key}: {MOTION_EXAMPLES[key]}{law_too}")
     if driver.return_duration is not None and not driver.returns:
-        what = "'return_duration' means nothing to a driver that does not return"
+        what = "'return_duration' has no effect on a driver that does not return"
         yield Finding(what, f"{where}.return_duration", "remove it, or returns: false")
     if driver.points is not None and driver.periodic and len(driver.points) < 3:
-        yield Finding("a periodic table needs three points", f"{where}.points", "add points")
+        yield Finding("a periodic table needs at least three points", f"{where}.points", "add points")
     if driver.points is not None and driver.ends == "natural":
         for key in ("periodic", "delay"):
             if key in driver.model_fields_set and getattr(driver, key):
@@ -304,7 +308,7 @@ def _link_load(mechanism: Numbers, load: Load, link: str, where: str) -> Iterato
     elif load.only is not None:
         yield Finding("only is for a load that resists a joint", f"{where}.only", "remove it, or state joint: …")
     elif load.force is None and load.moment is None:
-        yield Finding("there is nothing in this load", where, "state a force or a moment")
+        yield Finding("this load is empty", where, "state a force or a moment")
     if load.force is not None:
         yield from _length(len(load.force), mechanism.coordinates, f"{where}.force")
         if load.at is None:
@@ -318,7 +322,7 @@ def _link_load(mechanism: Numbers, load: Load, link: str, where: str) -> Iterato
         points = mechanism.points[link]
         yield Finding(f"the link '{link}' has no point '{load.at}'", f"{where}.at", nearest(load.at, points))
     if link == mechanism.fixed_link:
-        yield Finding("acts on the fixed link and does nothing", where, "name a moving link", Severity.WARNING)
+        yield Finding("acts on the fixed link and has no effect", where, "name a moving link", Severity.WARNING)
 
 
 def _joint_load(mechanism: Numbers, load: Load, where: str) -> Iterator[Finding]:
@@ -330,7 +334,7 @@ def _joint_load(mechanism: Numbers, load: Load, where: str) -> Iterator[Finding]
             "at, force and moment are for a load on a link", where, "state resisting_torque or resisting_force"
         )
     elif load.resisting_torque is None and load.resisting_force is None:
-        yield Finding("there is nothing in this load", where, "state resisting_torque or resisting_force")
+        yield Finding("this load is empty", where, "state resisting_torque or resisting_force")
     elif load.resisting_torque is not None and load.resisting_force is not None:
         yield Finding("resists a rotation and a slide at once", where, "state a load for each")
     if load.joint is None or load.joint not in joints:
@@ -369,7 +373,7 @@ def _others(mechanism: Numbers) -> Iterator[Finding]:
         elif point:
             yield Finding("a point has a position, not an angle", where, f"write {coordinates(mechanism)}")
         elif name in joints and not motions(joints[name].type):
-            what = f"one number does not say how far a {joints[name].type} joint has moved"
-            yield Finding(what, where, f"say where it is: {coordinates(mechanism)}")
+            what = f"one number does not state how far a {joints[name].type} joint has moved"
+            yield Finding(what, where, f"state where it is: {coordinates(mechanism)}")
     for name, measure in mechanism.measures.items():
         yield from check_measure(mechanism, measure, f"measures.{name}")

@@ -42,7 +42,7 @@ def cost_names(mechanism: Numbers) -> Iterator[Finding]:
         else:
             for key in (*FORMULA, "unit", "least", "most"):
                 if getattr(cost, key) is not None:
-                    what = f"'{key}' means nothing to a choice"
+                    what = f"'{key}' has no effect on a choice"
                     yield Finding(what, f"{where}.{key}", f"remove it, or state model: {' or '.join(COST_MODELS)}")
         if cost.process is not None and cost.process not in mechanism.processes:
             what = f"there is no process '{cost.process}'"
@@ -88,8 +88,8 @@ def _unknown(mechanism: Numbers, name: str, where: str, numbers: ParameterSet) -
     if name.endswith(".clearance") and joint is not None:
         if joint.pin is not None and (joint.pin.fit is not None or joint.pin.hole_radius is not None):
             source = f"the fit {joint.pin.fit.source}" if joint.pin.fit is not None else "the radii of pin and hole"
-            what = f"'{name}' cannot be bought: its play comes of {source}"
-            remedy = "to buy it state pin.clearance instead, or remove the cost: the play stays as it is"
+            what = f"'{name}' cannot have a cost: its play is derived from {source}"
+            remedy = "state pin.clearance instead, or remove the cost: the play stays as stated"
             return Finding(what, where, remedy)
         what = f"the joint of '{name}' states no clearance"
         return Finding(what, where, "state pin: {clearance: 0.02 mm}, or of a guide guide: {clearance: 0.02 mm}")
@@ -146,7 +146,7 @@ def _price(found: Price, where: str) -> Iterator[Finding]:
         yield Finding(what, f"{where}.least", "exchange them")
     for one in found.choices:
         if one.tolerance <= 0:
-            what = f"'{one.name}' keeps a tolerance of {one.tolerance:g} (SI)"
+            what = f"'{one.name}' has a tolerance of {one.tolerance:g} (SI)"
             yield Finding(what, f"{where}.options.{one.name}.tolerance", "give a half width above 0")
 
 

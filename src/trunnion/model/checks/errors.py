@@ -49,7 +49,7 @@ def errors(mechanism: Numbers) -> Iterator[Finding]:
             yield Finding(one.what, where, one.remedy)
             continue
         if path.startswith("drivers."):
-            what = "an error of a driver makes the ideal mechanism run at other times, and nothing can be compared"
+            what = "an error of a driver changes the times of the cycle, so there is no ideal cycle to compare with"
             yield Finding(what, where, "change the driver itself")
         if path in first:
             what = f"'{name}' and '{first[path]}' are the same number"
@@ -86,10 +86,10 @@ def _seat_on(joint: Joint, where: str) -> Iterator[Finding]:
     if joint.seat_on not in joint.links:
         yield Finding(f"'{joint.seat_on}' is no link of this joint", where, f"name {' or '.join(joint.links)}")
     elif joint.type not in TURNING_PAIRS:
-        what = f"the seat of a {joint.type} joint has no link to choose: its length goes with '{joint.links[1]}'"
+        what = f"the seat of a {joint.type} joint needs no seat_on: its length moves with '{joint.links[1]}'"
         yield Finding(what, where, f"remove it; {' and '.join(TURNING_PAIRS)} joints have one")
     elif isinstance(joint.seat, Seat):
-        what = "the seat is given, and seat_on is of a pin that may lie anywhere"
+        what = "the seat is given, and seat_on is for a pin without a stated seat"
         yield Finding(what, where, "keep one of seat and seat_on")
 
 
@@ -98,7 +98,7 @@ def _misalignment(joint: Joint, where: str, spatial: bool) -> Iterator[Finding]:
         what = f"the misalignment of a {joint.type} joint is not modelled"
         yield Finding(what, where, "state errors: {…} of the numbers of its points, or remove it")
     elif joint.misalignment and joint.misalignment.tilt is not None and not spatial:
-        yield Finding("nothing tilts in the plane", f"{where}.tilt", "keep the offset, or state space: spatial")
+        yield Finding("a planar joint cannot tilt", f"{where}.tilt", "keep the offset, or state space: spatial")
 
 
 def _pin(mechanism: Numbers, name: str, own: Pin | None, where: str) -> Iterator[Finding]:
@@ -146,7 +146,7 @@ def _seat(mechanism: Numbers, joint: Joint, stated_at: str, where: str) -> Itera
     guide = has_guide(joint.type)
     if not has_play(joint):
         play_keys = "guide: {clearance: …}" if guide else "pin: {clearance: …}, hole_radius or a fit"
-        yield Finding("a seat without a play to lie in", at, f"state {play_keys}, or seat: free")
+        yield Finding("a seat without play", at, f"state {play_keys}, or seat: free")
         return
     if not PAIRS[joint.type].ball and guide and not (joint.guide and joint.guide.length):
         yield Finding("a seat without the length of the guide", where, "state guide: {length: …}, or seat: free")
@@ -161,20 +161,26 @@ def _seat(mechanism: Numbers, joint: Joint, stated_at: str, where: str) -> Itera
         return
     if PAIRS[joint.type].ball:
         if seat.beta is not None or seat.xi is not None:
-            yield Finding("a ball lies in a direction, not at angles", at, "write seat: {direction: [0, 0, 1]}")
+            yield Finding(
+                "the seat of a ball is stated by a direction, not by angles", at, "write seat: {direction: [0, 0, 1]}"
+            )
         elif seat.direction is not None and len(seat.direction) != 3:
             what = f"has {len(seat.direction)} components, a ball in space needs 3"
             yield Finding(what, f"{at}.direction", "write [0, 0, 1]")
     elif seat.direction is not None:
         body = "slider" if guide else "pin"
-        yield Finding(f"a {body} lies at angles, not in a direction", f"{at}.direction", "write seat: {xi: 30 deg}")
+        yield Finding(
+            f"the seat of a {body} is stated by angles, not by a direction",
+            f"{at}.direction",
+            "write seat: {xi: 30 deg}",
+        )
     elif not spatial and not guide and seat.beta is not None and seat.beta.source != 0:
-        yield Finding("a pin in the plane does not lean: its beta is 0", f"{at}.beta", "keep xi")
+        yield Finding("a planar pin does not tilt: its beta is 0", f"{at}.beta", "keep xi")
 
 
 def _empty_seat(seat: object, where: str) -> Iterator[Finding]:
     if isinstance(seat, Seat) and not stated(seat):
-        yield Finding("says nowhere to lie", f"{where}.seat", "write {xi: 30 deg}, or of a ball {direction: [0, 0, 1]}")
+        yield Finding("states no position", f"{where}.seat", "write {xi: 30 deg}, or of a ball {direction: [0, 0, 1]}")
 
 
 def _unused(kind: str, pin: Pin | None, friction: Friction | None, where: str, spatial: bool) -> Iterator[Finding]:
@@ -189,7 +195,7 @@ def _unused(kind: str, pin: Pin | None, friction: Friction | None, where: str, s
     if pin and pin.offset is not None and not spatial:
         yield Finding("there is no axis in the plane to offset a bearing along", f"{where}.pin.offset", "remove it")
     if friction and friction.model == "pezzuti":
-        what = f"the model pezzuti is of bearings that carry a moment, and {body} carries none"
+        what = f"the model pezzuti needs a bearing that carries a moment, and {body} carries none"
         yield Finding(what, f"{where}.friction.model", "remove it")
 
 
@@ -203,7 +209,7 @@ def _defaults(mechanism: Numbers) -> Iterator[Finding]:
     if pin and pin.end_float is not None and mechanism.space == "planar":
         yield Finding("there is no end float in the plane", "joint_defaults.pin.end_float", "remove it")
     if seat not in (None, "free") and not any(has_play(joint) for joint in joints):
-        what = "no joint has a play to lie in"
+        what = "no joint has play"
         yield Finding(what, "joint_defaults.seat", "state pin: {clearance: …}, hole_radius or a fit", Severity.WARNING)
     if isinstance(seat, Seat) and seat.direction is not None and (seat.beta is not None or seat.xi is not None):
         what = "a direction is the seat of a ball, beta and xi are that of a pin"
@@ -231,14 +237,14 @@ def play_values(mechanism: Numbers, name: str, numbers: ParameterSet) -> Iterato
     joint, where, values = mechanism.effective_joints[name], f"joints.{name}", numbers.nominal
     tilt = values.get(f"{where}.misalignment.tilt", 0.0)
     if np.abs(tilt) > STEEPEST:
-        what = f"is {np.degrees(tilt):.4g} deg, an error of at most 45 deg is meant"
+        what = f"is {np.degrees(tilt):.4g} deg, an error can be at most 45 deg"
         yield Finding(what, f"{where}.misalignment.tilt", "check its unit; turn the axis of the point instead")
     elif np.abs(tilt) > LEANING:
         what = f"is {np.degrees(tilt):.4g} deg, more than a misalignment usually is"
         yield Finding(what, f"{where}.misalignment.tilt", "a plain number is in radians", Severity.WARNING)
     beta = values.get(f"{where}.seat.beta", 0.0)
     if np.abs(beta) > np.pi * (1 + 1e-12):
-        what = f"is {np.degrees(beta):.4g} deg, the ends of a pin lie at most 180 deg apart"
+        what = f"is {np.degrees(beta):.4g} deg, the ends of a pin are at most 180 deg apart"
         yield Finding(what, f"{where}.seat.beta", "give an angle above -180 deg up to 180 deg")
     stated_direction = isinstance(joint.seat, Seat) and joint.seat.direction is not None
     if stated_direction and all(values.get(f"{where}.seat.direction.{one}", np.nan) == 0 for one in "xyz"):
@@ -262,7 +268,7 @@ def _unmodelled(mechanism: Numbers, name: str, values: Mapping[str, Number]) -> 
     if not (np.abs(own) > 0 or np.abs(further) > 0):
         return
     size = f" of {_um(own)}" * bool(own > 0)
-    what = f"the play{size} of a {kind} joint is not modelled and would count for nothing"
+    what = f"the play{size} of a {kind} joint is not modelled"
     radius = f"radius: {values[f'{pin}.radius'] * 1e3:.6g} mm, " if f"{pin}.radius" in values else ""
     remedy = f"state pin: {{{radius}clearance: 0{', cylindricity: 0' * bool(further)}}} here"
     two = ", or two revolute joints in its place, whose play is modelled"
@@ -285,8 +291,10 @@ def _play_sign(mechanism: Numbers, name: str, joint: Joint, numbers: ParameterSe
         entry = numbers.entries[f"{where}.pin.hole_radius"]
         yield Finding(what, entry.alias or entry.path, "check the two; a press fit is a fixed joint")
     elif joint.seat not in (None, "free"):
-        what = f"the nominal play of the fit {pin.fit.source} is {_um(hole - radius)} on the radius: no pin lies in it"
-        yield Finding(what, _fit_place(mechanism, name), "take another fit, fits: maximum, or seat: free")
+        what = (
+            f"the nominal play of the fit {pin.fit.source} is {_um(hole - radius)} on the radius: an interference fit"
+        )
+        yield Finding(what, _fit_place(mechanism, name), "use another fit, fits: maximum, or seat: free")
 
 
 def _fit_place(mechanism: Numbers, name: str) -> str:
@@ -301,10 +309,10 @@ def _press(joint: Joint, found: FitLimits, where: str) -> Iterator[Finding]:
     reach = f"its play on the diameter is {_um(found.minimum)} to {_um(found.maximum)}"
     if found.maximum <= MEASURABLE:
         what = f"{text} is a press fit, no play: it cannot turn as a bearing; {reach}"
-        yield Finding(what, where, "take a shaft of class e to h, such as g6", Severity.WARNING)
+        yield Finding(what, where, "use a shaft of class e to h, such as g6", Severity.WARNING)
     elif found.minimum < -MEASURABLE:
         what = f"{text} may press: {reach}"
-        yield Finding(what, where, "take a shaft of class e to h, such as g6", Severity.WARNING)
+        yield Finding(what, where, "use a shaft of class e to h, such as g6", Severity.WARNING)
 
 
 def _play_size(mechanism: Numbers, name: str, joint: Joint, values: Mapping[str, Number]) -> Iterator[Finding]:
@@ -317,7 +325,7 @@ def _play_size(mechanism: Numbers, name: str, joint: Joint, values: Mapping[str,
     crossing = distance <= values.get(f"{where}.pin.radius", 0.0)  # axes that all but meet: that is no lever
     if rho > 0.01 * distance and not crossing:
         what = f"a play of {_mm(rho)} is {100 * rho / distance:.3g} % of the {_mm(distance)} from '{name}' to '{side}'"
-        remedy = f"above 1 % of a side of the link '{link}' small-play figures are rough: check its unit"
+        remedy = f"above 1 % of a side of the link '{link}' results for small play are inaccurate: check its unit"
         yield Finding(what, place, remedy, Severity.WARNING)
     if mechanism.space == "planar" or PAIRS[joint.type].ball:
         return
@@ -325,13 +333,13 @@ def _play_size(mechanism: Numbers, name: str, joint: Joint, values: Mapping[str,
     length = float(values.get(f"{where}.pin.length", values.get(f"{where}.pin.bearing", np.nan)))
     error = ellipse_error(rho, radius, length) if length > 0 else np.nan  # at β = π
     if error > 0.01:
-        what = f"taking the hole for a circle where a leaning pin cuts an ellipse errs by up to {100 * error:.2g} %"
+        what = f"the hole is modelled as a circle; for a tilted pin (an ellipse) the error is up to {100 * error:.2g} %"
         remedy = f"of the play {_mm(rho)}, by 2 r play / length²; a longer pin or a smaller play keeps it below 1 %"
         yield Finding(what, place, remedy, Severity.WARNING)
     leans = joint.seat not in (None, "free") or values.get(f"{where}.misalignment.tilt", 0.0) != 0
     if leans and length < 2 * radius:
-        what = f"the pin is {_mm(length)} long, less than its diameter {_mm(2 * radius)}: its two ends hardly guide it"
-        yield Finding(what, place, "give the length in the hole; a longer pin leans less", Severity.WARNING)
+        what = f"the pin is {_mm(length)} long, less than its diameter {_mm(2 * radius)}: it is poorly guided"
+        yield Finding(what, place, "check that it is the length in the hole; a longer pin tilts less", Severity.WARNING)
 
 
 def _shortest_side(mechanism: Numbers, name: str, joint: Joint, values: Mapping[str, Number]) -> tuple[str, float, str]:

@@ -27,7 +27,7 @@ def gears(mechanism: Numbers) -> Iterator[Finding]:
             yield Finding("gear pairs are planar", where, "use a planar mechanism")
             continue
         if name in joints:
-            yield Finding("a joint has this name too", where, "call the gear pair otherwise")
+            yield Finding("a joint has this name too", where, "rename the gear pair")
         missing = [joint for joint in gear.joints if joint not in joints]
         for joint in missing:
             yield Finding(f"there is no joint '{joint}'", f"{where}.joints", nearest(joint, joints))
@@ -50,7 +50,7 @@ def _teeth(mechanism: Numbers, name: str, where: str) -> Iterator[Finding]:
         what = f"'{gear.joints[0]}' and '{gear.joints[1]}' have no link in common that carries both gears"
         yield Finding(what, where, "state teeth: false for a train, belt or chain that passes torques alone")
     elif not gear.teeth and gear.pressure_angle is not None:
-        yield Finding("means nothing without teeth", f"{where}.pressure_angle", "remove it, or teeth: false")
+        yield Finding("has no effect without teeth", f"{where}.pressure_angle", "remove it, or teeth: false")
 
 
 def gear_values(mechanism: Numbers, values: Mapping[str, Number]) -> Iterator[Finding]:
@@ -63,10 +63,10 @@ def gear_values(mechanism: Numbers, values: Mapping[str, Number]) -> Iterator[Fi
         known = len({*gear.joints} & mechanism.effective_joints.keys()) == len(gear.joints)
         carriers = mechanism.carriers(name) if known else None
         if gear.teeth and carriers and abs((1 if carriers[0] == carriers[1] else -1) * ratio - 1) < 1e-9:
-            what = "the gears turn alike, seen from the link that carries them: they have no pitch point"
+            what = "relative to the link that carries them, the gears turn equally: they have no pitch point"
             yield Finding(what, f"{where}.ratio", "state teeth: false, or another ratio")
         if gear.teeth and carriers and not _apart(mechanism, name, carriers, values):
-            what = "both joints lie at one point of the link that carries them: there is no room for gears that touch"
+            what = "both joints are at the same point of the link that carries them: the centre distance is zero"
             yield Finding(what, where, "move one, or state teeth: false for gears inside each other or a belt")
         angle = values.get(f"{where}.pressure_angle", 0.0)
         if angle < 0 or angle >= np.pi / 2:

@@ -54,12 +54,12 @@ def _measure(value: Quantity, known: Dimensions) -> Dimension | None:
 def unknown_name(mechanism: Numbers, name: str, path: str, source: object, known: Dimensions) -> Finding:
     """A name in an expression that means nothing there."""
     section = path.partition(".")[0]
-    what = f"'{source}' speaks of '{name}', which is not one of the dimensions"
+    what = f"'{source}' refers to '{name}', which is not one of the dimensions"
     if name not in MOTION and name not in mechanism.tables:
         remedy = nearest(name, [*known, *(motion_dimensions(mechanism, known) if section == "loads" else ())])
         return Finding(what, path, remedy)
     if section == "loads":
-        return Finding(f"'{source}' speaks of '{name}', but nothing is driven", path, "state a driver")
+        return Finding(f"'{source}' refers to '{name}', but the model has no driver", path, "state a driver")
     return Finding(what, path, "drive, speed, time and tables are for loads; give a number or a dimension")
 
 
@@ -71,13 +71,15 @@ def tables(mechanism: Numbers, known: Dimensions) -> Iterator[Finding]:
     for name, table in mechanism.tables.items():
         where = f"tables.{name}"
         if name in RESERVED or name in MOTION or name in mechanism.dimensions:
-            other = "a dimension" if name in mechanism.dimensions else "a name of the expressions themselves"
-            yield Finding(f"'{name}' is {other}", where, "call the table otherwise")
+            other = "a dimension" if name in mechanism.dimensions else "a reserved name of expressions"
+            yield Finding(f"'{name}' is {other}", where, "rename the table")
         elif not name.isidentifier() or name.startswith("_"):
             remedy = "name it with letters, digits and _, a letter first"
             yield Finding(f"'{name}' cannot be used in an expression", where, remedy)
         if table.over == "drive" and not mechanism.drivers:
-            yield Finding("is over the coordinate of the first driver, but nothing is driven", where, "state a driver")
+            yield Finding(
+                "is over the coordinate of the first driver, but the model has no driver", where, "state a driver"
+            )
         if table.file is not None:
             yield unread(table.file, where)
             continue
@@ -90,7 +92,7 @@ def tables(mechanism: Numbers, known: Dimensions) -> Iterator[Finding]:
         if table.repeats and len(table.points) < (3 if table.period is None else 2):
             yield Finding("a periodic table needs three points", f"{where}.points", "add points")
         if table.period is not None and table.model_fields_set >= {"periodic"} and not table.periodic:
-            what = "means nothing to a table that does not repeat"
+            what = "has no effect on a table without a period"
             yield Finding(what, f"{where}.period", "remove it, or write periodic: true")
         first: Dimension | None = None
         for k, (_, value) in enumerate(table.points):
@@ -98,7 +100,7 @@ def tables(mechanism: Numbers, known: Dimensions) -> Iterator[Finding]:
             first = first if first is not None else measured
             if measured is not None and first is not None and not (fits(measured, first) and fits(first, measured)):
                 what = f"is {dimension_text(measured)}, the values before are {dimension_text(first)}"
-                yield Finding(what, f"{where}.points.{k}.value", "let a table measure one thing")
+                yield Finding(what, f"{where}.points.{k}.value", "use one unit within a table")
 
 
 _EXAMPLES = {"drive": "[[0 deg, 40 bar], [360 deg, 40 bar]]", "time": "[[0 s, 40 bar], [1 s, 40 bar]]"}
@@ -106,7 +108,7 @@ _EXAMPLES = {"drive": "[[0 deg, 40 bar], [360 deg, 40 bar]]", "time": "[[0 s, 40
 
 def unread(file: str, where: str) -> Finding:
     """Of a table that names a file in a model that was not read from one."""
-    what = f"names the file '{file[:60]}', but this model was not read from a file and has no folder to look in"
+    what = f"names the file '{file[:60]}', but this model was not read from a file and has no folder"
     remedy = "give its points instead, or write the model into a file beside it and read that"
     return Finding(what, f"{where}.file", remedy)
 
@@ -201,7 +203,7 @@ def springs(mechanism: Numbers) -> Iterator[Finding]:
         where = f"springs.{name}"
         if (spring.between is None) == (spring.joint is None):
             remedy = "state between: [link.point, link.point] or joint: …"
-            yield Finding("stands neither or both between two points and in a joint", where, remedy)
+            yield Finding("states neither or both of two points and a joint", where, remedy)
             continue
         joints, joint = mechanism.effective_joints, spring.joint or ""
         if spring.between is not None:
@@ -234,16 +236,16 @@ def _free(spring: Spring, turns: bool, where: str) -> Iterator[Finding]:
         kind = "turns" if turns else "acts along a line"
         yield Finding(f"this spring {kind}", f"{where}.{other}", f"state {own} instead")
     elif spring.stiffness is None and spring.damping is None and spring.preload is None:
-        yield Finding("there is nothing in this spring", where, "state a stiffness, a damping or a preload")
+        yield Finding("this spring is empty", where, "state a stiffness, a damping or a preload")
     elif spring.stiffness is not None and getattr(spring, own) is None:
         example = "20 deg" if turns else "40 mm"
         yield Finding(f"a stiffness without a {own}", where, f"add {own}: {example}; its force there is the preload")
     elif spring.stiffness is None and getattr(spring, own) is not None:
-        yield Finding(f"a {own} means nothing without a stiffness", f"{where}.{own}", "add stiffness: … or remove it")
+        yield Finding(f"a {own} has no effect without a stiffness", f"{where}.{own}", "add stiffness: … or remove it")
     if spring.only is not None and turns:
         yield Finding(f"a spring in a joint that turns cannot only {spring.only}", f"{where}.only", "remove it")
     elif spring.only is not None and spring.stiffness is None:
-        remedy = "add stiffness: … and free_length: …, which tells where it begins to act"
+        remedy = "add stiffness: … and free_length: …, at which it begins to act"
         yield Finding(f"a spring that can only {spring.only} needs a stiffness", where, remedy)
 
 

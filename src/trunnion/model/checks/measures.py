@@ -82,7 +82,7 @@ def _component(mechanism: Numbers, measure: Measure, where: str) -> Iterator[Fin
         what = "the axis of a coordinate is stated, but no point and no reaction"
         yield Finding(what, f"{where}.{stated[0]}", "remove it, or name a point")
     if len(stated) > 1 or ("along" in stated and measure.kind == "angle"):
-        yield Finding("has an axis and a direction", f"{where}.along", "keep one of them; an angle takes an axis")
+        yield Finding("has an axis and a direction", f"{where}.along", "keep one of them; an angle needs an axis")
     if measure.axis == "z" and planar:
         yield Finding("there is no z in the plane", f"{where}.axis", "write x or y")
     if measure.along is not None and len(measure.along) != mechanism.coordinates:
@@ -114,7 +114,7 @@ def _taken(mechanism: Numbers, measure: Measure, where: str) -> Iterator[Finding
     figure, subject = measure.statistic, measure.kind
     yield from _band(measure, where)
     if measure.at is not None and measure.over is not None:
-        yield Finding("is taken at a position and over a range", where, "keep at: … or over: …")
+        yield Finding("states both a position and a range", where, "keep at: … or over: …")
     if (measure.at is not None or measure.over is not None) and not mechanism.drivers:
         key = "at" if measure.at is not None else "over"
         what = "there is no driver whose coordinate it could be: the mechanism has one position"
@@ -122,7 +122,9 @@ def _taken(mechanism: Numbers, measure: Measure, where: str) -> Iterator[Finding
     if measure.reduced:
         whole = f"{subject}: {measure.subject}" if measure.subject == "cycle" else subject
         if measure.at is not None:
-            yield Finding(f"the {whole} is of a range, not of a position", f"{where}.at", "remove it, or say over: […]")
+            yield Finding(
+                f"the {whole} is of a range, not of a position", f"{where}.at", "remove it, or state over: […]"
+            )
         if figure is not None and not (subject == "dead_centre" and figure in PLACES):
             remedy = "remove it" if subject != "dead_centre" else f"write {' or '.join(PLACES)}"
             yield Finding(f"the {whole} is one number of a range already", f"{where}.as", remedy)
@@ -130,7 +132,7 @@ def _taken(mechanism: Numbers, measure: Measure, where: str) -> Iterator[Finding
             yield Finding("the efficiency of the cycle is over all of it", f"{where}.over", "remove it")
     elif measure.at is not None and figure not in (None, "value"):
         what = f"the {figure} is of a range, not of a position"
-        yield Finding(what, f"{where}.as", "remove it, or say over: [0 deg, 90 deg] instead of at")
+        yield Finding(what, f"{where}.as", "remove it, or state over: [0 deg, 90 deg] instead of at")
     elif measure.at is None and figure == "value":
         yield Finding("a value is that at a position", f"{where}.as", "add at: 60 deg, or remove it")
 
@@ -164,7 +166,9 @@ def measure_values(mechanism: Numbers, numbers: ParameterSet) -> Iterator[Findin
             )
             yield Finding(what, f"{where}.over", "give two coordinates of the first driver, or two times")
         elif start == end:
-            yield Finding(f"the range begins and ends at {start:g}", f"{where}.over", "give it an extent, or say at: …")
+            yield Finding(
+                f"the range begins and ends at {start:g}", f"{where}.over", "give it an extent, or state at: …"
+            )
 
 
 def point_exists(mechanism: Numbers, name: str, where: str) -> Iterator[Finding]:

@@ -70,7 +70,11 @@ def contact(joint: Joint, where: str, spatial: bool) -> Iterator[Finding]:
         return
     if not turns and not slides:
         what = f"friction of a {kind} joint is not modelled"
-        reason = "nothing slips in it: remove it" if not PAIRS[kind].count else "state friction: 0 for this joint"
+        reason = (
+            "this joint has no sliding motion: remove it"
+            if not PAIRS[kind].count
+            else "state friction: 0 for this joint"
+        )
         yield Finding(what, f"{where}.friction", reason)
         return
     lacks = contact_lacks(joint, spatial)
@@ -160,19 +164,19 @@ def loop(mechanism: Numbers) -> Iterator[Finding]:
         yield Finding("one joint makes no loop", "loop", "add the joints and links up to the ground again")
     for kind, names in (("joint", [row.joint for row in rows]), ("link", [row.link for row in rows])):
         for name in sorted({name for name in names if names.count(name) > 1}):
-            yield Finding(f"the {kind} '{name}' stands in several rows", "loop", "give each row its own")
+            yield Finding(f"the {kind} '{name}' occurs in several rows", "loop", "give each row its own")
     fixed, links = mechanism.fixed_link, [row.link for row in rows]
     if fixed in mechanism.links and fixed not in links:
         where = "ground" if mechanism.ground else "loop"
         remedy = "let a row end at it: its link is " + ", ".join(f"'{one}'" for one in links) + " now"
-        yield Finding(f"the fixed link '{fixed}' is none of the links of the loop", where, remedy)
+        yield Finding(f"the fixed link '{fixed}' is not a link of the loop", where, remedy)
     for row in rows:
         yield from _row(row)
     for name in links:
         for point in mechanism.links[name].points if name in mechanism.links else ():
             if point in mechanism.stated_joints and name in mechanism.stated_joints[point].links:
                 what = f"the joint '{point}' is where the loop has it, and cannot be placed again"
-                yield Finding(what, f"links.{name}.points.{point}", "call the point otherwise")
+                yield Finding(what, f"links.{name}.points.{point}", "rename the point")
 
 
 def _row(row: LoopJoint) -> Iterator[Finding]:

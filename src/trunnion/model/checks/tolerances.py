@@ -123,12 +123,12 @@ def _number(known: Mapping[str, Entry], path: str, used: set[str], where: str) -
         what = f"'{path}' varies with the motion and has no one tolerance"
         yield Finding(what, where, "state one of a dimension in it")
     elif not may_vary(entry):
-        what = f"'{path}' is no number of the mechanism itself: nothing in it varies"
+        what = f"'{path}' is not a parameter of the mechanism"
         yield Finding(what, where, "state tolerances of dimensions, joints, links, loads, springs or drivers")
     elif path.startswith(DEFAULTS) and not any(one.alias == path for one in known.values()):
         yield Finding(f"no joint follows '{path}'", where, "name the number of a joint, as B.pin.clearance")
     elif path.startswith("dimensions.") and path.partition(".")[2] not in used:
-        yield Finding(f"nothing depends on '{path}'", where, "use it, or remove it", Severity.WARNING)
+        yield Finding(f"no result depends on '{path}'", where, "use it, or remove it", Severity.WARNING)
 
 
 def _shape(mechanism: Numbers, variation: Variation, where: str) -> Iterator[Finding]:
@@ -139,14 +139,18 @@ def _shape(mechanism: Numbers, variation: Variation, where: str) -> Iterator[Fin
         if getattr(variation, key) is not None and key not in takes:
             others = " or ".join(one for one, keys in DISTRIBUTIONS.items() if key in keys)
             own = ", ".join(takes) or "nothing but limits"
-            what = f"'{key}' means nothing to the distribution {name}"
-            yield Finding(what, f"{where}.{key}", f"remove it, or state distribution: {others}; {name} takes {own}")
+            what = f"'{key}' has no effect on the distribution {name}"
+            yield Finding(
+                what,
+                f"{where}.{key}",
+                f"remove it, or state distribution: {others}; the parameters of {name} are {own}",
+            )
     if name == "sample" and variation.values is None:
         yield Finding(
             "the measured deviations are missing", where, "add values: [0.01 mm, …], or give them by --sample"
         )
     if name == FULL_TURN and variation.limits is not None:
-        yield Finding("a direction over the whole turn has no limits", where, "remove them, or say uniform")
+        yield Finding("a direction over the whole turn has no limits", where, "remove them, or state uniform")
 
 
 def _default_distribution(mechanism: Numbers) -> Iterator[Finding]:
@@ -156,7 +160,7 @@ def _default_distribution(mechanism: Numbers) -> Iterator[Finding]:
         yield Finding(what, f"{where}.distribution", "state it in tolerances: {…}")
     for key in OPTIONS:
         if getattr(defaults, key, None) is not None and key not in DISTRIBUTIONS[defaults.distribution]:
-            what = f"'{key}' means nothing to the distribution {defaults.distribution}"
+            what = f"'{key}' has no effect on the distribution {defaults.distribution}"
             yield Finding(what, f"{where}.{key}", "remove it, or state its distribution")
 
 
@@ -186,21 +190,21 @@ def _limits(
     path, lower, upper = tolerance.path, tolerance.lower, tolerance.upper
     with np.errstate(all="ignore"):
         if not np.isfinite(np.var(np.atleast_1d(tolerance.options.get("values", 0.0)))):
-            yield Finding(f"the deviations of '{path}' have no finite variance", where, "remove the wild ones")
+            yield Finding(f"the deviations of '{path}' have no finite variance", where, "remove the outliers")
     unstated = variation.limits is None and written is None
     if unstated and not {"values"} & tolerance.options.keys() and tolerance.distribution != FULL_TURN:
-        remedy = "add limits: ±0.05 mm, or write them where the number stands, as 60 mm ± 0.05 mm"
+        remedy = "add limits: ±0.05 mm, or write them with the value, as 60 mm ± 0.05 mm"
         yield Finding(f"the limits of '{path}' are missing", where, remedy)
     if lower > upper:
         what = f"the lower limit {lower:g} is above the upper one {upper:g} (SI)"
         yield Finding(what, where, "write ± before a number that is not negative")
     if written is not None and variation.limits is not None and not np.allclose(written, (lower, upper), rtol=1e-9):
-        what = f"these limits go before those that stand with '{path}', {written[0]:g} to {written[1]:g} (SI)"
+        what = f"these limits override those stated with '{path}', {written[0]:g} to {written[1]:g} (SI)"
         yield Finding(what, where, "state them once", Severity.NOTE)
     if variation.direction:
         if not towards(path, numbers):
             what = f"'{path}' has no direction: the tilt and the offset of a misaligned axis have"
-            yield Finding(what, f"{where}.direction", "remove it; of an angle say {distribution: direction}")
+            yield Finding(what, f"{where}.direction", "remove it; for an angle state {distribution: direction}")
         elif tolerance.nominal + lower < -ROUNDING * tolerance.half_width:
             what = f"is the size of a run-out, from {tolerance.nominal + lower:g} on (SI): a size is not negative"
             yield Finding(what, where, "write +0.02/0 mm")
@@ -245,12 +249,12 @@ def _correlations(mechanism: Numbers, numbers: ParameterSet) -> Iterator[Finding
             sound = False
             yield Finding(f"'{name}' has no tolerance", where, "state one in tolerances: {…}, or leave it out")
         if len(paths) < 2 and len(one.of) < 2:
-            yield Finding("one number is correlated with nothing", where, "name two, as of: [AB, BC]")
+            yield Finding("a correlation needs two parameters", where, "name two, as of: [AB, BC]")
         for pair in map(frozenset, combinations(paths, 2)):
             if len(pair) < 2:
                 yield Finding(f"'{next(iter(pair))}' is named twice", where, "name two numbers")
             elif pair in first:
-                what = f"the correlation of {_both(pair)} stands in entry {first[pair] + 1} already"
+                what = f"the correlation of {_both(pair)} is given in entry {first[pair] + 1} already"
                 yield Finding(what, where, "keep one of them")
             first.setdefault(pair, row)
     if not sound:
@@ -260,7 +264,7 @@ def _correlations(mechanism: Numbers, numbers: ParameterSet) -> Iterator[Finding
         what = (
             f"these correlations contradict one another: the least eigenvalue of their matrix is {least:.3g}, below 0"
         )
-        yield Finding(what, "correlations", "numbers that both go with a third go with each other: bring them nearer 0")
+        yield Finding(what, "correlations", "the correlation matrix is not positive definite: reduce the coefficients")
 
 
 def _both(pair: frozenset[str]) -> str:

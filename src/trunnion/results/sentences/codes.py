@@ -13,9 +13,10 @@ from trunnion.results.sentences.sentence import Sentence, filled
 from trunnion.results.sentences.structure import STRUCTURE
 from trunnion.results.sentences.studies import STUDIES
 
-__all__ = ["SENTENCES", "finding_for"]
+__all__ = ["QUIET", "SENTENCES", "finding_for"]
 
 SENTENCES: dict[str, Sentence] = {**STRUCTURE, **CYCLE, **STUDIES, **RIG}
+QUIET = frozenset(code for code, sentence in SENTENCES.items() if sentence.quiet)
 
 
 def finding_for(

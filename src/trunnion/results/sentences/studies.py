@@ -9,74 +9,72 @@ from trunnion.results.sentences.sentence import ERROR, NOTE, WARNING, Sentence
 
 __all__ = ["STUDIES"]
 
-RELY = "rely on the samples"
+RELY = "use the samples"
 MAGNITUDES = "check the orders of magnitude of costs and bounds"
-WIDER = "allow narrower tolerances, widen a limit or ask for less"
+WIDER = "allow narrower tolerances, widen a limit or ask for a lower yield"
 
 
 def _carried(ratios: Mapping[str, float], links: Mapping[str, Sequence[str]], joint: str) -> str:
     """ratios: of the deviation with the pin's place on its other link, by joint; links: of the joints."""
-    told = ", ".join(f"'{links[name][0]}' in {name}: {ratio:.3g} times" for name, ratio in ratios.items())
+    other = ", ".join(f"'{links[name][0]}' in {name}: {ratio:.3g} times" for name, ratio in ratios.items())
     holes = ", ".join(f"'{links[name][1]}' in {name}" for name in ratios)
-    what = f"scatter and yield suppose that pins keep their places on the links of the holes ({holes}); on the other "
-    return f"{what}link the deviation is another ({told}); the worst case is of both"
+    what = f"scatter and yield assume that the position of the pin is fixed on the link with the hole ({holes}); if it "
+    return f"{what}is fixed on the other link, the deviation differs ({other}); the worst case covers both"
 
 
 def _curve(points: int, lost: int, least: float | None) -> str:
-    return f"limits of at least {least:.3g} times the stated ones can be kept" if least is not None else ""
+    return f"limits of at least {least:.3g} times the stated ones are feasible" if least is not None else ""
 
 
 PLAY = {
     "play.measures_left_out": Sentence(
         NOTE,
-        "play is known of measures {known} and effort, which {measures} is none of: left out",
-        "`trunnion tolerance` knows the others",
+        "left out: {measures}; this study covers the measures {known} and effort",
+        "use `trunnion tolerance` for other measures",
     ),
     "measure.none_stated": Sentence(
         NOTE,
-        "no measure is stated: {measures} taken, joints to the ground without a driver",
-        "state measures: in the model, or give --measure link.point.x",
+        "the model states no measure; {measures} are used (joints to the ground without a driver)",
+        "state measures: in the model, or use --measure link.point.x",
     ),
     "play.redundant": Sentence(
         WARNING,
-        "constraints are redundant: the worst case is an upper bound, for pins that must fit one another",
-        "the deviation supposes that each may lie anywhere",
+        "constraints are redundant: the worst case is an upper bound, because pins constrain one another",
+        "the deviation assumes that each pin can be anywhere within its play",
     ),
     "play.seats_not_taken": Sentence(
         NOTE,
-        "play is counted from the middle of the holes: the seats of {joints} are not taken",
-        "analyse takes them",
+        "play is relative to the middle of the holes: this study ignores the seats of {joints}",
+        "`trunnion analyse` uses them",
     ),
     "play.left_out": Sentence(
-        WARNING, "the play of {joints} is left out ({kinds})", "play is modelled in {modelled} joints"
+        WARNING, "the play of {joints} is left out ({kinds} joints)", "play is modelled in {modelled} joints"
     ),
     "play.gears": Sentence(
         WARNING,
-        "gears turn in {joints}: what their play does between the teeth is left out",
-        "a gear's centre off by e across the line of centres turns it by e over its pitch radius more",
+        "gears turn in {joints}: the effect of this play on the tooth contact is left out",
+        "an offset e of a gear's centre across the line of centres turns the gear by e over its pitch radius",
     ),
     "play.spin": Sentence(
         WARNING,
-        "'{link}' can spin about the line of {points[0]} and {points[1]}: it is taken not to, whatever the play",
-        "measure one of these points",
+        "'{link}' can spin about the line {points[0]}-{points[1]}; this study sets that spin to zero",
+        "measure one of these two points",
     ),
-    "play.no_answer": Sentence(ERROR, "{status} {at}", "no effect of play is known there"),
+    "play.no_answer": Sentence(ERROR, "{status} {at}", "the effect of play is undefined there"),
     "limit.exceeded": Sentence(
         ERROR,
-        "the worst case is {worst:.4g} {unit} at {at}, the limit is {limit:.4g} {unit}; it is above {over}",
-        "tighten the joints with the largest share",
+        "the worst case, {worst:~{unit}} at {at}, exceeds the limit of {limit:~{unit}}; it exceeds it {over}",
+        "reduce the play of the joints with the largest share",
     ),
-    "limit.kept": Sentence(
-        NOTE, "the worst case is {worst:.4g} {unit} at {at}, the limit is {limit:.4g} {unit}: it is kept"
-    ),
+    "limit.kept": Sentence(NOTE, "the worst case, {worst:~{unit}} at {at}, is within the limit of {limit:~{unit}}"),
 }
 
 SWEEP = {
     "sweep.no_answer": Sentence(
         ERROR,
-        "{points:,} of {of:#point} {points:#has/have} no figures, first at {at} ({positions:#position} without an "
-        "answer): {status}",
-        "run analyse with these values: it says where in the cycle, and why",
+        "{points:,} of {of:#point} {points:#has/have} no result, the first at {at} ({positions:#position} not solved): "
+        "{status}",
+        "run `trunnion analyse` with these values to see where in the cycle, and why",
     ),
     "sweep.measures_left_out": Sentence(
         NOTE,
@@ -84,190 +82,191 @@ SWEEP = {
             f"the model's measure{'s' * (len(measures) > 1)} {', '.join(measures)} "
             f"{'are' if len(measures) > 1 else 'is'} not in this sweep"
         ),
-        "name it by --measure, in Python by measures=[…]",
+        "add it with --measure, in Python with measures=[…]",
     ),
 }
 
 ASSEMBLY = {
     "assembly.apart": Sentence(ERROR, "{status} {at}", "check the lengths, or limit the range of the driver"),
-    "assembly.clearance_short": Sentence(ERROR, "the stated clearances do not close the loops {takes}", "{remedy}"),
+    "assembly.clearance_short": Sentence(
+        ERROR, "the stated clearances are too small to close the loops {takes}", "{remedy}"
+    ),
     "assembly.no_play": Sentence(ERROR, "{none} stay open by up to {by}", "{remedy}"),
     "assembly.unsettled": Sentence(
         ERROR,
         "{status} {at}",
-        "pins that share an axis hold each other along it: give one an end float, or make it cylindrical",
+        "pins on a common axis block each other along it: give one an end float, or make it cylindrical",
     ),
-    "assembly.no_need": Sentence(NOTE, "{why}: errors shift its links, and it needs no clearance"),
-    "assembly.fits": Sentence(NOTE, "the axes fit: the loops close without any clearance"),
+    "assembly.no_need": Sentence(NOTE, "{why}: errors only shift its links, so it needs no clearance"),
+    "assembly.fits": Sentence(NOTE, "the loops close without any clearance"),
     "assembly.clearance_enough": Sentence(
-        NOTE, "the stated clearances take up the errors: {told} of them is needed, {at}"
+        NOTE, "the stated clearances are sufficient: {told} times their size is needed, {at}"
     ),
 }
 
 TOLERANCE = {
-    "limit.missed": Sentence(ERROR, "limits not kept: {told}; {limits}", "{remedy}"),
+    "limit.missed": Sentence(ERROR, "limits not met: {told}; {limits}", "{remedy}"),
     "limit.missed_yield": Sentence(
-        ERROR, "limits not kept: {told}, {target_percent:.6g} % asked for; {limits}", "{remedy}"
+        ERROR, "limits not met: {told}, required {target_percent:.6g} %; {limits}", "{remedy}"
     ),
     "limit.missed_together": Sentence(
         ERROR,
-        "limits not kept: yield of all measures together {percent:.6g} % (95 % interval {percent_low:.5g} to "
-        "{percent_high:.5g} %), {target_percent:.6g} % asked for",
-        "narrower tolerances of the measure with the lowest yield first",
+        "limits not met: yield of all measures together {percent:.6g} % (95 % confidence interval {percent_low:.5g} to "
+        "{percent_high:.5g} %), required {target_percent:.6g} %",
+        "narrow the tolerances of the measure with the lowest yield first",
     ),
     "tolerance.seats_not_taken": Sentence(
         NOTE,
-        "pins lie anywhere in their holes: seats by loads of {joints} are not taken",
-        "analyse takes them",
+        "pins can be anywhere in their holes: this study ignores seat: loaded of {joints}",
+        "`trunnion analyse` uses it",
     ),
     "tolerance.correlations_left_out": Sentence(
         NOTE,
-        "RSS and worst case leave the correlations out: deviation, shares of variance and samples have them",
+        "RSS and worst case ignore the correlations; standard deviation, shares of variance and samples include them",
     ),
     "tolerance.indices_lost": Sentence(
         WARNING,
-        "{count:#sample} of the variance-based indices {count:#has/have} no answer and {count:#counts/count} as the "
+        "{count:#sample} of the variance-based indices {count:#was/were} not solved and {count:#counts/count} as the "
         "mean",
-        "narrower tolerances, or a place where all go together",
+        "narrow the tolerances, or take the measure at a position that all samples reach",
     ),
     "tolerance.measured_outside": Sentence(
         WARNING,
-        "{count:,} of {of:,} measured deviations are outside the limits {lower:g} to {upper:g}, the farthest "
-        "{farthest:g} (SI)",
-        "check their unit",
+        "{count:,} of {of:,} measured deviations are outside the tolerance {lower:g} to {upper:g}, the largest is "
+        "{farthest:g} (SI units)",
+        "check the unit of the data",
     ),
     "tolerance.negative": Sentence(
-        WARNING, "its limits let it be {least:g} (SI), which is negative", "narrow the limits"
+        WARNING, "its tolerance includes the negative value {least:g} (SI unit)", "narrow the tolerance"
     ),
-    "tolerance.nominal_no_answer": Sentence(ERROR, "nominal: {status} {at}", "nothing is known there"),
+    "tolerance.nominal_no_answer": Sentence(ERROR, "nominal mechanism: {status} {at}", "there is no result there"),
     "tolerance.near_singular": Sentence(
-        WARNING, "close to a dead centre {at}: first order says little there", "rely on the samples there"
+        WARNING, "close to a dead centre {at}: the first-order result is not reliable there", "use the samples there"
     ),
     "tolerance.nominal_no_figure": Sentence(
         ERROR,
-        "{measure}: the nominal mechanism has no such figure",
-        "take it at a place, or over a range, where there is one",
+        "{measure}: undefined for the nominal mechanism",
+        "take it at a position, or over a range, where it is defined",
     ),
     "first_order.one_sided": Sentence(
-        WARNING, "a relative speed is zero there: friction jumps, and first order is of one side", RELY
+        WARNING, "a joint is momentarily at rest there: friction jumps, and the first-order result is one-sided", RELY
     ),
-    "first_order.no_answer": Sentence(WARNING, "first order has no answer", RELY),
+    "first_order.no_answer": Sentence(WARNING, "the first-order analysis has no result", RELY),
     "first_order.corner_open": Sentence(
         WARNING,
-        "at the linear corner of the {end} deviation the mechanism has no answer",
-        "the tolerances let it not go together there",
+        "the mechanism cannot be solved at the tolerance limits that give the {end} deviation to first order",
+        "within these tolerances it cannot always be assembled",
     ),
     "first_order.worst_case_differs": Sentence(
         NOTE,
-        "the worst case found is {ratio:.2f} times that of first order",
-        "rely on the one found, and on samples",
+        "the worst case found by search is {ratio:.2f} times the first-order one",
+        "use the one found by search, and the samples",
     ),
     "first_order.scatter_differs": Sentence(
         WARNING,
-        "the samples scatter by {found:.4g} (SI), first order says {linear:.4g}",
-        "it is not linear within the tolerances: rely on the samples",
+        "the standard deviation of the samples is {found:.4g} (SI unit), the first-order one {linear:.4g}",
+        "the measure is not linear within the tolerances: use the samples",
     ),
     "play.carried": Sentence(
         NOTE,
         _carried,
-        lambda ratios, links, joint: f"say joints.{joint}.seat_on: {links[joint][0]} or {links[joint][1]}",
+        lambda ratios, links, joint: f"state joints.{joint}.seat_on: {links[joint][0]} or {links[joint][1]}",
     ),
     "samples.no_answer": Sentence(
         ERROR,
-        "{count:,} of {samples:#sample} ({share:.2%}) {count:#has/have} no answer: {why}",
-        "they count as outside every limit; moments are of the others",
+        "{count:,} of {samples:#sample} ({share:.2%}) could not be solved: {why}",
+        "they count as outside every limit; mean and standard deviation are of the others",
     ),
     "samples.stopped": Sentence(
         WARNING,
         lambda kept, done, samples: f"stopped before the end: {done:,} of {counted(samples, 'sample')}",
-        lambda kept, done, samples: "go on with --resume" if kept else "with --checkpoint FILE what is done is kept",
+        lambda kept, done, samples: "continue with --resume" if kept else "use --checkpoint FILE to keep what is done",
     ),
     "samples.machines": Sentence(
         NOTE,
-        "machines of {kinds} kinds took part, whose sines or logarithms differ in the last bit",
-        "as good an answer, but another mix may give other last bits; use machines of one kind",
+        "the samples were computed on {kinds} kinds of machines, whose sines or logarithms differ in the last bit",
+        "use machines of one kind if results must be reproducible to the last bit",
     ),
 }
 
 ALLOCATION = {
-    "allocation.proven": Sentence(
-        NOTE, "no tolerances cost less, to first order: proven to {gap:.1e} of what they change"
-    ),
+    "allocation.proven": Sentence(NOTE, "minimum cost to first order (relative optimality gap {gap:.0e})", quiet=True),
     "allocation.proven_margin": Sentence(
-        NOTE, "no tolerances with the same margin at every limit cost less, to first order"
+        NOTE, "minimum cost to first order, for the same relative margin at every limit"
     ),
     "allocation.proven_roughly": Sentence(
-        WARNING, "the optimum is proven only to {gap:.1e} of what the tolerances cost", MAGNITUDES
+        WARNING, "the optimality gap is {gap:.1e} of the cost of the tolerances", MAGNITUDES
     ),
-    "allocation.choice_proven_roughly": Sentence(WARNING, "the optimum is proven only to {gap:.1e} of the cost"),
+    "allocation.choice_proven_roughly": Sentence(WARNING, "the optimality gap is {gap:.1e} of the cost"),
     "allocation.not_found": Sentence(
-        ERROR, "the solver found no allocation, though nothing says that the limits cannot be kept", MAGNITUDES
+        ERROR, "the solver found no allocation, although the limits may be feasible", MAGNITUDES
     ),
     "allocation.no_choice": Sentence(
-        ERROR, "no choice of processes keeps the limits", "widen a limit or add a finer process"
+        ERROR, "no choice of processes meets the limits", "widen a limit or add a finer process"
     ),
     "allocation.no_common_option": Sentence(
-        ERROR, "no option of the group lies between the bounds of all", "widen them"
+        ERROR, "no option of the group lies within the bounds of all its members", "widen the bounds"
     ),
-    "allocation.unbounded": Sentence(ERROR, "no limit bounds this tolerance: the wider, the cheaper", "state `most`"),
+    "allocation.unbounded": Sentence(ERROR, "no limit bounds this tolerance, and wider is cheaper", "state `most`"),
     "allocation.impossible": Sentence(
         ERROR,
-        "no tolerances keep the limit {limit_told}: with all at their least it takes {takes_told}{ratio}{more}",
-        "widen the limit, or narrow first '{largest}', {kept} and has the largest part",
+        "the limit {limit_told} is infeasible: with all tolerances at their least the deviation is "
+        "{takes_told}{ratio}{more}",
+        "widen the limit, or first narrow '{largest}', {kept} and has the largest share",
     ),
     "allocation.nominal_outside": Sentence(
         ERROR,
-        "the nominal figure is {told}, {word} is {limit}: no tolerance mends that",
+        "the nominal value is {told}, {word} is {limit}: tolerances cannot correct that",
         "change the mechanism or the bound",
     ),
     "allocation.unknown": Sentence(
         WARNING,
-        "first order says nothing of it: no tolerances were chosen for its limits",
-        "see whether the samples keep them",
+        "the measure has no first-order result: its limits were ignored in the allocation",
+        "check with the samples whether they are met",
     ),
     "allocation.not_for_sale": Sentence(
-        WARNING, "cannot be bought, {why}", "remove the cost; the tolerance stays as it is"
+        WARNING, "this tolerance is not allocated: {why}", "remove the cost; the tolerance stays as stated"
     ),
     "allocation.unsettled": Sentence(
         WARNING,
-        "what the tolerances do depends on themselves, and has not settled after {rounds} rounds",
-        "rely on the verification",
+        "the effects depend on the tolerances themselves and did not converge in {rounds} iterations",
+        "use the verification",
     ),
     "allocation.narrowed": Sentence(
-        NOTE, "its limits were taken {percent:.2g} % narrower, so that the mechanism itself keeps them"
+        NOTE, "its limits were narrowed by {percent:.2g} % so that the mechanism meets them exactly, not to first order"
     ),
     "allocation.correlations_left_out": Sentence(
-        WARNING, "the criterion {criterion} leaves the correlations out", "ask for a yield, which has them"
+        WARNING, "the criterion {criterion} ignores the correlations", "use a yield, which includes them"
     ),
     "allocation.curve_short": Sentence(
-        NOTE, "{lost} of the {points} points of the curve {lost:#has/have} no tolerances that keep the limits", _curve
+        NOTE, "{lost} of the {points} points of the curve {lost:#is/are} infeasible", _curve
     ),
     "allocation.worst_case_beyond": Sentence(
         WARNING,
-        "the worst case found on the mechanism is {worst:+.6g} {unit}, {percent:.2g} % beyond the limit {limit:+.6g} "
-        "{unit} that first order keeps",
-        "ask for `exact`, which takes them narrower",
+        "the worst case of the mechanism exceeds the limit {limit:~{unit}} by {percent:.2g} %; to first order it "
+        "is met",
+        "use `exact`, which narrows the tolerances",
     ),
     "yield.short": Sentence(
         ERROR,
-        "the yield of the samples is {share:.6g}, {target:g} was asked for",
-        "ask for more, or allow narrower tolerances",
+        "the yield of the samples is {share:.6g}, below the required {target:g}",
+        "require a higher yield, or allow narrower tolerances",
     ),
     "yield.uncertain": Sentence(
         NOTE,
-        "the yield of the samples is {share:.6g}, less than {target:g}, which lies in its interval {low:.6g} to "
-        "{high:.6g}",
-        "take more samples, or ask for more, to be surer",
+        "the yield of the samples is {share:.6g}, below {target:g}, which is within its confidence interval "
+        "{low:.6g} to {high:.6g}",
+        "take more samples, or require a higher yield",
     ),
     "yield.below_rss": Sentence(
         WARNING,
-        "the yield of the samples is {share:.6g}, an RSS within the limits stands for {target:g}",
-        "ask for that yield, which takes distributions, means and correlations as they are",
+        "the yield of the samples is {share:.6g}; an RSS within the limits implies {target:g}",
+        "require that yield instead, which uses distributions, means and correlations as stated",
     ),
     "yield.narrowest": Sentence(
-        ERROR, "with all tolerances as narrow as they can be the yield is {share:.6g}, not {target:g}", WIDER
+        ERROR, "with all tolerances at their least the yield is {share:.6g}, below {target:g}", WIDER
     ),
-    "yield.best": Sentence(ERROR, "the best yield that was sampled is {share:.6g}, not {target:g}", WIDER),
+    "yield.best": Sentence(ERROR, "the best yield found is {share:.6g}, below {target:g}", WIDER),
 }
 
 STUDIES: dict[str, Sentence] = {**PLAY, **SWEEP, **ASSEMBLY, **TOLERANCE, **ALLOCATION}

@@ -42,10 +42,10 @@ class Verdict(IntEnum):
         return one
 
     WITHIN = 0, "within"
-    OFFSET = 1, "within apart from a constant offset"
+    OFFSET = 1, "offset only"
     NOT = 2, "not within"
-    UNKNOWN = 3, "uncertainty not known"
-    NOTHING = 4, "nothing to compare"
+    UNKNOWN = 3, "U unknown"
+    NOTHING = 4, "no data"
 
 
 @dataclass(frozen=True, eq=False)

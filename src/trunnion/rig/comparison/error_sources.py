@@ -30,7 +30,7 @@ KINDS = {
     "zero": "a constant offset",
     "gain": "a wrong gain",
     "shift": "a shift of the crank angle",
-    "mirror": "a crank angle that runs the other way",
+    "mirror": "a crank angle with the wrong sign",
     "zero and gain": "an offset and a wrong gain",
 }
 

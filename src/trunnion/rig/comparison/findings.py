@@ -83,7 +83,7 @@ def gathered(findings: Iterable[Finding]) -> list[Finding]:
         if len(rows) > 1:
             where = first.where if len({one.where for one in rows}) == 1 else f"{first.where.partition(' ')[0]}s"
             some = ", ".join(files[:4]) + (", …" if len(files) > 4 else "")
-            what = f"{first.what} — and so {len(rows)} times in all" + (f": {some}" if files else "")
+            what = f"{first.what} — {len(rows)} such findings" + (f": {some}" if files else "")
             first = replace(first, what=what, where=where, file="", line=None)
         found.append(first)
     return found
@@ -134,9 +134,9 @@ def _of_channel(name: str, measures: str, found: Sequence[Compared]) -> Iterator
     for kind, members in by_cause.items():
         yield _explained(name, measures, kind, members, len(cases))
     unknown = [len(pair.course.turns) for _, pair in cases if pair.judged.verdict is Verdict.UNKNOWN]
-    once = "was measured in one turn only"
+    once = "measured in one turn only"
     if max(unknown, default=1) > 1:
-        once = f"has values of no more than one turn at a position, of up to {max(unknown)} that were measured"
+        once = f"has values from only one turn at a position, although up to {max(unknown)} turns were measured"
     turns = max(unknown, default=1)
     for verdict, code, figures in (
         (Verdict.UNKNOWN, "compare.turns_few", {"turns": turns}), (Verdict.NOTHING, "compare.nothing", {})
@@ -160,7 +160,7 @@ def _explained(
         story, remedy = _story(name, measures, kind, [_size(pair, kind) for _, pair in members], members)
         phrases = {"cases": where, "story": story, "remedy": remedy}
         return finding_for("compare.offset", f"channels.{name}", phrases=phrases, within_percent=100 * worst)
-    remedy = "look at the residual along the cycle; `trunnion identify` fits numbers of the model to it"
+    remedy = "see the residual over the cycle; `trunnion identify` fits parameters of the model to the data"
     phrases = {"cases": where, "rms_told": said(rms, unit), "explained": "", "remedy": remedy}
     figures: dict[str, Any] = {"within_percent": 100 * worst, "rms": rms, "several": len(members) > 1, "cause": kind}
     if kind:
@@ -182,15 +182,15 @@ def _size(pair: ChannelComparison, kind: str) -> Cause:
 
 
 REMEDIES = {
-    "flat": "look at the sensor and its cable, and at the column in the mapping",
-    "mirror": "state angle: {sign: -1} in the mapping, or take it away, and look at the zero of the angle",
-    "sign": "state sign: -1 of the channel in the mapping, or take it away",
-    "zero": "look at the zero of the channel, or at what loads the model lacks",
-    "gain": "look at the gain of the channel and its unit, or at friction and loads of the model",
-    "shift": "look at the zero of the angle, and at delays of the channel",
-    "zero and gain": "look at zero and gain of the channel",
+    "flat": "check the sensor, its cable, and the column in the mapping",
+    "mirror": "state angle: {sign: -1} in the mapping, or remove it, and check the zero of the angle",
+    "sign": "state sign: -1 for the channel in the mapping, or remove it",
+    "zero": "check the zero of the channel, and whether the model lacks a load",
+    "gain": "check gain and unit of the channel, and friction and loads of the model",
+    "shift": "check the zero of the angle, and delays of the channel",
+    "zero and gain": "check zero and gain of the channel",
 }
-MODEL = "it is not the same in all conditions: look at friction and loads of the model, not at the sensor"
+MODEL = "it differs between conditions: check friction and loads of the model, not the sensor"
 
 
 def _story(
@@ -204,7 +204,7 @@ def _story(
     if driver is not None and driver.speed is not None and kind in ("zero", "gain"):  # not one that swings
         speed = float(np.nanmean(pair.course.mean))
         story = _range(values, unit) if kind == "zero" else _percent(values)
-        remedy = f"set: {{{subject}.speed: {{mean: {name}}}}} in the mapping takes the speed that was"
+        remedy = f"set: {{{subject}.speed: {{mean: {name}}}}} in the mapping uses the measured speed"
         return f"another speed of the driver, measured {said(speed, unit)} ({KINDS[kind]} of {story})", remedy
     if kind == "sign":
         alike = pair.judged.correlation
@@ -212,15 +212,15 @@ def _story(
     elif kind == "zero":
         story = f"a constant offset of {_range(values, unit)}"
     elif kind == "gain":
-        story = f"a gain that is {_times(values) or f'off by {_percent(values)}'}"
+        story = f"a gain {_times(values)}" if _times(values) else f"a gain error of {_percent(values)}"
     elif kind == "flat":
-        story = f"a reading that stays at {_range(values, unit, False)} whatever the crank angle"
+        story = f"a constant reading of {_range(values, unit, False)}"
     elif kind == "shift":
         story = _ahead(values, [one for one, _ in members])
     elif kind == "mirror":
         story = KINDS[kind]
     else:
-        story = f"an offset of {_range(values, unit)} and a gain off by {_percent([one.gain for one in sizes])}"
+        story = f"an offset of {_range(values, unit)} and a gain error of {_percent([one.gain for one in sizes])}"
     return story, MODEL if kind in ("zero", "gain") and _differ(kind, sizes, members) else REMEDIES[kind]
 
 
@@ -239,7 +239,7 @@ def _times(values: Sequence[float]) -> str:
     if max(abs(one) for one in values) < FAR:
         return ""
     low, high = f"{1 + min(values):.3g}", f"{1 + max(values):.3g}"
-    return f"{low if low == high else f'{low} to {high}'} times what it should be"
+    return f"{low if low == high else f'{low} to {high}'} times its true value"
 
 
 def _percent(values: Sequence[float]) -> str:
@@ -253,9 +253,8 @@ def _percent(values: Sequence[float]) -> str:
 def _ahead(shares: Sequence[float], found: Sequence[Compared]) -> str:
     spans = [share * one.model.span for share, one in zip(shares, found, strict=True)]
     late = [-share * one.model.run.cycle.duration * 1e3 for share, one in zip(shares, found, strict=True)]
-    return (
-        f"the crank angle read off by {_range(spans, found[0].model.unit)}, or a delay of {_range(late, 'ms', False)},"
-    )
+    angle, delay = _range(spans, found[0].model.unit), _range(late, "ms", False)
+    return f"an error of {angle} in the crank angle, or a delay of {delay},"
 
 
 def _shifted(found: Sequence[Compared]) -> list[tuple[str, Compared, Cause]]:

@@ -48,7 +48,7 @@ VARIABLES: dict[str, Variable] = {
     "uncertainty": Variable(COURSE, "", "standard uncertainty of the mean: scatter, zero, gain"),
     "expanded": Variable(COURSE, "", "expanded uncertainty U of the mean"),
     "model": Variable(COURSE, "", "the model with the values of the condition"),
-    "residual": Variable(COURSE, "", "measured less model"),
+    "residual": Variable(COURSE, "", "measured minus model"),
     "compared": Variable(COURSE, "1", "1 where the position counts in the figures of the channel", np.int8),
     "turns": Variable(CC, "1", "turns that were measured", np.int32),
     "accuracy_zero": Variable(CC, "", "standard uncertainty of the zero"),
@@ -60,14 +60,14 @@ VARIABLES: dict[str, Variable] = {
     "bias_expanded": Variable(CC, "", "expanded uncertainty of the bias"),
     "rms_unbiased": Variable(CC, "", "root mean square of the residual less the bias"),
     "within": Variable(CC, "1", "share of the positions within ±U"),
-    "within_least": Variable(CC, "1", "share from which the course is taken to be within"),
+    "within_least": Variable(CC, "1", "least share of agreeing positions for agreement of the signal"),
     "correlation": Variable(CC, "1", "correlation of measured and model over the positions"),
     "verdict": Variable(CC, "1", "code of the verdict; see the attribute verdict_meanings", np.int8),
     "efficiency": Variable(C, "1", "measured efficiency"),
     "efficiency_expanded": Variable(C, "1", "expanded uncertainty of the measured efficiency"),
     "efficiency_model": Variable(C, "1", "efficiency of the model"),
     "efficiency_within": Variable(
-        C, "1", "1 where the model's efficiency lies within ±U, −1 where one is not known", np.int8
+        C, "1", "1 where the model's efficiency is within ±U, −1 where one is unknown", np.int8
     ),
 }
 EFFICIENCY = [name for name in VARIABLES if name.startswith("efficiency")]

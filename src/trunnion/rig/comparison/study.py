@@ -129,13 +129,13 @@ def _efficiency(condition: Condition, model: Modelled, joints: Mapping[str, str]
         first = error.findings[0]
         return Efficient(model=_of_model(condition, model, joints), reason=(first.what, first.remedy))
     if measured.turns < 2:
-        once = "there is one turn only: without scatter its uncertainty is not known", "measure more turns"
+        once = "there is only one turn: the uncertainty cannot be estimated without scatter", "measure more turns"
         return Efficient(measured.value, model=_of_model(condition, model, joints), reason=once)
     wide = measured.factor(coverage) * measured.uncertainty
-    wrong = "a sign, a gain, a unit or a column of its channels is wrong", "hold their means against what they measure"
+    wrong = "a sign, a gain, a unit or a column of its channels is wrong", "check their means"
     if wide > VAGUE:
         return Efficient(measured.value, model=_of_model(condition, model, joints),
-                         reason=(f"its U of {wide:.3g} tells nothing: {wrong[0]}", wrong[1]))  # fmt: skip
+                         reason=(f"its U of {wide:.3g} is not meaningful: {wrong[0]}", wrong[1]))  # fmt: skip
     if measured.value > 1 + wide:
         return Efficient(measured.value, model=_of_model(condition, model, joints),
                          reason=(f"{measured.value:.4g} is above 1: {wrong[0]}", wrong[1]))  # fmt: skip

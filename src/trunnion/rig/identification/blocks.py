@@ -184,6 +184,6 @@ def _share(turns: Array, share: float, condition: Condition) -> int:
     count = max(1, round(share * len(turns)))
     if count >= len(turns):
         what = f"has {len(turns)} turn{'s' * (len(turns) != 1)}: none would be left to fit"
-        remedy = "hold out whole conditions by name, or a smaller share"
+        remedy = "name whole conditions to hold out, or give a smaller share"
         raise MechanismError(Finding(what, f"condition {condition.name}", remedy))
     return count

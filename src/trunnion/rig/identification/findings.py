@@ -98,7 +98,7 @@ def _speeds(judged: Assessment) -> Iterator[Finding]:
     yield from other_speed(driver, [row for row in rows if np.isfinite(row[2])], len(rows))
 
 
-# ---- what cannot be told apart --------------------------------------------------------------------------------
+# ---- what is not identifiable ---------------------------------------------------------------------------------
 
 
 def _groups(judged: Assessment) -> Iterator[Finding]:
@@ -109,29 +109,29 @@ def _groups(judged: Assessment) -> Iterator[Finding]:
         if len(group.members) == 1:
             yield finding_for("parameter.no_effect", where, name=names[0], phrases={"channels": channels})
             continue
-        verb = "act on" if group.exact else "act nearly alike on"
-        alike = f"{_joined(names)} {verb} {channels}{' in the same way' if group.exact else ''}"
+        same = "the same" if group.exact else "nearly the same"
+        alike = f"{_joined(names)} are not separately identifiable: they have {same} effect on {channels}"
         some = "one" if len(names) == 2 else "some"
         phrases = {"alike": alike, "known": _known(judged, group, names), "some": some}
         yield finding_for("parameter.not_told_apart", where, phrases=phrases, names=names)
 
 
 def _near(judged: Assessment) -> Iterator[Finding]:
-    """Pairs that are told apart, but badly: what of them is known far better than either."""
+    """Pairs that are separately identifiable, but badly: what of them is known far better than either."""
     n = judged.problem.count
     size = sizes_of(judged.problem, judged.found.x)
     for p in range(n):
         for q in range(p):
-            if not abs(judged.correlation[p, q]) > ALIKE:  # NaN of what is not told
+            if not abs(judged.correlation[p, q]) > ALIKE:  # NaN of what is not identifiable
                 continue
             pair = (q, p)
             known = known_of(judged.problem, judged.found.x, judged.found.spread, pair, size)
             names = [_name(judged, i) for i in pair]
             together = f"{judged.correlation[p, q]:.3f}".replace("-", "−")
-            said = (
+            best = (
                 f": {_known(judged, InseparableUnknowns(pair, known, exact=False), names, short=True)}" if known else ""
             )
-            phrases = {"known": said, "correlation_told": together}
+            phrases = {"known": best, "correlation_told": together}
             correlation = judged.correlation[p, q]
             yield finding_for(
                 "parameter.hardly_told_apart", f"parameter {names[1]}", phrases=phrases, other=names[0],
@@ -149,28 +149,28 @@ def _name(judged: Assessment, i: int) -> str:
 def _known(judged: Assessment, group: InseparableUnknowns, names: Sequence[str], short: bool = False) -> str:
     """What of them is known, and that the rest is not; short: of what is known only."""
     if not group.known:
-        return "no combination of them is known"
+        return "no combination of them is identifiable"
     units = [_unit(judged, i) for i in group.members]
     pair = len(names) == 2
     if pair:
         one = group.known[0]
-        said = amount(one.value, one.uncertainty, _leading(one, units) if one.form == "sum" else "1")
+        result = amount(one.value, one.uncertainty, _leading(one, units) if one.form == "sum" else "1")
         if short:
             subject = f"their {one.form}" if one.form != "sum" else _formula(one, names, units)
-            return f"{subject} = {said} is known best"
+            return f"{subject} = {result} is determined best"
         other = {"sum": "difference", "product": "ratio", "ratio": "product"}[one.form]
         if one.form == "sum" and one.factors == (1.0, 1.0):
-            return f"their sum is known, {said}, their {other} is not"
+            return f"their sum is determined, {result}, their {other} is not"
         if one.form == "sum" and one.factors == (1.0, -1.0):
-            return f"their difference is known, {said}, their sum is not"
+            return f"their difference is determined, {result}, their sum is not"
         if one.form != "sum":
-            return f"their {one.form} is known, {said}, neither alone"
-        return f"{_formula(one, names, units)} = {said} is known, neither alone"
+            return f"their {one.form} is determined, {result}, neither alone"
+        return f"{_formula(one, names, units)} = {result} is determined, neither alone"
     listed = "; ".join(
         f"{_formula(one, names, units)} = {amount(one.value, one.uncertainty, _leading(one, units))}"
         for one in group.known
     )
-    many = f"{_count(len(group.known), 'combination')} of them {'is' if len(group.known) == 1 else 'are'} known"
+    many = f"{_count(len(group.known), 'combination')} of them {'is' if len(group.known) == 1 else 'are'} determined"
     return f"{many}, none alone: {listed}"
 
 
@@ -259,7 +259,7 @@ def _exact(judged: Assessment) -> Iterator[Finding]:
     forces = [channel for channel in bare if not measures[channel].of_motion]
     for channels, severity in ((forces, Severity.WARNING), ([one for one in bare if one not in forces], Severity.NOTE)):
         if channels:
-            narrow = ", and the intervals are too narrow by that" if severity is Severity.WARNING else ""
+            narrow = ", and the intervals are too narrow" if severity is Severity.WARNING else ""
             phrases = {"channels": _joined(channels), "too_narrow": narrow}
             yield finding_for("sensor.no_accuracy", "sensors", severity=severity, phrases=phrases)
 
@@ -273,7 +273,7 @@ def _data(judged: Assessment) -> Iterator[Finding]:
         yield finding_for("data.left_out", "data", count=out, positions=used + out)
     locked = sum(int(np.count_nonzero(status == Status.LOCKED)) for status in courses.status)
     lost = sum(int(np.count_nonzero(status >= Status.NOT_CONVERGED)) for status in courses.status) - locked
-    for number, why in ((locked, "locked by friction"), (lost, "without an answer")):
+    for number, why in ((locked, "locked by friction"), (lost, "without a solution")):
         if number:
             yield finding_for("fit.no_answer", "fit", phrases={"why": why}, count=number)
 
@@ -286,7 +286,7 @@ def _held(judged: Assessment) -> Iterator[Finding]:
     trust = judged.trust
     conditions = judged.found.measurement.conditions
     held = list(dict.fromkeys(conditions[judged.problem.blocks[one.block].condition].name for one in rows))
-    names = "; ".join(held) if len(held) <= MOST_NAMED else f"of {len(held)} conditions"
+    names = "; ".join(held) if len(held) <= MOST_NAMED else f"{len(held)} conditions"
     phrases = {"names": names}
     if not np.isfinite(trust):
         yield finding_for("held_out.untested", "hold_out", phrases=phrases)

@@ -83,13 +83,13 @@ def _driven(judged: Assessment) -> list[list[float] | None]:
 
 VARIABLES = {
     "start": Variable(("parameter",), "of the parameter", "start of the search"),
-    "estimate": Variable(("parameter",), "of the parameter", "estimate; NaN if the data do not tell it"),
+    "estimate": Variable(("parameter",), "of the parameter", "estimate; NaN if not identifiable"),
     "standard_uncertainty": Variable(("parameter",), "of the parameter", "standard uncertainty of the estimate"),
     "lower": Variable(("parameter",), "of the parameter", "lower end of the 95 % interval"),
     "upper": Variable(("parameter",), "of the parameter", "upper end of the 95 % interval"),
     "degrees_of_freedom": Variable(("parameter",), "1", "effective degrees of freedom of the standard uncertainty"),
     "limit": Variable(("parameter",), "1", "−1 on the lower limit, 1 on the upper: the interval is one-sided"),
-    "told": Variable(("parameter",), "1", "1 if the data tell it, 0 if not"),
+    "told": Variable(("parameter",), "1", "1 if identifiable, 0 if not"),
     "correlation": Variable(("parameter", "parameter_2"), "1", "correlation of the estimates"),
     "share": Variable(("parameter", "source"), "1", "share of a source in the variance of an estimate"),
     "singular_value": Variable(
@@ -102,37 +102,37 @@ VARIABLES = {
         ("channel", "condition"), "of the channel", "root mean square of the residual with the estimates"
     ),
     "rms_expected": Variable(
-        ("channel", "condition"), "of the channel", "what the scatter between turns explains of it"
+        ("channel", "condition"), "of the channel", "its expected value from the scatter between turns"
     ),
     "used": Variable(("channel", "condition"), "1", "positions used"),
     "left_out": Variable(("channel", "condition"), "1", "positions with data that are not used"),
     "turns": Variable(("channel", "condition"), "1", "turns used"),
-    "held_out_turns": Variable(("channel", "condition"), "1", "turns held out"),
+    "held_out_turns": Variable(("channel", "condition"), "1", "held-out turns"),
     "held_out_before": Variable(
         ("channel", "condition"),
         "of the channel",
-        "root mean square of the residual of what was held out, at the start",
+        "root mean square of the residual of the held-out data, at the start values",
     ),
     "held_out_after": Variable(("channel", "condition"), "of the channel", "the same with the estimates"),
     "held_out_expected": Variable(
         ("channel", "condition"),
         "of the channel",
-        "what its scatter and the uncertainty of the prediction explain of it",
+        "its expected value from the scatter and the uncertainty of the prediction",
     ),
-    "reduced_chi_squared": Variable((), "1", "χ² of the residuals over what the scatter between turns explains"),
+    "reduced_chi_squared": Variable((), "1", "χ² of the residuals relative to the scatter between turns"),
     "chi_squared_freedom": Variable((), "1", "degrees of freedom of that χ²"),
     "chi_squared_chance": Variable((), "1", "chance of a larger one if the model is right"),
-    "turn_correlation": Variable((), "1", "correlation of what each turn adds with the turn before it"),
-    "hold_out_ratio": Variable((), "1", "residuals of what was held out over what is expected of them"),
+    "turn_correlation": Variable((), "1", "correlation of the contributions of successive turns"),
+    "hold_out_ratio": Variable((), "1", "residuals of the held-out data over their expected value"),
     "phase": Variable(("condition", "position"), "1", "share of the cycle"),
     "measured": Variable(("channel", "condition", "position"), "of the channel", "mean over the turns"),
     "residual_before": Variable(
-        ("channel", "condition", "position"), "of the channel", "measured less model, at the start"
+        ("channel", "condition", "position"), "of the channel", "measured minus model, at the start"
     ),
     "residual_after": Variable(
         ("channel", "condition", "position"),
         "of the channel",
-        "measured less what the sensor would read with the estimates",
+        "measured value minus predicted reading of the sensor",
     ),
     "residual_uncertainty": Variable(
         ("channel", "condition", "position"), "of the channel", "standard uncertainty of the mean over the turns"

@@ -133,7 +133,7 @@ def _check(sensors: str, delay: float | None, guard: int | None, starts: int | N
     if guard is not None and guard < 0:
         raise MechanismError(Finding(f"{guard} positions cannot be left out", "guard", "give 0 or more"))
     if starts is not None and starts < 1:
-        raise MechanismError(Finding(f"{starts} starts find nothing", "starts", "give 1 or more"))
+        raise MechanismError(Finding(f"the number of start points is {starts}", "starts", "give 1 or more"))
 
 
 def _telling(model: Model, blocks: list[Block]) -> tuple[Model, list[Block]]:
@@ -199,7 +199,7 @@ def _measures(mechanism: Mechanism, run: Run, blocks: Sequence[Block]) -> dict[s
     for block in blocks:
         if texts.setdefault(block.channel, block.course.measures) != block.course.measures:
             what = f"measures {texts[block.channel]} in one condition and {block.course.measures} in another"
-            raise MechanismError(Finding(what, f"channel {block.channel}", "give them channels of their own"))
+            raise MechanismError(Finding(what, f"channel {block.channel}", "use separate channels"))
     found = {name: named(mechanism, [text], run.values)[0] for name, text in texts.items()}
     for name, measure in found.items():
         if not measure.everywhere or not (measure.single(run.system) or measure.kind == EFFICIENCY):

@@ -160,11 +160,11 @@ def _unusable(problem: FitProblem, start: Array) -> Iterator[Finding]:
         return
     if not any(np.any(np.isfinite(block.mean)) for block in problem.blocks if block.fitted):
         what = "no channel has a value at any position"
-        yield Finding(what, "data", "look at the gaps and columns with `trunnion data`")
+        yield Finding(what, "data", "check the gaps and columns with `trunnion data`")
         return
     bare = replace(problem, guard=0)
     if _any(bare, start):
-        what = "all positions are left out: each is beside one where a friction turns round"
+        what = "all positions are left out: each is next to a friction reversal"
         yield Finding(what, "guard", "give a smaller guard, or resample to more positions")
         return
     codes = np.concatenate([np.asarray(one) for one in problem.courses(start).status])
@@ -174,7 +174,7 @@ def _unusable(problem: FitProblem, start: Array) -> Iterator[Finding]:
         yield Finding(what, "data", "measure at more positions")
         return
     what = f"no position of the data has an answer of the model: {worst.text}"
-    yield Finding(what, "start", "give a start from which it runs, or look at it with analyse")
+    yield Finding(what, "start", "give start values with which the model has a solution, see `trunnion analyse`")
 
 
 def _dead(problem: FitProblem, start: Array) -> Iterator[Finding]:
@@ -194,5 +194,5 @@ def _dead(problem: FitProblem, start: Array) -> Iterator[Finding]:
         _, value, low, high = rows[0]
         many = f" in {len(rows)} conditions" if len(rows) > 1 else ""
         what = f"reads {value:.4g} at all positions of all turns{many}, where the model has {low:.4g} to {high:.4g}"
-        remedy = "look at the sensor, its column and its gain, or name the other channels"
+        remedy = "check the sensor, its column and its gain, or name the other channels"
         yield Finding(what, f"channel {channel}", remedy)

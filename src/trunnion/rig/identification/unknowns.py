@@ -50,7 +50,7 @@ def described(mechanism: Mechanism, parameters: Parameters) -> dict[str, tuple[s
     stated = parameters if isinstance(parameters, Mapping) else {name: [name] for name in parameters}
     if not stated:
         remedy = "name one, such as joint_defaults.friction.coefficient"
-        raise MechanismError(Finding("there is nothing to identify", "parameters", remedy))
+        raise MechanismError(Finding("no parameter to identify is given", "parameters", remedy))
     findings: list[Finding] = []
     found: dict[str, tuple[str, ...]] = {}
     owners: dict[str, str] = {}
@@ -80,7 +80,7 @@ def unknowns(
     """The unknowns of a mechanism that states all their numbers; start: of some, by name."""
     extra = [name for name in start if name not in described]
     if extra:
-        what = f"'{extra[0]}' is none of the parameters"
+        what = f"'{extra[0]}' is not one of the parameters"
         raise MechanismError(Finding(what, "start", f"they are {', '.join(described)}"))
     values = mechanism.parameters()
     kinds = measured(mechanism, mechanism.parameter_set.entries.values())
@@ -94,7 +94,7 @@ def unknowns(
         units = {PLAIN.get(kinds[path].unit, kinds[path].unit) for path in paths}
         if len(units) > 1:
             what = f"its numbers are not of one kind: {', '.join(sorted(units))}"
-            findings.append(Finding(what, f"parameter {name}", "give each kind a parameter of its own"))
+            findings.append(Finding(what, f"parameter {name}", "use one parameter for each kind"))
             continue
         before = tuple(float(np.ravel(values[path])[0]) for path in paths)
         ends = [limits(mechanism, path) for path in paths]

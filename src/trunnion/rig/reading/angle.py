@@ -84,7 +84,7 @@ def _of_column(source: AngleSource, table: DataTable, line: Timeline, account: A
         account.note(
             "data.angle.no_unit",
             "angle",
-            f"the column '{source.column}' has no unit and is taken for rad",
+            f"the column '{source.column}' has no unit; rad is assumed",
             "state angle.unit",
         )
     try:
@@ -109,7 +109,9 @@ def _of_column(source: AngleSource, table: DataTable, line: Timeline, account: A
     steps = np.abs(np.diff(told))
     moving = steps[steps > 0]
     if moving.size and np.median(moving) > TURN / 4:
-        what = f"a turn has {TURN / float(np.median(moving)):.3g} samples: which way it turns cannot be told"
+        what = (
+            f"a turn has {TURN / float(np.median(moving)):.3g} samples: the direction of rotation cannot be determined"
+        )
         account.warn("data.angle.few_samples", "angle", what, "sample at least 8 times a turn")
     values[finite] = told
     return values
@@ -176,7 +178,7 @@ def _check_index(values: Array, index: Array, line: Timeline, account: Account) 
     at = np.interp(index, line.seconds, np.where(np.isfinite(values), values, np.nan))
     usual = float(np.nanmedian(np.abs(np.diff(at)))) / TURN if np.isfinite(np.diff(at)).any() else 1.0
     if abs(usual - 1) > 0.5:
-        what = f"from one index pulse to the next the angle goes {usual:.3g} turns"
+        what = f"from one index pulse to the next the angle advances {usual:.3g} turns"
         account.warn(
             "data.index.turns",
             "angle.index",

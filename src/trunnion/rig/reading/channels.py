@@ -70,7 +70,7 @@ def reading(name: str, channel: Channel, column: Column, account: Account) -> Ch
         account.note(
             "data.unit.none",
             where,
-            f"has no unit in the mapping or the file and is taken for SI ({unit or '1'})",
+            f"has no unit in the mapping or the file; SI is assumed ({unit or '1'})",
             f"state {where}.unit",
         )
     try:
@@ -131,7 +131,7 @@ def zeroed(
         account.warn(
             "data.zero.drift_removed",
             where.removesuffix(".zero"),
-            f"{told}; a straight line is taken off",
+            f"{told}; a straight line is subtracted",
             "let the sensor warm up",
         )
         return Zeroed(float(np.mean(means)), error, slope, float(np.mean(middles)))
@@ -231,8 +231,8 @@ def filtered(values: Array, line: Timeline, low_pass: Filter, account: Account, 
                 what = f"order {low_pass.order} at {cut_off:g} Hz of {rate:.4g} Hz cannot be computed"
                 raise MechanismError(Finding(what, "filter", "lower the order", file=account.file)) from None
     if lost:
-        what = f"{counted(lost, 'sample')} between gaps too close together for the filter; left out"
-        account.warn("data.filter.gaps", where, what, "raise the cut-off, or mend what makes the gaps")
+        what = f"{counted(lost, 'sample')} between gaps too close for the filter; left out"
+        account.warn("data.filter.gaps", where, what, "raise the cut-off, or remove the cause of the gaps")
     result[~finite] = np.nan
     return result
 

@@ -148,7 +148,7 @@ def efficiency_of(
     pairs = pairs_of(condition, joints)
     if pairs is None:
         there = ", ".join(f"{name} ({course.measures})" for name, course in condition.courses.items()) or "none"
-        what = f"the channels do not tell the power in and out; there are {there}"
+        what = f"the channels do not measure input and output power; there are {there}"
         remedy = "measure effort: and rate: of the driver, load: of a load on a joint and rate: of that joint"
         raise MechanismError(Finding(what, condition.name, remedy))
     clock = _clock(pairs, condition)
@@ -156,13 +156,12 @@ def efficiency_of(
     left_out = int(np.count_nonzero(~whole))
     if not np.any(whole):
         what = f"no turn is whole in all channels of {len(whole)}"
-        raise MechanismError(Finding(what, condition.name, "look at the gaps that `trunnion data` reports"))
+        raise MechanismError(Finding(what, condition.name, "see the gaps reported by `trunnion data`"))
     power_in, power_out = float(np.mean(powers_in)), float(np.mean(powers_out))
     if not power_in:
-        what = (
-            f"no power goes in: {' or '.join(one.channel for pair in pairs.driven for one in pair)} reads 0 throughout"
-        )
-        raise MechanismError(Finding(what, condition.name, "look at these channels: a sensor may be dead"))
+        zero = " or ".join(one.channel for pair in pairs.driven for one in pair)
+        what = f"there is no input power: {zero} reads 0 throughout"
+        raise MechanismError(Finding(what, condition.name, "check these channels: a sensor may have failed"))
     value = power_out / power_in
     with np.errstate(all="ignore"):
         per_turn = powers_out / powers_in

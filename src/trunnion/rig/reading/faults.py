@@ -114,7 +114,7 @@ def _leave_out(part: Array, mask: Mask) -> None:
 def _doubtful(part: Array, mask: Mask, span: FaultSpan) -> str:
     """Leave out what may be the signal's own only where there are turns enough to tell; what was done."""
     if span.turns < FEW:
-        return f"left in: in {counted(span.turns, 'turn')} nothing tells whether it is the signal's own"
+        return f"left in: in {counted(span.turns, 'turn')} it cannot be decided whether this belongs to the signal"
     _leave_out(part, mask)
     return "left out"
 

@@ -61,10 +61,10 @@ class FromData(Part):
 def fixed(quantity: Quantity) -> Quantity:
     """A number with its unit; there are no dimensions here that an expression could speak of."""
     if quantity.names:
-        what = f"'{quantity.source}' speaks of {', '.join(quantity.names)}"
+        what = f"'{quantity.source}' refers to {', '.join(quantity.names)}"
         raise problem(what, "write a number with its unit")
     if quantity.tolerance is not None:
-        raise problem(f"'{quantity.source}' has a tolerance, which means nothing here", "write the value alone")
+        raise problem(f"'{quantity.source}' has a tolerance, which has no effect here", "write the value alone")
     return quantity
 
 
@@ -147,8 +147,8 @@ class AngleSource(Part):
         if missing := [key for key in needed if key not in stated]:
             raise problem(f"from: {self.from_} needs {' and '.join(missing)}", "add it")
         if extra := sorted(stated - {*needed, *allowed}):
-            remedy = f"remove it; from: {self.from_} takes {', '.join((*needed, *allowed))}"
-            raise problem(f"from: {self.from_} does not take {', '.join(extra)}", remedy)
+            remedy = f"remove it; the keys of from: {self.from_} are {', '.join((*needed, *allowed))}"
+            raise problem(f"from: {self.from_} does not use {', '.join(extra)}", remedy)
         if self.wrap is not None and self.kind == "level":
             raise problem("only a running count wraps", "remove wrap, or write kind: count")
         if self.unit is not None:
@@ -323,7 +323,7 @@ def _check(mapping: DataMapping) -> Iterator[Finding]:
         yield Finding("the cycle is not above zero", "cycle", "write it as 360 deg or 0.5 s")
     elif mapping.angle is None and not mapping.timed:
         remedy = "add angle: {from: …}, or write cycle: as a time"
-        yield Finding("'angle' is missing: nothing tells the coordinate of the driver", "", remedy)
+        yield Finding("'angle' is missing: no column gives the coordinate of the driver", "", remedy)
     source = mapping.angle.channel if mapping.angle else None
     if source is not None and source not in channels:
         yield Finding(f"there is no channel '{source}'", "angle.channel", nearest(source, channels))

@@ -52,7 +52,7 @@ def pulses_of(source: AngleSource, readings: Array, line: Timeline, indexed: boo
         account.warn(
             "data.counter.missing",
             "angle",
-            f"{what}; the reading before holds there",
+            f"{what}; the previous reading is used there",
             "check the counter and its cable",
         )
     if source.kind == "level":
@@ -170,7 +170,7 @@ def _missed(found: Pulses, step: float, most: float, account: Account) -> Pulses
         told.append(f"{counted(int(lost.sum()), 'pulse')} lost")
     if np.any(pairs):
         told.append(f"{counted(int(-pairs.sum()), 'pulse')} too many")
-    what = f"the encoder: {' and '.join(told)}, {times(at)}; the count is set right, these turns are left out"
+    what = f"the encoder: {' and '.join(told)}, {times(at)}; the count is corrected, these turns are left out"
     account.warn("data.pulses.wrong", "angle", what, "check encoder, cable and counter")
     way = np.sign(found.counts[-1] - found.counts[0]) or 1.0
     mended = found.counts + way * np.concatenate([[0.0], np.cumsum(change)])
@@ -208,7 +208,7 @@ def by_index(found: Pulses, index: Array, per_turn: int, step: float, account: A
         lost, more = -int(change[change < 0].sum()), int(change[change > 0].sum())
         told = [f"{counted(lost, 'pulse')} lost"] * (lost > 0) + [f"{counted(more, 'pulse')} too many"] * (more > 0)
         where = f"in {counted(int(np.count_nonzero(wrong)), 'turn')} of {change.size}, {times(index[:-1][wrong])}"
-        what = f"the encoder: {' and '.join(told)} {where}; set right at the index, these turns are left out"
+        what = f"the encoder: {' and '.join(told)} {where}; corrected at the index, these turns are left out"
         account.warn("data.pulses.wrong_index", "angle", what, "check encoder, cable and counter")
     place = np.clip(np.searchsorted(index, found.times, side="right") - 1, 0, index.size - 1)
     return found.counts - at[0] - way * usual - way * level[place], np.column_stack(
@@ -256,7 +256,7 @@ def unwrapped(source: AngleSource, readings: Array, seconds: Array, account: Acc
         return np.unwrap(readings, period=modulus), np.empty(0, dtype=np.intp)
     if falls.size > 2 and float(np.ptp(sizes)) <= 2 * float(apart.max()) + 1:
         what = f"the count of '{source.column}' falls by about {np.mean(sizes):,.0f}, {counted(falls.size, 'time')}"
-        what = f"{what}, and where it wraps cannot be told to the pulse"
+        what = f"{what}, and its wrap cannot be located to the pulse"
         raise MechanismError(Finding(what, "angle", "state wrap: of the counter", file=account.file))
     first = falls[0]
     what = f"the count of '{source.column}' is set back {counted(falls.size, 'time')}, {times(seconds[falls])}"
@@ -287,7 +287,7 @@ def _without_wild(source: AngleSource, readings: Array, seconds: Array, account:
     if not wild.size or wild.size > 0.01 * readings.size:
         return readings
     what = f"{counted(wild.size, 'count')} of '{source.column}' of {readings.size:,} far off the ones before and after"
-    what = f"{what}, {times(seconds[wild])}, such as {readings[wild[0]]:,.6g}; the one before holds there"
+    what = f"{what}, {times(seconds[wild])}, such as {readings[wild[0]]:,.6g}; the previous reading is used there"
     account.warn("data.counter.wild", "angle", what, "check the counter and its cable")
     mended = readings.copy()
     mended[wild] = mended[wild - 1]

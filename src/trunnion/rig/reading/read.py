@@ -208,7 +208,7 @@ class _File:
                 cuts.append((setting, turns))
                 if turns.numbers.size < UNUSED * gone - 2:
                     what = f"{counted(turns.numbers.size, 'turn')} of {gone:,.0f} recorded can be used"
-                    account.warn("data.turns.lost", f"condition {name}", what, "mend what the other findings name")
+                    account.warn("data.turns.lost", f"condition {name}", what, "correct what the other findings name")
             else:
                 what = self._no_turn(share[setting.window], allowed)
                 account.error("data.turns.none", f"condition {name}", what, "check angle, or record for longer")
@@ -252,7 +252,7 @@ class _File:
         self.lag = found.lag
         known = np.flatnonzero(np.isfinite(found.values) & self._used())
         if known.size < 3:
-            what = "the coordinate of the driver is known in no row that is used"
+            what = "no row in use has a coordinate of the driver"
             raise MechanismError(Finding(what, "angle", "check angle.column", file=self.account.file))
         clock = np.repeat(self.line.spoilt[:, None], 2, axis=1)
         way = 1.0 if found.values[known[-1]] >= found.values[known[0]] else -1.0
@@ -346,7 +346,7 @@ class _File:
         if found is None:
             return None
         by = f"{found.change:.3g} {own.scale.unit} in {found.span:.4g} s"
-        times = f"{abs(found.change) / max(found.scatter, 1e-300):.3g} times what turns scatter about the line"
+        times = f"{abs(found.change) / max(found.scatter, 1e-300):.3g} times the scatter of the turns about the line"
         what, remedy = f"drift: the mean of a turn changes by {by}, {times}", "let sensor and bearings warm up"
         if mapping.drift == "report":
             account.warn("data.zero.drift_files", where, what, f"{remedy}, or state drift: remove")
@@ -355,7 +355,7 @@ class _File:
         account.warn(
             "data.zero.drift_files_removed",
             where,
-            f"{what}; a straight line is taken off, zero at {since:.4g} s",
+            f"{what}; a straight line is subtracted, zero at {since:.4g} s",
             remedy,
         )
         for part in parts:
@@ -384,7 +384,9 @@ class _File:
             turns = courses[channel_name].turns
             if not np.isfinite(turns).any():
                 what = f"the channel '{channel_name}', whose mean it is, has no value in any turn"
-                raise MechanismError(Finding(what, f"set.{path}", "mend the channel, or state it", file=str(self.path)))
+                raise MechanismError(
+                    Finding(what, f"set.{path}", "correct the channel, or state it", file=str(self.path))
+                )
             values[path] = time_mean(part.turns, turns)
             known_as[path] = dimension_of(self.own[channel_name].scale.of_quantity, courses[channel_name].unit)
         positions = self.mapping.positions

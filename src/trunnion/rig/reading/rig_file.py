@@ -63,7 +63,7 @@ class Schedule(Part):
             values = _spread(given, f"schedule.over.{name}")
             if len(rows) * len(values) > MOST_CONDITIONS:
                 what = f"the grid has more than {MOST_CONDITIONS:,} conditions"
-                raise MechanismError(Finding(what, "schedule.over", "take fewer values"))
+                raise MechanismError(Finding(what, "schedule.over", "use fewer values"))
             rows = [{**row, name: value} for row in rows for value in values]
         return rows if not self.conditions else [dict(row) for row in self.conditions]
 
@@ -279,7 +279,7 @@ def _unsound_sensor(where: str, sensor: Sensor) -> Iterable[Finding]:
     if sensor.accuracy.gain.evaluate() < 0 or sensor.accuracy.zero.value < 0 or sensor.offset.value < 0:
         yield Finding("a standard uncertainty is negative", f"{where}.accuracy", "state it positive")
     if sensor.per_turn and not sensor.measures.startswith("rate:"):
-        yield Finding("pulses tell a speed only", f"{where}.per_turn", "measure rate:JOINT, or remove per_turn")
+        yield Finding("pulses measure a speed only", f"{where}.per_turn", "measure rate:JOINT, or remove per_turn")
 
 
 _NEEDS = {
@@ -299,6 +299,6 @@ def _unsound_fault(where: str, fault: Fault, rig: Rig) -> Iterable[Finding]:
     if fault.share is not None and not 0 <= float(fault.share.evaluate()) <= 1:
         yield Finding(f"the share {fault.share.source} is not in 0 … 100 %", f"{where}.share", "write 1 %")
     if fault.kind == "drift" and not fault.sensors:
-        yield Finding("does not say of which sensor", where, "state sensor")
+        yield Finding("does not state the sensor", where, "state sensor")
     if fault.kind == "lost-pulses" and rig.encoder is None:
         yield Finding("there is no encoder to lose pulses", where, "state an encoder, or remove the fault")

@@ -37,7 +37,9 @@ def _measures(text: str) -> str:
         known = ", ".join(f"{one}:NAME" for one in QUANTITIES if one != "point")
         near = nearest(kind, QUANTITIES)
         remedy = f"{near} " if near.startswith("did") else ""
-        raise problem(f"'{text[:80]}' is nothing a sensor follows", f"{remedy}write {known} or link.point.x")
+        raise problem(
+            f"'{text[:80]}' is not a quantity that a sensor measures", f"{remedy}write {known} or link.point.x"
+        )
     return text
 
 

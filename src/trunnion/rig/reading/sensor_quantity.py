@@ -89,7 +89,7 @@ def dimensions(text: str) -> tuple[float, Dimensions]:
         near = near if near.startswith("did you mean") else "write a unit such as mV, N m, rpm or deg"
         raise UnitError(error.what, error.remedy or near) from None
     if set(exponents) - set(_SYMBOLS):
-        raise UnitError(f"the unit '{text}' is none of a sensor", "use units of mechanics, volts, ampere or kelvin")
+        raise UnitError(f"the unit '{text}' is not one of a sensor", "use units of mechanics, volts, ampere or kelvin")
     pulses = any(name.endswith("hertz") for name in names) and exponents and exponents.keys() <= _COUNTED
     if not {"ampere", "kelvin"} & exponents.keys() and exponents != HERTZ and not pulses:
         unit(normalise(text))

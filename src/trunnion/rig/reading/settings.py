@@ -83,8 +83,8 @@ def settings(mapping: DataMapping, entry: File, table: DataTable, line: Timeline
     at = np.flatnonzero(known)
     unique, first, which = np.unique(rounded[known], axis=0, return_index=True, return_inverse=True)
     if len(unique) > MOST:
-        what = f"the columns that state the condition take {len(unique):,} different values"
-        remedy = "what is measured is no setting: write {mean: channel}"
+        what = f"the columns that state the condition have {len(unique):,} different values"
+        remedy = "a measured value is not a setting: write {mean: channel}"
         raise MechanismError(Finding(what, "set", remedy, file=account.file))
     found = []
     number = np.full(known.size, -1)

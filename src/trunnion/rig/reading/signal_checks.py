@@ -80,7 +80,10 @@ def steady(turns: Turns, step: float, where: str, account: Account) -> None:
         slow, fast = 60 / float(lengths.max()), 60 / float(lengths.min())
         what = f"the speed is not steady: {slow:.4g} to {fast:.4g} cycles a minute, {100 * spread:.3g} % between turns"
         account.warn(
-            "data.speed.unsteady", where, what, "state files: over: to use the steady part, or mend the speed control"
+            "data.speed.unsteady",
+            where,
+            what,
+            "state files: over: to use the steady part, or improve the speed control",
         )
 
 
@@ -108,8 +111,10 @@ def signs(
                 rate and turning is not None and float(np.nanmean(courses[rate])) * turning < 0 and len(drivers) == 1
             )
             likely = str(rate) if opposed else effort
-            other = "the angle turns the other way" if opposed else "or it drives the motor: then nothing is wrong"
-            what = f"sign: the power into {driver} is below zero in {_of(power)}"
+            other = (
+                "the angle has the wrong sign" if opposed else "or the load drives the motor, then the sign is correct"
+            )
+            what = f"sign: the power into {driver} is negative in {_of(power)}"
             account.warn(
                 "data.power.sign",
                 f"channels.{likely}",
@@ -127,8 +132,8 @@ def signs(
         power = turn_means(courses[key] * courses[rate])
         power = power[np.isfinite(power)]
         if _against(power):
-            what = f"sign: the power that {load} takes is below zero in {_of(power)}"
-            what = f"{what} ({power.mean():.4g} W) while the drive gives power"
+            what = f"sign: the power delivered to {load} is negative in {_of(power)}"
+            what = f"{what} ({power.mean():.4g} W) while the drive delivers power"
             remedy = f"write sign: {-channels[key].sign} (or turn that of {rate})"
             account.warn("data.power.sign", f"channels.{key}", what, remedy)
             suspects.append(key)

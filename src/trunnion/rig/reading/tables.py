@@ -30,7 +30,7 @@ def read_table(path: Path, wanted: Iterable[str], optional: Iterable[str] = ()) 
     """
     suffix = path.suffix.lower()
     if suffix not in FORMATS:
-        what = f"the extension '{suffix}' is none of a data file"
+        what = f"the extension '{suffix}' is not one of a data file"
         raise MechanismError(Finding(what, file=str(path), remedy=f"use {', '.join(FORMATS)}"))
     reader, package, extra = FORMATS[suffix]
     if package and importlib.util.find_spec(package) is None:

@@ -152,7 +152,7 @@ def _layout(path: Path, wanted: set[str]) -> _Layout:
     lines, encoding = _decoded(path)
     stated = [(place, line) for place, line in enumerate(lines) if line.strip() and not line.lstrip().startswith("#")]
     if not stated:
-        raise failed(path, "has nothing but remarks", "check that the recording was saved", 1)
+        raise failed(path, "has only comments", "check that the recording was saved", 1)
     best, header, cells, separator = -1, 0, [""], ","
     for order, (_, line) in enumerate(stated[:200]):  # loggers write some lines above the header
         bare = _QUOTED.sub("", line)

@@ -55,7 +55,7 @@ def timeline(table: DataTable, base: TimeBase | None, account: Account) -> Timel
         return Timeline(_counted(table.rows) * step, None, step, np.empty(0, dtype=np.intp))
     if base is None or base.column not in table.columns:
         if table.interval is None:
-            what = "nothing tells the time of its rows"
+            what = "no column gives the time of its rows"
             remedy = "add time: {column: …, unit: s} or time: {rate: 2 kHz} to the mapping"
             raise MechanismError(Finding(what, "time", remedy, file=table.file))
         start, step = table.interval
@@ -94,7 +94,7 @@ def _factor(base: TimeBase, column: Column, account: Account) -> float:
         account.note(
             "data.time.no_unit",
             "time",
-            f"the column '{base.column}' has no unit and is taken for seconds",
+            f"the column '{base.column}' has no unit; seconds are assumed",
             "state time.unit",
         )
         return 1.0

@@ -80,7 +80,7 @@ def cut(
                 "data.turns.unusual",
                 where,
                 what,
-                "the drive starts, stops or stands there; files: over: can name what counts",
+                "the drive starts, stops or is at rest there; use files: over: to select the steady part",
             )
         keep &= ~odd
     if len(spoilt):

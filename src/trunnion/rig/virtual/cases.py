@@ -155,7 +155,7 @@ def _of_the_drive(rig: Rig, run: Run) -> Iterator[Finding]:
         what = f"the cycle of {driver} ends elsewhere than it starts: it cannot run {rig.schedule.turns} times on end"
         yield Finding(what, "schedule.turns", "state turns: 1")
     if rig.encoder and not (run.system.turns(driver) and run.system.span(run.values, driver).one_way):
-        what = f"an encoder counts the turns of a driver that turns one way, {driver} does not"
+        what = f"an encoder needs a driver that turns in one direction, {driver} does not"
         yield Finding(what, "encoder", "remove the encoder: positions then follow from the time")
 
 
@@ -198,7 +198,7 @@ def case_of(
         return case
     for course, (sensor, channel) in zip(true.values, channels.items(), strict=True):
         if channel.per_turn and np.min(course) < 0 < np.max(course):
-            what = f"in condition {number} ({case.say()}) the speed changes its sign, which pulses do not tell"
+            what = f"in condition {number} ({case.say()}) the speed changes its sign, which pulses do not show"
             remedy = "remove per_turn, or measure another joint"
             raise MechanismError(Finding(what, f"sensors.{sensor}.per_turn", remedy))
     return replace(case, efficiency=cycle_efficiency(run))

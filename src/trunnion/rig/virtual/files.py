@@ -119,7 +119,7 @@ def _together(folder: Path) -> Iterator[Path]:
         else:
             _make(new, folder, home)
     except OSError as error:
-        what = f"cannot be written: {error.strerror or error}; nothing of it is left"
+        what = f"cannot be written: {error.strerror or error}; no part of it is left"
         raise MechanismError(Finding(what, str(folder), "make room there, or name another folder")) from None
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
@@ -416,7 +416,7 @@ def _fault(data: dict[str, Any]) -> dict[str, Any]:
 
 HEADS = {
     MAPPING: "# What the columns of the data files measure: for `trunnion data`, `compare` and `identify`.\n",
-    TRUTH: "# What the virtual rig drew and what is true of the model, in SI: to check what is found from the files.\n",
+    TRUTH: "# True values and random errors of the virtual rig, in SI, to check results obtained from the files.\n",
 }
 
 

@@ -92,7 +92,7 @@ def observe(
             if len(rows) > 1
             else "the condition cannot be measured"
         )
-        remedy = "take conditions in which the model has an answer at every position"
+        remedy = "choose conditions in which the model has a solution at every position"
         raise MechanismError([*findings, Finding(what, "schedule", remedy)])
     if any(one.severity is Severity.ERROR for one in findings):
         raise MechanismError(findings)

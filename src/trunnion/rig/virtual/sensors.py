@@ -167,7 +167,7 @@ def _reading(sensor: Sensor, unit: str) -> tuple[str, float]:
         factor, found = dimensions(reading)
         if not alike(found, measured):
             remedy = f"state a unit of {unit}, or the sensitivity: 100 mV/({unit})"
-            raise UnitError(f"'{reading}' does not measure what is in {unit}", remedy)
+            raise UnitError(f"'{reading}' does not measure a quantity in {unit}", remedy)
         return reading, 1 / factor
     given = sensor.sensitivity
     ways = (

@@ -75,7 +75,7 @@ def start_of(system: SpatialSystem, values: Values, ideal: Values, cycle: Cycle)
     nearly = _followed(system, values, cycle)
     misfit = finding_for("assembly.misfit", "links")
     if nearly is None:
-        what = f"{misfit.what}: nowhere is every loop nearly closed"
+        what = f"{misfit.what}: the loops are not nearly closed at any position"
         raise MechanismError(Finding(what, "links", "check the lengths"))
     return nearly, [misfit]
 
@@ -115,7 +115,7 @@ def _nearest(system: SpatialSystem, values: Values, loops: Loops) -> Array | Non
     singular = np.linalg.svd(part.linear(q[good], none[good]).jacobian, compute_uv=False)
     if loops.group.free and np.all(singular[:, -1] <= RANK * singular[:, 0]):
         what = "the joints leave a freedom undetermined"
-        raise MechanismError(Finding(what, "drivers", "drive it, or give the links joints that hold them"))
+        raise MechanismError(Finding(what, "drivers", "add a driver, or joints to these links"))
     far = distance(start(system, values), system.plan.modules[0], part.frames(q[good], none[good]), _same, _same)
     order = np.lexsort((gap[good], np.round(np.broadcast_to(far, good.shape) / loops.size**2, 6)))
     return np.asarray(q[good[order[0]]])

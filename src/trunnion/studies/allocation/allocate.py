@@ -132,7 +132,7 @@ def _check(asked: AllocationRequest) -> None:
         remedy = f"use {', '.join(('auto', *CHOICES))}"
         findings.append(Finding(f"there is no choice '{asked.choice}'", "choice", remedy))
     if not 0 < asked.target < 1:
-        what = f"a yield of {asked.target:g} cannot be asked for"
+        what = f"a yield of {asked.target:g} is not possible"
         findings.append(Finding(what, "yield", "give a share above 0 and below 1, such as 0.9973"))
     if asked.samples < 0:
         findings.append(Finding(f"{asked.samples} samples", "samples", "give a number from 0"))
@@ -150,7 +150,7 @@ def _limited(mechanism: Mechanism, measures: Sequence[str] | None) -> list[str]:
     found = [name for name in names if name in stated and any(getattr(stated[name], key) is not None for key in keys)]
     if not found:
         what = f"none of the measures {', '.join(names)} has a limit" if names else "no measure is stated"
-        remedy = "state what is to be kept, as measures: {position: {angle: rocker, limit: ±0.1 deg}}"
+        remedy = "state the measures with limits, as measures: {position: {angle: rocker, limit: ±0.1 deg}}"
         raise MechanismError(Finding(what, "measures", remedy))
     return found
 
@@ -158,7 +158,7 @@ def _limited(mechanism: Mechanism, measures: Sequence[str] | None) -> list[str]:
 def _found(mechanism: Mechanism, measures: Sequence[str], asked: AllocationRequest) -> Allocated:
     """The allocation, with effects that belong to the tolerances found."""
     if not mechanism.costs:
-        remedy = "say what tolerances cost, as costs: {AB: {model: power, B: 1, k: 0.45, unit: mm}}"
+        remedy = "state the costs of tolerances, as costs: {AB: {model: power, B: 1, k: 0.45, unit: mm}}"
         raise MechanismError(Finding("no tolerance has a cost", "costs", remedy))
     absent = {one.path: _start(one) for one in mechanism.prices() if one.play and not _clearance(mechanism, one.path)}
     now = _studied(mechanism.with_tolerances(absent) if absent else mechanism, measures, asked)
@@ -219,19 +219,18 @@ def _prices(found: ToleranceStudy) -> tuple[dict[str, Price], list[Finding]]:
     for one in mechanism.prices():
         what = ""
         if one.path not in inputs.names:
-            what = "its pin has a given seat: the play does not vary"
+            what = "its pin has a stated seat, so the play does not vary"
         elif one.path in known and known[one.path].direction:
-            what = "it may point anywhere: its tolerance has no middle to stay at"
+            what = "its direction is arbitrary, so the tolerance has no middle"
         elif plays := _plays_of(found, one.path):
-            what = (
-                f"it changes the play of {', '.join(plays)}: state pin.clearance and buy {plays[0]}.clearance instead"
-            )
+            instead = f"state pin.clearance and a cost of {plays[0]}.clearance instead"
+            what = f"it changes the play of {', '.join(plays)}; {instead}"
         if what:
             findings.append(finding_for("allocation.not_for_sale", f"costs.{one.path}", phrases={"why": what}))
         else:
             prices[one.path] = one
     if not prices:
-        raise MechanismError(findings or [Finding("no tolerance has a cost", "costs", "say what a tolerance costs")])
+        raise MechanismError(findings or [Finding("no tolerance has a cost", "costs", "state the cost of a tolerance")])
     return prices, findings
 
 

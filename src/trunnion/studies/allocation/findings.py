@@ -35,11 +35,11 @@ def summary(found: Allocated, known: xr.Dataset, arrays: Mapping[str, Any]) -> I
     if answer.found:
         yield Figure("cost_bound", "lower bound of the cost", answer.bound)
     if answer.sampled is not None:
-        yield Figure("yield_asked", "yield asked for", found.asked.target)
+        yield Figure("yield_asked", "required yield", found.asked.target)
         yield Figure("yield", "yield of the samples", answer.sampled.share)
     for name, used in zip(known["measure"].values.tolist(), arrays["used"].tolist(), strict=True):
         if answer.found and np.isfinite(used):
-            yield Figure(f"{name}.used", f"{name}, share of its room that is taken", used)
+            yield Figure(f"{name}.used", f"{name}, share of the limits used", used)
 
 
 def findings_of(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:

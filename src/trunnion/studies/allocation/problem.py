@@ -152,7 +152,7 @@ class AllocationProblem:
         found += [finding for members in self.groups().values() for finding in _group(members)]
         found += _effects(self.effects, len(self.contributions))
         if not found and all(one.fixed for one in self.contributions):
-            found.append(Finding("no tolerance has a cost", "costs", "say what a tolerance costs"))
+            found.append(Finding("no tolerance has a cost", "costs", "state the cost of a tolerance"))
         if found:
             raise MechanismError(found)
 
@@ -258,7 +258,7 @@ class Answer:
 
     def __str__(self) -> str:
         if not self.found:
-            return "no allocation keeps the limits"
+            return "no allocation meets the limits"
         word = "global optimum" if self.proven else "best found"
         return f"cost {self.cost:.8g}, {word} (lower bound {self.bound:.8g}, gap {self.gap:.1e})"
 
@@ -293,8 +293,8 @@ def shortfalls(problem: AllocationProblem, least: Array) -> list[Finding]:
         over = [row for row in rows if used[row] > 1 + ALLOWED]
         if over:
             places, broken = (len({effects.place(row) for row in some}) for some in (rows, over))
-            beyond = agreeing(broken, "is beyond its", "are beyond their")
-            more = f"; {broken} of {places} positions {beyond} limits" if places > 1 else ""
+            exceed = agreeing(broken, "exceeds its", "exceed their")
+            more = f"; {broken} of {places} positions {exceed} limits" if places > 1 else ""
             found.append(_shortfall(problem, least, max(over, key=lambda row: used[row]), more))
     return found
 
@@ -307,7 +307,7 @@ def _shortfall(problem: AllocationProblem, least: Array, row: int, more: str) ->
     over, limit = (high, upper) if high - upper >= lower - low else (low, lower)
     parts = effects.worst[row] * least
     largest = problem.contributions[int(np.argmax(parts))]
-    kept = "which has no cost and stays as it is" if largest.fixed else "which is at its least"
+    kept = "which has no cost and stays as stated" if largest.fixed else "which is at its least"
     ratio = f", {over / limit:.3g} times the limit" if over * limit > 0 else ""
     takes = f"{effects.say(row, over)}{effects.place(row)}"
     phrases = {"limit_told": effects.say(row, limit), "takes_told": takes, "ratio": ratio, "more": more, "kept": kept}

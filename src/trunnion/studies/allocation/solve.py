@@ -32,7 +32,7 @@ def solve(
     if problem.criterion != "yield" or target is None:
         return CHOICES[choice](problem)
     if not 0 < target < 1:
-        raise MechanismError(Finding(f"a yield of {target:g} cannot be asked for", "yield", "above 0 and below 1"))
+        raise MechanismError(Finding(f"a yield of {target:g} is not possible", "yield", "above 0 and below 1"))
     return meet(problem, target, CHOICES[choice], verify)
 
 

@@ -60,18 +60,18 @@ FIGURES: dict[str, Variable] = {
     "largest_share": Variable((), "1", "the largest needed share of the cycle, between the positions too"),
     "drive_coordinate": Variable(("driver", "position"), "", "coordinate of the driver, rad or m"),
     "needed_share": Variable(
-        LANES, "1", "share of the stated clearances that it takes to close the loops; above 1: too small"
+        LANES, "1", "share of the stated clearances that is needed to close the loops; above 1: too small"
     ),
     "needed_clearance": Variable(LANES, "m", "smallest radial clearance, the same in every pin, that closes the loops"),
-    "open_angle": Variable(LANES, "rad", "how far the loops stay open without play, in angle"),
-    "open_length": Variable(LANES, "m", "how far the loops stay open without play, in length"),
+    "open_angle": Variable(LANES, "rad", "opening of the loops without play, angle"),
+    "open_length": Variable(LANES, "m", "opening of the loops without play, length"),
     "stated_offset": Variable(OFFSETS, "m", "offset of the pin's end at the needed share, in the hole's frame"),
     "uniform_offset": Variable(OFFSETS, "m", "offset of the pin's end at the needed clearance, in the hole's frame"),
-    "stated_part": Variable(PARTS, "1", "part that an end's play has in the needed share; they add up to 1"),
-    "uniform_part": Variable(PARTS, "1", "part that an end's play has in the needed clearance; they add up to 1"),
+    "stated_part": Variable(PARTS, "1", "share of an end's play in the needed share; the sum is 1"),
+    "uniform_part": Variable(PARTS, "1", "share of an end's play in the needed clearance; the sum is 1"),
     "closure_residual": Variable(LANES, "1", "largest exact opening of a loop at these offsets, rad or of the size"),
-    "certificate": Variable(LANES, "1", "how far the proven lower bound of the need lies below it, relative"),
-    "status": Variable(LANES, "1", "code of what the position came to; see the attribute flag_meanings", np.int8),
+    "certificate": Variable(LANES, "1", "relative gap between the needed share and its proven lower bound"),
+    "status": Variable(LANES, "1", "status code of the position; see the attribute flag_meanings", np.int8),
 }
 
 
@@ -161,7 +161,7 @@ class Result:
 
     def _short(self) -> None:
         (share, at), short = self.share, np.flatnonzero(self.arrays["status"] == AssemblyStatus.SHORT)
-        times = f"it takes {_share(share)} times as much"
+        times = f"{_share(share)} times their size is needed"
         if len(short):
             place = self._share_place()
             takes = f"{times} {place}" if place == EVERYWHERE else f"{place} {times}"
@@ -180,17 +180,17 @@ class Result:
         angle, length = (float(np.nanmax(self.arrays[name])) for name in ("open_angle", "open_length"))
         sizes = [f"{1e3 * length:.4g} mm"] * (length > 0) + [f"{np.degrees(angle):.4g}°"] * (angle > 0)
         by = f"{' and '.join(sizes)} {self._intervals(places)}"
-        none = "a stated clearance of 0 is no play: the loops" if self.nil else "no play is stated: the loops"
+        none = "a stated clearance of 0 gives no play: the loops" if self.nil else "no play is stated: the loops"
         if self.played:
-            zero = " (a clearance of 0 is none)" if self.nil else ""
-            none = f"the stated play cannot close the loops, however large{zero}: they"
+            zero = " (a clearance of 0 gives no play)" if self.nil else ""
+            none = f"the joints with play cannot close the loops, however large the play{zero}: they"
         phrases = {"none": none, "by": by, "remedy": self._remedy()}
         self._say("no_play", "joints", phrases, angle=angle, length=length, clearance=self.clearance[0])
 
     def _remedy(self) -> str:
         need = self.clearance[0]
         if not np.isfinite(need):
-            return "give pins a clearance, those that nothing lets move along their axis an end float; or mend the axes"
+            return "state a clearance of pins, an end float of pins without axial freedom, or correct the axes"
         size = f"{_enough(1e3 * need)} mm" if need >= 1e-4 else f"{_enough(1e6 * need)} um"
         pins = "the pins " if self.pins else ""
         return f"the smallest radial clearance, the same in {pins}{self.of}, is {size}, needed {self._need_place()}"
@@ -204,15 +204,15 @@ class Result:
             return [Figure("smallest_clearance", "smallest clearance that is needed", 0.0, "mm")]
         angle, length = (float(np.nanmax(self.arrays[name], initial=0.0)) for name in ("open_angle", "open_length"))
         figures = [
-            Figure("open_angle", "loops open without play, angle", np.degrees(angle), "deg"),
-            Figure("open_length", "loops open without play, length", 1e3 * length, "mm"),
+            Figure("open_angle", "opening of the loops without play, angle", np.degrees(angle), "deg"),
+            Figure("open_length", "opening of the loops without play, length", 1e3 * length, "mm"),
         ]
         if angle > 0 or length > 0:
             figures = [figure for figure, size in zip(figures, (angle, length), strict=True) if size > 0]
         if self.played:
-            # what six digits show as 1 is told by as many as it takes
-            told = _share(share) if f"{share:.6g}" == "1" or np.isinf(share) else share
-            figures.append(Figure("largest_share", "needed share of the stated clearances", told))
+            # what six digits show as 1 is shown with as many as distinguish it from 1
+            needed = _share(share) if f"{share:.6g}" == "1" or np.isinf(share) else share
+            figures.append(Figure("largest_share", "needed share of the stated clearances", needed))
             if 0 < share < np.inf:
                 figures.append(Figure("largest_share.place", "  at", self._place(self.share, "needed_share"), ""))
         subject = f"smallest clearance, the same in {self.of}"
@@ -220,7 +220,7 @@ class Result:
         if 0 < need < np.inf:
             at = self._place(self.clearance, "needed_clearance")
             figures.append(Figure("smallest_clearance.place", "  at", at, ""))
-            figures.append(Figure("smallest_clearance.parts", "  part of each joint's clearance", self._parts(), ""))
+            figures.append(Figure("smallest_clearance.parts", "  share of each joint's clearance", self._parts(), ""))
         return figures
 
     def _parts(self) -> str:

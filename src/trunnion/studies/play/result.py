@@ -34,13 +34,13 @@ VARIABLES: dict[str, Variable] = {
     "value": Variable(OVER, "", "the measure with every pin in the middle of its hole"),
     "worst_case": Variable(BY_JOINT, "", "largest change that the play of the joint can make, to either side"),
     "deviation": Variable(BY_JOINT, "", "standard deviation by the play of the joint, pins anywhere in their holes"),
-    "worst_case_total": Variable(OVER, "", "worst case of all joints together: the sum"),
+    "worst_case_total": Variable(OVER, "", "worst case of all joints: the sum"),
     "rss": Variable(OVER, "", "root of the sum of the squares of the joints' worst cases"),
     "deviation_total": Variable(OVER, "", "standard deviation by the play of all joints, independent of one another"),
     "sensitivity": Variable(
         ("measure", "joint", "end", "axis", "position"), "/m", "change of the measure for an offset of 1 m at an end"
     ),
-    "radius": Variable(("joint", "end"), "m", "how far the pin can go from the middle at an end"),
+    "radius": Variable(("joint", "end"), "m", "largest displacement of the pin from the middle, at an end"),
     "status": Variable(("position",), "1", "code of the position's status; see the attribute flag_meanings", np.int8),
 }
 

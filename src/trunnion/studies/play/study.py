@@ -168,8 +168,8 @@ def _measures(run: Run, names: Sequence[str] | None) -> tuple[list[Measure], lis
     mechanism = run.system.mechanism
     found = named(mechanism, mechanism.measures if names is None else names, run.values)
     others = [one.name for one in found if one.kind not in MOTIONS and not one.single(run.system)]
-    what = f"play is known of what has one number at every position, which {', '.join(others)} has not"
-    remedy = "`trunnion tolerance` knows the others"
+    what = f"this study covers measures with one value at every position, which {', '.join(others)} has not"
+    remedy = "use `trunnion tolerance` for other measures"
     if others and names is not None:
         raise MechanismError(Finding(what, "measures", remedy))
     notes = [finding_for("play.measures_left_out", "measures", known=list(MOTIONS), measures=others)] if others else []

@@ -30,7 +30,7 @@ FIGURES: dict[str, Variable] = {
     "drive_effort_max": Variable(("driver",), "N m", "largest drive effort"),
     "drive_effort_rms": Variable(("driver",), "N m", "root mean square of the drive effort"),
     "drive_power_mean": Variable((), "W", "mean power of all drivers"),
-    "useful_power_mean": Variable((), "W", "mean power taken by the useful loads"),
+    "useful_power_mean": Variable((), "W", "mean power delivered to the useful loads"),
     "friction_power_mean": Variable((), "W", "mean power lost to friction"),
     "reaction_max": Variable(("joint",), "N", "largest reaction"),
     "transmission_error_max": Variable(
@@ -39,7 +39,7 @@ FIGURES: dict[str, Variable] = {
     "locking_margin": Variable(
         (), "1", "least multiple of the friction at which a position locks, ∞ if beyond 10", part="margin"
     ),
-    "without_answer": Variable((), "1", "positions without an answer", np.int32),
+    "without_answer": Variable((), "1", "positions not solved", np.int32),
     "not_valid": Variable(
         (), "1", "positions at which a pin loses contact, left out of the figures", np.int32, part="errors"
     ),

@@ -77,7 +77,7 @@ def _count(name: str, values: Any) -> int:
         raise MechanismError(Finding(f"'{values}' is no range and no list of values", name, remedy))
     if not isinstance(values, tuple):
         if not len(values):
-            raise MechanismError(Finding("has no values to take", name, remedy))
+            raise MechanismError(Finding("has no values", name, remedy))
         return len(values)
     count = values[-1] if len(values) == 3 else None
     if not isinstance(count, (int, np.integer)) or isinstance(count, bool):

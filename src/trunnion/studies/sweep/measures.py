@@ -25,10 +25,12 @@ def measures_of(run: Run, names: Sequence[str]) -> list[Measure]:
             findings.append(Finding(what, where, "call it otherwise in the model"))
         elif measure.of.against or measure.of_attitude(run.system):
             what = f"the measure '{measure.name}' is a deviation from the nominal mechanism, and each point is its own"
-            findings.append(Finding(what, where, "sweep another; `trunnion tolerance` tells what tolerances do to it"))
+            findings.append(
+                Finding(what, where, "sweep another; see `trunnion tolerance` for the effect of tolerances on it")
+            )
         elif measure.rule == "deviation":
             what = f"the measure '{measure.name}' has a number at every position and none of the cycle"
-            findings.append(Finding(what, where, "state where, as at: 60 deg, or what of it, as as: maximum"))
+            findings.append(Finding(what, where, "state a position, at: 60 deg, or a statistic, as: maximum"))
     if findings:
         raise MechanismError(findings)
     return found

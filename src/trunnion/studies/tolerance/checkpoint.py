@@ -82,7 +82,7 @@ class Checkpoint(Generic[T]):
                 tally = self._read()
                 if not tally.blocks:  # left by a run that did not get under way
                     return tally
-            remedy = "--resume goes on from it; otherwise delete it or name another file"
+            remedy = "continue with --resume, delete the file, or name another one"
             raise MechanismError(Finding("the checkpoint is there already", str(self.path), remedy))
         empty = self._job.empty()
         self._write(empty)  # so that a folder that cannot be written to is known now and not after an hour

@@ -157,7 +157,7 @@ class Cluster(Generic[T]):
             raise deadly(blocks, "workers of the cluster that died") from None
         except CancelledError:
             what = f"the connection with the scheduler at {self._address} was lost"
-            remedy = "start it again and go on with --resume, if there is a checkpoint"
+            remedy = "start it again and continue with --resume, if there is a checkpoint"
             raise MechanismError(Finding(what, "cluster", remedy)) from None
         return part
 

@@ -42,7 +42,7 @@ def summary(outcome: Outcome, counted: Sampled | None, units: Sequence[str], dia
     if len(units) > 1:
         yield Figure("yield", "yield, all measures", counted.arrays["yield_all"])
     yield Figure("samples", "samples", counted.done)
-    yield Figure("samples_failed", "samples without an answer", np.sum(counted.arrays["failed"]))
+    yield Figure("samples_failed", "samples not solved", np.sum(counted.arrays["failed"]))
 
 
 def _of_measure(outcome: Outcome, of: Of, i: int, unit: str, dial: Any) -> Iterator[Figure]:

@@ -147,7 +147,7 @@ def placed(mechanism: Mechanism, measure: Measure, at: float | str) -> Measure:
         quantity.check({}, kind)
         value = float(quantity.evaluate())
     except UnitError as error:
-        raise MechanismError(Finding(f"'{at}' is no place: {error.what}", "at", remedy)) from None
+        raise MechanismError(Finding(f"'{at}' is not a position: {error.what}", "at", remedy)) from None
     except KeyError:
         raise MechanismError(Finding(f"'{at}' is no place", "at", remedy)) from None
     return replace(measure, at=value, timed=kind.unit == "s")

@@ -211,7 +211,7 @@ def _uneven(mechanism: Mechanism, tolerances: Sequence[Tolerance]) -> Iterator[F
         section, _, rest = one.path.partition(".")
         key = rest.partition(".")[2].partition(".")[0]
         if section == "drivers" and len(mechanism.drivers) > 1 and key != "start":
-            what = "it cannot vary alone: the drivers would no longer be at the same positions together"
+            what = "it cannot vary alone: the drivers would have different cycle times"
             yield Finding(what, f"tolerances.{one.path}", "leave it out, or vary the start of the driver")
 
 

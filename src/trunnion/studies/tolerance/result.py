@@ -37,7 +37,7 @@ Array = NDArray[np.float64]
 M, P, MP, MPOS = ("measure",), ("parameter",), ("measure", "parameter"), ("measure", "position")
 VARIABLES: dict[str, Variable] = {
     "nominal": Variable(M, "", "figure of the nominal mechanism"),
-    "place": Variable(M, "drive", "drive coordinate at which the figure is taken; of an extreme, the nominal one"),
+    "place": Variable(M, "drive", "drive coordinate of the measure; for an extreme, the nominal one"),
     "parameter_nominal": Variable(P, "parameter", "nominal value; of a clearance its radius"),
     "parameter_lower": Variable(P, "parameter", "lower limit of the deviation from nominal"),
     "parameter_upper": Variable(P, "parameter", "upper limit of the deviation from nominal"),
@@ -58,15 +58,15 @@ VARIABLES: dict[str, Variable] = {
     "searched_upper": Variable(M, "", "largest deviation found on the mechanism itself"),
     "corner_lower": Variable(MP, "parameter", "value of the parameter at the least deviation"),
     "corner_upper": Variable(MP, "parameter", "value of the parameter at the largest deviation"),
-    "curve": Variable(MPOS, "course", "course of the measure on the nominal mechanism"),
-    "curve_sensitivity": Variable(("measure", "parameter", "position"), "course ratio", "derivative of the course"),
-    "curve_worst_case_lower": Variable(MPOS, "course", "least deviation of the course, to first order"),
-    "curve_worst_case_upper": Variable(MPOS, "course", "largest deviation of the course, to first order"),
+    "curve": Variable(MPOS, "course", "curve of the measure of the nominal mechanism"),
+    "curve_sensitivity": Variable(("measure", "parameter", "position"), "course ratio", "derivative of the curve"),
+    "curve_worst_case_lower": Variable(MPOS, "course", "least deviation of the curve, to first order"),
+    "curve_worst_case_upper": Variable(MPOS, "course", "largest deviation of the curve, to first order"),
     "curve_rss": Variable(
-        MPOS, "course", "half width of the course by the root of the sum of squares; without correlation"
+        MPOS, "course", "half width of the curve by the root of the sum of squares; without correlation"
     ),
-    "curve_shift": Variable(MPOS, "course", "mean deviation of the course from nominal, to first order"),
-    "curve_deviation": Variable(MPOS, "course", "standard deviation of the course, to first order"),
+    "curve_shift": Variable(MPOS, "course", "mean deviation of the curve from nominal, to first order"),
+    "curve_deviation": Variable(MPOS, "course", "standard deviation of the curve, to first order"),
     "status": Variable(("position",), "1", "code of the position's status; see the attribute flag_meanings"),
     "samples": Variable((), "1", "number of samples"),
     "mean": Variable(M, "", "mean of the figure"),
@@ -92,13 +92,13 @@ VARIABLES: dict[str, Variable] = {
     "yield_all_high": Variable((), "1", "yield of all, upper end of the 95 % interval"),
     "cp": Variable(M, "1", "capability index C_p of the figure"),
     "cpk": Variable(M, "1", "capability index C_pk of the figure"),
-    "failed": Variable(("cause",), "1", "samples without an answer, by the gravest status of their positions"),
+    "failed": Variable(("cause",), "1", "samples not solved, by the gravest status of their positions"),
     "histogram": Variable(("measure", "bin"), "1", "samples in a bin"),
     "edge": Variable(("measure", "edge"), "", "edges of the bins; those at the ends stand for all beyond"),
     "band": Variable(
         ("measure", "quantile", "position"),
         "course",
-        "deviation of the course from nominal that this share does not exceed",
+        "quantile of the deviation of the curve from nominal",
     ),
     "convergence_samples": Variable(("size",), "1", "first so many samples"),
     "convergence_mean": Variable(("measure", "size"), "", "mean of the first samples"),

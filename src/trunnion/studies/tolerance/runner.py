@@ -75,7 +75,7 @@ def _checked(jobs: int | None, chunk: int | None, resume: bool, checkpoint: obje
             Finding(f"a portion of {chunk} samples", "chunk", "state 1 or more; it is rounded up to blocks")
         )
     if resume and checkpoint is None:
-        findings.append(Finding("nothing to go on from", "resume", "name the file: --checkpoint FILE"))
+        findings.append(Finding("there is no checkpoint", "resume", "name the file: --checkpoint FILE"))
     if findings:
         raise MechanismError(findings)
     return jobs or os.cpu_count() or 1

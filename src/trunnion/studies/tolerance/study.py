@@ -117,7 +117,7 @@ def _check(methods: Sequence[str], samples: int, seed: int, engine: str, target:
         if method not in METHODS
     ]
     if sum(method in SAMPLINGS for method in methods) > 1:
-        findings.append(Finding("two sampling methods at once", "method", f"take one of {' and '.join(SAMPLINGS)}"))
+        findings.append(Finding("two sampling methods at once", "method", f"use one of {' and '.join(SAMPLINGS)}"))
     if not isinstance(samples, int) or not 1 <= samples <= MOST_SAMPLES:
         remedy = f"give a whole number from 1 to {MOST_SAMPLES:,}, or leave the sampling methods out"
         findings.append(Finding(f"{samples} samples", "samples", remedy))
@@ -131,11 +131,11 @@ def _check(methods: Sequence[str], samples: int, seed: int, engine: str, target:
 
 
 def _check_target(target: float | None, methods: Sequence[str]) -> None:
-    """MechanismError for a yield that cannot be asked for."""
+    """MechanismError for a yield that is not possible."""
     if target is None:
         return
     if not 0 < target < 1:
-        what = f"a yield of {target:g} cannot be asked for"
+        what = f"a yield of {target:g} is not possible"
         raise MechanismError(Finding(what, "yield", "give a share above 0 and below 1, such as 0.9973"))
     if not any(method in SAMPLINGS for method in methods):
         raise MechanismError(Finding("a yield is one of samples", "yield", f"add the method {' or '.join(SAMPLINGS)}"))

@@ -174,22 +174,24 @@ def _remedy(outcome: Outcome, of: Of, say: _Words) -> str:
     """What brings the measure within its limits: another nominal mechanism, other middles, or narrower tolerances."""
     lower, upper = limits(of)
     if lower > 0 or upper < 0:
-        return "the nominal figure itself is outside: no tolerance mends that, change the mechanism or the limit"
+        return (
+            "the nominal value is outside the limits: change the mechanism or the limit, tolerances cannot correct it"
+        )
     middle, fixed = _middle(outcome, of)
     if not np.isfinite(middle):
-        return "first order has no answer: change the nominal mechanism, or narrow the tolerances and sample again"
+        return "there is no first-order result: change the nominal mechanism, or narrow the tolerances and sample again"
     if not lower < middle < upper:
-        what = f"the tolerances and what points anywhere are off by {say.say(middle)} in their middle"
-        return f"{what}: no narrower ones mend that, centre them or change the nominal mechanism"
+        what = f"the middle of the tolerances is off by {say.say(middle)}"
+        return f"{what}: centre them or change the nominal mechanism, narrower ones cannot correct it"
     off = _off_middle(lower, upper, middle)
     first = f"bring the nominal mechanism {say.say(-off)} nearer to the middle of the limits, and " if off else ""
     name, share, priced = _largest(outcome, of)
-    told = f"{first}narrow first '{name}', {100 * share:.3g} % of the worst case"
+    narrow = f"{first}narrow first '{name}', {100 * share:.3g} % of the worst case"
     if not priced:
-        return f"{told}; `allocate` finds how far at least cost, once `costs` say what narrower tolerances cost"
+        return f"{narrow}; `trunnion allocate` finds the cheapest tolerances if the model states `costs`"
     if not fixed:
-        return f"{told}; what has no cost takes more than the limits by itself, and `allocate` leaves that as it is"
-    return f"{told}; `allocate` finds how far at least cost"
+        return f"{narrow}; tolerances without a cost, which `trunnion allocate` keeps, exceed the limits by themselves"
+    return f"{narrow}; `trunnion allocate` finds the cheapest tolerances"
 
 
 def _middle(outcome: Outcome, of: Of) -> tuple[float, bool]:

@@ -75,7 +75,7 @@ def bought(result: xr.Dataset) -> TextTable:
         )  # fmt: skip
     total, before = float(result["cost_total"]), float(result["cost_total_before"])
     rows.append(["all", "", "", "", _known(total), share(1.0), "", _known(before)])
-    head = ["what to buy", "tolerance", "made", "group", "cost", "share", "as stated", "cost as stated"]
+    head = ["parameter", "tolerance", "made", "group", "cost", "share", "as stated", "cost as stated"]
     return _without_empty(TextTable(headed(result), head, rows))
 
 
@@ -116,8 +116,8 @@ def room(result: xr.Dataset) -> TextTable:
             [read.name, read.told_limits, _share(read.value("used")), _share(max(found, default=math.nan)),
              _share(read.value("yield")), "—" if math.isnan(wider) else f"{wider:.4g}"]
         )  # fmt: skip
-    head = ["measure", "limits", "room taken", "worst case found", "yield", "1\u00a0% wider saves"]
-    return _without_empty(TextTable("how the limits are kept", head, rows))
+    head = ["measure", "limits", "used", "worst case", "yield", "1\u00a0% wider saves"]
+    return _without_empty(TextTable("share of the limits that is used", head, rows))
 
 
 def _share(value: float) -> str:
@@ -137,10 +137,10 @@ def trials(result: xr.Dataset) -> TextTable:
 def offers_table(result: xr.Dataset) -> TextTable:
     """Cost over accuracy."""
     rows = [
-        [f"{100 * factor:.4g}\u00a0%", _known(cost) if math.isfinite(cost) else "cannot be kept"]
+        [f"{100 * factor:.4g}\u00a0%", _known(cost) if math.isfinite(cost) else "infeasible"]
         for factor, cost in zip(result["trade_off_factor"].values, result["trade_off_cost"].values, strict=True)
     ]
-    return TextTable("what accuracy costs", ["limits, of the stated ones", "least cost"], rows)
+    return TextTable("cost over accuracy", ["limits, relative to stated", "minimum cost"], rows)
 
 
 # ---- figures ----------------------------------------------------------------------------------------------------
@@ -155,7 +155,7 @@ def check_kind(kind: str) -> None:
 def figure(result: xr.Dataset, kind: str | None = None) -> Figure:
     """A kind of figure; cost over accuracy where it was asked for, else what the tolerances cost, if none is named."""
     if not result.attrs["found"]:
-        raise MechanismError(Finding("there is no allocation to draw", "--out", "widen the limits that cannot be kept"))
+        raise MechanismError(Finding("there is no allocation to draw", "--out", "widen the infeasible limits"))
     kind = kind or ("trade-off" if "trade_off_cost" in result else "cost")
     check_kind(kind)
     if kind == "cost":
@@ -163,7 +163,7 @@ def figure(result: xr.Dataset, kind: str | None = None) -> Figure:
     if kind != "trade-off":
         return tolerance_figure(result, kind)
     if "trade_off_cost" not in result:
-        raise MechanismError(Finding("no measure has a figure 'trade-off'", "--kind", "ask for --curve 21"))
+        raise MechanismError(Finding("no measure has a figure 'trade-off'", "--kind", "add --curve 21"))
     return trade_off(result, offers(result), _limit(result), stepped=result.attrs["choices"] == "discrete")
 
 
@@ -205,15 +205,15 @@ def prices(result: xr.Dataset) -> list[PriceCurve]:
 
 def report(result: xr.Dataset) -> str:
     """The report of the mechanism with the tolerances found, what to buy first."""
-    kicker = "Tolerances of least cost for a linkage"
+    kicker = "Tolerances of minimum cost for a linkage"
     if not result.attrs["found"]:
         return tolerance_report(result, kicker=kicker)
-    pictures = [("What each tolerance costs, the chosen one marked", figure(result, "cost"))]
+    pictures = [("Cost of each tolerance, the chosen one marked", figure(result, "cost"))]
     told = [bought(result)._replace(title=""), room(result)]
     told += [trials(result)] if "trial_yield" in result else []
-    first = [Section("What to buy", headed(result), pictures, told)]
+    first = [Section("Allocated tolerances", headed(result), pictures, told)]
     if "trade_off_cost" in result:
-        about = "all limits multiplied by the same factor, and the least cost of keeping them"
-        curve = [("Least cost over accuracy", figure(result, "trade-off"))]
-        first.append(Section("What accuracy costs", about, curve, [offers_table(result)._replace(title="")]))
+        about = "Minimum cost if all limits are multiplied by the same factor."
+        curve = [("Minimum cost over accuracy", figure(result, "trade-off"))]
+        first.append(Section("Cost over accuracy", about, curve, [offers_table(result)._replace(title="")]))
     return tolerance_report(result, first, kicker)

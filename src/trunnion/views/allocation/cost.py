@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
+from trunnion.results.quantities import number
 from trunnion.views.common.cycle import Array
 from trunnion.views.common.figures import INK, MUTED, PALETTE, dress, legend, new
 from trunnion.views.common.lettering import plain
-from trunnion.views.common.quantities import number
 from trunnion.views.tolerance.readings import scaled
 
 if TYPE_CHECKING:
@@ -66,19 +66,19 @@ def trade_off(
     that limit, else its share of the stated ones. stepped: as with processes to choose from: what keeps a limit keeps
     any wider one too.
     """
-    drawn = new("What accuracy costs", result)
+    drawn = new("Cost over accuracy", result)
     axes = drawn.subplots()
     share, cost = (np.array([one[k] for one in sorted(offers)], float) for k in (0, 1))
     if limit is None:
-        factor, title = 100.0, "limits as a share of the stated ones [%]"
+        factor, title = 100.0, "limits relative to the stated ones [%]"
     else:
         name, half, si = limit
         scale, unit = scaled(half, si)
         factor, title = half * scale, f"limit of {name} ± [{unit}]" if unit else f"limit of {name} ±"
-    dress(axes, plain(title), "least cost")
+    dress(axes, plain(title), "minimum cost")
     steps: dict[str, Any] = {"drawstyle": "steps-post"} if stepped or _is_stepped(cost) else {}
     axes.plot(factor * share, cost, color=PALETTE[0], linewidth=1.8, marker="o", markersize=3.2,
-              label="least cost", **steps)  # fmt: skip
+              label="minimum cost", **steps)  # fmt: skip
     known = np.isfinite(cost)
     if known.any():
         stated = float(np.interp(1.0, share[known], cost[known]))
@@ -89,7 +89,7 @@ def trade_off(
     if lost.size:
         low, high = factor * share[0], factor * float(lost.max())
         axes.axvspan(low, high, facecolor="none", edgecolor="#d9dde2", hatch="///", linewidth=0, zorder=0.5)
-        axes.text((low + high) / 2, 0.5, "cannot be kept", transform=axes.get_xaxis_transform(), rotation=90,
+        axes.text((low + high) / 2, 0.5, "infeasible", transform=axes.get_xaxis_transform(), rotation=90,
                   ha="center", va="center", fontsize=8, color=MUTED)  # fmt: skip
     if known.any():
         axes.set_ylim(bottom=0.0 if cost[known].min() > 0 else None)
@@ -110,14 +110,14 @@ def tolerance_cost(result: xr.Dataset, prices: Sequence[PriceCurve]) -> Figure:
     shown = order[:MOST_PRICES]
     columns = min(len(shown), 2 if len(shown) in (2, 4) else COLUMNS)
     rows = -(-len(shown) // columns)
-    drawn = new("What the tolerances cost", result, 1.0 + rows * SIDE * (1.25 if columns < COLUMNS else 1.0))
+    drawn = new("Cost of the tolerances", result, 1.0 + rows * SIDE * (1.25 if columns < COLUMNS else 1.0))
     grid = drawn.subplots(rows, columns, squeeze=False).ravel()
     for axes in grid[len(shown) :]:
         axes.set_visible(False)
     for k, (axes, price) in enumerate(zip(grid, shown, strict=False)):
         _panel(axes, price, k % columns == 0, columns < COLUMNS)
     if len(shown) < len(prices):
-        drawn.text(0.012, 0.005, f"the {len(shown)} dearest of {len(prices)}", fontsize=7.5, color=MUTED)
+        drawn.text(0.012, 0.005, f"the {len(shown)} most expensive of {len(prices)}", fontsize=7.5, color=MUTED)
     return drawn
 
 
@@ -148,7 +148,7 @@ def _told(price: PriceCurve, factor: float, unit: str) -> list[str]:
     """What is chosen, what it costs, and by which process: "±0.0105 mm, cost 9"."""
     t, cost = price.chosen
     if not math.isfinite(t + cost):
-        return ["nothing chosen"]
+        return ["none chosen"]
     found = [name for name, half, _ in price.processes if half == t]
     gap = "" if unit in ("°", "") else "\u00a0"
     return [f"±{t * factor:.4g}{gap}{unit}, cost {number(cost)}", *(_end(name) for name in found[:1])]

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from trunnion.results.attributes import attribute
+from trunnion.results.quantities import prefixed, quantity
 from trunnion.views.common.cycle import Abscissa, Array, column, names
 from trunnion.views.common.figures import INK, MUTED, PALETTE, SHADE, along, curve, legend, new, style_of
 from trunnion.views.common.lettering import plain
-from trunnion.views.common.quantities import prefixed, quantity
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -34,7 +34,7 @@ def figure(result: xr.Dataset) -> Figure:
     stated = share is not None and bool(np.any(np.isfinite(share) & (share > 0)))
     parted = bool(np.nanmax(result["uniform_part"].values, initial=0.0) > 0)
     count = 1 + stated + parted
-    sheet = new("What clearance it needs to go together", result, 2.0 + 1.6 * count)
+    sheet = new("Clearance needed for assembly", result, 2.0 + 1.6 * count)
     panels = list(sheet.subplots(count, 1, sharex=True, squeeze=False)[:, 0])
     for axes in panels[: 1 + stated]:
         _shade(axes, result, over)
@@ -77,7 +77,7 @@ def _need(axes: Axes, result: xr.Dataset, over: Abscissa) -> None:
     if np.isfinite(most) and most > 0:
         axes.axhline(most * factor, color=MUTED, linewidth=0.9, linestyle=(0, (3, 2)))
         joints = result.attrs["assembling"]
-        text = f"smallest that suffices, the same in {joints}: {quantity(most, 'm')}"
+        text = f"smallest clearance, the same in {joints}: {quantity(most, 'm')}"
         axes.annotate(plain(text), (0.01, most * factor), xycoords=("axes fraction", "data"), fontsize=8, color=INK,
                       xytext=(0, 3), textcoords="offset points")  # fmt: skip
         axes.set_ylim(0, 1.22 * most * factor)
@@ -85,9 +85,7 @@ def _need(axes: Axes, result: xr.Dataset, over: Abscissa) -> None:
     axes.set_yticks([])
     axes.set_ylim(-0.1, 1)
     if known.size and most == 0:
-        axes.text(
-            0.5, 0.5, "none: it goes together without", transform=axes.transAxes, ha="center", fontsize=9, color=INK
-        )
+        axes.text(0.5, 0.5, "no clearance is needed", transform=axes.transAxes, ha="center", fontsize=9, color=INK)
 
 
 def _share(axes: Axes, share: Array, over: Abscissa) -> None:
@@ -103,7 +101,7 @@ def _share(axes: Axes, share: Array, over: Abscissa) -> None:
 
 def _parts(axes: Axes, result: xr.Dataset, over: Abscissa) -> None:
     """What each joint's clearance contributes to the need."""
-    along(axes, over, "part of the joint [%]")
+    along(axes, over, "share of the joint [%]")
     parts = 100 * np.asarray(result["uniform_part"].values, float).sum(axis=1)
     for i, joint in enumerate(names(result, "joint")):
         if np.nanmax(parts[i], initial=0.0) > 100 * TOLD:

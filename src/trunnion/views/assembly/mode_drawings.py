@@ -57,7 +57,7 @@ def ways(mechanism: Mechanism, found: Sequence[GroupModes] | None = None) -> Fig
     """
     found = choices(prepare(mechanism)) if found is None else found
     if not found:
-        what = "no group has more than one assembly: there is nothing to choose and nothing to draw"
+        what = "no group has more than one assembly mode: there is nothing to draw"
         raise MechanismError(Finding(what, remedy="draw the mechanism with `trunnion plot --kind mechanism`"))
     if mechanism.space == "spatial":
         return space_ways(mechanism, found)
@@ -68,7 +68,7 @@ def ways(mechanism: Mechanism, found: Sequence[GroupModes] | None = None) -> Fig
     lines = [math.ceil(len(row) / columns) for row in rows]
     high = WIDTH * min(max((box[3] - box[1]) / (box[2] - box[0]), 0.45), 1.6) + 0.28
     width = max(columns * WIDTH, 2 * WIDTH) + 0.2
-    figure = new("Ways to assemble", result, 0.6 + sum(0.3 + line * high for line in lines), width)
+    figure = new("Assembly modes", result, 0.6 + sum(0.3 + line * high for line in lines), width)
     parts = figure.subfigures(len(found), 1, squeeze=False, height_ratios=[0.3 + line * high for line in lines])[:, 0]
     labels = Labels(figure)
     for part, choice, row in zip(parts, found, rows, strict=True):
@@ -129,7 +129,7 @@ def _group(
 ) -> None:
     """The drawings of one group under its label."""
     where = f", at {choice.where}" if choice.where else ""
-    more = f", {len(row)} of {len(choice.ways)} ways" if len(row) < len(choice.ways) else ""
+    more = f", {len(row)} of {len(choice.ways)} assembly modes" if len(row) < len(choice.ways) else ""
     head = f"{choice.label}    {', '.join(choice.links)}{where}{more}"
     part.suptitle(plain(head), x=0.012, ha="left", fontsize=9, color=INK)
     grid = part.subplots(math.ceil(len(row) / columns), columns, squeeze=False).ravel()
@@ -146,7 +146,7 @@ def _one(axes: Axes, choice: GroupModes, one: ModeDrawing, size: float, labels: 
     paint, width = (INK, 1.8) if one.way.taken else (RULE, 1.0)
     for spine in axes.spines.values():
         spine.set(color=paint, linewidth=width)
-    title = f"{choice.link}: {one.way.name}" + "  taken" * one.way.taken
+    title = f"{choice.link}: {one.way.name}" + "  used" * one.way.taken
     weight = "bold" if one.way.taken else "normal"
     axes.set_title(plain(title), fontsize=8.5, fontweight=weight, color=INK, loc="left", pad=4)
     shown = replace(one.shown, size=SYMBOLS * size)

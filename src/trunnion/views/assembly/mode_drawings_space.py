@@ -49,7 +49,7 @@ def space_ways(mechanism: Mechanism, found: Sequence[GroupModes]) -> Figure:
     lines = [math.ceil(len(row) / columns) for row in rows]
     tall = WIDTH * min(max((frame[3] - frame[1]) / (frame[2] - frame[0]), 0.45), 1.4) + 0.28
     figure = new(
-        "Ways to assemble", result, 0.6 + sum(0.3 + line * tall for line in lines), max(columns, 2) * WIDTH + 0.2
+        "Assembly modes", result, 0.6 + sum(0.3 + line * tall for line in lines), max(columns, 2) * WIDTH + 0.2
     )
     parts = figure.subfigures(len(found), 1, squeeze=False, height_ratios=[0.3 + line * tall for line in lines])[:, 0]
     labels = Labels(figure)
@@ -82,7 +82,7 @@ def _group(
 ) -> None:
     """The drawings of one group under its label."""
     where = f", at {choice.where}" if choice.where else ""
-    more = f", {len(row)} of {len(choice.ways)} ways" if len(row) < len(choice.ways) else ""
+    more = f", {len(row)} of {len(choice.ways)} assembly modes" if len(row) < len(choice.ways) else ""
     head = f"{choice.label}    {', '.join(choice.links)}{where}{more}"
     part.suptitle(plain(head), x=0.012, ha="left", fontsize=9, color=INK)
     grid = part.subplots(math.ceil(len(row) / columns), columns, squeeze=False).ravel()
@@ -99,12 +99,12 @@ def _one(axes: Axes, choice: GroupModes, way: AssemblyMode, look: Scenery | None
     paint, width = (INK, 1.8) if way.taken else (RULE, 1.0)
     for spine in axes.spines.values():
         spine.set(color=paint, linewidth=width)
-    title = f"{choice.link}: {way.name}" + "  taken" * way.taken
+    title = f"{choice.link}: {way.name}" + "  used" * way.taken
     weight = "bold" if way.taken else "normal"
     axes.set_title(plain(title), fontsize=8.5, fontweight=weight, color=INK, loc="left", pad=4)
     if look is None:
         axes.text(
-            0.03, 0.03, "cannot be assembled in this way", transform=axes.transAxes, fontsize=7, color=MUTED, zorder=8
+            0.03, 0.03, "cannot be assembled in this mode", transform=axes.transAxes, fontsize=7, color=MUTED, zorder=8
         )
         return
     sketch(axes, look, index, choice.links)

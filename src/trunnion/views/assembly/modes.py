@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from trunnion.views.common.quantities import prefixed
+from trunnion.results.quantities import prefixed
 
 if TYPE_CHECKING:
     from trunnion.cycle.inspect import GearPair
@@ -29,12 +29,12 @@ def gear_line(pair: GearPair) -> str:
 def lines(choice: GroupModes) -> list[str]:
     """The position if it is not the start, each way with its joints, and what to write to take another."""
     wide = max(len(way.name) for way in choice.ways)
-    found = [f"as they are at {choice.where}:"] * bool(choice.where)
+    found = [f"at {choice.where}:"] * bool(choice.where)
     told = some(choice, MOST_WAYS)
-    found += [f"{way.name:<{wide}}  {places(choice, way)}{'  <- taken' * way.taken}" for way in told]
+    found += [f"{way.name:<{wide}}  {places(choice, way)}{'  <- used' * way.taken}" for way in told]
     found += [f"… and {len(choice.ways) - len(told)} more"] * (len(told) < len(choice.ways))
     other = next(way for way in choice.ways if not way.taken)
-    return [*found, f"to take another: {choice.line(other)}"]
+    return [*found, f"to use another: {choice.line(other)}"]
 
 
 def some(choice: GroupModes, most: int) -> list[AssemblyMode]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from trunnion.errors import Status
 from trunnion.joints.pairs import GUIDED
 from trunnion.results.attributes import attribute
-from trunnion.views.common.quantities import prefixed
+from trunnion.results.quantities import prefixed
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -160,7 +160,7 @@ def series(values: Array | None) -> list[float | None]:
 
 def status_text(code: int) -> str:
     """The sentence of a status code."""
-    return TEXTS.get(code, f"no answer (status {code})")
+    return TEXTS.get(code, f"not solved (status {code})")
 
 
 def intervals(result: xr.Dataset, lowest: int = Status.NOT_CONVERGED) -> list[Interval]:

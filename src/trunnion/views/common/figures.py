@@ -13,9 +13,9 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.ticker import AutoMinorLocator, MaxNLocator, MultipleLocator
 
 from trunnion.errors import Status
+from trunnion.results.quantities import quantity
 from trunnion.views.common.cycle import Abscissa, Array, intervals, thin
 from trunnion.views.common.lettering import Sheet, plain
-from trunnion.views.common.quantities import quantity
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -154,7 +154,7 @@ def frame_peak(axes: Axes, most: float, shown: float, factor: float, unit: str) 
 
 
 def outside(axes: Axes, most: float, unit: str) -> None:
-    text = f"peak {quantity(most, unit)} lies outside,\nnear a dead centre; --uncut shows it"
+    text = f"peak {quantity(most, unit)} is outside the frame,\nnear a dead centre; --uncut shows it"
     box = {"boxstyle": "round,pad=0.2", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
     axes.text(0.99, 0.97, text, transform=axes.transAxes, ha="right", va="top", fontsize=8, color=MUTED, bbox=box)
 

@@ -10,9 +10,9 @@ import numpy as np
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.names import nearest
 from trunnion.results.attributes import attribute
+from trunnion.results.quantities import number, prefixed
 from trunnion.rig.comparison.assessment import Verdict
 from trunnion.views.common.cycle import Abscissa, Array, names
-from trunnion.views.common.quantities import number, prefixed
 from trunnion.views.sweep.scales import Scale
 
 if TYPE_CHECKING:

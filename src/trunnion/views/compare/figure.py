@@ -18,6 +18,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError, Status
+from trunnion.results.quantities import number
 from trunnion.views.common.cycle import Abscissa, Array, names
 from trunnion.views.common.figures import (
     INK,
@@ -34,7 +35,6 @@ from trunnion.views.common.figures import (
     style_of,
 )
 from trunnion.views.common.lettering import Sheet, plain
-from trunnion.views.common.quantities import number
 from trunnion.views.compare.comparison import (
     coverage_of,
     drive,
@@ -56,7 +56,7 @@ if TYPE_CHECKING:
 
 __all__ = ["KINDS", "MOST_PANELS", "check_kind", "efficiency", "figure", "overlay", "panels", "small"]
 
-KINDS = {"efficiency": "measured and modelled efficiency", "overlay": "courses with residuals"}
+KINDS = {"efficiency": "measured and modelled efficiency", "overlay": "signals with residuals"}
 MOST_PANELS = 6
 MOST_NAMED = 8  # series that a legend tells apart; more by a scale of colours
 MEASURED, MODEL = PALETTE[0], PALETTE[1]
@@ -83,7 +83,7 @@ def figure(
         return overlay(result, panels(result, channel, condition))
     if not measured:
         what = "the efficiency was not measured"
-        remedy = "channels measuring effort: and rate: of the driver, load: and rate: of a load's joint tell it"
+        remedy = "measure effort: and rate: of the driver, load: and rate: of a load's joint"
         raise MechanismError(Finding(what, "--kind efficiency", remedy))
     return efficiency(result)
 
@@ -224,12 +224,12 @@ def overlay(result: xr.Dataset, shown: Sequence[tuple[int, int]]) -> Figure:
     """Courses of channels in conditions, each with its residual below; at most MOST_PANELS, and the figure says so."""
     if not shown:
         raise MechanismError(
-            Finding("there is no course to draw", "--kind overlay", "look at what `trunnion data` says")
+            Finding("there is no signal to draw", "--kind overlay", "see the findings of `trunnion data`")
         )
     count = min(len(shown), MOST_PANELS)
     columns = 1 if count == 1 else 2
     rows = -(-count // columns)
-    more = f", {count} of {len(shown)} courses" if len(shown) > count else ""
+    more = f", {count} of {len(shown)} signals" if len(shown) > count else ""
     sheet = new(f"Measured and model{more}", result, height=1.0 + 3.2 * rows, width=WIDTH if count == 1 else 10.6)
     parts = np.ravel(np.asarray(sheet.subfigures(rows, columns, squeeze=False)))
     for part, (i, k) in zip(parts, shown, strict=False):

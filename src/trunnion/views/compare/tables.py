@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from trunnion.results.attributes import attribute
+from trunnion.results.quantities import number, prefixed
 from trunnion.rig.comparison.assessment import Verdict
 from trunnion.views.common.cycle import Array, names
-from trunnion.views.common.quantities import number, prefixed
 from trunnion.views.common.table import TextTable
 from trunnion.views.compare.comparison import coverage_of, scale_of, sets, setting, text, units, verdict
 from trunnion.views.rig.conditions import shortened
@@ -35,7 +35,7 @@ def results(result: xr.Dataset, channel: int | None = None) -> TextTable:
             head = [name] if channel is not None else [name, names(result, "channel")[i]]
             rows.append([*head, *_figures(result, i, k)])
     first = [what] if channel is not None else [what, "channel"]
-    head = ["RMS", "largest", "at", "bias", "within ±U", "at least", "correlation", "verdict"]
+    head = ["RMS", "largest", "at", "bias", "within ±U", "required", "correlation", "verdict"]
     return TextTable("results", [*first, *head], rows)
 
 
@@ -102,7 +102,7 @@ def efficiencies(result: xr.Dataset) -> TextTable | None:
     """Measured efficiency with U beside the model's; None if it was not measured."""
     if "efficiency" not in result:
         return None
-    words = {1: "within", 0: "not within", -1: "not known"}
+    words = {1: "within", 0: "not within", -1: "unknown"}
     what, told = shortened(names(result, "condition"))
     rows = []
     for k, name in enumerate(told):
@@ -174,7 +174,7 @@ def headline(result: xr.Dataset) -> list[tuple[str, list[tuple[str, str]]]]:
     total = len(codes)
     count = int(np.count_nonzero(codes == Verdict.WITHIN))
     rows: list[tuple[str, list[tuple[str, str]]]] = [
-        ("courses within ±U", [(f"{count} of {total}", f"channels in conditions, {coverage_of(result)} coverage")])
+        ("signals within ±U", [(f"{count} of {total}", f"channels in conditions, {coverage_of(result)} coverage")])
     ]
     if "efficiency" in result:
         within = result["efficiency_within"].values
@@ -183,5 +183,5 @@ def headline(result: xr.Dataset) -> list[tuple[str, list[tuple[str, str]]]]:
         most = float(np.nanmax(gap)) if np.isfinite(gap).any() else float("nan")
         rows.append(("efficiencies within ±U", [(f"{int(np.count_nonzero(within == 1))} of {known}", "conditions")]))
         if np.isfinite(most):
-            rows.append(("largest difference of efficiency", [(number(most, 3), "measured less model, size")]))
+            rows.append(("largest difference of efficiency", [(number(most, 3), "measured minus model, magnitude")]))
     return rows

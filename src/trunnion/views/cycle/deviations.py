@@ -30,7 +30,7 @@ REMEDIES = {
 }
 LACKS = {
     "errors": "the mechanism has no errors",
-    "seats": "no joint of the mechanism has a pin with a seat in its hole",
+    "seats": "no joint of the mechanism has a pin with a seat",
 }
 
 
@@ -44,7 +44,7 @@ def need(result: xr.Dataset, part: str, figure: str) -> None:
     if has(result, part):
         return
     if part == "seats" and "seat_offset" in result:
-        what, remedy = "no position has an answer: no seat is known", "run check: it says why"
+        what, remedy = "no position is solved", "run `trunnion check` to see why"
     else:
         what, remedy = LACKS[part], REMEDIES[part]
     raise MechanismError(Finding(f"{what}, and there is no figure '{figure}'", "--kind", remedy))

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from trunnion.errors import MechanismError
+from trunnion.results.quantities import prefixed
 from trunnion.studies.play.study import play
 from trunnion.views.common.cycle import Abscissa, Array, abscissa, column, names
 from trunnion.views.common.figures import along, curve, frame_peak, legend, new, shade, style_of
 from trunnion.views.common.lettering import plain
 from trunnion.views.common.peaks import ease, usual_peak
-from trunnion.views.common.quantities import prefixed
 from trunnion.views.cycle.deviations import Output, angle_scale, has, losses, need, outputs, point_errors, worst_points
 
 if TYPE_CHECKING:
@@ -86,7 +86,7 @@ def _places(axes: Axes, result: xr.Dataset, over: Abscissa) -> None:
     every, worst = point_errors(result), worst_points(result)
     scope = usual_peak(ease(result), *every.values())
     factor, unit = prefixed(scope, "m")
-    along(axes, over, f"error of place [{unit or 'm'}]")
+    along(axes, over, f"position error [{unit or 'm'}]")
     shade(axes, result, over)
     for index, (key, size) in enumerate(worst.items()):
         curve(axes, over, size * factor, key, **style_of(index))

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from trunnion.results.attributes import attribute
+from trunnion.results.quantities import number, quantity
 from trunnion.views.common.cycle import Abscissa, Array, abscissa, column, mean_friction, names, valid
-from trunnion.views.common.quantities import number, quantity
 from trunnion.views.cycle.deviations import angle_scale, losses, outputs, worst_points
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ def error_rows(result: xr.Dataset) -> list[Row]:
         return []
     over = abscissa(result)
     rows = [
-        _error(f"Error of place of {key}, largest", valid(result, error), "m", over)
+        _error(f"Position error of {key}, largest", valid(result, error), "m", over)
         for key, error in worst_points(result).items()
     ]
     rows += [

@@ -8,11 +8,11 @@ import numpy as np
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.results.attributes import attribute
+from trunnion.results.quantities import prefixed
 from trunnion.views.common.cycle import abscissa, column
 from trunnion.views.common.figures import PALETTE, along, curve, frame_peak, new, shade
 from trunnion.views.common.lettering import plain
 from trunnion.views.common.peaks import ease, peak, usual_peak
-from trunnion.views.common.quantities import prefixed
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -18,6 +18,7 @@ from trunnion.errors import Finding, MechanismError, Status
 from trunnion.files import whole
 from trunnion.joints.pairs import GUIDED
 from trunnion.results.attributes import attribute
+from trunnion.results.quantities import prefixed, quantity
 from trunnion.views.common.cycle import (
     Abscissa,
     Array,
@@ -48,7 +49,6 @@ from trunnion.views.common.figures import (
 from trunnion.views.common.labels import Labels
 from trunnion.views.common.lettering import plain
 from trunnion.views.common.peaks import ease, peak, usual_peak
-from trunnion.views.common.quantities import prefixed, quantity
 from trunnion.views.cycle.deviations import has
 from trunnion.views.cycle.deviations_plot import error
 from trunnion.views.cycle.measures_plot import drawn, measures
@@ -147,7 +147,7 @@ def friction_power(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figur
 
 
 def _mean(value: float) -> str:
-    return f"mean {quantity(value, 'W')}" if np.isfinite(value) else "no answer"
+    return f"mean {quantity(value, 'W')}" if np.isfinite(value) else "not solved"
 
 
 def _reaction(result: xr.Dataset, joint: str, plane: tuple[str, str] = ("x", "y")) -> Array:

@@ -19,9 +19,9 @@ import numpy as np
 
 from trunnion.results.attributes import attribute, summary_of
 from trunnion.results.figure import MORE_THAN, Figure
+from trunnion.results.quantities import number, quantity
 from trunnion.views.common.bundle import bundle, web_text
 from trunnion.views.common.cycle import abscissa, column, intervals, names
-from trunnion.views.common.quantities import number, quantity
 from trunnion.views.cycle.deviations_tables import error_rows, loss_rows
 from trunnion.views.cycle.scene import scene
 
@@ -33,12 +33,12 @@ __all__ = ["embedded", "hashed", "inputs_of", "report", "said"]
 
 # Variable, label, unit, what a reader may make of it.
 BALANCE = (
-    ("closure_residual", "Closure of the loops", "m", "how far the pins of a joint are apart after assembly"),
-    ("condition", "Condition number", "1", "how strongly forces and speeds answer to the dimensions"),
-    ("friction_iterations", "Friction iterations", "1", "rounds until reactions and friction agree"),
-    ("friction_contraction", "Contraction", "1", "share of the error that a round leaves; below 1 it converges"),
-    ("friction_residual", "Friction residual", "N", "largest difference between a friction and its law"),
-    ("friction_change", "Last change", "N", "change of the reactions in the last round"),
+    ("closure_residual", "Closure of the loops", "m", "distance between the pins of a joint after assembly"),
+    ("condition", "Condition number", "1", "sensitivity of forces and speeds to the dimensions"),
+    ("friction_iterations", "Friction iterations", "1", "iterations until reactions and friction agree"),
+    ("friction_contraction", "Contraction", "1", "error ratio of successive iterations; below 1 it converges"),
+    ("friction_residual", "Friction residual", "N", "largest difference between a friction force and its law"),
+    ("friction_change", "Last change", "N", "change of the reactions in the last iteration"),
 )
 
 
@@ -144,9 +144,9 @@ def _balance(result: xr.Dataset) -> list[dict[str, str]]:
     if residual is not None and names(result, "driver"):
         drive = np.abs(np.asarray(result["drive_power"].sum("driver").values, dtype=float))
         most = float(drive[np.isfinite(drive)].max(initial=0.0))
-        meaning = "power that drive, loads, masses and friction leave over, as a share of the greatest drive power"
+        meaning = "sum of the powers of drive, loads, masses and friction, relative to the peak drive power"
         rows.append(
-            _worst("Power residual", residual / most if most else residual, "1" if most else "W", meaning, over)
+            _worst("Power balance residual", residual / most if most else residual, "1" if most else "W", meaning, over)
         )
     for name, label, unit, meaning in BALANCE:
         values = column(result, name)

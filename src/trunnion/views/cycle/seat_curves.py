@@ -11,10 +11,10 @@ from matplotlib.ticker import MultipleLocator
 from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError
+from trunnion.results.quantities import prefixed
 from trunnion.views.common.cycle import Abscissa, Array, abscissa, column, names
 from trunnion.views.common.figures import PALETTE, along, curve, legend, new, shade, style_of
 from trunnion.views.common.lettering import plain
-from trunnion.views.common.quantities import prefixed
 from trunnion.views.cycle.deviations import JUMP, NOWHERE, Seats, broken, continued, losses, need, seated
 from trunnion.views.cycle.deviations_plot import LOST
 
@@ -56,7 +56,7 @@ def beta(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
     need(result, "seats", "beta")
     panels = _panels(result)
     if not panels:
-        what = "only balls have seats, and no angle describes those: there is no figure 'beta'"
+        what = "the seats of balls are directions, not angles: there is no figure 'beta'"
         raise MechanismError(Finding(what, "--kind", "see the figure 'seat'"))
     over, lost = abscissa(result), losses(result)
     figure = new("Seats over the run", result, 1.4 + 2.3 * len(panels))

@@ -16,10 +16,10 @@ from matplotlib.colors import Colormap, LinearSegmentedColormap, Normalize
 from matplotlib.patches import Circle, Rectangle
 from numpy.typing import NDArray
 
+from trunnion.results.quantities import number, prefixed, quantity
 from trunnion.views.common.cycle import Abscissa, Array, abscissa
 from trunnion.views.common.figures import INK, MUTED, PALETTE, SHADE, dress, new
 from trunnion.views.common.lettering import plain
-from trunnion.views.common.quantities import number, prefixed, quantity
 from trunnion.views.cycle.deviations import Seats, need, seated
 
 if TYPE_CHECKING:

@@ -8,10 +8,10 @@ import numpy as np
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.results.attributes import attribute
+from trunnion.results.quantities import prefixed
 from trunnion.views.common.cycle import Array, names
 from trunnion.views.common.figures import INK, MUTED, PALETTE, SHADE, dress, legend, new
 from trunnion.views.common.lettering import plain
-from trunnion.views.common.quantities import prefixed
 from trunnion.views.identify.identification import Estimate, channels, conditions, curve_of, estimates
 from trunnion.views.rig.conditions import shortened
 
@@ -70,7 +70,7 @@ def _interval(axes: Axes, one: Estimate, labelled: bool) -> None:
                   label=label.get("interval"))  # fmt: skip
         axes.plot([one.value], [0], "o", color=AFTER, markersize=6, label=label.get("value"))
     else:
-        axes.text(0.5, 0.75, "the data do not tell it", transform=axes.transAxes, ha="center", va="center",
+        axes.text(0.5, 0.75, "not identifiable", transform=axes.transAxes, ha="center", va="center",
                   fontsize=8.5, color=MUTED)  # fmt: skip
     axes.plot([one.start], [0], "D", color=BEFORE, markersize=5, markerfacecolor="none", markeredgewidth=1.4,
               label=label.get("start"))  # fmt: skip
@@ -105,7 +105,7 @@ def correlation(result: xr.Dataset) -> Figure:
     for p in range(len(rows) if len(rows) <= MOST_TOLD else 0):
         for q in range(len(rows)):
             value = values[p, q]
-            text = "not told" if np.isnan(value) else f"{value:.2f}".replace("-", "−")
+            text = "—" if np.isnan(value) else f"{value:.2f}".replace("-", "−")
             colour = MUTED if np.isnan(value) else "white" if abs(value) > 0.6 else INK
             axes.text(q, p, text, ha="center", va="center", fontsize=8, color=colour)
     bar = sheet.colorbar(picture, ax=axes, shrink=0.8, aspect=25)

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from trunnion.results.attributes import attribute
+from trunnion.results.quantities import number
 from trunnion.views.common.bundle import web_text
-from trunnion.views.common.quantities import number
 from trunnion.views.common.table import TextTable
 from trunnion.views.compare.tables import files
 from trunnion.views.cycle.report import said
@@ -30,30 +30,30 @@ FEW = 2  # estimates whose correlation needs no picture
 DEFINITIONS = (
     (
         "Estimate",
-        "The values that make Σ w (ȳ − (1 + g) f − z)² + Σ a² least: ȳ the means over the turns, f the model, g and z "
+        "The values that minimise Σ w (ȳ − (1 + g) f − z)² + Σ a²: ȳ the means over the turns, f the model, g and z "
         "the errors of gain and zero of each sensor, a the same in their stated standard uncertainties. The weights w "
         "are 1 over the variance of the mean, by the scatter between turns and its correlation along a turn.",
     ),
     (
         "Standard uncertainty",
-        "By what each turn adds to the estimate, whatever the correlation within it (type A), and by the stated "
-        "uncertainties of zero, gain and resolution (type B), both through the exact derivatives of the model. Where "
-        "the model does not fit, or the conditions disagree, what is left over is added.",
+        "From the contribution of each turn to the estimate, whatever the correlation within it (type A), and from the "
+        "stated uncertainties of zero, gain and resolution (type B), both with the exact derivatives of the model. "
+        "Where the model does not fit, or the conditions disagree, the remaining deviation is added.",
     ),
     (
         "Interval",
         "It holds the true value in 95 of 100 such experiments if the model is right: estimate ± t u, Student's t for "
-        "the effective degrees of freedom (Welch and Satterthwaite, GUM G.4.1). On a limit it is one-sided.",
+        "the effective degrees of freedom (Welch and Satterthwaite, GUM G.4.1). At a bound it is one-sided.",
     ),
     (
         "Reduced χ²",
-        "Squares of the residuals of the means over what the scatter between turns explains, frequency by frequency "
-        "along the cycle: near 1 if the model fits.",
+        "Mean square of the residuals relative to that expected from the scatter between turns, frequency by "
+        "frequency along the cycle: near 1 if the model fits.",
     ),
     (
-        "Not told",
-        "Numbers that act on the data in the same way have no estimate; a finding says which of their combinations is "
-        "known.",
+        "Not identifiable",
+        "Parameters with the same effect on the data have no estimate; a finding names the combinations that are "
+        "determined.",
     ),
 )
 
@@ -90,9 +90,9 @@ def _summary(result: xr.Dataset) -> list[tuple[str, list[tuple[str, str]]]]:
 
 def _told(one: Any) -> tuple[str, str]:
     if not one.told:
-        return "not told", "by these data"
+        return "not identifiable", "from these data"
     if one.limit:
-        return one.say(one.value), "on its limit"
+        return one.say(one.value), "at its bound"
     return one.say(one.value), f"± {one.say(one.half)}, 95 %"
 
 
@@ -101,12 +101,12 @@ def _sections(result: xr.Dataset) -> list[dict[str, Any]]:
     told = [one for one in estimates(result) if one.told]
     several = correlations(result)
     held = held_out(result)
-    unheld = "Measured less model over the cycle before and after; of many conditions some."
+    unheld = "Measured minus model over the cycle, before and after the fit; a selection if there are many conditions."
     found = [
         _section("Estimates", result, "intervals", [estimated(result), budget(result), sensors(result)]),
         _section("Correlation", result, "correlation" if len(told) > FEW else "", [several]) if several else None,
         _section("Residuals", result, "residuals", [fits(result)], unheld),
-        _section("Held out", result, "", [held], "What was not fitted, and how well it is predicted.")
+        _section("Held out", result, "", [held], "Data not used in the fit, and the error of their prediction.")
         if held
         else None,
     ]

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from trunnion.results.quantities import prefixed
 from trunnion.views.common.cycle import names
-from trunnion.views.common.quantities import prefixed
 from trunnion.views.common.table import TextTable
 from trunnion.views.identify.identification import Estimate, channels, conditions, estimates, percent
 from trunnion.views.rig.conditions import shortened
@@ -38,8 +38,8 @@ def estimated(result: xr.Dataset) -> TextTable:
         ]
         for one in estimates(result)
     ]
-    head = ["parameter", "start", "estimate ± U", "95\u00a0% interval", "degrees of freedom", "most of its variance"]
-    return TextTable(f"{result.attrs['identified']}: what was found", head, rows)
+    head = ["parameter", "start", "estimate ± U", "95\u00a0% interval", "dof", "main source"]
+    return TextTable(f"{result.attrs['identified']}: estimates", head, rows)
 
 
 def _freedom(one: Estimate) -> str:
@@ -53,7 +53,7 @@ MANY = 1e4  # degrees of freedom: Student's t is the normal distribution to four
 
 def _value(one: Estimate) -> str:
     if not one.told:
-        return "not told"
+        return "not identifiable"
     if one.limit:
         return f"{one.say(one.value)} (limit)"
     return f"{one.say(one.value, unit=False)}\u00a0±\u00a0{one.say(one.half)}"
@@ -96,8 +96,8 @@ def fits(result: xr.Dataset) -> TextTable | None:
             rows.append([name, names_of[k], *numbers, shown, *counts])
     if not rows:
         return None
-    head = ["channel", title, "rms before", "rms after", "by scatter", "unit", "turns", "positions"]
-    return TextTable("how the model fits", head, rows)
+    head = ["channel", title, "RMS before", "RMS after", "expected", "unit", "turns", "positions"]
+    return TextTable("residuals of the fit", head, rows)
 
 
 def held_out(result: xr.Dataset) -> TextTable | None:
@@ -113,20 +113,24 @@ def held_out(result: xr.Dataset) -> TextTable | None:
             rows.append([name, names_of[k], f"{int(turns[k])}", *(_figure(one, factor) for one in values), shown])
     if not rows:
         return None
-    head = ["channel", title, "turns", "rms before", "rms after", "to be expected", "unit"]
-    return TextTable("what was held out", head, rows)
+    head = ["channel", title, "turns", "RMS before", "RMS after", "expected", "unit"]
+    return TextTable("held-out data", head, rows)
 
 
 def sensors(result: xr.Dataset) -> TextTable | None:
     """Estimated errors of the sensors, in what is stated of them."""
     rows = [
-        [name, f"{error:.2f} ± {2 * u:.2f}".replace("-", "−") if math.isfinite(error) else "not told"]
+        [name, f"{error:.2f} ± {2 * u:.2f}".replace("-", "−") if math.isfinite(error) else "not identifiable"]
         for name, error, u in zip(
             names(result, "sensor"), result["sensor_error"].values, result["sensor_uncertainty"].values, strict=True
         )
         if not name.startswith("zero of each file")  # as many as there are files
     ]
-    return TextTable("errors of the sensors", ["", "in stated standard uncertainties, ± 2 u"], rows) if rows else None
+    return (
+        TextTable("errors of the sensors", ["", "in units of its stated standard uncertainty, ± 2 u"], rows)
+        if rows
+        else None
+    )
 
 
 def budget(result: xr.Dataset) -> TextTable | None:
@@ -136,7 +140,7 @@ def budget(result: xr.Dataset) -> TextTable | None:
     if not told:
         return None
     rows = [[name, *(percent(one.shares[name]) for one in told)] for name in sources]
-    return TextTable("where the uncertainty comes from", ["share of the variance", *(one.short for one in told)], rows)
+    return TextTable("uncertainty budget", ["share of the variance", *(one.short for one in told)], rows)
 
 
 LEAST = 0.005

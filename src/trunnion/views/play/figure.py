@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from trunnion.results.attributes import attribute
+from trunnion.results.quantities import prefixed, quantity
 from trunnion.studies.play.result import relied_on
 from trunnion.views.common.cycle import Abscissa, Array, thin
 from trunnion.views.common.figures import INK, PALETTE, along, frame_peak, legend, new, shade
 from trunnion.views.common.lettering import plain
 from trunnion.views.common.peaks import ease, usual_peak
-from trunnion.views.common.quantities import prefixed, quantity
 from trunnion.views.common.table import TextTable
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ HATCHES = ("", "//", "..", "xx")
 def figure(result: xr.Dataset) -> Figure:
     """A panel for each measure: the joints' worst cases on top of one another, their RSS dashed."""
     over, names = _over(result), result["measure"].values[:MOST_PANELS]
-    sheet = new("What the play of the joints does", result, height=1.0 + PANEL * len(names))
+    sheet = new("Effect of the play of the joints", result, height=1.0 + PANEL * len(names))
     units, limits = (attribute(result, key) for key in ("measure_units", "limits"))
     panels = sheet.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
     for i, (axes, name) in enumerate(zip(panels, names, strict=True)):
@@ -102,7 +102,7 @@ def tables(result: xr.Dataset) -> list[TextTable]:
 def _table(result: xr.Dataset, over: Abscissa, name: str, unit: str) -> TextTable:
     total = _relied_on(result, "worst_case_total")
     if not np.isfinite(total).any():
-        return TextTable(f"{name}: no position has an answer", HEAD, [])
+        return TextTable(f"{name}: no position is solved", HEAD, [])
     top, rows, effects = int(np.nanargmax(total)), list[list[str]](), _relied_on(result, "worst_case")
     for j, joint in enumerate(result["joint"].values):
         effect = effects[j]

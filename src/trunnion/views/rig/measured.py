@@ -33,7 +33,7 @@ def tables(measurement: Measurement) -> list[TextTable]:
     shown = [TextTable(f"{measurement.name}\nconditions: mean over turns and positions", head, rows)]
     head = ["channel", "measures", "unit", "least", "largest", "scatter", "uncertainty"]
     rows = [[name, *_channel([one.courses[name] for one in conditions])] for name in channels]
-    title = "channels: mean courses, what turns scatter, standard uncertainty of the mean"
+    title = "channels: mean signal, scatter of turns, standard uncertainty of the mean"
     return [*shown, TextTable(title, head, rows)]
 
 
@@ -59,7 +59,7 @@ def _rms(values: np.ndarray) -> float:
 
 
 def _figure(value: float, digits: int = 5) -> str:
-    return "not known" if not np.isfinite(value) else f"{value + 0.0:.{digits}g}"
+    return "unknown" if not np.isfinite(value) else f"{value + 0.0:.{digits}g}"
 
 
 def _unit(unit: str) -> str:

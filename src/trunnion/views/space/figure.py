@@ -10,13 +10,13 @@ from matplotlib.patches import FancyArrowPatch
 from matplotlib.patheffects import Normal, Stroke
 
 from trunnion.errors import Finding, MechanismError, Status
+from trunnion.results.quantities import prefixed
 from trunnion.views.common.cycle import Array, abscissa, column, status_text
 from trunnion.views.common.drawing import PALE
 from trunnion.views.common.figures import INK, MUTED, PALETTE, new
 from trunnion.views.common.labels import Labels
 from trunnion.views.common.lettering import plain
 from trunnion.views.common.peaks import ease, usual_peak
-from trunnion.views.common.quantities import prefixed
 from trunnion.views.space.bodies import Space, space, without_noise
 from trunnion.views.space.camera import Camera, best, looking
 from trunnion.views.space.paint import JOINT, Strokes, paint
@@ -87,7 +87,7 @@ def mechanism(result: xr.Dataset, index: int | None = None) -> Figure:
         raise MechanismError(Finding(f"there is no position {index} among the {count}", "index", remedy))
     if not look.shown.drawable[index]:
         what = f"position {index} cannot be assembled: there is nothing to draw"
-        raise MechanismError(Finding(what, "index", "name a position that has an answer"))
+        raise MechanismError(Finding(what, "index", "choose a solved position"))
     arrows, most = _reactions(look, result, index)
     low, high = _limits(look, arrows)
     figure = new("Mechanism", result, float(np.clip(7.2 * (high - low)[1] / (high - low)[0], *HEIGHTS)) + 0.7)
@@ -109,7 +109,7 @@ def mechanism(result: xr.Dataset, index: int | None = None) -> Figure:
     if status >= Status.NOT_CONVERGED:
         facts.append(status_text(status).split(":")[0])
     if any(look.shown.shifts.values()):
-        facts.append("joints on one spot drawn apart")
+        facts.append("coincident joints drawn apart")
     axes.set_title(plain("    ".join(filter(None, facts))), fontsize=8.5, color=MUTED, loc="left")
     labels.place()
     return figure

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from trunnion.joints.pairs import PAIRS
+from trunnion.results.quantities import prefixed
 from trunnion.views.common.cycle import Abscissa, Array, abscissa, column, layout, names
 from trunnion.views.common.figures import along, curve, frame_peak, legend, new, shade, style_of
 from trunnion.views.common.lettering import plain
 from trunnion.views.common.peaks import ease, usual_peak
-from trunnion.views.common.quantities import prefixed
 from trunnion.views.space.bodies import NOISE
 
 if TYPE_CHECKING:

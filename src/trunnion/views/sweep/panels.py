@@ -12,11 +12,11 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import NullLocator, ScalarFormatter
 from numpy.typing import NDArray
 
+from trunnion.results.quantities import prefixed
 from trunnion.views.common.cycle import Array
 from trunnion.views.common.figures import INK, MUTED, dress, legend, new
 from trunnion.views.common.lettering import plain
 from trunnion.views.common.peaks import ease_of_status, usual_peak
-from trunnion.views.common.quantities import prefixed
 from trunnion.views.cycle.deviations import angle_scale
 from trunnion.views.cycle.deviations_plot import LOST
 from trunnion.views.sweep.scales import Arrangement, Scale, arrange, grid, meaning, statuses, thinned, written

@@ -15,10 +15,10 @@ from trunnion.errors import Finding, MechanismError, Status
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.names import nearest
 from trunnion.results.attributes import attribute
+from trunnion.results.quantities import SUPERSCRIPT, WORDS
 from trunnion.results.tables.studies import swept as figures
 from trunnion.studies.sweep.study import FIGURES
 from trunnion.views.common.cycle import Array
-from trunnion.views.common.quantities import SUPERSCRIPT, WORDS
 
 if TYPE_CHECKING:
     import xarray as xr

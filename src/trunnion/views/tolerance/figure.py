@@ -38,18 +38,18 @@ def _bars(rows: int) -> float:
     return max(1.4 + 0.34 * rows, 2.6)
 
 
-SAMPLES = "ask for samples: --method monte-carlo"
+SAMPLES = "add samples: --method monte-carlo"
 KINDS: dict[str, FigureKind] = {
     "histogram": FigureKind(
         "Distribution", histogram, lambda read: read.has("histogram"), lambda _: PANEL, SAMPLES
     ),
     "contributions": FigureKind(
         "Contributions", contributions, lambda read: read.has("contribution_rss"),
-        lambda read: _bars(rows_of(read)), "ask for --method linear"
+        lambda read: _bars(rows_of(read)), "add --method linear"
     ),
     "envelope": FigureKind(
         "Envelope over the drive", envelope, lambda read: read.places is not None, lambda _: PANEL + 0.3,
-        "measure it at more than one position; a place in the cycle has none",
+        "use a measure at every position instead of one position",
     ),
     "convergence": FigureKind(
         "Convergence", convergence, lambda read: len(read.row("convergence_samples")) > 1, lambda _: PANEL + 1.0,
@@ -57,7 +57,7 @@ KINDS: dict[str, FigureKind] = {
     ),
     "sobol": FigureKind(
         "Sobol indices", sobol, lambda read: read.has("total_order"),
-        lambda read: _bars(rows_of_sobol(read)), "ask for --method sobol"
+        lambda read: _bars(rows_of_sobol(read)), "add --method sobol"
     ),
 }  # fmt: skip
 
@@ -101,13 +101,13 @@ def sheet(result: xr.Dataset, measures: Sequence[str] | None = None) -> Figure:
     found = [(read, drawable(read)) for read in _named(result, measures)]
     found = [(read, kinds) for read, kinds in found if kinds]
     if not found:
-        raise MechanismError(Finding("no measure has anything to draw", remedy="ask for --method linear"))
+        raise MechanismError(Finding("no measure has a figure", remedy="add --method linear"))
     check_count(len(found))
     if len(found) == 1:
         return _alone(result, *found[0])
     columns = [kind for kind in FEW if any(kind in kinds for _, kinds in found)]
     heights = [max(KINDS[kind].height(read) for kind in columns if kind in kinds) + 0.3 for read, kinds in found]
-    drawn = new("What the tolerances do", result, 0.6 + sum(heights), WIDE * len(columns))
+    drawn = new("Effect of the tolerances", result, 0.6 + sum(heights), WIDE * len(columns))
     rows = drawn.subfigures(len(found), 1, squeeze=False, height_ratios=heights)[:, 0]
     for row, (read, kinds) in zip(rows, found, strict=True):
         row.suptitle(plain(_named_so(read)), x=0.006, ha="left", fontsize=10.5, fontweight="bold", color=INK)

@@ -28,13 +28,13 @@ NOTES: dict[str, tuple[str, str]] = {
     "quasi-monte-carlo": (
         "Quasi-Monte Carlo",
         "The samples are points of Sobol's sequence, which fill the space of the tolerances more evenly than random "
-        "ones, scrambled anew for each of several replicates; the intervals come from the scatter between them by "
+        "ones, scrambled for each of several replicates; the intervals come from the scatter between them by "
         "Student's t.",
     ),
     "sobol": (
         "Sobol indices",
-        "The share of the variance that a number makes alone, and with all its interactions (Sobol, 2001, "
-        "doi:10.1016/S0378-4754(00)00270-6). They hold for large and nonlinear deviations, but suppose independent "
+        "The share of the variance due to a parameter alone, and with all its interactions (Sobol, 2001, "
+        "doi:10.1016/S0378-4754(00)00270-6). They hold for large and nonlinear deviations, but assume independent "
         "numbers.",
     ),
 }

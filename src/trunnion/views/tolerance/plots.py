@@ -250,7 +250,7 @@ def _holes(axes: Axes, over: Abscissa, read: MeasureReading) -> None:
     for k in (k for k, index in enumerate(picked) if index < 0):
         axes.axvspan(x[k - 1], x[k + 1], color=SHADE, linewidth=0, zorder=0.5)
         axes.text(
-            x[k], 0.5, "no answer", transform=axes.get_xaxis_transform(), rotation=90, ha="center", va="center",
+            x[k], 0.5, "not solved", transform=axes.get_xaxis_transform(), rotation=90, ha="center", va="center",
             fontsize=8, color=MUTED, zorder=3, clip_on=True,
         )  # fmt: skip
 

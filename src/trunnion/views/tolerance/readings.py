@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from trunnion.results.attributes import attribute
+from trunnion.results.quantities import number, prefixed
 from trunnion.views.common.cycle import Abscissa, Array, names
-from trunnion.views.common.quantities import number, prefixed
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -49,7 +49,7 @@ class Section(NamedTuple):
     tables: Sequence[TextTable]
 
 
-def report(result: xr.Dataset, first: Sequence[Section] = (), kicker: str = "What tolerances do to a linkage") -> str:
+def report(result: xr.Dataset, first: Sequence[Section] = (), kicker: str = "Tolerance analysis of a linkage") -> str:
     """The whole report as HTML; first: parts that stand before those of the measures, as an allocation has them."""
     style = web_text("report.css") + web_text("tolerance.css")
     reads, run = readings(result), methods(result)
@@ -80,12 +80,12 @@ def template(name: str) -> Template:
 
 def _facts(result: xr.Dataset, run: Sequence[str]) -> list[tuple[str, str]]:
     """(figure, what it counts) of the run."""
-    counts = [(result.sizes["measure"], "measure"), (result.sizes["parameter"], "toleranced number")]
+    counts = [(result.sizes["measure"], "measure"), (result.sizes["parameter"], "toleranced parameter")]
     found = [(f"{count:,}", f"{what}{'' if count == 1 else 's'}") for count, what in counts]
     if any("monte-carlo" in name for name in run):
         count = int(result["samples"].values) if "samples" in result else int(result.attrs.get("samples", 0))
         found.append((f"{count:,}".replace(",", "\u202f"), "samples"))
-        found.append((str(result.attrs.get("seed", "")), "as seed"))
+        found.append((f"seed {result.attrs.get('seed', '')}", ""))
     return [*found, ("", ", ".join(NOTES[name][0] for name in run if name in NOTES))]
 
 

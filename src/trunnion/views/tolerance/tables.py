@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from trunnion.results.quantities import number
 from trunnion.views.common.cycle import names
-from trunnion.views.common.quantities import number
 from trunnion.views.common.table import TextTable
 from trunnion.views.tolerance.plots import outer, rss_label
 from trunnion.views.tolerance.readings import (
@@ -223,7 +223,7 @@ def contributions(read: MeasureReading, short: bool = False) -> TextTable:
         sums = (float(np.nansum([getattr(one, key) for one in rest])) for key in shares.values())
         rows.append([f"{len(rest)} others", "", "", "", *(share(part, 1) for part in sums)])
     at = f" at {read.told_place}" if read.told_place else ""
-    return TextTable(f"what contributes to {read.name}{at}", head, rows)
+    return TextTable(f"contributions to {read.name}{at}", head, rows)
 
 
 def indices(read: MeasureReading, short: bool = False) -> TextTable:
@@ -269,7 +269,7 @@ def corners(read: MeasureReading) -> TextTable | None:
         [path, *(value_text(float(read.row(f"corner_{end}")[j]), about[path].unit) for end in ends)]
         for j, path in enumerate(names(read.result, "parameter"))
     ]
-    return TextTable(f"worst corners of {read.name}, found on the nonlinear model", head, rows)
+    return TextTable(f"worst corners of {read.name}, of the nonlinear model", head, rows)
 
 
 def _searched(read: MeasureReading, end: str) -> float:
@@ -326,7 +326,7 @@ def failed(result: xr.Dataset) -> list[TextTable]:
     count = int(result["samples"].values) if "samples" in result else 0
     rows = [[cause, f"{n:,}", share(n / count, 2) if count else ""] for cause, n in found]
     return [
-        TextTable("samples that failed: outside every limit, not in means and quantiles", ["", "samples", ""], rows)
+        TextTable("failed samples: outside every limit, excluded from mean and quantiles", ["", "samples", ""], rows)
     ]
 
 
@@ -356,4 +356,6 @@ def inputs(result: xr.Dataset) -> TextTable:
         told = [value_text(float(nominal[j]), unit), limits_of(float(lower[j]), float(upper[j]), unit)]
         told += [value_text(float(row[j]), unit, 4) if row.size else "" for row in (deviation, shift)]
         rows.append([path, *told])
-    return TextTable("toleranced numbers", ["number", "nominal", "limits", "standard deviation", "shift of mean"], rows)
+    return TextTable(
+        "toleranced parameters", ["number", "nominal", "limits", "standard deviation", "shift of mean"], rows
+    )

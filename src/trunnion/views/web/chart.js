@@ -149,7 +149,7 @@ function describe(chart) {
   const found = extent(chart.series.map((one) => one.values));
   const span = found
     ? `from ${fixed(found[0] * chart.scale.factor, found[1] * chart.scale.factor)} to ${fixed(found[1] * chart.scale.factor, found[1] * chart.scale.factor)} ${chart.scale.unit}`
-    : "without values";
+    : "no values";
   return `${chart.title} over ${chart.scene.abscissa.label}, ${span}`;
 }
 

@@ -3,7 +3,7 @@
 import { stated } from "./format.js";
 
 const CONTACT_LOST = 3; // errors.Status
-export const OUTSIDE = "near a dead centre lies outside; --uncut shows it."; // of a peak that a chart cuts
+export const OUTSIDE = "near a dead centre is outside the frame; --uncut shows it."; // of a peak that a chart cuts
 
 const FIRST_UNSOLVED = 4; // errors.Status.NOT_CONVERGED: from here on the forces have no value
 
@@ -147,7 +147,7 @@ export function solved(scene, index) {
 
 /** The state of a position in a sentence. */
 export function state(scene, index) {
-  return scene.states[String(scene.status[index])] ?? "no answer";
+  return scene.states[String(scene.status[index])] ?? "not solved";
 }
 
 /** The place of a position in words: "132°", "12.5 mm". */

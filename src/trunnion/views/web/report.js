@@ -42,7 +42,7 @@ function charts(scene, kinds, pick) {
   if (sums.efficiency_instant) {
     const values = full(sums.efficiency_instant, count).map((value) => (value === null ? null : 100 * value));
     const whole = scene.efficiency === null ? "" : `Over the whole run: ${quantity(100 * scene.efficiency, "%")}. `;
-    const far = peak(values) > 100 ? "Beyond ±100 %, where the drive power nears zero, it is not shown." : "";
+    const far = peak(values) > 100 ? "Values beyond ±100 %, near zero drive power, are not shown." : "";
     list.push(
       lineChart(scene, {
         title: "Efficiency at each position",
@@ -66,7 +66,7 @@ function errorCharts(scene, kinds, pick) {
   const list = [];
   if (built.worst.length) {
     const series = built.worst.map(({ label, values }, order) => ({ label, values: full(values, count), kind: kindOf(order) }));
-    list.push(lineChart(scene, { title: "Errors of place, largest", unit: "m", series, marks, note, pick }));
+    list.push(lineChart(scene, { title: "Position errors, largest", unit: "m", series, marks, note, pick }));
   }
   for (const { label, unit, values, worst } of built.outputs)
     list.push(lineChart(scene, { title: `Transmission error, ${label}`, unit, marks, band: worst && { low: full(worst.low, count), high: full(worst.high, count), kind: "k0", label: "worst case of the play" }, note, pick, series: [{ label: "error", values: full(values, count), kind: "k0" }] })); // prettier-ignore
@@ -104,7 +104,7 @@ function momentChart(scene, kinds, pick) {
   const series = scene.joints
     .map(({ name, moment }) => ({ label: name, values: magnitude(moment, scene.count), kind: kinds.get(name) }))
     .filter((one) => peak(one.values) > 0);
-  const note = "About the middle of the bearing; drive and friction are not in it.";
+  const note = "About the middle of the bearing; without drive and friction.";
   return lineChart(scene, { title: "Reaction moments, magnitude", unit: "N m", series, note, pick });
 }
 

@@ -1,13 +1,13 @@
 """Numbers as an engineer reads them: an SI prefix that fits, four digits, true minus signs.
 
-`web/format.js` says the same in the browser; both are held to one table of cases in `tests/views`.
+`web/format.js` writes the same in the browser; both are held to one table of cases in `tests/views`.
 """
 
 from __future__ import annotations
 
 import math
 
-__all__ = ["number", "prefixed", "quantity"]
+__all__ = ["between", "number", "parts", "prefixed", "quantity", "readable"]
 
 PREFIXES = {-4: "p", -3: "n", -2: "µ", -1: "m", 0: "", 1: "k", 2: "M", 3: "G"}
 SCALABLE = ("N m", "N", "W", "m", "s", "J", "Pa")
@@ -53,6 +53,37 @@ def quantity(value: object, unit: str = "") -> str:
     factor, shown = prefixed(value, unit)
     separator = "" if shown in ("°", "") else "\u00a0"
     return f"{number(value * factor)}{separator}{shown}"
+
+
+def parts(value: float, unit: str, digits: int = 6) -> tuple[str, str]:
+    """A number and its unit for a line of plain text or a table of the terminal: ("18.75", "kN m").
+
+    No thin spaces and no zeros at the end, so that it can be searched for and copied; below 10⁻¹² of the unit it is
+    left in the unit itself, for it is no more than rounding.
+    """
+    if unit == "mm" and abs(value) < 0.01:
+        value, unit = value * 1e-3, "m"
+    factor, shown = (1.0, unit) if unit != "rad" and 0 < abs(value) < 1e-12 else prefixed(value, unit)
+    text = number(value * factor, digits).replace("\u202f", "")
+    if "." in text and "×" not in text:
+        text = text.rstrip("0").rstrip(".")
+    return text, {"1": "", "deg": "°"}.get(shown, shown)
+
+
+def readable(value: float, unit: str = "", digits: int = 4) -> str:
+    """A quantity within a sentence: "18.75 kN m", "−0.5°", "3.10×10⁻¹²"."""
+    text, shown = parts(value, unit, digits)
+    return f"{text}{'' if shown in ('°', '') else ' '}{shown}"
+
+
+def between(low: float, high: float, unit: str) -> str:
+    """Two ends of one quantity with a common unit, in as many digits as it takes to tell them apart:
+    "between −10.6059 and −10.6055 kN m"."""
+    size, width = max(abs(low), abs(high)), abs(high - low)
+    digits = 4 if not 0 < width < size else min(max(4, 2 + math.ceil(math.log10(size / width))), 9)
+    factor, shown = prefixed(size, unit)
+    ends = [parts(end * factor, "", digits)[0] for end in (low, high)]
+    return f"between {ends[0]} and {ends[1]}{'' if shown in ('°', '') else ' '}{shown}"
 
 
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")

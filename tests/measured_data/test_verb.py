@@ -80,7 +80,7 @@ def test_faults_and_bad_input(program: Run, rig: Path, tmp_path: Path) -> None:
     assert "channels.torque-in.column, channels.speed-out.column: there is no column 'T1', 'n2'; the file has" in err
     assert "'t', 'T2', 'n1', 'encoder', 'angle' — name one of these" in err
     assert not (tmp_path / "c.csv").exists()
-    code, _, err = program("data", "rig.json", "--out", "c.xlsx")
+    code, _, err = program("data", "rig.json", "--out", "c.ods")
     assert code == 2
     assert "cannot write" in err
     code, _, err = program("data", "missing.yaml")

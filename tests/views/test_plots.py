@@ -149,7 +149,7 @@ def test_formats(suffix, plain, tmp_path):
 
 
 def test_an_unknown_format_is_refused_before_anything_is_written(plain, tmp_path):
-    with pytest.raises(MechanismError, match=r"\.png, \.svg or \.pdf"):
+    with pytest.raises(MechanismError, match=r"\.png, \.svg, \.pdf or \.jpg"):
         save(PLOTS["torque"](plain, None), tmp_path / "torque.bmp")
     assert not list(tmp_path.iterdir())
 

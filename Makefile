@@ -33,7 +33,7 @@ test-all: $(VENV)/.dev
 bench: $(VENV)/.bench
 	$(BIN)/python -m benchmarks.run
 
-# The documentation in site/, with all figures: some minutes.
+# The documentation in site/, with all figures: two minutes, less when little has changed since the last time.
 docs: $(VENV)/.dev
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 

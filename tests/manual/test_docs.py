@@ -241,6 +241,16 @@ def test_changelog_names_the_verbs() -> None:
     assert sorted(re.findall(r"`(\w+)`", found[1])) == sorted(verbs)
 
 
+def test_search_needs_no_network() -> None:
+    """The worker that the search needs in pages opened from disk is one of the pages' own files."""
+    yaml = pytest.importorskip("yaml")
+    stated = yaml.safe_load((ROOT / "mkdocs.yml").read_text("utf-8"))
+    assert "offline" in stated["plugins"]
+    (script,) = stated["extra"]["polyfills"]
+    assert "iframe-worker" in script  # by this name the plugin knows that it need not fetch one
+    assert (ROOT / "docs" / script).is_file()
+
+
 def test_readme_is_short() -> None:
     """At most 1000 words, outputs included: who wants more finds it in docs/."""
     assert len((ROOT / "README.md").read_text("utf-8").split()) <= 1000

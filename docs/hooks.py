@@ -12,6 +12,7 @@ text, links and tables are checked within seconds, as `make test` does.
 
 from __future__ import annotations
 
+import gc
 import importlib.util
 import inspect
 import os
@@ -36,6 +37,11 @@ DOCS = ROOT / "docs"
 EXAMPLES = ROOT / "examples"
 
 TEXT_ONLY = os.environ.get("TRUNNION_DOCS") == "text"
+
+# The matrices are small: further threads of the linear algebra would only spin. Said before NumPy is loaded.
+for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(_name, "1")
+gc.set_threshold(50_000, 50, 50)  # pages and drawings are many small objects that live to the end
 
 
 # ---- mathematics ----------------------------------------------------------------------------------------------

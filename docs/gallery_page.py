@@ -1,17 +1,19 @@
-"""The gallery page: an entry for every example, with its drawing, notes, formula and checked fact.
+"""The gallery page: small pictures of all examples, then for each its drawing, notes, formula and checked fact.
 
-Which examples there are, in which order and with which fact, is told in `tests/gallery/facts.py`.
+`tests/gallery/facts.py` lists the examples in their order, each with its fact.
 """
 
 from __future__ import annotations
 
+import html
 import sys
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
 EXAMPLES = ROOT / "examples"
-STEPS = 180  # positions of figures and reports that only the gallery shows
+STEPS = 72  # positions of figures that only the gallery shows: those that the facts are read from
 
 
 def facts() -> Any:
@@ -24,58 +26,96 @@ def facts() -> Any:
     return facts
 
 
+@cache
+def model(name: str) -> Any:
+    """An example as read, once for the whole page."""
+    import trunnion
+
+    return trunnion.read(EXAMPLES / f"{name}.yaml")
+
+
+@cache
+def result(name: str) -> Any:
+    """The result of an example over `STEPS` positions: one analysis for its fact and all its figures."""
+    import trunnion
+
+    return trunnion.analyse(model(name), STEPS)
+
+
 def wanted() -> set[tuple[str, str, str]]:
-    """The drawings and reports that the page refers to: model, kind, suffix."""
-    entries = facts().ENTRIES.items()
-    return {(name, kind, "svg") for name, entry in entries for kind in entry.figures} | {
-        (name, "report", "html") for name, entry in entries if entry.report
-    }
+    """The drawings that the page refers to: model, kind, suffix."""
+    return {(name, kind, "svg") for name, entry in facts().ENTRIES.items() for kind in entry.figures}
 
 
-def page(text_only: bool = False) -> str:
-    """The entries as Markdown, by section. text_only: without what has to be computed."""
+def page(keep: Any, reports: set[str], text_only: bool = False) -> str:
+    """The page as Markdown, by section.
+
+    keep: `figures.kept`; reports: models whose report another page shows; text_only: without what has to be computed.
+    """
     known = facts()
     missing = {path.stem for path in EXAMPLES.glob("*.yaml")} ^ {*known.ENTRIES, *known.REFUSED}
     if missing:
         raise ValueError(f"tests/gallery/facts.py and examples/ do not name the same models: {sorted(missing)}")
-    parts = []
+    parts = [_thumbnails(known.ENTRIES)]
     for title, entries in known.SECTIONS.items():
-        parts += [f"## {title}", *(_entry(name, entry, text_only) for name, entry in entries.items())]
+        parts += [
+            f"## {title}",
+            *(_entry(name, one, keep, name in reports, text_only) for name, one in entries.items()),
+        ]
     parts += ["## Diagnosed and refused", *(() if text_only else map(_refused, known.REFUSED))]
     return "\n\n".join(parts) + "\n"
 
 
-def _entry(name: str, entry: Any, text_only: bool) -> str:
-    import trunnion
-    from gallery.entry import STEPS, Outcome
+def _thumbnails(entries: Any) -> str:
+    """A grid of small drawings, each a link to its entry."""
+    cells = []
+    for name, entry in entries.items():
+        title = html.escape(model(name).name)
+        picture = f"![](figures/{name}/{entry.figures[0]}.svg){{ loading=lazy }}"
+        cells.append(f"[{picture} <span>{title}</span>](#{name})")
+    return '<div class="thumbnails" markdown>\n' + "\n".join(cells) + "\n</div>"
 
-    mechanism = trunnion.read(EXAMPLES / f"{name}.yaml")
-    result = None if text_only else trunnion.analyse(mechanism, STEPS)
-    drawings = [f"![{_alt(kind)}](figures/{name}/{kind}.svg)" for kind in entry.figures]
-    report = f" · [report](figures/{name}/report.html)" if entry.report else ""
+
+def _entry(name: str, entry: Any, keep: Any, report: bool, text_only: bool) -> str:
+    mechanism = model(name)
+    drawings = [f"![{_alt(kind)}](figures/{name}/{kind}.svg){{ loading=lazy }}" for kind in entry.figures]
+    checked, formula = "", ""
+    if not text_only:
+        text = (EXAMPLES / f"{name}.yaml").read_text("utf-8")
+        checked, formula = keep(("gallery", text), lambda: _computed(name, entry, mechanism)).decode().split("\n\n")
     parts = [
-        f"### {mechanism.name}",
+        f"### {mechanism.name} {{ #{name} }}",
         " ".join(mechanism.notes.split()),
         '<div class="gallery" markdown>',
         *drawings,
         "</div>",
-        "" if result is None else _checked(entry, Outcome(mechanism, result)),
+        checked,
         *_sources(mechanism),
-        ("" if result is None else f"`{result.attrs['formula']}` · ") + f"[{name}.yaml](examples/{name}.yaml){report}",
+        (f"`{formula}` · " if formula else "")
+        + f"[{name}.yaml](examples/{name}.yaml)"
+        + (f" · [report](figures/{name}/report.html)" if report else ""),
     ]
     return "\n\n".join(parts)
+
+
+def _computed(name: str, entry: Any, mechanism: Any) -> bytes:
+    """What an entry says that has to be computed, as two paragraphs: the checked fact, the formula."""
+    from gallery.entry import Outcome
+
+    checked = _checked(entry, Outcome(mechanism, result(name)))
+    return f"{checked}\n\n{result(name).attrs['formula']}".encode()
 
 
 def _refused(name: str) -> str:
     """An example that is there for its diagnosis."""
     import trunnion
 
-    mechanism = trunnion.read(EXAMPLES / f"{name}.yaml")
+    mechanism = model(name)
     found = trunnion.check(mechanism, 72).findings
     errors = [one for one in found if one.severity == "error"]
     findings = [f"**Finding.** {one.what[0].upper()}{one.what[1:]}. Remedy: {one.remedy}." for one in errors]
     told = [" ".join(mechanism.notes.split()), *findings, *_sources(mechanism), f"[{name}.yaml](examples/{name}.yaml)"]
-    return "\n\n".join([f"### {mechanism.name}", *told])
+    return "\n\n".join([f"### {mechanism.name} {{ #{name} }}", *told])
 
 
 def _alt(kind: str) -> str:

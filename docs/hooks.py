@@ -1,12 +1,7 @@
 """What the build of the pages adds to their text, so that no table or picture can drift from the code.
 
 - `<!-- generated: NAME -->` in a page becomes the table of that name, made from the code's own tables.
-- `figures/MODEL/KIND.svg` and `figures/MODEL/report.html` are drawn when a page refers to them. KIND is a plot,
-  `assemblies` or `assemble`; MODEL is a file of `examples/`, a block of a page titled `MODEL.yaml`, or an entry of
-  `VARIANTS`.
-- `figures/sweeps/NAME.svg`, `figures/plays/NAME.svg`, `figures/assembles/NAME.svg`, `figures/tolerances/NAME.svg`,
-  `figures/allocates/NAME.svg` and `figures/compares/NAME.svg` are drawn by the command of a page,
-  `trunnion sweep … --out NAME.svg` and so on.
+- The figures and reports that a page refers to are drawn; see `figures.py`.
 - The line that says that a page has no tables in the repository is left out.
 - The gallery is made of the examples and of `tests/gallery/facts.py`; see `gallery_page.py`.
 - `$x$` and `$$x$$` become MathML, which browsers set without any script.
@@ -17,16 +12,13 @@ text, links and tables are checked within seconds, as `make test` does.
 
 from __future__ import annotations
 
+import gc
 import importlib.util
 import inspect
 import os
 import re
-import shlex
-import subprocess
-import sys
-import tempfile
 from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import ThreadPoolExecutor
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 from xml.etree.ElementTree import Element
@@ -45,16 +37,11 @@ DOCS = ROOT / "docs"
 EXAMPLES = ROOT / "examples"
 
 TEXT_ONLY = os.environ.get("TRUNNION_DOCS") == "text"
-EMPTY = b'<svg xmlns="http://www.w3.org/2000/svg"/>'
-# folders of figures that a command draws
-COMMANDS = ("sweeps", "plays", "assembles", "tolerances", "allocates", "compares")
 
-# model: (the model it is made from, what is replaced in it)
-VARIANTS: dict[str, tuple[str, dict[str, float | str]]] = {
-    "long-crank": ("durango-fourbar", {"AB": "2.6 m"}),
-    "press-long-guide": ("press", {"S.guide.length": "150 mm"}),
-    "lever-loaded": ("lever", {"joint_defaults.seat": "loaded"}),
-}
+# The matrices are small: further threads of the linear algebra would only spin. Said before NumPy is loaded.
+for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(_name, "1")
+gc.set_threshold(50_000, 50, 50)  # pages and drawings are many small objects that live to the end
 
 
 # ---- mathematics ----------------------------------------------------------------------------------------------
@@ -83,31 +70,14 @@ def on_config(config: Any) -> Any:
     return config
 
 
-# ---- figures --------------------------------------------------------------------------------------------------
+# ---- files that no page has -----------------------------------------------------------------------------------
 
 
 def on_files(files: Files, config: Any) -> Files:
     """Draw what the pages refer to; put the examples and the schema beside them."""
-    pages = {path: path.read_text("utf-8") for path in sorted(DOCS.rglob("*.md"))}
-    told = {found for text in pages.values() for found in re.findall(r"figures/([\w-]+)/([\w-]+)\.(svg|html)", text)}
-    swept = {found for found in told if found[0] in COMMANDS}
-    told -= swept
-    wanted = told | _gallery().wanted()
-    models = models_of(pages.values())
-    text = "\n".join(pages.values())
-    with ThreadPoolExecutor(1) as beside:  # the commands are processes of their own: one runs while this one draws
-        told_by_commands = {
-            f"figures/{verbs}/{name}.svg": beside.submit(_swept, verbs.removesuffix("s"), name, text, models)
-            for verbs, name, _ in sorted(swept)
-        }
-        for model in sorted({name for name, _, _ in wanted}):
-            kinds = [kind for name, kind, suffix in sorted(wanted) if name == model and suffix == "svg"]
-            steps = 360 if any(name == model for name, _, _ in told) else _gallery().STEPS
-            drawn = _drawn(model, models, kinds, steps, report=(model, "report", "html") in wanted)
-            for name, content in drawn.items():
-                files.append(File.generated(config, f"figures/{model}/{name}", content=content))
-        for place, content in told_by_commands.items():
-            files.append(File.generated(config, place, content=content.result()))
+    pages = [path.read_text("utf-8") for path in sorted(DOCS.rglob("*.md"))]
+    for place, content in _beside("figures").drawn(pages, _gallery()):
+        files.append(File.generated(config, place, content=content))
     for path in sorted(EXAMPLES.glob("*.yaml")):
         files.append(File.generated(config, f"examples/{path.name}", abs_src_path=str(path)))
     schema = ROOT / "src" / "trunnion" / "model" / "mechanism.schema.json"
@@ -115,90 +85,19 @@ def on_files(files: Files, config: Any) -> Files:
     return files
 
 
-def models_of(pages: Any) -> dict[str, str]:
-    """Model files by name: the examples, and the blocks of the pages titled as a file."""
-    models = {path.stem: path.read_text("utf-8") for path in EXAMPLES.glob("*.yaml")}
-    for text in pages:
-        models |= dict(re.findall(r'^```yaml title="([\w-]+)\.yaml"\n(.*?)^```', text, re.DOTALL | re.MULTILINE))
-    return models
-
-
-def _drawn(model: str, models: dict[str, str], kinds: list[str], steps: int, report: bool) -> dict[str, bytes]:
-    """The figures of a model, and its report, by file name."""
-    if TEXT_ONLY:
-        _base_of(model, models)
-        return dict.fromkeys((*(f"{kind}.svg" for kind in kinds), *(["report.html"] if report else [])), EMPTY)
-    from trunnion import analyse, assemble, read
-    from trunnion import report as page
-    from trunnion.views.assembly import figure as fit
-    from trunnion.views.assembly.mode_drawings import ways
-    from trunnion.views.cycle.plots import PLOTS, save
-
-    base, values = _base_of(model, models)
-    drawn = {}
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / f"{base}.yaml"
-        file.write_text(models[base], encoding="utf-8")
-        mechanism = read(file)
-        mechanism = mechanism.with_values(values) if values else mechanism
-        draw: dict[str, Callable[[], Any]] = {
-            "assemblies": lambda: ways(mechanism),
-            "assemble": lambda: fit.figure(assemble(mechanism)),
-        }
-        if report or any(kind not in draw for kind in kinds):
-            result, ideal = analyse(mechanism, steps), analyse(mechanism.with_friction("off"), steps)
-        for kind in kinds:
-            path = Path(folder) / f"{kind}.svg"
-            save(draw[kind]() if kind in draw else PLOTS[kind](result, ideal), path)
-            drawn[path.name] = path.read_bytes()
-        if report:
-            drawn["report.html"] = page(result, ideal).encode()
-    return drawn
-
-
-def _base_of(model: str, models: dict[str, str]) -> tuple[str, dict[str, float | str]]:
-    """The model file that figures are made from, and what is replaced in it."""
-    base, values = VARIANTS.get(model, (model, {}))
-    if base not in models:
-        raise PluginError(f"figures/{model}: there is no model '{base}'")
-    return base, values
-
-
-def _swept(verb: str, name: str, text: str, models: dict[str, str]) -> bytes:
-    """The figure that a page's own command draws, so that the two cannot differ."""
-    command = re.search(rf"^trunnion ({verb} .*--out {re.escape(name)}\.svg.*)$", text, re.MULTILINE)
-    if command is None:
-        raise PluginError(f"figures/{verb}s/{name}.svg: no page has a command that writes {name}.svg")
-    if TEXT_ONLY:
-        return EMPTY
-    with tempfile.TemporaryDirectory() as folder:
-        (Path(folder) / "examples").mkdir()
-        for model, content in models.items():
-            for place in ("", "examples"):
-                (Path(folder) / place / f"{model}.yaml").write_text(content, encoding="utf-8")
-        wanted = [*(_measured(text, command[1]) if verb == "compare" else ()), command[1]]
-        for one in wanted:
-            call = [sys.executable, "-m", "trunnion", *shlex.split(one, comments=True)]
-            done = subprocess.run(call, cwd=folder, capture_output=True, text=True, check=False)
-            if done.returncode not in (0, 1):
-                raise PluginError(f"trunnion {one}: {done.stderr}")
-        return (Path(folder) / f"{name}.svg").read_bytes()
-
-
-def _measured(text: str, command: str) -> list[str]:
-    """The command that writes the data that another reads: `FOLDER/mapping.yaml` is of `rig … --out FOLDER`."""
-    folder = shlex.split(command)[2].partition("/")[0]
-    return re.findall(rf"^trunnion (rig .*--out {re.escape(folder)})$", text, re.MULTILINE)[:1]
-
-
-def _gallery() -> Any:
-    """The module beside this one, which MkDocs has on the path while it loads this one only."""
-    spec = importlib.util.spec_from_file_location("gallery_page", DOCS / "gallery_page.py")
+@cache
+def _beside(name: str) -> Any:
+    """A module in this folder, which MkDocs has on the path while it loads this one only."""
+    spec = importlib.util.spec_from_file_location(name, DOCS / f"{name}.py")
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
+
+
+def _gallery() -> Any:
+    return _beside("gallery_page")
 
 
 # ---- tables ---------------------------------------------------------------------------------------------------
@@ -682,6 +581,13 @@ def _default(field: Any) -> str:
     return _code(value) if isinstance(value, (str, int)) and value != "" else ""
 
 
+def gallery() -> str:
+    """The entries of the gallery; those whose report a page shows link to it."""
+    pages = "".join(path.read_text("utf-8") for path in DOCS.rglob("*.md"))
+    reports = set(re.findall(r"figures/([\w-]+)/report\.html", pages))
+    return _gallery().page(_beside("figures").kept, reports, TEXT_ONLY)
+
+
 TABLES: dict[str, Callable[..., str]] = {
     "results": results_table,
     "sweeps": sweeps_table,
@@ -706,5 +612,5 @@ TABLES: dict[str, Callable[..., str]] = {
     "command-line": command_line,
     "public-names": public_names,
     "section": section,
-    "gallery": lambda: _gallery().page(TEXT_ONLY),
+    "gallery": gallery,
 }

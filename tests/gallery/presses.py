@@ -1,4 +1,4 @@
-"""Linkages of the gallery that press: a knuckle joint and a crusher."""
+"""Linkages of the gallery that press: two knuckle joints and a crusher."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
-from gallery.entry import Entry, Outcome
+import trunnion
+from gallery.entry import STEPS, Entry, Outcome
 from gallery.plane import corner
 from trunnion.solve.run import prepare
 from trunnion.studies import design
@@ -24,6 +25,21 @@ def holds_from(one: Outcome) -> float:
 
     time = brentq(force, 2.1, 3.0, xtol=1e-14)
     return -float(np.ravel(run.solve(np.array([time])).walk.point("upper", "A").place[0])[0])
+
+
+# ---- drawing-press: the friction of the guide at which it locks ------------------------------------------------------
+
+
+def guide_locks_from(one: Outcome) -> float:
+    """Coefficient of the guide at which the start of the stroke locks, the pins being free of friction."""
+    smooth = one.mechanism.with_values({f"{pin}.friction.coefficient": 0 for pin in "OKPCR"})
+    return 0.1 * float(trunnion.analyse(smooth, STEPS)["locking_margin"].min())
+
+
+def guide_locks_by_hand() -> float:
+    """slide / (2 neck tan α): the friction at both ends of the guide takes the whole force along it."""
+    knee = corner(-0.5 - 0.2j, 0, 0.38, 0.2, -1)
+    return float(0.08 / (2 * 0.12 * abs(knee.real / knee.imag)))
 
 
 # ---- jaw-crusher: stroke of the jaw's lip ----------------------------------------------------------------------------
@@ -71,6 +87,15 @@ ENTRIES = {
         expected=lambda: 2 * 0.1 * 0.02,
         source="the friction circles of the three pins, 2 f ρ",
         tolerance=1e-10,
+        figures=("mechanism", "torque"),
+    ),
+    "drawing-press": Entry(
+        says="Friction coefficient of the guide from which the press locks, with frictionless pins",
+        unit="1",
+        found=guide_locks_from,
+        expected=guide_locks_by_hand,
+        source="the equilibrium of the ram by hand, slide / (2 neck tan α)",
+        tolerance=1e-8,
         figures=("mechanism", "torque"),
     ),
     "jaw-crusher": Entry(

@@ -100,7 +100,6 @@ ENTRIES = {
         expected=steepest,
         source="the closed form cos φ = (a + c)/(e − c) at the corner",
         tolerance=1e-12,
-        report=False,
     ),
     "toleranced-fourbar": Entry(
         says="Most that the tolerances turn the rocker at 60° of the crank, to first order",

@@ -478,7 +478,7 @@ def test_zero_stiffness_is_doubted() -> None:
 @pytest.mark.parametrize(
     ("force", "words"),
     [
-        ("600 N * crank", "speaks of 'crank', which is not one of the dimensions"),
+        ("600 N * crank", "refers to 'crank', which is not one of the dimensions"),
         ("600 N * driv", "'drive'"),
         ("600 N / drive * 1 m", "where a force is needed"),
         ("600 N * (1 + time)", "added"),
@@ -486,7 +486,7 @@ def test_zero_stiffness_is_doubted() -> None:
         ("600 N * cos(drive) ± 5 N", "varies with the motion and has a tolerance"),
         ("cos(drive)", "is a number where a force is needed"),
         ("600 N * between(drive, 0 deg)", "between takes 3 arguments"),
-        ("600 N * between(drive, 0 deg, 3 mm)", "put together in between"),
+        ("600 N * between(drive, 0 deg, 3 mm)", "combined in between"),
     ],
 )
 def test_bad_expressions_are_refused(force: str, words: str) -> None:
@@ -518,7 +518,7 @@ def test_names_of_the_motion_are_not_for_dimensions_nor_for_other_sections() -> 
         ({"points": [[0, "1 N"], [1, "2 mm"]]}, "use one unit within a table"),
         ({"points": [[0, "1 N"], [1, "2 N"], [2, "3 N"]], "periodic": True}, "begins at 1 and ends at 3"),
         ({"points": [[0, "1 N"], [1, "2 N"]], "periodic": True}, "needs three points"),
-        ({"points": [[0, "1 N"], [1, "2 N"]], "interpolation": "cubic"}, "is none of"),
+        ({"points": [[0, "1 N"], [1, "2 N"]], "interpolation": "cubic"}, "is not one of"),
         ({"points": [[0, "1 N"], [1, "2 N * drive"]]}, "are for loads"),
         ({"over": "time", "points": [["0 deg", "1 N"], [1, "2 N"]]}, "is an angle where a time is needed"),
     ],

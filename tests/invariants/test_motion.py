@@ -380,7 +380,7 @@ BAD: list[tuple[Data, str, str]] = [
     ({"law": "table", "points": [[0, 1], [1, 1]]}, "drivers.A.points", "never moves"),
     ({"law": "table", "points": [[0, "0 mm"], ["1 s", "3 mm"]]}, "drivers.A.points.1.coordinate", "is a length"),
     ({"law": "table", "points": [[0, 0], [1, 1], [2, 2]], "periodic": True}, "drivers.A.points", "ends at 2 (SI)"),
-    ({"law": "table", "points": [[0, 0], [1, 0]], "periodic": True}, "drivers.A.points", "needs three points"),
+    ({"law": "table", "points": [[0, 0], [1, 0]], "periodic": True}, "drivers.A.points", "needs at least three points"),
     ({"law": "table", "points": [[0, 0], [1, 2]], "ends": "natural", "delay": 1}, "drivers.A.delay", "natural ends"),
 ]
 

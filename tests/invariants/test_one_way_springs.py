@@ -110,7 +110,7 @@ def test_duals_equal_central_differences(only: str) -> None:
         ({"only": "pull", "damping": 5.0}, "a spring that can only pull needs a stiffness — add stiffness"),
         (
             {"only": "twist", "stiffness": 5.0, "free_length": 0.1},
-            "springs.S.only: 'twist' is none of 'pull' or 'push'",
+            "springs.S.only: 'twist' is not one of 'pull' or 'push'",
         ),
         ({"only": "pull", "stiffness": 5.0, "free_length": 0.1, "preload": "-3 N"}, "preload: is -3 N, which pushes"),
         ({"only": "push", "stiffness": 5.0, "free_length": 0.1, "preload": "3 N"}, "preload: is 3 N, which pulls"),

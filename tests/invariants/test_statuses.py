@@ -342,7 +342,7 @@ def test_both_assemblies_are_found_and_the_choice_is_reported() -> None:
     data = slider_crank()
     del data["assembly"]
     result = analyse(data, 12)
-    assert "2 ways" in texts(result)
+    assert "2 assembly modes" in texts(result)
     data["assembly"] = {"P": [-0.7, 0.1]}
     left = analyse(data, 12)
     assert np.all(left["point_position"].sel(point="piston.P", axis="x") < 0)

@@ -210,7 +210,7 @@ def test_interrupted_while_writing(result: Any, tmp_path: Path, monkeypatch: pyt
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("name", ["r.xlsx", "r", "r.csv.gz", ".csv"])
+@pytest.mark.parametrize("name", ["r.xls", "r", "r.csv.gz", ".csv"])
 def test_unknown_extension(result: Any, tmp_path: Path, name: str) -> None:
     with pytest.raises(MechanismError) as error:
         trunnion.save(result, tmp_path / name)

@@ -134,7 +134,7 @@ def test_limits_that_nothing_keeps(run: Run, tmp_path: Path) -> None:
     )  # fmt: skip
     assert code == 1
     assert "no allocation meets the limits" in out
-    assert "error: measures.rocker-angle: no tolerances keep the limit +0.05 deg" in err
+    assert "error: measures.rocker-angle: the limit +0.05 deg is infeasible" in err
     assert {path.name for path in tmp_path.iterdir()} == {"a.json", "a.html"}
     assert json.loads((tmp_path / "a.json").read_text("utf-8"))["attrs"]["found"] == 0
 

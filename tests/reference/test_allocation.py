@@ -173,7 +173,7 @@ def test_what_cannot_be_met_says_where_and_by_how_much() -> None:
     assert not answer.found
     text = str(answer.findings[0])
     worst = np.max(np.abs(problem.effects.worst).sum(axis=1)) * 0.05
-    assert f"it takes {worst:+.6g}" in text
+    assert f"the deviation is {worst:+.6g}" in text
     assert "times the limit" in text
     fixed = (replace(problem.contributions[0], cost=None, value=0.5), *problem.contributions[1:])
     said = str(solve(replace(problem, contributions=fixed)).findings[0])

@@ -90,7 +90,7 @@ def test_rss_says_that_it_leaves_correlation_out() -> None:
 
 def test_table_and_chart_show_the_same_shares() -> None:
     found = study(-0.85)
-    table = next(one for one in tables(found) if one.title.startswith("what contributes"))
+    table = next(one for one in tables(found) if one.title.startswith("contributions to"))
     told = [float(row[table.head.index("of variance")].split("\u00a0")[0].replace("−", "-")) for row in table.rows]
     assert sum(told) == pytest.approx(100, abs=0.2)
     assert min(told) < 0  # one of two that work against each other

@@ -152,7 +152,7 @@ def test_missing_channels_are_told() -> None:
     del turns["T2"]
     with pytest.raises(MechanismError, match=r"T1 \(effort:a\), n1 \(rate:a\), n2 \(rate:out\).*load: of a load"):
         efficiency_of(condition(turns))
-    with pytest.raises(MechanismError, match="do not tell"):
+    with pytest.raises(MechanismError, match="do not measure input and output power"):
         efficiency_of(condition(exact()), joints={"brake": "elsewhere"})
     assert efficiency_of(condition(exact()), joints={"brake": "out"}).value == pytest.approx(ETA)
 

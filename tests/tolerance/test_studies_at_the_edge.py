@@ -95,7 +95,7 @@ def test_corner_that_does_not_go_together_is_told() -> None:
     mechanism = fourbar("±40 mm", measures={"angle": {"angle": "rocker", "at": "60 deg"}})
     result = trunnion.tolerance(mechanism, methods=["linear", "worst-case"])
     found = findings(result)
-    assert "cannot be solved at the tolerance limits that give the least deviation" in found
+    assert any("cannot be solved at the tolerance limits that give the least deviation" in text for text in found)
     # what is found all the same is a mechanism that goes together
     corner = result["corner_lower"].values[0]
     change = np.remainder(fourbar_angle(*corner) - fourbar_angle(**FOURBAR) + np.pi, 2 * np.pi) - np.pi
@@ -288,7 +288,7 @@ REFUSED: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
     "indices of correlated numbers": (
         {"correlations": [{"of": ["l1", "l2"], "coefficient": 0.5}]}, {"methods": ["sobol"]}, "independent",
     ),
-    "place in no unit": ({"measures": {"angle": {"angle": "rocker"}}}, {"at": float("nan")}, "is no place"),
+    "place in no unit": ({"measures": {"angle": {"angle": "rocker"}}}, {"at": float("nan")}, "is not a position"),
 }  # fmt: skip
 
 

@@ -119,7 +119,7 @@ def test_ways_of_a_spatial_group_are_drawn(tmp_path):
     told = tuple(AssemblyMode(f"way-{number}", {"pin-2": (0.0, 0.0, 0.0)}, number == 1) for number in (1, 2, 9))
     figure = ways(mechanism, [GroupModes(1, "II(2,3)CCC", ("cross", "output-shaft"), "cross", 0.0, "", told)])
     titles = [axes.get_title(loc="left") for axes in figure.axes if axes.get_visible()]
-    assert titles == ["cross: way-1  taken", "cross: way-2", "cross: way-9"]
+    assert titles == ["cross: way-1  used", "cross: way-2", "cross: way-9"]
     words = [{text.get_text() for text in axes.texts} for axes in figure.axes if axes.get_visible()]
     assert words == [{"pin-2"}, {"pin-2"}, {"cannot be assembled in this mode"}]
     assert save(figure, tmp_path / "ways.png").stat().st_size > 10_000

@@ -177,7 +177,7 @@ def test_what_cannot_be_met_says_where_and_by_how_much() -> None:
     assert "times the limit" in text
     fixed = (replace(problem.contributions[0], cost=None, value=0.5), *problem.contributions[1:])
     said = str(solve(replace(problem, contributions=fixed)).findings[0])
-    assert "narrow first 'l1', which has no cost" in said
+    assert "first narrow 'l1', which has no cost" in said
 
 
 @pytest.mark.parametrize(

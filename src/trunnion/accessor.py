@@ -56,9 +56,15 @@ class Accessor:
         """Its tables by name, with the columns of the CSV files."""
         return {name: frame(self._result, name) for name in KINDS[self.kind]}
 
-    def save(self, path: str | os.PathLike[str], units_row: bool = False, columns: Sequence[str] | None = None) -> None:
+    def save(
+        self,
+        path: str | os.PathLike[str],
+        units_row: bool = False,
+        columns: Sequence[str] | None = None,
+        units: str = "si",
+    ) -> None:
         """Write it by the file's extension, as `trunnion.save` does: .csv .json .nc .zarr .parquet .xlsx."""
-        save(self._result, path, units_row, columns)
+        save(self._result, path, units_row, columns, units)
 
     def report(self, path: str | os.PathLike[str] | None = None, **options: Any) -> str:
         """The report as HTML, also written if a path is given; options: those of the view, as ideal= of a cycle."""

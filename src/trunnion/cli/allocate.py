@@ -24,6 +24,8 @@ from trunnion.cli.options import (
     Set,
     Steps,
     TableFile,
+    TableUnits,
+    Units,
     UnitsRow,
     Write,
 )
@@ -62,6 +64,15 @@ class Choice(StrEnum):
     DISCRETE = "discrete"
 
 
+Way = Annotated[Choice, typer.Option("--choice", help="continuous, discrete, or auto: according to the stated costs.")]
+Exact = Annotated[
+    bool, typer.Option("--exact", help="Exact worst case of the mechanism instead of the first-order one.")
+]
+Curve = Annotated[int, typer.Option("--curve", help="Number of points of the cost-accuracy curve; 0: no curve.")]
+Samples = Annotated[int, typer.Option("--samples", help="Number of random mechanisms for the verification; 0: none.")]
+Figures = Annotated[str | None, typer.Option("--kind", help="Which figure: cost, trade-off, or one of `tolerance`.")]
+
+
 def allocate(
     file: File,
     measure: Measures = None,
@@ -74,20 +85,12 @@ def allocate(
             "--yield", help="Required share within all limits; implies --criterion yield.", show_default=False
         ),
     ] = None,
-    choice: Annotated[
-        Choice, typer.Option("--choice", help="continuous, discrete, or auto: according to the stated costs.")
-    ] = Choice.AUTO,
-    exact: Annotated[
-        bool, typer.Option("--exact", help="Exact worst case of the mechanism instead of the first-order one.")
-    ] = False,
-    curve: Annotated[
-        int, typer.Option("--curve", help="Number of points of the cost-accuracy curve; 0: no curve.")
-    ] = 0,
+    choice: Way = Choice.AUTO,
+    exact: Exact = False,
+    curve: Curve = 0,
     at: At = None,
     steps: Steps = 360,
-    samples: Annotated[
-        int, typer.Option("--samples", help="Number of random mechanisms for the verification; 0: none.")
-    ] = 10_000,
+    samples: Samples = 10_000,
     seed: Seed = 1,
     jobs: Jobs = None,
     set_: Set = None,
@@ -95,12 +98,11 @@ def allocate(
     friction: FrictionLaw = None,
     write: Write = None,
     force: Force = False,
-    kind: Annotated[
-        str | None, typer.Option("--kind", help="Which figure: cost, trade-off, or one of `tolerance`.")
-    ] = None,
+    kind: Figures = None,
     out: Out = None,
     report: Report = None,
     units_row: UnitsRow = False,
+    units: Units = TableUnits.si,
 ) -> None:
     """Find the tolerances of minimum cost that meet the limits.
 
@@ -121,7 +123,9 @@ def allocate(
             seed, curve, exact=exact, jobs=jobs, progress=progress,
         )  # fmt: skip
     draw = partial(_draw, result, kind)
-    shown = Shown(result, file, SECTIONS, out or [], report, units_row, draw=draw, show=partial(_show, result))
+    shown = Shown(
+        result, file, SECTIONS, out or [], report, units_row, draw=draw, show=partial(_show, result), units=units
+    )
     shown.write()
     findings = findings_of(result)
     if write is not None:

@@ -37,7 +37,9 @@ from trunnion.cli.options import (
     Set,
     Steps,
     TableFile,
+    TableUnits,
     Uncut,
+    Units,
     UnitsRow,
 )
 from trunnion.cli.play import play
@@ -142,6 +144,7 @@ def analyse(
     out: Data = None,
     report: Report = None,
     units_row: UnitsRow = False,
+    units: Units = TableUnits.si,
     columns: Columns = None,
     uncut: Uncut = False,
 ) -> None:
@@ -151,7 +154,7 @@ def analyse(
     with lines_of(file):
         result = _run(mechanism, steps, _method(method, criterion, iterations))
     page = partial(_page, mechanism, result, uncut)
-    Shown(result, file, ["assembly"], out or [], report, units_row, page=page, columns=columns).finish()
+    Shown(result, file, ["assembly"], out or [], report, units_row, page=page, columns=columns, units=units).finish()
 
 
 @verb

@@ -9,7 +9,20 @@ import typer
 
 from trunnion.cli.inputs import spare_data
 from trunnion.cli.model import exit_status, lines_of, stated
-from trunnion.cli.options import DataFiles, File, FrictionLaw, MappingFile, Out, Report, Seats, Set, TableFile, UnitsRow
+from trunnion.cli.options import (
+    DataFiles,
+    File,
+    FrictionLaw,
+    MappingFile,
+    Out,
+    Report,
+    Seats,
+    Set,
+    TableFile,
+    TableUnits,
+    Units,
+    UnitsRow,
+)
 from trunnion.cli.result import Shown, check_files, show_tables
 from trunnion.cli.terminal import bar
 from trunnion.results.attributes import findings_of
@@ -43,6 +56,7 @@ def compare(
     out: Out = None,
     report: Report = None,
     units_row: UnitsRow = False,
+    units: Units = TableUnits.si,
 ) -> None:
     """Compare a model with measured data: residual, bias, verdict.
 
@@ -64,7 +78,7 @@ def compare(
     errors = exit_status([*measurement.findings, *findings_of(result)])
     Shown(
         result, file, ["assembly", "measures"], out or [], report, units_row, drawn, show=partial(_show, result),
-        others=found,
+        others=found, units=units,
     ).finish(0 if bool(result.attrs["all_within"]) and not errors else 1)  # fmt: skip
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -33,6 +34,8 @@ __all__ = [
     "Set",
     "Steps",
     "TableFile",
+    "TableUnits",
+    "Units",
     "UnitsRow",
     "Write",
     "named_file",
@@ -115,6 +118,18 @@ Columns = Annotated[
     ),
 ]
 UnitsRow = Annotated[bool, typer.Option("--units-row", help="Second CSV header row with the units.")]
+
+
+class TableUnits(StrEnum):
+    """What tables are written in."""
+
+    si = "si"
+    model = "model"
+
+
+Units = Annotated[
+    TableUnits, typer.Option("--units", help="Units of table files: si, or model for those of the model file.")
+]
 Kinds = Annotated[
     list[str] | None, typer.Option("--kind", help=f"{PLOT_KINDS}. Repeatable; all if not given.", show_default=False)
 ]

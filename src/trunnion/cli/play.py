@@ -6,7 +6,19 @@ from pathlib import Path
 from typing import Any
 
 from trunnion.cli.model import lines_of, stated
-from trunnion.cli.options import File, FrictionLaw, Measures, Out, Set, Steps, TableFile, Uncut, UnitsRow
+from trunnion.cli.options import (
+    File,
+    FrictionLaw,
+    Measures,
+    Out,
+    Set,
+    Steps,
+    TableFile,
+    TableUnits,
+    Uncut,
+    Units,
+    UnitsRow,
+)
 from trunnion.cli.result import Shown, check_files, show_tables
 from trunnion.cli.terminal import bar
 from trunnion.errors import Finding, MechanismError
@@ -23,6 +35,7 @@ def play(
     friction: FrictionLaw = None,
     out: Out = None,
     units_row: UnitsRow = False,
+    units: Units = TableUnits.si,
     uncut: Uncut = False,
 ) -> None:
     """Effect of the play of each joint on measures.
@@ -50,4 +63,4 @@ def play(
 
         show_tables(mechanism.name, tables(result), apart=False)
 
-    Shown(result, file, ["measures", "joints"], out or [], None, units_row, draw=draw, show=show).finish()
+    Shown(result, file, ["measures", "joints"], out or [], None, units_row, draw=draw, show=show, units=units).finish()

@@ -74,7 +74,7 @@ class Shown:
     file: of the model, whose lines the findings get, in these sections where they name no place. out, report: files to
     write. drawn: options of the figure, such as its kind; draw: another figure, by the path of its file, or None; page:
     the report as HTML; show: prints the tables, the summary if not given; others: findings beside those of the result,
-    which are said as they are; columns: those of a table file, the usual ones if not given.
+    which are said as they are; columns, units: those of a table file, see `save`.
     """
 
     result: xr.Dataset
@@ -90,6 +90,7 @@ class Shown:
     others: Iterable[Finding] = ()
     written: list[Path] = field(default_factory=list)
     columns: Sequence[str] | None = None
+    units: str = "si"
 
     def write(self) -> None:
         """Write every file that is asked for."""
@@ -97,7 +98,7 @@ class Shown:
 
         for path in self.out:
             if path.suffix.lower() not in IMAGES:
-                save(self.result, path, self.units_row, self.columns)
+                save(self.result, path, self.units_row, self.columns, self.units)
             elif not self._drawn(path):
                 continue
             self.written.append(path)

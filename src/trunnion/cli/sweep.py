@@ -19,7 +19,9 @@ from trunnion.cli.options import (
     Set,
     Steps,
     TableFile,
+    TableUnits,
     Uncut,
+    Units,
     UnitsRow,
     over,
     points,
@@ -83,6 +85,7 @@ def sweep(
     out: Out = None,
     image: Picture = "png",
     units_row: UnitsRow = False,
+    units: Units = TableUnits.si,
     uncut: Uncut = False,
 ) -> None:
     """Results over a range of model values: tables, curves, maps.
@@ -112,7 +115,7 @@ def sweep(
         return figure(whole_peaks(result, uncut), files[path], x or "", family or "", kind)
 
     show = partial(_show, result, mechanism, file, measures, x or "", family or "")
-    Shown(result, file, ["assembly"], list(files), None, units_row, draw=draw, show=show).finish()
+    Shown(result, file, ["assembly"], list(files), None, units_row, draw=draw, show=show, units=units).finish()
 
 
 def _check_figures(grid: Mapping[str, Any], x: str, family: str, kind: str) -> None:

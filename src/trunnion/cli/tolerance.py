@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -21,6 +22,8 @@ from trunnion.cli.options import (
     Set,
     Steps,
     TableFile,
+    TableUnits,
+    Units,
     UnitsRow,
     named_file,
 )
@@ -91,6 +94,7 @@ def tolerance(
     out: Out = None,
     report: Report = None,
     units_row: UnitsRow = False,
+    units: Units = TableUnits.si,
 ) -> None:
     """Effect of tolerances and play: worst case, RSS, yield, shares."""
     from trunnion.studies.tolerance.sampling import METHODS as SAMPLINGS
@@ -108,9 +112,8 @@ def tolerance(
             mechanism, measure, methods, samples, seed, steps, at, jobs=jobs, chunk=chunk, engine=engine,
             cluster=cluster, checkpoint=checkpoint, resume=resume, progress=progress, target=target,
         )  # fmt: skip
-    shown_of(result, mechanism.name, file, out or [], units_row, kind, report).finish(
-        STOPPED if result.attrs["stopped"] else None
-    )
+    shown = shown_of(result, mechanism.name, file, out or [], units_row, kind, report)
+    replace(shown, units=units).finish(STOPPED if result.attrs["stopped"] else None)
 
 
 def shown_of(

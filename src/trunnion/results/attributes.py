@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from trunnion.model.mechanism import Mechanism
+from trunnion.model.stated_units import stated_units
 
 __all__ = [
     "attribute", "cited", "codes", "encoded", "figure_rows", "finding_rows", "findings_of", "origin", "summary_of",
@@ -22,8 +23,8 @@ __all__ = [
 
 
 def origin(mechanism: Mechanism, formula: str, **more: Any) -> dict[str, Any]:
-    """Whose result it is and by which version; more: what is said between."""
-    told = {"name": mechanism.name, "formula": formula, **more}
+    """Whose result it is, the units it is written in, and by which version; more: what comes between."""
+    told = {"name": mechanism.name, "formula": formula, **more, "model_units": stated_units(mechanism)}
     return {**told, "model_hash": mechanism.digest, "trunnion_version": __version__}
 
 

@@ -32,6 +32,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from trunnion.errors import Finding, MechanismError
 from trunnion.files import whole
 from trunnion.model.names import guarded
+from trunnion.results.model_units import in_model_units
 from trunnion.results.tables import KINDS, Column, kind_of, table_of
 from trunnion.results.tables import columns as flat_columns
 from trunnion.results.tables.selection import selected
@@ -41,9 +42,10 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-__all__ = ["FORMATS", "check_format", "frame", "save"]
+__all__ = ["FORMATS", "UNITS", "check_format", "check_units", "frame", "save"]
 
 Columns = Callable[[str], list[Column]]  # of a table by name; of the file's own if that is empty
+UNITS = ("si", "model")
 ROWS = 20_000  # written at a time, so that memory does not grow with the number of positions
 
 
@@ -168,21 +170,32 @@ def check_format(path: str | os.PathLike[str], others: tuple[str, ...] = ()) -> 
         raise MechanismError(Finding(f"{suffix} needs {package}", str(path), f"pip install 'trunnion[{extra}]'"))
 
 
+def check_units(units: str) -> None:
+    """MechanismError for units that tables are not written in."""
+    if units not in UNITS:
+        raise MechanismError(
+            Finding(f"tables are not written in '{units}' units", "units", f"use {' or '.join(UNITS)}")
+        )
+
+
 def save(
     result: xr.Dataset,
     path: str | os.PathLike[str],
     units_row: bool = False,
     columns: Sequence[str] | None = None,
+    units: str = "si",
 ) -> None:
     """Write a result by the file's extension, whole or not at all.
 
     result: of any function that returns a Dataset; path: .csv .json .nc .zarr .parquet .xlsx. units_row: a second
     header row with the units (CSV; a workbook has it always). columns: of a cycle, the columns of CSV, Parquet and
-    workbook: usual, motion (with velocities and accelerations), all, or names and patterns such as `crank.B.*`. The
-    other formats hold the whole Dataset. Raises MechanismError for an unknown extension or column, a missing package,
-    or a place that cannot be written.
+    workbook: usual, motion (with velocities and accelerations), all, or names and patterns such as `crank.B.*`. units:
+    of these tables: si, or model, those that the model is written in, in columns named with them (`rod.C.x [mm]`). The
+    other formats hold the whole Dataset, in SI. Raises MechanismError for an unknown extension, column or choice of
+    units, a missing package, or a place that cannot be written.
     """
     check_format(path)
+    check_units(units)
     writer, _, _ = FORMATS[Path(path).suffix.lower()]
     if Path(path).suffix.lower() == ".zarr" and Path(path).is_dir():
         raise MechanismError(Finding("exists already", str(path), "remove it or choose another name"))
@@ -190,7 +203,8 @@ def save(
 
     def chosen(table: str) -> list[Column]:
         """The columns of a table; what was asked for holds for the one that the file is named for."""
-        return selected(result, columns if table in ("", own) else None, table or own)
+        found = selected(result, columns if table in ("", own) else None, table or own)
+        return in_model_units(result, found) if units == "model" else found
 
     with whole(path) as temporary:
         writer(result, temporary, units_row, chosen)

@@ -227,7 +227,7 @@ def _summary(run: Run, found: Positions, near: near_locking.Locking | None) -> I
         if near and (back := near_locking.reverse_figure(run, near.back, useful_loads(run.system.mechanism))):
             yield back
         residual = balance(arrays) if np.any(counted) else None
-        yield Figure("power_residual", "power balance residual", residual, aspect="largest, relative to the peak power")
+        yield Figure("power_residual", "power balance residual", residual, aspect="largest, of peak power")
     rounds = int(np.max(arrays["friction_iterations"]))
     yield Figure("friction_iterations", "friction iterations", rounds, aspect="most")
     lost = int(np.count_nonzero(status == Status.CONTACT_LOST))

@@ -193,12 +193,14 @@ def reverse_figure(run: Run, back: Reverse, useful: Sequence[str]) -> Figure | N
     It locks, or is 0 or less: then it holds itself.
     """
     name, subject = "efficiency_reverse", "efficiency when backdriven by the useful loads"
+    if run.seats:  # the way back is that of the mechanism without play
+        subject += ", pins centred"
     delivered, given = _reversed_means(run, back, useful)
     if np.all(np.isfinite(back.given)) and not given > 0:
         return None
     if np.any(back.locked):
         places = counted(int(np.count_nonzero(back.locked)), "position")
-        return Figure(name, "efficiency when backdriven by the useful loads (it locks)", None, place=f"at {places}")
+        return Figure(name, subject, None, place=f"at {places}", note="it locks")
     if not np.isfinite(delivered + given) or not np.all(np.isfinite(back.given + back.delivered)):
         return Figure(name, subject, None, note="not every position is solved")
     value = delivered / given

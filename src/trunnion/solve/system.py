@@ -33,6 +33,7 @@ Values = Mapping[str, Number]  # every number of a mechanism by its path, SI
 
 
 MOST_INTERVALS = 6  # named in one finding; the rest are counted
+ROUNDING = 1e-12  # of the largest coordinate of a drive
 
 Positions = NDArray[np.intp]
 
@@ -45,9 +46,9 @@ class Dial(NamedTuple):
     of: str
 
     def at(self, position: int) -> str:
-        """One position."""
-        number = f"{self.values[position]:.4g}"
-        return f"{number}{self.unit}"
+        """One position; what is next to nothing of the largest coordinate is 0."""
+        value, largest = float(self.values[position]), float(np.max(np.abs(self.values)))
+        return f"{0.0 if abs(value) < ROUNDING * largest else value:.4g}{self.unit}"
 
     def intervals(self, positions: Positions) -> str:
         """Positions as intervals: 'at 0° and 12°, between 132° and 228° of A'."""

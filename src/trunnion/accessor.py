@@ -36,6 +36,10 @@ class Accessor:
     def __init__(self, result: xr.Dataset) -> None:
         self._result = result
 
+    def __repr__(self) -> str:
+        """One line; `summary`, `findings` and `tables()` have what it holds."""
+        return f"<{self.kind} of {self._result.attrs.get('name', '')!r}: {len(self.findings)} findings>"
+
     @property
     def kind(self) -> str:
         """What it is a result of: cycle, sweep, play, assembly, tolerance, allocation, measurement, comparison or

@@ -283,3 +283,10 @@ def test_tables_in_the_units_of_the_model(tmp_path: Path) -> None:
     assert converted == {"mm", "deg", "rpm"}
     with pytest.raises(MechanismError, match="use si or model"):
         trunnion.save(result, tmp_path / "no.csv", units="imperial")
+
+
+def test_tables_with_a_unit_in_each_row_stay_in_si(tmp_path: Path) -> None:
+    study = trunnion.tolerance(trunnion.read(DURANGO.parent / "one-way-clutch.yaml"), methods=["linear"])
+    with pytest.raises(MechanismError, match="name the unit in each row"):
+        trunnion.save(study, tmp_path / "r.csv", units="model")
+    assert not list(tmp_path.iterdir())

@@ -24,8 +24,6 @@ from trunnion.cli.options import (
     Set,
     Steps,
     TableFile,
-    TableUnits,
-    Units,
     UnitsRow,
     Write,
 )
@@ -102,7 +100,6 @@ def allocate(
     out: Out = None,
     report: Report = None,
     units_row: UnitsRow = False,
-    units: Units = TableUnits.si,
 ) -> None:
     """Find the tolerances of minimum cost that meet the limits.
 
@@ -123,9 +120,7 @@ def allocate(
             seed, curve, exact=exact, jobs=jobs, progress=progress,
         )  # fmt: skip
     draw = partial(_draw, result, kind)
-    shown = Shown(
-        result, file, SECTIONS, out or [], report, units_row, draw=draw, show=partial(_show, result), units=units
-    )
+    shown = Shown(result, file, SECTIONS, out or [], report, units_row, draw=draw, show=partial(_show, result))
     shown.write()
     findings = findings_of(result)
     if write is not None:

@@ -19,8 +19,6 @@ from trunnion.cli.options import (
     Seats,
     Set,
     TableFile,
-    TableUnits,
-    Units,
     UnitsRow,
 )
 from trunnion.cli.result import Shown, check_files, show_tables
@@ -56,7 +54,6 @@ def compare(
     out: Out = None,
     report: Report = None,
     units_row: UnitsRow = False,
-    units: Units = TableUnits.si,
 ) -> None:
     """Compare a model with measured data: residual, bias, verdict.
 
@@ -78,7 +75,7 @@ def compare(
     errors = exit_status([*measurement.findings, *findings_of(result)])
     Shown(
         result, file, ["assembly", "measures"], out or [], report, units_row, drawn, show=partial(_show, result),
-        others=found, units=units,
+        others=found,
     ).finish(0 if bool(result.attrs["all_within"]) and not errors else 1)  # fmt: skip
 
 

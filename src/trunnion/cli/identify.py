@@ -21,8 +21,6 @@ from trunnion.cli.options import (
     Seats,
     Set,
     TableFile,
-    TableUnits,
-    Units,
     UnitsRow,
     Write,
     setting,
@@ -118,7 +116,6 @@ def identify(
     out: Out = None,
     report: Report = None,
     units_row: UnitsRow = False,
-    units: Units = TableUnits.si,
 ) -> None:
     """Identify parameters of a model from measured data.
 
@@ -142,9 +139,7 @@ def identify(
     )
 
     show, sections = partial(_show, result), ["assembly", "measures"]
-    shown = Shown(
-        result, file, sections, out or [], report, units_row, {"kind": kind}, show=show, others=found, units=units
-    )
+    shown = Shown(result, file, sections, out or [], report, units_row, {"kind": kind}, show=show, others=found)
     shown.write()
     findings = findings_of(result)
     if write is not None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -22,8 +21,6 @@ from trunnion.cli.options import (
     Set,
     Steps,
     TableFile,
-    TableUnits,
-    Units,
     UnitsRow,
     named_file,
 )
@@ -94,7 +91,6 @@ def tolerance(
     out: Out = None,
     report: Report = None,
     units_row: UnitsRow = False,
-    units: Units = TableUnits.si,
 ) -> None:
     """Effect of tolerances and play: worst case, RSS, yield, shares."""
     from trunnion.studies.tolerance.sampling import METHODS as SAMPLINGS
@@ -113,7 +109,7 @@ def tolerance(
             cluster=cluster, checkpoint=checkpoint, resume=resume, progress=progress, target=target,
         )  # fmt: skip
     shown = shown_of(result, mechanism.name, file, out or [], units_row, kind, report)
-    replace(shown, units=units).finish(STOPPED if result.attrs["stopped"] else None)
+    shown.finish(STOPPED if result.attrs["stopped"] else None)
 
 
 def shown_of(

@@ -366,6 +366,10 @@ class Mechanism(Numbers):
         parts = f"{len(self.effective_links)} links, {len(self.effective_joints)} joints"
         return f"<Mechanism {self.name!r}, {self.space}: {parts}, {len(self.drivers)} drivers>"
 
+    def __str__(self) -> str:
+        """The same line: `print` shows no thousands of characters."""
+        return repr(self)
+
     def _repr_html_(self) -> str:
         """What a notebook shows: drawing, structural formula, mobility, findings. Never raises."""
         return str(_notebook().mechanism_html(self))

@@ -46,6 +46,7 @@ __all__ = ["FORMATS", "UNITS", "check_format", "check_units", "frame", "save"]
 
 Columns = Callable[[str], list[Column]]  # of a table by name; of the file's own if that is empty
 UNITS = ("si", "model")
+BY_ROW = ("tolerance", "allocation", "comparison", "identification", "measurement")  # no column has one unit there
 ROWS = 20_000  # written at a time, so that memory does not grow with the number of positions
 
 
@@ -196,6 +197,9 @@ def save(
     """
     check_format(path)
     check_units(units)
+    if units == "model" and kind_of(result) in BY_ROW:
+        what = f"tables of a result of kind {kind_of(result)} name the unit in each row"
+        raise MechanismError(Finding(what, "units", "write them in SI, without units='model'"))
     writer, _, _ = FORMATS[Path(path).suffix.lower()]
     if Path(path).suffix.lower() == ".zarr" and Path(path).is_dir():
         raise MechanismError(Finding("exists already", str(path), "remove it or choose another name"))

@@ -18,7 +18,7 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.attributes import findings_of, summary_of
 from trunnion.results.figure import MORE_THAN, Figure
-from trunnion.results.quantities import quantity
+from trunnion.results.quantities import readable
 from trunnion.results.tables import kind_of
 from trunnion.views.cycle import plots
 
@@ -101,10 +101,15 @@ def _told(members: Iterable[Figure]) -> str:
     """The figures of one subject, each with what it is."""
     cells = []
     for one in members:
-        text = one.value if isinstance(one.value, str) else quantity(one.value, one.unit) or "—"
+        text = one.value if isinstance(one.value, str) else "—" if one.value is None else _figure(one)
         text = f"> {text}" if one.aspect == MORE_THAN else text
         cells.append(f"<b>{escape(text)}</b>" + (f" {escape(one.remark)}" if one.remark else ""))
     return "; ".join(cells)
+
+
+def _figure(one: Figure) -> str:
+    """A number with as many digits as the terminal shows: four would hide what a narrow limit is about."""
+    return readable(float(one.value or 0.0), one.unit, 7).replace(" ", "\u00a0")
 
 
 def _svg(figure: Drawing, salt: str) -> str:

@@ -151,7 +151,7 @@ def test_long_bearing_runs() -> None:
         assert 0.3 < float(result.efficiency) < 1
         assert int(result.friction_iterations.max()) <= 20
     slow = trunnion.FrictionMethod("successive-approximation", criterion=1e-6, limit=2000)
-    other = analysed(cardan(model="pezzuti"), 72, method=slow)
+    other = analysed(cardan(model="pezzuti"), 72, friction_method=slow)
     assert int(other.friction_iterations.max()) > 100
     np.testing.assert_allclose(other.drive_effort.values, result.drive_effort.values, rtol=1e-6)
 

@@ -37,7 +37,7 @@ def test_every_kind_of_result_makes_a_well_formed_page(name):
 @pytest.mark.slow
 def test_several_measures_are_told_together_first():
     words = " ".join(Page(report(toleranced(24, 300, measures=2))).words)
-    assert words.index("All limits together") < words.index("Measures") < words.index("Toleranced numbers")
+    assert words.index("All limits together") < words.index("Measures") < words.index("Toleranced parameters")
     assert words.count("Results") == 2
 
 

@@ -43,10 +43,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def call(folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):  # type: ignore[no-untyped-def]
-    def run(*options: str) -> tuple[int, str]:
+    def run(*options: str, mapping: str = "data/mapping.yaml") -> tuple[int, str]:
         monkeypatch.chdir(folder)
         monkeypatch.setenv("COLUMNS", "160")
-        monkeypatch.setattr("sys.argv", ["trunnion", "identify", MODEL, "data/mapping.yaml", *options])
+        monkeypatch.setattr("sys.argv", ["trunnion", "identify", MODEL, mapping, *options])
         capsys.readouterr()
         with pytest.raises(SystemExit) as ended:
             main()
@@ -54,6 +54,17 @@ def call(folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFi
         return int(ended.value.code or 0), told.out + told.err
 
     return run
+
+
+def test_estimates_of_a_model_that_does_not_fit_are_not_written(folder: Path, call) -> None:  # type: ignore[no-untyped-def]
+    """The crank angle 10° off: a coefficient that makes up for it is no coefficient of friction."""
+    mapping = (folder / "data" / "mapping.yaml").read_text()
+    assert "angle: {from: pulses," in mapping
+    (folder / "data" / "off.yaml").write_text(mapping.replace("angle: {from", "angle: {zero: 10 deg, from"))
+    status, text = call("--parameter", f"mu={FRICTION}", "--write", "off-model.yaml", mapping="data/off.yaml")
+    assert status == 1
+    assert "'off-model.yaml' is not written: the model does not fit" in text
+    assert not (folder / "off-model.yaml").exists()
 
 
 @pytest.mark.slow

@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 __all__ = ["identify"]
 
 MOST_ROWS = 24
+GROSS = 25.0  # reduced χ²: residuals of five times the scatter; estimates then stand for something else
 
 Parameters = Annotated[
     list[str] | None,
@@ -217,6 +218,10 @@ def _write_model(
     if len(lost) == result.sizes["parameter"] or not result.attrs["converged"]:
         why = "no parameter is identifiable" if result.attrs["converged"] else "the search did not converge"
         return [Finding(f"'{write}' is not written: {why}", "--write", "", Severity.ERROR)]
+    misfit = float(result["reduced_chi_squared"])
+    if misfit > GROSS:
+        what = f"'{write}' is not written: the model does not fit (reduced χ² {misfit:.3g})"
+        return [Finding(what, "--write", "find the cause first: `trunnion compare` names errors of sensors and angle")]
     rewrite_mechanism(with_estimates(mechanism, result), file, write, force)
     written.append(write)
     if not lost:

@@ -78,6 +78,7 @@ def test_it_runs_as_a_module_and_completes_in_a_shell(installed: Path, tmp_path:
     assert trunnion.__version__ in run(sys.executable, "-m", "trunnion", "--version", **at)
     assert "durango-fourbar" in run(sys.executable, "-m", "trunnion", "examples", **at)
     command = installed / "bin" / "trunnion"
+    at["_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION"] = "1"  # take the shell that is named, not the one above us
     shown = run(sys.executable, command, "--show-completion", "bash", **at)
     assert "_TRUNNION_COMPLETE=complete_bash" in shown
     asked = {"_TRUNNION_COMPLETE": "complete_bash", "COMP_WORDS": "trunnion analyse --st", "COMP_CWORD": "2"}

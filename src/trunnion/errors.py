@@ -10,9 +10,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import IntEnum, StrEnum
-from typing import Any
+from typing import Any, Self
 
-__all__ = ["Finding", "MechanismError", "Severity", "Status", "agreeing", "counted"]
+__all__ = ["Coded", "Finding", "MechanismError", "Severity", "Status", "agreeing", "counted"]
 
 
 def counted(count: int, noun: str, plural: str = "") -> str:
@@ -82,17 +82,21 @@ class MechanismError(ValueError):
         return type(self), (self.findings,)
 
 
-class Status(IntEnum):
-    """What a position came to, in rising order of severity; from `NOT_CONVERGED` on the forces are NaN."""
+class Coded(IntEnum):
+    """An integer code that carries its words."""
 
     text: str
 
-    def __new__(cls, value: int, text: str) -> Status:
-        """An integer code that carries its sentence."""
-        status = int.__new__(cls, value)
-        status._value_ = value
-        status.text = text
-        return status
+    def __new__(cls, value: int, text: str) -> Self:
+        """A member: its code, and what it says."""
+        one = int.__new__(cls, value)
+        one._value_ = value
+        one.text = text
+        return one
+
+
+class Status(Coded):
+    """What a position came to, in rising order of severity; from `NOT_CONVERGED` on the forces are NaN."""
 
     SOLVED = 0, "solved"
     ZERO_SLIP = 1, "a joint with friction is momentarily at rest: its friction may act either way"

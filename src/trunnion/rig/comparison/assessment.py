@@ -10,12 +10,12 @@ positions are independent of each other, which the turns tell (`independent`).
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from enum import IntEnum
 from math import erf, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.errors import Coded
 from trunnion.rig.reading.measurement import Signal
 
 __all__ = [
@@ -29,17 +29,8 @@ FEWEST_TURNS = 5  # that tell whether errors go on from turn to turn
 ROUNDING = 1e-9  # of the size of a course: differences below it are none
 
 
-class Verdict(IntEnum):
+class Verdict(Coded):
     """What a comparison of one course comes to."""
-
-    text: str
-
-    def __new__(cls, value: int, text: str) -> Verdict:
-        """An integer code that carries its words."""
-        one = int.__new__(cls, value)
-        one._value_ = value
-        one.text = text
-        return one
 
     WITHIN = 0, "within"
     OFFSET = 1, "offset only"

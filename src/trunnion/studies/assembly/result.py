@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from enum import IntEnum
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
-from trunnion.errors import Finding
+from trunnion.errors import Coded, Finding
 from trunnion.results.attributes import cited, figure_rows, finding_rows, origin
 from trunnion.results.dataset import Variable, dataset_of, described, driven
 from trunnion.results.figure import Figure
@@ -33,17 +32,8 @@ SOURCE = (
 )
 
 
-class AssemblyStatus(IntEnum):
+class AssemblyStatus(Coded):
     """What a position came to."""
-
-    text: str
-
-    def __new__(cls, value: int, text: str) -> AssemblyStatus:
-        """An integer code that carries its sentence."""
-        one = int.__new__(cls, value)
-        one._value_ = value
-        one.text = text
-        return one
 
     FITS = 0, "it can be assembled"
     SHORT = 1, "the stated clearances do not suffice"

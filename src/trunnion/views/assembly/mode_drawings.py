@@ -17,16 +17,17 @@ from trunnion.solve.assembly_modes import AssemblyMode, GroupModes, choices, put
 from trunnion.solve.forward import forward
 from trunnion.solve.run import Run, prepare
 from trunnion.views.assembly.mode_drawings_space import space_ways
+from trunnion.views.assembly.mode_panels import panels
 from trunnion.views.assembly.modes import some
 from trunnion.views.common.cycle import Array, layout
 from trunnion.views.common.drawing import Picture, framed, name_points, sketch
-from trunnion.views.common.figures import INK, MUTED, RULE, new
+from trunnion.views.common.figures import MUTED, new
 from trunnion.views.common.labels import Labels
 from trunnion.views.common.lettering import plain
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure, SubFigure
+    from matplotlib.figure import Figure
 
 __all__ = ["ways"]
 
@@ -71,8 +72,10 @@ def ways(mechanism: Mechanism, found: Sequence[GroupModes] | None = None) -> Fig
     figure = new("Assembly modes", result, 0.6 + sum(0.3 + line * high for line in lines), width)
     parts = figure.subfigures(len(found), 1, squeeze=False, height_ratios=[0.3 + line * high for line in lines])[:, 0]
     labels = Labels(figure)
+    size = float(np.hypot(box[2] - box[0], box[3] - box[1]))
     for part, choice, row in zip(parts, found, rows, strict=True):
-        _group(part, choice, row, columns, box, labels)
+        for axes, one in zip(panels(part, choice, [one.way for one in row], columns, box), row, strict=True):
+            _one(axes, one, size, labels)
     labels.place()
     return figure
 
@@ -119,36 +122,8 @@ def _box(pictures: Sequence[Picture]) -> tuple[float, float, float, float]:
     return left, below - 0.03 * size, right, above  # a bearing reaches below its joint
 
 
-def _group(
-    part: SubFigure,
-    choice: GroupModes,
-    row: Sequence[ModeDrawing],
-    columns: int,
-    box: tuple[float, float, float, float],
-    labels: Labels,
-) -> None:
-    """The drawings of one group under its label."""
-    where = f", at {choice.where}" if choice.where else ""
-    more = f", {len(row)} of {len(choice.ways)} assembly modes" if len(row) < len(choice.ways) else ""
-    head = f"{choice.label}    {', '.join(choice.links)}{where}{more}"
-    part.suptitle(plain(head), x=0.012, ha="left", fontsize=9, color=INK)
-    grid = part.subplots(math.ceil(len(row) / columns), columns, squeeze=False).ravel()
-    for axes in grid[len(row) :]:
-        axes.set_visible(False)
-    for axes, one in zip(grid, row, strict=False):
-        axes.set_aspect("equal")
-        axes.set(xlim=(box[0], box[2]), ylim=(box[1], box[3]), xticks=[], yticks=[])
-        _one(axes, choice, one, float(np.hypot(box[2] - box[0], box[3] - box[1])), labels)
-
-
-def _one(axes: Axes, choice: GroupModes, one: ModeDrawing, size: float, labels: Labels) -> None:
-    """One drawing: in a frame, which is bold around the way that is taken, under the name of the way."""
-    paint, width = (INK, 1.8) if one.way.taken else (RULE, 1.0)
-    for spine in axes.spines.values():
-        spine.set(color=paint, linewidth=width)
-    title = f"{choice.link}: {one.way.name}" + "  used" * one.way.taken
-    weight = "bold" if one.way.taken else "normal"
-    axes.set_title(plain(title), fontsize=8.5, fontweight=weight, color=INK, loc="left", pad=4)
+def _one(axes: Axes, one: ModeDrawing, size: float, labels: Labels) -> None:
+    """One drawing."""
     shown = replace(one.shown, size=SYMBOLS * size)
     sketch(axes, shown, one.index)
     name_points(axes, shown, one.index, labels, list(one.way.joints))

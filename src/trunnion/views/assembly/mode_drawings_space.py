@@ -12,17 +12,17 @@ from trunnion.cycle.analyse import analyse
 from trunnion.errors import MechanismError
 from trunnion.model.mechanism import Mechanism
 from trunnion.solve.assembly_modes import AssemblyMode, GroupModes, put_together
+from trunnion.views.assembly.mode_panels import panels
 from trunnion.views.assembly.modes import some
-from trunnion.views.common.figures import INK, MUTED, RULE, new
+from trunnion.views.common.figures import MUTED, new
 from trunnion.views.common.labels import Labels
-from trunnion.views.common.lettering import plain
 from trunnion.views.space.bodies import Space, space
 from trunnion.views.space.camera import best, looking
 from trunnion.views.space.figure import Scenery, name_joints, scenery, sketch
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure, SubFigure
+    from matplotlib.figure import Figure
 
 __all__ = ["space_ways"]
 
@@ -54,7 +54,10 @@ def space_ways(mechanism: Mechanism, found: Sequence[GroupModes]) -> Figure:
     parts = figure.subfigures(len(found), 1, squeeze=False, height_ratios=[0.3 + line * tall for line in lines])[:, 0]
     labels = Labels(figure)
     for part, choice, row in zip(parts, found, rows, strict=True):
-        _group(part, choice, row, columns, frame, looks, labels)
+        for axes, (way, shown, index) in zip(
+            panels(part, choice, [way for way, _, _ in row], columns, frame), row, strict=True
+        ):
+            _one(axes, choice, way, next((look for look in looks if look.shown is shown), None), index, labels)
     labels.place()
     return figure
 
@@ -71,37 +74,8 @@ def _drawn(mechanism: Mechanism, choice: GroupModes, way: AssemblyMode) -> Drawn
     return way, shown, int(known[np.argmin(np.abs(times[known] - choice.time))])
 
 
-def _group(
-    part: SubFigure,
-    choice: GroupModes,
-    row: list[Drawn],
-    columns: int,
-    frame: tuple[float, ...],
-    looks: list[Scenery],
-    labels: Labels,
-) -> None:
-    """The drawings of one group under its label."""
-    where = f", at {choice.where}" if choice.where else ""
-    more = f", {len(row)} of {len(choice.ways)} assembly modes" if len(row) < len(choice.ways) else ""
-    head = f"{choice.label}    {', '.join(choice.links)}{where}{more}"
-    part.suptitle(plain(head), x=0.012, ha="left", fontsize=9, color=INK)
-    grid = part.subplots(math.ceil(len(row) / columns), columns, squeeze=False).ravel()
-    for axes in grid[len(row) :]:
-        axes.set_visible(False)
-    for axes, (way, shown, index) in zip(grid, row, strict=False):
-        axes.set_aspect("equal")
-        axes.set(xlim=(frame[0], frame[2]), ylim=(frame[1], frame[3]), xticks=[], yticks=[])
-        _one(axes, choice, way, next((look for look in looks if look.shown is shown), None), index, labels)
-
-
 def _one(axes: Axes, choice: GroupModes, way: AssemblyMode, look: Scenery | None, index: int, labels: Labels) -> None:
-    """One drawing: in a frame, which is bold around the way that is taken, under the name of the way."""
-    paint, width = (INK, 1.8) if way.taken else (RULE, 1.0)
-    for spine in axes.spines.values():
-        spine.set(color=paint, linewidth=width)
-    title = f"{choice.link}: {way.name}" + "  used" * way.taken
-    weight = "bold" if way.taken else "normal"
-    axes.set_title(plain(title), fontsize=8.5, fontweight=weight, color=INK, loc="left", pad=4)
+    """One drawing."""
     if look is None:
         axes.text(
             0.03, 0.03, "cannot be assembled in this mode", transform=axes.transAxes, fontsize=7, color=MUTED, zorder=8

@@ -15,7 +15,7 @@ from mechanisms import build, four_bar, slider_crank
 from trunnion import Mechanism, MechanismError
 from trunnion.algebra.dual import Dual, derivative
 from trunnion.cycle.vocabulary import vocabulary
-from trunnion.measures.curves import COURSES
+from trunnion.measures.curves import CURVES
 from trunnion.measures.measures import Measure, named
 from trunnion.model.measure_table import MEASURES
 from trunnion.solve.forward import forward
@@ -45,7 +45,7 @@ def course(run: Run, name: str, time: Any) -> Any:
 
 
 def test_every_kind_has_a_course() -> None:
-    assert list(COURSES) == list(MEASURES)
+    assert list(CURVES) == list(MEASURES)
 
 
 # ---- the slider-crank -----------------------------------------------------------------------------------------

@@ -464,7 +464,7 @@ def test_without_measures_outputs_are_taken() -> None:
 # ---- figures of a course --------------------------------------------------------------------------------------
 
 FINE = np.linspace(0, 2 * np.pi, 7200, endpoint=False)
-COURSES: dict[str, dict[str, Any]] = {
+CURVES: dict[str, dict[str, Any]] = {
     "path": {"path_error": "coupler.C"},
     "place": {"path_error": "coupler.C", "at": "60 deg"},
     "rms": {"path_error": "coupler.C", "as": "rms"},
@@ -490,10 +490,10 @@ def of_courses(sizes: Any) -> dict[str, tuple[float, float]]:
 
 def test_worst_case_of_figures_of_a_course() -> None:
     """Found on the mechanism: the same as the best of all corners by the closed form."""
-    found = trunnion.tolerance(fourbar(measures=COURSES), methods=FAST, steps=180)
+    found = trunnion.tolerance(fourbar(measures=CURVES), methods=FAST, steps=180)
     signs = itertools.product((-1, 0, 1), repeat=4)
     corners = [of_courses([v + s * T for v, s in zip(FOURBAR.values(), sign, strict=True)]) for sign in signs]
-    for name in COURSES:
+    for name in CURVES:
         at = found.sel(measure=name)
         assert at["searched_upper"].item() == pytest.approx(max(one[name][1] for one in corners), rel=1e-4), name
         assert at["searched_lower"].item() == pytest.approx(min(one[name][0] for one in corners), rel=1e-4, abs=1e-15)

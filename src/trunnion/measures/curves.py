@@ -1,6 +1,6 @@
 """The course of every kind of measure: one number or more, position by position; SI, angles in (−π, π].
 
-`COURSES` has one function an entry of `model.measure_table.MEASURES`, of a `Backward` if that needs forces, else of a
+`CURVES` has one function an entry of `model.measure_table.MEASURES`, of a `Backward` if that needs forces, else of a
 `Forward`. Floats, arrays or dual numbers flow through, as the values of the mechanism are.
 """
 
@@ -23,7 +23,7 @@ from trunnion.solve.friction_method import MARGIN
 from trunnion.solve.loads import useful_loads
 from trunnion.solve.space.motion import SpatialWalk
 
-__all__ = ["COURSES", "Course"]
+__all__ = ["CURVES", "Course"]
 
 Course = Callable[[MotionRequest, Any], tuple[Number, ...]]
 
@@ -182,7 +182,7 @@ def locking_margin(measure: MotionRequest, back: Backward) -> tuple[Number, ...]
     return (margin,)
 
 
-COURSES: dict[str, Course] = {
+CURVES: dict[str, Course] = {
     "point": value,
     "path_error": place,
     "straightness": place,

@@ -1,6 +1,6 @@
 """Measures: numbers that follow from the motion of a mechanism, or from its forces.
 
-`model.measure_table.MEASURES` is the vocabulary, one entry a kind, `courses.COURSES` the course of each: the one or
+`model.measure_table.MEASURES` is the vocabulary, one entry a kind, `courses.CURVES` the course of each: the one or
 more numbers, position by position, that its figure is made of (`figures`).
 """
 
@@ -17,7 +17,7 @@ from trunnion.algebra import space
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, MechanismError
-from trunnion.measures.curves import COURSES
+from trunnion.measures.curves import CURVES
 from trunnion.measures.motion import AXES, MOTIONS
 from trunnion.model.checks.measures import check_measure
 from trunnion.model.contact import motions
@@ -147,7 +147,7 @@ class Measure:
         Floats, arrays or dual numbers, as the values were.
         """
         walk = back if isinstance(back, Forward) else back.walk
-        return COURSES[self.kind](self, cast(Any, back if self.of.of_forces else walk))
+        return CURVES[self.kind](self, cast(Any, back if self.of.of_forces else walk))
 
     def coordinate(self, system: System) -> Measure:
         """The rotation or slide of a joint that a stroke, a dead centre or a transmission error is of."""

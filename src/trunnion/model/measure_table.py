@@ -1,6 +1,6 @@
 """What a measure may be of: the one table that the file, its checks, every study and the documentation read.
 
-Its course, the numbers position by position, is the function of the same name in `measures.curves.COURSES`.
+Its course, the numbers position by position, is the function of the same name in `measures.curves.CURVES`.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ from trunnion.results.attributes import attribute
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["TABLES"]
+__all__ = ["CURVES", "TABLES"]
 
 Flat = list[tuple[str, str, NDArray[Any]]]
 FIGURES = ("start", "estimate", "standard_uncertainty", "lower", "upper")

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from trunnion.cycle.summary import references
 from trunnion.results.attributes import finding_rows, origin
 from trunnion.results.dataset import Variable, dataset_of, described
+from trunnion.results.tables.identification import CURVES
 from trunnion.rig.comparison.result import data_findings, hashed_files
 from trunnion.rig.identification.assessment import Assessment
 from trunnion.rig.identification.findings import sentences
@@ -210,4 +211,3 @@ def _blocks(judged: Assessment) -> dict[str, Array]:
 
 FIGURES = ("rms_before", "rms_after", "rms_expected", "held_out_before", "held_out_after", "held_out_expected")
 COUNTS = ("used", "left_out", "turns", "held_out_turns")
-CURVES = ("measured", "residual_before", "residual_after", "residual_uncertainty")

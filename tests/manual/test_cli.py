@@ -439,6 +439,19 @@ def test_help_needs_no_heavy_imports() -> None:
     assert done.stdout.strip() == "[]"
 
 
+@pytest.mark.parametrize("name", ["durango-fourbar", "jansen", "rssr", "pezzuti-cardan-as-built"])
+def test_an_analysis_on_the_terminal_needs_few_libraries(name: str) -> None:
+    """What takes as long to load as the analysis itself is loaded for files, figures and reports only."""
+    heavy = ("xarray", "pandas", "scipy", "pint", "networkx", "matplotlib")
+    command = ["trunnion", "analyse", str(EXAMPLES / f"{name}.yaml"), "--steps", "12"]
+    code = f"import sys; sys.argv = {command}; sys.exit = lambda _: print([m for m in {heavy} if m in sys.modules])"
+    done = subprocess.run(
+        [sys.executable, "-c", f"{code}; from trunnion.cli.app import main; main()"],
+        capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    assert done.stdout.splitlines()[-1] == "[]"
+
+
 # ---- in space -------------------------------------------------------------------------------------------------
 
 

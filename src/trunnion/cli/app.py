@@ -57,6 +57,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from trunnion.model.mechanism import Mechanism
+    from trunnion.results.result import Result
     from trunnion.solve.friction_method import FrictionMethod
 
 app = typer.Typer(
@@ -152,7 +153,7 @@ def analyse(
     check_files(out or [], report, drawn=False)
     mechanism = stated(file, set_, table, friction, seat)
     with lines_of(file):
-        result = _run(mechanism, steps, _method(method, criterion, iterations))
+        result = _analysed(mechanism, steps, _method(method, criterion, iterations))
     page = partial(_page, mechanism, result, uncut)
     Shown(result, file, ["assembly"], out or [], report, units_row, page=page, columns=columns, units=units).finish()
 
@@ -269,7 +270,7 @@ def report(
     check_page(out, "--out")
     mechanism = stated(file, set_, table, friction, seat)
     with lines_of(file):
-        result = _run(mechanism, steps, _method(method, criterion, iterations))
+        result = _analysed(mechanism, steps, _method(method, criterion, iterations))
     write_text(_page(mechanism, result, uncut), out)
     wrote(out)
     raise typer.Exit(exit_status(findings_of(result)))
@@ -365,12 +366,17 @@ def _method(name: str, criterion: float | None, iterations: int) -> FrictionMeth
     return method_named(name, criterion, iterations)
 
 
-def _run(mechanism: Mechanism, steps: int, method: FrictionMethod | None) -> xr.Dataset:
+def _analysed(mechanism: Mechanism, steps: int, method: FrictionMethod | None) -> Result:
     """Analyse, with a progress bar when it takes long enough to need one."""
-    from trunnion.cycle.analyse import analyse as run
+    from trunnion.cycle.analyse import analysed
 
     with bar("positions", steps, least=200_000) as progress:
-        return run(mechanism, steps, method, progress)
+        return analysed(mechanism, steps, method, progress)
+
+
+def _run(mechanism: Mechanism, steps: int, method: FrictionMethod | None) -> xr.Dataset:
+    """The same as a Dataset."""
+    return _analysed(mechanism, steps, method).dataset
 
 
 def _ideal(mechanism: Mechanism, steps: int, method: FrictionMethod | None) -> xr.Dataset | None:
@@ -380,12 +386,13 @@ def _ideal(mechanism: Mechanism, steps: int, method: FrictionMethod | None) -> x
     return _run(mechanism.with_friction("off"), steps, method)
 
 
-def _page(mechanism: Mechanism, result: xr.Dataset, uncut: bool) -> str:
+def _page(mechanism: Mechanism, analysed: Result, uncut: bool) -> str:
     """The report of a cycle as HTML."""
     from trunnion.views.common.peaks import whole_peaks
     from trunnion.views.cycle.deviations_plot import with_worst_case
     from trunnion.views.cycle.report import report as page
 
+    result = analysed.dataset
     shown = whole_peaks(with_worst_case(result, mechanism), uncut)
     return page(shown, _ideal(mechanism, result.sizes["position"], None))
 

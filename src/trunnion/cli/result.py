@@ -13,7 +13,8 @@ from trunnion.cli.model import exit_status, placed
 from trunnion.cli.options import IMAGES
 from trunnion.cli.terminal import console, say, say_missed, show_figures, show_rows, wrote
 from trunnion.errors import Finding, MechanismError, counted
-from trunnion.results.attributes import findings_of, summary_of
+from trunnion.results.attributes import Described, findings_of, summary_of
+from trunnion.results.result import Result
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -77,7 +78,7 @@ class Shown:
     which are said as they are; columns, units: those of a table file, see `save`.
     """
 
-    result: xr.Dataset
+    result: xr.Dataset | Result
     file: Path
     sections: Sequence[str]
     out: Sequence[Path] = ()
@@ -92,27 +93,32 @@ class Shown:
     columns: Sequence[str] | None = None
     units: str = "si"
 
+    @property
+    def dataset(self) -> xr.Dataset:
+        """The result as files, figures and reports take it."""
+        return self.result.dataset if isinstance(self.result, Result) else self.result
+
     def write(self) -> None:
         """Write every file that is asked for."""
         from trunnion.results.export import save
 
         for path in self.out:
             if path.suffix.lower() not in IMAGES:
-                save(self.result, path, self.units_row, self.columns, self.units)
+                save(self.dataset, path, self.units_row, self.columns, self.units)
             elif not self._drawn(path):
                 continue
             self.written.append(path)
         if self.report is not None:
             from trunnion.views.shown import report_of
 
-            write_text(self.page() if self.page else report_of(self.result), self.report)
+            write_text(self.page() if self.page else report_of(self.dataset), self.report)
             self.written.append(self.report)
 
     def _drawn(self, path: Path) -> bool:
         from trunnion.views.cycle.plots import save
         from trunnion.views.shown import figure_of
 
-        figure = self.draw(path) if self.draw else figure_of(self.result, **self.drawn)
+        figure = self.draw(path) if self.draw else figure_of(self.dataset, **self.drawn)
         if figure is None:
             return False
         save(figure, path)
@@ -149,7 +155,7 @@ def write_text(text: str, path: Path) -> None:
         temporary.write_text(text, encoding="utf-8")
 
 
-def show_summary(result: xr.Dataset, file: Path) -> None:
+def show_summary(result: Described, file: Path) -> None:
     """The summary of a result under its name and formula."""
     show_figures(f"{result.attrs['name'] or file}\n{result.attrs['formula']}", summary_of(result))
 

@@ -10,13 +10,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from trunnion.errors import Finding, Severity
-from trunnion.results.attributes import attribute
+from trunnion.results.attributes import Described, attribute
 from trunnion.results.quantities import parts
 from trunnion.results.sentences import QUIET
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from trunnion.results.figure import Figure
 
 __all__ = ["bar", "console", "say", "say_missed", "show_figures", "show_rows", "wrote"]
@@ -138,7 +136,7 @@ def _broken(text: str, width: int, length: Callable[[str], int]) -> str:
     return "\n".join(lines)
 
 
-def say_missed(result: xr.Dataset) -> None:
+def say_missed(result: Described) -> None:
     """What of the limits is not kept, before anything else."""
     for line in attribute(result, "missed"):
         console().print(line, style="bold", markup=False, highlight=False, soft_wrap=True)

@@ -15,9 +15,10 @@ from trunnion.solve.friction_method import FrictionMethod
 if TYPE_CHECKING:
     import xarray as xr
 from trunnion.cycle.positions import check_steps, positions
+from trunnion.results.result import Result
 from trunnion.solve.run import Run, prepare
 
-__all__ = ["analyse", "analyse_run"]
+__all__ = ["analyse", "analyse_run", "analysed"]
 
 
 @renamed(method="friction_method")
@@ -37,11 +38,22 @@ def analyse(
     Method: the modules' closed forms or the general group, friction settled per module (`friction.settle`).
     Raises MechanismError if the structure does not determine the motion or `steps` is out of range.
     """
+    return analysed(mechanism, steps, friction_method, progress).dataset
+
+
+@np.errstate(all="ignore")
+def analysed(
+    mechanism: Mechanism,
+    steps: int = 360,
+    method: FrictionMethod | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> Result:
+    """What `analyse` does, before it becomes a Dataset."""
     check_steps(steps)
     run = prepare(mechanism)
     if run.determinacy is not None:
         run.determinacy.refuse()
-    return analyse_run(run, steps, friction_method, progress)
+    return summary.result_of(run, positions(run, steps, method, progress))
 
 
 @np.errstate(all="ignore")
@@ -52,5 +64,4 @@ def analyse_run(
     progress: Callable[[int], None] | None = None,
 ) -> xr.Dataset:
     """What `analyse` does, for a mechanism that is prepared."""
-    found = positions(run, steps, method, progress)
-    return summary.finish(run, found)
+    return summary.result_of(run, positions(run, steps, method, progress)).dataset

@@ -21,9 +21,10 @@ from trunnion.model.mechanism import Mechanism
 from trunnion.model.quantity import Quantity
 from trunnion.model.units import KINDS, Dimension, si_unit
 from trunnion.results import variables as results
-from trunnion.results.attributes import cited, figure_rows, finding_rows, origin
+from trunnion.results.attributes import cited, encoded, figure_rows, finding_rows, origin
 from trunnion.results.dataset import driven
 from trunnion.results.figure import Figure
+from trunnion.results.result import Result
 from trunnion.results.sentences import finding_for
 from trunnion.solve.forward import start
 from trunnion.solve.friction_method import FrictionMethod
@@ -42,10 +43,10 @@ from trunnion.solve.loads import useful_loads
 
 __all__ = [
     "effort_units",
-    "finish",
     "inputs",
     "model_notes",
     "references",
+    "result_of",
     "scene_of",
     "sound_positions",
 ]
@@ -66,8 +67,8 @@ PEZZUTI = (
 )
 
 
-def finish(run: Run, found_positions: Positions) -> xr.Dataset:
-    """The Dataset with its attributes: formula, findings, summary, input data, drawing data, provenance."""
+def result_of(run: Run, found_positions: Positions) -> Result:
+    """The result with its attributes: formula, findings, summary, input data, drawing data, provenance."""
     mechanism, arrays, time = run.system.mechanism, found_positions.arrays, found_positions.time
     method = found_positions.method
     found, near = findings(run, found_positions)
@@ -84,11 +85,13 @@ def finish(run: Run, found_positions: Positions) -> xr.Dataset:
         "scene": scene_of(run),
         "periodic": int(run.cycle.periodic),
     }
-    along = driven(time, *run.system.dial(run.values, time))
-    result = results.dataset(
-        arrays, found_positions.labels, along, found_positions.means, attributes, found_positions.ideal
-    )
-    return measured.joined(result)
+
+    def build() -> xr.Dataset:
+        along = driven(time, *run.system.dial(run.values, time))
+        means, ideal = found_positions.means, found_positions.ideal
+        return measured.joined(results.dataset(arrays, found_positions.labels, along, means, attributes, ideal))
+
+    return Result(encoded(attributes), build)
 
 
 def findings(run: Run, at: Positions) -> tuple[list[Finding], near_locking.Locking | None]:

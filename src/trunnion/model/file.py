@@ -12,6 +12,7 @@ import re
 import tomllib
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -94,7 +95,9 @@ def placed(findings: Iterable[Finding], path: str | os.PathLike[str], sections: 
 
     sections: those of the model to which this is limited; all if there is none.
     """
-    path = Path(path)
+    path, findings = Path(path), list(findings)
+    if not findings:
+        return []
     only = set(sections)
     text = read_text(path, "a model file", MAX_BYTES, "start from one of the examples")
     data, lines = _parse(text, _file_type(path))
@@ -228,8 +231,9 @@ def _parse_yaml(text: str, kind: str) -> tuple[dict[str, Any], Lines]:
     return data, builder.lines
 
 
+@lru_cache(maxsize=2)  # a verb reads its model for the numbers, and again for the lines of findings
 def composed(text: str) -> Node:
-    """The nodes of a YAML text with where each stands; MechanismError on what no model file has."""
+    """The nodes of a YAML text with where each stands, not to be changed; MechanismError on what no model file has."""
     reader = YAML(typ="safe", pure=True)
     reader.Parser = _Parser
     reader.composer.warn_double_anchors = False  # nothing may refer to one

@@ -6,6 +6,7 @@ import re
 from collections import Counter
 from typing import TYPE_CHECKING
 
+from trunnion.model.unit_spellings import READ, plain, words
 from trunnion.model.units import UnitError, si_unit, unit
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ def stated_units(mechanism: Mechanism) -> dict[str, str]:
     for entry in mechanism.parameter_set.entries.values():
         text = str(entry.quantity.source)
         found = STATED.fullmatch(text)
-        if entry.alias or not found:
+        if entry.alias or not found or not READ.issuperset(words(plain(found[1]))):  # of a formula: "2 e", "40 N * x"
             continue
         try:
             counts[si_unit(unit(found[1])[1]), found[1]] += 1

@@ -143,6 +143,7 @@ def _registry() -> pint.UnitRegistry[Fraction]:
 _PI = Fraction("3.1415926535897932384626433832795028841971693993751")  # as pint has it
 _M, _RAD, _S = {"meter": Fraction(1)}, {"radian": Fraction(1)}, {"second": Fraction(1)}
 _NEWTON = {"gram": Fraction(1), "meter": Fraction(1), "second": Fraction(-2)}
+_PASCAL = {"gram": Fraction(1), "meter": Fraction(-1), "second": Fraction(-2)}
 # of the units in most models: name and root as pint has them, factor to SI; a test holds them against pint
 _COMMON: dict[str, tuple[str, Fraction, dict[str, Fraction]]] = {
     "mm": ("millimeter", Fraction(1, 1000), _M),
@@ -159,9 +160,11 @@ _COMMON: dict[str, tuple[str, Fraction, dict[str, Fraction]]] = {
     "ms": ("millisecond", Fraction(1, 1000), _S),
     "N": ("newton", Fraction(1), _NEWTON),
     "kN": ("kilonewton", Fraction(1000), _NEWTON),
+    "MPa": ("megapascal", Fraction(10**6), _PASCAL),
+    "bar": ("bar", Fraction(10**5), _PASCAL),
 }
 _FACTOR = re.compile(r"([^\W\d]+)(?:\^(-?[1-9]))?")
-_PRODUCT_OF_COMMON = re.compile(rf"{_FACTOR.pattern}(?: ?[ */] ?{_FACTOR.pattern})*")
+_PRODUCT_OF_COMMON = re.compile(rf"(?:1 ?/ ?)?{_FACTOR.pattern}(?: ?[ */] ?{_FACTOR.pattern})*")
 
 
 def _common(spaced: str) -> tuple[Fraction, dict[str, Fraction], tuple[str, ...]] | None:

@@ -5,21 +5,27 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Mapping
 from enum import IntEnum
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from trunnion.errors import Finding, Severity, Status
 from trunnion.results.figure import Figure
 from trunnion.version import __version__
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from trunnion.model.mechanism import Mechanism
 from trunnion.model.stated_units import stated_units
 
 __all__ = [
-    "attribute", "cited", "codes", "encoded", "figure_rows", "finding_rows", "findings_of", "origin", "summary_of",
+    "Described", "attribute", "cited", "codes", "encoded", "figure_rows", "finding_rows", "findings_of", "origin",
+    "summary_of",
 ]  # fmt: skip
+
+
+class Described(Protocol):
+    """A Dataset, one of its variables, or a `Result` that is to become a Dataset."""
+
+    @property
+    def attrs(self) -> Mapping[Any, Any]: ...
 
 
 def origin(mechanism: Mechanism, formula: str, **more: Any) -> dict[str, Any]:
@@ -55,12 +61,12 @@ def encoded(attributes: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def attribute(result: xr.Dataset | xr.DataArray, name: str, default: str = "[]") -> Any:
+def attribute(result: Described, name: str, default: str = "[]") -> Any:
     """An attribute that `encoded` wrote; that of `default` if it is absent or empty."""
     return json.loads(result.attrs.get(name) or default)
 
 
-def findings_of(result: xr.Dataset) -> list[Finding]:
+def findings_of(result: Described) -> list[Finding]:
     """The findings that a result carries."""
     return [
         Finding(
@@ -76,6 +82,6 @@ def figure_rows(figures: Iterable[Figure]) -> list[dict[str, Any]]:
     return [one.row() for one in figures]
 
 
-def summary_of(result: xr.Dataset) -> list[Figure]:
+def summary_of(result: Described) -> list[Figure]:
     """The figures that one looks at first."""
     return [Figure.read(row) for row in attribute(result, "summary")]

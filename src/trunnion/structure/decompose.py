@@ -15,13 +15,12 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import maximum_bipartite_matching
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.mechanism import Mechanism
 from trunnion.structure.generic import GEAR, SPIN, Constraint, Generic
+from trunnion.structure.graph import matching
 from trunnion.structure.parts import Parts
 
 __all__ = ["FREEDOMS", "Module", "Plan", "decompose", "mobility_by_formula", "passive"]
@@ -229,16 +228,11 @@ def _match(
     constraints = _constraints(mechanism) + [(link, SPIN) for link in spinning]
     size = FREEDOMS[mechanism.space]
     number = {body: i for i, body in enumerate(bodies)}
-    rows: list[int] = []
-    columns: list[int] = []
-    for row, constraint in enumerate(constraints):
-        for link in _links_of(mechanism, constraint):
-            if link != ground:
-                columns += range(size * number[link], size * (number[link] + 1))
-                rows += [row] * size
-    shape = (len(constraints), size * len(bodies))
-    graph = csr_array((np.ones(len(rows), dtype=np.int8), (rows, columns)), shape=shape)
-    matched = maximum_bipartite_matching(graph, perm_type="column").tolist()
+    wanted: list[list[int]] = []
+    for constraint in constraints:
+        moving = (number[link] for link in _links_of(mechanism, constraint) if link != ground)
+        wanted.append([size * link + freedom for link in moving for freedom in range(size)])
+    matched = matching(wanted, size * len(bodies))
     found = {one: bodies[k // size] for one, k in zip(constraints, matched, strict=True) if k >= 0}
     return found, [one for one, k in zip(constraints, matched, strict=True) if k < 0]
 

@@ -1,8 +1,4 @@
-"""The parts of a mechanism: links whose positions depend on each other, and which parts come before which.
-
-Strongly connected components by SciPy, which is loaded for the matching anyway; networkx would take a tenth of the time
-that a small analysis takes from its start.
-"""
+"""The parts of a mechanism: links whose positions depend on each other, and which parts come before which."""
 
 from __future__ import annotations
 
@@ -10,9 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from functools import cached_property
 from heapq import heappop, heappush
 
-import numpy as np
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components
+from trunnion.structure.graph import components
 
 __all__ = ["Parts"]
 
@@ -23,17 +17,19 @@ class Parts:
     def __init__(self, links: Sequence[str], edges: Iterable[tuple[str, str]]) -> None:
         number = {link: k for k, link in enumerate(links)}
         pairs = sorted({(number[one], number[other]) for one, other in edges})
-        rows, columns = zip(*pairs, strict=True) if pairs else ((), ())
-        graph = csr_array((np.ones(len(pairs), np.int8), (rows, columns)), shape=(len(links),) * 2)
-        count, labels = connected_components(graph, directed=True, connection="strong")
-        self.part_of = dict(zip(links, labels.tolist(), strict=True))
+        following: list[list[int]] = [[] for _ in links]
+        for row, column in pairs:
+            following[row].append(column)
+        labels = components(following)
+        count = max(labels, default=-1) + 1
+        self.part_of = dict(zip(links, labels, strict=True))
         self.members: list[list[str]] = [[] for _ in range(count)]
         for link, part in self.part_of.items():
             self.members[part].append(link)
         self.after: list[set[int]] = [set() for _ in range(count)]
         for row, column in pairs:
             if labels[row] != labels[column]:
-                self.after[labels[row]].add(int(labels[column]))
+                self.after[labels[row]].add(labels[column])
 
     @cached_property
     def before(self) -> list[set[int]]:

@@ -19,6 +19,7 @@ from trunnion.solve.bristles import History, histories
 from trunnion.solve.forward import Forward, Travel, forward
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.geometry import build
+from trunnion.solve.memory import keep_pages
 from trunnion.solve.seats import GivenSeat, seats
 from trunnion.solve.space.determinacy import Determinacy
 from trunnion.solve.switches import Mechanisms, edges
@@ -139,6 +140,7 @@ class Run:
 @np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
 def prepare(mechanism: Mechanism) -> Run:
     """Decompose a mechanism and choose its assembly. Raises MechanismError if its structure is not determined."""
+    keep_pages()
     system = build(mechanism)
     values = mechanism.parameters()
     cycle = system.cycle(values)

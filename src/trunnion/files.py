@@ -22,7 +22,7 @@ from pathlib import Path
 
 from trunnion.errors import Finding, MechanismError
 
-__all__ = ["Target", "folder", "reading", "same", "spare", "whole", "writing"]
+__all__ = ["Target", "cache_directory", "folder", "reading", "same", "spare", "whole", "writing"]
 
 REMEDY = "name another file"
 MOST_LINKS = 40  # one to the other, as operating systems have it
@@ -219,3 +219,14 @@ def folder(path: Path) -> None:
     except OSError as error:
         what = f"cannot be made a folder: {error.strerror or error}"
         raise MechanismError(Finding(what, str(path), "name a folder, or a .png, .svg or .pdf file")) from None
+
+
+def cache_directory(engine: str) -> Path:
+    """Where what an engine has compiled is kept between runs: in the user's cache directory."""
+    if sys.platform == "win32":
+        base = Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData" / "Local"))
+    elif sys.platform == "darwin":
+        base = Path.home() / "Library" / "Caches"
+    else:
+        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    return base / "trunnion" / engine

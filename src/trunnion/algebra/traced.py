@@ -90,6 +90,30 @@ class Traced:
         """The number as a constant for derivatives, as the real part of a dual number is."""
         return Traced(_jax().lax.stop_gradient(self.value))
 
+    def kept(self) -> Traced:
+        """The number, computed in one place only.
+
+        XLA repeats cheap sums and products in every loop that uses them, and what these are made of again in those: a
+        number that many others are made of is better kept. A quotient is, for XLA; this one's divisor is 1, which XLA
+        cannot know, and NaN where the number is.
+        """
+        value, jnp = self.value, _jnp()
+        return Traced(value / jnp.where(value == value, 1.0, jnp.nan))
+
+    @classmethod
+    def looped(cls, step: Callable[[list[Any]], list[Any]], start: Sequence[Any], rounds: int) -> list[Any]:
+        """See `looped` below."""
+        jax = _jax()
+
+        def body(_: Any, numbers: list[Any]) -> list[Any]:
+            return [_jnp().asarray(bare(one), float) for one in step([Traced(one) for one in numbers])]
+
+        state = [_jnp().asarray(bare(one), float) for one in start]
+        for _ in range(2):  # in the shape that it comes to: that of all lanes
+            shapes = jax.eval_shape(body, 0, state)
+            state = [_jnp().broadcast_to(one, shape.shape) for one, shape in zip(state, shapes, strict=True)]
+        return [Traced(one) for one in jax.lax.fori_loop(0, rounds, body, state)]
+
     def astype(self, kind: Any) -> Traced:
         return Traced(self.value.astype(kind))
 
@@ -192,26 +216,14 @@ functions: Any = _Functions()
 
 def looped(step: Callable[[list[Any]], list[Any]], start: Sequence[Any], rounds: int) -> list[Any]:
     """step(… step(start)), with the step compiled once. start, and what a step makes of it: lists of numbers."""
-    jax = _jax()
-
-    def body(_: Any, numbers: list[Any]) -> list[Any]:
-        return [_jnp().asarray(bare(one), float) for one in step([Traced(one) for one in numbers])]
-
-    state = [_jnp().asarray(bare(one), float) for one in start]
-    for _ in range(2):  # in the shape that it comes to: that of all lanes
-        shapes = jax.eval_shape(body, 0, state)
-        state = [_jnp().broadcast_to(one, shape.shape) for one, shape in zip(state, shapes, strict=True)]
-    return [Traced(one) for one in jax.lax.fori_loop(0, rounds, body, state)]
+    if rounds < 1:
+        return list(start)
+    if not any(isinstance(one, Traced) for one in start):  # plain numbers; what a round makes of them tells the kind
+        return looped(step, step(list(start)), rounds - 1)
+    kind = next(type(one) for one in start if isinstance(one, Traced))
+    return kind.looped(step, start, rounds)
 
 
 def kept(number: Any) -> Any:
-    """The number, computed in one place only where it is compiled.
-
-    XLA repeats cheap sums and products in every loop that uses them, and what these are made of again in those: a
-    number that many others are made of is better kept. A quotient is, for XLA; this one's divisor is 1, which XLA
-    cannot know, and NaN where the number is.
-    """
-    if not isinstance(number, Traced):
-        return number
-    value, jnp = number.value, _jnp()
-    return Traced(value / jnp.where(value == value, 1.0, jnp.nan))
+    """The number, computed in one place only where it is compiled."""
+    return number.kept() if isinstance(number, Traced) else number

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 __all__ = ["Kernel", "batch_of", "kernel_of", "references"]
 
 
-AT_ONCE = {"numpy": 10_000, "jax": 1 << 20}  # numbers in an array, by engine
+AT_ONCE = {"numpy": 10_000, "compiled": 1 << 20, "jax": 1 << 20}  # numbers in an array, by engine
 
 
 class Kernel(Protocol):
@@ -38,10 +38,11 @@ class Kernel(Protocol):
 
 
 @dataclass(frozen=True)
-class JaxKernel:
-    """The same compiled by JAX; what it cannot decide NumPy computes again. numpy: the kernel it stands for."""
+class OtherKernel:
+    """The same by another engine; what that cannot decide NumPy computes again. numpy: the kernel it stands for."""
 
     numpy: NumpyKernel
+    engine: str
 
     @cached_property
     def _parts(self) -> dict[str, tuple[Measure, int]]:
@@ -53,13 +54,21 @@ class JaxKernel:
 
     @cached_property
     def _compiled(self) -> CompiledKernel:
-        from trunnion.studies.tolerance.compiled import CompiledKernel
+        made: type[CompiledKernel]
+        if self.engine == "jax":
+            from trunnion.studies.tolerance import compiled_jax
+
+            made = compiled_jax.JaxKernel
+        else:
+            from trunnion.studies.tolerance import compiled_vectors
+
+            made = compiled_vectors.VectorKernel
 
         def figure(measure: Measure, k: int) -> Callable[[Backward], Number]:
             return lambda back: measure.curve(back.walk if measure.of_motion else back)[k]
 
         figures = {name: figure(*part) for name, part in self._parts.items()}
-        return CompiledKernel(self.numpy.run, figures, self.numpy.forces, self.numpy.method)
+        return made(self.numpy.run, figures, self.numpy.forces, self.numpy.method)
 
     def courses(self, values: Mapping[str, Number], time: Number) -> tuple[Courses, NDArray[np.int8]]:
         """As `NumpyKernel.courses`, of plain numbers."""
@@ -80,9 +89,9 @@ def kernel_of(engine: str, run: Run, measures: Sequence[Measure], friction: Fric
     numpy = NumpyKernel(run, measures, friction)
     if engine == "numpy":
         return numpy
-    if engine == "jax":
-        return JaxKernel(numpy)
-    raise MechanismError(Finding(f"there is no engine '{engine}'", "engine", "use numpy or jax"))
+    if engine in AT_ONCE:
+        return OtherKernel(numpy, engine)
+    raise MechanismError(Finding(f"there is no engine '{engine}'", "engine", f"use {' or '.join(AT_ONCE)}"))
 
 
 def references(kernel: NumpyKernel, plan: PositionPlan, inputs: Inputs) -> dict[str, Reference]:

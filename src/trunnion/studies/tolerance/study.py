@@ -28,7 +28,7 @@ from trunnion.studies.tolerance.result import dataset
 
 __all__ = ["DEFAULT_METHODS", "METHODS", "tolerance"]
 
-ENGINES = ("numpy", "jax")
+ENGINES = ("numpy", "compiled", "jax")
 METHODS = ("linear", "worst-case", *SAMPLINGS, "sobol")
 DEFAULT_METHODS = ("linear", "worst-case", "monte-carlo")
 DEFAULT_SAMPLES = 10_000
@@ -64,8 +64,8 @@ def tolerance(
     a whole cycle; at: the place (driver coordinate or time) of measures that state neither a place nor a figure.
     friction_method: how friction and reactions are settled; Newton's method if not given.
     jobs: processes, one a core if not given and worth it; chunk, cluster, checkpoint, resume, progress: `runner.run`.
-    engine: numpy, or jax (an extra). target: the yield that is asked for; limits are missed below it, and if none is
-    given where a worst case, a yield below 1 or a C_pk below 1 breaks them: errors among the findings.
+    engine: numpy, compiled or jax (extras). target: the yield that is asked for; limits are missed below it, and if
+    none is given where a worst case, a yield below 1 or a C_pk below 1 breaks them: errors among the findings.
     Returns a Dataset over (measure, parameter, position, …) of `result.VARIABLES`; SI, each measure in its own unit.
     Method: exact first derivatives by dual numbers; the worst corner of the tolerances found on the mechanism itself;
     Monte Carlo or scrambled Sobol points through the whole analysis; Sobol' indices. Samples that have no answer are

@@ -1,0 +1,262 @@
+"""What a kernel computes, as a graph: each operation once, constants folded.
+
+A node is an operation on earlier nodes; two equal operations are one node. What a loop repeats are the nodes that
+depend on its state; all others are outside of it, so nothing is computed twice there either.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+__all__ = ["BOTH", "EXP_RANGE", "POSITION", "SAMPLE", "SINE_RANGE", "Graph", "Loop", "Node"]
+
+SINE_RANGE = 1e5  # rad, within which the sine of a compiled kernel is exact
+EXP_RANGE = 700.0  # neither overflow nor loss of digits
+RANGES = {"sin": SINE_RANGE, "cos": SINE_RANGE, "exp": EXP_RANGE}
+SAMPLE, POSITION = 1, 2  # what a number differs by
+BOTH = SAMPLE | POSITION
+BOOLEAN = frozenset({"lt", "le", "gt", "ge", "eq", "ne", "and", "or", "xor", "not", "finite"})
+COMMUTATIVE = frozenset({"add", "mul", "max", "min", "and", "or", "xor", "eq", "ne"})
+OF_BOOLEANS = frozenset({"and", "or", "xor", "not"})
+
+
+class Node(NamedTuple):
+    """An operation on nodes by number; what belongs to it beside them: a constant, a name, a table, a loop."""
+
+    op: str
+    args: tuple[int, ...] = ()
+    extra: Any = None
+
+
+@dataclass(frozen=True)
+class Loop:
+    """A part of the graph that is run `rounds` times: its state before a round and what the round makes of it."""
+
+    rounds: int
+    states: tuple[int, ...]
+    results: tuple[int, ...]
+
+
+FOLDED: dict[str, Callable[..., Any]] = {
+    "neg": np.negative, "abs": np.abs, "sqrt": np.sqrt, "sin": np.sin, "cos": np.cos, "exp": np.exp, "tanh": np.tanh,
+    "sign": np.sign, "floor": np.floor, "finite": np.isfinite, "not": np.logical_not, "add": np.add,
+    "sub": np.subtract, "mul": np.multiply, "div": np.divide, "max": np.maximum, "min": np.minimum,
+    "atan2": np.arctan2, "lt": np.less, "le": np.less_equal, "gt": np.greater, "ge": np.greater_equal,
+    "eq": np.equal, "ne": np.not_equal, "and": np.logical_and, "or": np.logical_or, "xor": np.logical_xor,
+}  # fmt: skip
+
+
+class Graph:
+    """Nodes in the order of their making.
+
+    inputs: name and what it differs by, in order. doubts: conditions under which an operation is not as exact as
+    elsewhere, so that NumPy has to decide.
+    """
+
+    def __init__(self) -> None:
+        self.nodes: list[Node] = []
+        self.differs: list[int] = []  # of each node, by SAMPLE and POSITION
+        self.within: list[int] = []  # of each node the loops whose state it depends on, a bit each
+        self.loops: list[Loop] = []
+        self.inputs: dict[str, int] = {}
+        self.doubts: list[int] = []
+        self._numbers: dict[Any, int] = {}
+
+    # ---- making nodes -----------------------------------------------------------------------------------------
+
+    def node(self, op: str, args: tuple[int, ...] = (), extra: Any = None, differs: int = 0, within: int = 0) -> int:
+        """The number of this node, which is made if there is none such."""
+        key = Node(op, args, extra)
+        if key in self._numbers:
+            return self._numbers[key]
+        for arg in args:
+            differs |= self.differs[arg]
+            within |= self.within[arg]
+        number = self._numbers[key] = len(self.nodes)
+        self.nodes.append(key)
+        self.differs.append(differs)
+        self.within.append(within)
+        return number
+
+    def constant(self, value: Any) -> int:
+        """A float or a bool that is known now. 0 and −0 are two."""
+        if isinstance(value, (bool, np.bool_)):
+            return self.node("bool", (), bool(value))
+        value = float(value)
+        return self.node("float", (), (value, math.copysign(1.0, value)) if value == value else ("nan", 1.0))
+
+    def value(self, number: int) -> float | bool | None:
+        """What a constant is; None of any other node."""
+        node = self.nodes[number]
+        if node.op == "bool":
+            return bool(node.extra)
+        if node.op != "float":
+            return None
+        return math.nan if node.extra[0] == "nan" else float(node.extra[0])
+
+    def input(self, name: str, differs: int) -> int:
+        """A number that is given when the kernel is run."""
+        self.inputs[name] = differs
+        return self.node("input", (), name, differs)
+
+    def boolean(self, number: int) -> bool:
+        """Whether a node is true or false rather than a number."""
+        return self.nodes[number].op in BOOLEAN or self.nodes[number].op == "bool"
+
+    def as_boolean(self, number: int) -> int:
+        return number if self.boolean(number) else self.apply("ne", number, self.constant(0.0))
+
+    def as_float(self, number: int) -> int:
+        return self.where(number, self.constant(1.0), self.constant(0.0)) if self.boolean(number) else number
+
+    # ---- operations -------------------------------------------------------------------------------------------
+
+    def apply(self, op: str, *args: int) -> int:
+        """An operation, simpler where what it is applied to allows."""
+        if op in OF_BOOLEANS:
+            args = tuple(map(self.as_boolean, args))
+        elif not (op in ("eq", "ne") and all(map(self.boolean, args))):
+            args = tuple(map(self.as_float, args))
+        known = [self.value(arg) for arg in args]
+        if all(value is not None for value in known):
+            with np.errstate(all="ignore"):
+                return self.constant(FOLDED[op](*known))
+        simpler = self._of_one(op, args[0]) if len(args) == 1 else self._of_two(op, args, known)
+        if simpler is not None:
+            return simpler
+        if op in RANGES and not self.within[args[0]]:  # within a loop it is NaN there
+            self.doubts.append(self.apply("not", self.apply("le", self.apply("abs", *args), self.constant(RANGES[op]))))
+        return self.node(op, tuple(sorted(args)) if op in COMMUTATIVE else args)
+
+    def _of_one(self, op: str, a: int) -> int | None:
+        inner = self.nodes[a]
+        if op in ("neg", "not") and inner.op == op:
+            return inner.args[0]
+        if op == "neg" and inner.op == "sub":
+            return self.apply("sub", *inner.args[::-1])
+        if op == "abs" and inner.op in ("neg", "abs"):
+            return self.apply("abs", inner.args[0])
+        return None
+
+    def _of_two(self, op: str, args: tuple[int, ...], known: Sequence[Any]) -> int | None:
+        """What an operation on two nodes comes to where one is a constant or a negative, or both are the same."""
+        (a, b), (first, second) = args, known
+        if a == b and op in ("max", "min", "and", "or"):
+            return a
+        if op in ("and", "or"):
+            kept = op == "and"  # the value that leaves the other as it is
+            for value, other in ((first, b), (second, a)):
+                if value is not None:
+                    return other if value is kept else self.constant(not kept)
+        if op == "add":
+            return self._sum(args, known)
+        if op == "sub":
+            return self._difference(args, known)
+        if op in ("mul", "div"):
+            return self._product(op, args, known)
+        return None
+
+    def _sum(self, args: tuple[int, ...], known: Sequence[Any]) -> int | None:
+        (a, b), (first, second) = args, known
+        if first == 0.0 or second == 0.0:
+            return b if first == 0.0 else a
+        for one, other in ((a, b), (b, a)):
+            if self.nodes[other].op == "neg":
+                return self.apply("sub", one, self.nodes[other].args[0])
+        return None
+
+    def _difference(self, args: tuple[int, ...], known: Sequence[Any]) -> int | None:
+        (a, b), (first, second) = args, known
+        if second == 0.0:
+            return a
+        if first == 0.0:
+            return self.apply("neg", b)
+        return self.apply("add", a, self.nodes[b].args[0]) if self.nodes[b].op == "neg" else None
+
+    def _product(self, op: str, args: tuple[int, ...], known: Sequence[Any]) -> int | None:
+        (a, b), (first, second) = args, known
+        if second in (1.0, -1.0):
+            return a if second == 1.0 else self.apply("neg", a)
+        if op == "mul" and first in (1.0, -1.0):
+            return b if first == 1.0 else self.apply("neg", b)
+        if op == "div" and first != 1.0:  # one division serves all that are divided by the same
+            return self.apply("mul", a, self.apply("div", self.constant(1.0), b))
+        for place, number in enumerate(args):
+            if self.nodes[number].op == "neg":
+                inner = list(args)
+                inner[place] = self.nodes[number].args[0]
+                return self.apply("neg", self.apply(op, *inner))
+        return None
+
+    def where(self, condition: int, a: int, b: int) -> int:
+        """a where the condition holds, b elsewhere."""
+        condition = self.as_boolean(condition)
+        known = self.value(condition)
+        if known is not None or a == b:
+            return b if known is False else a
+        if self.boolean(a) and self.boolean(b):
+            other = self.apply("and", self.apply("not", condition), b)
+            return self.apply("or", self.apply("and", condition, a), other)
+        return self.node("where", (condition, self.as_float(a), self.as_float(b)))
+
+    # ---- loops ------------------------------------------------------------------------------------------------
+
+    def loop(self, step: Callable[[list[int]], list[int]], start: Sequence[int], rounds: int) -> list[int]:
+        """step(… step(start)): the nodes of one step, made once and run `rounds` times."""
+        start = [self.as_float(number) for number in start]
+        if rounds < 1:
+            return start
+        differs = 0
+        for number in start:
+            differs |= self.differs[number]
+        while True:
+            index = len(self.loops)
+            self.loops.append(Loop(0, (), ()))  # its number is taken, also for loops within
+            states = tuple(self.node("state", (), (index, k), differs, 1 << index) for k in range(len(start)))
+            results = tuple(self.as_float(number) for number in step(list(states)))
+            most = differs
+            for number in results:
+                most |= self.differs[number]
+            if most == differs:
+                break
+            differs = most
+        self.loops[index] = Loop(rounds, states, results)
+        outer = [n for n in self._outside(results, index) if self.value(n) is None]
+        loop = self.node("loop", (*start, *outer), index)
+        return [self.node("result", (loop,), k) for k in range(len(start))]
+
+    def inside(self, numbers: Iterable[int], index: int) -> list[int]:
+        """The nodes of a loop that these are made of, in order."""
+        return sorted(n for n in self._reached(numbers, index) if self.within[n] >> index & 1)
+
+    def _outside(self, numbers: Iterable[int], index: int) -> list[int]:
+        """The nodes from outside of a loop that these are made of directly."""
+        return sorted(n for n in self._reached(numbers, index) if not self.within[n] >> index & 1)
+
+    def _reached(self, numbers: Iterable[int], index: int) -> set[int]:
+        """Nodes that these are made of, down to the first outside of the loop."""
+        found: set[int] = set()
+        left = list(numbers)
+        while left:
+            number = left.pop()
+            if number not in found:
+                found.add(number)
+                if self.within[number] >> index & 1:
+                    left += self.nodes[number].args
+        return found
+
+    def live(self, numbers: Iterable[int]) -> list[int]:
+        """The nodes that these are made of, in order, without what only the rounds of a loop need."""
+        found: set[int] = set()
+        left = list(numbers)
+        while left:
+            number = left.pop()
+            if number not in found:
+                found.add(number)
+                left += self.nodes[number].args
+        return sorted(found)

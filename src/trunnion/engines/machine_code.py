@@ -1,0 +1,149 @@
+"""Programs of LLVM as machine code: compiled for this processor, kept on disk, run by as many threads as one likes."""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+import os
+import stat
+import tempfile
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+from threading import Lock
+from typing import Any
+
+import llvmlite
+import llvmlite.binding as llvm
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.engines.program import Program
+from trunnion.files import cache_directory
+from trunnion.version import __version__
+
+__all__ = ["MachineCode", "vector_width"]
+
+Array = NDArray[np.float64]
+COMPILING = Lock()  # LLVM's own state is not made for several threads
+MAGIC = b"trunnion object 1\n"
+
+
+@cache
+def _target() -> tuple[str, str]:
+    """Name and features of this processor, once LLVM is ready."""
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    return llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
+
+
+@cache
+def vector_width() -> int:
+    """Floats that this processor takes at a time."""
+    features = _target()[1].split(",")
+    return 8 if "+avx512f" in features else 4 if "+avx" in features else 2
+
+
+class MachineCode:
+    """A program, ready to run. folder: where its object code is kept; read from there if it is, written if it can be.
+
+    compiled: whether it had to be compiled.
+    """
+
+    def __init__(self, program: Program, folder: Path | None = None) -> None:
+        self.program = program
+        with COMPILING:
+            path = _path(program, cache_directory("compiled") if folder is None else folder)
+            code = _read(path)
+            self.compiled = code is None
+            if code is None:
+                code = _compiled(program.text)
+                _keep(path, code)
+            self._engine = _linked(code)
+        kinds = [*[ctypes.c_int64] * 5, *[ctypes.c_void_p] * 6]
+        self._function = ctypes.CFUNCTYPE(None, *kinds)(self._engine.get_function_address("kernel"))
+
+    def run(
+        self,
+        inputs: Mapping[str, Array],
+        outputs: Sequence[NDArray[Any]],
+        samples: tuple[int, int],
+        positions: tuple[int, int],
+    ) -> None:
+        """Fill the outputs, (sample, position), from the first to before the last sample and position.
+
+        inputs: by name, (1,), (sample,), (position,) or (sample, position), contiguous floats. There are at least as
+        many positions as a vector holds.
+        """
+        stride = outputs[0].shape[-1]
+        table = np.empty(max(1, self.program.rows * (positions[1] - positions[0])))
+        arrays = [[inputs[name] for name in names] for names in self.program.inputs]
+        self._function(
+            *samples, *positions, stride, *(_pointers(some) for some in (*arrays, outputs)), table.ctypes.data
+        )
+
+
+def _pointers(arrays: Sequence[NDArray[Any]]) -> Any:
+    return (ctypes.c_void_p * max(1, len(arrays)))(*(array.ctypes.data for array in arrays))
+
+
+def _machine() -> Any:
+    name, features = _target()
+    target = llvm.Target.from_default_triple()
+    # with the small code model, code that is loaded far from the tables it reads ends the process
+    return target.create_target_machine(cpu=name, features=features, opt=2, reloc="pic", codemodel="large")
+
+
+def _compiled(text: str) -> bytes:
+    module = llvm.parse_assembly(text)
+    module.verify()
+    code: bytes = _machine().emit_object(module)
+    return code
+
+
+def _linked(code: bytes) -> Any:
+    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _machine())
+    engine.add_object_file(llvm.object_file.ObjectFileRef.from_data(code))
+    engine.finalize_object()
+    return engine
+
+
+# ---- on disk --------------------------------------------------------------------------------------------------
+
+
+def _path(program: Program, folder: Path) -> Path:
+    """The file of a program, by what it does, for which processor, made by which versions."""
+    told = "\0".join((program.text, *_target(), llvmlite.__version__, __version__))
+    return folder / f"{hashlib.sha256(told.encode()).hexdigest()}.o"
+
+
+def _read(path: Path) -> bytes | None:
+    """Object code that this user has kept; None if there is none, or it is not whole, or another's."""
+    with suppress(OSError):
+        if not _own(path.parent) or not _own(path):
+            return None
+        data = path.read_bytes()
+        head, digest, code = data[: len(MAGIC)], data[len(MAGIC) : len(MAGIC) + 32], data[len(MAGIC) + 32 :]
+        if head == MAGIC and hashlib.sha256(code).digest() == digest:
+            return code
+    return None
+
+
+def _own(path: Path) -> bool:
+    """Whether a file or folder is this user's and nobody else can write it; of Windows the user's folders are."""
+    if not hasattr(os, "getuid"):
+        return True
+    told = path.stat()
+    return told.st_uid == os.getuid() and not told.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+
+
+def _keep(path: Path, code: bytes) -> None:
+    """Keep object code, if the folder can be written and is this user's."""
+    with suppress(OSError):
+        path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        if _own(path.parent):
+            handle, name = tempfile.mkstemp(dir=path.parent)  # for this user alone, unlike what `files.whole` writes
+            with os.fdopen(handle, "wb") as file:
+                file.write(MAGIC + hashlib.sha256(code).digest() + code)
+            os.replace(name, path)

@@ -1,0 +1,276 @@
+"""From a graph to a program of LLVM: loops over samples and positions around vectors of lanes.
+
+kernel(s0, s1, p0, p1, P, given, by_sample, by_position, by_both, outputs, table) fills outputs[k][s, p] for the samples
+s0 to s1 and the positions p0 to p1 of P. What is made of given numbers alone is computed once a call, what differs by
+sample alone once a sample, both as plain numbers; what differs by position alone once a call, into a table of the
+caller. The last vector of a row is moved back to end with
+it: so a row holds at least as many positions as a vector.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from llvmlite import ir
+
+from trunnion.engines.graph import BOTH, POSITION, SAMPLE, Graph
+from trunnion.engines.lanes import BYTE, DOUBLE, LONG, Lanes
+
+__all__ = ["Program", "program"]
+
+KINDS = (0, SAMPLE, POSITION, BOTH)  # what numbers differ by
+COMPARED = {"lt": "<", "le": "<=", "gt": ">", "ge": ">=", "eq": "==", "ne": "!="}
+Value = Any  # of llvmlite, which has no types
+
+
+@dataclass(frozen=True)
+class Program:
+    """The text of a module; names of the inputs, given and by sample, position and both; rows of the table it needs."""
+
+    text: str
+    inputs: tuple[tuple[str, ...], ...]
+    rows: int
+
+
+def program(graph: Graph, outputs: Sequence[int], width: int) -> Program:
+    """A program that computes some nodes. Numbers become floats of 64 bits, what is true or false and "byte" bytes."""
+    return _Writer(graph, outputs, width).write()
+
+
+@dataclass
+class _Writer:
+    """One module as it is written."""
+
+    graph: Graph
+    outputs: Sequence[int]
+    width: int
+    module: Any = field(default_factory=lambda: ir.Module(name="trunnion"))
+
+    def write(self) -> Program:
+        live = self.graph.live(self.outputs)
+        names = tuple(self._inputs(live, differs) for differs in KINDS)
+        self._open()
+        self.pointers = [
+            {name: self._pointer(argument, k) for k, name in enumerate(some)}
+            for argument, some in zip(self.arguments[5:9], names, strict=True)
+        ]
+        self.out = [self._pointer(self.arguments[9], k) for k in range(len(self.outputs))]
+        level = {n: self.graph.differs[n] for n in live}
+        if not any(differs & SAMPLE for differs in level.values()):  # one sample: no table is needed for it
+            level = {n: BOTH if differs == POSITION else differs for n, differs in level.items()}
+        given, once, ahead, each = ([n for n in live if level[n] == kind] for kind in KINDS)
+        plain: dict[int, Value] = self._loaded(0, ir.Constant(LONG, 0))
+        self._emit(given, plain, self.scalar)
+        wide = self._spread(plain, [*ahead, *each])
+        self.tabled = self._frontier(ahead, each)
+        if self.tabled:
+            self._fill_table(ahead, wide)
+        self._samples(once, each, plain, wide)
+        self.b.ret_void()
+        return Program(str(self.module), names, len(self.tabled))
+
+    def _spread(self, plain: dict[int, Value], readers: Iterable[int]) -> dict[int, Value]:
+        """Plain numbers in all lanes, those that some nodes read or that are outputs."""
+        read = {arg for n in readers for arg in self.graph.nodes[n].args} | set(self.outputs)
+        return {n: self.lanes.splat(plain[n]) for n in sorted(read & plain.keys())}
+
+    def _inputs(self, live: Iterable[int], differs: int) -> tuple[str, ...]:
+        nodes = (self.graph.nodes[n] for n in live)
+        return tuple(node.extra for node in nodes if node.op == "input" and self.graph.inputs[node.extra] == differs)
+
+    def _open(self) -> None:
+        """The function with its arguments, and a builder at its entry."""
+        double = DOUBLE.as_pointer()
+        kinds = [*[LONG] * 5, *[double.as_pointer()] * 5, double]
+        function = ir.Function(self.module, ir.FunctionType(ir.VoidType(), kinds), name="kernel")
+        self.arguments = function.args
+        self.b = ir.IRBuilder(function.append_basic_block("entry"))
+        tables: dict[tuple[float, ...], Value] = {}
+        self.lanes, self.scalar = Lanes(self.b, self.width, tables), Lanes(self.b, 1, tables)
+
+    def _pointer(self, array: Value, k: int) -> Value:
+        return self.b.load(self.b.gep(array, [ir.Constant(LONG, k)]))
+
+    def _frontier(self, ahead: Sequence[int], each: Sequence[int]) -> list[int]:
+        """Nodes that differ by position alone and are read where samples are gone through."""
+        own = {n for n in ahead if self.graph.nodes[n].op not in ("input", "loop")}
+        read = {arg for n in each for arg in self.graph.nodes[n].args} | set(self.outputs)
+        return sorted(own & read)
+
+    # ---- loops ----------------------------------------------------------------------------------------------------
+
+    def _counted(self, low: Value, high: Value, step: int, body: Callable[[Value], None]) -> None:
+        """for i in range(low, high, step): body(i)."""
+        before = self.b.block
+        head, inside, after = (self.b.append_basic_block() for _ in range(3))
+        self.b.branch(head)
+        self.b.position_at_end(head)
+        i = self.b.phi(LONG)
+        i.add_incoming(low, before)
+        self.b.cbranch(self.b.icmp_signed("<", i, high), inside, after)
+        self.b.position_at_end(inside)
+        body(i)
+        i.add_incoming(self.b.add(i, ir.Constant(LONG, step)), self.b.block)
+        self.b.branch(head)
+        self.b.position_at_end(after)
+
+    def _positions(self, body: Callable[[Value], None]) -> None:
+        """Vectors of positions, the last one moved back to end with the row."""
+        low, high = self.arguments[2:4]
+        last = self.b.sub(high, ir.Constant(LONG, self.width))
+
+        def moved(i: Value) -> None:
+            body(self.b.select(self.b.icmp_signed(">", i, last), last, i))
+
+        self._counted(low, high, self.width, moved)
+
+    def _fill_table(self, ahead: Sequence[int], wide: dict[int, Value]) -> None:
+        low, high = self.arguments[2:4]
+        row = self.b.sub(high, low)
+
+        def body(p: Value) -> None:
+            values = {**wide, **self._loaded(POSITION, p)}
+            self._emit(ahead, values, self.lanes)
+            for k, n in enumerate(self.tabled):
+                self._store(self.arguments[10], self._place(row, k, self.b.sub(p, low)), self._as_double(values[n]))
+
+        self._positions(body)
+
+    def _place(self, row: Value, k: int, p: Value) -> Value:
+        return self.b.add(self.b.mul(row, ir.Constant(LONG, k)), p)
+
+    def _as_double(self, value: Value) -> Value:
+        return self.b.uitofp(value, self.lanes.double) if value.type == self.lanes.bit else value
+
+    def _samples(
+        self, once: Sequence[int], each: Sequence[int], given: dict[int, Value], all_samples: dict[int, Value]
+    ) -> None:
+        first, last, low, high, stride = self.arguments[:5]
+        row = self.b.sub(high, low)
+
+        def sample(s: Value) -> None:
+            plain = {**given, **self._loaded(SAMPLE, s)}
+            self._emit(once, plain, self.scalar)
+            own = {n: value for n, value in plain.items() if n not in given}
+            wide = {**all_samples, **self._spread(own, each)}
+            start = self.b.mul(s, stride)
+
+            def position(p: Value) -> None:
+                place = self.b.add(start, p)
+                values = {**wide, **self._loaded(POSITION, p), **self._loaded(BOTH, place)}
+                for k, n in enumerate(self.tabled):
+                    entry = self._load(self.arguments[10], self._place(row, k, self.b.sub(p, low)))
+                    bit = self.graph.boolean(n)
+                    values[n] = self.lanes.compare("!=", entry, self.lanes.constant(0.0)) if bit else entry
+                self._emit(each, values, self.lanes)
+                for k, n in enumerate(self.outputs):
+                    self._output(self.out[k], place, self._of(n, values, self.lanes))
+
+            self._positions(position)
+
+        self._counted(first, last, 1, sample)
+
+    # ---- memory ------------------------------------------------------------------------------------------------------
+
+    def _loaded(self, differs: int, place: Value) -> dict[int, Value]:
+        """The inputs of a kind at a place."""
+        pointers = self.pointers[KINDS.index(differs)]
+        found = {}
+        for name, pointer in pointers.items():
+            number = self.graph.input(name, self.graph.inputs[name])
+            plain = differs in (0, SAMPLE)
+            found[number] = self.b.load(self.b.gep(pointer, [place])) if plain else self._load(pointer, place)
+        return found
+
+    def _load(self, pointer: Value, place: Value) -> Value:
+        at = self.b.bitcast(self.b.gep(pointer, [place]), self.lanes.double.as_pointer())
+        return self.b.load(at, align=8)
+
+    def _store(self, pointer: Value, place: Value, value: Value) -> None:
+        self.b.store(value, self.b.bitcast(self.b.gep(pointer, [place]), value.type.as_pointer()), align=8)
+
+    def _output(self, pointer: Value, place: Value, value: Value) -> None:
+        """A row of floats, or of bytes for what is true or false."""
+        if value.type == self.lanes.double:
+            self._store(pointer, place, value)
+            return
+        wide = self.b.zext(value, self.lanes.byte) if value.type == self.lanes.bit else value
+        at = self.b.gep(self.b.bitcast(pointer, BYTE.as_pointer()), [place])
+        self.b.store(wide, self.b.bitcast(at, wide.type.as_pointer()), align=1)
+
+    # ---- nodes -------------------------------------------------------------------------------------------------------
+
+    def _of(self, n: int, values: dict[int, Value], lanes: Lanes) -> Value:
+        known = self.graph.value(n)
+        return values[n] if known is None else lanes.constant(known)
+
+    def _emit(self, numbers: Iterable[int], values: dict[int, Value], lanes: Lanes) -> None:
+        """Instructions for nodes, in their order; what is known already is not computed again."""
+        angles: dict[int, tuple[Value, Value]] = {}
+        for n in numbers:
+            op, args, extra = self.graph.nodes[n]
+            if n in values or self.graph.value(n) is not None:
+                continue
+            if op == "loop":
+                values[n] = self._loop(args, extra, values, lanes)
+            elif op == "result":
+                values[n] = values[args[0]][extra]
+            elif op in ("sin", "cos"):
+                if args[0] not in angles:
+                    angles[args[0]] = lanes.sincos(self._of(args[0], values, lanes))
+                values[n] = angles[args[0]][op == "cos"]
+            else:
+                values[n] = self._operation(n, [self._of(arg, values, lanes) for arg in args], lanes)
+
+    def _operation(self, n: int, a: list[Value], lanes: Lanes) -> Value:
+        op, _, extra = self.graph.nodes[n]
+        if op in COMPARED:
+            if a[0].type == lanes.bit:
+                return self.b.icmp_signed(COMPARED[op], *a)
+            return lanes.compare(COMPARED[op], *a)
+        match op:
+            case "and" | "or":
+                return getattr(self.b, f"{op}_")(*a)
+            case "xor":
+                return self.b.xor(*a)
+            case "not":
+                return self.b.xor(a[0], lanes.constant(True))
+            case "where":
+                return lanes.select(*a)
+            case "max":
+                return lanes.larger(a[0], a[1])
+            case "min":
+                return lanes.larger(a[0], a[1], "<")
+            case "byte":
+                return self.b.fptosi(a[0], lanes.byte)
+            case "take":
+                return lanes.take(extra, a[0])
+            case "search":
+                entries, side = extra
+                return lanes.search(entries, side, a[0])
+        return getattr(lanes, op)(*a)
+
+    def _loop(self, args: tuple[int, ...], index: int, values: dict[int, Value], lanes: Lanes) -> list[Value]:
+        """A loop of the graph: what it comes to after its rounds."""
+        loop, int_ = self.graph.loops[index], ir.IntType(32)
+        start = [self._of(n, values, lanes) for n in args[: len(loop.states)]]
+        before = self.b.block
+        body, after = self.b.append_basic_block(), self.b.append_basic_block()
+        self.b.branch(body)
+        self.b.position_at_end(body)
+        count = self.b.phi(int_)
+        count.add_incoming(ir.Constant(int_, 0), before)
+        states = [self.b.phi(lanes.double) for _ in start]
+        inner = dict(values) | dict(zip(loop.states, states, strict=True))
+        self._emit(self.graph.inside(loop.results, index), inner, lanes)
+        found = [self._of(n, inner, lanes) for n in loop.results]
+        for state, first, next_ in zip(states, start, found, strict=True):
+            state.add_incoming(first, before)
+            state.add_incoming(next_, self.b.block)
+        further = self.b.add(count, ir.Constant(int_, 1))
+        count.add_incoming(further, self.b.block)
+        self.b.cbranch(self.b.icmp_signed("<", further, ir.Constant(int_, loop.rounds)), body, after)
+        self.b.position_at_end(after)
+        return found

@@ -1,0 +1,166 @@
+"""The kernel of a tolerance run as machine code for vectors of lanes, by LLVM."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.errors import Finding, MechanismError
+from trunnion.solve.system import Values
+from trunnion.studies.tolerance.compiled import Array, CompiledKernel, Lanes
+
+if TYPE_CHECKING:
+    from trunnion.engines.machine_code import MachineCode
+
+__all__ = ["VectorKernel"]
+
+PROBE = 4096  # lanes by which one judges whether the rest is worth while
+HOPELESS = 0.5  # share of doubtful lanes from which the rest is left to NumPy
+ALONE = 1 << 15  # lanes that one thread does in about the time that starting another takes
+STRUCTURAL = (0.0, 1.0, -1.0)  # numbers by which kernels save work: they are compiled in
+TIME = "time"
+
+
+class _Inputs(NamedTuple):
+    """What a kernel is given: the numbers by path, those that stand for themselves, and what each differs by."""
+
+    numbers: dict[str, Array]
+    literal: dict[str, Any]
+    differs: dict[str, int]
+
+    @property
+    def structure(self) -> tuple[Any, ...]:
+        """What a program is compiled for."""
+        return tuple(self.literal.items()), tuple(self.differs.items())
+
+
+class VectorKernel(CompiledKernel):
+    """Recorded once and compiled by LLVM for vectors of lanes: one program for all values of the same numbers."""
+
+    def prepare(self) -> None:
+        """Load LLVM; MechanismError if it is not installed."""
+        try:
+            import llvmlite as _  # noqa: F401
+        except ImportError:
+            what = "the engine compiled needs the package llvmlite, which is not installed"
+            remedy = "pip install 'trunnion[compiled]', or use the engine numpy"
+            raise MechanismError(Finding(what, "engine", remedy)) from None
+        self._programs: dict[tuple[Any, ...], MachineCode] = {}
+
+    def fill(self, values: Values, time: Array, found: Lanes) -> None:
+        """All lanes, a part of the samples or positions in each thread."""
+        from trunnion.engines.machine_code import vector_width
+
+        samples, positions = found.status.shape
+        if positions >= vector_width():
+            self._filled(values, time, found)
+            return
+        # rows too short for a vector: all lanes as one row, which ends with itself again where it is too short too
+        row = np.resize(np.arange(samples * positions), max(samples * positions, vector_width()))
+        lanes = {path: _of_lanes(value, row // positions) for path, value in values.items()}
+        times = np.ascontiguousarray(np.broadcast_to(time, (samples, positions)).ravel()[row])
+        flat = _empty(list(found.curves), (1, len(row)))
+        self._filled(lanes, times, flat)
+        for into, came in zip(_arrays(found), _arrays(flat), strict=True):
+            into[:] = came[0, : samples * positions].reshape(samples, positions)
+
+    def _filled(self, values: Values, time: Array, found: Lanes) -> None:
+        inputs = _inputs(values, time, found.status.shape)
+        program, arrays = self.program(inputs, values, time), _arrays(found)
+        with ThreadPoolExecutor(self.threads) as pool:
+            first, *rest = _parts(found.status.shape, self.threads)
+            program.run(inputs.numbers, arrays, *first)
+            probed = found.doubtful[slice(*first[0]), slice(*first[1])]
+            if rest and np.mean(probed) > HOPELESS:
+                found.doubtful[:] = True  # NumPy is quicker at once
+                return
+            list(pool.map(lambda part: program.run(inputs.numbers, arrays, *part), rest))
+
+    def program(self, inputs: _Inputs, values: Values, time: Array) -> MachineCode:
+        """The machine code for numbers of this structure."""
+        key = inputs.structure
+        if key not in self._programs:
+            self._programs[key] = self._recorded(inputs)
+        return self._programs[key]
+
+    def _recorded(self, inputs: _Inputs) -> MachineCode:
+        """Run the walk once on numbers that write down what is done with them, and compile that."""
+        from trunnion.engines.graph import Graph
+        from trunnion.engines.machine_code import MachineCode, vector_width
+        from trunnion.engines.program import program
+        from trunnion.engines.recorded import Recorded, number_of
+
+        graph = Graph()
+        numbers = {path: Recorded(graph, graph.input(path, differs)) for path, differs in inputs.differs.items()}
+        found = self.walked({**inputs.literal, **numbers}, numbers.pop(TIME))
+        curves = [graph.as_float(number_of(graph, curve)) for curve in found.curves.values()]
+        doubtful = graph.as_boolean(number_of(graph, found.doubtful))
+        for doubt in graph.doubts:
+            doubtful = graph.apply("or", doubtful, doubt)
+        for curve in curves:
+            doubtful = graph.apply("or", doubtful, graph.apply("not", graph.apply("finite", curve)))
+        status = graph.node("byte", (graph.as_float(number_of(graph, found.status)),))
+        return MachineCode(program(graph, [*curves, status, doubtful], vector_width()))
+
+
+# ---- lanes in arrays ------------------------------------------------------------------------------------------
+
+
+def _empty(names: list[str], shape: tuple[int, ...]) -> Lanes:
+    return Lanes({name: np.empty(shape) for name in names}, np.empty(shape, np.int8), np.empty(shape, bool))
+
+
+def _arrays(found: Lanes) -> list[NDArray[Any]]:
+    return [*found.curves.values(), found.status, found.doubtful]
+
+
+def _of_lanes(value: Any, samples: NDArray[np.intp]) -> Any:
+    """A number in the sample of each lane, as a row of lanes."""
+    if not np.ndim(value):
+        return value
+    flat = np.ravel(np.asarray(value, float))
+    return flat[samples][None, :] if len(flat) > 1 else float(flat[0])
+
+
+def _inputs(values: Values, time: Array, shape: tuple[int, ...]) -> _Inputs:
+    """What a program for lanes of this shape is given."""
+    from trunnion.engines.graph import BOTH, POSITION, SAMPLE
+
+    numbers: dict[str, Array] = {}
+    literal: dict[str, Any] = {}
+    differs: dict[str, int] = {}
+    for path, value in values.items():
+        if isinstance(value, str) or (not np.ndim(value) and float(value) in STRUCTURAL):
+            literal[path] = value
+        elif np.ndim(value) == 2 and np.shape(value)[1] > 1:
+            numbers[path], differs[path] = np.ascontiguousarray(value, float).ravel(), POSITION
+        elif np.size(value) > 1:
+            numbers[path], differs[path] = np.ascontiguousarray(value, float).ravel(), SAMPLE
+        else:
+            numbers[path], differs[path] = np.array([float(np.ravel(value)[0])]), 0
+    one = time.ndim == 1 or len(time) == 1
+    numbers[TIME] = np.ascontiguousarray(time, float) if not one else np.ascontiguousarray(time, float).ravel()
+    differs[TIME] = POSITION if one else BOTH
+    return _Inputs(numbers, literal, differs)
+
+
+def _parts(shape: tuple[int, ...], threads: int) -> Iterator[tuple[tuple[int, int], tuple[int, int]]]:
+    """Samples and positions of the parts of a job: first one to judge by, then as even as may be."""
+    from trunnion.engines.machine_code import vector_width
+
+    samples, positions = shape
+    if samples > 1:
+        first = min(samples, max(1, PROBE // positions))
+        count = max(1, min(threads, (samples - first) * positions // ALONE))
+        edges = np.linspace(first, samples, count + 1).astype(int).tolist() if samples > first else [first]
+        yield (0, first), (0, positions)
+        yield from (((low, high), (0, positions)) for low, high in pairwise(edges))
+        return
+    count = max(1, min(threads, positions // max(ALONE, vector_width())))
+    edges = np.linspace(0, positions, count + 1).astype(int).tolist()
+    yield from (((0, 1), (low, high)) for low, high in pairwise(edges))

@@ -1,10 +1,10 @@
-"""The compiled kernel beside NumPy's: `python -m benchmarks.compiled`, on a CPU or, where JAX finds one, on a GPU.
+"""The compiled kernels beside NumPy's: `python -m benchmarks.compiled`, JAX on a CPU or, where it finds one, on a GPU.
 
-The four-bar of `examples/durango-fourbar.yaml` with three lengths that differ from sample to sample: its motion, and
-the drive effort with friction. Both kernels take turns in one process and the best of several rounds counts. NumPy
-runs in chunks on one core; JAX on as many threads as it is given. What the device is and how much of it is used is
-printed beside: the bytes that must be written at least and the operations that the program counts, against what a copy
-and a chain of products reach on the same device in the same run.
+Mechanisms with three numbers that differ from sample to sample: motion, and the drive effort with friction. All kernels
+take turns in one process and the best of several rounds counts. NumPy runs in chunks on one core; the machine code of
+LLVM on one and on all, JAX on all. What the device is and how much of it JAX uses is printed beside: the bytes that
+must be written at least and the operations that the program counts, against what a copy and a chain of products reach
+on the same device in the same run.
 """
 
 from __future__ import annotations
@@ -14,6 +14,8 @@ import os
 import platform
 import time
 from collections.abc import Callable
+from functools import partial
+from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -21,25 +23,29 @@ import numpy as np
 
 from trunnion import Mechanism
 from trunnion.cycle.positions import CHUNK
-from trunnion.measures.measures import named
-from trunnion.solve.run import prepare
+from trunnion.solve.run import Run, prepare
 from trunnion.solve.status import pose_status, status_of
 from trunnion.studies.tolerance.compiled import CompiledKernel
+from trunnion.studies.tolerance.compiled_jax import JaxKernel
+from trunnion.studies.tolerance.compiled_vectors import VectorKernel
 
-MODEL = Path(__file__).parents[1] / "examples" / "durango-fourbar.yaml"
-SIZES = (10**4, 10**5, 10**6, 4 * 10**6)
+EXAMPLES = Path(__file__).parents[1] / "examples"
+JOBS = (
+    ("durango-fourbar", False), ("durango-fourbar", True), ("watt-six-bar", True), ("toggle-press", True),
+    ("stephenson-six-bar", True), ("rccc", True), ("rssr", True),
+)  # fmt: skip
 POSITIONS = 360
-SPREAD = 1e-3
+SPREAD = 1e-4
 PROBE = 1 << 24  # numbers in the arrays that measure the device
 
 
-class Found(NamedTuple):
-    """Seconds of both kernels, the largest difference relative to the curve's peak, and the share computed again."""
+class Job(NamedTuple):
+    """Numbers of a mechanism over samples, and the times of one cycle."""
 
-    numpy: float
-    jax: float
-    apart: float
-    again: float
+    run: Run
+    forces: bool
+    values: dict[str, Any]
+    times: Any
 
 
 def best(run: Callable[[], Any], rounds: int) -> float:
@@ -67,35 +73,64 @@ def by_numpy(kernel: CompiledKernel, values: dict[str, Any], moments: Any, sampl
     return curves
 
 
-def job(forces: bool, samples: int, threads: int | None) -> tuple[CompiledKernel, dict[str, Any], Any]:
-    """The kernel, all numbers, and the times of one turn."""
-    mechanism = Mechanism.read(MODEL)
+def job(name: str, forces: bool, configurations: int) -> Job:
+    """A mechanism with three numbers that differ."""
+    mechanism = Mechanism.read(EXAMPLES / f"{name}.yaml")
     run = prepare(mechanism)
-    (measure,) = named(mechanism, ["effort:A" if forces else "angle:rocker"], run.values)
-    figure = (lambda back: back.efforts["A"]) if forces else (lambda back: measure.value(back.walk))
-    rng = np.random.default_rng(1)
-    varied = {
-        f"dimensions.{name}": run.values[f"dimensions.{name}"] * (1 + SPREAD * rng.standard_normal((samples, 1)))
-        for name in ("AB", "BC", "CD")
-    }
-    kernel = CompiledKernel(run, {measure.name: figure}, forces, threads=threads)
-    return kernel, mechanism.parameter_set.evaluate(varied), run.cycle.times(POSITIONS)
+    entries, rng = mechanism.parameter_set.entries, np.random.default_rng(1)
+    free = (
+        path for path, entry in entries.items()
+        if path.startswith(("dimensions.", "links.")) and not entry.depends and run.values.get(path)
+    )  # fmt: skip
+    shape = (max(1, configurations // POSITIONS), 1)
+    varied = {path: run.values[path] * (1 + SPREAD * rng.standard_normal(shape)) for path in islice(free, 3)}
+    return Job(run, forces, mechanism.parameter_set.evaluate(varied), run.cycle.times(POSITIONS))
 
 
-def measured(forces: bool, configurations: int, rounds: int, threads: int | None) -> Found:
-    """Both kernels on one job."""
-    samples = max(1, configurations // POSITIONS)
-    kernel, values, moments = job(forces, samples, threads)
-    curves, _ = kernel.curves(values, moments)  # compiled by now
-    again = kernel.again / (samples * POSITIONS)
-    expected = by_numpy(kernel, values, moments, samples)
-    apart = max(float(np.nanmax(np.abs(curves[n] - e)) / np.nanmax(np.abs(e))) for n, e in expected.items())
-    return Found(
-        best(lambda: by_numpy(kernel, values, moments, samples), rounds),
-        best(lambda: kernel.curves(values, moments), rounds),
-        apart,
-        again,
+def kernel_of(one: Job, engine: type[CompiledKernel], threads: int | None) -> CompiledKernel:
+    """A kernel that gives the angle of the last link, or the effort of the first driver."""
+    driver, link = next(iter(one.run.system.mechanism.drivers)), list(one.run.system.mechanism.effective_links)[-1]
+
+    def angle(back: Any) -> Any:
+        frame = back.walk.motions[link].frame
+        return np.arctan2(frame.s, frame.c)
+
+    return engine(
+        one.run, {"curve": (lambda back: back.efforts[driver]) if one.forces else angle}, one.forces, threads=threads
     )
+
+
+def measured(one: Job, rounds: int, threads: int | None) -> str:
+    """A row of the table: all kernels on one job, in turn."""
+    kernels = {
+        "compiled, one thread": kernel_of(one, VectorKernel, 1),
+        "compiled": kernel_of(one, VectorKernel, threads),
+        "jax": kernel_of(one, JaxKernel, threads),
+    }
+    samples = max(len(value) for value in one.values.values() if np.ndim(value))
+    count = samples * len(one.times)
+    start = time.perf_counter()
+    curves, _ = kernels["compiled"].curves(one.values, one.times)
+    first = time.perf_counter() - start
+    again = kernels["compiled"].again / count
+    some = max(1, min(samples, 200_000 // len(one.times)))  # as many as NumPy does in a second
+    part = {path: value[:some] if np.ndim(value) else value for path, value in one.values.items()}
+    expected = by_numpy(kernels["compiled"], part, one.times, some)["curve"]
+    apart = float(np.nanmax(np.abs(curves["curve"][:some] - expected)) / np.nanmax(np.abs(expected)))
+    calls: dict[str, Callable[[], Any]] = {
+        name: partial(kernel.curves, one.values, one.times) for name, kernel in kernels.items()
+    }
+    for call in calls.values():
+        call()
+    numpy = partial(by_numpy, kernels["compiled"], part, one.times, some)
+    least = dict.fromkeys(("numpy", *calls), np.inf)
+    for _ in range(rounds):
+        least["numpy"] = min(least["numpy"], best(numpy, 1) / (some * len(one.times)))
+        for name, call in calls.items():
+            least[name] = min(least[name], best(call, 1) / count)
+    told = " | ".join(f"{1e6 * seconds:.3f}" for seconds in least.values())
+    ratio = least["numpy"] / least["compiled, one thread"]
+    return f"{told} | {ratio:.1f} | {first:.2f} | {apart:.0e} | {again:.1%} |"
 
 
 def device(jax: Any, rounds: int) -> tuple[float, float]:
@@ -115,7 +150,7 @@ def device(jax: Any, rounds: int) -> tuple[float, float]:
     return bandwidth, 256 * PROBE / best(lambda: jax.block_until_ready(chain(numbers)), rounds)
 
 
-def operations(kernel: CompiledKernel, values: dict[str, Any], moments: Any) -> tuple[float, float]:
+def operations(kernel: JaxKernel, values: dict[str, Any], moments: Any) -> tuple[float, float]:
     """Floating-point operations and bytes of memory or cache for one configuration, as the compiler counts them."""
     arrays = {path: np.asarray(value) for path, value in values.items() if np.ndim(value)}
     cost = kernel.function(values).lower(arrays, moments).compile().cost_analysis()
@@ -136,35 +171,37 @@ def main() -> None:
 
     jax.config.update("jax_enable_x64", True)
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--rounds", type=int, default=3)
-    parser.add_argument("--threads", type=int, default=None, help="of JAX on a CPU; all cores if not given")
-    parser.add_argument("--sizes", type=int, nargs="*", default=SIZES, help="configurations")
+    parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--threads", type=int, default=None, help="all cores if not given")
+    parser.add_argument("--configurations", type=int, default=1_000_000)
     options = parser.parse_args()
     one = jax.devices()[0]
     print(f"{processor()}, {os.cpu_count()} cores; JAX {jax.__version__} on {one.platform}: {one.device_kind}")
     bandwidth, speed = device(jax, options.rounds)
     print(f"the device copies {bandwidth / 1e9:.1f} GB/s and computes {speed / 1e9:.1f} GFLOP/s (float64)\n")
-    print("| job | configurations | NumPy, M/s | JAX, M/s | ratio | apart | again |")
-    print("| --- | --- | --- | --- | --- | --- | --- |")
-    for forces in (False, True):
-        name = "drive effort with friction" if forces else "motion"
-        found = None
-        for size in options.sizes:
-            found = measured(forces, size, options.rounds, options.threads)
-            print(
-                f"| {name} | {size:.0e} | {size / found.numpy / 1e6:.2f} | {size / found.jax / 1e6:.2f}"
-                f" | {found.numpy / found.jax:.2f} | {found.apart:.0e} | {found.again:.1%} |"
-            )
-        if found is not None:
-            kernel, values, moments = job(forces, 64, options.threads)
-            flops, touched = operations(kernel, values, moments)
-            rate = options.sizes[-1] / found.jax
-            written = 8 * len(kernel.figures) + 2  # curves, status, and whether it is to be computed again
-            print(
-                f"\n{name}: {flops:.0f} operations a configuration, {flops * rate / speed:.0%} of the device's"
-                f" arithmetic; {written} bytes that must be written, {written * rate / bandwidth:.1%} of its bandwidth;"
-                f" {touched:.0f} bytes between loops, {touched * rate / bandwidth:.0%} of it if none were in cache\n"
-            )
+    print(
+        "Microseconds a configuration; ratio of NumPy to compiled, one thread each; first call, s; largest difference"
+    )
+    print("from NumPy, of the peak; share that NumPy decides.\n")
+    print("| job | NumPy | compiled, one thread | compiled | JAX | ratio | first | difference | NumPy decides |")
+    print("| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |")
+    for name, forces in JOBS:
+        of = job(name, forces, options.configurations)
+        print(
+            f"| {name}, {'friction' if forces else 'motion'} | {measured(of, options.rounds, options.threads)}",
+            flush=True,
+        )
+    of = job("durango-fourbar", True, 64 * POSITIONS)
+    kernel = kernel_of(of, JaxKernel, options.threads)
+    assert isinstance(kernel, JaxKernel)
+    flops, touched = operations(kernel, of.values, of.times)
+    seconds = best(lambda: kernel.curves(of.values, of.times), options.rounds)
+    rate = 64 * POSITIONS / seconds
+    print(
+        f"\nJAX, friction of the four-bar: {flops:.0f} operations a configuration, {flops * rate / speed:.0%} of the"
+        f" device's arithmetic; {touched:.0f} bytes between loops, {touched * rate / bandwidth:.0%} of its bandwidth if"
+        " none were in cache"
+    )
 
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import trunnion
+import trunnion.studies.tolerance.kernel
 from mechanisms import DURANGO, eccentric_press
 from trunnion import Mechanism, MechanismError
 from trunnion.algebra.dual import derivative, seed
@@ -239,3 +240,39 @@ def test_compiled_functions_are_kept_between_runs(tmp_path: Path) -> None:
     kernel.curves(values, time)
     assert kernel.function(values) is kernel.function(values)
     assert cache_directory("jax").parts[-2:] == ("trunnion", "jax")
+
+
+def toleranced(engine: str, **options: Any) -> Any:
+    model = trunnion.read(EXAMPLES / "toleranced-fourbar.yaml")
+    return trunnion.tolerance(model, methods=["monte-carlo"], steps=36, engine=engine, jobs=1, **options)
+
+
+def test_a_whole_study_by_the_compiled_engine() -> None:
+    """The same random numbers, the same moments and counts."""
+    numpy, found = (toleranced(engine, samples=700) for engine in ("numpy", "compiled"))
+    assert found.attrs["engine"] == "compiled"
+    for name, variable in numpy.data_vars.items():
+        if variable.dtype.kind == "f":
+            scale = np.nanmax(np.abs(variable.values), initial=0.0)
+            np.testing.assert_allclose(found[name], variable, rtol=1e-7, atol=1e-9 * scale, err_msg=name)
+        else:
+            assert np.array_equal(found[name], variable), name
+
+
+def test_the_engine_is_chosen_by_size(monkeypatch: pytest.MonkeyPatch) -> None:
+    kernel = trunnion.studies.tolerance.kernel
+    assert toleranced("auto", samples=200).attrs["engine"] == "numpy"
+    monkeypatch.setattr(kernel, "WORTH_COMPILING", 7_000)
+    assert toleranced("auto", samples=200).attrs["engine"] == "compiled"
+    monkeypatch.setattr(kernel, "find_spec", lambda name: None)
+    assert toleranced("auto", samples=200).attrs["engine"] == "numpy"
+
+
+def test_auto_leaves_to_numpy_what_only_numpy_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(trunnion.studies.tolerance.kernel, "WORTH_COMPILING", 1)
+    data = trunnion.read(EXAMPLES / "toleranced-fourbar.yaml").data()
+    data["joint_defaults"]["friction"] = {"law": "dahl", "coefficient": 0.12, "stiffness": 4e3}
+    found = trunnion.tolerance(
+        Mechanism.model_validate(data), ["effort:A"], methods=["monte-carlo"], samples=20, steps=12, engine="auto"
+    )
+    assert found.attrs["engine"] == "numpy"

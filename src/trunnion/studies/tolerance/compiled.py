@@ -79,6 +79,10 @@ class CompiledKernel(ABC):
         """Load the engine; MechanismError if it is not installed."""
 
     @abstractmethod
+    def check(self, values: Values) -> None:
+        """MechanismError if this mechanism cannot be compiled, found without compiling it."""
+
+    @abstractmethod
     def fill(self, values: Values, time: Array, found: Lanes) -> None:
         """Compute all lanes, (sample, position), into arrays. time: (position,) or (sample, position)."""
 

@@ -38,6 +38,11 @@ class JaxKernel(CompiledKernel):
         """Where it runs: cpu, gpu or tpu."""
         return str(self._jax.default_backend())
 
+    def check(self, values: Values) -> None:
+        """See `CompiledKernel.check`."""
+        with self._wide():
+            self._jax.eval_shape(self.pure(dict(values)), {}, np.zeros(1))
+
     def fill(self, values: Values, time: Array, found: Lanes) -> None:
         """All lanes, a batch of samples at a time."""
         arrays = {path: np.asarray(value, float) for path, value in values.items() if np.ndim(value)}

@@ -15,6 +15,7 @@ from trunnion.solve.system import Values
 from trunnion.studies.tolerance.compiled import Array, CompiledKernel, Lanes
 
 if TYPE_CHECKING:
+    from trunnion.engines.graph import Graph
     from trunnion.engines.machine_code import MachineCode
 
 __all__ = ["VectorKernel"]
@@ -52,6 +53,10 @@ class VectorKernel(CompiledKernel):
             raise MechanismError(Finding(what, "engine", remedy)) from None
         self._programs: dict[tuple[Any, ...], MachineCode] = {}
 
+    def check(self, values: Values) -> None:
+        """See `CompiledKernel.check`."""
+        self._recorded(_inputs(values, np.zeros(1)))
+
     def fill(self, values: Values, time: Array, found: Lanes) -> None:
         """All lanes, a part of the samples or positions in each thread."""
         from trunnion.engines.machine_code import vector_width
@@ -70,8 +75,8 @@ class VectorKernel(CompiledKernel):
             into[:] = came[0, : samples * positions].reshape(samples, positions)
 
     def _filled(self, values: Values, time: Array, found: Lanes) -> None:
-        inputs = _inputs(values, time, found.status.shape)
-        program, arrays = self.program(inputs, values, time), _arrays(found)
+        inputs = _inputs(values, time)
+        program, arrays = self.program(inputs), _arrays(found)
         with ThreadPoolExecutor(self.threads) as pool:
             first, *rest = _parts(found.status.shape, self.threads)
             program.run(inputs.numbers, arrays, *first)
@@ -81,18 +86,19 @@ class VectorKernel(CompiledKernel):
                 return
             list(pool.map(lambda part: program.run(inputs.numbers, arrays, *part), rest))
 
-    def program(self, inputs: _Inputs, values: Values, time: Array) -> MachineCode:
+    def program(self, inputs: _Inputs) -> MachineCode:
         """The machine code for numbers of this structure."""
-        key = inputs.structure
-        if key not in self._programs:
-            self._programs[key] = self._recorded(inputs)
-        return self._programs[key]
-
-    def _recorded(self, inputs: _Inputs) -> MachineCode:
-        """Run the walk once on numbers that write down what is done with them, and compile that."""
-        from trunnion.engines.graph import Graph
         from trunnion.engines.machine_code import MachineCode, vector_width
         from trunnion.engines.program import program
+
+        key = inputs.structure
+        if key not in self._programs:
+            self._programs[key] = MachineCode(program(*self._recorded(inputs), vector_width()))
+        return self._programs[key]
+
+    def _recorded(self, inputs: _Inputs) -> tuple[Graph, list[int]]:
+        """Run the walk once on numbers that write down what is done with them: figures, status, doubt."""
+        from trunnion.engines.graph import Graph
         from trunnion.engines.recorded import Recorded, number_of
 
         graph = Graph()
@@ -105,7 +111,7 @@ class VectorKernel(CompiledKernel):
         for curve in curves:
             doubtful = graph.apply("or", doubtful, graph.apply("not", graph.apply("finite", curve)))
         status = graph.node("byte", (graph.as_float(number_of(graph, found.status)),))
-        return MachineCode(program(graph, [*curves, status, doubtful], vector_width()))
+        return graph, [*curves, status, doubtful]
 
 
 # ---- lanes in arrays ------------------------------------------------------------------------------------------
@@ -127,8 +133,8 @@ def _of_lanes(value: Any, samples: NDArray[np.intp]) -> Any:
     return flat[samples][None, :] if len(flat) > 1 else float(flat[0])
 
 
-def _inputs(values: Values, time: Array, shape: tuple[int, ...]) -> _Inputs:
-    """What a program for lanes of this shape is given."""
+def _inputs(values: Values, time: Array) -> _Inputs:
+    """What a program is given."""
     from trunnion.engines.graph import BOTH, POSITION, SAMPLE
 
     numbers: dict[str, Array] = {}

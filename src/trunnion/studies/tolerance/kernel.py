@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -25,10 +26,11 @@ from trunnion.studies.tolerance.inputs import Inputs
 if TYPE_CHECKING:
     from trunnion.studies.tolerance.compiled import CompiledKernel
 
-__all__ = ["Kernel", "batch_of", "kernel_of", "references"]
+__all__ = ["Kernel", "batch_of", "engine_for", "kernel_of", "references"]
 
 
 AT_ONCE = {"numpy": 10_000, "compiled": 1 << 20, "jax": 1 << 20}  # numbers in an array, by engine
+WORTH_COMPILING = 500_000  # configurations; NumPy does as many in the time that compiling takes at most
 
 
 class Kernel(Protocol):
@@ -70,6 +72,10 @@ class OtherKernel:
         figures = {name: figure(*part) for name, part in self._parts.items()}
         return made(self.numpy.run, figures, self.numpy.forces, self.numpy.method)
 
+    def check(self, values: Mapping[str, Number]) -> None:
+        """MechanismError for a mechanism that only NumPy takes."""
+        self._compiled.check(values)
+
     def courses(self, values: Mapping[str, Number], time: Number) -> tuple[Courses, NDArray[np.int8]]:
         """As `NumpyKernel.courses`, of plain numbers."""
         curves, status = self._compiled.curves(values, np.asarray(time, float))
@@ -77,6 +83,19 @@ class OtherKernel:
         for name, (measure, _) in self._parts.items():
             found[measure.name] += (where_known(known(measure, status), curves[name]),)
         return found, status
+
+
+def engine_for(engine: str, numpy: NumpyKernel, values: Mapping[str, Number], configurations: int) -> str:
+    """The engine by its name; of auto the compiled one where it is installed, pays, and can take the mechanism."""
+    if engine != "auto":
+        return engine
+    if configurations < WORTH_COMPILING or find_spec("llvmlite") is None:
+        return "numpy"
+    try:
+        OtherKernel(numpy, "compiled").check(values)
+    except MechanismError:
+        return "numpy"
+    return "compiled"
 
 
 def batch_of(engine: str, positions: int) -> int:

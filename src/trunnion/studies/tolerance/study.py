@@ -23,12 +23,13 @@ if TYPE_CHECKING:
     import xarray as xr
 
 from trunnion.studies.tolerance.first_order import FEW, study
+from trunnion.studies.tolerance.kernel import engine_for
 from trunnion.studies.tolerance.outcome import Outcome
 from trunnion.studies.tolerance.result import dataset
 
 __all__ = ["DEFAULT_METHODS", "METHODS", "tolerance"]
 
-ENGINES = ("numpy", "compiled", "jax")
+ENGINES = ("numpy", "compiled", "jax", "auto")
 METHODS = ("linear", "worst-case", *SAMPLINGS, "sobol")
 DEFAULT_METHODS = ("linear", "worst-case", "monte-carlo")
 DEFAULT_SAMPLES = 10_000
@@ -64,8 +65,9 @@ def tolerance(
     a whole cycle; at: the place (driver coordinate or time) of measures that state neither a place nor a figure.
     friction_method: how friction and reactions are settled; Newton's method if not given.
     jobs: processes, one a core if not given and worth it; chunk, cluster, checkpoint, resume, progress: `runner.run`.
-    engine: numpy, compiled or jax (extras). target: the yield that is asked for; limits are missed below it, and if
-    none is given where a worst case, a yield below 1 or a C_pk below 1 breaks them: errors among the findings.
+    engine: numpy, compiled or jax (extras), or auto: compiled where it pays. target: the yield that is asked for;
+    limits are missed below it, and if none is given where a worst case, a yield below 1 or a C_pk below 1 breaks them:
+    errors among the findings.
     Returns a Dataset over (measure, parameter, position, …) of `result.VARIABLES`; SI, each measure in its own unit.
     Method: exact first derivatives by dual numbers; the worst corner of the tolerances found on the mechanism itself;
     Monte Carlo or scrambled Sobol points through the whole analysis; Sobol' indices. Samples that have no answer are
@@ -82,6 +84,8 @@ def tolerance(
     stopped = False
     method = next((one for one in methods if one in SAMPLINGS), None)
     if method is not None:
+        many = samples * len(found.plan.times)
+        engine = "numpy" if engine == "auto" and cluster else engine_for(engine, found.kernel, found.run.values, many)
         job = found.sampling(method, samples, seed, engine)
         alone = job.samples * job.positions < FEW and cluster is None
         jobs = 1 if jobs is None and (alone or engine != "numpy") else jobs

@@ -276,4 +276,42 @@ _MEASURES = (
     ),
 )
 
-FAULTS = (*_ALGEBRA, *_JOINTS, *_GROUPS, *_SOLVE, *_CYCLE, *_MEASURES)
+_ENGINES = (
+    Fault(
+        "negative-difference-not-turned",
+        "engines/graph.py",
+        'self.apply("sub", *inner.args[::-1])',
+        'self.apply("sub", *inner.args)',
+        ("tests/reference/test_engines.py",),
+    ),
+    Fault(
+        "angle-beyond-a-quarter",
+        "engines/lanes.py",
+        "quarter = self._minus(math.pi / 4, self.neg(small), HALF_PI[1] / 2)",
+        "quarter = self._minus(math.pi / 4, small, HALF_PI[1] / 2)",
+        ("tests/reference/test_engines.py",),
+    ),
+    Fault(
+        "doubt-dropped",
+        "studies/tolerance/compiled.py",
+        "doubtful = doubtful | np.logical_not(settled.certain)",
+        "doubtful = doubtful | False",
+        ("tests/reference/test_compiled.py",),
+    ),
+    Fault(
+        "code-of-others-trusted",
+        "engines/machine_code.py",
+        "and not told.st_mode & (stat.S_IWGRP | stat.S_IWOTH)",
+        "and bool(told.st_mode)",
+        ("tests/reference/test_engines.py",),
+    ),
+    Fault(
+        "component-against-the-edges",
+        "structure/graph.py",
+        "before[other].append(node)",
+        "before[node].append(other)",
+        ("tests/invariants/test_graph.py",),
+    ),
+)
+
+FAULTS = (*_ALGEBRA, *_JOINTS, *_GROUPS, *_ENGINES, *_SOLVE, *_CYCLE, *_MEASURES)

@@ -171,7 +171,27 @@ def test_bristles_are_left_to_numpy(engine: type[CompiledKernel]) -> None:
         engine(run, {})
 
 
-@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("example", "coefficient"), [("slider-crank", 0.8), ("slider-crank", 2.0), ("toggle-press", 2.0)]
+)
+def test_friction_without_proof_of_one_solution_is_numpys(
+    engine: type[CompiledKernel], example: str, coefficient: float
+) -> None:
+    """Where friction may lock, no fixed number of rounds decides."""
+    model = trunnion.read(EXAMPLES / f"{example}.yaml")
+    paths = [path for path in model.parameter_set.entries if path.endswith("friction.coefficient")]
+    run = prepare(model.with_values(dict.fromkeys(paths, coefficient)))
+    driver = next(iter(model.drivers))
+    read_off = figures(run, f"effort:{driver}")
+    values, time = varied(run, *free(run)[:2], spread=1e-4), run.cycle.times(36)
+    kernel = engine(run, read_off)
+    curves, status = kernel.curves(values, time)
+    expected, expected_status = by_numpy(run, values, time, read_off)
+    assert kernel.again > 0
+    np.testing.assert_array_equal(status, expected_status)
+    agree(curves, expected)
+
+
 def test_failures_are_those_of_numpy(engine: type[CompiledKernel]) -> None:
     """Lengths so far off that some samples do not assemble and others come near to a dead centre."""
     run = prepare(trunnion.read(DURANGO))

@@ -292,10 +292,10 @@ _ENGINES = (
         ("tests/reference/test_engines.py",),
     ),
     Fault(
-        "doubt-dropped",
+        "doubtful-lane-of-another-sample",
         "studies/tolerance/compiled.py",
-        "doubtful = doubtful | np.logical_not(settled.certain)",
-        "doubtful = doubtful | False",
+        "return flat[rows] if len(flat) > 1",
+        "return flat[0 * rows] if len(flat) > 1",
         ("tests/reference/test_compiled.py",),
     ),
     Fault(

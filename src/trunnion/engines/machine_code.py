@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import hashlib
 import os
+import platform
 import stat
 import tempfile
 from collections.abc import Mapping, Sequence
@@ -92,7 +93,8 @@ def _machine() -> Any:
     name, features = _target()
     target = llvm.Target.from_default_triple()
     # with the small code model, code that is loaded far from the tables it reads ends the process
-    return target.create_target_machine(cpu=name, features=features, opt=2, reloc="pic", codemodel="large")
+    model = "large" if platform.machine().lower() in ("x86_64", "amd64") else "jitdefault"
+    return target.create_target_machine(cpu=name, features=features, opt=2, reloc="pic", codemodel=model)
 
 
 def _compiled(text: str) -> bytes:

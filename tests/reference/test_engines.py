@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from benchmarks.engines import compared
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -268,6 +269,14 @@ def test_angles_beyond_the_range_are_left_to_numpy() -> None:
     assert kernel.again == 8
     assert np.array_equal(curves["effort"][0], run.solve(turns, run.values).efforts["A"])
     assert np.all(status < trunnion.Status.NOT_CONVERGED)
+
+
+@pytest.mark.spread(2)
+@pytest.mark.parametrize("seed", range(30, 50))
+def test_random_mechanisms(seed: int) -> None:
+    """Every fourth in space: efforts and reactions to 1e-9 of their peak, the same statuses."""
+    found = compared("planar" if seed % 4 else "spatial", seed)
+    assert found.refused or found.agrees
 
 
 # ---- what is kept on disk -------------------------------------------------------------------------------------

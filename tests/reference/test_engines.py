@@ -273,9 +273,16 @@ def test_angles_beyond_the_range_are_left_to_numpy() -> None:
 
 @pytest.mark.spread(2)
 @pytest.mark.parametrize("seed", range(30, 50))
-def test_random_mechanisms(seed: int) -> None:
-    """Every fourth in space: efforts and reactions to 1e-9 of their peak, the same statuses."""
-    found = compared("planar" if seed % 4 else "spatial", seed)
+def test_random_planar_mechanisms(seed: int) -> None:
+    """Efforts and reactions to 1e-9 of their peak, the same statuses."""
+    found = compared("planar", seed)
+    assert found.refused or found.agrees
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(30, 36))
+def test_random_spatial_mechanisms(seed: int) -> None:
+    found = compared("spatial", seed)
     assert found.refused or found.agrees
 
 

@@ -12,10 +12,9 @@ from trunnion.cycle import contact_loss, diagnosis, near_locking
 from trunnion.cycle.deviations import error_figures
 from trunnion.cycle.means import Means
 from trunnion.cycle.scene import DRAWN
-from trunnion.errors import Finding, Severity, Status
+from trunnion.errors import Finding, Status
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.joints.pairs import PAIRS
-from trunnion.model.checks.check import check_model
 from trunnion.model.contact import clearance
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.quantity import Quantity
@@ -120,7 +119,7 @@ def spring_units(system: System) -> list[list[str]]:
 
 def model_notes(mechanism: Mechanism, system: System) -> list[Finding]:
     """What the model says that this analysis leaves out, and warnings about the data."""
-    notes = [finding for finding in check_model(mechanism) if finding.severity is not Severity.ERROR]
+    notes = list(mechanism.checked)
     values = mechanism.parameters()
     playing = [
         name

@@ -83,10 +83,15 @@ class Mechanism(Numbers):
             sections = {one.alias or name for name, one in type(self).model_fields.items()}
             if lost & sections:  # a whole section: the rest would speak of nothing else
                 raise MechanismError(findings) from None
-        found = check_model(self, lost)
+        found = self.__dict__["checked"] = check_model(self, lost)
         findings += [finding for finding in found if finding.severity is Severity.ERROR]
         if findings:
             raise MechanismError(findings)
+
+    @cached_property
+    def checked(self) -> list[Finding]:
+        """What the checks have found; of a mechanism that exists warnings and notes."""
+        return check_model(self)
 
     @classmethod
     def model_validate(cls, obj: Any, **options: Any) -> Self:

@@ -149,12 +149,12 @@ def test_a_file_in_disorder_is_told_briefly(tmp_path: Path) -> None:
 
 
 def test_a_large_file_is_refused_quickly_with_the_limit(tmp_path: Path) -> None:
-    started = time.perf_counter()
+    started = time.process_time()
     (finding,) = refused(tmp_path, "".join(f"{k},{k}\n" for k in range(10**6)))
     assert "has 13.8 MB, a table at most 1.0 MB" in finding
     (finding,) = refused(tmp_path, "".join(f"{k},{k}\n" for k in range(MAX_ROWS + 2)))
     assert f"has {MAX_ROWS + 2} rows, a table at most {MAX_ROWS}" in finding
-    assert time.perf_counter() - started < 3
+    assert time.process_time() - started < 3
 
 
 def test_what_is_no_text_or_not_there(tmp_path: Path) -> None:

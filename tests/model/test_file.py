@@ -116,9 +116,9 @@ BAD_FILES = [
 def test_files_that_are_no_model(
     findings_of: FindingsOf, content: str | bytes, line: int | None, what: str, remedy: str
 ) -> None:
-    started = time.perf_counter()
+    started = time.process_time()
     found = findings_of(content)
-    assert time.perf_counter() - started < 3
+    assert time.process_time() - started < 3
     fitting = [one for one in found if what in one.what and remedy in one.remedy]
     assert fitting, "\n".join(map(str, found))
     assert line is None or fitting[0].line == line
@@ -181,10 +181,10 @@ def test_a_huge_file_is_refused_at_once(tmp_path: Path) -> None:
     path = tmp_path / "huge.yaml"
     with path.open("wb") as stream:
         stream.truncate(50_000_000)
-    started = time.perf_counter()
+    started = time.process_time()
     with pytest.raises(MechanismError, match=r"has 50\.0 MB, a model file at most 1\.0 MB"):
         read_mechanism(path)
-    assert time.perf_counter() - started < 0.5
+    assert time.process_time() - started < 0.5
 
 
 def test_writing_fails_whole(tmp_path: Path) -> None:

@@ -210,7 +210,7 @@ def test_thousands_of_rows_are_fast() -> None:
     rng = np.random.default_rng(3)
     effect = rng.normal(size=(20_000, 15)) * (1 + 0.2 * rng.normal(size=(20_000, 1)))
     for criterion in ("worst-case", "rss", "yield"):
-        began = time.perf_counter()
+        began = time.process_time()
         answer: Answer = solve(AllocationProblem(bought(random_costs(rng, 15), most=1.0), rows(effect, 0.2), criterion))
         assert answer.proven
-        assert time.perf_counter() - began < 10
+        assert time.process_time() - began < 10

@@ -215,7 +215,7 @@ verb(play)
 @verb
 def plot(
     file: File,
-    out: Annotated[Path, typer.Option("--out", help="Folder, or a .png, .svg or .pdf file of one plot.")],
+    out: Annotated[Path, typer.Option("--out", help="Folder, or a .png .svg .pdf .jpg file of one plot.")],
     kind: Kinds = None,
     steps: Steps = 360,
     set_: Set = None,

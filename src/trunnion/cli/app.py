@@ -222,7 +222,7 @@ def plot(
     table: TableFile = None,
     friction: FrictionLaw = None,
     seat: Seats = None,
-    image: Annotated[str, typer.Option("--format", help="png, svg or pdf, for a folder of plots.")] = "png",
+    image: Annotated[str, typer.Option("--format", help="png, svg, pdf or jpg, for a folder of plots.")] = "png",
     uncut: Uncut = False,
 ) -> None:
     """Plot a cycle: torque, friction power, reactions, mechanism."""

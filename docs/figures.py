@@ -55,15 +55,14 @@ def drawn(pages: Iterable[str], gallery: Any) -> Iterator[tuple[str, bytes]]:
     for verbs, name, _ in sorted(found for found in told if found[0] in COMMANDS):
         yield f"figures/{verbs}/{name}.svg", by_command(verbs.removesuffix("s"), name, text, models)
     told = {found for found in told if found[0] not in COMMANDS}
-    wanted = told | gallery.wanted()
-    for model in sorted({name for name, _, _ in wanted}):
-        base, values = _base_of(model, models)
-        files = sorted(f"{kind}.{suffix}" for name, kind, suffix in wanted if name == model)
-        steps = STEPS if any(name == model for name, _, _ in told) else gallery.STEPS
-        key = (models[base], values, steps)
-        made: Callable[[], dict[str, bytes]] = _Drawing(base, models[base], values, steps, files, gallery).files
-        for file in files:
-            yield f"figures/{model}/{file}", kept((*key, file), lambda made=made, file=file: made()[file])
+    for steps, some in ((STEPS, told), (gallery.STEPS, gallery.wanted() - told)):
+        for model in sorted({name for name, _, _ in some}):
+            base, values = _base_of(model, models)
+            files = sorted(f"{kind}.{suffix}" for name, kind, suffix in some if name == model)
+            made: Callable[[], dict[str, bytes]] = _Drawing(base, models[base], values, steps, files, gallery).files
+            for file in files:
+                content = kept((models[base], values, steps, file), lambda made=made, file=file: made()[file])
+                yield f"figures/{model}/{file}", content
 
 
 def models_of(pages: Iterable[str]) -> dict[str, str]:
@@ -143,16 +142,24 @@ class _Drawing:
             mechanism = read(file)
         mechanism = mechanism.with_values(self.values) if self.values else mechanism
 
+        shared = self.steps == self.gallery.STEPS and not self.values
+        # only these show means over the cycle, which ask for most positions
+        result_of = analyse if {"report.html", "friction-power.svg"} & {*self.wanted} else self.gallery.brief
+
         @cache
         def real() -> Any:
-            shared = self.steps == self.gallery.STEPS and not self.values
-            return self.gallery.result(self.base) if shared else analyse(mechanism, self.steps)
+            if shared and result_of is self.gallery.brief:
+                return self.gallery.shown(self.base)
+            return result_of(mechanism, self.steps)
 
         @cache
         def ideal() -> Any:
-            return analyse(mechanism.with_friction("off"), self.steps)
+            return result_of(mechanism.with_friction("off"), self.steps)
 
-        special = {"assemblies": lambda: ways(mechanism), "assemble": lambda: fit.figure(assemble(mechanism))}
+        special = {
+            "assemblies": lambda: ways(mechanism),
+            "assemble": lambda: fit.figure(assemble(mechanism, self.steps)),
+        }
         contents = {}
         for name in self.wanted:
             kind, path = Path(name).stem, folder / name

@@ -216,14 +216,14 @@ verb(play)
 @verb
 def plot(
     file: File,
-    out: Annotated[Path, typer.Option("--out", help="Folder, or a .png, .svg or .pdf file of one plot.")],
+    out: Annotated[Path, typer.Option("--out", help="Folder, or a .png .svg .pdf .jpg file of one plot.")],
     kind: Kinds = None,
     steps: Steps = 360,
     set_: Set = None,
     table: TableFile = None,
     friction: FrictionLaw = None,
     seat: Seats = None,
-    image: Annotated[str, typer.Option("--format", help="png, svg or pdf, for a folder of plots.")] = "png",
+    image: Annotated[str, typer.Option("--format", help="png, svg, pdf or jpg, for a folder of plots.")] = "png",
     uncut: Uncut = False,
 ) -> None:
     """Plot a cycle: torque, friction power, reactions, mechanism."""

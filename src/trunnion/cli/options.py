@@ -101,10 +101,12 @@ Report = Annotated[
 ]
 Out = Annotated[
     list[Path] | None,
-    typer.Option("--out", help="Write it: .csv .json .nc .zarr .parquet, or a figure: .png .svg .pdf. Repeatable."),
+    typer.Option(
+        "--out", help="Write tables: .csv .xlsx .json .nc .zarr .parquet; figures: .png .svg .pdf .jpg. Repeatable."
+    ),
 ]
 Data = Annotated[
-    list[Path] | None, typer.Option("--out", help="Write the result: .csv .json .nc .zarr .parquet. Repeatable.")
+    list[Path] | None, typer.Option("--out", help="Write the result: .csv .xlsx .json .nc .zarr .parquet. Repeatable.")
 ]
 Uncut = Annotated[
     bool, typer.Option("--uncut", help="Show peaks near dead centres in full; default: cut at the frame.")

@@ -66,7 +66,7 @@ Family = Annotated[
 ]
 Kind = Annotated[str, typer.Option("--kind", help="curves, or map: contours over two swept values.")]
 Margin = Annotated[bool, typer.Option("--margin", help="Compute the locking margin too; takes many times as long.")]
-Picture = Annotated[str, typer.Option("--format", help="png, svg or pdf, for a folder of figures.")]
+Picture = Annotated[str, typer.Option("--format", help="png, svg, pdf or jpg, for a folder of figures.")]
 
 
 def sweep(

@@ -107,7 +107,8 @@ def _parts(axes: Axes, result: xr.Dataset, over: Abscissa) -> None:
         if np.nanmax(parts[i], initial=0.0) > 100 * TOLD:
             look: dict[str, Any] = style_of(i)
             curve(axes, over, parts[i], joint, **look)
-    axes.set_ylim(0, 105)
+    most = float(np.nanmax(parts, initial=0.0))
+    axes.set_ylim(0, min(105.0, 1.1 * most) if most > 0 else 105.0)
     legend(axes)
 
 

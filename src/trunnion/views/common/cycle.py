@@ -22,6 +22,7 @@ __all__ = [
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
+ROUNDING = 1e-9  # of the largest value of the abscissa: what is nearer to zero is zero
 TEXTS = {int(status): status.text for status in Status}
 
 
@@ -47,6 +48,8 @@ class Abscissa:
     def say(self, index: int) -> str:
         """The place of a position in words: "132°", "12.5 mm"."""
         value = float(self.values[index])
+        if abs(value) < ROUNDING * float(np.abs(self.values).max(initial=0.0)):
+            value = 0.0
         return f"{value:.4g}{'' if self.unit in ('°', '') else ' '}{self.unit}".replace("-", "−")
 
 

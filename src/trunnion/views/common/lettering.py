@@ -29,11 +29,25 @@ OTHERS = (
 class Sheet(Figure):
     """A figure whose texts find their signs in whichever of the installed fonts has them."""
 
+    _lettered = False  # since the last drawing
+
     def draw(self, renderer: RendererBase) -> None:
-        """Give every text the fonts, then draw."""
-        for text in self.findobj(Text):
-            text.set_fontfamily(list(families()))
-        super().draw(renderer)
+        """Give every text the fonts, then draw.
+
+        Matplotlib draws a figure that has a layout twice, the first time with the renderer's methods replaced by
+        empty ones. That pass only has to arrange the figure; all its paths would be prepared for nothing.
+        """
+        if not self._lettered:
+            for text in self.findobj(Text):
+                text.set_fontfamily(list(families()))
+        engine = self.get_layout_engine()
+        self._lettered = engine is not None and "draw_path" in vars(renderer)
+        if self._lettered and engine is not None:
+            engine.execute(self)
+            for axes in self.axes:
+                axes.apply_aspect()
+        else:
+            super().draw(renderer)
 
     def _repr_png_(self) -> bytes:
         """What a notebook shows; matplotlib tells it only of figures that pyplot has made."""

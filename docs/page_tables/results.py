@@ -1,0 +1,165 @@
+"""Tables of what results hold: variables, statuses, codes of findings, plots, formats."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Mapping
+from typing import Any
+
+from page_tables.cells import code, rows_of, unit
+
+PARTS = {"": "", "seats": "with a seat", "errors": "with an error"}
+
+
+def results_table() -> str:
+    """Every variable of a result, in the plane and in space: one row where it is the same in both."""
+    from trunnion.results.variables import variables
+
+    plane, space = variables("planar"), variables("spatial")
+    rows: list[tuple[object, ...]] = []
+    for name in _in_order(list(plane), list(space)):
+        forms = [(where, known[name]) for where, known in (("plane", plane), ("space", space)) if name in known]
+        if len(forms) == 2 and forms[0][1] == forms[1][1]:
+            forms = [("", forms[0][1])]
+        for where, one in forms:
+            there = ", ".join(word for word in (where, PARTS[one.part]) if word)
+            rows.append((code(name), there, ", ".join((*one.dims, "position")), unit(one.units), one.long_name))
+    rows.append((code("efficiency"), "", "", "1", "useful work over drive work of the cycle"))
+    rows.append((code("efficiency_ideal"), PARTS["errors"], "", "1", "efficiency of the mechanism without errors"))
+    return rows_of(("variable", "only in", "dimensions", "unit", "meaning"), rows)
+
+
+def _in_order(first: list[str], second: list[str]) -> list[str]:
+    """The names of both lists, those of the second alone behind the one they follow there."""
+    merged = list(first)
+    for before, name in zip([None, *second], second, strict=False):
+        if name not in merged:
+            merged.insert(merged.index(before) + 1 if before else 0, name)
+    return merged
+
+
+def sweeps_table() -> str:
+    """Every figure of a sweep."""
+    from trunnion.studies.sweep.study import FIGURES
+
+    rows = [(code(name), ", ".join(one.dims), unit(one.units), one.long_name) for name, one in FIGURES.items()]
+    return rows_of(("variable", "dimension before the swept ones", "unit", "meaning"), rows)
+
+
+def plays_table() -> str:
+    """Every variable of the play of joints."""
+    from trunnion.studies.play.result import VARIABLES
+
+    rows = [
+        (code(name), ", ".join(one.dims), unit(one.units) if one.units else "of the measure", one.long_name)
+        for name, one in VARIABLES.items()
+    ]
+    return rows_of(("variable", "dimension", "unit", "meaning"), rows)
+
+
+def tolerances_table() -> str:
+    """Every variable of a tolerance analysis."""
+    from trunnion.studies.tolerance.result import VARIABLES
+
+    return _toleranced(VARIABLES)
+
+
+def identification_table() -> str:
+    """Every variable of an identification."""
+    from trunnion.rig.identification.result import VARIABLES
+
+    rows = [(code(name), ", ".join(one.dims), unit(one.units), one.long_name) for name, one in VARIABLES.items()]
+    return rows_of(("variable", "dimension", "unit", "meaning"), rows)
+
+
+def allocations_table() -> str:
+    """Every variable of an allocation beside those of the tolerance analysis."""
+    from trunnion.studies.allocation.result import VARIABLES
+
+    return _toleranced(VARIABLES)
+
+
+def _toleranced(variables: Mapping[str, Any]) -> str:
+    told = {
+        "": "of the measure", "parameter": "of the parameter", "ratio": "one by the other", "drive": "deg, mm, s",
+        "1/": "1 by that of the measure", "course": "of the course", "course ratio": "course by parameter",
+    }  # fmt: skip
+    rows = [
+        (
+            code(name),
+            ", ".join(one.dims),
+            "" if name == "choice" else told.get(one.units) or unit(one.units),
+            one.long_name,
+        )
+        for name, one in variables.items()
+    ]
+    return rows_of(("variable", "dimensions", "unit", "meaning"), rows)
+
+
+def comparisons_table() -> str:
+    """Every variable of a comparison with a measurement."""
+    from trunnion.rig.comparison.result import VARIABLES
+
+    told = {"": "of the channel", "set": "of what is set", "drive": "rad, m or s"}
+    rows = [
+        (code(name), ", ".join(one.dims), told.get(one.units) or unit(one.units), one.long_name)
+        for name, one in VARIABLES.items()
+    ]
+    return rows_of(("variable", "dimensions", "unit", "meaning"), rows)
+
+
+def assembling_table() -> str:
+    """Every variable of whether a mechanism goes together."""
+    from trunnion.studies.assembly.study import FIGURES
+
+    rows = [(code(name), ", ".join(one.dims), unit(one.units), one.long_name) for name, one in FIGURES.items()]
+    return rows_of(("variable", "dimensions", "unit", "meaning"), rows)
+
+
+def status_table() -> str:
+    """Every status."""
+    from trunnion.errors import Status
+
+    shown = {True: "all", False: "motion only"}
+    rows = [
+        (
+            int(one),
+            code(one.name.lower()),
+            "nothing"
+            if one is Status.NOT_ASSEMBLED
+            else "positions only"
+            if one is Status.SINGULAR
+            else shown[one.solved],
+            one.text,
+        )
+        for one in Status
+    ]
+    return rows_of(("code", "name", "numbers given", "meaning"), rows)
+
+
+def plots_table() -> str:
+    """Every plot."""
+    from trunnion.views.cycle.plots import PLOTS
+
+    return rows_of(
+        ("kind", "shows"), [(code(name), (inspect.getdoc(f) or "").splitlines()[0]) for name, f in PLOTS.items()]
+    )
+
+
+def formats_table() -> str:
+    """Every format a result is written in."""
+    from trunnion.results.export import FORMATS
+
+    rows = [
+        (code(name), f"`pip install 'trunnion[{extra}]'`" if extra else "") for name, (_, _, extra) in FORMATS.items()
+    ]
+    return rows_of(("extension", "needs"), rows)
+
+
+def codes_table() -> str:
+    """The codes of findings about results, with the sentence where it is a plain text."""
+    from trunnion.results.sentences.codes import SENTENCES
+
+    rows = [(code(name), str(one.severity), one.what if isinstance(one.what, str) else "")
+            for name, one in sorted(SENTENCES.items())]  # fmt: skip
+    return rows_of(("code", "is", "says"), rows)

@@ -235,8 +235,8 @@ IDENTIFY = {
     ),
     "data.left_out": Sentence(
         NOTE,
-        "{count:,} of {positions:#position} {count:#is/are} left out: friction reverses or a joint is at rest there, "
-        "the position is close to singular, or the model has no solution",
+        "{count:,} of {positions:#position} {count:#is/are} left out: friction reverses, a joint is at rest, a load has a "
+        "corner or a jump, the position is close to singular, or the model has no solution",
     ),
     "held_out.untested": Sentence(NOTE, "the expected prediction error of {names} is not known"),
     "held_out.missed": Sentence(

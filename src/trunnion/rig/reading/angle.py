@@ -219,12 +219,11 @@ def _of_pulses(
     blur = pulse * min(0.5 * found.slack(line.step), 0.5)
     when, spans, lag = found.times, np.zeros(0), 0.0
     if not found.crossings and found.slack(line.step) < 1:  # a count for each event: its time is not known
-        when, spans = smoothed(when, 0.5 * line.step, source.per_turn)
+        when, spans = smoothed(when, 0.5 * line.step, source.per_turn, counts)
         lag = unresolved((found.times - when)[spans > 0], line.step)
     elif not found.crossings:  # an event for each sample: its count is not known
-        jump = float(np.median(np.abs(np.diff(counts))))
         raw = turned
-        turned, spans = smoothed(raw, float(np.radians(blur)), source.per_turn / jump)
+        turned, spans = smoothed(raw, float(np.radians(blur)), source.per_turn / found.slack(line.step), found.times)
         per_pulse = line.step / found.slack(line.step)
         lag = unresolved((raw - turned)[spans > 0], float(np.radians(pulse))) / np.radians(pulse) * per_pulse
     values = np.interp(line.seconds, when, turned, left=np.nan, right=np.nan)
@@ -240,20 +239,22 @@ def _of_pulses(
     return Coordinate(values + zero, spoilt, lag)
 
 
-def smoothed(values: Array, off: float, per_turn: float) -> tuple[Array, Array]:
+def smoothed(values: Array, off: float, per_turn: float, over: Array | None = None) -> tuple[Array, Array]:
     """Values at pulses by local cubics (Savitzky and Golay, doi:10.1021/ac60214a047), and the turns of each span.
 
     values: times, s, of pulses one count apart, or angles, rad, of pulses one sample apart; off: by which each may be
-    off, as uniformly as rounding; per_turn: pulses of a turn. Each takes the longest span in which no value is farther
-    from the cubic than it may be, and their root mean square is that of rounding; none, 0, where not even the shortest
-    is so.
+    off, as uniformly as rounding; per_turn: pulses of a turn; over: counts of the times, or times of the angles, where
+    some are more than one apart, as near one count a sample: the values are smoothed less a straight line over them.
+    Each takes the longest span in which no value is farther from the cubic than it may be, and their root mean square
+    is that of rounding; none, 0, where not even the shortest is so.
     """
     found, spans = values.copy(), np.zeros(values.size)
     if off <= 0:
         return found, spans
     from scipy.signal import savgol_filter  # brings scipy.stats: longer to import than all the rest
 
-    trend = np.linspace(values[0], values[-1], values.size)
+    over = np.arange(values.size, dtype=np.float64) if over is None else over
+    trend = values[0] + (values[-1] - values[0]) * (over - over[0]) / (over[-1] - over[0])
     for span in SPANS:
         width = 2 * int(span * per_turn / 2) + 1
         if width < FEWEST or width > values.size:

@@ -39,9 +39,11 @@ def corners(
     bend = np.abs(np.roll(value, -1) - 2 * value + np.roll(value, 1))
     if not closed:
         bend[[0, -1]] = 0.0
-    before = np.searchsorted(phase, bends + CLOSE, side="right") - 1  # the position at the bend, or the last before it
+    order = np.argsort(phase)
+    before = np.searchsorted(phase[order], bends + CLOSE, side="right") - 1  # at the bend, or the last before it
+    before = order[before % size] if closed else before
     rounded: list[tuple[float, Places]] = []
-    for place in np.unique(before % size if closed else before[(before >= 0) & (before < size)]):
+    for place in np.unique(before if closed else before[(before >= 0) & (before < size)]):
         at = _there(place + np.arange(2), size, closed)
         if np.any(taken[at]):
             continue

@@ -68,13 +68,33 @@ def coordinate(
     else:
         assert speed is not None
         values = _integrated(speed, line, account)
+    values, lag = _refined(source, values, line, account)
     values = source.sign * values
     if index.size > 1 and source.from_ in ("time", "speed"):
         values, spoilt = _tied(values, index, line, account)
     else:
         spoilt = np.empty((0, 2))
         _check_index(values, index, line, account)
-    return Coordinate(values + zero, spoilt)
+    return Coordinate(values + zero, spoilt, lag)
+
+
+def _refined(source: AngleSource, values: Array, line: Timeline, account: Account) -> tuple[Array, float]:
+    """An angle that is read in steps, between them as the shaft turns; standard uncertainty, s, of what is left."""
+    known = np.flatnonzero(np.isfinite(values))
+    if source.resolution is None or known.size < FEWEST:
+        return values, 0.0
+    step = float(source.resolution.evaluate())
+    raw, seconds = values[known], line.seconds[known]
+    speeds = np.abs(np.diff(raw)) / np.diff(seconds)
+    turning = speeds > 0.1 * np.mean(speeds)
+    rate = float(np.sum(np.abs(np.diff(raw))[turning]) / max(np.sum(np.diff(seconds)[turning]), 1e-300)) or 1.0
+    smooth, spans = smoothed(raw, 0.5 * step, TURN / (rate * line.step), seconds)
+    refined = values.copy()
+    refined[known] = smooth
+    usual = float(np.median(spans))
+    even = f"; it is smoothed over {usual:.3g} turns, with which all readings agree" if usual > 0 else ""
+    account.say(f"the angle is read in steps of {np.degrees(step):.4g} deg{even}")
+    return refined, unresolved((raw - smooth)[spans > 0], step) / rate
 
 
 def _of_column(source: AngleSource, table: DataTable, line: Timeline, account: Account) -> Array:

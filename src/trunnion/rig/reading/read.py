@@ -19,6 +19,7 @@ from trunnion.rig.reading.columns import DataTable
 from trunnion.rig.reading.log import Account, counted, told
 from trunnion.rig.reading.mapping import DataMapping, File, FromData, Mapped, Zero, read_mapping
 from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal
+from trunnion.rig.reading.sensor_quantity import alike
 from trunnion.rig.reading.settings import Setting, dimension_of, settings, stated
 from trunnion.rig.reading.signal_checks import Drift, drift, signs, speeds, steady
 from trunnion.rig.reading.tables import read_table
@@ -29,6 +30,7 @@ __all__ = ["read_measured"]
 
 Array = NDArray[np.float64]
 FEW_HARMONICS = 5.0
+SPARSE = 0.25  # samples a position, below which nearly all values are interpolated
 UNUSED = 0.5  # of the turns recorded, below which it is told how few are used
 
 
@@ -299,7 +301,9 @@ class _File:
             if turns.density < 1:
                 samples = f"{turns.density * mapping.positions:.4g} samples a turn for {mapping.positions} positions"
                 what = f"the sampling is slow: {samples}; between them it is interpolated"
-                account.warn("data.sampling.slow", where, what, "state fewer positions, or sample faster")
+                severity = Severity.WARNING if turns.density < SPARSE else Severity.NOTE  # no fault of the readings
+                remedy = "state fewer positions, or sample faster"
+                account.warn("data.sampling.slow", where, what, remedy, severity)
             length = float(np.mean(turns.end - turns.begin))
             passed = mapping.filter.cut_off.value * length if mapping.filter else np.inf
             if passed < FEW_HARMONICS:
@@ -378,7 +382,7 @@ class _File:
             of_file = float(np.hypot(abs(own.scale.factor) * zeros[name].uncertainty, extra))
             zero = float(np.hypot(own.accuracy_zero, of_file))
             accuracy = Accuracy(zero, own.accuracy_gain, self.steps[name], of_file)
-            courses[name] = Signal(name, channel.measures, own.scale.unit, part.courses[name], accuracy)
+            courses[name] = Signal(name, channel.measures, own.scale.unit, part.courses[name], accuracy, _read_in(own))
         values, known_as = dict(part.setting.values), dict(part.setting.dimensions)
         for path, channel_name in part.setting.means.items():
             turns = courses[channel_name].turns
@@ -400,6 +404,12 @@ class _File:
             name, values, phase, courses, (str(self.path),), speed, start, cycle,
             lag=self.lag, dimensions=known_as, duration=duration,
         )  # fmt: skip
+
+
+def _read_in(own: ChannelReading) -> tuple[str, float]:
+    """The unit of readings that are what is measured itself, and its factor to SI; empty of volts and the like."""
+    raw = own.scale
+    return (own.unit, raw.raw) if own.unit and alike(raw.of_reading, raw.of_quantity) else ("", 1.0)
 
 
 def _gone(share: Array, allowed: NDArray[np.bool_]) -> float:

@@ -90,6 +90,12 @@ COMPARE = {
         ),
         "{remedy}",
     ),
+    "compare.bias": Sentence(
+        NOTE,
+        "agrees within U at {within_percent:.0f} % of the positions, but its bias is significant {cases}{most}: the "
+        "mean residual is {bias_told}, its U {wide_told}",
+        "of a true model that is so in 5 % of the conditions; check zero and gain of the channel, and the model",
+    ),
     "compare.angle_shifted": Sentence(
         ERROR,
         "{channels} do not agree within U {cases}; an error of {range} in the crank angle explains "

@@ -79,7 +79,10 @@ def coordinate(
 
 
 def _refined(source: AngleSource, values: Array, line: Timeline, account: Account) -> tuple[Array, float]:
-    """An angle that is read in steps, between them as the shaft turns; standard uncertainty, s, of what is left."""
+    """An angle that is read in steps, between them as the shaft turns; standard uncertainty, s, of what is left.
+
+    Whether a reading is rounded or cut off is not known: all may be off by up to half a step, rectangular.
+    """
     known = np.flatnonzero(np.isfinite(values))
     if source.resolution is None or known.size < FEWEST:
         return values, 0.0
@@ -94,7 +97,7 @@ def _refined(source: AngleSource, values: Array, line: Timeline, account: Accoun
     usual = float(np.median(spans))
     even = f"; it is smoothed over {usual:.3g} turns, with which all readings agree" if usual > 0 else ""
     account.say(f"the angle is read in steps of {np.degrees(step):.4g} deg{even}")
-    return refined, unresolved((raw - smooth)[spans > 0], step) / rate
+    return refined, math.hypot(unresolved((raw - smooth)[spans > 0], step), step / math.sqrt(12.0)) / rate
 
 
 def _of_column(source: AngleSource, table: DataTable, line: Timeline, account: Account) -> Array:

@@ -291,7 +291,8 @@ def _sensors(judged: Assessment) -> Iterator[Finding]:
                     "parameter.sensor", f"parameter {unknown.name}", phrases=phrases, share=part, source=source
                 )
     for s, sensor in enumerate(problem.sensors, problem.count):
-        if sensor.stated and abs(judged.found.x[s]) > FAR:
+        explained = bool(judged.found.causes)  # then it is off because of what explains the misfit
+        if sensor.stated and abs(judged.found.x[s]) > FAR and not explained:
             yield finding_for("sensor.off", sensor.name, times=abs(judged.found.x[s]))
 
 

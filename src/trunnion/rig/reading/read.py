@@ -202,18 +202,18 @@ class _File:
         cuts, used = [], self._used()
         for setting in settings(mapping, self.entry, self.table, self.line, account):
             allowed = used[setting.window] & setting.rows
-            name = self._named(setting)
-            turns = cut(share, self.line, setting.window, allowed, mapping.positions, spoilt, account, name)
+            where = _where(setting)
+            turns = cut(share, self.line, setting.window, allowed, mapping.positions, spoilt, account, where)
             gone = _gone(share[setting.window], allowed)
             account.recorded += gone
             if turns.numbers.size:
                 cuts.append((setting, turns))
                 if turns.numbers.size < UNUSED * gone - 2:
                     what = f"{counted(turns.numbers.size, 'turn')} of {gone:,.0f} recorded can be used"
-                    account.warn("data.turns.lost", f"condition {name}", what, "correct what the other findings name")
+                    account.warn("data.turns.lost", where, what, "correct what the other findings name")
             else:
                 what = self._no_turn(share[setting.window], allowed)
-                account.error("data.turns.none", f"condition {name}", what, "check angle, or record for longer")
+                account.error("data.turns.none", where, what, "check angle, or record for longer")
         if not cuts:
             return []
         self._check_rows(cuts)
@@ -289,7 +289,7 @@ class _File:
         """Tell how turns are sampled, whether they are enough and equally fast, and what the filter leaves of them."""
         account, mapping = self.account, self.mapping
         for setting, turns in cuts:
-            where = f"condition {self._named(setting)}"
+            where = _where(setting)
             if turns.numbers.size < 2:
                 account.warn(
                     "data.turns.one",
@@ -404,6 +404,11 @@ class _File:
             name, values, phase, courses, (str(self.path),), speed, start, cycle,
             lag=self.lag, dimensions=known_as, duration=duration,
         )  # fmt: skip
+
+
+def _where(setting: Setting) -> str:
+    """What a finding about a condition is about; its file says which one, where nothing is set."""
+    return f"condition {setting.name}" if setting.name else "turns"
 
 
 def _read_in(own: ChannelReading) -> tuple[str, float]:

@@ -96,13 +96,15 @@ def test_a_point_that_may_part_thousands_or_decimals_is_refused(tmp_path: Path) 
 
 
 def test_an_angle_in_steps_is_smoothed_to_what_the_shaft_does(tmp_path: Path) -> None:
-    """Steps of 6° every turn in the same places: of the torque's slope of 200 N m/rad they leave 21 N m, smoothed 1."""
+    """Steps of 8°, every turn in the same places, leave 14 N m of a slope of 200 N m/rad; smoothed, below 2."""
     mapping = recorded(tmp_path, "Zeit [ms];Winkel [°];Moment [Nm];Drehzahl [U/min]", step=8.0)
     true = 1450.33 + 200 * np.sin(2 * np.pi * np.arange(72) / 72)
 
     def off() -> float:
         found = read_measured(mapping, [tmp_path / "lauf.csv"])
-        assert found.conditions[0].lag == 0.0 or "resolution" in mapping["angle"]
+        stated = "resolution" in mapping["angle"]
+        assert (found.conditions[0].lag > 0) == stated
+        assert ("data.angle.steps" in {one.code for one in found.findings}) != stated
         return float(np.max(np.abs(found.conditions[0].courses["M"].mean - true)))
 
     rough = off()

@@ -30,6 +30,8 @@ TURN = 2 * np.pi
 JUMP = 8.0  # times the usual step, by which a cell is off its neighbours
 SPANS = (2.0, 1.0, 0.5, 0.25, 0.125, 0.0625)  # turns over which it is tried, the longest first
 ORDER = 3
+LOOKED_AT = 50_000  # readings of which steps are told
+COARSE = 0.3  # of what an angle gains in a sample: steps from which they are told
 FEWEST = 5  # pulses in a span
 BOUND = 1.1  # of what a pulse may be off: more tells that the shaft itself runs unevenly
 EVEN = 1.1 / np.sqrt(3.0)  # the same of the root mean square, of errors spread evenly
@@ -85,6 +87,7 @@ def _refined(source: AngleSource, values: Array, line: Timeline, account: Accoun
     """
     known = np.flatnonzero(np.isfinite(values))
     if source.resolution is None or known.size < FEWEST:
+        _tell_steps(source, values, account)
         return values, 0.0
     step = float(source.resolution.evaluate())
     raw, seconds = values[known], line.seconds[known]
@@ -98,6 +101,28 @@ def _refined(source: AngleSource, values: Array, line: Timeline, account: Accoun
     even = f"; it is smoothed over {usual:.3g} turns, with which all readings agree" if usual > 0 else ""
     account.say(f"the angle is read in steps of {np.degrees(step):.4g} deg{even}")
     return refined, math.hypot(unresolved((raw - smooth)[spans > 0], step), step / math.sqrt(12.0)) / rate
+
+
+def _tell_steps(source: AngleSource, values: Array, account: Account) -> None:
+    """Tell of an angle that is read in steps as wide as what it gains in a few samples: they shift it within a turn.
+
+    From sample to sample it then gains one step or another number of them; of one that is read finely, always as much.
+    """
+    part = values[:LOOKED_AT]
+    gained = np.abs(np.diff(part))
+    gained = gained[np.isfinite(gained)]  # from each row to the next: a reading that is left out is no step
+    levels = np.unique(np.round(part[np.isfinite(part)] % TURN, 9))
+    if source.from_ != "column" or not np.any(gained > 0) or not FEWEST < levels.size < part.size / FEWEST:
+        return
+    apart = np.diff(levels)
+    step = float(np.median(apart))
+    low, high = np.percentile(gained[gained > 0], (1, 99))
+    between = np.diff(np.flatnonzero(gained > 0))  # samples from one step to the next; more than a few, and it stands
+    uneven = high - low > 0.5 * step or np.mean((between > 1) & (between < 1 / COARSE**2)) > 0.05
+    if uneven and float(np.percentile(apart, 5)) > 0.7 * step and step > COARSE * float(np.mean(gained[gained > 0])):
+        told = f"{np.degrees(step):.4g} deg"
+        what = f"the column '{source.column}' is read in steps of {told}, about what it gains in a sample"
+        account.note("data.angle.steps", "angle", what, f"state angle: {{resolution: {told}}} to have it smoothed")
 
 
 def _of_column(source: AngleSource, table: DataTable, line: Timeline, account: Account) -> Array:

@@ -95,7 +95,7 @@ FAULTS: list[tuple[Any, str, tuple[str, ...], str]] = [
     (_repeated, "time", ("repeats in 2 rows", "at 1, 1 s"), "logger"),
     (_backward, "time", ("runs backward 1 time", "0.0198 s"), "split the file"),
     (_lost, "angle", ("1 pulse lost",), "cable"),
-    (_unsteady, "condition run", ("speed is not steady",), "over:"),
+    (_unsteady, "turns", ("speed is not steady",), "over:"),
 ]
 
 

@@ -6,7 +6,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from trunnion.rig.reading.angle import seen_edges, smoothed, unresolved
+from trunnion.rig.reading.angle import coordinate, seen_edges, smoothed, unresolved
+from trunnion.rig.reading.columns import Column, DataTable
+from trunnion.rig.reading.log import Account
+from trunnion.rig.reading.mapping import AngleSource
+from trunnion.rig.reading.timebase import Timeline
 
 Array = NDArray[np.float64]
 STEP = 1 / 5000
@@ -29,6 +33,21 @@ def test_steady_pulses_in_step_with_the_sampling(per_turn: int, rate: float) -> 
     off = (found - true)[per_turn:-per_turn]
     assert np.std(off) < 0.06 * STEP
     assert abs(off.mean()) < 1.8 * unresolved(raw - found, STEP)  # a rectangle is √3 wide
+
+
+@pytest.mark.parametrize("per_sample", [0.97, 1.01, 1.2, 1.5, 2.4])
+def test_a_count_about_as_fast_as_the_sampling(per_sample: float) -> None:
+    """A running count of 1.2 a sample steps by 1, 1, 1, 1, 2: the angle is right to a small part of a count."""
+    per_turn, samples = 360, 20_000
+    time = STEP * np.arange(samples)
+    true = (per_sample * np.arange(samples) + 0.37) / per_turn
+    table = DataTable("run.csv", {"n": Column(np.floor(true * per_turn), "", 0, "")})
+    source = AngleSource(**{"from": "pulses"}, column="n", per_turn=per_turn)
+    line = Timeline(time, None, STEP, np.empty(0, np.intp))
+    found = coordinate(source, table, line, None, Account("run.csv")).values / (2 * np.pi)
+    off = (found - true)[2000:-2000] * per_turn
+    assert np.std(off) < 0.03
+    assert np.ptp(off) < 0.15
 
 
 def test_uneven_running_stays() -> None:

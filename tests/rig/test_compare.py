@@ -136,6 +136,22 @@ def test_an_offset_is_named_with_its_size():
     assert said(result, "within U in every condition apart from a constant offset of +1.5 N m")
 
 
+@pytest.mark.parametrize(("size", "severity"), [(0.0, None), (0.01, "note"), (0.015, "warning")])
+def test_a_bias_beyond_its_uncertainty_is_said_of_a_course_that_is_within(size, severity):
+    """The mean of 8 turns and 36 positions of noise 0.05 has U ≈ 0.006, each position six times it."""
+    result = compare(measured(noise=0.05, seed=2, wrong=wrong_in("torque", lambda true: true + size)))
+    torque = result.sel(channel="torque").isel(condition=0)
+    assert torque.verdict == Verdict.WITHIN
+    ratio = abs(float(torque.bias / torque.bias_expanded))
+    expected = None if ratio <= 1 else "note" if ratio <= 1.5 else "warning"
+    rows = [row for row in json.loads(result.attrs["findings"]) if row["code"] == "compare.bias"]
+    assert [row["severity"] for row in rows] == ([expected] if expected else [])
+    assert expected == severity, ratio
+    for row in rows:
+        assert row["figures"]["bias"] == pytest.approx(float(torque.bias))
+        assert row["figures"]["expanded"] == pytest.approx(float(torque.bias_expanded))
+
+
 def test_a_gain_is_named_with_its_size():
     result = compare(measured(wrong=wrong_in("torque", lambda true: 1.08 * true)))
     assert said(result, "a gain error of +8 %", "explains 100 %")

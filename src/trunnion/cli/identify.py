@@ -26,6 +26,7 @@ from trunnion.cli.options import (
     setting,
 )
 from trunnion.cli.result import Shown, check_files, check_model, show_tables
+from trunnion.cli.terminal import bar
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.results.attributes import findings_of
 
@@ -134,7 +135,9 @@ def identify(
         wanted, begin = parameters(parameter or []), dict(setting(text) for text in start or ())
         held, late = held_out(hold_out or []), seconds(delay)
         measurement = read_measured(mapping, [str(path) for path in data] if data else None)
-        result = run(mechanism, measurement, wanted, channel, begin, held, sensors, late, guard, starts)  # type: ignore[arg-type]
+        with bar("models evaluated", None) as progress:
+            result = run(mechanism, measurement, wanted, channel, begin, held, sensors, late, guard, starts,  # type: ignore[arg-type]
+                         progress=progress)  # fmt: skip
     found = gathered(  # of the notes those that tell what was set
         one for one in measurement.findings if one.severity is not Severity.NOTE or one.where == "files"
     )
@@ -221,7 +224,10 @@ def _write_model(
     misfit = float(result["reduced_chi_squared"])
     if misfit > GROSS:
         what = f"'{write}' is not written: the model does not fit (reduced χ² {misfit:.3g})"
-        return [Finding(what, "--write", "find the cause first: `trunnion compare` names errors of sensors and angle")]
+        explained = any(one.code == "fit.cause" for one in findings_of(result))
+        named = "correct what explains the misfit, and identify again"
+        unknown = "find the cause first: `trunnion compare` shows each channel and names errors of sensors and angle"
+        return [Finding(what, "--write", named if explained else unknown)]
     rewrite_mechanism(with_estimates(mechanism, result), file, write, force)
     written.append(write)
     if not lost:

@@ -153,9 +153,12 @@ def say(findings: Iterable[Finding], every: bool = False) -> None:
 
 
 @contextmanager
-def bar(what: str, total: int, least: int = 0) -> Iterator[Callable[[int], None] | None]:
-    """A progress bar on the error stream, to be called with how many are done; None off a terminal or below `least`."""
-    if total < least or not sys.stderr.isatty():
+def bar(what: str, total: int | None, least: int = 0) -> Iterator[Callable[[int], None] | None]:
+    """A progress bar on the error stream, to be called with how many are done; None off a terminal or below `least`.
+
+    total: None where it is not known beforehand: the bar then only counts.
+    """
+    if (total is not None and total < least) or not sys.stderr.isatty():
         yield None
         return
     from rich.console import Console

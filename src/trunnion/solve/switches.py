@@ -27,7 +27,7 @@ from trunnion.solve.forward import Assembly, Forward, forward, start
 from trunnion.solve.loads import Stated, Switch
 from trunnion.solve.system import Cycle, System, Values, rubbing
 
-__all__ = ["Mechanisms", "edges"]
+__all__ = ["Mechanisms", "bends", "edges"]
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -92,7 +92,15 @@ def edges(of: Mechanisms) -> list[Array]:
 
     No two are farther apart than a PANELS-th of a turn.
     """
-    found = [[0.0, cycle.duration] for cycle in of.cycles]
+    return [
+        _parted(np.concatenate([[0.0, cycle.duration], times]), cycle)
+        for times, cycle in zip(bends(of), of.cycles, strict=True)
+    ]
+
+
+def bends(of: Mechanisms) -> list[Array]:
+    """Times, s, of every mechanism at which its forces may jump or bend, in no order."""
+    found: list[list[float]] = [[] for _ in of.cycles]
     for row, moment in _knots(of):
         found[row].append(moment)
     for scan in (
@@ -101,7 +109,7 @@ def edges(of: Mechanisms) -> list[Array]:
     ):
         for row, moment in _passages(of, scan):
             found[row].append(moment)
-    return [_parted(np.array(times), cycle) for times, cycle in zip(found, of.cycles, strict=True)]
+    return [np.array(times, float) for times in found]
 
 
 def _parted(times: Array, cycle: Cycle) -> Array:

@@ -90,6 +90,12 @@ COMPARE = {
         ),
         "{remedy}",
     ),
+    "compare.bias": Sentence(
+        NOTE,
+        "agrees within U at {within_percent:.0f} % of the positions, but its bias is significant {cases}{most}: the "
+        "mean residual is {bias_told}, its U {wide_told}",
+        "of a true model that is so in 5 % of the conditions; check zero and gain of the channel, and the model",
+    ),
     "compare.angle_shifted": Sentence(
         ERROR,
         "{channels} do not agree within U {cases}; an error of {range} in the crank angle explains "
@@ -170,14 +176,25 @@ IDENTIFY = {
     ),
     "fit.misfit": Sentence(
         WARNING,
-        "the model does not fit: reduced χ² {reduced:.3g} (1 is expected from the scatter between turns), p-value "
+        "the model does not fit: reduced χ² {reduced_told} (1 is expected from the scatter between turns), p-value "
         "{chance_told}; the intervals are widened accordingly",
         "see the residuals; identify another parameter as well, or use another friction law",
     ),
+    "fit.cause": Sentence(
+        WARNING,
+        "{story} would explain {explains_percent:.0f} % of the misfit{also}; the estimates would then be {estimates}",
+        lambda kind, size_told, channel, **_: {
+            "shift": f"check the zero of the angle; if it is off, add {size_told} to angle: zero: in the mapping",
+            "delay": "check the filters of the channels; --delay allows for a delay and estimates it",
+            "sign": f"state sign: -1 for {channel} in the mapping, or remove it",
+            "zero": f"check the zero of {channel}; with accuracy: {{zero: …}} in the mapping it is estimated too",
+            "gain": f"check the gain of {channel}; with accuracy: {{gain: …}} in the mapping it is estimated too",
+        }[kind],
+    ),
     "fit.conditions_disagree": Sentence(
         NOTE,
-        "the conditions disagree: the estimates from single conditions vary {times:.2g} times as much as expected from "
-        "the scatter between turns; the interval is widened accordingly",
+        "the conditions disagree: the estimates from single conditions vary {times_told} times as much as expected "
+        "from the scatter between turns; the interval is widened accordingly",
         "look for differences between conditions: settings, speed, temperature, the zero of each file",
     ),
     "fit.not_repeated": Sentence(
@@ -235,8 +252,8 @@ IDENTIFY = {
     ),
     "data.left_out": Sentence(
         NOTE,
-        "{count:,} of {positions:#position} {count:#is/are} left out: friction reverses or a joint is at rest there, "
-        "the position is close to singular, or the model has no solution",
+        "{count:,} of {positions:#position} {count:#is/are} left out: friction reverses, a joint is at rest, a load "
+        "has a corner or a jump, the position is close to singular, or the model has no solution",
     ),
     "held_out.untested": Sentence(NOTE, "the expected prediction error of {names} is not known"),
     "held_out.missed": Sentence(

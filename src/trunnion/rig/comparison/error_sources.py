@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["KINDS", "Cause", "best", "causes"]
+__all__ = ["ENOUGH", "KINDS", "Cause", "best", "causes"]
 
 Array = NDArray[np.float64]
 ENOUGH = 0.8  # of the mean square of the residual that a cause has to explain

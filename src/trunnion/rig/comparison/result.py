@@ -141,6 +141,11 @@ def _fill_channel(
         arrays[name][at] = getattr(judged, field)
 
 
+def _read_in(name: str, found: Sequence[Compared]) -> tuple[str, float]:
+    """The unit of a channel's readings with its factor to SI, where they are what is measured itself."""
+    return next((one.pairs[name].course.read_in for one in found if name in one.pairs), ("", 1.0))
+
+
 def _attributes(
     mechanism: Mechanism,
     measurement: Measurement,
@@ -173,6 +178,7 @@ def _attributes(
         **cited(dict.fromkeys([GUM, PEZZUTI, *references(mechanism)])),
         **codes("verdict", Verdict),
         "channel_units": list(units.values()),
+        "channel_read_in": [_read_in(name, found) for name in channels],
         "channel_measures": list(channels.values()),
         **dict(zip(("set_units", "set_written"), written, strict=True)),
         "findings": finding_rows(told),

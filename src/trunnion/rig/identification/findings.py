@@ -8,10 +8,12 @@ import numpy as np
 
 from trunnion.errors import Finding, Severity, Status
 from trunnion.results.sentences import finding_for
+from trunnion.rig.comparison.error_sources import KINDS
 from trunnion.rig.comparison.findings import other_speed
 from trunnion.rig.identification.assessment import Assessment
 from trunnion.rig.identification.blocks import OWN, shared_zero
 from trunnion.rig.identification.identifiability import Combination, InseparableUnknowns, known_of, sizes_of
+from trunnion.rig.identification.misfit import MisfitCause
 from trunnion.rig.identification.number_text import amount, share
 from trunnion.rig.identification.uncertainty import RANDOM, quantile
 
@@ -43,6 +45,11 @@ def _count(number: int, what: str) -> str:
     return f"{NUMBERS[number] if number < len(NUMBERS) else f'{number:,}'} {what}{'s' * (number != 1)}"
 
 
+def _times(number: float) -> str:
+    """A ratio to three digits, without a power of ten."""
+    return f"{float(f'{number:.3g}'):,.10g}"
+
+
 def _search(judged: Assessment) -> Iterator[Finding]:
     """How the search went."""
     search, problem = judged.found.search, judged.problem
@@ -67,14 +74,16 @@ def _fit(judged: Assessment) -> Iterator[Finding]:
     test, problem = judged.found.spread.test, judged.problem
     if test.misfit:
         chance = "less than 0.01 %" if test.chance < 1e-4 else f"{100 * test.chance:.2g} %"
-        phrases = {"chance_told": chance}
+        phrases = {"chance_told": chance, "reduced_told": _times(test.reduced)}
         yield finding_for("fit.misfit", "fit", phrases=phrases, reduced=test.reduced, chance=test.chance)
+        yield from _causes(judged)
     apart = judged.found.spread.apart
     for p in np.flatnonzero((apart > 1) & ~judged.lost[: problem.count]):
+        if judged.found.causes:  # which explain this, too
+            break
         where, times = f"parameter {problem.model.unknowns[p].name}", np.sqrt(apart[p])
-        yield finding_for(
-            "fit.conditions_disagree", where, severity=Severity.WARNING if times > MUCH else None, times=times
-        )
+        severity, phrases = Severity.WARNING if times > MUCH else None, {"times_told": _times(times)}
+        yield finding_for("fit.conditions_disagree", where, severity=severity, phrases=phrases, times=times)
     single = [block for block in problem.blocks if block.fitted and not block.repeats]
     if single and len(single) == sum(block.fitted for block in problem.blocks):
         yield finding_for("fit.not_repeated", "data")
@@ -86,6 +95,46 @@ def _fit(judged: Assessment) -> Iterator[Finding]:
     pairs = sum(len(block.turns) - 1 for block in problem.blocks if block.fitted)
     if follows > 2 / np.sqrt(max(pairs, 1)):
         yield finding_for("fit.turns_alike", "data", correlation=follows)
+
+
+def _causes(judged: Assessment) -> Iterator[Finding]:
+    """The error of angle or sensor that explains a misfit, with the estimates that go with it."""
+    found, problem = judged.found.causes, judged.problem
+    if not found:
+        return
+    first = found[0]
+    also = [_story(judged, one) for one in found[1:]]
+    also_told = f"; {' or '.join(also)} would explain as much" if also else ""
+    rows = zip(problem.model.unknowns, first.estimates, first.halves, strict=True)
+    known = [f"{one.name} = {amount(value, half, one.unit)}" for one, value, half in rows if np.isfinite(half)]
+    unit = {"shift": "rad", "delay": "s", "zero": _unit_of(judged, first.channel)}.get(first.kind, "1")
+    phrases = {
+        "story": _story(judged, first), "also": also_told, "estimates": _joined(known), "channel": first.channel,
+        "size_told": amount(first.size, None, unit) if first.kind != "shift" else f"{np.degrees(first.size):+.3g} deg",
+    }  # fmt: skip
+    yield finding_for(
+        "fit.cause", "fit", phrases=phrases, kind=first.kind, size=first.size, expanded=first.expanded,
+        explains_percent=100 * first.explains,
+        values={one.name: float(value) for one, value in zip(problem.model.unknowns, first.estimates, strict=True)},
+    )  # fmt: skip
+
+
+def _unit_of(judged: Assessment, channel: str) -> str:
+    return next((one.course.unit for one in judged.problem.blocks if one.channel == channel), "1")
+
+
+def _story(judged: Assessment, one: MisfitCause) -> str:
+    """A cause with its size."""
+    if one.kind == "shift":
+        return f"an offset of the drive angle of {amount(one.size, one.expanded, 'rad').replace(' °', '°')}"
+    if one.kind == "delay":
+        factor = 1e3
+        return f"a delay of all channels of {amount(one.size * factor, one.expanded * factor, 'ms')}"
+    if one.kind == "zero":
+        return f"a constant offset of {one.channel} of {amount(one.size, one.expanded, _unit_of(judged, one.channel))}"
+    if one.kind == "gain":
+        return f"a gain error of {one.channel} of {amount(100 * one.size, 100 * one.expanded, '%')}"
+    return f"{KINDS[one.kind]} of {one.channel}"
 
 
 def _speeds(judged: Assessment) -> Iterator[Finding]:
@@ -242,7 +291,8 @@ def _sensors(judged: Assessment) -> Iterator[Finding]:
                     "parameter.sensor", f"parameter {unknown.name}", phrases=phrases, share=part, source=source
                 )
     for s, sensor in enumerate(problem.sensors, problem.count):
-        if sensor.stated and abs(judged.found.x[s]) > FAR:
+        explained = bool(judged.found.causes)  # then it is off because of what explains the misfit
+        if sensor.stated and abs(judged.found.x[s]) > FAR and not explained:
             yield finding_for("sensor.off", sensor.name, times=abs(judged.found.x[s]))
 
 

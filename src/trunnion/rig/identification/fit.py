@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from trunnion.errors import Status
 from trunnion.rig.identification.blocks import OWN, Block, shared_zero
+from trunnion.rig.identification.corners import corners
 from trunnion.rig.identification.signals import Courses, Model
 
 __all__ = ["FitProblem", "LeastSquaresFit", "SensorError", "fit", "sensors_of"]
@@ -253,7 +254,7 @@ class FitProblem:
     def allowed(self, x: Array) -> list[Mask]:
         """Positions of each block where the model has a sound answer and the data have a value."""
         found, courses = [], self.courses(x)
-        for block in self.blocks:
+        for k, block in enumerate(self.blocks):
             status, turned = courses.status[block.condition], courses.turned[block.condition]
             measure = self.model.measures[block.channel]
             size = block.turns.shape[1]
@@ -263,11 +264,22 @@ class FitProblem:
                 good = (status < Status.SINGULAR) & (status != Status.NEAR_SINGULAR)
             else:
                 guard = -(-size // PER_GUARD) if self.guard is None else self.guard
-                good = (status == Status.SOLVED) & ~_widened(turned, guard)
+                value = courses.said[block.condition][block.channel].value
+                rounded = turned | self._corners(k, value, turned, guard)
+                good = (status == Status.SOLVED) & ~_widened(rounded, guard)
             value = courses.said[block.condition][block.channel].value[:size]
             there = np.isfinite(block.mean) if block.fitted else np.isfinite(block.held_mean)
             found.append(good & there & np.isfinite(value))
         return found
+
+    def _corners(self, k: int, value: Array, taken: Mask, guard: int) -> Mask:
+        """Positions of a block beside corners of the model's signal that resampling rounds off visibly."""
+        block, model = self.blocks[k], self.model
+        uncertainty = np.sqrt(self.variances[k] / np.maximum(block.count, 1) + block.unresolved**2)
+        if len(value) != len(model.phases[block.condition]) or len(uncertainty) != len(value):
+            return np.zeros(len(value), bool)
+        phase, shares = model.phases[block.condition], model.bends[block.condition]
+        return corners(value, phase, shares, uncertainty, taken, closed=model.run.cycle.periodic, guard=guard)
 
     def unanswered(self, x: Array) -> int:
         """Positions with data that friction or the assembly leaves without an answer."""

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from trunnion.model.mechanism import Mechanism
 from trunnion.rig.identification.fit import FitProblem
 from trunnion.rig.identification.identifiability import InseparableUnknowns
+from trunnion.rig.identification.misfit import MisfitCause
 from trunnion.rig.identification.search import Search
 from trunnion.rig.identification.uncertainty import Covariances
 from trunnion.rig.reading.measurement import Measurement
@@ -24,7 +25,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Identified:
-    """All that an identification found, before it is written down."""
+    """All that an identification found, before it is written down. causes: what would explain a misfit, best first."""
 
     mechanism: Mechanism
     measurement: Measurement
@@ -33,6 +34,7 @@ class Identified:
     search: Search
     spread: Covariances
     groups: Sequence[InseparableUnknowns]
+    causes: Sequence[MisfitCause] = ()
 
     @property
     def x(self) -> Array:

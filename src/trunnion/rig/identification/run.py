@@ -17,6 +17,7 @@ from trunnion.rig.identification.blocks import EFFICIENCY, Block, blocks_of, cha
 from trunnion.rig.identification.fit import FitProblem, fit, sensors_of
 from trunnion.rig.identification.holdout import HoldOut, held_out
 from trunnion.rig.identification.identifiability import inseparable
+from trunnion.rig.identification.misfit import explanations
 from trunnion.rig.identification.search import search
 from trunnion.rig.identification.signals import Model, SeatedModel
 from trunnion.rig.identification.uncertainty import left_over, spread_of
@@ -72,25 +73,6 @@ def identify(
     Method: weighted least squares with exact derivatives, trust region; covariances by the scatter between turns.
     Raises MechanismError for names, channels or conditions that are not there, or where the model has no answer.
     """
-    return dataset(identified(mechanism, measurement, parameters, channels, start, hold_out, sensors, delay, guard,
-                              starts, friction_method, progress))  # fmt: skip
-
-
-def identified(
-    mechanism: Mechanism,
-    measurement: Measurement,
-    parameters: Parameters,
-    channels: Sequence[str] | None = None,
-    start: Mapping[str, float | str] | None = None,
-    hold_out: HoldOut = None,
-    sensors: Errors = "channel",
-    delay: float | None = None,
-    guard: int | None = None,
-    starts: int | None = None,
-    method: FrictionMethod | None = None,
-    progress: Callable[[int], None] | None = None,
-) -> Identified:
-    """What `identify` makes its Dataset of."""
     _check(sensors, delay, guard, starts)
     check_settings(mechanism, measurement)
     measurement = finite(measurement)
@@ -107,12 +89,17 @@ def identified(
     phases = tuple(np.asarray(one.phase, float) for one in measurement.conditions)
     kind = SeatedModel if any(seat.given is None for seat in run.seats) else Model
     model = kind(run, tuple(unknowns(stated, paths, start or {})), measures, settings, phases,
-                 method or FrictionMethod())  # fmt: skip
+                 friction_method or FrictionMethod())  # fmt: skip
     if channels is None:
         model, blocks = _telling(model, blocks)
     names = [one.name for one in measurement.conditions] if sensors == "condition" else None
     lags = {one.name: one.lag for one in measurement.conditions}
     problem = FitProblem(model, blocks, sensors_of(blocks, names, delay, lags), guard, progress=progress)
+    return dataset(_solved(stated, measurement, problem, starts))
+
+
+def _solved(mechanism: Mechanism, measurement: Measurement, problem: FitProblem, starts: int | None) -> Identified:
+    """The estimates, what they are worth, and what would explain a misfit."""
     found = search(problem, starts)
     spread = spread_of(problem, found.fit.x)
     problem.left_over = left_over(problem, spread)
@@ -120,7 +107,8 @@ def identified(
         found = replace(found, fit=fit(problem, found.fit.x))
         spread = spread_of(problem, found.fit.x)
     groups = inseparable(problem, found.fit.x, spread)
-    return Identified(stated, measurement, run, problem, found, spread, groups)
+    causes = explanations(problem, found, spread.test) if spread.test.misfit else []
+    return Identified(mechanism, measurement, problem.model.run, problem, found, spread, groups, causes)
 
 
 def _check(sensors: str, delay: float | None, guard: int | None, starts: int | None) -> None:

@@ -13,7 +13,7 @@ from trunnion.rig.identification.fit import FitProblem, LeastSquaresFit, fit
 from trunnion.rig.identification.identifiability import sizes_of
 from trunnion.rig.identification.uncertainty import correlation_factors, lack_of_fit
 
-__all__ = ["Search", "refuse_unusable", "search"]
+__all__ = ["Search", "inside", "refined", "refuse_unusable", "search"]
 
 Array = NDArray[np.float64]
 HALVINGS = 8
@@ -45,7 +45,7 @@ def search(problem: FitProblem, starts: int | None) -> Search:
     """The estimates. starts: how many places to begin at; 1, and more if the model does not fit, if not given."""
     problem.start_scatter()
     first, shared = _runnable(problem)
-    best, settled = _refined(problem, _inside(problem, first))
+    best, settled = refined(problem, inside(problem, first))
     count, other = 1, None
     wanted = len(OTHERS) if starts is None else max(0, starts - 1)
     if starts is None and best.converged and not lack_of_fit(problem, best.x).misfit:
@@ -60,7 +60,7 @@ def search(problem: FitProblem, starts: int | None) -> Search:
         sizes = sizes_of(problem, best.x)
         away = float(np.max(np.abs(found.x - best.x)[: problem.count] / sizes[: problem.count]))
         if found.cost < best.cost * (1 - 1e-6) - 1e-6 and away > CLOSE:
-            worse, (best, settled) = best, _refined(problem, found.x)
+            worse, (best, settled) = best, refined(problem, found.x)
             kept = problem.masks, problem.variances, problem.factors
             other = worse.x if worse.cost < best.cost + AS_GOOD else None
         elif away > CLOSE and found.cost < best.cost + AS_GOOD:
@@ -87,7 +87,7 @@ def _runnable(problem: FitProblem) -> tuple[Array, float]:
     return best, shared
 
 
-def _inside(problem: FitProblem, start: Array) -> Array:
+def inside(problem: FitProblem, start: Array) -> Array:
     """A start that is not on a limit: there a search would not get off."""
     problem.masks = problem.allowed(start)
     sizes = sizes_of(problem, start)
@@ -96,7 +96,7 @@ def _inside(problem: FitProblem, start: Array) -> Array:
     return np.asarray(np.clip(start, low + room, high - room))
 
 
-def _refined(problem: FitProblem, start: Array) -> tuple[LeastSquaresFit, bool]:
+def refined(problem: FitProblem, start: Array) -> tuple[LeastSquaresFit, bool]:
     """A fit whose weights and used positions are those of where it ends; whether they came to rest."""
     problem.masks, problem.factors = problem.allowed(start), {}
     found = fit(problem, start)
@@ -125,7 +125,7 @@ def _others(problem: FitProblem, first: Array, wanted: int) -> list[Array]:
         factors = np.full(problem.count, OTHERS[k]) if k < len(OTHERS) else 10 ** random.uniform(-1, 1, problem.count)
         place = first.copy()
         place[: problem.count] *= factors
-        found.append(_inside(problem, np.clip(place, low, high)))
+        found.append(inside(problem, np.clip(place, low, high)))
     return found
 
 

@@ -6,7 +6,7 @@ All conditions and unknowns are one batch: row c·P + p of it is condition c wit
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -26,6 +26,7 @@ from trunnion.solve.run import Run, prepare
 from trunnion.solve.seating import settle
 from trunnion.solve.seats import given_offsets
 from trunnion.solve.status import pose_status, status_of
+from trunnion.solve.switches import Mechanisms, bends
 from trunnion.solve.system import sticking
 
 __all__ = ["Courses", "Model", "Said", "SeatedModel"]
@@ -163,6 +164,20 @@ class Model:
             return np.asarray(np.gradient(row, phase * duration, axis=-1))
         gap = (np.roll(phase, -1) - np.roll(phase, 1)) % 1.0
         return np.asarray((np.roll(row, -1, axis=-1) - np.roll(row, 1, axis=-1)) / (gap * duration))
+
+    @cached_property
+    def bends(self) -> tuple[Array, ...]:
+        """Shares of the cycle at which forces may bend or jump, by condition, with the unknowns at their start.
+
+        Points of load tables, ends of `between`, springs that let go, motion laws; see `switches`.
+        """
+        found, start = [], np.array([one.start for one in self.unknowns])
+        for k in range(len(self.phases)):
+            values = self.run.system.mechanism.parameters(self._overrides(k, start))
+            cycle = replace(self.run.cycle, duration=self._started[k])
+            times = bends(Mechanisms(self.run.system, self.run.chosen.assembly, values, [cycle]))[0]
+            found.append(times / (cycle.duration or 1.0))
+        return tuple(found)
 
     # ---- the batch --------------------------------------------------------------------------------------------
 

@@ -30,6 +30,8 @@ TURN = 2 * np.pi
 JUMP = 8.0  # times the usual step, by which a cell is off its neighbours
 SPANS = (2.0, 1.0, 0.5, 0.25, 0.125, 0.0625)  # turns over which it is tried, the longest first
 ORDER = 3
+LOOKED_AT = 50_000  # readings of which steps are told
+COARSE = 0.3  # of what an angle gains in a sample: steps from which they are told
 FEWEST = 5  # pulses in a span
 BOUND = 1.1  # of what a pulse may be off: more tells that the shaft itself runs unevenly
 EVEN = 1.1 / np.sqrt(3.0)  # the same of the root mean square, of errors spread evenly
@@ -68,13 +70,59 @@ def coordinate(
     else:
         assert speed is not None
         values = _integrated(speed, line, account)
+    values, lag = _refined(source, values, line, account)
     values = source.sign * values
     if index.size > 1 and source.from_ in ("time", "speed"):
         values, spoilt = _tied(values, index, line, account)
     else:
         spoilt = np.empty((0, 2))
         _check_index(values, index, line, account)
-    return Coordinate(values + zero, spoilt)
+    return Coordinate(values + zero, spoilt, lag)
+
+
+def _refined(source: AngleSource, values: Array, line: Timeline, account: Account) -> tuple[Array, float]:
+    """An angle that is read in steps, between them as the shaft turns; standard uncertainty, s, of what is left.
+
+    Whether a reading is rounded or cut off is not known: all may be off by up to half a step, rectangular.
+    """
+    known = np.flatnonzero(np.isfinite(values))
+    if source.resolution is None or known.size < FEWEST:
+        _tell_steps(source, values, account)
+        return values, 0.0
+    step = float(source.resolution.evaluate())
+    raw, seconds = values[known], line.seconds[known]
+    speeds = np.abs(np.diff(raw)) / np.diff(seconds)
+    turning = speeds > 0.1 * np.mean(speeds)
+    rate = float(np.sum(np.abs(np.diff(raw))[turning]) / max(np.sum(np.diff(seconds)[turning]), 1e-300)) or 1.0
+    smooth, spans = smoothed(raw, 0.5 * step, TURN / (rate * line.step), seconds)
+    refined = values.copy()
+    refined[known] = smooth
+    usual = float(np.median(spans))
+    even = f"; it is smoothed over {usual:.3g} turns, with which all readings agree" if usual > 0 else ""
+    account.say(f"the angle is read in steps of {np.degrees(step):.4g} deg{even}")
+    return refined, math.hypot(unresolved((raw - smooth)[spans > 0], step), step / math.sqrt(12.0)) / rate
+
+
+def _tell_steps(source: AngleSource, values: Array, account: Account) -> None:
+    """Tell of an angle that is read in steps as wide as what it gains in a few samples: they shift it within a turn.
+
+    From sample to sample it then gains one step or another number of them; of one that is read finely, always as much.
+    """
+    part = values[:LOOKED_AT]
+    gained = np.abs(np.diff(part))
+    gained = gained[np.isfinite(gained)]  # from each row to the next: a reading that is left out is no step
+    levels = np.unique(np.round(part[np.isfinite(part)] % TURN, 9))
+    if source.from_ != "column" or not np.any(gained > 0) or not FEWEST < levels.size < part.size / FEWEST:
+        return
+    apart = np.diff(levels)
+    step = float(np.median(apart))
+    low, high = np.percentile(gained[gained > 0], (1, 99))
+    between = np.diff(np.flatnonzero(gained > 0))  # samples from one step to the next; more than a few, and it stands
+    uneven = high - low > 0.5 * step or np.mean((between > 1) & (between < 1 / COARSE**2)) > 0.05
+    if uneven and float(np.percentile(apart, 5)) > 0.7 * step and step > COARSE * float(np.mean(gained[gained > 0])):
+        told = f"{np.degrees(step):.4g} deg"
+        what = f"the column '{source.column}' is read in steps of {told}, about what it gains in a sample"
+        account.note("data.angle.steps", "angle", what, f"state angle: {{resolution: {told}}} to have it smoothed")
 
 
 def _of_column(source: AngleSource, table: DataTable, line: Timeline, account: Account) -> Array:
@@ -219,12 +267,11 @@ def _of_pulses(
     blur = pulse * min(0.5 * found.slack(line.step), 0.5)
     when, spans, lag = found.times, np.zeros(0), 0.0
     if not found.crossings and found.slack(line.step) < 1:  # a count for each event: its time is not known
-        when, spans = smoothed(when, 0.5 * line.step, source.per_turn)
+        when, spans = smoothed(when, 0.5 * line.step, source.per_turn, counts)
         lag = unresolved((found.times - when)[spans > 0], line.step)
     elif not found.crossings:  # an event for each sample: its count is not known
-        jump = float(np.median(np.abs(np.diff(counts))))
         raw = turned
-        turned, spans = smoothed(raw, float(np.radians(blur)), source.per_turn / jump)
+        turned, spans = smoothed(raw, float(np.radians(blur)), source.per_turn / found.slack(line.step), found.times)
         per_pulse = line.step / found.slack(line.step)
         lag = unresolved((raw - turned)[spans > 0], float(np.radians(pulse))) / np.radians(pulse) * per_pulse
     values = np.interp(line.seconds, when, turned, left=np.nan, right=np.nan)
@@ -240,20 +287,22 @@ def _of_pulses(
     return Coordinate(values + zero, spoilt, lag)
 
 
-def smoothed(values: Array, off: float, per_turn: float) -> tuple[Array, Array]:
+def smoothed(values: Array, off: float, per_turn: float, over: Array | None = None) -> tuple[Array, Array]:
     """Values at pulses by local cubics (Savitzky and Golay, doi:10.1021/ac60214a047), and the turns of each span.
 
     values: times, s, of pulses one count apart, or angles, rad, of pulses one sample apart; off: by which each may be
-    off, as uniformly as rounding; per_turn: pulses of a turn. Each takes the longest span in which no value is farther
-    from the cubic than it may be, and their root mean square is that of rounding; none, 0, where not even the shortest
-    is so.
+    off, as uniformly as rounding; per_turn: pulses of a turn; over: counts of the times, or times of the angles, where
+    some are more than one apart, as near one count a sample: the values are smoothed less a straight line over them.
+    Each takes the longest span in which no value is farther from the cubic than it may be, and their root mean square
+    is that of rounding; none, 0, where not even the shortest is so.
     """
     found, spans = values.copy(), np.zeros(values.size)
     if off <= 0:
         return found, spans
     from scipy.signal import savgol_filter  # brings scipy.stats: longer to import than all the rest
 
-    trend = np.linspace(values[0], values[-1], values.size)
+    over = np.arange(values.size, dtype=np.float64) if over is None else over
+    trend = values[0] + (values[-1] - values[0]) * (over - over[0]) / (over[-1] - over[0])
     for span in SPANS:
         width = 2 * int(span * per_turn / 2) + 1
         if width < FEWEST or width > values.size:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -100,12 +101,27 @@ def numbers(cells: Any, decimal: str = ".") -> tuple[Array, int, str]:
     values = np.empty(cells.size)
     for place, cell in enumerate(cells.tolist()):
         text = cell.strip().replace("−", "-") if isinstance(cell, str) else cell
-        if decimal != "." and isinstance(text, str):
-            text = text.replace(decimal, ".")
+        if isinstance(text, str):
+            text = ungrouped(text, decimal)
         values[place] = number(text)
         if np.isnan(values[place]) and isinstance(text, str) and text.casefold() not in NOTHING:
             texts, example = texts + 1, example or str(cell).strip()[:40]
     return values, texts, example
+
+
+GROUPED = {  # thousands with a sign between them; of a point or a comma only where decimals tell which of them it is
+    ",": re.compile(r"[-+]?\d{1,3}(?:(?:\.\d{3})+,\d+|(?:['’\u00a0\u202f ]\d{3})+(?:,\d+)?)"),
+    ".": re.compile(r"[-+]?\d{1,3}(?:(?:,\d{3})+\.\d+|(?:['’\u00a0\u202f ]\d{3})+(?:\.\d+)?)"),
+}
+_BETWEEN = re.compile(r"[.,'’\u00a0\u202f ](?=\d{3}(?:\D|$))")
+
+
+def ungrouped(text: str, decimal: str) -> str:
+    """A number without signs between thousands and with a decimal point: 1450.33 of `1.450,33`."""
+    if GROUPED[decimal].fullmatch(text):
+        whole, sign, part = text.partition(decimal)
+        text = _BETWEEN.sub("", whole) + sign + part
+    return text if decimal == "." else text.replace(decimal, ".")
 
 
 def clock_of(cells: Any, texts: int, example: str) -> Clock | None:

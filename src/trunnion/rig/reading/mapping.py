@@ -138,12 +138,13 @@ class AngleSource(Part):
     zero: FixedAngle = Quantity(0.0, KINDS["angle"])
     index: Index | None = None
     sign: Sign = 1
+    resolution: FixedAngle | None = None
 
     @model_validator(mode="after")
     def _of_its_kind(self) -> AngleSource:
         needed, allowed = _KEYS[self.from_]
-        stated = {key for key in ("column", "unit", "per_turn", "kind", "wrap", "speed", "channel", "index")
-                  if getattr(self, key) is not None}  # fmt: skip
+        keys = {key for own in _KEYS.values() for part in own for key in part}
+        stated = {key for key in keys if getattr(self, key) is not None}
         if missing := [key for key in needed if key not in stated]:
             raise problem(f"from: {self.from_} needs {' and '.join(missing)}", "add it")
         if extra := sorted(stated - {*needed, *allowed}):
@@ -153,6 +154,8 @@ class AngleSource(Part):
             raise problem("only a running count wraps", "remove wrap, or write kind: count")
         if self.unit is not None:
             _unit_of(self.unit, "rad", "a unit of angle such as deg")
+        if self.resolution is not None and not self.resolution.evaluate() > 0:
+            raise problem("the resolution is not above zero", "write the step of the readings, such as 0.1 deg")
         if self.speed is not None and self.speed.evaluate() == 0:
             raise problem("the speed is zero: there are no turns", "write the speed of the driver, such as 1500 rpm")
         return self
@@ -161,7 +164,7 @@ class AngleSource(Part):
 # keys each source needs, and those it may have
 _KEYS = {
     "pulses": (("column", "per_turn"), ("kind", "wrap", "index")),
-    "column": (("column",), ("unit", "index")),
+    "column": (("column",), ("unit", "index", "resolution")),
     "time": (("speed",), ("index",)),
     "speed": (("channel",), ("index",)),
 }

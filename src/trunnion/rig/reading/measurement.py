@@ -59,6 +59,7 @@ class Signal:
 
     channel: its name in the mapping; measures: what it measures, as `measures.measures.named` reads it (`effort:input`,
     `rate:output`, `load:brake`); unit: SI; turns: (turn, position), NaN where there is nothing to be had.
+    read_in: unit of the readings for people, factor to SI, where they are in a unit of what is measured: U/min.
     """
 
     channel: str
@@ -66,6 +67,12 @@ class Signal:
     unit: str
     turns: Array
     accuracy: Accuracy = Accuracy()
+    read_in: tuple[str, float] = ("", 1.0)
+
+    @property
+    def shown(self) -> tuple[str, float]:
+        """Unit in which values are shown, and its factor to SI: that of the readings, else SI."""
+        return self.read_in if self.read_in[0] else (self.unit, 1.0)
 
     @cached_property
     def count(self) -> NDArray[np.intp]:

@@ -20,6 +20,7 @@ TOLD_BY = 5  # samples between pulses from which a lost one shows in the time be
 Places = NDArray[np.intp]
 MODULI = (1 << 8, 1 << 16, 1 << 24, 1 << 32)  # at which counters usually wrap
 AROUND = 8  # steps about a fall, that tell how far the count would have gone
+STANDS = 3.0  # times the usual time of a count, from which the shaft stands or a pulse is lost
 WILD = 20.0  # times the largest usual step, by which a single reading is off
 SURE = 0.15  # of a count, standard error of a place to wrap at that can be rounded to a whole number
 
@@ -39,8 +40,14 @@ class Pulses:
     crossings: bool = False
 
     def slack(self, step: float) -> float:
-        """Counts from one sample to the next."""
-        return step * float(np.median(np.abs(np.diff(self.counts)) / np.diff(self.times)))
+        """Counts from one sample to the next, in the mean while the shaft turns.
+
+        The median would be 1 of 1.2: most samples then count on by one, some by two.
+        """
+        counts, times = np.abs(np.diff(self.counts)), np.diff(self.times)
+        each = times / np.maximum(counts, 0.5)
+        turning = each < STANDS * np.median(each)
+        return step * float(np.sum(counts[turning]) / np.sum(times[turning]))
 
 
 def pulses_of(source: AngleSource, readings: Array, line: Timeline, indexed: bool, account: Account) -> Pulses:

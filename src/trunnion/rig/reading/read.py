@@ -19,6 +19,7 @@ from trunnion.rig.reading.columns import DataTable
 from trunnion.rig.reading.log import Account, counted, told
 from trunnion.rig.reading.mapping import DataMapping, File, FromData, Mapped, Zero, read_mapping
 from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal
+from trunnion.rig.reading.sensor_quantity import alike
 from trunnion.rig.reading.settings import Setting, dimension_of, settings, stated
 from trunnion.rig.reading.signal_checks import Drift, drift, signs, speeds, steady
 from trunnion.rig.reading.tables import read_table
@@ -29,6 +30,7 @@ __all__ = ["read_measured"]
 
 Array = NDArray[np.float64]
 FEW_HARMONICS = 5.0
+SPARSE = 0.25  # samples a position, below which nearly all values are interpolated
 UNUSED = 0.5  # of the turns recorded, below which it is told how few are used
 
 
@@ -200,18 +202,18 @@ class _File:
         cuts, used = [], self._used()
         for setting in settings(mapping, self.entry, self.table, self.line, account):
             allowed = used[setting.window] & setting.rows
-            name = self._named(setting)
-            turns = cut(share, self.line, setting.window, allowed, mapping.positions, spoilt, account, name)
+            where = _where(setting)
+            turns = cut(share, self.line, setting.window, allowed, mapping.positions, spoilt, account, where)
             gone = _gone(share[setting.window], allowed)
             account.recorded += gone
             if turns.numbers.size:
                 cuts.append((setting, turns))
                 if turns.numbers.size < UNUSED * gone - 2:
                     what = f"{counted(turns.numbers.size, 'turn')} of {gone:,.0f} recorded can be used"
-                    account.warn("data.turns.lost", f"condition {name}", what, "correct what the other findings name")
+                    account.warn("data.turns.lost", where, what, "correct what the other findings name")
             else:
                 what = self._no_turn(share[setting.window], allowed)
-                account.error("data.turns.none", f"condition {name}", what, "check angle, or record for longer")
+                account.error("data.turns.none", where, what, "check angle, or record for longer")
         if not cuts:
             return []
         self._check_rows(cuts)
@@ -287,7 +289,7 @@ class _File:
         """Tell how turns are sampled, whether they are enough and equally fast, and what the filter leaves of them."""
         account, mapping = self.account, self.mapping
         for setting, turns in cuts:
-            where = f"condition {self._named(setting)}"
+            where = _where(setting)
             if turns.numbers.size < 2:
                 account.warn(
                     "data.turns.one",
@@ -299,7 +301,9 @@ class _File:
             if turns.density < 1:
                 samples = f"{turns.density * mapping.positions:.4g} samples a turn for {mapping.positions} positions"
                 what = f"the sampling is slow: {samples}; between them it is interpolated"
-                account.warn("data.sampling.slow", where, what, "state fewer positions, or sample faster")
+                severity = Severity.WARNING if turns.density < SPARSE else Severity.NOTE  # no fault of the readings
+                remedy = "state fewer positions, or sample faster"
+                account.warn("data.sampling.slow", where, what, remedy, severity)
             length = float(np.mean(turns.end - turns.begin))
             passed = mapping.filter.cut_off.value * length if mapping.filter else np.inf
             if passed < FEW_HARMONICS:
@@ -378,7 +382,7 @@ class _File:
             of_file = float(np.hypot(abs(own.scale.factor) * zeros[name].uncertainty, extra))
             zero = float(np.hypot(own.accuracy_zero, of_file))
             accuracy = Accuracy(zero, own.accuracy_gain, self.steps[name], of_file)
-            courses[name] = Signal(name, channel.measures, own.scale.unit, part.courses[name], accuracy)
+            courses[name] = Signal(name, channel.measures, own.scale.unit, part.courses[name], accuracy, _read_in(own))
         values, known_as = dict(part.setting.values), dict(part.setting.dimensions)
         for path, channel_name in part.setting.means.items():
             turns = courses[channel_name].turns
@@ -400,6 +404,17 @@ class _File:
             name, values, phase, courses, (str(self.path),), speed, start, cycle,
             lag=self.lag, dimensions=known_as, duration=duration,
         )  # fmt: skip
+
+
+def _where(setting: Setting) -> str:
+    """What a finding about a condition is about; its file says which one, where nothing is set."""
+    return f"condition {setting.name}" if setting.name else "turns"
+
+
+def _read_in(own: ChannelReading) -> tuple[str, float]:
+    """The unit of readings that are what is measured itself, and its factor to SI; empty of volts and the like."""
+    raw = own.scale
+    return (own.unit, raw.raw) if own.unit and alike(raw.of_reading, raw.of_quantity) else ("", 1.0)
 
 
 def _gone(share: Array, allowed: NDArray[np.bool_]) -> float:

@@ -20,6 +20,7 @@ from trunnion.model.entry import problem
 from trunnion.model.expression import normalise
 from trunnion.model.names import nearest
 from trunnion.model.units import UnitError, root, si_unit, unit
+from trunnion.rig.reading.clock import is_time
 
 __all__ = [
     "HERTZ",
@@ -169,6 +170,11 @@ def _stated(value: object, kind: str) -> Any:
                 raise UnitError("is not a unit", "write a unit such as mV or N m")
             dimensions(value)
             return value
+        if is_time(value):
+            raise UnitError(
+                f"'{value}' is a time stamp; times are counted in seconds from the first row of the file",
+                "write a time in seconds, such as [0 s, 0.5 s]",
+            )
         amount = read_amount(value)
         if kind == "frequency" and not (amount.value > 0 and (amount.plain or amount.dimensions == HERTZ)):
             raise UnitError(f"'{value}' is not a frequency above zero", "write it as 2 kHz or 500 Hz")

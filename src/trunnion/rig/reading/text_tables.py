@@ -13,7 +13,7 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -34,10 +34,12 @@ LONGEST = 1 << 24  # bytes in which the first lines have to end
 ROWS = 250_000  # read at a time, so that memory does not grow with the columns that are not wanted
 WIDE = 40  # columns from which those that are not wanted are passed over, and too many cells in a row not seen
 _UNIT = re.compile(r"^(.*?)\s*\[([^\[\]]*)\]\s*$", re.DOTALL)
-_COMMA = re.compile(r"[-+]?\d*,\d+(?:[eE][-+]?\d+)?")
+_BEHIND = re.compile(r"^(.*?\S)\s*(?:\(([^()]+)\)|(?:\s/|\sin)\s+(\S.*))$", re.DOTALL)  # T (V), T / V, T in V
+_COMMA = re.compile(r"[-+]?(?:\d{1,3}(?:\.\d{3})+|\d{1,3}(?:['’\u00a0\u202f ]\d{3})+|\d*),\d+(?:[eE][-+]?\d+)?")
 _QUOTED = re.compile(r'"[^"]*"')
 _POINT = re.compile(r"[-+]?\d*\.\d+(?:[eE][-+]?\d+)?")
 _NO_UNIT = ("", "-", "–", "1")
+GERMAN = ("Grad", "U/min", "Umin", "Umdr./min")  # units in headings, if not all are read without the mapping's word
 MOST_ABOVE = 3  # rows of units and remarks between names and numbers
 
 
@@ -79,7 +81,7 @@ def read_csv(path: Path, wanted: Sequence[str], optional: Sequence[str]) -> Data
     for name in places:
         values = np.concatenate(pieces.pop(name) or [np.empty(0)])
         columns[name] = Column(values, units[name], texts[name], examples[name], clocks.get(name))
-    notes = [] if layout.encoding.startswith("utf-8") else [f"{path.name}: read as {layout.encoding}"]
+    notes = [] if layout.encoding.startswith("utf-8") else [f"read in the encoding {layout.encoding}"]
     return DataTable(str(path), columns, notes=notes)
 
 
@@ -158,10 +160,10 @@ def _layout(path: Path, wanted: set[str]) -> _Layout:
         bare = _QUOTED.sub("", line)
         sign = next((one for one in ";\t" if one in bare), ",")
         found = _cells(line, sign)
-        hits = len({_named(cell)[0] for cell in found} & wanted)
+        hits = len({_named(cell, wanted)[0] for cell in found} & wanted)
         if hits > max(best, 0) or best < 0:
             best, header, cells, separator = hits, order, found, sign
-    named = [_named(cell) for cell in cells]
+    named = [_named(cell, wanted) for cell in cells]
     if all(not np.isnan(number(name)) for name, _ in named if name):
         first = ", ".join(cells[:4])
         remedy = "write the names of the columns in the first line, such as t [s],T1 [V]"
@@ -193,13 +195,21 @@ def _cells(line: str, separator: str) -> list[str]:
         return [line]
 
 
-def _named(cell: str) -> tuple[str, str]:
-    """Name and unit of a header's cell."""
-    cell = unguarded(cell)
+def _named(cell: str, wanted: Container[str]) -> tuple[str, str]:
+    """Name and unit of a header's cell: `T [V]`, and where it is a unit `T / V`, `T in V` or `T (V)`.
+
+    A name that is wanted with its unit in it stays whole.
+    """
+    cell = unguarded(cell.strip().strip('"').strip())
     found = _UNIT.match(cell)
-    if not found:
+    if found:
+        unit = "" if found[2].strip() in _NO_UNIT else found[2].strip()
+        return (cell if cell in wanted else found[1]), unit
+    found = _BEHIND.match(cell)
+    unit = (found[2] or found[3]).strip() if found else ""
+    if not found or not (_is_unit(unit) or unit in GERMAN):
         return cell, ""
-    return found[1], "" if found[2].strip() in _NO_UNIT else found[2].strip()
+    return (cell if cell in wanted else found[1]), unit
 
 
 def _above_numbers(rows: Sequence[Sequence[str]]) -> list[list[str]]:

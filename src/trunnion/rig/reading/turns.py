@@ -54,13 +54,13 @@ def cut(
     positions: int,
     spoilt: Array,
     account: Account,
-    name: str,
+    where: str,
 ) -> Turns:
     """The whole turns among the rows of a window that are allowed; those left out are told.
 
     shares: cycles gone through, rising with time, NaN where not known; spoilt: stretches of time to leave out.
     """
-    where, share, line = f"condition {name}", shares[window], times.part(window)
+    share, line = shares[window], times.part(window)
     known = np.isfinite(share)
     highest = np.maximum.accumulate(np.where(known, share, -np.inf))
     begin, end, numbers = _whole(share, highest, line)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,7 +54,7 @@ class Recorded:
     skipped: tuple[int, ...]
     findings: tuple[Finding, ...]
 
-    def seeded(self, seed: int) -> Recorded:
+    def seeded(self, seed: int) -> Self:
         """The same with the random numbers of another seed: other errors of the sensors, other noise."""
         check_seed(seed)
         drawn = {name: draw(channel, int(seed)) for name, channel in self.channels.items()}

@@ -111,7 +111,10 @@ def text(value: float, unit: str, digits: int = 3) -> str:
 
 
 def scale_of(result: xr.Dataset, channel: int, condition: int | None = None) -> tuple[float, str]:
-    """Factor and unit that a channel is read in, of one condition or of all."""
+    """Factor and unit that a channel is read in, of one condition or of all; a speed in the unit of its file."""
+    unit, size = (attribute(result, "channel_read_in") or [["", 1.0]] * (channel + 1))[channel]
+    if unit and units(result)[channel] == "rad/s":
+        return 1 / size, str(unit)
     where = slice(None) if condition is None else condition
     rows = [result[name].values[channel, where] for name in ("measured", "model")]
     sizes = np.abs(np.concatenate([row[np.isfinite(row)].ravel() for row in rows]))

@@ -21,7 +21,7 @@ def tables(measurement: Measurement) -> list[TextTable]:
     named, short = shortened([one.name for one in conditions])
     settings = [named] if named == "condition" else named.split(", ")
     head = [*settings, "turns", *(["speed rpm"] if speeds else [])]
-    head += [f"{name} {_unit(conditions[0].courses[name].unit)}".strip() for name in channels]
+    head += [f"{name} {_unit(conditions[0].courses[name].shown[0])}".strip() for name in channels]
     rows = []
     for one, name in list(zip(conditions, short, strict=True))[:MOST]:
         turns = max(course.turns.shape[0] for course in one.courses.values())
@@ -39,17 +39,18 @@ def tables(measurement: Measurement) -> list[TextTable]:
 
 def _channel(courses: list[Signal]) -> list[str]:
     """Measure and unit of a channel; extremes of its mean courses; RMS of scatter and of uncertainty."""
-    means = np.concatenate([one.mean for one in courses])
+    unit, factor = courses[0].shown
+    means = np.concatenate([one.mean for one in courses]) / factor
     known = means[np.isfinite(means)]
     extremes = [_figure(float(known.min())), _figure(float(known.max()))] if known.size else ["none", "none"]
     spreads = [np.concatenate([getattr(one, figure) for one in courses]) for figure in ("scatter", "uncertainty")]
-    return [courses[0].measures, _unit(courses[0].unit), *extremes, *(_figure(_rms(one), 3) for one in spreads)]
+    return [courses[0].measures, _unit(unit), *extremes, *(_figure(_rms(one) / factor, 3) for one in spreads)]
 
 
 def _overall(course: Signal) -> float:
     known = course.mean[np.isfinite(course.mean)]
     with np.errstate(over="ignore"):
-        return float(known.mean()) if known.size else np.nan
+        return float(known.mean()) / course.shown[1] if known.size else np.nan
 
 
 def _rms(values: np.ndarray) -> float:

@@ -155,7 +155,8 @@ CYCLE: dict[str, Sentence] = {
     ),
     "seat.held": Sentence(
         NOTE,
-        "the contact points move too fast to be differentiated {at}: velocities and accelerations there leave out the "
-        "motion of the pins within their play",
+        "the load of a pin changes its direction {at}, so that the pin jumps across its play: the pin of {joint} moves "
+        "by {jump:~m} from one position to the next; velocities and accelerations there leave out this motion",
+        "take velocities and accelerations from the positions beside these",
     ),
 }

@@ -133,7 +133,7 @@ def _summary(found: PlayEffects, units: Sequence[str], dial: Any) -> Iterator[Fi
             yield Figure(*worst, None, unit)
             continue
         top = int(np.nanargmax(total))
-        yield Figure(*worst, total[top], unit, "largest", f"at {dial.at(top)}")
+        yield Figure(*worst, total[top], unit, "maximum", f"at {dial.at(top)}")
         rss, deviation = (np.sqrt(np.sum(part[i, :, top] ** 2)) for part in (found.worst_case, found.deviation))
         yield Figure(f"{name}.rss", f"{name}, RSS there", rss, unit)
         yield Figure(f"{name}.deviation", f"{name}, standard deviation there", deviation, unit)

@@ -39,6 +39,7 @@ BALANCE = (
     ("friction_contraction", "Contraction", "1", "error ratio of successive iterations; below 1 it converges"),
     ("friction_residual", "Friction residual", "N", "largest difference between a friction force and its law"),
     ("friction_change", "Last change", "N", "change of the reactions in the last iteration"),
+    ("seat_rounds", "Seat iterations", "1", "iterations until the pins lie where their loads press them"),
 )
 
 
@@ -111,9 +112,10 @@ def _ordinal(shown: dict[str, Any]) -> str:
 
 
 def _summary(result: xr.Dataset) -> list[tuple[str, list[tuple[str, str]]]]:
-    """Subjects, each with its figures and what they are: ("drive torque of A", [("9.3 kN m", "largest, at 24°")])."""
+    """Subjects, each with its figures and what they are: ("drive torque of A", [("9.3 kN m", "maximum, at 24°")])."""
     found = []
-    for subject, members in groupby(summary_of(result), key=lambda one: one.subject):
+    headline = [one for one in summary_of(result) if not one.numerical]
+    for subject, members in groupby(headline, key=lambda one: one.subject):
         found.append((subject, [(_value(one), one.remark) for one in members]))
     return found
 
@@ -148,6 +150,11 @@ def _balance(result: xr.Dataset) -> list[dict[str, str]]:
         rows.append(
             _worst("Power balance residual", residual / most if most else residual, "1" if most else "W", meaning, over)
         )
+    error = column(result, "efficiency_error")
+    if error is not None and np.isfinite(error):
+        meaning = "effect of the errors of the integrals over the cycle"
+        rows.append({"label": "Error of the efficiency", "value": quantity(float(error), "1"), "place": "",
+                     "meaning": meaning})  # fmt: skip
     for name, label, unit, meaning in BALANCE:
         values = column(result, name)
         if values is not None:

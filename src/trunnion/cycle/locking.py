@@ -20,9 +20,10 @@ from trunnion.cycle.near_locking import (
 )
 from trunnion.errors import Coded, Finding, MechanismError, Status
 from trunnion.model.mechanism import Mechanism
-from trunnion.results.attributes import codes
+from trunnion.results.attributes import attribute, codes, encoded, finding_rows
 from trunnion.results.dataset import Variable, described
 from trunnion.results.figure import Figure
+from trunnion.results.sentences import finding_for
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.loads import useful_loads
 from trunnion.solve.run import Run, prepare
@@ -125,7 +126,10 @@ def look(run: Run, steps: int = 360, progress: Callable[[int], None] | None = No
     }
     found = result.assign(described(arrays, VARIABLES))
     found["locking_state"].attrs.update(codes("flag", LockingState))
-    return found
+    if not run.seats:
+        return found
+    seated = finding_for("locking.pins_centred", "joints", joints=[one.joint for one in run.seats])
+    return found.assign_attrs(encoded({"findings": [*attribute(found, "findings"), *finding_rows([seated])]}))
 
 
 def _efficiency_reverse(back: Reverse) -> NDArray[np.float64]:
@@ -161,7 +165,7 @@ def ranges(found: xr.Dataset, near: float = NEAR) -> list[LockingRange]:
     """The intervals of a result of `locking` in which its state stays the same, in the order of the cycle; after them
     those that run, but with a margin below `near`."""
     state, margin = found["locking_state"].values, found["locking_margin"].values
-    runs = [LockingRange(LockingState(int(state[run[0]])), *_worst(run, margin)) for run in _runs(state)]
+    runs = [LockingRange(list(LockingState)[int(state[run[0]])], *_worst(run, margin)) for run in _runs(state)]
     close = (margin < near) & (state < LockingState.LOCKED)
     return [*runs, *(LockingRange(None, *_worst(run, margin)) for run in _runs(close) if close[run[0]])]
 

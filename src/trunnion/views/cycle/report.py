@@ -22,6 +22,7 @@ from trunnion.results.figure import MORE_THAN, Figure
 from trunnion.results.quantities import number, quantity
 from trunnion.views.common.bundle import bundle, web_text
 from trunnion.views.common.cycle import abscissa, column, intervals, names
+from trunnion.views.common.markup import with_code
 from trunnion.views.cycle.deviations_tables import error_rows, loss_rows
 from trunnion.views.cycle.scene import scene
 
@@ -68,8 +69,10 @@ def report(result: xr.Dataset, ideal: xr.Dataset | None = None) -> str:
 @cache
 def _template() -> Template:
     from jinja2 import Environment, StrictUndefined
+    from markupsafe import Markup
 
     environment = Environment(autoescape=True, undefined=StrictUndefined, keep_trailing_newline=True)
+    environment.filters["code"] = lambda text: Markup(with_code(text))
     return environment.from_string(web_text("report.html.j2"))
 
 

@@ -38,7 +38,8 @@ def _sizes(result: xr.Dataset, variable: str, dim: str, name: str) -> Array | No
 def reactions(result: xr.Dataset, ideal: xr.Dataset | None, free: dict[str, Any]) -> Figure:
     """Magnitudes of the reaction and of its moment about the middle of the bearing, one panel each.
 
-    Joints with the same force and moment are one curve in either panel, for the legend is that of both. free: the look of curves without friction.
+    Joints with the same force and moment are one curve in either panel, for the legend is that of both.
+    free: the look of curves without friction.
     """
     over, joints = abscissa(result), names(result, "joint")
     figure = new("Joint reactions", result, 6.6)

@@ -69,7 +69,8 @@ def _margin(axes: Axes, result: xr.Dataset, over: Abscissa) -> None:
     top = MARGIN if reached else max(1.1 * largest, LEAST_TOP)
     along(axes, over, f"times the friction, searched to {MARGIN:g}" if reached else "times the friction", zero=False)
     axes.set_ylim(0.0, top)
-    curve(axes, over, _shown(margin), "locking margin, all friction", color=INK, linewidth=2.0)
+    never = f": more than {MARGIN:g}" if not np.isfinite(margin).any() else ""
+    curve(axes, over, _shown(margin), f"locking margin, all friction{never}", color=INK, linewidth=2.0)
     for label, first, values in joined({joint: _shown(values) for joint, values in known.items()}):
         curve(axes, over, values, f"{label} alone", linewidth=1.3, **style_of(first))
     axes.axhline(1.0, color=INK, linewidth=1.0, linestyle=(0, (3, 2)), zorder=1.6, label="locks at 1")

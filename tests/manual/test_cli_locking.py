@@ -64,7 +64,13 @@ def test_nothing_to_draw_without_friction(program: Run, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("place", "code", "part"),
-    [("30mm", 0, ""), ("1s", 0, ""), ("400mm", 2, "not in the cycle"), ("30deg", 2, "length"), ("there", 2, "no place")],
+    [
+        ("30mm", 0, ""),
+        ("1s", 0, ""),
+        ("400mm", 2, "not in the cycle"),
+        ("30deg", 2, "length"),
+        ("there", 2, "no place"),
+    ],
 )
 def test_a_place_in_plots(program: Run, tmp_path: Path, place: str, code: int, part: str) -> None:
     done = program("plot", PRESS, "--steps", 24, "--kind", "torque", "--at", place, "--out", "t.svg")

@@ -1,4 +1,4 @@
-"""Locking at every position: a crank against its friction circle in closed form, and what the states must agree with."""
+"""Locking at every position: a crank against its friction circle in closed form, and what its states agree with."""
 
 from __future__ import annotations
 

@@ -68,6 +68,8 @@ def test_a_dimension_of_two_links_is_named_by_check_and_by_tolerance() -> None:
 def test_a_dimension_of_one_link_or_without_tolerance_is_not() -> None:
     plain = slider(dimensions={"r": "60 mm ± 0.1 mm", "k": "200 mm"}, costs={})
     assert not coded(trunnion.check(plain), "tolerance.shared_dimension")
+    roller = trunnion.read(EXAMPLES / "one-way-clutch.yaml")  # its radius stands beside other dimensions of two links
+    assert not coded(trunnion.check(roller), "tolerance.shared_dimension")
 
 
 def test_the_tolerance_of_a_clearance_is_in_the_row_of_the_play() -> None:

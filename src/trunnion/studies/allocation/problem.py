@@ -114,7 +114,7 @@ class RowEffects:
     def say(self, row: int, value: float) -> str:
         """A deviation of a row with its sign and unit, angles in degrees, lengths in mm."""
         factor, unit = drawn_in(value, self.units[row]) if self.units else (1.0, "")
-        return signed(value, factor, unit)
+        return signed(value, factor, unit, digits=6)
 
     def spread(self) -> Array:
         """What RSS squares."""

@@ -37,7 +37,7 @@ TEXT_ONLY = os.environ.get("TRUNNION_DOCS") == "text"
 EMPTY = b'<svg xmlns="http://www.w3.org/2000/svg"/>'
 STEPS = 360  # positions of the figures and reports of pages, as `analyse` has them
 # folders of figures that a command draws
-COMMANDS = ("sweeps", "plays", "assembles", "tolerances", "allocates", "compares")
+COMMANDS = ("sweeps", "plays", "lockings", "assembles", "tolerances", "allocates", "compares")
 
 # model: (the model it is made from, what is replaced in it)
 VARIANTS: dict[str, tuple[str, dict[str, float | str]]] = {

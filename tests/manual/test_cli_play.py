@@ -74,7 +74,7 @@ def test_a_limit_is_a_finding_with_the_line_of_the_file(run: Run, tmp_path: Path
     trunnion.Mechanism(**data).write(tmp_path / "bar.yaml")
     code, _, err = run("bar.yaml", "--steps", 12, "--out", "bar.svg")
     assert code == 1
-    assert "measures.swing.limit: the worst case, " in err
+    assert "measures.swing.limit: the worst case to first order, " in err
     assert err.startswith("bar.yaml:")
     assert (tmp_path / "bar.svg").exists()
 
@@ -100,7 +100,7 @@ def test_faults(run: Run, tmp_path: Path, arguments: list[str], what: str) -> No
 def test_the_figure_stacks_the_joints_up_to_the_sum() -> None:
     result = trunnion.play(trunnion.read(SLIDER), ["piston.Q.x"], steps=72)
     (axes,) = figure(result).axes
-    total = next(line for line in axes.lines if line.get_label() == "sum: worst case").get_xydata()
+    total = next(line for line in axes.lines if line.get_label() == "sum: worst case, first order").get_xydata()
     assert total[-1, 0] == pytest.approx(360)  # the turn closes
     assert total[:-1, 1] == pytest.approx(result["worst_case_total"].values[0] * 1e6)
     assert len(axes.collections) == 4

@@ -164,7 +164,7 @@ def test_a_figure_shows_units_and_gaps() -> None:
     labels = axes.get_legend_handles_labels()[1]
     assert labels == ["A.pin.radius = 50 mm", "A.pin.radius = 100 mm"]
     assert axes.get_xlabel() == "AB [m]"
-    assert axes.get_ylabel() == "largest drive effort of A [kN m]"
+    assert axes.get_ylabel() == "maximum drive effort of A [kN m]"
     curve = axes.get_lines()[0]
     assert np.isnan(curve.get_ydata()).tolist() == np.isnan(grid["drive_effort_max"].values[0, :, 0]).tolist()
     assert "cannot be assembled" in [text.get_text() for text in axes.texts]

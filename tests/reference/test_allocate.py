@@ -228,7 +228,7 @@ def test_nothing_keeps_the_limits() -> None:
     worst = np.max(np.abs(slopes()).sum(axis=1)) * 2e-5
     assert f"the deviation is +{np.degrees(worst):.6g} deg at 20°" in said
     assert "measures.rocker-angle" in said
-    assert "the limit +0.05 deg is infeasible" in said
+    assert "the limit +0.05° is infeasible" in said
 
 
 def test_a_nominal_figure_beyond_its_bounds() -> None:

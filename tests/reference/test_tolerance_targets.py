@@ -40,7 +40,7 @@ def made(**limits: Any) -> dict[str, Any]:
         ({"limit": "±0.1 deg"}, ["linear", "worst-case"], ("worst case",)),
         ({"limit": "±0.05 deg"}, ["monte-carlo"], ("yield", "Cpk")),
         ({"limit": "±0.05 deg"}, ["linear", "worst-case", "monte-carlo"], ("worst case", "yield", "Cpk")),
-        ({"at_most": NOMINAL + 1e-3}, ["linear"], ("worst case", "at_most")),
+        ({"at_most": NOMINAL + 1e-3}, ["linear"], ("worst case", "at most")),
         ({"at_least": NOMINAL - 1e-2, "at_most": NOMINAL + 1e-2}, ["linear", "monte-carlo"], ()),
     ],
 )
@@ -133,7 +133,7 @@ def test_the_first_line_and_the_exit_status(tmp_path: Path, limit: str, code: in
     assert ("limits not met" in err) == bool(code)
     body = page.read_text("utf-8").partition("<main>")[2]
     first = re.sub(r"<[^>]+>", "", body).strip().partition("\n")[0]
-    assert first.startswith("measures.angle: limits not met") == bool(code)
+    assert first.startswith("Error measures.angle limits not met") == bool(code)
 
 
 def test_play_and_allocate_say_it_first_too(tmp_path: Path) -> None:
@@ -142,7 +142,7 @@ def test_play_and_allocate_say_it_first_too(tmp_path: Path) -> None:
     mechanism = fourbar(joints=joints, measures={"angle": {"angle": "rocker", "limit": "±0.01 deg"}}, costs=COSTS)
     status, out, _ = run(tmp_path, mechanism, "play")
     assert status == 1
-    assert out.startswith("measures.angle.limit: the worst case, ")
+    assert out.startswith("measures.angle.limit: the worst case to first order, ")
     status, out, _ = run(tmp_path, mechanism, "allocate", "--samples", "0")
     assert status == 1
     assert out.startswith("measures.angle: the limit ")

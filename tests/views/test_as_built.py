@@ -86,7 +86,7 @@ def test_the_transmission_error_of_a_four_bar_is_in_minutes_of_arc_with_its_wors
     axes = error(result).axes[1]
     assert "rotation [arcmin]" in axes.get_ylabel()
     assert _label(axes, "D").get_ydata()[:-1] == pytest.approx(60 * np.degrees(wrong))
-    (band,) = [one for one in axes.collections if one.get_label() == "worst case of the play"]
+    (band,) = [one for one in axes.collections if one.get_label() == "worst case of the play, first order"]
     x, y = band.get_paths()[0].vertices.T
     at = y[np.isclose(x, 60.0)]
     assert [at.min(), at.max()] == pytest.approx([-60 * 0.017902, 60 * 0.017902], rel=1e-4)

@@ -193,7 +193,7 @@ def test_a_map_has_both_names_with_units_and_a_scale_with_that_of_the_measure():
     sheet = figure(swept(GRID, cardan), "input.effort_max", x="input.speed", kind="map")
     axes, bar = sheet.axes
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("input.speed [rpm]", "misalignment [°]")
-    assert bar.get_ylabel() == "largest drive effort of input [kN m]"
+    assert bar.get_ylabel() == "maximum drive effort of input [kN m]"
     assert axes.get_xlim() == pytest.approx((50, 1500))
     assert [text.get_text() for text in bar.get_yticklabels()][:2] == ["7.0", "7.5"]
 

@@ -21,6 +21,7 @@ from trunnion.cli.data import data
 from trunnion.cli.edge import status_of
 from trunnion.cli.files import guarded
 from trunnion.cli.identify import identify
+from trunnion.cli.locking import locking
 from trunnion.cli.model import exit_status, lines_of, placed, stated
 from trunnion.cli.options import (
     IMAGES,
@@ -181,27 +182,7 @@ def design(
     show_figures(mechanism.name or str(file), figures)
 
 
-@verb
-def locking(
-    file: File, steps: Steps = 360, set_: Set = None, table: TableFile = None, friction: FrictionLaw = None
-) -> None:
-    """Margin against locking by friction; backdriving.
-
-    The margin for the friction of all joints and of each joint alone, other solutions of the friction equations, and
-    whether the useful loads can drive the mechanism backward.
-    """
-    from trunnion.cycle.locking import look, report_figures
-    from trunnion.solve.run import prepare
-
-    mechanism = stated(file, set_, table, friction)
-    with lines_of(file):
-        run = prepare(mechanism)
-        with bar("positions", steps, least=200_000) as progress:
-            found = look(run, steps, progress)
-    figures = report_figures(run, found)
-    Shown(found, file, ["assembly"], show=lambda: show_figures(mechanism.name or str(file), figures)).finish()
-
-
+verb(locking)
 verb(assemble)
 verb(tolerance)
 verb(allocate)
@@ -223,6 +204,14 @@ def plot(
     table: TableFile = None,
     friction: FrictionLaw = None,
     seat: Seats = None,
+    at: Annotated[
+        str | None,
+        typer.Option(
+            "--at",
+            help="Position to draw the mechanism in and to mark in curves: 60deg, 20mm, 0.1s.",
+            show_default=False,
+        ),
+    ] = None,
     image: Annotated[str, typer.Option("--format", help="png, svg, pdf or jpg, for a folder of plots.")] = "png",
     uncut: Uncut = False,
 ) -> None:
@@ -230,6 +219,7 @@ def plot(
     from trunnion.views.common.peaks import whole_peaks
     from trunnion.views.cycle.deviations_plot import with_worst_case
     from trunnion.views.cycle.plots import PLOTS, check_kinds, drawable, save
+    from trunnion.views.cycle.plots import figure as figure_of
 
     check_kinds(kind or [])
     single = out.suffix.lower() in IMAGES
@@ -243,7 +233,7 @@ def plot(
     if not single:
         folder(out)
     shown = whole_peaks(with_worst_case(result, mechanism) if "error" in (kind or PLOTS) else result, uncut)
-    for name, figure in [(name, PLOTS[name](shown, ideal)) for name in kind or drawable(result)]:
+    for name, figure in [(name, figure_of(shown, name, ideal, at)) for name in kind or drawable(result)]:
         path = out if single else out / f"{name}.{image.lstrip('.')}"
         save(figure, path)
         wrote(path)

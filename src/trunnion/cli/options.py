@@ -45,7 +45,9 @@ __all__ = [
 ]
 
 IMAGES = (".png", ".svg", ".pdf", ".jpg", ".jpeg")
-PLOT_KINDS = "torque, friction-power, reactions, polar, power, mechanism, motion, error, seat, beta or measures"
+PLOT_KINDS = (
+    "torque, friction-power, reactions, polar, power, mechanism, motion, error, seat, beta, locking or measures"
+)
 
 File = Annotated[Path, typer.Argument(help="Model file: YAML, JSON or TOML.", show_default=False)]
 Steps = Annotated[int, typer.Option("--steps", help="Equally spaced positions over the turn or range.")]
@@ -115,7 +117,7 @@ Columns = Annotated[
     list[str] | None,
     typer.Option(
         "--columns",
-        help="Columns of a table file: usual, motion (velocities, accelerations), all, or names. Repeatable.",
+        help="Columns of a table file: usual, motion (velocities, accelerations), locking, all, or names. Repeatable.",
         show_default=False,
     ),
 ]

@@ -101,7 +101,7 @@ def tolerance(
     mechanism = stated(file, set_, table, friction)
     for text in sample or []:
         mechanism = mechanism.with_samples(*named_file(text, "--sample"))
-    methods = tuple(method or DEFAULT_METHODS)
+    methods = tuple(method or (one for one in DEFAULT_METHODS if samples or one not in SAMPLINGS))
     counted = samples if any(one in SAMPLINGS for one in methods) else 0
     with lines_of(file), bar("samples", counted, least=1000) as progress:
         result = run(

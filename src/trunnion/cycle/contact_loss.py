@@ -301,7 +301,8 @@ def findings(found: Sequence[Loss], arrays: Arrays, joints: Sequence[str], dial:
         return
     held = np.flatnonzero((arrays["seat_travel"] == 0) & (arrays["status"] < Status.CONTACT_LOST))
     if len(held):
-        yield finding_for("seat.held", "joints", at=dial.intervals(held))
+        joint, jump = _jump(arrays["seat_offset"], held, joints)
+        yield finding_for("seat.held", "joints", at=dial.intervals(held), joint=joint, jump=jump)
     for loss in found:
         where = f"joints.{loss.joint}"
         if not loss.loaded:
@@ -314,6 +315,19 @@ def findings(found: Sequence[Loss], arrays: Arrays, joints: Sequence[str], dial:
         if len(loss.unsettled):
             worst = np.nanmax(arrays["seat_change"][loss.unsettled])
             yield finding_for("seat.unsettled", where, rounds=ROUNDS, at=dial.intervals(loss.unsettled), change=worst)
+
+
+def _jump(offsets: NDArray[np.float64], held: NDArray[np.intp], joints: Sequence[str]) -> tuple[str, float]:
+    """The joint whose pin moves furthest between some positions and those beside them, and how far, m.
+
+    offsets: of pins from the middle of their holes, (joint, end, axis, position), m.
+    """
+    step = np.sqrt(np.sum(np.diff(offsets, axis=-1) ** 2, axis=-2))  # (joint, end, step)
+    if not step.shape[-1]:
+        return joints[0], 0.0
+    beside = np.unique(np.clip([held - 1, held], 0, step.shape[-1] - 1))
+    furthest = np.nan_to_num(step[..., beside]).max(axis=(1, 2), initial=0.0)
+    return joints[int(np.argmax(furthest))], float(np.max(furthest))
 
 
 def _lost(loss: Loss, numbers: NDArray[np.float64], dial: Dial) -> Finding:

@@ -166,13 +166,15 @@ def error_figures(
             error = np.where(valid, np.abs(arrays[f"joint_{what}_error"][i]), np.nan)
             if (what == "rotation") == (not PAIRS[kind].guided) and np.any(np.isfinite(error)):
                 at, name = int(np.nanargmax(error)), f"{joint}.{what}_error_max"
-                yield Figure(name, f"transmission error of {joint}", error[at], unit, "largest", f"at {dial.at(at)}")
+                yield Figure(
+                    name, f"transmission error of {joint}", error[at], unit, "largest magnitude", f"at {dial.at(at)}"
+                )
     for i, joint in enumerate(run.system.mechanism.drivers):
         change = np.where(valid, arrays["drive_effort_change"][i], np.nan)
         if np.any(np.isfinite(change)):
             at, name = int(np.nanargmax(np.abs(change))), f"{joint}.effort_change_max"
             kind, unit = ("torque", "N m") if run.system.turns(joint) else ("force", "N")
             subject = f"change of the drive {kind} of {joint} by the errors"
-            yield Figure(name, subject, change[at], unit, "largest", f"at {dial.at(at)}")
+            yield Figure(name, subject, change[at], unit, "largest magnitude", f"at {dial.at(at)}")
     if run.seats:
-        yield Figure("seat_rounds", "seat iterations", np.max(arrays["seat_rounds"]), aspect="most")
+        yield Figure("seat_rounds", "seat iterations", np.max(arrays["seat_rounds"]), aspect="maximum")

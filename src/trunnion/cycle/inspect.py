@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from trunnion.algebra.dual import primal
-from trunnion.cycle import summary
+from trunnion.cycle import shared_dimensions, summary
 from trunnion.cycle.positions import positions
 from trunnion.cycle.scene import pitch_circles
 from trunnion.errors import Finding, Severity
@@ -72,6 +72,7 @@ def check(mechanism: Mechanism, steps: int = 360, progress: Callable[[int], None
     rank = run.determinacy.mobility if run.determinacy else _rank(walk)
     if run.determinacy is None and rank is not None and rank != run.system.plan.mobility:
         found.append(finding_for("mobility.special", "joints", formula=run.system.plan.mobility, rank=rank))
+    found += shared_dimensions.findings(mechanism)
     order = list(Severity)
     found.sort(key=lambda finding: order.index(finding.severity))
     return Check(run.system.plan, rank, run.chosen.found, choices(run), tuple(found), _gears(run))

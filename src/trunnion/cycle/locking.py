@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +18,12 @@ from trunnion.cycle.near_locking import (
     reverse,
     reverse_figure,
 )
-from trunnion.errors import Finding, MechanismError, Status
+from trunnion.errors import Coded, Finding, MechanismError, Status
 from trunnion.model.mechanism import Mechanism
+from trunnion.results.attributes import attribute, codes, encoded, finding_rows
 from trunnion.results.dataset import Variable, described
 from trunnion.results.figure import Figure
+from trunnion.results.sentences import finding_for
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.loads import useful_loads
 from trunnion.solve.run import Run, prepare
@@ -30,9 +32,38 @@ from trunnion.solve.system import Dial, rubbing
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["MOST_STEPS", "locking", "look", "report_figures"]
+__all__ = ["MOST_STEPS", "NEAR", "LockingRange", "LockingState", "locking", "look", "ranges", "report_figures"]
 
 MOST_STEPS = 8192
+ROUNDING = 1e-9  # of the largest power: what is less is no power
+NEAR = 1.5  # a locking margin below it counts as near locking, unless another is stated
+
+
+class LockingState(Coded):
+    """What friction does at a position: forward, and when all speeds are reversed."""
+
+    RUNS = 0, "runs; the useful loads do not push it backward"
+    BACKDRIVABLE = 1, "can be backdriven by the useful loads"
+    SELF_LOCKING = 2, "self-locking: the useful loads push it backward, but do not overcome friction"
+    LOCKED_BACKWARD = 3, "locked backward: no drive effort can move it backward"
+    LOCKED = 4, "locked: no drive effort can move it forward"
+    JAMMED = 5, "jammed: locked forward and backward"
+    UNSOLVED = 6, "not solved"
+
+
+class LockingRange(NamedTuple):
+    """Consecutive positions in one state, or with a margin below the one that counts as near locking.
+
+    state: None of the latter; first, last: numbers of positions; margin: the smallest locking margin in it, NaN if it
+    is not known; at: its position.
+    """
+
+    state: LockingState | None
+    first: int
+    last: int
+    margin: float
+    at: int
+
 
 VARIABLES = {
     "critical_multiple": Variable(
@@ -44,6 +75,10 @@ VARIABLES = {
     ),
     "power_delivered_reverse": Variable(("position",), "W", "power delivered to the drivers when backdriven"),
     "power_given_reverse": Variable(("position",), "W", "power supplied by the useful loads when backdriven"),
+    "efficiency_reverse_instant": Variable(
+        ("position",), "1", "power delivered to the drivers over power supplied by the useful loads, backward"
+    ),
+    "locking_state": Variable(("position",), "1", "what friction does forward and backward", np.int8),
 }
 
 
@@ -51,8 +86,10 @@ def locking(mechanism: Mechanism, steps: int = 360, progress: Callable[[int], No
     """The result of `analyse` with what is to know of locking at every position, by dims joint, driver and position.
 
     critical_multiple: by continuation from no friction, ∞ beyond 10; 0 for a joint without whose friction its group
-    still locks; NaN for joints without friction and positions without forces for another cause. The names, units and
-    meanings are in the Dataset. progress: called with the number of positions analysed.
+    still locks; NaN for joints without friction and positions without forces for another cause. locking_state: a code
+    of `LockingState`, whose words are its attribute `flag_meanings`; `ranges` has its intervals. Where pins have seats
+    the margin is that of the seated pins; the rest is that of pins in the middle of their play. The names, units
+    and meanings are in the Dataset. progress: called with the number of positions analysed.
     Raises MechanismError if the structure does not determine the motion, or for no steps or more than MOST_STEPS.
     """
     return look(prepare(mechanism), steps, progress)
@@ -84,8 +121,65 @@ def look(run: Run, steps: int = 360, progress: Callable[[int], None] | None = No
         "drive_effort_reverse": np.array(efforts).reshape(len(efforts), len(time)),
         "power_delivered_reverse": np.where(other.locked, np.nan, other.delivered),
         "power_given_reverse": other.given,
+        "efficiency_reverse_instant": _efficiency_reverse(other),
+        "locking_state": _states(status, other, known),
     }
-    return result.assign(described(arrays, VARIABLES))
+    found = result.assign(described(arrays, VARIABLES))
+    found["locking_state"].attrs.update(codes("flag", LockingState))
+    if not run.seats:
+        return found
+    seated = finding_for("locking.pins_centred", "joints", joints=[one.joint for one in run.seats])
+    return found.assign_attrs(encoded({"findings": [*attribute(found, "findings"), *finding_rows([seated])]}))
+
+
+def _efficiency_reverse(back: Reverse) -> NDArray[np.float64]:
+    """Of every position; NaN where the useful loads supply no power backward, or where that motion locks."""
+    with np.errstate(all="ignore"):
+        return np.where(_pushed(back) & ~back.locked, back.delivered / back.given, np.nan)
+
+
+def _pushed(back: Reverse) -> NDArray[np.bool_]:
+    """Where the useful loads supply power backward, and no rounding of none."""
+    found: NDArray[np.bool_] = back.given > ROUNDING * np.nanmax(np.abs(back.given), initial=0.0)
+    return found
+
+
+def _states(status: NDArray[Any], back: Reverse, known: NDArray[np.bool_]) -> NDArray[np.int8]:
+    """The code of `LockingState` of every position. known: where the forces or the cause of locking are known."""
+    ahead, behind = status == Status.LOCKED, back.locked
+    pushed = _pushed(back) & ~behind
+    cases = [
+        (~known, LockingState.UNSOLVED),
+        (ahead & behind, LockingState.JAMMED),
+        (ahead, LockingState.LOCKED),
+        (behind, LockingState.LOCKED_BACKWARD),
+        (pushed & (back.delivered > 0), LockingState.BACKDRIVABLE),
+        (pushed, LockingState.SELF_LOCKING),
+    ]
+    return np.select([of for of, _ in cases], [int(state) for _, state in cases], int(LockingState.RUNS)).astype(
+        np.int8
+    )
+
+
+def ranges(found: xr.Dataset, near: float = NEAR) -> list[LockingRange]:
+    """The intervals of a result of `locking` in which its state stays the same, in the order of the cycle; after them
+    those that run, but with a margin below `near`."""
+    state, margin = found["locking_state"].values, found["locking_margin"].values
+    runs = [LockingRange(list(LockingState)[int(state[run[0]])], *_worst(run, margin)) for run in _runs(state)]
+    close = (margin < near) & (state < LockingState.LOCKED)
+    return [*runs, *(LockingRange(None, *_worst(run, margin)) for run in _runs(close) if close[run[0]])]
+
+
+def _runs(values: NDArray[Any]) -> Iterator[NDArray[np.intp]]:
+    """Numbers of consecutive positions of one value."""
+    yield from np.split(np.arange(len(values)), np.flatnonzero(np.diff(values)) + 1)
+
+
+def _worst(run: NDArray[np.intp], margin: NDArray[np.float64]) -> tuple[int, int, float, int]:
+    """First and last of some positions, their smallest margin and where it is."""
+    own = margin[run]
+    at = int(run[np.nanargmin(own)]) if np.any(np.isfinite(own)) else int(run[0])
+    return int(run[0]), int(run[-1]), float(margin[at]), at
 
 
 def report_figures(run: Run, found: xr.Dataset) -> list[Figure]:
@@ -100,7 +194,7 @@ def report_figures(run: Run, found: xr.Dataset) -> list[Figure]:
     more = found["other_solutions"].values
     if np.any(more > 0):
         subject = f"other solutions of the friction equations, {dial.intervals(np.flatnonzero(more > 0))}"
-        figures.append(Figure("other_solutions", subject, np.nanmax(more), aspect="most"))
+        figures.append(Figure("other_solutions", subject, np.nanmax(more), aspect="maximum"))
     backward = reverse_figure(run, _reverse(found), useful_loads(run.system.mechanism))
     stays = Figure("efficiency_reverse", "efficiency when backdriven (the useful loads do no net work backward)", None)
     return [*figures, backward or stays]

@@ -66,8 +66,8 @@ class Watched:
                 own = measure.figure_unit(self.run.system, self.run.values)
                 yield Figure(name, subject, figure, own, measure.statistic.replace("-", " "))
             elif np.any(np.isfinite(values)):
-                yield Figure(f"{name}.min", subject, np.nanmin(values), unit, "least")
-                yield Figure(f"{name}.max", subject, np.nanmax(values), unit, "largest")
+                yield Figure(f"{name}.min", subject, np.nanmin(values), unit, "minimum")
+                yield Figure(f"{name}.max", subject, np.nanmax(values), unit, "maximum")
 
 
 def watched(run: Run, time: Array, method: FrictionMethod) -> Watched:

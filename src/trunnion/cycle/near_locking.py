@@ -166,7 +166,7 @@ def least_margin(name: str, subject: str, values: Array, dial: Dial, note: str =
     if not np.any(np.isfinite(values)):
         return Figure(name, subject, MARGIN, aspect=MORE_THAN, note=note)
     at = int(np.nanargmin(values))
-    return Figure(name, subject, values[at], aspect="least", place=f"at {dial.at(at)}", note=note)
+    return Figure(name, subject, values[at], aspect="minimum", place=f"at {dial.at(at)}", note=note)
 
 
 def critical_figure(run: Run, joint: str, multiple: float, place: str) -> Figure:

@@ -229,9 +229,9 @@ def _summary(run: Run, found: Positions, near: near_locking.Locking | None) -> I
         if near and (back := near_locking.reverse_figure(run, near.back, useful_loads(run.system.mechanism))):
             yield back
         residual = balance(arrays) if np.any(counted) else None
-        yield Figure("power_residual", "power balance residual", residual, aspect="largest, of peak power")
+        yield Figure("power_residual", "power balance residual", residual, aspect="maximum, of peak power")
     rounds = int(np.max(arrays["friction_iterations"]))
-    yield Figure("friction_iterations", "friction iterations", rounds, aspect="most")
+    yield Figure("friction_iterations", "friction iterations", rounds, aspect="maximum")
     lost = int(np.count_nonzero(status == Status.CONTACT_LOST))
     solved = int(np.count_nonzero(counted)) - lost
     yield Figure("positions_solved", "positions solved", solved, aspect=f"of {len(found.time)}")
@@ -242,7 +242,7 @@ def _summary(run: Run, found: Positions, near: near_locking.Locking | None) -> I
 def _effort_figures(system: System, found: Positions, dial: Dial, sound: NDArray[np.intp]) -> Iterator[Figure]:
     for i, (name, unit) in enumerate(zip(system.mechanism.drivers, effort_units(system), strict=True)):
         effort, subject = found.arrays["drive_effort"][i], f"drive {'torque' if unit == 'N m' else 'force'} of {name}"
-        for end, aspect, pick in (("min", "least", np.argmin), ("max", "largest", np.argmax)) if len(sound) else ():
+        for end, aspect, pick in (("min", "minimum", np.argmin), ("max", "maximum", np.argmax)) if len(sound) else ():
             k = int(sound[pick(effort[sound])])
             yield Figure(f"{name}.effort_{end}", subject, effort[k], unit, aspect, f"at {dial.at(k)}")
         yield Figure(f"{name}.effort_rms", subject, found.means.drive_effort_rms[i], unit, "RMS")
@@ -261,7 +261,7 @@ def _friction_figures(
     if len(sound):
         lost = np.sum(found.arrays["friction_power"], axis=0)
         top = int(sound[np.argmax(lost[sound])])
-        yield Figure("friction_power_max", "friction power", lost[top], "W", "largest", f"at {dial.at(top)}")
+        yield Figure("friction_power_max", "friction power", lost[top], "W", "maximum", f"at {dial.at(top)}")
 
 
 def sound_positions(status: NDArray[Any]) -> NDArray[np.intp]:
@@ -284,7 +284,7 @@ def _reaction_figures(system: System, arrays: Arrays, dial: Dial, sound: NDArray
             top = int(sound[np.argmax(size[sound])])
             if system.mechanism.space == "planar" or size[top] > _rounding(arrays, variable):
                 key = f"{name}.{what.replace(' ', '_')}_max"
-                yield Figure(key, f"{what} of {name}", size[top], unit, "largest", f"at {dial.at(top)}")
+                yield Figure(key, f"{what} of {name}", size[top], unit, "maximum", f"at {dial.at(top)}")
         slide = arrays["joint_slide"][i]
         slide = slide[arrays["status"] != Status.CONTACT_LOST]
         if PAIRS[kind].guided and np.any(np.isfinite(slide)):

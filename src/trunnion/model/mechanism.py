@@ -295,6 +295,8 @@ class Mechanism(Numbers):
             if key == "direction" and below in (["x"], ["y"], ["z"]):
                 return path, (*holder, part, key, "xyz".index(below[0]))
             return None if below or key in ("fit", "direction") else (path, (*holder, part, key))
+        if name == "joint_defaults.friction":  # as a file has it: a plain number is the coefficient
+            name += ".coefficient"
         before, found, key = name.rpartition(".friction.")
         if before == "joint_defaults" and key in FRICTION_LAWS[self._default_law].parameters:
             return name, (before, "friction", key)

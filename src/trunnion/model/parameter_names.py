@@ -9,6 +9,7 @@ from trunnion.model.names import as_key, nearest
 
 __all__ = ["ERRORS", "ParameterNames"]
 
+SHORT_FORM = "coefficient"  # what a plain number as friction states
 ERRORS = "errors."  # before the path of a number: that of its deviation
 
 
@@ -38,6 +39,9 @@ class ParameterNames:
                 Finding(f"the name '{name}' stands for {len(paths)} numbers", remedy=f"say which: {some}")
             )
         below = [path for path in self.paths if f".{path}.".find(f".{name}.") >= 0]
+        short = [path for path in below if path.endswith(f"{name}.{SHORT_FORM}")]
+        if len(short) == 1 and name.endswith("friction"):  # `friction: 0.1` in a file is the coefficient, so here too
+            return short[0]
         if below:
             some = ", ".join(below[:6]) + (", …" if len(below) > 6 else "")
             raise MechanismError(Finding(f"'{name}' is not one number", remedy=f"set one of {some}"))

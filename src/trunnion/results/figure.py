@@ -9,6 +9,8 @@ from typing import Any
 
 __all__ = ["MORE_THAN", "Figure"]
 
+# names of figures that say how well a result is solved, and nothing of the mechanism
+NUMERICAL = ("efficiency_error", "power_residual", "friction_iterations", "seat_rounds")
 MORE_THAN = "more than"  # the aspect of a figure that is known from below only
 
 
@@ -17,7 +19,7 @@ class Figure:
     """One number of the summary of a result.
 
     name: what a program asks for, such as `A.effort_max`; subject: in words; value: in `unit`, None if there is none,
-    or words; aspect: which of the subject's figures, as "largest"; place: where in the cycle, as "at 24°"; note: what
+    or words; aspect: which of the subject's figures, as "maximum"; place: where in the cycle, as "at 24°"; note: what
     is to be known of the subject.
     """
 
@@ -35,8 +37,13 @@ class Figure:
             object.__setattr__(self, "value", float(self.value) if isfinite(self.value) else None)
 
     @property
+    def numerical(self) -> bool:
+        """Whether it is a figure of the solution and not of the mechanism: a report has it in a table of its own."""
+        return self.name in NUMERICAL
+
+    @property
     def label(self) -> str:
-        """What it is, in words: "drive torque of A, largest, at 24°"."""
+        """What it is, in words: "drive torque of A, maximum, at 24°"."""
         note = f" ({self.note})" if self.note else ""
         return ", ".join(part for part in (f"{self.subject}{note}", self.aspect, self.place) if part)
 

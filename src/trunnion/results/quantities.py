@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-__all__ = ["between", "number", "parts", "prefixed", "quantity", "readable"]
+__all__ = ["between", "drawn_in", "number", "parts", "prefixed", "quantity", "readable", "signed"]
 
 PREFIXES = {-4: "p", -3: "n", -2: "µ", -1: "m", 0: "", 1: "k", 2: "M", 3: "G"}
 SCALABLE = ("N m", "N", "W", "m", "s", "J", "Pa")
@@ -73,6 +73,17 @@ def parts(value: float, unit: str, digits: int = 6) -> tuple[str, str]:
 def readable(value: float, unit: str = "", digits: int = 4) -> str:
     """A quantity within a sentence: "18.75 kN m", "−0.5°", "3.10×10⁻¹²"."""
     text, shown = parts(value, unit, digits)
+    return f"{text}{'' if shown in ('°', '') else ' '}{shown}"
+
+
+def drawn_in(peak: float, unit: str) -> tuple[float, str]:
+    """The factor and the unit of what has limits: lengths in mm as on a drawing, others as `prefixed` has them."""
+    return (1e3, "mm") if unit == "m" else prefixed(peak, unit)
+
+
+def signed(value: float, factor: float, shown: str, sign: str = "+", digits: int = 4) -> str:
+    """A deviation in a unit of `drawn_in`: "+0.4831°", "−0.8014 mm"; sign: "" for a plus that is not written."""
+    text = format(value * factor + 0.0, f"{sign}.{digits}g").replace("-", "−")
     return f"{text}{'' if shown in ('°', '') else ' '}{shown}"
 
 

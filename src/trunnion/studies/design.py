@@ -409,7 +409,7 @@ def report_figures(mechanism: Mechanism, steps: int = 720, fluctuation: float = 
     figures = [Figure("grashof", "four-bar type (Grashof)", found.grashof)] if found.grashof else []
     for name, angle in found.transmission_angle.items():
         subject = f"transmission angle of {name}"
-        figures.append(Figure(f"{name}.transmission_angle", subject, angle * 180 / np.pi, "°", "least"))
+        figures.append(Figure(f"{name}.transmission_angle", subject, angle * 180 / np.pi, "°", "minimum"))
     figures += [_pressure(name, extremes, scale, unit) for name, extremes in found.pressure_angle.items()]
     for name, places in found.dead_centres.items():
         if places:
@@ -418,10 +418,10 @@ def report_figures(mechanism: Mechanism, steps: int = 720, fluctuation: float = 
     text = ", ".join(f"{low * scale:.6g} … {high * scale:.6g}" for low, high in found.limits) or "no position"
     figures += [
         Figure("limits", "range of assembly", text, f"{unit} of {driver}" if driver else ""),
-        Figure("shaking_force", "shaking force", found.shaking_force, "N", "largest"),
-        Figure("shaking_moment", "shaking moment about the ground's origin", found.shaking_moment, "N m", "largest"),
+        Figure("shaking_force", "shaking force", found.shaking_force, "N", "maximum"),
+        Figure("shaking_moment", "shaking moment about the ground's origin", found.shaking_moment, "N m", "maximum"),
         Figure("effort_rms", "drive effort", found.rms_effort, "N m" if turns else "N", "RMS"),
-        Figure("peak_power", "drive power", found.peak_power, "W", "largest"),
+        Figure("peak_power", "drive power", found.peak_power, "W", "maximum"),
         Figure("mean_power", "drive power", found.mean_power, "W", "mean"),
         Figure("energy_swing", "energy swing about the mean", found.energy_swing, "J"),
     ]

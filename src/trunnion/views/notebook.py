@@ -20,6 +20,7 @@ from trunnion.results.attributes import findings_of, summary_of
 from trunnion.results.figure import MORE_THAN, Figure
 from trunnion.results.quantities import readable
 from trunnion.results.tables import kind_of
+from trunnion.views.common.markup import with_code
 from trunnion.views.cycle import plots
 
 if TYPE_CHECKING:
@@ -125,10 +126,10 @@ def _findings(findings: Iterable[Finding]) -> str:
     rows = []
     for one in findings:
         where = f"<code>{escape(one.where)}</code> " if one.where else ""
-        remedy = f" — {escape(one.remedy)}" if one.remedy else ""
+        remedy = f" — {with_code(one.remedy)}" if one.remedy else ""
         severity = str(one.severity)
         head = f'<b style="color:{COLOURS.get(severity, "inherit")}">{escape(severity)}</b>'
-        rows.append(f"<li>{head} {where}{escape(one.what)}{remedy}</li>")
+        rows.append(f"<li>{head} {where}{with_code(one.what)}{remedy}</li>")
     if not rows:
         return ""
     more = _more(len(rows) - MOST_FINDINGS, "findings")

@@ -16,7 +16,10 @@ def _centred(joints: Sequence[str], seatable: Sequence[str]) -> str:
     if not seatable:
         return "see `trunnion play` for the effect of the play, `trunnion assemble` for whether the links fit together"
     of = f" of {', '.join(seatable)}" if len(seatable) < len(joints) else ", or analyse with --seat loaded"
-    return f"state seat: loaded{of}; see `trunnion play` for the effect of the play"
+    return (
+        f"for pins pressed to one side by their loads state seat: loaded{of}; `trunnion play` and `trunnion tolerance` "
+        "cover all positions of these pins, also with that seat"
+    )
 
 
 def _locked(at: str, share: float, joints: Sequence[str], reverse: str, decides: str, multiple: float | None) -> str:
@@ -131,6 +134,11 @@ CYCLE: dict[str, Sentence] = {
         "the friction equations have up to {count} other {count:#solution/solutions} {at}",
         "the solution that is continuous with the one without friction is given; in another the mechanism may wedge",
     ),
+    "locking.pins_centred": Sentence(
+        NOTE,
+        "the locking margin is that with the seats of {joints}; critical multiples of single joints and the motion "
+        "backward are those of pins in the middle of their play",
+    ),
     "contact.lost": Sentence(
         WARNING,
         "the {part} loses contact {at}: its load falls to {least:~N} (peak {peak:~N}) and reverses, and the pin would "
@@ -155,7 +163,8 @@ CYCLE: dict[str, Sentence] = {
     ),
     "seat.held": Sentence(
         NOTE,
-        "the contact points move too fast to be differentiated {at}: velocities and accelerations there leave out the "
-        "motion of the pins within their play",
+        "the load of a pin changes its direction {at}, so that the pin jumps across its play: the pin of {joint} moves "
+        "by {jump:~m} from one position to the next; velocities and accelerations there leave out this motion",
+        "take velocities and accelerations from the positions beside these",
     ),
 }

@@ -44,8 +44,15 @@ PLAY = {
     ),
     "play.seats_not_taken": Sentence(
         NOTE,
-        "play is relative to the middle of the holes: this study ignores the seats of {joints}",
-        "`trunnion analyse` uses them",
+        "play is relative to the middle of the holes: the worst case is over all positions of the pins and does not "
+        "use the seats of {joints}",
+        "`trunnion analyse` has the deviation with these seats",
+    ),
+    "play.beyond_first_order": Sentence(
+        NOTE,
+        "pins in their holes can change it by {exact:~{unit}} (at {at}), {percent:.2g} % more than the worst case to "
+        "first order, {first:~{unit}}",
+        "use the larger figure",
     ),
     "play.left_out": Sentence(
         WARNING, "the play of {joints} is left out ({kinds} joints)", "play is modelled in {modelled} joints"
@@ -63,10 +70,13 @@ PLAY = {
     "play.no_answer": Sentence(ERROR, "{status} {at}", "the effect of play is undefined there"),
     "limit.exceeded": Sentence(
         ERROR,
-        "the worst case, {worst:~{unit}} at {at}, exceeds the limit of {limit:~{unit}}; it exceeds it {over}",
+        "the worst case to first order, {worst:~{unit}} at {at}, exceeds the limit of {limit:~{unit}}; it does so "
+        "{over}",
         "reduce the play of the joints with the largest share",
     ),
-    "limit.kept": Sentence(NOTE, "the worst case, {worst:~{unit}} at {at}, is within the limit of {limit:~{unit}}"),
+    "limit.kept": Sentence(
+        NOTE, "the worst case to first order, {worst:~{unit}} at {at}, is within the limit of {limit:~{unit}}"
+    ),
 }
 
 SWEEP = {
@@ -105,6 +115,7 @@ ASSEMBLY = {
 }
 
 TOLERANCE = {
+    "tolerance.method_alias": Sentence(NOTE, "RSS is a figure of the method {method}, which was used", "name {method}"),
     "limit.missed": Sentence(ERROR, "limits not met: {told}; {limits}", "{remedy}"),
     "limit.missed_yield": Sentence(
         ERROR, "limits not met: {told}, required {target_percent:.6g} %; {limits}", "{remedy}"
@@ -117,12 +128,23 @@ TOLERANCE = {
     ),
     "tolerance.seats_not_taken": Sentence(
         NOTE,
-        "pins can be anywhere in their holes: this study ignores seat: loaded of {joints}",
-        "`trunnion analyse` uses it",
+        "the pins of {joints} can be anywhere in their holes here: seat: loaded is one of these positions and limits "
+        "nothing",
+        "`trunnion analyse` has the deviation with that seat",
     ),
     "tolerance.correlations_left_out": Sentence(
         NOTE,
         "RSS and worst case ignore the correlations; standard deviation, shares of variance and samples include them",
+    ),
+    "tolerance.shared_dimension": Sentence(
+        NOTE,
+        "one tolerance sets points of {links} ({shown}): these links deviate together, by the same amount",
+        "if the links are made separately, give each a dimension of its own with its own tolerance",
+    ),
+    "tolerance.play_size": Sentence(
+        NOTE,
+        "the tolerance of {numbers} enlarges the play: its effect is in the row of {plays}, whose limit is the largest "
+        "play",
     ),
     "tolerance.indices_lost": Sentence(
         WARNING,
@@ -227,6 +249,12 @@ ALLOCATION = {
     "allocation.not_for_sale": Sentence(
         WARNING, "this tolerance is not allocated: {why}", "remove the cost; the tolerance stays as stated"
     ),
+    "allocation.play_tolerance": Sentence(
+        NOTE,
+        "the clearance is allocated; the tolerance {lower_um:+g}/{upper_um:+g} µm of {number} stays as stated, in "
+        "addition to it, and the limits include it",
+        "remove this tolerance if the cost covers the largest clearance",
+    ),
     "allocation.unsettled": Sentence(
         WARNING,
         "the effects depend on the tolerances themselves and did not converge in {rounds} iterations",
@@ -243,9 +271,9 @@ ALLOCATION = {
     ),
     "allocation.worst_case_beyond": Sentence(
         WARNING,
-        "the worst case of the mechanism exceeds the limit {limit:~{unit}} by {percent:.2g} %; to first order it "
-        "is met",
-        "use `exact`, which narrows the tolerances",
+        "the worst case of the mechanism, {worst:~{unit}}, exceeds the limit {limit:~{unit}} by {percent:.2g} %; to "
+        "first order it is met (up to {accepted:g} % beyond is accepted)",
+        "use --exact (in Python exact=True), which narrows the tolerances",
     ),
     "yield.short": Sentence(
         ERROR,

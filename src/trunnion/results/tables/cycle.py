@@ -13,7 +13,7 @@ from trunnion.results.tables.column import Column, column, status_column, time_c
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["motion", "positions", "rest"]
+__all__ = ["locking", "motion", "positions", "rest"]
 
 RATES = ("", "_velocity", "_acceleration")
 # what only `rest` has, beside the motion: variable, the dimension whose names stand before the column's name, that name
@@ -25,6 +25,7 @@ REST = (
     ("contact_loss_number", "joint", "contact_loss_number"),
     *((name, "", name) for name in (
         "efficiency_instant", "locking_margin", "other_solutions", "power_delivered_reverse", "power_given_reverse",
+        "efficiency_reverse_instant",
         "closure_residual", "condition", "power_residual", "friction_iterations", "friction_change",
         "friction_residual", "friction_contraction", "seat_change", "seat_travel",
     )),
@@ -90,7 +91,11 @@ def rest(result: xr.Dataset) -> list[Column]:
         if not dim:
             found.append(column(result, variable, name, ()))
         else:
-            found += [column(result, variable, f"{of}.{name}", (i,)) for i, of in enumerate(result[dim].values)]
+            own = attribute(result, "driver_units") if variable == "drive_effort_reverse" else []
+            for i, of in enumerate(result[dim].values):
+                title, unit, values = column(result, variable, f"{of}.{name}", (i,))
+                found.append((title, own[i] if own else unit, values))
+    found += _locking_state(result)
     if "link_error" in result:
         for i, link in enumerate(result["link"].values):
             vectorial = "axis" in result["link_error"].dims
@@ -100,6 +105,30 @@ def rest(result: xr.Dataset) -> list[Column]:
                 else [column(result, "link_error", f"{link}.angle_error", (i,))]
             )
     return found
+
+
+def locking(result: xr.Dataset) -> list[Column]:
+    """What `locking` tells of each position; of a result of `analyse` the columns that it has."""
+    found = [time_column(result)]
+    if "drive" in result.coords:
+        found.append(("drive", str(result["drive"].attrs["units"]), lambda window: result["drive"].values[window]))
+    found += [one for one in rest(result) if one[0] == "locking_margin" or one[0].endswith(".critical_multiple")]
+    for i, (driver, unit) in enumerate(zip(result["driver"].values, attribute(result, "driver_units"), strict=True)):
+        for end in ("", "_reverse"):
+            if f"drive_effort{end}" in result:
+                values = column(result, f"drive_effort{end}", "", (i,))[2]
+                found.append((f"{driver}.effort{end}", unit, values))
+    wanted = ("efficiency_instant", "efficiency_reverse_instant", "other_solutions", "power_delivered_reverse")
+    found += [column(result, name, name, ()) for name in (*wanted, "power_given_reverse") if name in result]
+    return [*found, *_locking_state(result), status_column(result)]
+
+
+def _locking_state(result: xr.Dataset) -> list[Column]:
+    """What friction does at every position, in words; none of a result that has not been asked."""
+    if "locking_state" not in result:
+        return []
+    words = np.array(str(result["locking_state"].attrs["flag_meanings"]).split())
+    return [("locking_state", "", lambda window: words[result["locking_state"].values[window]])]
 
 
 def _measures(result: xr.Dataset) -> list[Column]:

@@ -21,14 +21,20 @@ def _motion(result: xr.Dataset, table: str) -> list[Column]:
     return cycle.motion(result) if _of_cycle(result) else columns(result, table)
 
 
+def _locking(result: xr.Dataset, table: str) -> list[Column]:
+    return cycle.locking(result) if _of_cycle(result) else columns(result, table)
+
+
 def _all(result: xr.Dataset, table: str) -> list[Column]:
     usual = columns(result, table)
     return _once([*usual, *cycle.motion(result), *cycle.rest(result)]) if _of_cycle(result) else usual
 
 
-# usual: what a file has if nothing is asked for; motion: coordinates, velocities and accelerations; all: whatever there
-# is at each position
-GROUPS: dict[str, Callable[[xr.Dataset, str], list[Column]]] = {"usual": columns, "motion": _motion, "all": _all}
+# usual: what a file has if nothing is asked for; motion: coordinates, velocities and accelerations; locking: margins,
+# efficiency and effort forward and backward; all: whatever there is at each position
+GROUPS: dict[str, Callable[[xr.Dataset, str], list[Column]]] = {
+    "usual": columns, "motion": _motion, "locking": _locking, "all": _all,
+}  # fmt: skip
 
 
 def selected(result: xr.Dataset, wanted: Sequence[str] | None = None, table: str = "") -> list[Column]:

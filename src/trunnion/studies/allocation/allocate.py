@@ -19,12 +19,12 @@ from trunnion.deprecation import renamed
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.prices import Price
+from trunnion.results.quantities import drawn_in, signed
 from trunnion.results.sentences import finding_for
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.statistics.costs import Cost
 from trunnion.studies.allocation.problem import (
     CRITERIA,
-    SHOWN,
     AllocationProblem,
     Answer,
     Contribution,
@@ -374,8 +374,8 @@ def _off(now: ToleranceStudy) -> list[Finding]:
             measure, nominal = of.measure, of.reference.figure
             word, bound = ("at_least", nominal + lower) if lower > 0 else ("at_most", nominal + upper)
             unit = measure.figure_unit(now.run.system, now.run.values)
-            factor, shown = SHOWN.get(unit, (1.0, "" if unit == "1" else unit))
-            texts = (f"{factor * value:.6g} {shown}".rstrip() for value in (nominal, bound))
+            factor, shown = drawn_in(bound, unit)
+            texts = (signed(value, factor, shown, "", 6) for value in (nominal, bound))
             phrases = dict(zip(("told", "limit"), texts, strict=True))
             where = f"measures.{measure.name}"
             found.append(

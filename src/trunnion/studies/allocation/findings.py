@@ -12,7 +12,6 @@ from trunnion.results.attributes import attribute
 from trunnion.results.figure import Figure
 from trunnion.results.sentences import finding_for
 from trunnion.studies.allocation.outcome import CLOSE, DEFAULT_YIELD, share_of
-from trunnion.studies.allocation.problem import SHOWN
 from trunnion.studies.tolerance.targets import limits
 
 if TYPE_CHECKING:
@@ -23,6 +22,7 @@ if TYPE_CHECKING:
 __all__ = ["findings_of", "summary"]
 
 TWICE = 2.0  # so many rejects as an RSS stands for are an error
+SHOWN = {"rad": (180 / np.pi, "deg"), "m": (1e3, "mm")}
 ROUGH, SLIGHT = 0.01, 0.001  # of a limit: what first order may leave out before it is an error, and a warning
 
 
@@ -53,6 +53,7 @@ def findings_of(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:
         yield finding_for("allocation.proven_margin")
     elif answer.proven:
         yield finding_for("allocation.proven", gap=max(answer.gap, 0.0))
+    yield from _plays(found)
     for name, share in found.tight.items():
         yield finding_for("allocation.narrowed", f"measures.{name}", percent=100 * (1 - share))
     if found.asked.criterion != "yield" and found.study.effects.correlated:
@@ -67,6 +68,17 @@ def findings_of(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:
     if len(kept) < len(found.offers):
         points, least = len(found.offers), min(kept, default=None)
         yield finding_for("allocation.curve_short", points=points, lost=points - len(kept), least=least)
+
+
+def _plays(found: Allocated) -> Iterator[Finding]:
+    """Allocated plays whose clearance has a tolerance of its own, which no cost is of."""
+    for path in found.prices:
+        joint = path.split(".")[1]
+        sizes = [f"joints.{joint}.{part}.clearance" for part in ("pin", "guide")]
+        for one in found.study.inputs.tolerances:
+            if path == f"joints.{joint}.clearance" and one.path in sizes:
+                ends: dict[str, Any] = {"lower_um": 1e6 * one.lower, "upper_um": 1e6 * one.upper}
+                yield finding_for("allocation.play_tolerance", f"costs.{joint}.clearance", number=one.path, **ends)
 
 
 def _yielded(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:
@@ -109,5 +121,5 @@ def _searched(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:
         severity = Severity.ERROR if beyond > ROUGH else Severity.WARNING if beyond > SLIGHT else Severity.NOTE
         yield finding_for(
             "allocation.worst_case_beyond", f"measures.{of.measure.name}", severity=severity, worst=factor * value,
-            unit=unit, percent=100 * beyond, limit=factor * limit,
+            unit=unit, percent=100 * beyond, limit=factor * limit, accepted=100 * ROUGH,
         )  # fmt: skip

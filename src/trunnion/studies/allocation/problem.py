@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError, agreeing
+from trunnion.results.quantities import drawn_in, signed
 from trunnion.results.sentences import finding_for
 from trunnion.statistics.costs import Cost
 
@@ -43,7 +44,6 @@ CRITERIA: dict[Criterion, str] = {
     "rss": "the root of the sum of squares keeps every limit",
     "yield": "the stated share of mechanisms keeps every limit",
 }
-SHOWN = {"rad": (180 / np.pi, "deg"), "m": (1e3, "mm")}
 ALLOWED = 1e-9  # of a limit: how far a row may lie beyond it
 PROVEN = 1e-9  # of the cost that tolerances change: a gap below it proves the optimum
 
@@ -113,8 +113,8 @@ class RowEffects:
 
     def say(self, row: int, value: float) -> str:
         """A deviation of a row with its sign and unit, angles in degrees, lengths in mm."""
-        factor, unit = SHOWN.get(self.units[row], (1.0, self.units[row])) if self.units else (1.0, "")
-        return f"{factor * value:+.6g} {unit}".removesuffix(" 1").rstrip()
+        factor, unit = drawn_in(value, self.units[row]) if self.units else (1.0, "")
+        return signed(value, factor, unit, digits=6)
 
     def spread(self) -> Array:
         """What RSS squares."""

@@ -34,7 +34,7 @@ VARIABLES: dict[str, Variable] = {
     "value": Variable(OVER, "", "the measure with every pin in the middle of its hole"),
     "worst_case": Variable(BY_JOINT, "", "largest change that the play of the joint can make, to either side"),
     "deviation": Variable(BY_JOINT, "", "standard deviation by the play of the joint, pins anywhere in their holes"),
-    "worst_case_total": Variable(OVER, "", "worst case of all joints: the sum"),
+    "worst_case_total": Variable(OVER, "", "worst case of all joints to first order: the sum"),
     "rss": Variable(OVER, "", "root of the sum of the squares of the joints' worst cases"),
     "deviation_total": Variable(OVER, "", "standard deviation by the play of all joints, independent of one another"),
     "sensitivity": Variable(
@@ -128,12 +128,12 @@ def _summary(found: PlayEffects, units: Sequence[str], dial: Any) -> Iterator[Fi
     """Of each measure the largest worst case, what each joint has in it, RSS and deviation there."""
     for i, (measure, unit) in enumerate(zip(found.measures, units, strict=True)):
         name, total = measure.name, relied_on(found.total[i], found.status)
-        worst = f"{name}.worst_case", f"{name}, worst case"
+        worst = f"{name}.worst_case", f"{name}, worst case to first order"
         if not np.any(np.isfinite(total)):
             yield Figure(*worst, None, unit)
             continue
         top = int(np.nanargmax(total))
-        yield Figure(*worst, total[top], unit, "largest", f"at {dial.at(top)}")
+        yield Figure(*worst, total[top], unit, "maximum", f"at {dial.at(top)}")
         rss, deviation = (np.sqrt(np.sum(part[i, :, top] ** 2)) for part in (found.worst_case, found.deviation))
         yield Figure(f"{name}.rss", f"{name}, RSS there", rss, unit)
         yield Figure(f"{name}.deviation", f"{name}, standard deviation there", deviation, unit)

@@ -17,7 +17,6 @@ a ball. Both are of first order in the play.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -43,6 +42,8 @@ from trunnion.solve.run import Run, prepare
 from trunnion.solve.shifts import HOLE, Play
 from trunnion.solve.status import pose_status, status_of
 from trunnion.solve.system import System, Values
+from trunnion.studies.play.effect import Effect
+from trunnion.studies.play.exact import beyond_first_order
 from trunnion.studies.play.result import dataset, relied_on
 
 if TYPE_CHECKING:
@@ -109,29 +110,6 @@ def variance(loads: Sequence[Vector], radii: Sequence[Number]) -> Number:
 
 
 # ---- over the cycle -------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Effect:
-    """What play does over the cycle. measures; plays by joint; time, s, (position,); value (measure, position);
-    worst_case and deviation (measure, joint, position); loads (measure, joint, end, axis, position); status.
-    """
-
-    run: Run
-    measures: Sequence[Measure]
-    plays: Mapping[str, Play]
-    time: Array
-    value: Array
-    worst_case: Array
-    deviation: Array
-    loads: Array
-    status: NDArray[np.int8]
-
-    @property
-    def total(self) -> Array:
-        """Worst case of all joints together, (measure, position)."""
-        found: Array = np.sum(self.worst_case, axis=1)
-        return found
 
 
 @np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
@@ -293,6 +271,7 @@ def _model_findings(run: Run, effect: Effect) -> Iterator[Finding]:
     if run.seats:
         yield finding_for("play.seats_not_taken", "joints", joints=[one.joint for one in run.seats])
     yield from _limits(run, effect)
+    yield from beyond_first_order(effect)
     dial = run.system.dial(run.values, effect.time)
     for code in Status:
         where = np.flatnonzero(effect.status == code)

@@ -26,13 +26,13 @@ FIGURES: dict[str, Variable] = {
     "efficiency": Variable((), "1", "useful work over drive work of the cycle"),
     "efficiency_error": Variable((), "1", "how far the errors of its integrals may have moved the efficiency"),
     "efficiency_ideal": Variable((), "1", "efficiency of the mechanism without errors", part="errors"),
-    "drive_effort_min": Variable(("driver",), "N m", "least drive effort"),
-    "drive_effort_max": Variable(("driver",), "N m", "largest drive effort"),
+    "drive_effort_min": Variable(("driver",), "N m", "minimum drive effort"),
+    "drive_effort_max": Variable(("driver",), "N m", "maximum drive effort"),
     "drive_effort_rms": Variable(("driver",), "N m", "root mean square of the drive effort"),
     "drive_power_mean": Variable((), "W", "mean power of all drivers"),
     "useful_power_mean": Variable((), "W", "mean power delivered to the useful loads"),
     "friction_power_mean": Variable((), "W", "mean power lost to friction"),
-    "reaction_max": Variable(("joint",), "N", "largest reaction"),
+    "reaction_max": Variable(("joint",), "N", "maximum reaction"),
     "transmission_error_max": Variable(
         ("joint",), "rad", "largest error of the joint's rotation, of a prismatic joint its slide", part="errors"
     ),

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.cycle import shared_dimensions
 from trunnion.cycle.summary import model_notes
 from trunnion.errors import Finding, Severity, Status
 from trunnion.model.checks.values import NOT_NEGATIVE
@@ -105,6 +106,8 @@ def findings_of(outcome: Outcome, counted: Sampled | None) -> Iterator[Finding]:
         yield finding_for("tolerance.seats_not_taken", "joints", joints=loaded)
     if study.effects.correlated:
         yield finding_for("tolerance.correlations_left_out", "correlations")
+    yield from shared_dimensions.findings(mechanism)
+    yield from _play_sizes(outcome)
     yield from _measured(outcome)
     yield from _impossible(outcome)
     yield from _nominal(outcome)
@@ -115,6 +118,16 @@ def findings_of(outcome: Outcome, counted: Sampled | None) -> Iterator[Finding]:
         yield from _samples(outcome, counted)
     if outcome.indices is not None and outcome.indices.lost:
         yield finding_for("tolerance.indices_lost", count=outcome.indices.lost)
+
+
+def _play_sizes(outcome: Outcome) -> Iterator[Finding]:
+    """Tolerances of clearances whose pins may lie anywhere: their effect is that of the play."""
+    sizes = [(one.path, joint) for joint in outcome.study.inputs.loose for one in outcome.study.inputs.tolerances
+             if one.path in (f"joints.{joint}.pin.clearance", f"joints.{joint}.guide.clearance")]  # fmt: skip
+    if sizes:
+        numbers = [path.removeprefix("joints.") for path, _ in sizes]
+        plays = [f"{joint}.clearance" for _, joint in sizes]
+        yield finding_for("tolerance.play_size", "tolerances", numbers=numbers, plays=plays)
 
 
 def _measured(outcome: Outcome) -> Iterator[Finding]:

@@ -74,13 +74,14 @@ def tolerance(
     counted, and are outside every limit.
     Raises MechanismError if nothing varies, for an unknown measure or method, or as `analyse` does.
     """
+    notes = [finding_for("tolerance.method_alias", "method", method="linear")] if "rss" in methods else []
+    methods = tuple(dict.fromkeys("linear" if one == "rss" else one for one in methods))
     _check(methods, samples, seed, engine, target)
     found = study(mechanism, measures, steps, at, friction_method)
     worst = found.worst() if "worst-case" in methods else None
     job: Sampling | None = None
     tally: SampleTally | None = None
     shares: Indices | None = None
-    notes: list[Finding] = []
     stopped = False
     method = next((one for one in methods if one in SAMPLINGS), None)
     if method is not None:
@@ -122,7 +123,8 @@ def _check(methods: Sequence[str], samples: int, seed: int, engine: str, target:
     ]
     if sum(method in SAMPLINGS for method in methods) > 1:
         findings.append(Finding("two sampling methods at once", "method", f"use one of {' and '.join(SAMPLINGS)}"))
-    if not isinstance(samples, int) or not 1 <= samples <= MOST_SAMPLES:
+    drawn = any(method in (*SAMPLINGS, "sobol") for method in methods)
+    if not isinstance(samples, int) or not (1 if drawn else 0) <= samples <= MOST_SAMPLES:
         remedy = f"give a whole number from 1 to {MOST_SAMPLES:,}, or leave the sampling methods out"
         findings.append(Finding(f"{samples} samples", "samples", remedy))
     if engine not in ENGINES:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from trunnion.errors import Finding
 from trunnion.measures.measures import Measure
+from trunnion.results.quantities import drawn_in, signed
 from trunnion.results.sentences import finding_for
 
 if TYPE_CHECKING:
@@ -27,7 +28,6 @@ Array = NDArray[np.float64]
 MISSED = "limit.missed"  # with which the code of such a finding begins
 CLOSE, SLIGHT = 1e-6, 1e-3  # of a limit: rounding, and what first order leaves out where it was kept
 HALF = 0.5  # of the room: a nominal figure that is further off its middle is to be brought there first
-SHOWN = {"rad": (180 / np.pi, "deg"), "m": (1e3, "mm")}
 
 
 def limited(measure: Measure) -> bool:
@@ -141,18 +141,21 @@ class _Words:
     """Deviations of a measure with their unit."""
 
     def __init__(self, outcome: Outcome, of: Of) -> None:
+        self.worst = "worst case" if outcome.worst is not None else "worst case, first order,"
         run = outcome.study.run
         unit = of.measure.figure_unit(run.system, run.values)
+        one = of.measure
+        stated = [end for end in (one.lower, one.upper, one.at_least, one.at_most) if end is not None]
         self.of = of
-        self.factor, self.unit = SHOWN.get(unit, (1.0, "" if unit == "1" else unit))
+        self.factor, self.unit = drawn_in(max(map(abs, stated), default=0.0), unit)
 
     def say(self, value: float, sign: str = "+") -> str:
-        return f"{format(self.factor * value + 0.0, f'{sign}.4g')} {self.unit}".rstrip()
+        return signed(value, self.factor, self.unit, sign)
 
     def range(self, low: float, high: float) -> str:
         if limits(self.of)[0] == -limits(self.of)[1] and low == 0.0:
-            return f"worst case {self.say(high, '')}"
-        return f"worst case {format(self.factor * low + 0.0, '+.4g')} to {self.say(high)}"
+            return f"{self.worst} {self.say(high, '')}"
+        return f"{self.worst} {signed(low, self.factor, '')} to {self.say(high)}"
 
     def limits(self) -> str:
         """Deviations, and bounds of the figure itself with the nominal one."""
@@ -160,7 +163,7 @@ class _Words:
         if one.lower is not None or one.upper is not None:
             ends = [self.say(end) for end in (one.lower, one.upper) if end is not None]
             told.append(f"allowed {' to '.join(ends)}")
-        bounds = (("at_least", one.at_least), ("at_most", one.at_most))
+        bounds = (("at least", one.at_least), ("at most", one.at_most))
         told += [f"{word} {self.say(end, '')}" for word, end in bounds if end is not None]
         if one.at_least is not None or one.at_most is not None:
             told.append(f"nominal {self.say(self.of.reference.figure, '')}")

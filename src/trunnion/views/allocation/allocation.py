@@ -116,7 +116,7 @@ def room(result: xr.Dataset) -> TextTable:
             [read.name, read.told_limits, _share(read.value("used")), _share(max(found, default=math.nan)),
              _share(read.value("yield")), "—" if math.isnan(wider) else f"{wider:.4g}"]
         )  # fmt: skip
-    head = ["measure", "limits", "used", "worst case", "yield", "1\u00a0% wider saves"]
+    head = ["measure", "limits", "used", "worst case found", "yield", "1\u00a0% wider saves"]
     return _without_empty(TextTable("share of the limits that is used", head, rows))
 
 
@@ -164,7 +164,12 @@ def figure(result: xr.Dataset, kind: str | None = None) -> Figure:
         return tolerance_figure(result, kind)
     if "trade_off_cost" not in result:
         raise MechanismError(Finding("no measure has a figure 'trade-off'", "--kind", "add --curve 21"))
-    return trade_off(result, offers(result), _limit(result), stepped=result.attrs["choices"] == "discrete")
+    return trade_off(result, offers(result), _limit(result), stepped=_all_choices(result))
+
+
+def _all_choices(result: xr.Dataset) -> bool:
+    """Whether every tolerance is chosen from processes, so that the cost goes in steps."""
+    return result.attrs["choices"] == "discrete" and not any(one["model"] for one in attribute(result, "prices"))
 
 
 def offers(result: xr.Dataset) -> list[Offer]:
@@ -196,7 +201,11 @@ def prices(result: xr.Dataset) -> list[PriceCurve]:
             over = np.geomspace(low, high, POINTS)
             model = Cost(str(one["model"]), one["parameters"])
             curve = over, np.array([model.value(float(at)) for at in over])
-        found.append(PriceCurve(path, units[path], (t, cost), *curve, processes=made, group=str(one["group"])))
+        found.append(
+            PriceCurve(
+                path, units[path], (t, cost), *curve, processes=made, group=str(one["group"]), play=_is_play(path)
+            )
+        )
     return found
 
 

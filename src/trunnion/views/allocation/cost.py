@@ -46,6 +46,7 @@ class PriceCurve:
 
     name: its path; unit: SI, of t; tolerances, costs: points of the curve, t rising; processes: (name, t, cost) of each
     that can be chosen; chosen: (t, cost), NaN if there is none; group: what is bought with it, at one t for all.
+    play: whether t is the clearance of a joint, and no half width.
     """
 
     name: str
@@ -55,16 +56,20 @@ class PriceCurve:
     costs: Array = field(default_factory=lambda: np.empty(0))
     processes: tuple[tuple[str, float, float], ...] = ()
     group: str = ""
+    play: bool = False
 
 
 def trade_off(
-    result: xr.Dataset, offers: Sequence[Offer], limit: tuple[str, float, str] | None = None, stepped: bool = False
+    result: xr.Dataset,
+    offers: Sequence[Offer],
+    limit: tuple[str, float, str] | None = None,
+    stepped: bool | None = None,
 ) -> Figure:
     """Least cost over accuracy, the stated limits marked.
 
     result: whose name stands beneath; limit: (measure, half width, SI unit) of the one limit there is: the axis is then
     that limit, else its share of the stated ones. stepped: as with processes to choose from: what keeps a limit keeps
-    any wider one too.
+    any wider one too; None where only the costs can say so, as of which many are the same.
     """
     drawn = new("Cost over accuracy", result)
     axes = drawn.subplots()
@@ -76,7 +81,8 @@ def trade_off(
         scale, unit = scaled(half, si)
         factor, title = half * scale, f"limit of {name} ± [{unit}]" if unit else f"limit of {name} ±"
     dress(axes, plain(title), "minimum cost")
-    steps: dict[str, Any] = {"drawstyle": "steps-post"} if stepped or _is_stepped(cost) else {}
+    stepped = _is_stepped(cost) if stepped is None else stepped
+    steps: dict[str, Any] = {"drawstyle": "steps-post"} if stepped else {}
     axes.plot(factor * share, cost, color=PALETTE[0], linewidth=1.8, marker="o", markersize=3.2,
               label="minimum cost", **steps)  # fmt: skip
     known = np.isfinite(cost)
@@ -124,7 +130,8 @@ def tolerance_cost(result: xr.Dataset, prices: Sequence[PriceCurve]) -> Figure:
 def _panel(axes: Axes, price: PriceCurve, first: bool, roomy: bool) -> None:
     known = [t for _, t, _ in price.processes] or [*price.tolerances.tolist(), price.chosen[0]]
     factor, unit = scaled(max((t for t in known if math.isfinite(t)), default=1.0), price.unit)
-    dress(axes, f"± [{unit}]" if unit else "±", "cost" if first else "")
+    sign = "clearance" if price.play else "±"
+    dress(axes, f"{sign} [{unit}]" if unit else sign, "cost" if first else "")
     lines = [_headed(price), *_told(price, factor, unit)]
     axes.set_title("\n".join(plain(line) for line in lines), fontsize=8.5, color=INK, loc="left")
     if price.tolerances.size:
@@ -151,7 +158,8 @@ def _told(price: PriceCurve, factor: float, unit: str) -> list[str]:
         return ["none chosen"]
     found = [name for name, half, _ in price.processes if half == t]
     gap = "" if unit in ("°", "") else "\u00a0"
-    return [f"±{t * factor:.4g}{gap}{unit}, cost {number(cost)}", *(_end(name) for name in found[:1])]
+    sign = "" if price.play else "±"
+    return [f"{sign}{t * factor:.4g}{gap}{unit}, cost {number(cost)}", *(_end(name) for name in found[:1])]
 
 
 def _end(name: str) -> str:

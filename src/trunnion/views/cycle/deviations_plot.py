@@ -107,7 +107,7 @@ def _transmission(axes: Axes, result: xr.Dataset, over: Abscissa, found: list[Ou
         look = style_of(index)
         if bands[one.joint]:
             low, high = (_closed(over, edge * factor) for edge in bands[one.joint])
-            label = f"worst case of the play{f', {one.joint}' if len(found) > 1 else ''}"
+            label = f"worst case of the play, first order{f', {one.joint}' if len(found) > 1 else ''}"
             x = _closed(over, over.values, over.period)
             axes.fill_between(x, low, high, color=look["color"], alpha=0.15, linewidth=0, label=plain(label))
         curve(axes, over, one.error * factor, one.joint, **look)

@@ -46,11 +46,14 @@ from trunnion.views.common.figures import (
     square,
     style_of,
 )
+from trunnion.views.common.joined import joined
 from trunnion.views.common.labels import Labels
 from trunnion.views.common.lettering import plain
 from trunnion.views.common.peaks import ease, peak, usual_peak
 from trunnion.views.cycle.deviations import has
 from trunnion.views.cycle.deviations_plot import error
+from trunnion.views.cycle.locking_plot import has_friction, locking
+from trunnion.views.cycle.marked import OVER_DRIVE, mark, position_at
 from trunnion.views.cycle.measures_plot import drawn, measures
 from trunnion.views.cycle.seat_curves import beta, described
 from trunnion.views.cycle.seat_plot import seat
@@ -164,7 +167,7 @@ def _sound(result: xr.Dataset, ideal: xr.Dataset | None) -> tuple[xr.Dataset, xr
 
 
 def reactions(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
-    """Magnitude of the reaction in each joint; without friction thin and dotted."""
+    """Magnitude of the reaction in each joint, of those with the same as one curve; without friction thin, dotted."""
     if is_spatial(result):
         return space_plots.reactions(*_sound(result, ideal), FREE)
     over, joints = abscissa(result), names(result, "joint")
@@ -176,9 +179,9 @@ def reactions(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
     axes = figure.subplots()
     along(axes, over, f"magnitude of the reaction [{unit}]")
     shade(axes, result, over)
-    for index, (joint, force) in enumerate(zip(joints, forces, strict=True)):
-        curve(axes, over, force * factor, joint, **style_of(index))
-    for index, force in enumerate(free):
+    for label, first, force in joined(dict(zip(joints, forces, strict=True))):
+        curve(axes, over, force * factor, label, **style_of(first))
+    for index, (_, _, force) in enumerate(joined(dict(zip(joints, free, strict=False)))):
         curve(axes, over, force * factor, "without friction" if index == 0 else None, **FREE)
     frame_peak(axes, peak(*forces, *free), scope, factor, "N")
     legend(axes)
@@ -393,6 +396,7 @@ PLOTS: dict[str, Callable[[xr.Dataset, xr.Dataset | None], Figure]] = {
     "error": error,
     "seat": seat,
     "beta": beta,
+    "locking": locking,
     "measures": measures,
 }
 # whether a result has what a figure needs that not all results have
@@ -400,14 +404,24 @@ READY: dict[str, Callable[[xr.Dataset], bool]] = {
     "error": lambda result: has(result, "errors"),
     "seat": lambda result: has(result, "seats"),
     "beta": described,
+    "locking": has_friction,
     "measures": lambda result: bool(drawn(result)),
 }
 
 
-def figure(result: xr.Dataset, kind: str = "torque", ideal: xr.Dataset | None = None) -> Figure:
-    """One figure. kind: of PLOTS; ideal: the same run without friction, to compare with."""
+def figure(
+    result: xr.Dataset, kind: str = "torque", ideal: xr.Dataset | None = None, at: str | float | None = None
+) -> Figure:
+    """One figure. kind: of PLOTS; ideal: the same run without friction, to compare with.
+
+    at: a place such as "60deg": the mechanism is drawn there, and curves over the drive are marked.
+    """
     check_kinds([kind])
-    return PLOTS[kind](result, ideal)
+    index = None if at is None else position_at(result, at)
+    if kind == "mechanism":
+        return mechanism(result, ideal, index)
+    whole_figure = PLOTS[kind](result, ideal)
+    return whole_figure if index is None or kind not in OVER_DRIVE else mark(whole_figure, result, index)
 
 
 def check_kinds(kinds: Sequence[str]) -> None:

@@ -22,6 +22,7 @@ from trunnion.results.figure import MORE_THAN, Figure
 from trunnion.results.quantities import number, quantity
 from trunnion.views.common.bundle import bundle, web_text
 from trunnion.views.common.cycle import abscissa, column, intervals, names
+from trunnion.views.common.markup import with_code
 from trunnion.views.cycle.deviations_tables import error_rows, loss_rows
 from trunnion.views.cycle.scene import scene
 
@@ -39,6 +40,7 @@ BALANCE = (
     ("friction_contraction", "Contraction", "1", "error ratio of successive iterations; below 1 it converges"),
     ("friction_residual", "Friction residual", "N", "largest difference between a friction force and its law"),
     ("friction_change", "Last change", "N", "change of the reactions in the last iteration"),
+    ("seat_rounds", "Seat iterations", "1", "iterations until the pins lie where their loads press them"),
 )
 
 
@@ -67,8 +69,10 @@ def report(result: xr.Dataset, ideal: xr.Dataset | None = None) -> str:
 @cache
 def _template() -> Template:
     from jinja2 import Environment, StrictUndefined
+    from markupsafe import Markup
 
     environment = Environment(autoescape=True, undefined=StrictUndefined, keep_trailing_newline=True)
+    environment.filters["code"] = lambda text: Markup(with_code(text))
     return environment.from_string(web_text("report.html.j2"))
 
 
@@ -111,9 +115,10 @@ def _ordinal(shown: dict[str, Any]) -> str:
 
 
 def _summary(result: xr.Dataset) -> list[tuple[str, list[tuple[str, str]]]]:
-    """Subjects, each with its figures and what they are: ("drive torque of A", [("9.3 kN m", "largest, at 24°")])."""
+    """Subjects, each with its figures and what they are: ("drive torque of A", [("9.3 kN m", "maximum, at 24°")])."""
     found = []
-    for subject, members in groupby(summary_of(result), key=lambda one: one.subject):
+    headline = [one for one in summary_of(result) if not one.numerical]
+    for subject, members in groupby(headline, key=lambda one: one.subject):
         found.append((subject, [(_value(one), one.remark) for one in members]))
     return found
 
@@ -148,6 +153,11 @@ def _balance(result: xr.Dataset) -> list[dict[str, str]]:
         rows.append(
             _worst("Power balance residual", residual / most if most else residual, "1" if most else "W", meaning, over)
         )
+    error = column(result, "efficiency_error")
+    if error is not None and np.isfinite(error):
+        meaning = "effect of the errors of the integrals over the cycle"
+        rows.append({"label": "Error of the efficiency", "value": quantity(float(error), "1"), "place": "",
+                     "meaning": meaning})  # fmt: skip
     for name, label, unit, meaning in BALANCE:
         values = column(result, name)
         if values is not None:

@@ -60,7 +60,7 @@ def _panel(axes: Axes, result: xr.Dataset, over: Abscissa, name: str, unit: str,
             }
             axes.fill_between(x, floor, floor + row, label=plain(str(joint)), alpha=0.75, linewidth=0, **look)
         floor = floor + row
-    axes.plot(x, floor, color=INK, linewidth=1.4, label="sum: worst case", **_marks(x))
+    axes.plot(x, floor, color=INK, linewidth=1.4, label="sum: worst case, first order", **_marks(x))
     axes.plot(x, lanes[-1], color=INK, linewidth=1.2, linestyle=(0, (5, 2)), label="RSS")
     if limit is not None:
         axes.axhline(limit * factor, color=PALETTE[1], linewidth=1.2, linestyle=(0, (1, 1.5)), label="limit")
@@ -110,7 +110,7 @@ def _table(result: xr.Dataset, over: Abscissa, name: str, unit: str) -> TextTabl
         share = f"{100 * effect[top] / total[top]:.1f} %" if total[top] > 0 else "—"
         rows.append([str(joint), _play(result, j), quantity(float(np.nanmax(effect)), unit), where, share])
     for label, key in (
-        ("all, worst case", "worst_case_total"),
+        ("all, worst case, first order", "worst_case_total"),
         ("all, RSS", "rss"),
         ("all, standard deviation", "deviation_total"),
     ):

@@ -13,6 +13,7 @@ from trunnion.joints.pairs import PAIRS
 from trunnion.results.quantities import prefixed
 from trunnion.views.common.cycle import Abscissa, Array, abscissa, column, layout, names
 from trunnion.views.common.figures import along, curve, frame_peak, legend, new, shade, style_of
+from trunnion.views.common.joined import joined
 from trunnion.views.common.lettering import plain
 from trunnion.views.common.peaks import ease, usual_peak
 from trunnion.views.space.bodies import NOISE
@@ -37,11 +38,13 @@ def _sizes(result: xr.Dataset, variable: str, dim: str, name: str) -> Array | No
 def reactions(result: xr.Dataset, ideal: xr.Dataset | None, free: dict[str, Any]) -> Figure:
     """Magnitudes of the reaction and of its moment about the middle of the bearing, one panel each.
 
+    Joints with the same force and moment are one curve in either panel, for the legend is that of both.
     free: the look of curves without friction.
     """
     over, joints = abscissa(result), names(result, "joint")
     figure = new("Joint reactions", result, 6.6)
     panels = figure.subplots(2, 1, sharex=True)
+    shared = _shared(result, joints)
     for axes, variable, unit, what in zip(
         panels, ("reaction_force", "reaction_moment"), ("N", "N m"), ("force", "moment"), strict=True
     ):
@@ -51,9 +54,10 @@ def reactions(result: xr.Dataset, ideal: xr.Dataset | None, free: dict[str, Any]
         factor, shown = prefixed(scope, unit)
         along(axes, over, f"{what} of the reaction [{shown}]")
         shade(axes, result, over)
-        for index, (joint, values) in enumerate(columns.items()):
+        for label, first in shared:
+            values = columns[joints[first]]
             if values is not None:
-                curve(axes, over, values * factor, joint, **style_of(index))
+                curve(axes, over, values * factor, label, **style_of(first))
         for index, values in enumerate(others.values()):
             if values is not None:
                 curve(axes, over, values * factor, "without friction" if index == 0 else None, **free)
@@ -61,6 +65,18 @@ def reactions(result: xr.Dataset, ideal: xr.Dataset | None, free: dict[str, Any]
     panels[0].set_xlabel("")
     legend(panels[0])
     return figure
+
+
+def _shared(result: xr.Dataset, joints: list[str]) -> list[tuple[str, int]]:
+    """Joints with the same force and moment: their names, and the number of the first."""
+    both: dict[str, list[Array]] = {joint: [] for joint in joints}
+    for variable in ("reaction_force", "reaction_moment"):
+        sizes = {joint: _sizes(result, variable, "joint", joint) for joint in joints}
+        largest = max(_peak(sizes), 1e-300)
+        for joint, values in sizes.items():
+            both[joint].append(np.zeros(0) if values is None else values / largest)
+    known = {joint: np.concatenate(parts) for joint, parts in both.items()}
+    return [(label, first) for label, first, _ in joined(known)]
 
 
 def _peak(columns: dict[str, Array | None]) -> float:

@@ -203,7 +203,7 @@ def meaning(name: str, unit: str) -> str:
     if told is None or not told.dims:
         return name.replace("_", " ")
     if key == "transmission_error_max":
-        return f"largest error of the {'slide' if unit == 'm' else 'rotation'} of {member}"
+        return f"maximum error of the {'slide' if unit == 'm' else 'rotation'} of {member}"
     return f"{told.long_name} of {member}"
 
 

@@ -16,6 +16,7 @@ from matplotlib import rc_context
 
 from trunnion.results.attributes import attribute
 from trunnion.views.common.bundle import web_text
+from trunnion.views.common.markup import with_code
 from trunnion.views.cycle.report import inputs_of, said
 from trunnion.views.tolerance.figure import KINDS, drawable, figure
 from trunnion.views.tolerance.notes import NOTES, ON_SAMPLES
@@ -54,15 +55,19 @@ def report(result: xr.Dataset, first: Sequence[Section] = (), kicker: str = "Tol
     style = web_text("report.css") + web_text("tolerance.css")
     reads, run = readings(result), methods(result)
     parts = [*first, *(_measure(result, read) for read in reads)]
+    stated = said(result, style)
+    first_lines = set(attribute(result, "missed"))  # what is wrong stands first, once, with its remedy
+    missed = [row for row in stated["findings"] if f"{row['where']}: {row['what']}".lstrip(": ") in first_lines]
+    stated["findings"] = [row for row in stated["findings"] if row not in missed]
     context: dict[str, Any] = {
         "kicker": kicker, "name": str(result.attrs.get("name", "")) or "Mechanism",
         "formula": str(result.attrs.get("formula", "")), "facts": _facts(result, run),
-        "summary": headline(result), "missed": attribute(result, "missed"),
+        "summary": headline(result), "missed": missed,
         "overview": overview(result), "sections": [_drawn(part) for part in parts], "whole": failed(result),
         "toleranced": inputs(result), "inputs": inputs_of(result),
         "methods": [NOTES[name] for name in run if name in NOTES],
         "on_samples": ON_SAMPLES if any("monte-carlo" in name for name in run) else "",
-        **said(result, style),
+        **stated,
     }  # fmt: skip
     return template("tolerance.html.j2").render(context)
 
@@ -71,10 +76,12 @@ def report(result: xr.Dataset, first: Sequence[Section] = (), kicker: str = "Tol
 def template(name: str) -> Template:
     """A page of `views/web`, which may import the others."""
     from jinja2 import Environment, FunctionLoader, StrictUndefined
+    from markupsafe import Markup
 
     environment = Environment(
         autoescape=True, undefined=StrictUndefined, keep_trailing_newline=True, loader=FunctionLoader(web_text)
     )
+    environment.filters["code"] = lambda text: Markup(with_code(text))
     return environment.get_template(name)
 
 

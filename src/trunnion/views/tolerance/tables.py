@@ -208,8 +208,6 @@ def contributions(read: MeasureReading, short: bool = False) -> TextTable:
     kept = kept if short and len(kept) < len(found) - 1 else found
     apart = read.shares_apart
     shares = {"share": "worst_share", "of RSS²": "rss_share"} | ({"of variance": "variance_share"} if apart else {})
-    if apart and short:  # a terminal is 80 characters wide; the share follows from the size beside it
-        del shares["share"]
     head = ["contribution", "tolerance", "sensitivity", "worst ±", *shares]
     rows = [
         [
@@ -221,7 +219,8 @@ def contributions(read: MeasureReading, short: bool = False) -> TextTable:
     rest = [one for one in found if one not in kept]
     if rest:
         sums = (float(np.nansum([getattr(one, key) for one in rest])) for key in shares.values())
-        rows.append([f"{len(rest)} others", "", "", "", *(share(part, 1) for part in sums)])
+        alike = "no effect" if all(one.worst == 0 for one in rest) else "small"
+        rows.append([f"{len(rest)} others, {alike}", "", "", "", *(share(part, 1) for part in sums)])
     at = f" at {read.told_place}" if read.told_place else ""
     return TextTable(f"contributions to {read.name}{at}", head, rows)
 
@@ -311,7 +310,11 @@ def headline(result: xr.Dataset) -> list[tuple[str, list[tuple[str, str]]]]:
         cells = {label: tell(read) for label, tell in FIGURES}
         worst = cells["worst case"].get("searched") or cells["worst case"].get("linear", "")
         told = [(cells["yield"].get("sampled", ""), f"yield, {cells['yield'].get('interval', '')}")]
-        told += [(worst, "worst case"), (cells["Cpk"].get("sampled", ""), "Cpk")]
+        searched = bool(cells["worst case"].get("searched"))
+        told += [
+            (worst, "worst case" if searched else "worst case, first order"),
+            (cells["Cpk"].get("sampled", ""), "Cpk"),
+        ]
         kept = [pair for pair in told if pair[0]]
         found += [(read.name, kept)] if kept else []
     whole = _overall(result)

@@ -69,7 +69,7 @@ function errorCharts(scene, kinds, pick) {
     list.push(lineChart(scene, { title: "Position errors, largest", unit: "m", series, marks, note, pick }));
   }
   for (const { label, unit, values, worst } of built.outputs)
-    list.push(lineChart(scene, { title: `Transmission error, ${label}`, unit, marks, band: worst && { low: full(worst.low, count), high: full(worst.high, count), kind: "k0", label: "worst case of the play" }, note, pick, series: [{ label: "error", values: full(values, count), kind: "k0" }] })); // prettier-ignore
+    list.push(lineChart(scene, { title: `Transmission error, ${label}`, unit, marks, band: worst && { low: full(worst.low, count), high: full(worst.high, count), kind: "k0", label: "worst case of the play, first order" }, note, pick, series: [{ label: "error", values: full(values, count), kind: "k0" }] })); // prettier-ignore
   for (const [sign, title] of [["β", "β, between the seats of the ends"], ["ξ", "ξ, direction of the seats"]]) {
     const series = built.angles
       .filter((one) => one.sign === sign)
@@ -97,7 +97,25 @@ function reactionChart(scene, kinds, pick) {
     values: magnitude(joint.reaction, scene.count),
     kind: kinds.get(joint.name),
   }));
-  return lineChart(scene, { title: "Joint reactions, magnitude", unit: "N", series, pick });
+  return lineChart(scene, { title: "Joint reactions, magnitude", unit: "N", series: joined(series), pick });
+}
+
+/** Series that are the same, drawn once with the names of all: "A = B". */
+function joined(series) {
+  const near = 1e-6 * Math.max(0, ...series.map((one) => peak(one.values)));
+  const same = (one, other) =>
+    one.values.length === other.values.length &&
+    one.values.every((value, index) => {
+      const beside = other.values[index];
+      return Number.isFinite(value) ? Math.abs(value - beside) <= near : !Number.isFinite(beside);
+    });
+  const found = [];
+  for (const one of series) {
+    const first = found.find((other) => same(one, other));
+    if (first) first.label += ` = ${one.label}`;
+    else found.push({ ...one });
+  }
+  return found;
 }
 
 function momentChart(scene, kinds, pick) {

@@ -1,0 +1,114 @@
+"""`trunnion locking`: how near to locking, at which positions, by which joint, and whether it can be backdriven."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from trunnion.cli.model import lines_of, stated
+from trunnion.cli.options import (
+    Columns,
+    File,
+    FrictionLaw,
+    Out,
+    Seats,
+    Set,
+    Steps,
+    TableFile,
+    TableUnits,
+    Units,
+    UnitsRow,
+)
+from trunnion.cli.result import Shown, check_files
+from trunnion.cli.terminal import bar, console, show_figures, show_rows
+
+if TYPE_CHECKING:
+    from trunnion.cycle.locking import LockingRange
+    from trunnion.solve.system import Dial
+
+__all__ = ["locking"]
+
+MOST_RANGES = 24  # rows of the table of ranges
+STATES = {
+    "RUNS": "loads do not push back",
+    "BACKDRIVABLE": "can be backdriven",
+    "SELF_LOCKING": "self-locking",
+    "LOCKED_BACKWARD": "locked backward",
+    "LOCKED": "locked",
+    "JAMMED": "jammed",
+    "UNSOLVED": "not solved",
+}
+
+
+def locking(
+    file: File,
+    steps: Steps = 360,
+    set_: Set = None,
+    table: TableFile = None,
+    friction: FrictionLaw = None,
+    seat: Seats = None,
+    near: Annotated[
+        float, typer.Option("--near", help="Locking margin below which a position counts as near locking.")
+    ] = 1.5,
+    out: Out = None,
+    units_row: UnitsRow = False,
+    units: Units = TableUnits.si,
+    columns: Columns = None,
+) -> None:
+    """Margin against locking by friction; backdriving.
+
+    The margin for the friction of all joints and of each joint alone, other solutions of the friction equations, and
+    the ranges of the drive in which the mechanism locks, is near locking, is self-locking or can be backdriven.
+    """
+    from trunnion.cycle.locking import look, ranges, report_figures
+    from trunnion.solve.run import prepare
+    from trunnion.solve.system import rubbing
+
+    check_files(out or [])
+    mechanism = stated(file, set_, table, friction, seat)
+    with lines_of(file):
+        run = prepare(mechanism)
+        with bar("positions", steps, least=200_000) as progress:
+            found = look(run, steps, progress)
+    figures = report_figures(run, found)
+
+    def show() -> None:
+        show_figures(mechanism.name or str(file), figures)
+        if rubbing(run.system) and mechanism.drivers:
+            console().print()
+            _show_ranges(ranges(found, near), run.system.dial(run.values, found["time"].values), near)
+
+    def draw(path: Path) -> Any:
+        from trunnion.views.cycle.locking_plot import locking as figure
+
+        return figure(found)
+
+    Shown(
+        found, file, ["assembly"], out or [], None, units_row,
+        draw=draw, show=show, columns=columns or ["locking"], units=units,
+    ).finish()  # fmt: skip
+
+
+def _show_ranges(found: list[LockingRange], dial: Dial, near: float) -> None:
+    """The ranges as a table, in the order of the cycle; those near locking last."""
+    head = ["state", "from", "to", "smallest margin", "at"]
+    rows = [_row(one, dial, near) for one in found[:MOST_RANGES]]
+    show_rows(f"ranges of {dial.of}" if dial.of else "ranges", head, rows)
+    if len(found) > MOST_RANGES:
+        console().print(f"{len(found) - MOST_RANGES} more ranges; --out has every position", markup=False)
+
+
+def _row(one: LockingRange, dial: Dial, near: float) -> list[str]:
+    from math import isfinite, isnan
+
+    from trunnion.results.quantities import readable
+    from trunnion.solve.friction_method import MARGIN
+
+    state = f"margin below {near:g}" if one.state is None else STATES[one.state.name]
+    ends = [dial.at(one.first), dial.at(one.last)]
+    if isnan(one.margin):
+        return [state, *ends, "—", ""]
+    margin = readable(one.margin) if isfinite(one.margin) else f"more than {MARGIN:g}"
+    return [state, *ends, margin, dial.at(one.at) if isfinite(one.margin) else ""]

@@ -1,0 +1,91 @@
+"""`trunnion locking` and places in plots as a user meets them: ranges, files, figures, faults."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import trunnion
+from manual.conftest import Run
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+PRESS, FREE = EXAMPLES / "drawing-press.yaml", EXAMPLES / "durango-fourbar.yaml"
+
+
+def test_ranges_and_files(program: Run, tmp_path: Path) -> None:
+    files = ["l.csv", "l.json", "l.nc", "l.png"]
+    code, out, _ = program("locking", PRESS, "--steps", 24, "--near", 5, *(f"--out={name}" for name in files))
+    assert code == 0
+    assert {path.name for path in tmp_path.iterdir()} == set(files)
+    assert "ranges of Z" in out
+    assert "margin below 5" in out
+    with (tmp_path / "l.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    result = trunnion.locking(trunnion.read(PRESS), 24)
+    margins = [float(row["locking_margin"]) for row in rows]
+    assert margins == pytest.approx(result["locking_margin"].values)
+    assert {"time", "drive", "B.critical_multiple", "Z.effort", "Z.effort_reverse", "locking_state"} <= set(rows[0])
+    meanings = result["locking_state"].attrs["flag_meanings"].split()
+    assert [row["locking_state"] for row in rows] == [meanings[code] for code in result["locking_state"].values]
+    assert "locking_state" in json.loads((tmp_path / "l.json").read_text())["data_vars"]
+    with xr.open_dataset(tmp_path / "l.nc") as read:
+        np.testing.assert_array_equal(read["locking_state"].values, result["locking_state"].values)
+
+
+def test_efforts_of_a_slide_are_forces(program: Run, tmp_path: Path) -> None:
+    assert program("locking", PRESS, "--steps", 4, "--units-row", "--out", "l.csv").code == 0
+    with (tmp_path / "l.csv").open(encoding="utf-8", newline="") as file:
+        head, units = list(csv.reader(file))[:2]
+    assert dict(zip(head, units, strict=True))["Z.effort_reverse"] == "N"
+
+
+def test_the_margin_is_that_of_the_seats(program: Run, tmp_path: Path) -> None:
+    """Pins at the rims of large holes change the arms, and with them the margin."""
+    wide = ("--set", "joint_defaults.pin.clearance=2mm")
+    for name, seats in (("free", ()), ("loaded", ("--seat", "loaded"))):
+        done = program("locking", PRESS, "--steps", 6, *wide, *seats, "--out", f"{name}.nc")
+        assert done.code == 0, done.err
+        assert ("critical multiples of single joints" in done.err) == (name == "loaded")
+    with xr.open_dataset(tmp_path / "free.nc") as free, xr.open_dataset(tmp_path / "loaded.nc") as loaded:
+        assert float(np.abs(free["locking_margin"] - loaded["locking_margin"]).max()) > 1e-3
+
+
+def test_nothing_to_draw_without_friction(program: Run, tmp_path: Path) -> None:
+    code, _, err = program("locking", PRESS, "--friction", "off", "--steps", 4, "--out", "l.png")
+    assert code == 2
+    assert "no joint has friction" in err
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("place", "code", "part"),
+    [
+        ("30mm", 0, ""),
+        ("1s", 0, ""),
+        ("400mm", 2, "not in the cycle"),
+        ("30deg", 2, "length"),
+        ("there", 2, "no place"),
+    ],
+)
+def test_a_place_in_plots(program: Run, tmp_path: Path, place: str, code: int, part: str) -> None:
+    done = program("plot", PRESS, "--steps", 24, "--kind", "torque", "--at", place, "--out", "t.svg")
+    assert done.code == code
+    assert part in done.err
+    assert (tmp_path / "t.svg").exists() == (code == 0)
+
+
+def test_friction_is_set_as_a_file_states_it(program: Run) -> None:
+    short = program("analyse", PRESS, "--steps", 12, "--set", "K.friction=0.2")
+    long = program("analyse", PRESS, "--steps", 12, "--set", "K.friction.coefficient=0.2")
+    assert short.code == 0
+    assert short.out == long.out
+    swept = program("sweep", PRESS, "--steps", 12, "--over", "joint_defaults.friction=0.05,0.1")
+    assert swept.code == 0
+    several = program("analyse", PRESS, "--set", "friction=0.2")
+    assert several.code == 2
+    assert "joints.K.friction.coefficient" in several.err or "joint_defaults.friction.coefficient" in several.err

@@ -1,0 +1,99 @@
+"""Locking at every position: a crank against its friction circle in closed form, and what its states agree with."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+from test_locking import CRITICAL, pushed_slider
+
+import trunnion
+from mechanisms import eccentric_press
+from mechanisms_parts import Data, revolute
+from trunnion import Mechanism, Status
+from trunnion.cycle.locking import LockingState, locking, ranges
+
+ARM, RADIUS, FRICTION = 0.02, 0.012, 0.5
+
+
+def hoist(friction: float = FRICTION) -> Mechanism:
+    """A crank on one pin that lifts a weight from hanging level to behind the top: the load passes its pin there."""
+    data: Data = {
+        "links": {"ground": {"points": {"A": [0, 0]}}, "crank": {"points": {"A": [0, 0], "P": [ARM, 0]}}},
+        "joints": {"A": {**revolute("ground", "crank"), "pin": {"radius": RADIUS}, "friction": friction}},
+        "drivers": {"A": {"speed": 1.0, "range": [0.0, 2.5]}},
+        "loads": {"weight": {"link": "crank", "at": "P", "force": [0.0, -100.0], "useful": True}},
+    }
+    return Mechanism(trunnion=1, **data)
+
+
+def states(found: xr.Dataset) -> np.ndarray:
+    return np.asarray(found["locking_state"].values)
+
+
+def test_a_crank_holds_its_load_inside_the_friction_circle() -> None:
+    """Backdriven while the load's arm L cos θ exceeds f r, self-locking from there to the top, pulled on behind it."""
+    found = locking(hoist(), 401)
+    arm = ARM * np.cos(np.radians(found["drive"].values))
+    expected = np.where(
+        arm > FRICTION * RADIUS,
+        LockingState.BACKDRIVABLE,
+        np.where(arm > 0, LockingState.SELF_LOCKING, LockingState.RUNS),
+    )
+    np.testing.assert_array_equal(states(found), expected)
+    pushed = states(found) != LockingState.RUNS
+    efficiency = found["efficiency_reverse_instant"].values
+    np.testing.assert_allclose(efficiency[pushed], 1 - FRICTION * RADIUS / arm[pushed], rtol=1e-9)
+    assert np.all(np.isnan(efficiency[~pushed]))
+    first, second, third = ranges(found)
+    assert [one.state for one in (first, second, third)] == [
+        LockingState.BACKDRIVABLE, LockingState.SELF_LOCKING, LockingState.RUNS,
+    ]  # fmt: skip
+    angle = found["drive"].values
+    limit = np.degrees(np.arccos(FRICTION * RADIUS / ARM))
+    assert angle[first.last] < limit < angle[second.first]
+    assert second.last + 1 == third.first
+    assert third.last == 400
+
+
+def test_without_friction_every_load_drives_back() -> None:
+    found = locking(hoist(0.0), 51)
+    assert set(states(found)) <= {LockingState.BACKDRIVABLE, LockingState.RUNS}
+    pushed = states(found) == LockingState.BACKDRIVABLE
+    np.testing.assert_allclose(found["efficiency_reverse_instant"].values[pushed], 1.0, rtol=1e-9)
+
+
+@pytest.mark.parametrize("load", [-40.0, 40.0])
+def test_locked_forward_and_jammed(load: float) -> None:
+    """Beyond the critical coefficient the drawer locks: its state agrees with its status and with the way back."""
+    found = locking(pushed_slider(1.3 * CRITICAL, load), 5)
+    ahead = found["status"].values == Status.LOCKED
+    behind = np.isnan(found["drive_effort_reverse"].values[0])
+    np.testing.assert_array_equal(states(found) == LockingState.JAMMED, ahead & behind)
+    np.testing.assert_array_equal(states(found) == LockingState.LOCKED, ahead & ~behind)
+    assert np.any(ahead | behind)
+    assert not [one for one in ranges(found, 1e9) if one.state is None and ahead[one.first]]
+
+
+def test_ranges_cover_every_position_once_and_near_ones_are_below_the_margin() -> None:
+    found = locking(eccentric_press(), 90)
+    margin = found["locking_margin"].values
+    near = float(np.nanquantile(margin, 0.3))
+    every = ranges(found, near)
+    covered = np.concatenate([np.arange(one.first, one.last + 1) for one in every if one.state is not None])
+    np.testing.assert_array_equal(covered, np.arange(90))
+    close = np.concatenate([np.arange(one.first, one.last + 1) for one in every if one.state is None])
+    running = states(found) < LockingState.LOCKED
+    np.testing.assert_array_equal(close, np.flatnonzero((margin < near) & running))
+    for one in every:
+        own = margin[one.first : one.last + 1]
+        assert one.margin == pytest.approx(np.nanmin(own), nan_ok=True)
+        assert one.first <= one.at <= one.last
+
+
+def test_states_are_flags_with_meanings() -> None:
+    found = locking(hoist(), 12)
+    words = found["locking_state"].attrs["flag_meanings"].split()
+    assert words == [one.name.lower() for one in LockingState]
+    columns = trunnion.analyse(hoist(), 12)
+    assert "locking_state" not in columns

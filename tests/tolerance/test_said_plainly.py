@@ -1,0 +1,152 @@
+"""What a study of tolerances and an allocation say beside their figures: codes and numbers, each once."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import trunnion
+from toleranced import FOURBAR, fourbar
+from trunnion import Mechanism
+from trunnion.results.attributes import findings_of
+from trunnion.results.quantities import drawn_in, signed
+from trunnion.views.allocation.allocation import prices
+from trunnion.views.allocation.cost import trade_off
+from trunnion.views.tolerance.report import report
+from trunnion.views.tolerance.tables import tables
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+SLIDER = {
+    "dimensions": {"r": "60 mm ± 0.1 mm", "k": "200 mm ± 0.15 mm"},
+    "links": {
+        "ground": {"points": {"O": [0, 0], "S": {"at": [0, 0], "axis": [1, 0]}}},
+        "crank": {"points": {"O": [0, 0], "P": ["r", 0]}},
+        "rod": {"points": {"P": [0, 0], "Q": ["k", 0]}},
+        "ram": {"points": {"Q": [0, 0], "S": {"at": [0, 0], "axis": [1, 0]}, "T": ["k", 0]}},
+    },
+    "joints": {
+        "O": {"type": "revolute", "links": ["ground", "crank"]},
+        "P": {"type": "revolute", "links": ["crank", "rod"]},
+        "Q": {"type": "revolute", "links": ["rod", "ram"]},
+        "S": {"type": "prismatic", "links": ["ground", "ram"]},
+    },
+    "joint_defaults": {"pin": {"radius": "15 mm", "clearance": "20 um"}},
+    "drivers": {"O": {"speed": "60 rpm"}},
+    "assembly": {"Q": ["260 mm", 0]},
+    "measures": {"tip": {"point": "ram.T", "axis": "x", "limit": "±0.6 mm"}},
+    "tolerances": {"O.pin.clearance": "+0.01/0 mm"},
+    "costs": {
+        "k": {"model": "power", "B": 1, "k": 0.5, "unit": "mm", "least": "0.01 mm", "most": "0.3 mm"},
+        "O.clearance": {"model": "power", "B": 0.3, "k": 0.5, "unit": "mm", "least": "0.01 mm", "most": "0.05 mm"},
+    },
+}  # fmt: skip
+
+
+def slider(**more: Any) -> Mechanism:
+    return Mechanism(**{"trunnion": 1, **SLIDER, **more})
+
+
+def coded(result: Any, code: str) -> list[Any]:
+    found = findings_of(result) if "findings" in getattr(result, "attrs", {}) else result.findings
+    return [one for one in found if one.code == code]
+
+
+def test_a_dimension_of_two_links_is_named_by_check_and_by_tolerance() -> None:
+    """k is the length of the rod and that of the ram: one number for two parts."""
+    for result in (trunnion.check(slider()), trunnion.tolerance(slider(), methods=["linear"], steps=12)):
+        (found,) = coded(result, "tolerance.shared_dimension")
+        assert found.where == "dimensions.k"
+        assert found.figures["links"] == ["rod", "ram"]
+        assert "rod.Q.x" in found.what
+        assert "ram.T.x" in found.what
+
+
+def test_a_dimension_of_one_link_or_without_tolerance_is_not() -> None:
+    plain = slider(dimensions={"r": "60 mm ± 0.1 mm", "k": "200 mm"}, costs={})
+    assert not coded(trunnion.check(plain), "tolerance.shared_dimension")
+    roller = trunnion.read(EXAMPLES / "one-way-clutch.yaml")  # its radius stands beside other dimensions of two links
+    assert not coded(trunnion.check(roller), "tolerance.shared_dimension")
+
+
+def test_the_tolerance_of_a_clearance_is_in_the_row_of_the_play() -> None:
+    (found,) = coded(trunnion.tolerance(slider(), methods=["linear"], steps=12), "tolerance.play_size")
+    assert found.figures == {"numbers": ["O.pin.clearance"], "plays": ["O.clearance"]}
+
+
+def test_an_allocated_clearance_keeps_its_stated_tolerance_and_that_is_said() -> None:
+    """Both are in the worst case: 0.05 mm allocated and 0.01 mm stated make a play of 0.06 mm."""
+    result = trunnion.allocate(slider(), steps=12, samples=0)
+    (found,) = coded(result, "allocation.play_tolerance")
+    assert found.where == "costs.O.clearance"
+    assert (found.figures["lower_um"], found.figures["upper_um"]) == pytest.approx((0.0, 10.0))
+    play = result.sel(parameter="joints.O.clearance")
+    size = float(play["tolerance"]) + 10e-6
+    assert float(play["parameter_upper"]) == pytest.approx(size)
+    worst = float(play["contribution_worst_case"].sel(measure="tip"))
+    assert worst == pytest.approx(size * abs(float(play["sensitivity"].sel(measure="tip"))), rel=1e-6)
+
+
+def test_limits_are_told_in_units_that_fit() -> None:
+    assert signed(-2.441e5, *drawn_in(2.4e5, "N")) == "−244.1 kN"
+    assert signed(4.831e-4, *drawn_in(6e-4, "m")) == "+0.4831 mm"
+    assert signed(np.radians(0.1), *drawn_in(np.radians(0.1), "rad")) == "+0.1°"
+    assert signed(0.5, *drawn_in(0.5, "1"), sign="") == "0.5"
+    mechanism = trunnion.read(EXAMPLES / "drawing-press.yaml")
+    data = mechanism.data() | {
+        "measures": {"force": {"reaction": "O", "at": "10 mm", "at_most": "100 kN"}},
+        "tolerances": {"L": "±0.1 mm"},
+    }
+    (found,) = coded(trunnion.tolerance(Mechanism(**data), methods=["linear"], steps=12), "limit.missed")
+    assert "at most 100 kN" in found.what
+    assert "first order" in found.what
+    assert not re.search(r"\de\+\d", str(found))
+
+
+def test_rss_is_a_figure_of_the_method_linear() -> None:
+    result = trunnion.tolerance(fourbar(), ["angle:rocker"], methods=["rss"], steps=12)
+    assert coded(result, "tolerance.method_alias")[0].figures == {"method": "linear"}
+    plain = trunnion.tolerance(fourbar(), ["angle:rocker"], methods=["linear"], steps=12)
+    assert float(result["rss"][0]) == float(plain["rss"][0])
+    assert FOURBAR
+
+
+def test_no_samples_are_none_where_no_method_draws_any() -> None:
+    result = trunnion.tolerance(slider(), methods=["linear"], samples=0, steps=12)
+    assert "yield" not in result
+    with pytest.raises(trunnion.MechanismError, match="samples"):
+        trunnion.tolerance(slider(), methods=["monte-carlo"], samples=0, steps=12)
+
+
+def test_shares_are_shown_beside_those_of_the_variance() -> None:
+    result = trunnion.tolerance(slider(), samples=50, steps=12)
+    heads = next(one.head for one in tables(result) if one.title.startswith("contributions"))
+    assert {"share", "of RSS²", "of variance"} <= set(heads)
+
+
+def test_a_report_has_a_missed_limit_once_and_no_backtick() -> None:
+    tight = slider(measures={"tip": {"point": "ram.T", "axis": "x", "limit": "±0.1 mm"}})
+    result = trunnion.tolerance(tight, samples=50, steps=12)
+    page = report(result)
+    (found,) = coded(result, "limit.missed")
+    assert page.count("limits not met") == 1
+    assert "<code>trunnion allocate</code>" in page
+    assert "`" in found.remedy
+    assert "`" not in re.sub(r"<style>.*?</style>", "", page, flags=re.S)
+
+
+def test_costs_of_formulas_are_a_line_and_a_play_has_no_sign() -> None:
+    result = trunnion.allocate(slider(), steps=12, samples=0, curve=9)
+    figure = result.trunnion.plot("trade-off")
+    assert figure.axes[0].lines[0].get_drawstyle() == "default"
+    plays = {one.name: one.play for one in prices(result)}
+    assert plays == {"dimensions.k": False, "joints.O.clearance": True}
+    panels = {axes.get_title(loc="left").split("\n")[0]: axes for axes in result.trunnion.plot("cost").axes}
+    assert panels["joints.O.clearance"].get_xlabel().startswith("clearance")
+    assert "±" not in panels["joints.O.clearance"].get_title(loc="left")
+    assert panels["dimensions.k"].get_xlabel().startswith("±")
+    steps = trade_off(result, [(0.5, 3.0), (1.0, 1.0), (2.0, 1.0)], stepped=True)  # type: ignore[list-item]
+    assert steps.axes[0].lines[0].get_drawstyle() == "steps-post"

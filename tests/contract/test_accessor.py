@@ -13,6 +13,7 @@ import pytest
 import xarray as xr
 
 import trunnion
+from trunnion import MechanismError
 from trunnion.results.tables import KINDS, kind_of
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -67,6 +68,12 @@ def test_a_result_is_drawn(result: Any) -> None:
 
 
 @pytest.mark.slow
+def test_a_kind_of_figure_that_there_is_not_is_a_finding(result: Any) -> None:
+    with pytest.raises(MechanismError) as caught:
+        trunnion.plot(result, "no such figure")
+    assert caught.value.findings[0].where in ("kind", "--kind")
+
+
 def test_a_result_is_written_and_read_again(result: Any, tmp_path: Path) -> None:
     data, kind = result
     data.trunnion.save(tmp_path / "x.nc")

@@ -10,7 +10,8 @@ import trunnion
 from manual.conftest import Run
 from manual.test_cli import EXAMPLES
 from trunnion import MechanismError
-from trunnion.cli.options import over, points
+from trunnion.cli.options import PLOT_KINDS, over, points
+from trunnion.views.cycle.plots import PLOTS
 
 FOUR_BAR, CARDAN = EXAMPLES / "durango-fourbar.yaml", EXAMPLES / "pezzuti-cardan.yaml"
 STRIBECK = {"joint_defaults.friction.static": "0.5", "joint_defaults.friction.stribeck_speed": "0.1 m/s"}
@@ -100,3 +101,8 @@ def test_a_default_parameter_can_be_set_before_it_is_stated() -> None:
 def test_points_of_a_grid_are_all_combinations() -> None:
     assert points(over(["a=0deg:30deg:7", "b=1,2,3"])) == 21
     assert points({}) == 1
+
+
+def test_the_help_names_every_plot_of_a_cycle() -> None:
+    """Written out there, for the module of the plots loads matplotlib."""
+    assert PLOT_KINDS.replace(" or ", ", ").split(", ") == list(PLOTS)

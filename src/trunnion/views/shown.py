@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from importlib import import_module
+from inspect import signature
 from typing import TYPE_CHECKING, Any
 
 from trunnion.errors import Finding, MechanismError
@@ -64,6 +65,9 @@ def figure_of(result: xr.Dataset, kind: str | None = None, **options: Any) -> Fi
     if kind is None:
         main = getattr(view, "sheet", view.figure)
         return main(result, **options)  # type: ignore[no-any-return]
+    if "kind" not in signature(view.figure).parameters:
+        what, remedy = f"a result of {kind_of(result)} has one figure", "leave the kind out"
+        raise MechanismError(Finding(what, "kind", remedy))
     return view.figure(result, kind=kind, **options)  # type: ignore[no-any-return]
 
 

@@ -22,7 +22,7 @@ from trunnion.studies.tolerance.sampling import SampleTally, Sampling
 if TYPE_CHECKING:
     import xarray as xr
 
-from trunnion.studies.tolerance.first_order import FEW, study
+from trunnion.studies.tolerance.first_order import FEW, ToleranceStudy, study
 from trunnion.studies.tolerance.kernel import engine_for
 from trunnion.studies.tolerance.outcome import Outcome
 from trunnion.studies.tolerance.result import dataset
@@ -74,8 +74,7 @@ def tolerance(
     counted, and are outside every limit.
     Raises MechanismError if nothing varies, for an unknown measure or method, or as `analyse` does.
     """
-    notes = [finding_for("tolerance.method_alias", "method", method="linear")] if "rss" in methods else []
-    methods = tuple(dict.fromkeys("linear" if one == "rss" else one for one in methods))
+    methods, notes = _known(methods)
     _check(methods, samples, seed, engine, target)
     found = study(mechanism, measures, steps, at, friction_method)
     worst = found.worst() if "worst-case" in methods else None
@@ -85,8 +84,7 @@ def tolerance(
     stopped = False
     method = next((one for one in methods if one in SAMPLINGS), None)
     if method is not None:
-        many = samples * len(found.plan.times)
-        engine = "numpy" if engine == "auto" and cluster else engine_for(engine, found.kernel, found.run.values, many)
+        engine = _engine(found, engine, samples, cluster)
         job = found.sampling(method, samples, seed, engine)
         alone = job.samples * job.positions < FEW and cluster is None
         jobs = 1 if jobs is None and (alone or engine != "numpy") else jobs
@@ -96,10 +94,23 @@ def tolerance(
         tally, stopped = ran.tally, ran.stopped
         notes += [*ran.notes, *_stopped(ran, job, kept=checkpoint is not None)]
     if "sobol" in methods:
-        # Not turned: each number is to have its own coordinates of the points.
-        own = replace(found.sampling("quasi-monte-carlo", samples, seed), rotation=None)
+        own = found.sampling("quasi-monte-carlo", samples, seed)
+        own = replace(own, rotation=None)  # each number is to have its own coordinates of the points
         shares = indices(found.sampler(own), samples, seed)
     return dataset(Outcome(found, tuple(methods), worst, job, tally, shares, stopped, target), [*found.told, *notes])
+
+
+def _known(methods: Sequence[str]) -> tuple[tuple[str, ...], list[Finding]]:
+    """The methods by their own names, and a note of another that was used."""
+    notes = [finding_for("tolerance.method_alias", "method", method="linear")] if "rss" in methods else []
+    return tuple(dict.fromkeys("linear" if one == "rss" else one for one in methods)), notes
+
+
+def _engine(found: ToleranceStudy, engine: str, samples: int, cluster: str | None) -> str:
+    """The engine to use; of auto NumPy on a cluster, whose workers may have no other."""
+    if engine == "auto" and cluster:
+        return "numpy"
+    return engine_for(engine, found.kernel, found.run.values, samples * len(found.plan.times))
 
 
 def _stopped(ran: runner.JobRun[SampleTally], job: Sampling, kept: bool) -> list[Finding]:

@@ -21,7 +21,7 @@ import shlex
 import sys
 import tempfile
 from collections.abc import Callable, Iterable, Iterator
-from functools import cache
+from functools import cache, partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -229,12 +229,14 @@ def _lay(folder: Path, models: dict[str, str]) -> None:
 def _call(command: str, folder: Path) -> None:
     """Run a command of Trunnion in this process: a process of its own takes seconds to load everything again."""
     from trunnion.cli.app import main
+    from trunnion.studies.sweep import study
 
     said, status = io.StringIO(), 0
     streams = contextlib.redirect_stdout(said), contextlib.redirect_stderr(said)
     with (
         contextlib.chdir(folder),
         patch.object(sys, "argv", ["trunnion", *shlex.split(command)]),
+        patch.object(study, "sweep", partial(_swept, study.sweep)),
         streams[0],
         streams[1],
     ):
@@ -244,6 +246,18 @@ def _call(command: str, folder: Path) -> None:
             status = int(end.code or 0)
     if status not in (0, 1):
         raise PluginError(f"trunnion {command}: {said.getvalue()}")
+
+
+_SWEEPS: dict[str, Any] = {}
+
+
+def _swept(sweep: Callable[..., Any], mechanism: Any, *given: Any, **options: Any) -> Any:
+    """A sweep, run once for all figures that show it in different ways."""
+    own = {name: value for name, value in options.items() if name != "progress"}
+    key = repr((mechanism.digest, given, own))
+    if key not in _SWEEPS:
+        _SWEEPS[key] = sweep(mechanism, *given, **options)
+    return _SWEEPS[key]
 
 
 def _measured(text: str, command: str) -> str:

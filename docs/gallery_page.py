@@ -39,12 +39,12 @@ def model(name: str) -> Any:
 def brief(mechanism: Any, steps: int) -> Any:
     """What `analyse` returns, without the means over the cycle: figures show none, and they ask for most positions."""
     from trunnion.cycle.positions import positions
-    from trunnion.cycle.summary import finish
+    from trunnion.cycle.summary import result_of
     from trunnion.solve.run import prepare
 
     with np.errstate(all="ignore"):  # a position that is not solved is NaN
         run = prepare(mechanism)
-        return finish(run, positions(run, steps, averaged=False))
+        return result_of(run, positions(run, steps, averaged=False)).dataset
 
 
 @cache

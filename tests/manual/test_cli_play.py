@@ -116,3 +116,18 @@ def test_one_position_and_no_answer_are_drawn_and_told() -> None:
         empty[key] = np.nan * empty[key]
     assert "no position is solved" in tables(empty)[0].title
     assert figure(empty).axes
+
+
+def test_a_place_and_joints_without_effect_are_told(tmp_path: Path) -> None:
+    """The table has the whole cycle; a measure with a place has its figure there beside it."""
+    model = tmp_path / "model.yaml"
+    text = (EXAMPLES / "fourbar-with-play.yaml").read_text(encoding="utf-8")
+    assert "measures:" not in text
+    model.write_text(
+        f"{text}\nmeasures:\n  place: {{angle: rocker, at: 90 deg}}\n  held: {{angle: crank}}\n", encoding="utf-8"
+    )
+    result = trunnion.play(trunnion.read(model), steps=8)
+    findings = {one.code: one for one in result.trunnion.findings}
+    there = float(result["worst_case_total"].sel(measure="place").isel(position=2))  # 90° of 0°, 45°, 90° …
+    assert findings["play.at_a_place"].figures["worst"] == pytest.approx(there, rel=1e-9)
+    assert findings["play.no_effect"].figures["measure"] == "held"

@@ -110,7 +110,7 @@ CYCLE: dict[str, Sentence] = {
     "position.singular": Sentence(
         ERROR,
         "{kind} {at}: condition number {condition:.3g}",
-        "speeds and forces have no finite value there; limit the range of the driver",
+        "speeds have no finite value there, nor have forces without friction; limit the range of the driver",
     ),
     "position.near_singular": Sentence(
         WARNING,

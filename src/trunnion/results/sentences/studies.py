@@ -54,6 +54,15 @@ PLAY = {
         "first order, {first:~{unit}}",
         "use the larger figure",
     ),
+    "play.at_a_place": Sentence(
+        NOTE,
+        "at {at} the worst case of {measure} to first order is ±{worst:~{unit}}; the table has the whole cycle",
+    ),
+    "play.no_effect": Sentence(
+        NOTE,
+        "the play of {joints} has no effect on {measure} while {drivers} {count:#is/are} driven",
+        "drive the joint that is driven in the machine",
+    ),
     "play.left_out": Sentence(
         WARNING, "the play of {joints} is left out ({kinds} joints)", "play is modelled in {modelled} joints"
     ),

@@ -31,6 +31,7 @@ from trunnion.errors import Finding, MechanismError, Severity, Status
 from trunnion.joints.clearance import CLEARANCE_MODELS, Vector, worst_case
 from trunnion.measures.measures import Measure, named, outputs
 from trunnion.measures.motion import MOTIONS
+from trunnion.measures.positions import plan
 from trunnion.model.contact import clearance
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.sentences import finding_for
@@ -52,6 +53,7 @@ if TYPE_CHECKING:
 __all__ = ["Effect", "by_duals", "by_virtual_load", "play", "plays", "variance"]
 
 CHUNK = 4096  # positions at a time
+IDLE = 1e-9  # of the largest effect of a joint: what is less is rounding
 
 Array = NDArray[np.float64]
 Loads = dict[str, list[Vector]]  # load at each end, by joint
@@ -137,7 +139,7 @@ def play(
     found, told = _measures(run, measures)
     known = plays(run.system, run.values)
     _check(known)
-    effect = _over_the_cycle(run, found, known, steps if run.cycle.duration > 0 else 1, progress)
+    effect = _over(run, found, known, run.cycle.times(steps if run.cycle.duration > 0 else 1), progress)
     return dataset(effect, [*_model_findings(run, effect), *told])
 
 
@@ -173,14 +175,15 @@ def _check(known: Mapping[str, Play]) -> None:
         raise MechanismError(findings)
 
 
-def _over_the_cycle(
+def _over(
     run: Run,
     measures: Sequence[Measure],
     known: Mapping[str, Play],
-    steps: int,
+    time: Array,
     progress: Callable[[int], None] | None = None,
 ) -> Effect:
-    time = run.cycle.times(steps)
+    """The effect at some positions of the cycle, by their times, s."""
+    steps = len(time)
     shape = (len(measures), len(known), steps)
     ends = max(len(play.model.ends) for play in known.values())
     effect = Effect(
@@ -271,6 +274,8 @@ def _model_findings(run: Run, effect: Effect) -> Iterator[Finding]:
     if run.seats:
         yield finding_for("play.seats_not_taken", "joints", joints=[one.joint for one in run.seats])
     yield from _limits(run, effect)
+    yield from _places(run, effect)
+    yield from _idle(run, effect)
     yield from beyond_first_order(effect)
     dial = run.system.dial(run.values, effect.time)
     for code in Status:
@@ -322,3 +327,30 @@ def _limits(run: Run, effect: Effect) -> Iterator[Finding]:
             yield finding_for("limit.exceeded", where, **figures, over=dial.intervals(over))
         else:
             yield finding_for("limit.kept", where, **figures)
+
+
+def _places(run: Run, effect: Effect) -> Iterator[Finding]:
+    """What play does at the place that a measure states: the result has the whole cycle."""
+    for measure in effect.measures:
+        if measure.at is None:
+            continue
+        there = _over(run, [measure], effect.plays, plan(run, [measure], 1).times)
+        worst = float(relied_on(there.total[0], there.status)[0])
+        at = run.system.dial(run.values, there.time).at(0)
+        yield finding_for(
+            "play.at_a_place", f"measures.{measure.name}.at", measure=measure.name, at=at, worst=worst,
+            unit=measure.unit(run.system),
+        )  # fmt: skip
+
+
+def _idle(run: Run, effect: Effect) -> Iterator[Finding]:
+    """Joints whose play does nothing to a measure: likely another joint is driven in the machine."""
+    for measure, rows in zip(effect.measures, effect.worst_case, strict=True):
+        largest = [float(np.nanmax(row, initial=0.0)) for row in rows]
+        idle = [joint for joint, most in zip(effect.plays, largest, strict=True) if most <= IDLE * max(largest)]
+        if idle:
+            drivers = list(run.system.mechanism.drivers)
+            yield finding_for(
+                "play.no_effect", f"measures.{measure.name}", joints=idle, measure=measure.name, drivers=drivers,
+                count=len(drivers),
+            )  # fmt: skip

@@ -99,7 +99,7 @@ def test_the_summary_has_the_numbers_of_the_result() -> None:
     summary = {one.name: one for one in cycle.trunnion.summary}
     driver = str(cycle["driver"].values[0])
     most = summary[f"{driver}.effort_max"]
-    assert (most.value, most.unit, most.aspect) == (float(cycle["drive_effort"].max()), "N m", "largest")
+    assert (most.value, most.unit, most.aspect) == (float(cycle["drive_effort"].max()), "N m", "maximum")
     assert summary["efficiency"].value == float(cycle["efficiency"])
     table = cycle.trunnion.tables()["positions"]
     np.testing.assert_array_equal(table[f"{driver}.effort"], cycle["drive_effort"].values[0])

@@ -26,7 +26,7 @@ def test_an_unforeseen_exception_is_one_line(
     def broken(*_: object) -> None:
         raise fault
 
-    monkeypatch.setattr(analysing, "analyse", broken)
+    monkeypatch.setattr(analysing, "analysed", broken)
     done = program("analyse", FOUR_BAR)
     assert done.code == 3
     assert done.out == ""
@@ -45,7 +45,7 @@ def test_debug_shows_where(
     def broken(*_: object) -> None:
         raise KeyError("x")
 
-    monkeypatch.setattr(analysing, "analyse", broken)
+    monkeypatch.setattr(analysing, "analysed", broken)
     monkeypatch.setattr(sys, "argv", ["trunnion", *words, str(FOUR_BAR)])
     with pytest.raises(SystemExit) as stop:
         cli.main()
@@ -67,7 +67,7 @@ def test_an_interrupt_that_became_another_exception(program: Run, monkeypatch: p
         except KeyboardInterrupt:
             raise ImportError("numpy cannot be loaded") from None
 
-    monkeypatch.setattr(analysing, "analyse", broken)
+    monkeypatch.setattr(analysing, "analysed", broken)
     done = program("analyse", FOUR_BAR)
     assert done.code == 130
     assert done.err == "stopped\n"

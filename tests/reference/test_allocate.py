@@ -226,7 +226,7 @@ def test_nothing_keeps_the_limits() -> None:
     assert half_widths(result) == {}
     (said,) = findings(result, "error")
     worst = np.max(np.abs(slopes()).sum(axis=1)) * 2e-5
-    assert f"the deviation is +{np.degrees(worst):.6g} deg at 20°" in said
+    assert f"the deviation is +{np.degrees(worst):.6g}° at 20°" in said
     assert "measures.rocker-angle" in said
     assert "the limit +0.05° is infeasible" in said
 

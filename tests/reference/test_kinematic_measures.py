@@ -222,8 +222,8 @@ def test_the_models_measures_in_the_result_of_a_cycle(tmp_path: Path) -> None:
     np.testing.assert_allclose(result["measure_figure"].values[1:], list(expected.values()), rtol=1e-12)
     labels = [row["label"] for row in json.loads(result.attrs["summary"])]
     assert [one for one in labels if "speed" in one and "measure" in one] == [
-        "measure speed, least",
-        "measure speed, largest",
+        "measure speed, minimum",
+        "measure speed, maximum",
     ]
     left = [one for one in json.loads(result.attrs["findings"]) if one["where"] == "measures.off"]
     assert [one["severity"] for one in left] == ["note"]

@@ -24,7 +24,7 @@ def console() -> Any:
     """Where tables go."""
     from rich.console import Console
 
-    return Console()
+    return Console(emoji=False)  # else `effort:O:` has a circle
 
 
 def wrote(path: Path) -> None:

@@ -195,8 +195,8 @@ TOLERANCE = {
     ),
     "first_order.scatter_differs": Sentence(
         WARNING,
-        "the standard deviation of the samples is {found:.4g} (SI unit), the first-order one {linear:.4g}",
-        "the measure is not linear within the tolerances: use the samples",
+        "the standard deviation of the samples is {found:~{unit}}, the first-order one {linear:~{unit}}",
+        "the measure is not linear within the tolerances: use the samples; if a load begins at once, use more --steps",
     ),
     "play.carried": Sentence(
         NOTE,
@@ -225,6 +225,12 @@ ALLOCATION = {
     "allocation.proven_margin": Sentence(
         NOTE, "minimum cost to first order, for the same relative margin at every limit"
     ),
+    "allocation.same_margin": Sentence(
+        WARNING,
+        "the cost is an upper bound: all {count} limits get the same relative margin, and margins that differ may cost "
+        "less, above all where one limit is hard to meet",
+        "compare with the cost without one of the limits",
+    ),
     "allocation.proven_roughly": Sentence(
         WARNING, "the optimality gap is {gap:.1e} of the cost of the tolerances", MAGNITUDES
     ),
@@ -243,7 +249,7 @@ ALLOCATION = {
         ERROR,
         "the limit {limit_told} is infeasible: with all tolerances at their least the deviation is "
         "{takes_told}{ratio}{more}",
-        "widen the limit, or first narrow '{largest}', {kept} and has the largest share",
+        "widen the limit, or first {narrow} has the largest share",
     ),
     "allocation.nominal_outside": Sentence(
         ERROR,

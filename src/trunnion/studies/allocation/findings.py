@@ -51,6 +51,9 @@ def findings_of(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:
         return
     if answer.proven and found.asked.criterion == "yield":
         yield finding_for("allocation.proven_margin")
+        limited = len(np.unique(found.rows.measure))
+        if limited > 1:
+            yield finding_for("allocation.same_margin", "measures", count=limited)
     elif answer.proven:
         yield finding_for("allocation.proven", gap=max(answer.gap, 0.0))
     yield from _plays(found)

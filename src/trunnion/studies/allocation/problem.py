@@ -307,10 +307,17 @@ def _shortfall(problem: AllocationProblem, least: Array, row: int, more: str) ->
     over, limit = (high, upper) if high - upper >= lower - low else (low, lower)
     parts = effects.worst[row] * least
     largest = problem.contributions[int(np.argmax(parts))]
-    kept = "which has no cost and stays as stated" if largest.fixed else "which is at its least"
+    name = f"'{largest.name}'"
+    narrow = f"narrow {name}, which has no cost and" if largest.fixed else f"allow {name} a smaller least: it"
     ratio = f", {over / limit:.3g} times the limit" if over * limit > 0 else ""
     takes = f"{effects.say(row, over)}{effects.place(row)}"
-    phrases = {"limit_told": effects.say(row, limit), "takes_told": takes, "ratio": ratio, "more": more, "kept": kept}
+    phrases = {
+        "limit_told": effects.say(row, limit),
+        "takes_told": takes,
+        "ratio": ratio,
+        "more": more,
+        "narrow": narrow,
+    }
     return finding_for(
         "allocation.impossible", effects.label(row), phrases=phrases, limit=limit, takes=over, largest=largest.name
     )

@@ -209,7 +209,10 @@ def _scatter(outcome: Outcome, counted: Sampled) -> Iterator[Finding]:
         if by_position(of.reference) or counted.done < ENOUGH or not np.isfinite(linear + found):
             continue
         if max(linear, found) > 0 and not 1 / OTHERWISE < found / max(linear, 1e-300) < OTHERWISE:
-            yield finding_for("first_order.scatter_differs", f"measures.{of.measure.name}", found=found, linear=linear)
+            unit = of.measure.figure_unit(outcome.study.run.system, outcome.study.run.values)
+            yield finding_for(
+                "first_order.scatter_differs", f"measures.{of.measure.name}", found=found, linear=linear, unit=unit
+            )
 
 
 def _samples(outcome: Outcome, counted: Sampled) -> Iterator[Finding]:

@@ -283,7 +283,9 @@ def test_the_engine_is_chosen_by_size(monkeypatch: pytest.MonkeyPatch) -> None:
     kernel = trunnion.studies.tolerance.kernel
     assert toleranced("auto", samples=200).attrs["engine"] == "numpy"
     monkeypatch.setattr(kernel, "WORTH_COMPILING", 7_000)
-    assert toleranced("auto", samples=200).attrs["engine"] == "compiled"
+    found = toleranced("auto", samples=200)
+    assert found.attrs["engine"] == "compiled"
+    assert [one.figures for one in found.trunnion.findings if one.code == "samples.engine"] == [{"engine": "compiled"}]
     monkeypatch.setattr(kernel, "find_spec", lambda name: None)
     assert toleranced("auto", samples=200).attrs["engine"] == "numpy"
 

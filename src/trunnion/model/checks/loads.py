@@ -257,7 +257,7 @@ def spring_values(mechanism: Numbers, values: Values) -> Iterator[Finding]:
             number = values.get(f"{where}.{key}", np.nan)
             if number < 0:
                 yield Finding(f"is {number:g}, which is negative", f"{where}.{key}", "give a value of at least 0")
-        if values.get(f"{where}.stiffness", np.nan) == 0:
+        if values.get(f"{where}.stiffness", np.nan) == 0 and not values.get(f"{where}.preload", 0.0):
             yield Finding("is 0: the spring does not pull", f"{where}.stiffness", "remove it", Severity.WARNING)
         preload = values.get(f"{where}.preload", np.nan)
         if spring.only is not None and preload * (1 if spring.only == "pull" else -1) < 0:

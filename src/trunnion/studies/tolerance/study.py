@@ -15,7 +15,7 @@ from trunnion.model.mechanism import Mechanism
 from trunnion.results.sentences import finding_for
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.studies.tolerance import runner
-from trunnion.studies.tolerance.indices import Indices, indices
+from trunnion.studies.tolerance.indices import indices
 from trunnion.studies.tolerance.sampling import METHODS as SAMPLINGS
 from trunnion.studies.tolerance.sampling import SampleTally, Sampling
 
@@ -78,13 +78,10 @@ def tolerance(
     _check(methods, samples, seed, engine, target)
     found = study(mechanism, measures, steps, at, friction_method)
     worst = found.worst() if "worst-case" in methods else None
-    job: Sampling | None = None
-    tally: SampleTally | None = None
-    shares: Indices | None = None
-    stopped = False
+    job, tally, shares, stopped = None, None, None, False
     method = next((one for one in methods if one in SAMPLINGS), None)
     if method is not None:
-        engine = _engine(found, engine, samples, cluster)
+        engine, chosen = _engine(found, engine, samples, cluster)
         job = found.sampling(method, samples, seed, engine)
         alone = job.samples * job.positions < FEW and cluster is None
         jobs = 1 if jobs is None and (alone or engine != "numpy") else jobs
@@ -92,7 +89,7 @@ def tolerance(
             job, jobs=jobs, chunk=chunk, cluster=cluster, checkpoint=checkpoint, resume=resume, progress=progress
         )
         tally, stopped = ran.tally, ran.stopped
-        notes += [*ran.notes, *_stopped(ran, job, kept=checkpoint is not None)]
+        notes += [*chosen, *ran.notes, *_stopped(ran, job, kept=checkpoint is not None)]
     if "sobol" in methods:
         own = found.sampling("quasi-monte-carlo", samples, seed)
         own = replace(own, rotation=None)  # each number is to have its own coordinates of the points
@@ -106,11 +103,13 @@ def _known(methods: Sequence[str]) -> tuple[tuple[str, ...], list[Finding]]:
     return tuple(dict.fromkeys("linear" if one == "rss" else one for one in methods)), notes
 
 
-def _engine(found: ToleranceStudy, engine: str, samples: int, cluster: str | None) -> str:
-    """The engine to use; of auto NumPy on a cluster, whose workers may have no other."""
-    if engine == "auto" and cluster:
-        return "numpy"
-    return engine_for(engine, found.kernel, found.run.values, samples * len(found.plan.times))
+def _engine(found: ToleranceStudy, engine: str, samples: int, cluster: str | None) -> tuple[str, list[Finding]]:
+    """The engine to use, and a note of one that was chosen; NumPy on a cluster, whose workers may have no other."""
+    if engine != "auto":
+        return engine, []
+    many = samples * len(found.plan.times)
+    engine = "numpy" if cluster else engine_for(engine, found.kernel, found.run.values, many)
+    return engine, [finding_for("samples.engine", "samples", engine=engine)]
 
 
 def _stopped(ran: runner.JobRun[SampleTally], job: Sampling, kept: bool) -> list[Finding]:

@@ -52,6 +52,11 @@ __all__ = [
 
 
 Arrays = Mapping[str, NDArray[np.float64]]
+FEWEST = 12  # positions among which a jump can be told from a slope
+JUMP, STEADY = (
+    0.2,
+    2e-3,
+)  # of the largest effort: what drops by more is a jump, what changes by less is steady beside it
 TIMES = "times the friction"  # what a locking margin is
 ZERO_INERTIA = Quantity(0, KINDS["moment of inertia"])
 
@@ -102,6 +107,7 @@ def findings(run: Run, at: Positions) -> tuple[list[Finding], near_locking.Locki
         *(run.determinacy.findings() if run.determinacy else []),
         *_over_the_cycle(run, at.arrays, at.causes, at.time, near),
         *_missed_peaks(run.system, at),
+        *_beside_jumps(run, at),
         *contact_loss.findings(at.losses, at.arrays, list(run.system.joints), run.system.dial(run.values, at.time)),
     ], near
 
@@ -183,6 +189,24 @@ def _missed_peaks(system: System, at: Positions) -> Iterator[Finding]:
         largest, rms = float(np.max(np.abs(at.arrays["drive_effort"][i][sound]))), float(at.means.drive_effort_rms[i])
         if rms > (1 + 1e-6) * largest:
             yield finding_for("effort.peak_missed", f"drivers.{name}", rms=rms, largest=largest, unit=unit)
+
+
+def _beside_jumps(run: Run, at: Positions) -> Iterator[Finding]:
+    """Efforts that are largest beside a jump, of a load or of friction: how much more it may be at the jump itself."""
+    time, status, dial = at.time, at.arrays["status"], run.system.dial(run.values, at.time)
+    if len(time) < FEWEST or not len(run.edges):
+        return
+    for i, (name, unit) in enumerate(zip(run.system.mechanism.drivers, effort_units(run.system), strict=True)):
+        size = np.abs(np.where(status < Status.NOT_CONVERGED, at.arrays["drive_effort"][i], np.nan))
+        if not np.any(np.isfinite(size)):
+            continue
+        k = int(np.nanargmax(size))
+        for side in (-1, 1) if 1 < k < len(time) - 2 else ():
+            low, high = sorted((time[k], time[k + side]))
+            beyond, more = size[k] - size[k + side], size[k] - size[k - side]
+            jumps = np.any((run.edges >= low) & (run.edges <= high)) and beyond > JUMP * size[k]
+            if jumps and STEADY * size[k] < more < beyond:
+                yield finding_for("effort.beside_jump", f"drivers.{name}", at=dial.at(k), more=more, unit=unit)
 
 
 def _loads_over_the_cycle(run: Run, arrays: Arrays, time: NDArray[np.float64]) -> Iterator[Finding]:

@@ -86,6 +86,11 @@ CYCLE: dict[str, Sentence] = {
         "the {whom} have no common period; the cycle is the longest period, {duration:g} s",
         "means and efficiency are over that time; choose speeds with a common period, or ranges",
     ),
+    "effort.beside_jump": Sentence(
+        NOTE,
+        "the largest effort, at {at}, is beside a jump; at the jump it may be larger by up to about {more:~{unit}}",
+        "use more --steps",
+    ),
     "effort.peak_missed": Sentence(
         WARNING,
         "the RMS over the cycle, {rms:~{unit}}, exceeds the largest value at any position, {largest:~{unit}}",

@@ -45,8 +45,11 @@ def locking(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
     if not has_friction(result):
         raise MechanismError(Finding("no joint has friction, so nothing can lock", "locking", "state friction"))
     over = abscissa(result)
-    figure = new("Locking by friction", result, 6.2)
-    margin, efficiency = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+    drawn = any(
+        np.isfinite(result[name].values).any() for name in ("locking_margin", "critical_multiple") if name in result
+    )
+    figure = new("Locking by friction", result, 6.2 if drawn else 5.2)
+    margin, efficiency = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2) if drawn else (1, 2))
     _margin(margin, result, over)
     _efficiency(efficiency, result, over)
     for axes in (margin, efficiency):
@@ -67,12 +70,16 @@ def _margin(axes: Axes, result: xr.Dataset, over: Abscissa) -> None:
     largest = float(np.max(every[np.isfinite(every)], initial=0.0))
     reached = bool(np.any(np.isinf(every))) or largest >= MARGIN
     top = MARGIN if reached else max(1.1 * largest, LEAST_TOP)
-    along(axes, over, f"times the friction, searched to {MARGIN:g}" if reached else "times the friction", zero=False)
+    searched = f", searched to {MARGIN:g}" if reached and largest else ""
+    along(axes, over, f"times the friction{searched}", zero=False)
     axes.set_ylim(0.0, top)
     never = f": more than {MARGIN:g}" if not np.isfinite(margin).any() else ""
     curve(axes, over, _shown(margin), f"locking margin, all friction{never}", color=INK, linewidth=2.0)
     for label, first, values in joined({joint: _shown(values) for joint, values in known.items()}):
         curve(axes, over, values, f"{label} alone", linewidth=1.3, **style_of(first))
+    if not largest:  # nothing to draw
+        told = f"more than {MARGIN:g} at every position"
+        axes.text(0.5, 0.5, told, ha="center", va="center", transform=axes.transAxes)
     axes.axhline(1.0, color=INK, linewidth=1.0, linestyle=(0, (3, 2)), zorder=1.6, label="locks at 1")
 
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import trunnion
@@ -87,3 +90,62 @@ def test_an_error_of_the_model_is_not_laid_on_a_sensor(folder: Path) -> None:
     codes = {one.code for one in result.trunnion.findings}
     assert "fit.misfit" in codes
     assert "fit.cause" not in codes
+
+
+Change = Callable[[np.ndarray], np.ndarray]
+
+
+def off_in_the_last(folder: Path, change: Change, **stated: Any) -> Any:
+    """Identified from data of which the readings of the last condition are changed."""
+    found = trunnion.rig.read(folder / "mapping.yaml")
+    courses = {
+        k: {name: replace(one, turns=change(one.turns) if k else one.turns) for name, one in condition.courses.items()}
+        for k, condition in enumerate(found.conditions)
+    }
+    conditions = tuple(replace(one, courses=courses[k], **stated) for k, one in enumerate(found.conditions))
+    machine = trunnion.read(MODEL)
+    return trunnion.rig.identify(machine, replace(found, conditions=conditions), {"mu": [GUIDE]}, ["M"])
+
+
+OFF: dict[str, tuple[Change, str, float, float]] = {
+    "angle": (lambda turns: np.roll(turns, 2, axis=1), "shift", -2.0, 0.1),
+    "zero": (lambda turns: turns + 0.6, "zero", 0.6, 0.1),
+}
+
+
+@pytest.mark.parametrize("lag", [0.0, 1e-5])
+@pytest.mark.parametrize("name", OFF)
+def test_one_condition_alone_is_named_with_its_size(folder: Path, name: str, lag: float) -> None:
+    """Also where an error of its own is stated of each condition: so small a one that it does not explain it."""
+    change, kind, size, near = OFF[name]
+    result = off_in_the_last(folder, change, lag=lag)
+    found, names = cause(result), [str(one) for one in result["condition"].values]
+    positions = result.sizes["position"]
+    scale = 2 * np.pi / positions if kind == "shift" else 1.0
+    assert found.figures["kind"] == kind
+    sizes = found.figures["conditions"]
+    assert sizes[names[1]] == pytest.approx(size * scale, abs=near * scale)
+    assert sizes[names[0]] == pytest.approx(0.0, abs=near * scale)
+    assert names[1] in found.what
+    assert names[0] not in found.what
+    assert names[1] in found.remedy
+    assert "add" not in found.remedy  # nothing to the zero that all share
+
+
+def test_no_cause_is_named_whose_size_is_zero_within_its_uncertainty(folder: Path) -> None:
+    """Angles off by as much to either side, each stated to be known well: the mean is no cause."""
+    found = trunnion.rig.read(folder / "mapping.yaml")
+    conditions = []
+    for k, condition in enumerate(found.conditions):
+        courses = {
+            name: replace(one, turns=np.roll(one.turns, 1 - 2 * k, axis=1)) for name, one in condition.courses.items()
+        }
+        conditions.append(replace(condition, courses=courses, lag=1e-5))
+    data = replace(found, conditions=tuple(conditions))
+    result = trunnion.rig.identify(trunnion.read(MODEL), data, {"mu": [GUIDE]}, ["M"])
+    told = cause(result)
+    assert told.figures["kind"] == "shift"
+    assert abs(told.figures["size"]) > told.figures["expanded"]
+    assert np.ptp(list(told.figures["conditions"].values())) == pytest.approx(
+        2 * 2 * np.pi / result.sizes["position"], rel=0.05
+    )

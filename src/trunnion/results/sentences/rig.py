@@ -183,13 +183,22 @@ IDENTIFY = {
     "fit.cause": Sentence(
         WARNING,
         "{story} would explain {explains_percent:.0f} % of the misfit{also}; the estimates would then be {estimates}",
-        lambda kind, size_told, channel, **_: {
-            "shift": f"check the zero of the angle; if it is off, add {size_told} to angle: zero: in the mapping",
-            "delay": "check the filters of the channels; --delay allows for a delay and estimates it",
-            "sign": f"state sign: -1 for {channel} in the mapping, or remove it",
-            "zero": f"check the zero of {channel}; with accuracy: {{zero: …}} in the mapping it is estimated too",
-            "gain": f"check the gain of {channel}; with accuracy: {{gain: …}} in the mapping it is estimated too",
-        }[kind],
+        lambda kind, size_told, channel, odd, conditions=None, **_: (
+            {
+                "shift": f"check the angle sensor, its coupling and its zero in {odd}; leave these data out, or "
+                "correct their angle: zero: in a mapping of their own, not the one that all share",
+                "zero": f"check the zero of {channel} in {odd}: unloaded stretch, drift, amplifier",
+                "gain": f"check range and gain of {channel}, and the loads, in {odd}",
+            }
+            if conditions
+            else {
+                "shift": f"check the zero of the angle; if it is off, add {size_told} to angle: zero: in the mapping",
+                "delay": "check the filters of the channels; --delay allows for a delay and estimates it",
+                "sign": f"state sign: -1 for {channel} in the mapping, or remove it",
+                "zero": f"check the zero of {channel}; with accuracy: {{zero: …}} in the mapping it is estimated too",
+                "gain": f"check the gain of {channel}; with accuracy: {{gain: …}} in the mapping it is estimated too",
+            }
+        )[kind],
     ),
     "fit.conditions_disagree": Sentence(
         NOTE,

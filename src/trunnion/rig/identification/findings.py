@@ -13,7 +13,7 @@ from trunnion.rig.comparison.findings import other_speed
 from trunnion.rig.identification.assessment import Assessment
 from trunnion.rig.identification.blocks import OWN, shared_zero
 from trunnion.rig.identification.identifiability import Combination, InseparableUnknowns, known_of, sizes_of
-from trunnion.rig.identification.misfit import MisfitCause
+from trunnion.rig.identification.misfit import MisfitCause, OwnSize
 from trunnion.rig.identification.number_text import amount, share
 from trunnion.rig.identification.uncertainty import RANDOM, quantile
 
@@ -25,6 +25,8 @@ FAR = 3.0  # standard uncertainties from what was stated of a sensor
 MOSTLY = 0.5  # of the variance
 POOR = 2.0  # times what is expected, of predictions
 MOST_NAMED = 3
+SMALL = 0.2  # of the largest: what a condition has of an error to be named with it
+MOST_TOLD = 4
 FEW = 5.0  # degrees of freedom
 NUMBERS = ("no", "one", "two", "three", "four", "five", "six")
 
@@ -112,9 +114,10 @@ def _causes(judged: Assessment) -> Iterator[Finding]:
         "story": _story(judged, first), "also": also_told, "estimates": _joined(known), "channel": first.channel,
         "size_told": amount(first.size, None, unit) if first.kind != "shift" else f"{np.degrees(first.size):+.3g} deg",
     }  # fmt: skip
+    each = {"conditions": {_condition(judged, one): one.size for one in first.own}} if first.own else {}
     yield finding_for(
-        "fit.cause", "fit", phrases=phrases, kind=first.kind, size=first.size, expanded=first.expanded,
-        explains_percent=100 * first.explains,
+        "fit.cause", "fit", phrases=phrases | {"odd": _joined(_odd(judged, first))}, kind=first.kind, size=first.size,
+        expanded=first.expanded, explains_percent=100 * first.explains, **each,
         values={one.name: float(value) for one, value in zip(problem.model.unknowns, first.estimates, strict=True)},
     )  # fmt: skip
 
@@ -123,18 +126,52 @@ def _unit_of(judged: Assessment, channel: str) -> str:
     return next((one.course.unit for one in judged.problem.blocks if one.channel == channel), "1")
 
 
+def _condition(judged: Assessment, one: OwnSize) -> str:
+    return judged.found.measurement.conditions[one.condition].name
+
+
+def _apart(one: MisfitCause) -> tuple[list[OwnSize], list[OwnSize]]:
+    """The conditions that carry an error, the largest first, and the others."""
+    least = SMALL * abs(one.size)
+    odd = [own for own in one.own if abs(own.size) > max(own.expanded, least)]
+    return sorted(odd, key=lambda own: -abs(own.size)), [own for own in one.own if own not in odd]
+
+
+def _odd(judged: Assessment, one: MisfitCause) -> list[str]:
+    return [_condition(judged, own) for own in _apart(one)[0][:MOST_TOLD]] or [""]
+
+
 def _story(judged: Assessment, one: MisfitCause) -> str:
-    """A cause with its size."""
-    if one.kind == "shift":
-        return f"an offset of the drive angle of {amount(one.size, one.expanded, 'rad').replace(' °', '°')}"
-    if one.kind == "delay":
-        factor = 1e3
-        return f"a delay of all channels of {amount(one.size * factor, one.expanded * factor, 'ms')}"
-    if one.kind == "zero":
-        return f"a constant offset of {one.channel} of {amount(one.size, one.expanded, _unit_of(judged, one.channel))}"
-    if one.kind == "gain":
-        return f"a gain error of {one.channel} of {amount(100 * one.size, 100 * one.expanded, '%')}"
-    return f"{KINDS[one.kind]} of {one.channel}"
+    """A cause with its size, that of each condition where they do not share it."""
+    what = {
+        "shift": "an offset of the drive angle",
+        "delay": "a delay of all channels",
+        "zero": f"a constant offset of {one.channel}",
+        "gain": f"a gain error of {one.channel}",
+    }.get(one.kind)
+    if what is None:
+        return f"{KINDS[one.kind]} of {one.channel}"
+    if not one.own:
+        return f"{what} of {_sized(judged, one, one.size, one.expanded)}"
+    odd, others = _apart(one)
+    told = [f"{_condition(judged, own)}: {_sized(judged, one, own.size, own.expanded)}" for own in odd[:MOST_TOLD]]
+    told += [f"{len(odd) - MOST_TOLD} more conditions"] * (len(odd) > MOST_TOLD)
+    rest = "the other" if len(others) == 1 else "the others"
+    beyond = [abs(own.size) for own in others if abs(own.size) > own.expanded]
+    if beyond:
+        told.append(f"{rest} up to {_sized(judged, one, max(beyond), None)}")
+    elif others:
+        told.append(f"{rest} 0 within U")
+    alone = "in single conditions" if others else "that differs between the conditions"
+    return f"{what} {alone} ({'; '.join(told)})"
+
+
+def _sized(judged: Assessment, one: MisfitCause, size: float, expanded: float | None) -> str:
+    """A size of a cause with its U and unit."""
+    unit, factor = {"shift": ("rad", 1.0), "delay": ("ms", 1e3), "gain": ("%", 100.0)}.get(
+        one.kind, (_unit_of(judged, one.channel), 1.0)
+    )
+    return amount(size * factor, None if expanded is None else expanded * factor, unit).replace(" °", "°")
 
 
 def _speeds(judged: Assessment) -> Iterator[Finding]:

@@ -281,3 +281,34 @@ def test_with_few_turns_nothing_is_left_out_that_may_be_the_signals_own(
     assert not faults(found, "left out")
     for course in found.conditions[0].courses.values():
         assert np.isfinite(course.turns).all()
+
+
+def _loaded(found: Any) -> list[Any]:
+    return [one for one in found.findings if one.code == "data.zero.loaded"]
+
+
+def test_an_unloaded_stretch_in_which_the_machine_runs(run: Columns, tmp_path: Path) -> None:
+    """180° of the first turn, with the load on: a warning; with a shaft that is uncoupled until then, a note."""
+    stretch = {"channels/torque-in/zero": {"over": ["0 s", "0.25 s"]}}
+    (one,) = _loaded(read(run, tmp_path, stretch))
+    assert one.severity is Severity.WARNING
+    assert one.where == "channels.torque-in.zero"
+    assert re.search(r"the angle moves by 1[678]\d° and the readings vary by 2\d\.\d N m", one.what)
+    assert "up to 0.19" in one.remedy
+    still = run["t"] < 0.26
+    run["T1"][still] = run["T1"][run["t"] < 0.19][np.arange(still.sum()) % 900]
+    (one,) = _loaded(read(run, tmp_path, stretch))
+    assert one.severity is Severity.NOTE
+    assert "vary" not in one.what
+
+
+def test_an_unloaded_stretch_that_is_loaded_at_rest(run: Columns, tmp_path: Path) -> None:
+    """Noise is no load, whether white or of the mains."""
+    rest = run["t"] < 0.2
+    hum = 0.1 * 0.5 * np.sin(2 * np.pi * 50 * run["t"])
+    assert not _loaded(read({**run, "T1": run["T1"] + hum}, tmp_path))
+    run["T1"][rest & (run["t"] > 0.12)] += 0.1 * 3.0
+    (one,) = _loaded(read(run, tmp_path))
+    assert one.severity is Severity.WARNING
+    assert "angle" not in one.what
+    assert "vary by 3.2" in one.what

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -114,7 +115,7 @@ def _causes(judged: Assessment) -> Iterator[Finding]:
         "story": _story(judged, first), "also": also_told, "estimates": _joined(known), "channel": first.channel,
         "size_told": amount(first.size, None, unit) if first.kind != "shift" else f"{np.degrees(first.size):+.3g} deg",
     }  # fmt: skip
-    each = {"conditions": {_condition(judged, one): one.size for one in first.own}} if first.own else {}
+    each: dict[str, Any] = {"conditions": {_condition(judged, one): one.size for one in first.own}} if first.own else {}
     yield finding_for(
         "fit.cause", "fit", phrases=phrases | {"odd": _joined(_odd(judged, first))}, kind=first.kind, size=first.size,
         expanded=first.expanded, explains_percent=100 * first.explains, **each,

@@ -17,7 +17,17 @@ from trunnion.rig.reading.scale import SensorScale, default_unit, scale
 from trunnion.rig.reading.sensor_quantity import HERTZ, Amount, alike, dimensions
 from trunnion.rig.reading.timebase import Timeline
 
-__all__ = ["ChannelReading", "Zeroed", "filtered", "mean_uncertainty", "reading", "resolution", "zeroed"]
+__all__ = [
+    "ChannelReading",
+    "Zeroed",
+    "filtered",
+    "mean_uncertainty",
+    "read_in",
+    "reading",
+    "resolution",
+    "shown",
+    "zeroed",
+]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -101,6 +111,18 @@ def _compare(where: str, channel: Channel, column: Column, account: Account) -> 
     if not alike(own[1], stated[1]) or own[0] != stated[0]:
         what = f"the file has the unit '{column.unit}' for '{channel.column}', the mapping '{channel.unit}'"
         account.warn("data.unit.differs", where, f"{what}, which is taken", f"correct {where}.unit, or remove it")
+
+
+def shown(own: ChannelReading) -> tuple[str, float]:
+    """Unit in which figures of a channel are told, and its size in SI: that of its readings where it is another one."""
+    unit, size = read_in(own)
+    return (unit, size) if size != 1 else (own.scale.unit, 1.0)
+
+
+def read_in(own: ChannelReading) -> tuple[str, float]:
+    """The unit of readings that are what is measured itself, and its factor to SI; empty of volts and the like."""
+    raw = own.scale
+    return (own.unit, raw.raw) if own.unit and alike(raw.of_reading, raw.of_quantity) else ("", 1.0)
 
 
 def zeroed(

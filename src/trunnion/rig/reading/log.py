@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from trunnion.errors import Finding, Severity, counted
 
-__all__ = ["Account", "counted", "places", "runs", "times", "told"]
+__all__ = ["Account", "counted", "few_digits", "places", "runs", "times", "told"]
 
 FILES = 4  # named in a sentence
 
@@ -42,6 +42,11 @@ class Account:
         self.done.setdefault(sentence, []).extend([] if value is None else [value])
 
 
+def few_digits(number: float, digits: int = 2) -> str:
+    """A number to so many digits, without a power of ten as far as that is readable."""
+    return f"{float(f'{number:.{digits}g}'):,.6g}"
+
+
 def told(accounts: Sequence[Account]) -> list[str]:
     """What was done to the files of accounts, each sentence once, with the files where it is not all of them."""
     sentences = list(dict.fromkeys(sentence for one in accounts for sentence in one.done))
@@ -49,7 +54,7 @@ def told(accounts: Sequence[Account]) -> list[str]:
     for sentence in sentences:
         said = [one for one in accounts if sentence in one.done]
         values = [value for one in said for value in one.done[sentence]]
-        low, high = (f"{limit(values):.2g}" for limit in (min, max)) if values else ("", "")
+        low, high = (few_digits(limit(values)) for limit in (min, max)) if values else ("", "")
         text = sentence.replace("{}", low if low == high else f"{low} to {high}")
         names = [Path(one.file).name for one in said]
         most = ", ".join(names[:FILES]) + (f" and {len(names) - FILES} more" if len(names) > FILES else "")

@@ -14,17 +14,17 @@ from numpy.typing import NDArray
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.rig.reading import faults
 from trunnion.rig.reading.angle import Coordinate, coordinate
-from trunnion.rig.reading.channels import ChannelReading, Zeroed, filtered, reading, resolution, zeroed
+from trunnion.rig.reading.channels import ChannelReading, Zeroed, filtered, read_in, reading, resolution, shown, zeroed
 from trunnion.rig.reading.columns import DataTable
 from trunnion.rig.reading.log import Account, counted, told
 from trunnion.rig.reading.mapping import DataMapping, File, FromData, Mapped, Zero, read_mapping
 from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal
-from trunnion.rig.reading.sensor_quantity import alike
 from trunnion.rig.reading.settings import Setting, dimension_of, settings, stated
 from trunnion.rig.reading.signal_checks import Drift, drift, signs, speeds, steady
 from trunnion.rig.reading.tables import read_table
 from trunnion.rig.reading.timebase import Timeline, timeline
 from trunnion.rig.reading.turns import DENSE, Turns, cut, resampled, time_mean
+from trunnion.rig.reading.unloaded import check_unloaded
 
 __all__ = ["read_measured"]
 
@@ -217,6 +217,7 @@ class _File:
         if not cuts:
             return []
         self._check_rows(cuts)
+        self._check_zeros(cuts, share)
         parts = [_Part(setting, turns, {}) for setting, turns in cuts]
         drifts = {name: self._channel(name, zeros[name], parts) for name in mapping.channels}
         whole = {name: np.concatenate([part.courses[name] for part in parts]) for name in mapping.channels}
@@ -314,19 +315,29 @@ class _File:
             "values at a position: mean of the samples within half a position to either side"
             if dense else "values at a position: interpolated by a cubic between four samples"
         )  # fmt: skip
+
+    def _check_zeros(self, cuts: Sequence[tuple[Setting, Turns]], share: Array) -> None:
+        """Tell of unloaded stretches in which the sensor is loaded."""
+        mapping, account, seconds = self.mapping, self.account, self.line.seconds
+        measured = mapping.angle is not None and mapping.angle.from_ != "time" and not mapping.timed
+        angle = share * float(mapping.cycle.evaluate()) if measured else None
+        begin, end = min(one.begin[0] for _, one in cuts), max(one.end[-1] for _, one in cuts)
+        run = slice(int(np.searchsorted(seconds, begin)), int(np.searchsorted(seconds, end)))
         for name, channel in mapping.channels.items():
+            where, scale = f"channels.{name}.zero", self.own[name].scale
+            unit, factor = shown(self.own[name])
             for low, high in channel.zero.over if isinstance(channel.zero, Zero) else ():
                 inside = sum(int(np.sum((one.begin < high.value) & (one.end > low.value))) for _, one in cuts)
                 if inside:
                     what = (
                         f"the unloaded stretch {low.value:g} to {high.value:g} s reaches into {counted(inside, 'turn')}"
                     )
-                    account.warn(
-                        "data.zero.in_turns",
-                        f"channels.{name}.zero",
-                        what,
-                        "state a stretch in which the sensor is not loaded",
-                    )
+                    remedy = "state a stretch in which the sensor is not loaded"
+                    account.warn("data.zero.in_turns", where, what, remedy)
+                    continue
+                size = factor / abs(scale.factor)
+                span = low.value, high.value
+                check_unloaded(where, span, seconds, angle, self.readings[name], run, (unit, size), account)
 
     def _channel(self, name: str, zero: Zeroed, parts: Sequence[_Part]) -> Drift | None:
         """The courses of a channel, put into the parts; the drift that is left in them."""
@@ -382,7 +393,7 @@ class _File:
             of_file = float(np.hypot(abs(own.scale.factor) * zeros[name].uncertainty, extra))
             zero = float(np.hypot(own.accuracy_zero, of_file))
             accuracy = Accuracy(zero, own.accuracy_gain, self.steps[name], of_file)
-            courses[name] = Signal(name, channel.measures, own.scale.unit, part.courses[name], accuracy, _read_in(own))
+            courses[name] = Signal(name, channel.measures, own.scale.unit, part.courses[name], accuracy, read_in(own))
         values, known_as = dict(part.setting.values), dict(part.setting.dimensions)
         for path, channel_name in part.setting.means.items():
             turns = courses[channel_name].turns
@@ -409,12 +420,6 @@ class _File:
 def _where(setting: Setting) -> str:
     """What a finding about a condition is about; its file says which one, where nothing is set."""
     return f"condition {setting.name}" if setting.name else "turns"
-
-
-def _read_in(own: ChannelReading) -> tuple[str, float]:
-    """The unit of readings that are what is measured itself, and its factor to SI; empty of volts and the like."""
-    raw = own.scale
-    return (own.unit, raw.raw) if own.unit and alike(raw.of_reading, raw.of_quantity) else ("", 1.0)
 
 
 def _gone(share: Array, allowed: NDArray[np.bool_]) -> float:

@@ -134,6 +134,9 @@ def test_an_offset_is_named_with_its_size():
     assert (result.verdict.sel(channel="torque").values == Verdict.OFFSET).all()
     assert result.bias.sel(channel="torque").values == pytest.approx([1.5, 1.5], abs=0.01)
     assert said(result, "within U in every condition apart from a constant offset of +1.5 N m")
+    (told,) = (one for one in result.trunnion.findings if one.code == "compare.offset")
+    assert told.figures["within_percent"] < 5
+    assert told.figures["corrected_percent"] > 90
 
 
 @pytest.mark.parametrize(("size", "severity"), [(0.0, None), (0.01, "note"), (0.015, "warning")])

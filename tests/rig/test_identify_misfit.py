@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -12,6 +14,7 @@ import pytest
 
 import trunnion
 from trunnion.errors import Finding
+from trunnion.views.identify.report import report
 
 GUIDE = "S.friction.coefficient"
 MODEL = "examples/slider-crank.yaml"
@@ -149,3 +152,17 @@ def test_no_cause_is_named_whose_size_is_zero_within_its_uncertainty(folder: Pat
     assert np.ptp(list(told.figures["conditions"].values())) == pytest.approx(
         2 * 2 * np.pi / result.sizes["position"], rel=0.05
     )
+
+
+def test_the_report_has_the_model_and_counts_what_was_found_in_the_data(folder: Path) -> None:
+    result = identified(folder)
+    model = report(result).partition("<h2>Model</h2>")[2]
+    assert GUIDE in model
+    assert len(re.findall(r"<tr>", model)) > 20
+    warned = [{"severity": "warning", "where": "angle", "what": "odd", "remedy": "", "code": "x", "file": "run-1.csv"}]
+    result.attrs |= {"findings": "[]", "data_findings": json.dumps(warned)}
+    page = report(result)
+    assert 'href="#data">1 about the data' in page
+    assert "run-1.csv angle" in page
+    result.attrs |= {"data_findings": "[]"}
+    assert "No errors or warnings." in report(result)

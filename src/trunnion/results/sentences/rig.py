@@ -79,7 +79,8 @@ COMPARE = {
     ),
     "compare.offset": Sentence(
         ERROR,
-        "agrees within U {cases} apart from {story}: {within_percent:.0f} % of the positions agree after correction",
+        "agrees within U {cases} apart from {story}: without it {corrected_percent:.0f} % of the positions agree, "
+        "as measured {within_percent:.0f} %",
         "{remedy}",
     ),
     "compare.not_within": Sentence(

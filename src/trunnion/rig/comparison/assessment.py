@@ -73,7 +73,8 @@ class SignalAssessment:
     """Figures of a residual, measured less model, over the positions that can be compared; NaN where not known.
 
     largest: the residual of the largest size; place: its position, −1 if there is none; least: the share within ±U
-    from which the course is taken to be within; bias_expanded: U of the bias.
+    from which the course is taken to be within; bias_expanded: U of the bias; within_unbiased: the share within ±U once
+    the bias is taken off.
     """
 
     compared: int = 0
@@ -87,6 +88,7 @@ class SignalAssessment:
     least: float = np.nan
     correlation: float = np.nan
     verdict: Verdict = Verdict.NOTHING
+    within_unbiased: float = np.nan
 
 
 def probability(coverage: float) -> float:
@@ -137,6 +139,7 @@ def judge(course: Signal, model: Array, comparable: NDArray[np.bool_], coverage:
     return SignalAssessment(
         int(np.count_nonzero(where)), _rms(residual), float(residual[worst]), int(np.flatnonzero(where)[worst]),
         bias, _bias_expanded(of, coverage), _rms(unbiased), share, least, _correlation(measured, theirs), verdict,
+        share_0,
     )  # fmt: skip
 
 

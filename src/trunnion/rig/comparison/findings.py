@@ -194,7 +194,11 @@ def _explained(
     if offset and kind == "zero":
         story, remedy = _story(name, measures, kind, [_size(pair, kind) for _, pair in members], members)
         phrases = {"cases": where, "story": story, "remedy": remedy}
-        return finding_for("compare.offset", f"channels.{name}", phrases=phrases, within_percent=100 * worst)
+        after = min(pair.judged.within_unbiased for _, pair in members)
+        return finding_for(
+            "compare.offset", f"channels.{name}", phrases=phrases, within_percent=100 * worst,
+            corrected_percent=100 * after,
+        )  # fmt: skip
     remedy = "see the residual over the cycle; `trunnion identify` fits parameters of the model to the data"
     phrases = {"cases": where, "rms_told": said(rms, unit), "explained": "", "remedy": remedy}
     figures: dict[str, Any] = {"within_percent": 100 * worst, "rms": rms, "several": len(members) > 1, "cause": kind}

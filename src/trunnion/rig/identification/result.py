@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.cycle.summary import references
+from trunnion.cycle.summary import inputs, references
 from trunnion.results.attributes import finding_rows, origin
 from trunnion.results.dataset import Variable, dataset_of, described
 from trunnion.results.tables.identification import CURVES
@@ -61,6 +61,7 @@ def dataset(found: Identified) -> xr.Dataset:
         "data_files": hashed_files(measurement.conditions),
         "data_findings": data_findings(measurement),
         "done": list(measurement.done),
+        "inputs": inputs(found.mechanism),
         "evaluations": problem.evaluations,
         "starts": found.search.starts,
         "converged": int(found.search.fit.converged),

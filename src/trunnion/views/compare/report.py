@@ -26,7 +26,7 @@ from trunnion.views.tolerance.report import source, template
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["MOST_DRAWN", "report"]
+__all__ = ["MOST_DRAWN", "of_file", "report"]
 
 MOST_DRAWN = 6  # conditions of a channel
 
@@ -40,7 +40,7 @@ def report(result: xr.Dataset) -> str:
     context: dict[str, Any] = {
         "name": str(result.attrs["comparing"]) or "Measurement", "model": str(result.attrs["name"]) or "model",
         "formula": str(result.attrs["formula"]), "facts": _facts(result), "summary": headline(result),
-        "data_findings": [_of_file(row) for row in attribute(result, "data_findings")],
+        "data_findings": [of_file(row) for row in attribute(result, "data_findings")],
         "efficiency": table,
         "picture": _picture("Measured and modelled efficiency", efficiency(result)) if table else None,
         "verdicts": verdicts(result), "conditions": conditions(result), "sensors": sensors(result),
@@ -53,7 +53,7 @@ def report(result: xr.Dataset) -> str:
     return template("compare.html.j2").render(context)
 
 
-def _of_file(row: dict[str, str]) -> dict[str, str]:
+def of_file(row: dict[str, str]) -> dict[str, str]:
     """A finding about data with the name of its file."""
     return {**row, "where": " ".join(part for part in (Path(row["file"]).name, row["where"]) if part)}
 

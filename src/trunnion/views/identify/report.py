@@ -14,11 +14,12 @@ from trunnion.results.attributes import attribute
 from trunnion.results.quantities import number
 from trunnion.views.common.bundle import web_text
 from trunnion.views.common.table import TextTable
+from trunnion.views.compare.report import of_file
 from trunnion.views.compare.tables import files
-from trunnion.views.cycle.report import said
+from trunnion.views.cycle.report import inputs_of, said
 from trunnion.views.identify.figure import figure
 from trunnion.views.identify.identification import estimates
-from trunnion.views.identify.tables import budget, correlations, estimated, fits, held_out, sensors
+from trunnion.views.identify.tables import budget, correlations, estimated, fits, held_out, sensors, stated
 from trunnion.views.tolerance.report import source, template
 
 if TYPE_CHECKING:
@@ -65,8 +66,9 @@ def report(result: xr.Dataset) -> str:
         "name": str(result.attrs["identified"]) or "Measurement", "model": str(result.attrs["name"]) or "model",
         "formula": str(result.attrs["formula"]), "facts": _facts(result), "summary": _summary(result),
         "sections": _sections(result), "done": attribute(result, "done"),
-        "files": files(result, "data_files"), "data_findings": attribute(result, "data_findings"),
-        "definitions": DEFINITIONS,
+        "files": files(result, "data_files"), "definitions": DEFINITIONS,
+        "data_findings": [of_file(row) for row in attribute(result, "data_findings")],
+        "parameters": stated(result), "inputs": inputs_of(result) if "inputs" in result.attrs else [],
         **said(result, style),
     }  # fmt: skip
     return template("identify.html.j2").render(context)

@@ -16,7 +16,7 @@ from trunnion.views.rig.conditions import shortened
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["budget", "correlations", "estimated", "fits", "held_out", "sensors", "tables"]
+__all__ = ["budget", "correlations", "estimated", "fits", "held_out", "sensors", "stated", "tables"]
 
 
 def tables(result: xr.Dataset) -> list[TextTable]:
@@ -40,6 +40,14 @@ def estimated(result: xr.Dataset) -> TextTable:
     ]
     head = ["parameter", "start", "estimate ± U", "95\u00a0% interval", "dof", "main source"]
     return TextTable(f"{result.attrs['identified']}: estimates", head, rows)
+
+
+def stated(result: xr.Dataset) -> TextTable:
+    """What of the model each parameter is: all its paths, and its value at the start."""
+    rows = [
+        [one.name, ", ".join(one.paths), f"{one.start:.4g}{one.tail}".replace("-", "−")] for one in estimates(result)
+    ]
+    return TextTable("parameters", ["parameter", "paths in the model", "start"], rows)
 
 
 def _freedom(one: Estimate) -> str:

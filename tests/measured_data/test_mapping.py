@@ -266,3 +266,26 @@ def test_remedies_speak_of_mappings() -> None:
         read_mapping(mapping({"positions": 1, "files": [{"file": ""}]}))
     assert caught.value.findings
     assert not [one for one in caught.value.findings if "model files" in one.remedy]
+
+
+def test_a_column_with_its_unit_in_braces_is_to_be_quoted(tmp_path: Path) -> None:
+    """What is to be written instead is read as the name."""
+    wrong = 'trunnion-data: 1\nchannels:\n  T: {column: Drehmoment [Nm], measures: "effort:input"}\n'
+    path = tmp_path / "m.yaml"
+    path.write_text(wrong)
+    with pytest.raises(MechanismError) as caught:
+        read_mapping(path)
+    (found,) = caught.value.findings
+    assert found.line == 3
+    name = found.remedy.partition(": ")[2]
+    assert name == '"Drehmoment [Nm]"'
+    path.write_text(wrong.replace("Drehmoment [Nm]", name))
+    assert not [one for one in _findings(path) if "YAML" in one.what]
+
+
+def _findings(path: Path) -> list[Any]:
+    try:
+        read_mapping(path)
+    except MechanismError as error:
+        return list(error.findings)
+    return []

@@ -242,6 +242,17 @@ def test_a_driver_at_another_speed_is_named():
     result = compare(replace(other, conditions=conditions))
     assert said(result, "channels.speed", "another speed of the driver, measured 6 rad/s", "A.speed: {mean: speed}")
     assert said(result, "drivers.A", "6 rad/s measured, 4 rad/s in the model")
+    rpm = np.pi / 30
+    told = [
+        replace(one, courses={name: replace(row, read_in=("U/min", rpm)) if name == "speed" else row
+                              for name, row in one.courses.items()})
+        for one in conditions
+    ]  # fmt: skip
+    result = compare(replace(other, conditions=tuple(told)))
+    (found,) = (one for one in result.trunnion.findings if one.code == "compare.speed")
+    assert found.figures["measured"] == pytest.approx(6.0)
+    assert f"{6 / rpm:.3g} U/min measured" in found.what
+    assert said(result, "channels.speed", f"measured {6 / rpm:.3g} U/min")
 
 
 # ---- no answer ------------------------------------------------------------------------------------------------

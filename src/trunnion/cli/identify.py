@@ -228,8 +228,30 @@ def _write_model(
         named = "correct what explains the misfit, and identify again"
         unknown = "find the cause first: `trunnion compare` shows each channel and names errors of sensors and angle"
         return [Finding(what, "--write", named if explained else unknown)]
+    before = file.read_text("utf-8", errors="replace").splitlines()
     rewrite_mechanism(with_estimates(mechanism, result), file, write, force)
     written.append(write)
+    found = _outdated(before, write)
     if not lost:
+        return found
+    return [
+        *found,
+        Finding(f"{', '.join(lost)} unchanged: not identifiable from the data", "--write", "", Severity.NOTE),
+    ]
+
+
+def _outdated(before: list[str], write: Path) -> list[Finding]:
+    """A note of the comments behind values that are replaced: they speak of what was there."""
+    after = write.read_text("utf-8").splitlines()
+    if write.suffix.lower() not in (".yaml", ".yml") or len(after) != len(before):
         return []
-    return [Finding(f"{', '.join(lost)} unchanged: not identifiable from the data", "--write", "", Severity.NOTE)]
+    rows = [(k, new.partition(" #")) for k, (old, new) in enumerate(zip(before, after, strict=True), 1) if old != new]
+    kept = [f"line {k} '{comment.strip()}'" for k, (_, mark, comment) in rows if mark]
+    if not kept:
+        return []
+    what = f"comments behind replaced values are kept: {', '.join(kept[:MOST_NAMED])}"
+    what += ", …" * (len(kept) > MOST_NAMED)
+    return [Finding(what, "--write", "check whether they still hold", Severity.NOTE, file=str(write))]
+
+
+MOST_NAMED = 4

@@ -23,8 +23,9 @@ from trunnion.rig.comparison.error_sources import KINDS, Cause
 
 if TYPE_CHECKING:
     from trunnion.rig.comparison.comparison import ChannelComparison, Compared
+    from trunnion.rig.reading.measurement import Condition
 
-__all__ = ["findings_of", "gathered", "other_speed", "said", "units_set"]
+__all__ = ["findings_of", "gathered", "other_speed", "said", "speed_unit", "units_set"]
 
 FAR = 0.5  # of a gain: told as a factor from here on
 SIGNIFICANT = 3.5  # standard deviations: of a correlation of turns that is none, in 1 of 4000 channels
@@ -241,10 +242,11 @@ def _story(
     subject = measures.removeprefix("rate:")
     driver = first.model.run.system.mechanism.drivers.get(subject)
     if driver is not None and driver.speed is not None and kind in ("zero", "gain"):  # not one that swings
-        speed = float(np.nanmean(pair.course.mean))
-        story = _range(values, unit) if kind == "zero" else _percent(values)
+        shown, size = pair.course.shown
+        speed = float(np.nanmean(pair.course.mean)) / size
+        story = _range([one / size for one in values], shown) if kind == "zero" else _percent(values)
         remedy = f"set: {{{subject}.speed: {{mean: {name}}}}} in the mapping uses the measured speed"
-        return f"another speed of the driver, measured {said(speed, unit)} ({KINDS[kind]} of {story})", remedy
+        return f"another speed of the driver, measured {said(speed, shown)} ({KINDS[kind]} of {story})", remedy
     if kind == "sign":
         alike = pair.judged.correlation
         story = "a wrong sign" + (f", correlation {alike:+.3f}," if np.isfinite(alike) else "")
@@ -360,17 +362,27 @@ def _speeds(found: Sequence[Compared]) -> Iterator[Finding]:
             rows.append((one.condition.name, one.condition.speed, one.model.span / one.model.run.cycle.duration))
             driver = first
     if rows:
-        yield from other_speed(driver, rows, len(found))
+        yield from other_speed(driver, rows, len(found), speed_unit(driver, [one.condition for one in found]))
 
 
-def other_speed(driver: str, rows: Sequence[tuple[str, float, float]], of: int) -> Iterator[Finding]:
-    """Of a driver whose speed, by condition as measured and in the model, rad/s, differs; of: conditions in all."""
+def speed_unit(driver: str, conditions: Iterable[Condition]) -> tuple[str, float]:
+    """Unit in which the speed of a driver is read, such as U/min, and its size in rad/s; rad/s where it is not read."""
+    courses = [one for condition in conditions for one in condition.courses.values()]
+    return next((one.shown for one in courses if one.measures == f"rate:{driver}"), ("rad/s", 1.0))
+
+
+def other_speed(
+    driver: str, rows: Sequence[tuple[str, float, float]], of: int, shown: tuple[str, float]
+) -> Iterator[Finding]:
+    """Of a driver whose speed, by condition as measured and in the model, rad/s, differs; of: conditions in all; shown:
+    unit in which it is told, and its size in rad/s."""
+    unit, size = shown
     off = [row for row in rows if np.isfinite(row[1]) and abs(row[1] - row[2]) > SLOWER * abs(row[2])]
     if off:
         _, measured, theirs = off[0]
         phrases = {
             "cases": _in([row[0] for row in off], of), "key": as_key(f"{driver}.speed"),
-            "measured_told": said(measured, "rad/s"), "model_told": said(theirs, "rad/s"),
+            "measured_told": said(measured / size, unit), "model_told": said(theirs / size, unit),
         }  # fmt: skip
         figures = {"measured": measured, "model": theirs, "driver": driver}
         yield finding_for("compare.speed", f"drivers.{driver}", severity=None, phrases=phrases, **figures)

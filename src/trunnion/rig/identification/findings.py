@@ -10,7 +10,7 @@ import numpy as np
 from trunnion.errors import Finding, Severity, Status
 from trunnion.results.sentences import finding_for
 from trunnion.rig.comparison.error_sources import KINDS
-from trunnion.rig.comparison.findings import other_speed
+from trunnion.rig.comparison.findings import other_speed, speed_unit
 from trunnion.rig.identification.assessment import Assessment
 from trunnion.rig.identification.blocks import OWN, shared_zero
 from trunnion.rig.identification.identifiability import Combination, InseparableUnknowns, known_of, sizes_of
@@ -182,7 +182,8 @@ def _speeds(judged: Assessment) -> Iterator[Finding]:
     conditions = judged.found.measurement.conditions
     fitted = dict.fromkeys(block.condition for block in judged.problem.blocks if block.fitted)
     rows = [(conditions[k].name, conditions[k].speed, model.driven(k, judged.told)[2]) for k in fitted]
-    yield from other_speed(driver, [row for row in rows if np.isfinite(row[2])], len(rows))
+    rows = [row for row in rows if np.isfinite(row[2])]
+    yield from other_speed(driver, rows, len(fitted), speed_unit(driver, conditions))
 
 
 # ---- what is not identifiable ---------------------------------------------------------------------------------

@@ -82,7 +82,7 @@ def _fit(judged: Assessment) -> Iterator[Finding]:
         yield from _causes(judged)
     apart = judged.found.spread.apart
     for p in np.flatnonzero((apart > 1) & ~judged.lost[: problem.count]):
-        if judged.found.causes:  # which explain this, too
+        if any(not one.own for one in judged.found.causes):  # which explain this, too
             break
         where, times = f"parameter {problem.model.unknowns[p].name}", np.sqrt(apart[p])
         severity, phrases = Severity.WARNING if times > MUCH else None, {"times_told": _times(times)}

@@ -44,6 +44,7 @@ def test_efforts_of_a_slide_are_forces(program: Run, tmp_path: Path) -> None:
     assert dict(zip(head, units, strict=True))["Z.effort_reverse"] == "N"
 
 
+@pytest.mark.slow
 def test_the_margin_is_that_of_the_seats(program: Run, tmp_path: Path) -> None:
     """Pins at the rims of large holes change the arms, and with them the margin."""
     wide = ("--set", "joint_defaults.pin.clearance=2mm")

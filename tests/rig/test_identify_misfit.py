@@ -59,6 +59,7 @@ CASES = {
 }  # fmt: skip
 
 
+@pytest.mark.spread(3)
 @pytest.mark.parametrize("name", CASES)
 def test_what_explains_a_misfit(folder: Path, name: str) -> None:
     old, new, kind, size, near = CASES[name]
@@ -116,6 +117,7 @@ OFF: dict[str, tuple[Change, str, float, float]] = {
 }
 
 
+@pytest.mark.spread(2)
 @pytest.mark.parametrize("lag", [0.0, 1e-5])
 @pytest.mark.parametrize("name", OFF)
 def test_one_condition_alone_is_named_with_its_size(folder: Path, name: str, lag: float) -> None:

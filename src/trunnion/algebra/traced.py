@@ -141,12 +141,12 @@ class Traced:
             return NotImplemented
         if method != "__call__" or options:
             raise UntraceableError(f"np.{ufunc.__name__} with {method} {', '.join(options)} is not compiled")
-        return getattr(functions, ufunc.__name__)(*inputs)
+        return getattr(self.__array_namespace__(), ufunc.__name__)(*inputs)
 
     def __array_function__(self, function: Any, types: Any, args: Sequence[Any], options: dict[str, Any]) -> Any:
         if function in _OF_ALL_LANES and not any(value is not None for value in (*args[1:], *options.values())):
             return _OF_ALL_LANES[function]
-        return getattr(functions, function.__name__)(*args, **options)
+        return getattr(self.__array_namespace__(), function.__name__)(*args, **options)
 
     # ---- operators ----------------------------------------------------------------------------------------------
 

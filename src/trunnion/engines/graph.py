@@ -240,23 +240,19 @@ class Graph:
 
     def _reached(self, numbers: Iterable[int], index: int) -> set[int]:
         """Nodes that these are made of, down to the first outside of the loop."""
-        found: set[int] = set()
-        left = list(numbers)
-        while left:
-            number = left.pop()
-            if number not in found:
-                found.add(number)
-                if self.within[number] >> index & 1:
-                    left += self.nodes[number].args
-        return found
+        return self._made_of(numbers, lambda number: bool(self.within[number] >> index & 1))
 
     def live(self, numbers: Iterable[int]) -> list[int]:
         """The nodes that these are made of, in order, without what only the rounds of a loop need."""
+        return sorted(self._made_of(numbers, lambda number: True))
+
+    def _made_of(self, numbers: Iterable[int], further: Callable[[int], bool]) -> set[int]:
+        """These nodes, and what they are made of beyond those that are to be gone through further."""
         found: set[int] = set()
         left = list(numbers)
         while left:
             number = left.pop()
             if number not in found:
                 found.add(number)
-                left += self.nodes[number].args
-        return sorted(found)
+                left += self.nodes[number].args if further(number) else ()
+        return found

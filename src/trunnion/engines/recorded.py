@@ -93,18 +93,6 @@ class Recorded(Traced):
     def __array_namespace__(self, api_version: str | None = None) -> Any:
         return functions
 
-    def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **options: Any) -> Any:
-        if any(hasattr(one, "dual") for one in inputs):
-            return NotImplemented
-        if method != "__call__" or options:
-            raise UntraceableError(f"np.{ufunc.__name__} with {method} {', '.join(options)}")
-        return getattr(functions, ufunc.__name__)(*inputs)
-
-    def __array_function__(self, function: Any, types: Any, args: Sequence[Any], options: dict[str, Any]) -> Any:
-        if function in (np.any, np.all) and not any(value is not None for value in (*args[1:], *options.values())):
-            return function is np.any
-        return getattr(functions, function.__name__)(*args, **options)
-
     __add__ = _operator("add")
     __radd__ = _operator("add", turned=True)
     __sub__ = _operator("sub")

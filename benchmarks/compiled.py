@@ -23,11 +23,11 @@ import numpy as np
 
 from trunnion import Mechanism
 from trunnion.cycle.positions import CHUNK
+from trunnion.solve.compiled import CompiledKernel
+from trunnion.solve.compiled_vectors import VectorKernel
 from trunnion.solve.run import Run, prepare
 from trunnion.solve.status import pose_status, status_of
-from trunnion.studies.tolerance.compiled import CompiledKernel
 from trunnion.studies.tolerance.compiled_jax import JaxKernel
-from trunnion.studies.tolerance.compiled_vectors import VectorKernel
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 JOBS = (

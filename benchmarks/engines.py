@@ -16,9 +16,9 @@ import numpy as np
 
 from benchmarks.drawn import planar, spatial
 from trunnion import Mechanism, MechanismError
+from trunnion.solve.compiled_vectors import VectorKernel
 from trunnion.solve.run import prepare
 from trunnion.solve.status import status_of
-from trunnion.studies.tolerance.compiled_vectors import VectorKernel
 
 DRAWN = {"planar": planar.drawn, "spatial": spatial.drawn}
 SAMPLES, POSITIONS, SPREAD = 3, 24, 1e-4

@@ -19,12 +19,12 @@ from trunnion.algebra.dual import derivative, seed
 from trunnion.errors import Status
 from trunnion.files import cache_directory
 from trunnion.measures.measures import named, outputs
+from trunnion.solve.compiled import CompiledKernel
+from trunnion.solve.compiled_vectors import VectorKernel
 from trunnion.solve.run import Run, prepare
 from trunnion.solve.status import pose_status, status_of
 from trunnion.studies.tolerance import compiled_jax
-from trunnion.studies.tolerance.compiled import CompiledKernel
 from trunnion.studies.tolerance.compiled_jax import JaxKernel
-from trunnion.studies.tolerance.compiled_vectors import VectorKernel
 
 jax = pytest.importorskip("jax")
 
@@ -247,7 +247,7 @@ def test_what_only_numpy_does_is_said(engine: type[CompiledKernel]) -> None:
 
 @pytest.mark.slow
 def test_engines_are_imported_only_where_asked_for() -> None:
-    modules = "trunnion.studies.tolerance.compiled_jax, trunnion.studies.tolerance.compiled_vectors"
+    modules = "trunnion.studies.tolerance.compiled_jax, trunnion.solve.compiled_vectors"
     code = f"import sys, {modules}; sys.exit(bool({{'jax', 'llvmlite'}} & set(sys.modules)))"
     assert subprocess.run([sys.executable, "-c", code], check=False, cwd=Path(__file__).parent).returncode == 0
 

@@ -19,8 +19,8 @@ from mechanisms import DURANGO
 from trunnion.algebra.traced import UntraceableError, looped
 from trunnion.engines.graph import BOTH, EXP_RANGE, POSITION, SAMPLE, SINE_RANGE, Graph
 from trunnion.engines.recorded import Recorded, functions, number_of
+from trunnion.solve.compiled_vectors import VectorKernel
 from trunnion.solve.run import prepare
-from trunnion.studies.tolerance.compiled_vectors import VectorKernel
 
 pytest.importorskip("llvmlite")
 machine_code = pytest.importorskip("trunnion.engines.machine_code")

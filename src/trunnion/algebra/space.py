@@ -149,30 +149,26 @@ def element(place: Vector3, axis: Vector3, x: Vector3 | None) -> Frame:
 
 def quaternion(frame: Frame) -> tuple[Number, Number, Number, Number]:
     """Unit quaternion (w, x, y, z) of the axes, w ≥ 0; of the four formulas that with the largest divisor."""
-    rotation = np.array([[primal(entry) + 0.0 for entry in np.broadcast_arrays(*axis)] for axis in _broadcast(frame)])
-    xx, yx, zx = rotation[0]  # x axis: R_xx, R_yx, R_zx
-    xy, yy, zy = rotation[1]
-    xz, yz, zz = rotation[2]
-    squares = np.array([1 + xx + yy + zz, 1 + xx - yy - zz, 1 - xx + yy - zz, 1 - xx - yy + zz])
-    rows = np.array(
-        [
-            [squares[0], zy - yz, xz - zx, yx - xy],
-            [zy - yz, squares[1], yx + xy, xz + zx],
-            [xz - zx, yx + xy, squares[2], zy + yz],
-            [yx - xy, xz + zx, zy + yz, squares[3]],
-        ]
+    (xx, yx, zx), (xy, yy, zy), (xz, yz, zz) = (  # x axis: R_xx, R_yx, R_zx
+        tuple(primal(entry) + 0.0 for entry in axis) for axis in frame[:3]
     )
-    best = np.argmax(np.nan_to_num(squares), axis=0)
-    picked = np.take_along_axis(rows, best[None, None, ...], axis=0)[0]
+    squares = (1 + xx + yy + zz, 1 + xx - yy - zz, 1 - xx + yy - zz, 1 - xx - yy + zz)
+    rows = (
+        (squares[0], zy - yz, xz - zx, yx - xy),
+        (zy - yz, squares[1], yx + xy, xz + zx),
+        (xz - zx, yx + xy, squares[2], zy + yz),
+        (yx - xy, xz + zx, zy + yz, squares[3]),
+    )
+    largest, picked = squares[0], rows[0]
+    for square, row in zip(squares[1:], rows[1:], strict=True):
+        larger = np.greater(square, largest)
+        picked = tuple(np.where(larger, a, b) for a, b in zip(row, picked, strict=True))
+        largest = np.where(larger, square, largest)
+    w, x, y, z = picked
     with np.errstate(invalid="ignore"):
-        picked = picked / np.sqrt(np.sum(picked * picked, axis=0))
-    w, x, y, z = np.where(picked[0] < 0, -picked, picked)
-    return w, x, y, z
-
-
-def _broadcast(frame: Frame) -> list[tuple[Number, ...]]:
-    flat = np.broadcast_arrays(*(primal(entry) for axis in frame[:3] for entry in axis))
-    return [tuple(flat[3 * k : 3 * k + 3]) for k in range(3)]
+        size = np.sqrt(w * w + x * x + y * y + z * z)
+        scale = np.where(np.less(w, 0), -size, size)
+        return w / scale, x / scale, y / scale, z / scale
 
 
 def line_of(frame: Frame) -> Screw:

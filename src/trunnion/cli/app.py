@@ -149,12 +149,13 @@ def analyse(
     units: Units = TableUnits.si,
     columns: Columns = None,
     uncut: Uncut = False,
+    engine: Annotated[str, typer.Option("--engine", help="numpy, compiled, or auto: by size.")] = "auto",
 ) -> None:
     """Analyse a cycle: motion, reactions, friction, effort, power."""
     check_files(out or [], report, drawn=False)
     mechanism = stated(file, set_, table, friction, seat)
     with lines_of(file):
-        result = _analysed(mechanism, steps, _method(method, criterion, iterations))
+        result = _analysed(mechanism, steps, _method(method, criterion, iterations), engine)
     page = partial(_page, mechanism, result, uncut)
     Shown(result, file, ["assembly"], out or [], report, units_row, page=page, columns=columns, units=units).finish()
 
@@ -356,12 +357,12 @@ def _method(name: str, criterion: float | None, iterations: int) -> FrictionMeth
     return method_named(name, criterion, iterations)
 
 
-def _analysed(mechanism: Mechanism, steps: int, method: FrictionMethod | None) -> Result:
+def _analysed(mechanism: Mechanism, steps: int, method: FrictionMethod | None, engine: str = "auto") -> Result:
     """Analyse, with a progress bar when it takes long enough to need one."""
     from trunnion.cycle.analyse import analysed
 
     with bar("positions", steps, least=200_000) as progress:
-        return analysed(mechanism, steps, method, progress)
+        return analysed(mechanism, steps, method, progress, engine)
 
 
 def _run(mechanism: Mechanism, steps: int, method: FrictionMethod | None) -> xr.Dataset:

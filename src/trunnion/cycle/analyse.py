@@ -28,17 +28,20 @@ def analyse(
     steps: int = 360,
     friction_method: FrictionMethod | None = None,
     progress: Callable[[int], None] | None = None,
+    engine: str = "auto",
 ) -> xr.Dataset:
     """Motion, reactions with friction, drive effort and power of a mechanism over its cycle.
 
     steps: equally spaced positions; over a full turn the end is not repeated. Returns a Dataset with the names,
     units and dims of `results.VARIABLES`; positions without an answer are NaN and have a status.
     friction_method: how friction and reactions are settled; Newton's method if not given.
-    progress: called with the number of positions done.
+    progress: called with the number of positions done. engine: numpy, compiled (an extra: machine code, which pays
+    from some 10⁵ positions on), or auto: compiled where it is installed, pays and can do the mechanism.
     Method: the modules' closed forms or the general group, friction settled per module (`friction.settle`).
-    Raises MechanismError if the structure does not determine the motion or `steps` is out of range.
+    Raises MechanismError if the structure does not determine the motion, `steps` is out of range, or the engine is not
+    installed or cannot do the mechanism.
     """
-    return analysed(mechanism, steps, friction_method, progress).dataset
+    return analysed(mechanism, steps, friction_method, progress, engine).dataset
 
 
 @np.errstate(all="ignore")
@@ -47,13 +50,14 @@ def analysed(
     steps: int = 360,
     method: FrictionMethod | None = None,
     progress: Callable[[int], None] | None = None,
+    engine: str = "auto",
 ) -> Result:
     """What `analyse` does, before it becomes a Dataset."""
     check_steps(steps)
     run = prepare(mechanism)
     if run.determinacy is not None:
         run.determinacy.refuse()
-    return summary.result_of(run, positions(run, steps, method, progress))
+    return summary.result_of(run, positions(run, steps, method, progress, engine=engine))
 
 
 @np.errstate(all="ignore")

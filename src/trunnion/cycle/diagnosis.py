@@ -47,28 +47,28 @@ class Causes:
     _seats: dict[str, list[NDArray[np.float64]]] = field(default_factory=dict)
     _stuck: list[Positions] = field(default_factory=list)
 
-    def note(self, back: Backward, status: NDArray[np.int8], offset: int) -> None:
-        """Look at one chunk, whose first position has the number `offset`."""
+    def note(self, back: Backward, status: NDArray[np.int8], places: Positions) -> None:
+        """Look at some positions, by their numbers in the cycle."""
         if np.any(status == Status.NOT_ASSEMBLED):
-            self._note_open(back.walk, status, offset)
+            self._note_open(back.walk, status, places)
         for name in sticking(self.system):
             zero = np.broadcast_to(back.slips[name].zero, status.shape) & (status < Status.NOT_CONVERGED)
             if np.any(zero):
-                self._zero.setdefault(name, []).append(np.flatnonzero(zero) + offset)
+                self._zero.setdefault(name, []).append(places[np.flatnonzero(zero)])
         if np.any(status == Status.LOAD_UNDEFINED):
             for path, where in back.undefined.items():
                 bad = np.broadcast_to(where, status.shape) & (status == Status.LOAD_UNDEFINED)
                 if np.any(bad):
-                    self._undefined.setdefault(path, []).append(np.flatnonzero(bad) + offset)
+                    self._undefined.setdefault(path, []).append(places[np.flatnonzero(bad)])
         if np.any(status == Status.SINGULAR):
-            self._note_singular(back.walk, status, offset)
+            self._note_singular(back.walk, status, places)
         if np.any(status == Status.LOCKED):
             modules = reversed(range(len(back.settled)))  # settled from the last module to the first
             for number, settled in zip(modules, back.settled, strict=True):
                 share = np.broadcast_to(settled.share, status.shape)
                 locked = np.flatnonzero((share < 1.0) & (status == Status.LOCKED))
                 if len(locked):
-                    self._locked.setdefault(number, []).append((locked + offset, share[locked]))
+                    self._locked.setdefault(number, []).append((places[locked], share[locked]))
 
     def note_seats(self, offsets: Mapping[str, NDArray[np.float64]], sticks: NDArray[np.bool_], offset: int) -> None:
         """Keep where the pins of one chunk lie, and where joints stick while pins travel."""
@@ -84,7 +84,7 @@ class Causes:
         """Offsets of the pins at all positions, by the names of `shifts`."""
         return {path: np.concatenate(parts) for path, parts in self._seats.items()}
 
-    def _note_singular(self, walk: Forward, status: NDArray[np.int8], offset: int) -> None:
+    def _note_singular(self, walk: Forward, status: NDArray[np.int8], places: Positions) -> None:
         """The module whose condition is the worst at each singular position."""
         conditions = [
             np.broadcast_to(np.nan_to_num(group.condition(pose), nan=np.inf), status.shape)
@@ -94,13 +94,13 @@ class Causes:
         for number in range(len(conditions)):
             here = np.flatnonzero((status == Status.SINGULAR) & (worst == number))
             if len(here):
-                self._singular.setdefault(number, []).append(here + offset)
+                self._singular.setdefault(number, []).append(places[here])
 
     def singular(self) -> dict[int, Positions]:
         """Singular positions by module."""
         return {number: np.concatenate(parts) for number, parts in self._singular.items()}
 
-    def _note_open(self, walk: Forward, status: NDArray[np.int8], offset: int) -> None:
+    def _note_open(self, walk: Forward, status: NDArray[np.int8], places: Positions) -> None:
         """The first module of each unassembled position that does not close, and by how much."""
         left = status == Status.NOT_ASSEMBLED
         for number, pose in enumerate(walk.poses):
@@ -114,7 +114,7 @@ class Causes:
             reasons = {
                 text: np.broadcast_to(figure, status.shape)[here] for text, figure in _shortfalls(walk, number).items()
             }
-            self._open.append(_Open(number, here + offset, reasons))
+            self._open.append(_Open(number, places[here], reasons))
 
     def zero_slip(self) -> dict[str, Positions]:
         """Positions at which the relative speed of a joint with friction is zero."""

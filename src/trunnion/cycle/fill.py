@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,10 +16,12 @@ from trunnion.solve.loads import useful_loads
 from trunnion.solve.system import System, Values
 
 __all__ = [
-    "absent", "fill_efforts", "fill_forces", "fill_motion", "fill_points", "fill_power", "labels", "put", "unwrap",
+    "Into", "absent", "fill_efforts", "fill_forces", "fill_motion", "fill_points", "fill_power", "labels", "put",
+    "unwrap",
 ]  # fmt: skip
 
 Arrays = dict[str, NDArray[np.float64]]
+Into = Mapping[str, Any]  # arrays by name, or what stands for them where a walk is written down
 
 
 def labels(system: System) -> dict[str, list[str]]:
@@ -48,7 +50,7 @@ def absent(system: System) -> list[str]:
     return [*slides, "reaction_moment"]
 
 
-def fill_motion(arrays: Arrays, back: Backward, window: slice) -> None:
+def fill_motion(arrays: Into, back: Backward, window: slice) -> None:
     """Angles, points and joints of one chunk."""
     walk = back.walk
     for i, link in enumerate(walk.system.mechanism.links):
@@ -68,20 +70,20 @@ def fill_motion(arrays: Arrays, back: Backward, window: slice) -> None:
             arrays["joint_slide"][i, window] = 0.0 if walk.system.turns(joint) else walk.coordinates(joint)[1]
 
 
-def fill_points(arrays: Arrays, walk: Forward, window: slice) -> None:
+def fill_points(arrays: Into, walk: Forward, window: slice) -> None:
     """Named points of one chunk."""
     for i, (link, name) in enumerate(walk.system.points):
         for key, numbers in zip(("position", "velocity", "acceleration"), walk.point(link, name), strict=True):
             put(arrays[f"point_{key}"], i, numbers, window)
 
 
-def put(array: NDArray[np.float64], i: int, numbers: Sequence[Number], window: slice) -> None:
+def put(array: Any, i: int, numbers: Sequence[Number], window: slice) -> None:
     """The components of the i-th vector."""
     for axis, number in enumerate(numbers):
         array[i, axis, window] = number
 
 
-def fill_forces(arrays: Arrays, back: Backward, window: slice) -> None:
+def fill_forces(arrays: Into, back: Backward, window: slice) -> None:
     """Reactions, friction, and what `fill_efforts` does, of one chunk."""
     for i, name in enumerate(back.walk.system.joints):
         *force, moment = back.reactions[name]
@@ -94,7 +96,7 @@ def fill_forces(arrays: Arrays, back: Backward, window: slice) -> None:
     fill_efforts(arrays, back, window)
 
 
-def fill_efforts(arrays: Arrays, back: Backward, window: slice) -> None:
+def fill_efforts(arrays: Into, back: Backward, window: slice) -> None:
     """Drive efforts, springs and gear pairs of one chunk."""
     mechanism = back.walk.system.mechanism
     for i, name in enumerate(mechanism.drivers):
@@ -125,9 +127,7 @@ def unwrap(arrays: Arrays, system: System, values: Values, time: NDArray[np.floa
             rotation[:] = np.where(np.isfinite(rotation), system.drive(values, name, time)[0], np.nan)
 
 
-def fill_power(
-    arrays: dict[str, NDArray[np.float64]], back: Backward, time: NDArray[np.float64], window: slice
-) -> None:
+def fill_power(arrays: Into, back: Backward, time: Number, window: slice) -> None:
     """Power of drivers, loads, springs and friction, and what is left over: their sum with inertia and gravity."""
     walk = back.walk
     total: Number = back.body_power + back.gear_power
@@ -150,7 +150,7 @@ def fill_power(
     for name in useful_loads(walk.system.mechanism):
         useful = useful - back.load_powers[name]
     arrays["useful_power"][window] = useful
-    arrays["efficiency_instant"][window] = useful / np.where(np.asarray(driven) > 0, driven, np.nan)
+    arrays["efficiency_instant"][window] = useful / np.where(np.greater(driven, 0), driven, np.nan)
     arrays["power_residual"][window] = total + driven
     arrays["closure_residual"][window] = _worst(walk.system, walk.poses, "closure")
     arrays["condition"][window] = _worst(walk.system, walk.poses, "condition")

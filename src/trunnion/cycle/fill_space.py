@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.namespace import Number
 from trunnion.algebra.space import moment_at, quaternion
 from trunnion.algebra.unwrap import unwrap_row
 from trunnion.algebra.vector import cross, dot, plus, scaled
@@ -36,14 +35,14 @@ def absent(system: System) -> list[str]:
     return []
 
 
-def fill_motion(arrays: Arrays, back: Backward, window: slice) -> None:
+def fill_motion(arrays: fill.Into, back: Backward, window: slice) -> None:
     """Frames, points and joints of one chunk."""
     walk = back.walk
     assert isinstance(walk, SpatialWalk)
     for i, link in enumerate(walk.system.mechanism.effective_links):
         frame, twist, second = walk.motions[link]
-        arrays["link_rotation"][i, :, window] = _full(quaternion(frame), arrays["status"][window].shape)
         for name, numbers in (
+            ("link_rotation", quaternion(frame)),
             ("link_position", frame.place),
             ("link_angular_velocity", twist.u),
             ("link_angular_acceleration", second.u),
@@ -54,11 +53,7 @@ def fill_motion(arrays: Arrays, back: Backward, window: slice) -> None:
         _fill_joint(arrays, walk, i, joint, window)
 
 
-def _full(numbers: tuple[Number, ...], shape: tuple[int, ...]) -> NDArray[np.float64]:
-    return np.array([np.broadcast_to(number, shape) for number in numbers])
-
-
-def _fill_joint(arrays: Arrays, walk: SpatialWalk, i: int, joint: str, window: slice) -> None:
+def _fill_joint(arrays: fill.Into, walk: SpatialWalk, i: int, joint: str, window: slice) -> None:
     """Rotation and slide of one joint with their derivatives; of balls and crosses the angle between their elements."""
     pair = walk.pair(joint)
     if pair.one_axis or pair.angle:
@@ -78,12 +73,12 @@ def _fill_joint(arrays: Arrays, walk: SpatialWalk, i: int, joint: str, window: s
     speed = np.sqrt(dot(spin, spin))
     arrays["joint_rotation"][i, window] = np.arctan2(np.sqrt(dot(turn, turn)), cosine)
     arrays["joint_rotation_velocity"][i, window] = speed
-    moves = np.asarray(speed > 0)
+    moves = np.greater(speed, 0)
     rate = (spin[0] * change[0] + spin[1] * change[1] + spin[2] * change[2]) / np.where(moves, speed, 1.0)
     arrays["joint_rotation_acceleration"][i, window] = np.where(moves, rate, 0.0)
 
 
-def fill_forces(arrays: Arrays, back: Backward, window: slice) -> None:
+def fill_forces(arrays: fill.Into, back: Backward, window: slice) -> None:
     """Reactions, friction, drive efforts and springs of one chunk."""
     walk = back.walk
     assert isinstance(walk, SpatialWalk)

@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.algebra.namespace import Number
 from trunnion.algebra.quadrature import Effort
 from trunnion.cycle import contact_loss, diagnosis, resting_joints
+from trunnion.cycle.compiled import CycleKernel, compiles
 from trunnion.cycle.deviations import COMPARED, fill_errors, fill_seats
-from trunnion.cycle.fill import fill_power
+from trunnion.cycle.fill import Into, fill_power
 from trunnion.cycle.means import AVERAGED, Means, means_of, still
 from trunnion.cycle.unanswered import blank
 from trunnion.errors import Finding, MechanismError, Status
@@ -21,6 +23,7 @@ from trunnion.results import variables as results
 from trunnion.solve.backward import Backward
 from trunnion.solve.eccentricity_rate import Lanes, around, lanes
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
+from trunnion.solve.memory import CHUNK
 from trunnion.solve.seating import settle
 from trunnion.solve.switches import Mechanisms
 from trunnion.solve.system import System
@@ -35,7 +38,6 @@ __all__ = ["Arrays", "Positions", "filled", "positions"]
 
 
 MOST_STEPS = 100_000_000
-CHUNK = 8192  # positions at a time: the arrays of a walk stay in cache
 SEATED = Effort(1e-6, 2)  # for means with pins in seats, which themselves settle to 1e-6 of their clearance
 Arrays = dict[str, NDArray[np.float64]]
 
@@ -70,11 +72,12 @@ def positions(
     progress: Callable[[int], None] | None = None,
     margin: bool = True,
     averaged: bool = True,
+    engine: str = "auto",
 ) -> Positions:
     """The numbers of every variable of `results` at equally spaced positions, their statuses and causes.
 
     margin: whether the locking margin is looked for; it is infinite if not. averaged: whether the means over the cycle
-    are, which ask for many positions more; they are NaN if not.
+    are, which ask for many positions more; they are NaN if not. engine: see `compiled.cycle_kernels`.
     """
     check_steps(steps)
     _refuse_seats(run)
@@ -86,7 +89,8 @@ def positions(
     arrays = results.allocate(labels, steps, fill_of(run.system).absent(run.system), parts)
     causes = diagnosis.Causes(run.system)
     ideal = {name: np.zeros(arrays[name].shape, arrays[name].dtype) for name in IDEAL} if run.erring else {}
-    for low in range(0, steps, CHUNK):
+    done = compiles(engine, run, steps) and _fill_compiled(arrays, ideal, run, time, method, causes, engine == "auto")
+    for low in range(0, 0 if done else steps, CHUNK):
         window = slice(low, min(low + CHUNK, steps))
         if run.erring:
             _fill_as_built(arrays, ideal, run, time, window, method, causes)
@@ -231,17 +235,79 @@ def _fill(
     status = status_of(back, arrays["status"][window].shape)
     arrays["status"][window] = status
     if causes:
-        causes.note(back, status, window.start)
+        causes.note(back, status, np.arange(window.start, window.stop))
     with np.errstate(all="ignore"):
-        fill = fill_of(back.walk.system)
-        fill.motion(arrays, back, window)
-        fill.forces(arrays, back, window)
-        _fill_settled(arrays, back, window)
-        fill_power(arrays, back, time, window)
+        _write(arrays, back, time, window)
     blank(arrays, status, window)
 
 
-def _fill_settled(arrays: Arrays, back: Backward, window: slice) -> None:
+def _fill_compiled(
+    arrays: Arrays,
+    ideal: Arrays,
+    run: Run,
+    time: NDArray[np.float64],
+    method: FrictionMethod,
+    causes: diagnosis.Causes,
+    or_not: bool,
+) -> bool:
+    """All positions by the compiled engine. or_not: False where it cannot, in place of a MechanismError."""
+    try:
+        own = CycleKernel(run, run.values, arrays, _write, method)
+    except MechanismError:
+        if or_not:
+            return False
+        raise
+    _fill_rest(arrays, own.fill(arrays, time), run.solve, time, method, causes)
+    if run.erring:
+        quick, system = replace(method, margin_up_to=0.0), run.system
+        labels, absent = fill_of(system).labels(system), fill_of(system).absent(system)
+        meant = results.allocate(labels, len(time), absent, wanted={*IDEAL, *COMPARED})
+        other = CycleKernel(run, run.ideal_values, meant, _write, quick)
+        _fill_rest(meant, other.fill(meant, time), run.ideal, time, quick)
+        ideal |= {name: meant[name] for name in ideal}
+        fill_errors(arrays, meant, _link_numbers(system), slice(None))
+        blank(arrays, arrays["status"].astype(np.int8), slice(None))
+    return True
+
+
+def _fill_rest(
+    arrays: Arrays,
+    left: NDArray[np.intp],
+    solve: Callable[..., Backward],
+    time: NDArray[np.float64],
+    method: FrictionMethod,
+    causes: diagnosis.Causes | None = None,
+) -> None:
+    """Those positions that the compiled engine leaves to NumPy."""
+    for low in range(0, len(left), CHUNK):
+        lanes = left[low : low + CHUNK]
+        _fill_lanes(arrays, solve(time[lanes], method=method), time[lanes], lanes, causes)
+
+
+def _fill_lanes(
+    arrays: Arrays, back: Backward, time: NDArray[np.float64], lanes: NDArray[np.intp], causes: diagnosis.Causes | None
+) -> None:
+    """The same of some positions, wherever they are."""
+    there = {name: array for name, array in arrays.items() if array.flags.writeable and array.strides[-1]}
+    some = {name: array[..., lanes] for name, array in arrays.items()}
+    some |= {name: some[other] for name, other in results.SAME_AS.items()}
+    _fill(some, back, time, slice(0, len(lanes)))
+    if causes:
+        causes.note(back, some["status"].astype(np.int8), lanes)
+    for name, array in there.items():
+        array[..., lanes] = some[name]
+
+
+def _write(arrays: Into, back: Backward, time: Number, window: slice) -> None:
+    """Every variable but the status, of one walk."""
+    fill = fill_of(back.walk.system)
+    fill.motion(arrays, back, window)
+    fill.forces(arrays, back, window)
+    _fill_settled(arrays, back, window)
+    fill_power(arrays, back, time, window)
+
+
+def _fill_settled(arrays: Into, back: Backward, window: slice) -> None:
     """Figures of the friction iteration."""
     settled = back.settled
     for key, field in (

@@ -7,6 +7,7 @@ fdlibm (Sun Microsystems, 1993; https://netlib.org/fdlibm), whose arguments are 
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -127,6 +128,16 @@ class Lanes:
 
     def finite(self, a: Value) -> Value:
         return self.compare("<", self.abs(a), self.constant(math.inf))
+
+    def differ(self, some: Sequence[Value], others: Sequence[Value]) -> Value:
+        """Whether any bit of any lane does: one plain bit."""
+        pairs = [[self.b.bitcast(one, self.long) for one in pair] for pair in zip(some, others, strict=True)]
+        bits = functools.reduce(self.b.or_, [self.b.xor(*pair) for pair in pairs])
+        found = self.b.icmp_signed("!=", bits, self.whole(0))
+        if self.width == 1:
+            return found
+        whole = ir.IntType(self.width)
+        return self.b.icmp_signed("!=", self.b.bitcast(found, whole), ir.Constant(whole, 0))
 
     def larger(self, a: Value, b: Value, sign: str = ">") -> Value:
         """The larger of two, NaN if one is; with < the smaller."""

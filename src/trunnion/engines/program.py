@@ -253,7 +253,7 @@ class _Writer:
         return getattr(lanes, op)(*a)
 
     def _loop(self, args: tuple[int, ...], index: int, values: dict[int, Value], lanes: Lanes) -> list[Value]:
-        """A loop of the graph: what it comes to after its rounds."""
+        """A loop of the graph: what it comes to after its rounds, or those after which one changes nothing any more."""
         loop, int_ = self.graph.loops[index], ir.IntType(32)
         start = [self._of(n, values, lanes) for n in args[: len(loop.states)]]
         before = self.b.block
@@ -271,6 +271,7 @@ class _Writer:
             state.add_incoming(next_, self.b.block)
         further = self.b.add(count, ir.Constant(int_, 1))
         count.add_incoming(further, self.b.block)
-        self.b.cbranch(self.b.icmp_signed("<", further, ir.Constant(int_, loop.rounds)), body, after)
+        more = self.b.icmp_signed("<", further, ir.Constant(int_, loop.rounds))
+        self.b.cbranch(self.b.and_(more, lanes.differ(states, found)), body, after)
         self.b.position_at_end(after)
         return found

@@ -223,13 +223,15 @@ def _chosen(lanes: Number, rows: Sequence[Sequence[Number]], others: Sequence[Se
 def _unrolled(problem: FrictionProblem, method: FrictionMethod) -> Settled:
     """Newton with a fixed number of rounds, for numbers that are compiled; the last one carries the derivatives.
 
-    Lanes that need more, and those without the certificate, are for whoever compiles to compute again.
+    Lanes that need more, and those without the certificate, are for whoever compiles to compute again; so are those
+    whose margin comes out as NaN.
     """
     real = _primal(problem)
     forces: list[Number] = [0.0] * len(real.contacts)
     state = real.state(forces)
     bound = np.where(np.isfinite(peak(state.normals)), real.bound(), 0.0)
     certain = ~(bound >= 1.0)
+    rows = real.map_derivative(state)
 
     def step(now: list[Number]) -> list[Number]:
         at = real.state(now)
@@ -251,11 +253,11 @@ def _unrolled(problem: FrictionProblem, method: FrictionMethod) -> Settled:
         forces=forces,
         iterations=COMPILED_ROUNDS,
         change=_changed(state, before),
-        contraction=0.0,
+        contraction=largest([total([np.abs(entry) for entry in row]) for row in rows]),
         converged=certain & ~(real.excess(gaps, plain) > SETTLED),
         residual=real.misfit(gaps),
         share=1.0,
-        margin=np.inf,
+        margin=_compiled_margin(real, bound, method.margin_up_to),
         certain=certain,
         problem=real,
     )
@@ -368,19 +370,44 @@ def scaled(problem: FrictionProblem, weights: Weights | None = None) -> continua
                 last[:] = forces, part.target(state.normals), part.map_derivative(state)
             return last[1], last[2]
 
-        def system(
-            forces: Sequence[NDArray[np.float64]], share: NDArray[np.float64]
-        ) -> tuple[list[Number], list[list[Number]]]:
+        def system(forces: Sequence[Number], share: Number) -> tuple[list[Number], list[list[Number]]]:
             found = [share] * len(part.contacts) if weights is None else weights(share, lanes)
-            shares = [weight if contact.rubs else 1.0 for weight, contact in zip(found, part.contacts, strict=True)]
-            target, slopes = laws(forces)
-            residual = [f - s * t for f, s, t in zip(forces, shares, target, strict=True)]
-            rows = [[s * entry for entry in row] for s, row in zip(shares, slopes, strict=True)]
-            return residual, identity_minus(rows)
+            return _balance(part, forces, *laws(forces), found)
 
         return system
 
     return family
+
+
+def _balance(
+    problem: FrictionProblem,
+    forces: Sequence[Number],
+    target: Sequence[Number],
+    slopes: Sequence[Sequence[Number]],
+    multiples: Sequence[Number],
+) -> tuple[list[Number], list[list[Number]]]:
+    """Residual and Jacobian with multiples of the contacts' friction. target, slopes: of the laws, and derivatives."""
+    shares = [multiple if contact.rubs else 1.0 for multiple, contact in zip(multiples, problem.contacts, strict=True)]
+    residual = [f - s * t for f, s, t in zip(forces, shares, target, strict=True)]
+    rows = [[s * entry for entry in row] for s, row in zip(shares, slopes, strict=True)]
+    return residual, identity_minus(rows)
+
+
+def _compiled_margin(problem: FrictionProblem, bound: Number, most: float) -> Number:
+    """`_margin` of numbers that are compiled; NaN where the search does not come to an end."""
+
+    def system(forces: Sequence[Number], share: Number) -> tuple[list[Number], list[list[Number]]]:
+        state = problem.state(forces)
+        laws = problem.target(state.normals), problem.map_derivative(state)
+        return _balance(problem, forces, *laws, [share] * len(problem.contacts))
+
+    if most <= 0:
+        return np.inf
+    none: list[Number] = [0.0] * len(problem.contacts)
+    target = problem.target(problem.state(none).normals)
+    start = [0.0 if contact.rubs else load for contact, load in zip(problem.contacts, target, strict=True)]
+    reached = continuation.followed(system, start, (bound * most >= 1.0) & (bound < 1.0), most)
+    return np.where(reached >= most, np.inf, reached)
 
 
 def frictionless(problem: FrictionProblem, chosen: NDArray[np.bool_]) -> list[NDArray[np.float64]]:

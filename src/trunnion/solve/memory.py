@@ -1,4 +1,4 @@
-"""Memory that is used again rather than given back."""
+"""Memory that is used again: arrays that stay in cache, pages that are not given back."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from functools import cache
 
 import numpy as np
 
-__all__ = ["keep_pages"]
+__all__ = ["CHUNK", "keep_pages"]
 
+CHUNK = 8192  # solved at a time: the arrays of a walk stay in cache
 BLOCK = 30 * 2**20  # bytes; glibc learns from blocks of up to 32 MiB
 
 

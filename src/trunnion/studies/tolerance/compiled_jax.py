@@ -15,8 +15,8 @@ from trunnion.algebra.namespace import Number
 from trunnion.algebra.traced import Traced, bare
 from trunnion.errors import Finding, MechanismError
 from trunnion.files import cache_directory
+from trunnion.solve.compiled import Array, CompiledKernel, Lanes
 from trunnion.solve.system import Values
-from trunnion.studies.tolerance.compiled import Array, CompiledKernel, Lanes
 
 __all__ = ["JaxKernel"]
 

@@ -24,7 +24,7 @@ from trunnion.solve.run import Run
 from trunnion.studies.tolerance.inputs import Inputs
 
 if TYPE_CHECKING:
-    from trunnion.studies.tolerance.compiled import CompiledKernel
+    from trunnion.solve.compiled import CompiledKernel
 
 __all__ = ["Kernel", "batch_of", "engine_for", "kernel_of", "references"]
 
@@ -62,7 +62,7 @@ class OtherKernel:
 
             made = compiled_jax.JaxKernel
         else:
-            from trunnion.studies.tolerance import compiled_vectors
+            from trunnion.solve import compiled_vectors
 
             made = compiled_vectors.VectorKernel
 

@@ -50,7 +50,7 @@ def tolerance(
     friction_method: FrictionMethod | None = None,
     jobs: int | None = None,
     chunk: int | None = None,
-    engine: str = "numpy",
+    engine: str = "auto",
     cluster: str | None = None,
     checkpoint: str | os.PathLike[str] | None = None,
     resume: bool = False,
@@ -65,9 +65,9 @@ def tolerance(
     a whole cycle; at: the place (driver coordinate or time) of measures that state neither a place nor a figure.
     friction_method: how friction and reactions are settled; Newton's method if not given.
     jobs: processes, one a core if not given and worth it; chunk, cluster, checkpoint, resume, progress: `runner.run`.
-    engine: numpy, compiled or jax (extras), or auto: compiled where it pays. target: the yield that is asked for;
-    limits are missed below it, and if none is given where a worst case, a yield below 1 or a C_pk below 1 breaks them:
-    errors among the findings.
+    engine: numpy, compiled or jax (extras), or auto: compiled where it is installed, pays and can do the mechanism.
+    target: the yield that is asked for; limits are missed below it, and if none is given where a worst case, a yield
+    below 1 or a C_pk below 1 breaks them: errors among the findings.
     Returns a Dataset over (measure, parameter, position, …) of `result.VARIABLES`; SI, each measure in its own unit.
     Method: exact first derivatives by dual numbers; the worst corner of the tolerances found on the mechanism itself;
     Monte Carlo or scrambled Sobol points through the whole analysis; Sobol' indices. Samples that have no answer are
@@ -104,12 +104,12 @@ def _known(methods: Sequence[str]) -> tuple[tuple[str, ...], list[Finding]]:
 
 
 def _engine(found: ToleranceStudy, engine: str, samples: int, cluster: str | None) -> tuple[str, list[Finding]]:
-    """The engine to use, and a note of one that was chosen; NumPy on a cluster, whose workers may have no other."""
+    """The engine to use, and a note if it is not NumPy, as it is on a cluster, whose workers may have no other."""
     if engine != "auto":
         return engine, []
     many = samples * len(found.plan.times)
     engine = "numpy" if cluster else engine_for(engine, found.kernel, found.run.values, many)
-    return engine, [finding_for("samples.engine", "samples", engine=engine)]
+    return engine, [finding_for("samples.engine", "samples", engine=engine)] if engine != "numpy" else []
 
 
 def _stopped(ran: runner.JobRun[SampleTally], job: Sampling, kept: bool) -> list[Finding]:

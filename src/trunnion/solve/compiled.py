@@ -1,4 +1,4 @@
-"""The kernel of a tolerance run, compiled: the same walk forward and back, written down once and run often.
+"""The kernel of many samples or positions, compiled: the same walk forward and back, written down once and run often.
 
 `solve.forward`, `solve.backward`, the groups and the laws run on numbers that stand for values; what comes out is one
 function of the numbers that vary and of the times. Lanes that cannot be decided without values - not plainly solved, or
@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import os
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.traced import UntraceableError
-from trunnion.cycle.positions import CHUNK
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.solve.backward import Backward
 from trunnion.solve.forward import forward
 from trunnion.solve.friction_method import FrictionMethod
+from trunnion.solve.memory import CHUNK
 from trunnion.solve.run import Run
 from trunnion.solve.status import (
     NEAR_SINGULAR,
@@ -53,8 +53,9 @@ class CompiledKernel(ABC):
     """Curves of measures over samples and positions.
 
     run: the prepared mechanism; figures: by name, what to read off each walk; forces: whether one of them needs more
-    than the motion; threads: at a time, by default one for each core. Raises MechanismError if the engine is not
-    installed, or the mechanism has what only NumPy does.
+    than the motion; threads: at a time, by default one for each core; gravest: status from which on NumPy computes a
+    lane again; undefined: figures that may have no finite value. Raises MechanismError if the engine is not installed,
+    or the mechanism has what only NumPy does.
     """
 
     def __init__(
@@ -64,12 +65,15 @@ class CompiledKernel(ABC):
         forces: bool = True,
         method: FrictionMethod | None = None,
         threads: int | None = None,
+        gravest: Status = Status.ZERO_SLIP,
+        undefined: Collection[str] = (),
     ) -> None:
         self.run = run
         self.figures = dict(figures)
         self.forces = forces
         self.method = method or FrictionMethod()
         self.threads = threads or os.cpu_count() or 1
+        self.gravest, self.undefined = gravest, undefined
         self.again = 0  # lanes that NumPy computed again, so far
         self.prepare()
         _check(run)
@@ -105,9 +109,9 @@ class CompiledKernel(ABC):
         with np.errstate(all="ignore"):
             back = self._back(values, time)
             status = status_number(back) if self.forces else pose_status_number(back.walk)
-            doubtful = (status > Status.ZERO_SLIP) | (worst_condition(back.walk) > BORDER)
+            doubtful = (status > self.gravest) | (worst_condition(back.walk) > BORDER)
             for settled in back.settled:
-                doubtful = doubtful | np.logical_not(settled.certain)
+                doubtful = doubtful | np.logical_not(settled.certain) | np.isnan(settled.margin)
             return Lanes({name: figure(back) for name, figure in self.figures.items()}, status, doubtful)
 
     def _back(self, values: Values, time: Number) -> Backward:

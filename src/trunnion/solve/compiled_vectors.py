@@ -1,9 +1,8 @@
-"""The kernel of a tolerance run as machine code for vectors of lanes, by LLVM."""
+"""The kernel of many samples or positions as machine code for vectors of lanes, by LLVM."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -11,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError
+from trunnion.solve.compiled import Array, CompiledKernel, Lanes
 from trunnion.solve.system import Values
-from trunnion.studies.tolerance.compiled import Array, CompiledKernel, Lanes
 
 if TYPE_CHECKING:
     from trunnion.engines.graph import Graph
@@ -76,6 +75,8 @@ class VectorKernel(CompiledKernel):
 
     def _filled(self, values: Values, time: Array, found: Lanes) -> None:
         inputs = _inputs(values, time)
+        from concurrent.futures import ThreadPoolExecutor  # takes long to import
+
         program, arrays = self.program(inputs), _arrays(found)
         with ThreadPoolExecutor(self.threads) as pool:
             first, *rest = _parts(found.status.shape, self.threads)
@@ -108,7 +109,9 @@ class VectorKernel(CompiledKernel):
         doubtful = graph.as_boolean(number_of(graph, found.doubtful))
         for doubt in graph.doubts:
             doubtful = graph.apply("or", doubtful, doubt)
-        for curve in curves:
+        for name, curve in zip(found.curves, curves, strict=True):
+            if name in self.undefined:
+                continue
             doubtful = graph.apply("or", doubtful, graph.apply("not", graph.apply("finite", curve)))
         status = graph.node("byte", (graph.as_float(number_of(graph, found.status)),))
         return graph, [*curves, status, doubtful]

@@ -1,0 +1,110 @@
+"""The variables of a cycle by the compiled engine: what is written of one walk, recorded once and run everywhere."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from importlib.util import find_spec
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.algebra.namespace import Number
+from trunnion.errors import Finding, MechanismError, Status
+from trunnion.solve.backward import Backward
+from trunnion.solve.compiled import Figure, Lanes
+from trunnion.solve.compiled_vectors import VectorKernel
+from trunnion.solve.friction_method import FrictionMethod
+from trunnion.solve.run import Run
+from trunnion.solve.system import Values
+
+__all__ = ["ENGINES", "CycleKernel", "compiles"]
+
+Arrays = dict[str, NDArray[Any]]
+Cell = tuple[str, tuple[int, ...]]  # variable, and place in its array but for the position
+Write = Callable[[Any, Backward, Number, slice], None]  # a walk at these times into arrays
+
+ENGINES = ("auto", "numpy", "compiled")
+WORTH_COMPILING = 200_000  # positions; NumPy does as many in the time that compiling takes
+UNDEFINED = ("efficiency_instant", "locking_margin")  # variables that may have no finite value in a solved position
+
+
+class _Row:
+    """One variable of `Cells`."""
+
+    def __init__(self, name: str, array: NDArray[Any], numbers: dict[Cell, Number]) -> None:
+        self.name, self.flags, self.numbers = name, array.flags, numbers
+
+    def __setitem__(self, place: Any, number: Number) -> None:
+        *cell, _ = place if isinstance(place, tuple) else (place,)
+        self.numbers[self.name, tuple(cell)] = number
+
+
+class _Cells(dict[str, _Row]):
+    """Stands for the arrays of a result while one walk is written into them, and keeps the number of every cell."""
+
+    def __init__(self, arrays: Arrays) -> None:
+        self.numbers: dict[Cell, Number] = {}
+        super().__init__((name, _Row(name, array, self.numbers)) for name, array in arrays.items())
+
+
+class CycleKernel:
+    """Every variable of a cycle at many positions.
+
+    run: the prepared mechanism, with these values; arrays: those of a result, for their shapes; write: writes a walk
+    into them. Raises MechanismError as `CompiledKernel` does.
+    """
+
+    def __init__(self, run: Run, values: Values, arrays: Arrays, write: Write, method: FrictionMethod) -> None:
+        self._write, self._arrays, self._values = write, arrays, values
+        self._last: tuple[Backward | None, Mapping[Cell, Number]] = None, {}
+        with np.errstate(all="ignore"):
+            numbers = self._cells(run.solve(np.zeros(1), values, FrictionMethod()))
+        wanted = (cell for cell, number in numbers.items() if self._wanted(cell, number))
+        self._names = {f"{name}{list(place)}": (name, place) for name, place in wanted}
+        self._kernel = VectorKernel(
+            run,
+            {name: self._figure(cell) for name, cell in self._names.items()},
+            method=method,
+            gravest=Status.SOLVED,
+            undefined=[name for name, (variable, _) in self._names.items() if variable in UNDEFINED],
+        )
+        self._kernel.check(values)
+
+    def fill(self, arrays: Arrays, time: NDArray[np.float64]) -> NDArray[np.intp]:
+        """Fill arrays at these times, s; returns the positions that NumPy has to decide."""
+        doubtful, curves = np.empty((1, len(time)), bool), {}
+        for name, (variable, place) in self._names.items():
+            whole = arrays[variable].dtype != float
+            curves[name] = np.empty((1, len(time))) if whole else arrays[variable][place][None, :]
+        self._kernel.fill(self._values, time, Lanes(curves, arrays["status"][None, :], doubtful))
+        for name, (variable, place) in self._names.items():
+            if arrays[variable].dtype != float:
+                arrays[variable][place] = curves[name][0]
+        return np.flatnonzero(doubtful[0])
+
+    def _wanted(self, cell: Cell, number: Number) -> bool:
+        """Whether a cell is read, and not 0 whatever the values are, as the arrays are before."""
+        return bool(self._arrays[cell[0]].strides[-1]) and not (isinstance(number, (int, float)) and number == 0)
+
+    def _cells(self, back: Backward) -> Mapping[Cell, Number]:
+        """The number of every cell, of one walk; those of the last one are remembered, for figures ask one by one."""
+        if self._last[0] is not back:
+            into = _Cells(self._arrays)
+            self._write(into, back, back.walk.time, slice(None))
+            self._last = back, into.numbers
+        return self._last[1]
+
+    def _figure(self, cell: Cell) -> Figure:
+        return lambda back: self._cells(back)[cell]
+
+
+def compiles(engine: str, run: Run, positions: int) -> bool:
+    """Whether the compiled engine is to be tried. MechanismError if there is no such engine, or seats need NumPy."""
+    if engine not in ENGINES:
+        raise MechanismError(Finding(f"there is no engine '{engine}'", "engine", f"use {' or '.join(ENGINES)}"))
+    if engine == "compiled" and run.seats:
+        what = "pins in seats follow the load: that is not compiled"
+        raise MechanismError(Finding(what, f"joints.{run.seats[0].joint}.seat", "use the engine numpy"))
+    pays = positions >= WORTH_COMPILING and not run.seats and find_spec("llvmlite") is not None
+    return engine == "compiled" or (engine == "auto" and pays)

@@ -1,0 +1,119 @@
+"""All variables of a cycle by the compiled engine against NumPy's, with the locking margin and the statuses."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+import trunnion
+from mechanisms import DURANGO
+from trunnion import Mechanism, MechanismError, Status
+from trunnion.cycle.positions import Positions, positions
+from trunnion.solve.run import prepare
+
+pytest.importorskip("llvmlite")
+
+EXAMPLES = DURANGO.parent
+OF_THE_ITERATION = {"friction_iterations", "friction_change", "friction_residual", "friction_contraction"}
+ROUNDING = {"power_residual", "closure_residual"}
+AGREE = 1e-9  # of the peak
+MARGINS = 1e-6  # where Newton's method ceases to converge is not sharper
+
+
+@pytest.fixture(autouse=True, scope="module")
+def cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("compiled")))
+        yield
+
+
+def both(mechanism: Mechanism, steps: int) -> tuple[Positions, Positions]:
+    run = prepare(mechanism)
+    one, other = (positions(run, steps, averaged=False, engine=engine) for engine in ("numpy", "compiled"))
+    return one, other
+
+
+def agree(one: Positions, other: Positions) -> None:
+    """Statuses are equal, numbers agree to AGREE of the largest of their variable, and there is none for none."""
+    np.testing.assert_array_equal(one.arrays["status"], other.arrays["status"])
+    for name in one.arrays.keys() - OF_THE_ITERATION - ROUNDING:
+        a, b = (found.arrays[name].astype(float) for found in (one, other))
+        np.testing.assert_array_equal(np.isfinite(a), np.isfinite(b), err_msg=name)
+        known = np.isfinite(a)
+        peak = np.max(np.abs(a[known]), initial=0.0)
+        if peak > 1e-11:
+            most = np.max(np.abs(a[known] - b[known]))
+            assert most <= (MARGINS if name == "locking_margin" else AGREE) * peak, name
+    for name in ROUNDING:
+        assert np.nanmax(np.abs(other.arrays[name]), initial=0.0) < 1e-9 * max(1.0, np.nanmax(np.abs(power(one))))
+
+
+def power(found: Positions) -> Any:
+    return np.append(found.arrays["drive_power"].ravel(), found.arrays["friction_power"].ravel())
+
+
+FEW = ["durango-fourbar", "slider-crank", "drawing-press", "cardan-gears", "universal-joint"]
+MORE = [
+    "andrews-squeezer", "chebyshev-line", "five-bar-robot", "geared-five-bar", "inverted-slider-crank", "jansen",
+    "one-way-clutch", "pezzuti-cardan", "rccc", "rssp", "rssr", "scotch-yoke", "spring-balanced-lamp",
+    "swash-plate-pump", "toggle-press", "watt-six-bar", "whitworth-quick-return",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("example", [*FEW, *(pytest.param(one, marks=pytest.mark.slow) for one in MORE)])
+def test_every_variable_agrees(example: str) -> None:
+    agree(*both(trunnion.read(EXAMPLES / f"{example}.yaml"), 180))
+
+
+def test_the_margin_is_that_of_numpy_and_finite_somewhere() -> None:
+    one, other = both(trunnion.read(EXAMPLES / "drawing-press.yaml"), 90)
+    margins = one.arrays["locking_margin"]
+    assert np.count_nonzero(np.isfinite(margins)) > 30
+    agree(one, other)
+
+
+def test_positions_that_cannot_be_reached_or_lock_are_those_of_numpy() -> None:
+    """A crank that is too long, and a coefficient at which the press locks: NumPy decides these positions."""
+    long = trunnion.read(DURANGO)
+    name = long.path_of("AB")
+    longer = long.with_values({name: 2.5 * float(long.parameters()[name])})
+    for mechanism, code in ((longer, Status.NOT_ASSEMBLED), (locking(), Status.LOCKED)):
+        one, other = both(mechanism, 120)
+        assert np.any(one.arrays["status"] == code)
+        agree(one, other)
+
+
+def locking() -> Mechanism:
+    mechanism = trunnion.read(EXAMPLES / "drawing-press.yaml")
+    paths = [path for path in mechanism.parameters() if path.endswith("friction.coefficient")]
+    return mechanism.with_values({path: 6 * float(mechanism.parameters()[path]) for path in paths})
+
+
+def test_errors_stand_beside_the_ideal_mechanism() -> None:
+    one, other = both(trunnion.read(EXAMPLES / "fourbar-by-grades.yaml"), 60)
+    agree(one, other)
+
+
+def test_findings_and_summary_are_the_same() -> None:
+    mechanism = trunnion.read(EXAMPLES / "slider-crank.yaml")
+    one, other = (trunnion.analyse(mechanism, 200, engine=engine) for engine in ("numpy", "compiled"))
+    assert [found.what for found in one.trunnion.findings] == [found.what for found in other.trunnion.findings]
+    figures = [{figure.name: figure.value for figure in result.trunnion.summary} for result in (one, other)]
+    assert figures[0].keys() == figures[1].keys()
+    for name, value in figures[0].items():
+        if name not in ("power_residual", "friction_iterations") and isinstance(value, float):
+            assert figures[1][name] == pytest.approx(value, rel=1e-9, nan_ok=True), name
+
+
+def test_what_only_numpy_does_is_said() -> None:
+    seated = trunnion.read(EXAMPLES / "fourbar-with-play.yaml")
+    with pytest.raises(MechanismError) as caught:
+        trunnion.analyse(seated, 10, engine="compiled")
+    assert caught.value.findings[0].where.endswith("seat")
+    with pytest.raises(MechanismError) as caught:
+        trunnion.analyse(seated, 10, engine="fortran")
+    assert caught.value.findings[0].where == "engine"
+    assert trunnion.analyse(seated, 10).sizes["position"] == 10  # auto: NumPy

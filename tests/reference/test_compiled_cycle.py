@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ import trunnion
 from mechanisms import DURANGO
 from trunnion import Mechanism, MechanismError, Status
 from trunnion.cycle.positions import Positions, positions
+from trunnion.solve.compiled_vectors import VectorKernel
 from trunnion.solve.run import prepare
 
 pytest.importorskip("llvmlite")
@@ -117,3 +119,42 @@ def test_what_only_numpy_does_is_said() -> None:
         trunnion.analyse(seated, 10, engine="fortran")
     assert caught.value.findings[0].where == "engine"
     assert trunnion.analyse(seated, 10).sizes["position"] == 10  # auto: NumPy
+
+
+# ---- machine code that is kept --------------------------------------------------------------------------------
+
+
+def kernel_of(figure: str, described: str | None = "efforts") -> VectorKernel:
+    run = prepare(trunnion.read(DURANGO))
+    return VectorKernel(run, {figure: lambda back: back.efforts["A"]}, described=described)
+
+
+def curve(kernel: VectorKernel) -> Any:
+    run = kernel.run
+    (found,) = kernel.curves(run.values, run.cycle.times(24))[0].values()
+    return found[0]
+
+
+def test_kept_code_is_found_without_recording(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    first = curve(kernel_of("one"))
+    recorded: list[int] = []
+    plain = VectorKernel._recorded
+    monkeypatch.setattr(VectorKernel, "_recorded", lambda self, inputs: recorded.append(1) or plain(self, inputs))
+    assert np.array_equal(curve(kernel_of("one")), first)
+    assert not recorded
+    curve(kernel_of("other"))  # other figures
+    curve(kernel_of("one", described=None))  # figures that nothing tells from others of this name
+    assert len(recorded) == 2
+    for path in (tmp_path / "trunnion" / "compiled").glob("*.key"):
+        path.write_bytes(b"damaged")
+    assert np.array_equal(curve(kernel_of("one")), first)
+    assert len(recorded) == 3
+
+
+def test_kept_code_of_another_law_is_not_taken(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Another coefficient is the same program, another law is not."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    mechanism = trunnion.read(DURANGO)
+    for changed in (mechanism, mechanism.with_friction("rolling-bearing"), mechanism.with_friction("off")):
+        agree(*both(changed, 40))

@@ -68,6 +68,7 @@ class CycleKernel:
             method=method,
             gravest=Status.SOLVED,
             undefined=[name for name, (variable, _) in self._names.items() if variable in UNDEFINED],
+            described="cycle",
         )
         self._kernel.check(values)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import hashlib
+import json
 import os
 import platform
 import stat
@@ -53,14 +54,39 @@ class MachineCode:
     """
 
     def __init__(self, program: Program, folder: Path | None = None) -> None:
-        self.program = program
         with COMPILING:
-            path = _path(program, cache_directory("compiled") if folder is None else folder)
-            code = _read(path)
+            self.path = _path(program, _folder(folder))
+            code = _read(self.path)
             self.compiled = code is None
             if code is None:
                 code = _compiled(program.text)
-                _keep(path, code)
+                _keep(self.path, code)
+        self._link(program.inputs, program.rows, code)
+
+    @classmethod
+    def known(cls, key: str, folder: Path | None = None) -> MachineCode | None:
+        """The machine code that was kept under a key, see `keep_as`; None if there is none."""
+        told = _read(_alias(key, _folder(folder)))
+        if told is None:
+            return None
+        name, inputs, rows = json.loads(told)
+        path = _folder(folder) / name
+        code = _read(path)
+        if code is None:
+            return None
+        found = cls.__new__(cls)
+        found.path, found.compiled = path, False
+        found._link(tuple(tuple(names) for names in inputs), rows, code)
+        return found
+
+    def keep_as(self, key: str) -> None:
+        """Keep it under a key that is known before the program is."""
+        told = json.dumps([self.path.name, self.inputs, self.rows])
+        _keep(_alias(key, self.path.parent), told.encode())
+
+    def _link(self, inputs: tuple[tuple[str, ...], ...], rows: int, code: bytes) -> None:
+        self.inputs, self.rows = inputs, rows
+        with COMPILING:
             self._engine = _linked(code)
         kinds = [*[ctypes.c_int64] * 5, *[ctypes.c_void_p] * 6]
         self._function = ctypes.CFUNCTYPE(None, *kinds)(self._engine.get_function_address("kernel"))
@@ -78,8 +104,8 @@ class MachineCode:
         many positions as a vector holds.
         """
         stride = outputs[0].shape[-1]
-        table = np.empty(max(1, self.program.rows * (positions[1] - positions[0])))
-        arrays = [[inputs[name] for name in names] for names in self.program.inputs]
+        table = np.empty(max(1, self.rows * (positions[1] - positions[0])))
+        arrays = [[inputs[name] for name in names] for names in self.inputs]
         self._function(
             *samples, *positions, stride, *(_pointers(some) for some in (*arrays, outputs)), table.ctypes.data
         )
@@ -112,6 +138,27 @@ def _linked(code: bytes) -> Any:
 
 
 # ---- on disk --------------------------------------------------------------------------------------------------
+
+
+def _folder(folder: Path | None) -> Path:
+    return cache_directory("compiled") if folder is None else folder
+
+
+def _alias(key: str, folder: Path) -> Path:
+    """The file that tells which program a key stands for, on this processor, by these versions of the sources."""
+    told = "\0".join((key, *_target(), llvmlite.__version__, __version__, _sources()))
+    return folder / f"{hashlib.sha256(told.encode()).hexdigest()}.key"
+
+
+@cache
+def _sources() -> str:
+    """What tells these sources from others of the same version: places, sizes and times of their files."""
+    root = Path(__file__).parents[1]
+    found = hashlib.sha256()
+    for path in sorted(root.rglob("*.py")):
+        state = path.stat()
+        found.update(f"{path} {state.st_size} {state.st_mtime_ns}\n".encode())
+    return found.hexdigest()
 
 
 def _path(program: Program, folder: Path) -> Path:

@@ -54,8 +54,9 @@ class CompiledKernel(ABC):
 
     run: the prepared mechanism; figures: by name, what to read off each walk; forces: whether one of them needs more
     than the motion; threads: at a time, by default one for each core; gravest: status from which on NumPy computes a
-    lane again; undefined: figures that may have no finite value. Raises MechanismError if the engine is not installed,
-    or the mechanism has what only NumPy does.
+    lane again; undefined: figures that may have no finite value; described: tells these figures from all others of the
+    model, so that machine code that was kept is found without recording anything. Raises MechanismError if the engine
+    is not installed, or the mechanism has what only NumPy does.
     """
 
     def __init__(
@@ -67,6 +68,7 @@ class CompiledKernel(ABC):
         threads: int | None = None,
         gravest: Status = Status.ZERO_SLIP,
         undefined: Collection[str] = (),
+        described: str | None = None,
     ) -> None:
         self.run = run
         self.figures = dict(figures)
@@ -74,6 +76,7 @@ class CompiledKernel(ABC):
         self.method = method or FrictionMethod()
         self.threads = threads or os.cpu_count() or 1
         self.gravest, self.undefined = gravest, undefined
+        self.described = described and f"{described} {list(self.figures)}"
         self.again = 0  # lanes that NumPy computed again, so far
         self.prepare()
         _check(run)

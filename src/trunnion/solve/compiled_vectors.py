@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.solve.compiled import Array, CompiledKernel, Lanes
-from trunnion.solve.system import Values
+from trunnion.solve.system import Values, law_of, rubbing
 
 if TYPE_CHECKING:
     from trunnion.engines.graph import Graph
@@ -51,10 +51,13 @@ class VectorKernel(CompiledKernel):
             remedy = "pip install 'trunnion[compiled]', or use the engine numpy"
             raise MechanismError(Finding(what, "engine", remedy)) from None
         self._programs: dict[tuple[Any, ...], MachineCode] = {}
+        self._graphs: dict[tuple[Any, ...], tuple[Graph, list[int]]] = {}
 
     def check(self, values: Values) -> None:
         """See `CompiledKernel.check`."""
-        self._recorded(_inputs(values, np.zeros(1)))
+        inputs = _inputs(values, np.zeros(1))
+        if self._known(inputs) is None:
+            self._graphs[inputs.structure] = self._recorded(inputs)
 
     def fill(self, values: Values, time: Array, found: Lanes) -> None:
         """All lanes, a part of the samples or positions in each thread."""
@@ -92,10 +95,32 @@ class VectorKernel(CompiledKernel):
         from trunnion.engines.machine_code import MachineCode, vector_width
         from trunnion.engines.program import program
 
-        key = inputs.structure
-        if key not in self._programs:
-            self._programs[key] = MachineCode(program(*self._recorded(inputs), vector_width()))
-        return self._programs[key]
+        code = self._known(inputs)
+        if code is None:
+            graph = self._graphs.pop(inputs.structure, None) or self._recorded(inputs)
+            code = self._programs[inputs.structure] = MachineCode(program(*graph, vector_width()))
+            if key := self._key(inputs):
+                code.keep_as(key)
+        return code
+
+    def _known(self, inputs: _Inputs) -> MachineCode | None:
+        """The machine code if it needs no recording: that of this model and these figures was kept."""
+        from trunnion.engines.machine_code import MachineCode
+
+        key = None if inputs.structure in self._programs else self._key(inputs)
+        if key and (kept := MachineCode.known(key)):
+            self._programs[inputs.structure] = kept
+        return self._programs.get(inputs.structure)
+
+    def _key(self, inputs: _Inputs) -> str | None:
+        """What decides the program: model, figures, and what they are computed from; None where that is not all."""
+        run = self.run
+        laws = (law_of(run.system, joint).function.__module__ for joint in rubbing(run.system))
+        if self.described is None or not all(name.startswith("trunnion.") for name in laws):
+            return None
+        model = run.system.mechanism.model_dump_json()
+        asked = self.described, self.forces, self.method, self.gravest, sorted(self.undefined)
+        return "\0".join((model, *map(repr, (run.chosen.assembly, asked, inputs.structure))))
 
     def _recorded(self, inputs: _Inputs) -> tuple[Graph, list[int]]:
         """Run the walk once on numbers that write down what is done with them: figures, status, doubt."""

@@ -70,7 +70,8 @@ class OtherKernel:
             return lambda back: measure.curve(back.walk if measure.of_motion else back)[k]
 
         figures = {name: figure(*part) for name, part in self._parts.items()}
-        return made(self.numpy.run, figures, self.numpy.forces, self.numpy.method)
+        told = repr(list(self._parts.items()))
+        return made(self.numpy.run, figures, self.numpy.forces, self.numpy.method, described=told)
 
     def check(self, values: Mapping[str, Number]) -> None:
         """MechanismError for a mechanism that only NumPy takes."""
